@@ -1,0 +1,164 @@
+"""Who is in the group: nodes, their antennas, and the order in which arrays index them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from tracking.arrays import F64, I64, Bool
+from tracking.errors import ConfigError
+
+VEHICLES = ("car", "human", "drone", "hand", "robot", "none")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Antenna:
+    """An antenna that is not at the origin of its node's body."""
+
+    id: int
+    node: int
+    """Id of the node that carries it."""
+    offset_b: tuple[float, float, float]
+    """[m] Position in the body frame of the node."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NodeConfig:
+    """One tracker node."""
+
+    id: int
+    kind: Literal["moving", "static"] = "moving"
+    """A static node has no IMU and never moves."""
+    vehicle: str = "none"
+    """What carries it, one of `VEHICLES`."""
+    initial_heading: float | None = None
+    """[rad] Yaw of the body at its first IMU sample, for headings without a magnetometer."""
+    imu_hz: float = 100.0
+    """[Hz] Nominal rate of the IMU; the orientation filter is built for it."""
+    mag_hz: float | None = None
+    """[Hz] Nominal rate of the magnetometer where it is not that of the IMU."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Constellation:
+    """The nodes of a group and the plane or space they move in.
+
+    Arrays over nodes follow `nodes`; arrays over pairs follow `pairs`, all i < j in
+    lexicographic order; arrays over antennas follow `antenna_node`, where every node without
+    an antenna of its own has one at the origin of its body.
+    """
+
+    nodes: tuple[NodeConfig, ...]
+    dimensions: Literal[2, 3] = 3
+    """2 where all nodes move in one plane."""
+    heading: Literal["magnetic", "initial"] = "magnetic"
+    """Where yaw comes from: the magnetometer, or `NodeConfig.initial_heading`."""
+    antennas: tuple[Antenna, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        ids = [node.id for node in self.nodes]
+        _expect(len(ids) >= 2, f"nodes: expected at least 2, got {len(ids)}")
+        _expect(len(set(ids)) == len(ids), f"nodes: ids must differ, got {ids}")
+        _expect(self.dimensions in (2, 3), f"dimensions: expected 2 or 3, got {self.dimensions!r}")
+        _expect(
+            self.heading in ("magnetic", "initial"),
+            f"heading: expected 'magnetic' or 'initial', got {self.heading!r}",
+        )
+        for node in self.nodes:
+            _expect(
+                node.kind in ("moving", "static"),
+                f"nodes.{node.id}.kind: expected 'moving' or 'static', got {node.kind!r}",
+            )
+            _expect(
+                node.vehicle in VEHICLES,
+                f"nodes.{node.id}.vehicle: expected one of {', '.join(VEHICLES)}, "
+                f"got {node.vehicle!r}",
+            )
+            _expect(node.imu_hz > 0, f"nodes.{node.id}.imu_hz: expected > 0, got {node.imu_hz}")
+        _expect(
+            len({a.id for a in self.antennas}) == len(self.antennas), "antennas: ids must differ"
+        )
+        for antenna in self.antennas:
+            _expect(
+                antenna.node in ids, f"antennas.{antenna.id}.node: no node {antenna.node} in {ids}"
+            )
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes."""
+        return len(self.nodes)
+
+    @property
+    def n_pairs(self) -> int:
+        """Number of unordered pairs."""
+        return self.n_nodes * (self.n_nodes - 1) // 2
+
+    @cached_property
+    def ids(self) -> tuple[int, ...]:
+        """Node ids in array order."""
+        return tuple(node.id for node in self.nodes)
+
+    @cached_property
+    def index_of(self) -> dict[int, int]:
+        """Array index of each node id."""
+        return {node_id: k for k, node_id in enumerate(self.ids)}
+
+    @cached_property
+    def pairs(self) -> I64:
+        """Node indices of every pair, (pair, 2), i < j."""
+        return np.stack(np.triu_indices(self.n_nodes, k=1), axis=1).astype(np.int64)
+
+    @cached_property
+    def pair_index(self) -> I64:
+        """Pair of two nodes in either order, (node, node); the diagonal is -1, never read."""
+        table = np.full((self.n_nodes, self.n_nodes), -1, dtype=np.int64)
+        i, j = self.pairs.T
+        table[i, j] = table[j, i] = np.arange(self.n_pairs)
+        return table
+
+    @cached_property
+    def is_static(self) -> Bool:
+        """True for nodes that never move, (node)."""
+        return np.array([node.kind == "static" for node in self.nodes])
+
+    @cached_property
+    def all_antennas(self) -> tuple[Antenna, ...]:
+        """Antennas in array order: those of the first node, of the second, and so on."""
+        table: list[Antenna] = []
+        for node in self.nodes:
+            own = [a for a in self.antennas if a.node == node.id]
+            table += own or [Antenna(id=-1, node=node.id, offset_b=(0.0, 0.0, 0.0))]
+        return tuple(table)
+
+    @cached_property
+    def antenna_offset_b(self) -> F64:
+        """Antenna positions in their node's body frame, (antenna, 3) [m]."""
+        return np.array([a.offset_b for a in self.all_antennas], dtype=np.float64)
+
+    @cached_property
+    def default_antenna(self) -> I64:
+        """The antenna a node uses where a range names none, (node)."""
+        nodes = [a.node for a in self.all_antennas]
+        return np.array([nodes.index(node_id) for node_id in self.ids], dtype=np.int64)
+
+    def antenna_index(self, node_id: int, antenna_id: int | None) -> int:
+        """Array index of a node's antenna.
+
+        Raises:
+            ConfigError: No such antenna, or several and none was named.
+        """
+        own = [k for k, a in enumerate(self.all_antennas) if a.node == node_id]
+        if antenna_id is None:
+            _expect(len(own) == 1, f"node {node_id} has {len(own)} antennas: name the one used")
+            return own[0]
+        named = [k for k in own if self.all_antennas[k].id == antenna_id]
+        _expect(len(named) == 1, f"node {node_id} has no antenna {antenna_id}")
+        return named[0]
+
+
+def _expect(condition: bool, message: str) -> None:
+    if not condition:
+        raise ConfigError(message)

@@ -1,0 +1,90 @@
+"""Quaternions and rotations.
+
+A quaternion is (w, x, y, z), of unit length, and maps the body frame to the world frame:
+``v_w = R(q) v_b``. Functions work on any leading axes.
+"""
+
+import numpy as np
+
+from tracking.arrays import F64
+
+GRAVITY = 9.81
+"""[m/s2] Length of gravity assumed where it is not measured; VQF's convention as well."""
+
+
+def quat_multiply(a: F64, b: F64) -> F64:
+    """Hamilton product a b, (..., 4)."""
+    aw, ax, ay, az = np.moveaxis(np.asarray(a), -1, 0)
+    bw, bx, by, bz = np.moveaxis(np.asarray(b), -1, 0)
+    return np.stack(
+        [
+            aw * bw - ax * bx - ay * by - az * bz,
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+        ],
+        axis=-1,
+    )
+
+
+def quat_conjugate(q: F64) -> F64:
+    """Inverse of a unit quaternion, (..., 4)."""
+    return np.asarray(q) * np.array([1.0, -1.0, -1.0, -1.0])
+
+
+def quat_to_matrix(q: F64) -> F64:
+    """Rotation matrix R_wb of q_wb, (..., 3, 3)."""
+    w, x, y, z = np.moveaxis(np.asarray(q), -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def rotate(q: F64, v: F64) -> F64:
+    """R(q) v, (..., 3)."""
+    rotated: F64 = (quat_to_matrix(q) @ np.asarray(v)[..., None])[..., 0]
+    return rotated
+
+
+def quat_from_yaw(yaw: F64 | float) -> F64:
+    """Rotation about the vertical, (..., 4)."""
+    half = 0.5 * np.asarray(yaw, dtype=np.float64)
+    zero = np.zeros_like(half)
+    return np.stack([np.cos(half), zero, zero, np.sin(half)], axis=-1)
+
+
+def yaw_of(q: F64) -> F64:
+    """Heading of the body x axis, counter-clockwise from world x, (...) [rad]."""
+    w, x, y, z = np.moveaxis(np.asarray(q), -1, 0)
+    return np.asarray(np.arctan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z)))
+
+
+def best_rotation(source: F64, target: F64, *, planar: bool, reflect: bool = False) -> F64:
+    """Rotation R that minimises |R source - target|, the orthogonal Procrustes problem [1].
+
+    Args:
+        source: Vectors, (..., vector, 3).
+        target: Vectors, (..., vector, 3).
+        planar: Rotate about the vertical only.
+        reflect: Also allow mirror images.
+
+    Returns:
+        (..., 3, 3), R such that ``R @ source[k]`` is near ``target[k]``.
+
+    References:
+        [1] Kabsch, Acta Cryst. A32 (1976) 922; Schoenemann, Psychometrika 31 (1966) 1.
+    """
+    d = 2 if planar else 3
+    H = np.swapaxes(target[..., :d], -1, -2) @ source[..., :d]  # noqa: N806
+    U, _, Vt = np.linalg.svd(H)  # noqa: N806
+    if not reflect:
+        U = U.copy()  # noqa: N806
+        U[..., :, -1] *= np.sign(np.linalg.det(U @ Vt))[..., None]
+    R = np.zeros((*H.shape[:-2], 3, 3))  # noqa: N806
+    R[..., :d, :d] = U @ Vt
+    if planar:
+        R[..., 2, 2] = 1.0
+    return R

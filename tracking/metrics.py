@@ -1,0 +1,121 @@
+"""How wrong an estimate is, and whether it knows: the figures every result is stated in.
+
+Relative positions are scored in the world frame over the pairs with at least one moving node.
+
+- ``rmse``: as the estimate is.
+- ``rmse_yaw``: after one constant yaw for the whole run, since magnetic north and the frame
+  of a motion-capture room differ by a constant.
+- ``rmse_shape``: after the best rotation at each instant. A mirror image stays an error.
+- ``nees``: mean of e^T P^-1 e over the position errors e, per dimension: 1 where the
+  covariance P is right, larger where the filter is too sure [1].
+
+References:
+    [1] Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking and Navigation,
+        Wiley 2001, ch. 5.4.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tracking.arrays import F64, Bool
+from tracking.estimate import TeamEstimate
+from tracking.geometry import best_rotation
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """Errors of one run; figures are None where nothing could be scored."""
+
+    rmse: float | None
+    """[m]"""
+    rmse_yaw: float | None
+    """[m]"""
+    yaw_deg: float | None
+    """[deg] The constant yaw that `rmse_yaw` takes out."""
+    rmse_shape: float | None
+    """[m]"""
+    nees: float | None
+    """[-]"""
+    pair_rmse: F64
+    """`rmse` of each pair, (pair) [m]; NaN for pairs without a score."""
+    pair_rmse_yaw: F64
+    """(pair) [m]"""
+    pair_rmse_shape: F64
+    """(pair) [m]"""
+    n_scored: int
+    """Relative positions that went into the figures."""
+
+
+def score(estimate: TeamEstimate, truth_ij_w: F64, has_truth: Bool, skip_until: float) -> Score:
+    """Score a run of one environment.
+
+    Args:
+        estimate: Arrays over (time, pair).
+        truth_ij_w: True relative positions, (time, pair, 3) [m].
+        has_truth: True where they are known, (time, pair).
+        skip_until: Times before this are not scored [s].
+    """
+    constellation = estimate.constellation
+    planar = constellation.dimensions == 2
+    d = constellation.dimensions
+    moving = ~constellation.is_static[constellation.pairs].all(axis=1)
+    scored = has_truth & moving & (estimate.t >= skip_until)[:, None]
+    rows = scored.any(axis=1)
+    x, truth, scored = estimate.pos_ij_w[rows], truth_ij_w[rows], scored[rows]
+    n_pairs = constellation.n_pairs
+    if not scored.any():
+        nothing = np.full(n_pairs, np.nan)
+        return Score(None, None, None, None, None, nothing, nothing, nothing, 0)
+    x = np.where(scored[..., None], x, 0.0)
+    truth = np.where(scored[..., None], truth, 0.0)
+    if planar:
+        # Nodes of one plane are scored in it, whatever their height in the truth.
+        x, truth = x * [1.0, 1.0, 0.0], truth * [1.0, 1.0, 0.0]
+
+    yaw = best_yaw(x, truth)
+    c, s = np.cos(yaw), np.sin(yaw)
+    R_yaw = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])  # noqa: N806
+    R_shape = best_rotation(x, truth, planar=planar)  # noqa: N806
+    errors = [x - truth, x @ R_yaw.T - truth, x @ np.swapaxes(R_shape, -1, -2) - truth]
+
+    cov = estimate.cov[rows][..., :d, :d]
+    known = scored & (np.linalg.eigvalsh(cov)[..., 0] > 0.0)
+    e = errors[0][known][:, :d]
+    whitened = np.einsum("ki,ki->k", e, np.linalg.solve(cov[known], e[..., None])[..., 0])
+    squared = [np.sum(e * e, axis=-1) for e in errors]
+    overall = [float(np.sqrt(sq[scored].mean())) for sq in squared]
+    count = np.maximum(scored.sum(axis=0), 1)
+    per_pair = [
+        np.where(scored.any(axis=0), np.sqrt(sq.sum(axis=0) / count), np.nan) for sq in squared
+    ]
+    return Score(
+        rmse=overall[0],
+        rmse_yaw=overall[1],
+        yaw_deg=float(np.degrees(yaw)),
+        rmse_shape=overall[2],
+        nees=float(whitened.mean() / d) if known.any() else None,
+        pair_rmse=per_pair[0],
+        pair_rmse_yaw=per_pair[1],
+        pair_rmse_shape=per_pair[2],
+        n_scored=int(scored.sum()),
+    )
+
+
+def best_yaw(x: F64, truth: F64) -> float:
+    """The one rotation about the vertical that brings x nearest to truth, both (..., 3) [rad]."""
+    cross = np.sum(x[..., 0] * truth[..., 1] - x[..., 1] * truth[..., 0])
+    dot = np.sum(x[..., 0] * truth[..., 0] + x[..., 1] * truth[..., 1])
+    return float(np.arctan2(cross, dot))
+
+
+def errors_after(
+    estimate: TeamEstimate, truth_ij_w: F64, yaw_rad: float
+) -> F64:
+    """Position errors of a run after a constant yaw, (time, pair, 3) [m]."""
+    c, s = np.cos(yaw_rad), np.sin(yaw_rad)
+    R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])  # noqa: N806
+    difference: F64 = estimate.pos_ij_w @ R.T - truth_ij_w
+    return difference
