@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+from tracking.errors import ConfigError
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GateParams:
@@ -20,8 +22,10 @@ class GateParams:
     """[m] What is allowed at rest: about four standard deviations of a range in sight."""
     speed_gain: float = 1.5
     """[-] How much of the motion since the average is allowed for."""
+    min_speed: float = 0.5
+    """[m/s] Relative speed assumed at least, since the estimate may still be wrong."""
     max_rejected: int = 8
-    """[-] So many rejected in a row that agree with each other are believed after all."""
+    """[-] So many rejected in a row are believed after all: the average was wrong."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,25 +34,35 @@ class MdsParams:
 
     period: float = 0.012
     """[s] Shortest time between two refinements: one ranging round of three nodes."""
-    std: float = 0.05
-    """[m] Standard deviation with which a refined position corrects the filters. 0 replaces
-    the position outright, as the text of the paper has it."""
+    velocity_gain: float = 0.0
+    """[-] Share of the velocity correction that goes with a position correction by the
+    filter's own covariance. 0 corrects positions only, as the paper does."""
     min_spread: float = 0.15
     """[m] Layouts flatter than this are not refined: their mirror image cannot be told."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StartParams:
-    """Starting a group, or a node that joins it."""
+    """Starting a group, or a node that joins it, and the bank of hypotheses.
+
+    Ranges give the shape of a group but neither its rotation nor its mirror image. Both are
+    tried: the filter starts as a bank of turned and mirrored copies, and motion tells.
+    """
 
     k: int = 8
     """[-] Ranges per pair whose mean starts the shape, the paper's first k measurements."""
-    window: float = 4.0
-    """[s] Longest stretch of motion used to find rotation and mirror image."""
-    min_window: float = 1.5
-    """[s] Shortest stretch tried."""
-    retry: float = 0.25
-    """[s] Time between two tries."""
+    max_age: float = 2.0
+    """[s] The first k measurements must come within this time."""
+    rotations_2d: int = 8
+    """[-] Rotations tried in the plane, each with its mirror image."""
+    prune: float = 12.0
+    """[-] A hypothesis so much less likely than the best (log-likelihood) is dropped."""
+    merge_distance: float = 0.25
+    """[m] Two hypotheses as near as this in every pair are one."""
+    max_nis: float = 9.0
+    """[-] A single range counts for at most this in the likelihood, outlier or not."""
+    check_period: float = 0.25
+    """[s] Time between two looks at the bank."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,6 +74,8 @@ class PairEkfParams:
     slow error of a wrong tilt. Larger forgets dead reckoning sooner."""
     unaided_accel_psd: float = 0.7
     """[m/s2/sqrt(Hz)] The same for a moving node whose IMU is not heard."""
+    unaided_after: float = 0.3
+    """[s] A node whose IMU was silent for so long is unaided."""
     orientation_std: float = 0.05
     """[rad] Error of one axis of a node's orientation; VQF states none."""
     range_std: float = 0.10
@@ -80,3 +96,13 @@ class PairEkfParams:
     gate: GateParams = field(default_factory=GateParams)
     mds: MdsParams = field(default_factory=MdsParams)
     start: StartParams = field(default_factory=StartParams)
+
+    def __post_init__(self) -> None:
+        for name in ("accel_psd", "unaided_accel_psd", "range_std", "survey_std", "speed_std"):
+            if not getattr(self, name) > 0.0:
+                raise ConfigError(f"{name}: expected > 0, got {getattr(self, name)}")
+        if self.speed_model not in ("range-rate", "speed-norm", "none"):
+            raise ConfigError(
+                f"speed_model: expected 'range-rate', 'speed-norm' or 'none', "
+                f"got {self.speed_model!r}"
+            )

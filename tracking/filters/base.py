@@ -1,0 +1,45 @@
+"""What every filter is: events in, estimates out."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+from tracking.arrays import F64
+from tracking.estimate import TeamEstimate
+from tracking.measurements import MeasurementBlock
+
+
+class Filter(Protocol):
+    """A position filter over a batch of groups.
+
+    Laws, tested for every registered filter: a step without events changes nothing; any split
+    into blocks gives the same estimate; environment k of a batch is that environment alone;
+    noiseless data give zero error; swapping i and j mirrors; saved and restored in mid-run is
+    uninterrupted.
+    """
+
+    def run(self, block: MeasurementBlock, t_out: F64) -> TeamEstimate:
+        """Handle the events and report at the given times.
+
+        Args:
+            block: Events in order, later than any handled before. STATE, not IMU.
+            t_out: Times of the estimates, ascending, (env, time) [s].
+
+        Returns:
+            Estimates, arrays over (env, time, ...).
+        """
+
+    def reset(self, env: int) -> None:
+        """Forget everything of one environment."""
+
+    def save(self) -> Any:
+        """A copy of everything that evolves."""
+
+    def restore(self, saved: Any) -> None:
+        """Go on from a saved copy."""
+
+    def mean_nis(self) -> F64:
+        """Mean NIS over all accepted ranges, (env) [-]; NaN before the first."""
+
+    def n_rejected(self) -> F64:
+        """Ranges refused as outliers, (env)."""

@@ -1,0 +1,123 @@
+"""One extended Kalman filter per pair, with or without MDS: the pipeline of the paper.
+
+The state of a pair is its relative position and velocity in the world frame,
+``x = (p_j - p_i, v_j - v_i)``. The relative orientation of the paper's state,
+``q_ij = q_i^-1 q_j``, is a function of the inputs alone and is reported from them; its
+covariance is the constant sum of both orientation noises ([1] eq. 8-9, `docs/tracker.md`).
+
+    predict     pos += dt vel + dt^2/2 (a_j - a_i),  vel += dt (a_j - a_i)
+    correct     z = (range, its low-passed derivative),  h = (|pos|, u . vel)
+    refine      pos <- MDS of all |pos|, aligned to pos         (`ekf-mds` only)
+
+References:
+    [1] Armani, Holz, Accurately tracking relative positions of moving trackers based on UWB
+        ranging and inertial sensing without anchors, ICRA 2024.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from tracking.arrays import F64, Bool, I64
+from tracking.constellation import Constellation
+from tracking.estimate import TeamEstimate
+from tracking.filters._event_kernels import run_events
+from tracking.filters.params import PairEkfParams
+from tracking.filters.state import BankState, NodeState, PairState, make_coefficients, make_state
+from tracking.measurements import MeasurementBlock
+
+
+class PairEkf:
+    """Pair filters over a batch of groups; see the module for the equations."""
+
+    def __init__(
+        self,
+        constellation: Constellation,
+        params: PairEkfParams,
+        n_envs: int = 1,
+        *,
+        use_mds: bool = True,
+    ) -> None:
+        self._constellation = constellation
+        self._coefficients = make_coefficients(constellation, params, use_mds=use_mds)
+        n_hyps = len(self._coefficients.rotations)
+        self._nodes, self._pairs, self._bank = make_state(constellation, n_envs, n_hyps)
+        self._n_envs = n_envs
+
+    def run(self, block: MeasurementBlock, t_out: F64) -> TeamEstimate:
+        """Handle the events and report at the given times; see `Filter.run`."""
+        out = self._make_outputs(t_out.shape[1])
+        events = (
+            block.t,
+            block.kind,
+            block.i,
+            block.j,
+            block.antenna_i,
+            block.antenna_j,
+            block.values,
+            block.valid,
+        )
+        events = tuple(np.ascontiguousarray(a) for a in events)
+        t_out = np.ascontiguousarray(t_out, dtype=np.float64)
+        run_events(self._coefficients, self._nodes, self._pairs, self._bank, events, t_out, out)
+        pos, vel, cov, q_wb, has_q, age, nis, status = out
+        return TeamEstimate(
+            constellation=self._constellation,
+            t=t_out,
+            pos_ij_w=pos,
+            vel_ij_w=vel,
+            cov=cov,
+            q_wb=q_wb,
+            has_orientation=has_q,
+            age=age,
+            nis=nis,
+            nlos_prob=np.zeros_like(age),
+            status=status,
+        )
+
+    def reset(self, env: int) -> None:
+        """Forget everything of one environment."""
+        fresh = make_state(self._constellation, 1, len(self._coefficients.rotations))
+        for part, new in zip((self._nodes, self._pairs, self._bank), fresh, strict=True):
+            for array, value in zip(part, new, strict=True):
+                array[env] = value[0]
+
+    def save(self) -> tuple[NodeState, PairState, BankState]:
+        """A copy of everything that evolves."""
+        return (
+            NodeState(*(a.copy() for a in self._nodes)),
+            PairState(*(a.copy() for a in self._pairs)),
+            BankState(*(a.copy() for a in self._bank)),
+        )
+
+    def restore(self, saved: Any) -> None:
+        """Go on from a saved copy."""
+        for part, old in zip((self._nodes, self._pairs, self._bank), saved, strict=True):
+            for array, value in zip(part, old, strict=True):
+                array[...] = value
+
+    def mean_nis(self) -> F64:
+        """Mean NIS over all accepted ranges, (env) [-]; NaN before the first."""
+        n = self._bank.nis_n
+        return np.where(n > 0, self._bank.nis_sum / np.maximum(n, 1), np.nan)
+
+    def n_rejected(self) -> F64:
+        """Ranges refused as outliers, (env)."""
+        return np.asarray(self._pairs.n_rejected.sum(axis=1), dtype=np.float64)
+
+    def _make_outputs(self, n_times: int) -> tuple[F64 | Bool | I64, ...]:
+        """Arrays that the kernel fills: pos, vel, cov, q, has_q, age, nis, status."""
+        lead = (self._n_envs, n_times)
+        n, p = self._constellation.n_nodes, self._constellation.n_pairs
+        return (
+            np.zeros((*lead, p, 3)),
+            np.zeros((*lead, p, 3)),
+            np.zeros((*lead, p, 6, 6)),
+            np.zeros((*lead, n, 4)),
+            np.zeros((*lead, n), dtype=bool),
+            np.zeros((*lead, p)),
+            np.zeros((*lead, p)),
+            np.zeros((*lead, p), dtype=np.int64),
+        )

@@ -1,0 +1,8 @@
+"""The log folder: a recorded run as plain files, format 1 (`docs/log-format.md`)."""
+
+from tracking.log.folder import Log
+from tracking.log.read import read_log
+from tracking.log.truth import Truth
+from tracking.log.write import write_log
+
+__all__ = ["Log", "Truth", "read_log", "write_log"]

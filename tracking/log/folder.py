@@ -1,0 +1,53 @@
+"""A recorded run in memory, and the names of its files and columns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tracking.arrays import Bool
+from tracking.constellation import Constellation
+from tracking.log.truth import Truth
+from tracking.measurements import Kind, MeasurementBlock
+
+FORMAT = 1
+GYR = ("gyr_x", "gyr_y", "gyr_z")
+ACC = ("acc_x", "acc_y", "acc_z")
+MAG = ("mag_x", "mag_y", "mag_z")
+QUAT = ("qw", "qx", "qy", "qz")
+POWERS = ("rx_power_dbm", "fp_power_dbm")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Log:
+    """A recorded run of one group."""
+
+    name: str
+    constellation: Constellation
+    block: MeasurementBlock
+    """Every measurement, in order; IMU samples raw."""
+    truth: Truth = field(default_factory=Truth.empty)
+    nlos: Bool | None = None
+    """What the recording says of each RANGE event, in order; for study, not for tracking."""
+    source: str = ""
+    """Where it comes from."""
+    licence: str = ""
+    skipped: dict[str, int] = field(default_factory=dict)
+    """Bad measurements left out while reading, per file."""
+
+    @property
+    def t_range(self) -> tuple[float, float]:
+        """First and last range [s]."""
+        t = self.block.t[0][self.block.kind[0] == Kind.RANGE]
+        return float(t[0]), float(t[-1])
+
+    @property
+    def duration(self) -> float:
+        """From the first to the last measurement [s]."""
+        return float(np.ptp(self.block.t[0]))
+
+    @property
+    def n_ranges(self) -> int:
+        """UWB ranges, surveys not counted."""
+        return self.block.count(Kind.RANGE)

@@ -1,0 +1,99 @@
+"""meta.toml: what a log is and who is in it."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tracking.constellation import Antenna, Constellation, NodeConfig
+from tracking.errors import ConfigError, LogError
+from tracking.log.folder import FORMAT
+
+
+@dataclass(frozen=True, slots=True)
+class Meta:
+    """The contents of meta.toml."""
+
+    name: str
+    source: str
+    licence: str
+    constellation: Constellation
+
+
+def read_meta(path: Path) -> Meta:
+    """Read and check meta.toml.
+
+    Raises:
+        LogError: Missing, no TOML, or a field that is missing or makes no sense.
+    """
+    if not path.is_file():
+        raise LogError(f"{path.parent}: no meta.toml, expected a log folder")
+    try:
+        raw = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise LogError(f"meta.toml: not TOML ({error})") from error
+    if raw.get("format") != FORMAT:
+        raise LogError(f"meta.toml, format: expected {FORMAT}, found {raw.get('format')!r}")
+    nodes = raw.get("nodes")
+    if not isinstance(nodes, dict) or not nodes:
+        raise LogError("meta.toml, nodes: expected a table [nodes.ID] for each node")
+    antennas = raw.get("antennas", {})
+    if not isinstance(antennas, dict):
+        raise LogError("meta.toml, antennas: expected a table [antennas.ID] for each antenna")
+    dimensions, heading = raw.get("dimensions", 3), raw.get("heading", "magnetic")
+    try:
+        constellation = Constellation(
+            nodes=tuple(_node(key, table) for key, table in nodes.items()),
+            dimensions=dimensions,
+            heading=heading,
+            antennas=tuple(_antenna(key, table) for key, table in antennas.items()),
+        )
+    except ConfigError as error:
+        raise LogError(f"meta.toml, {error}") from error
+    return Meta(
+        name=str(raw.get("name", path.parent.name)),
+        source=str(raw.get("source", "")),
+        licence=str(raw.get("licence", "")),
+        constellation=constellation,
+    )
+
+
+def _node(key: str, table: Any) -> NodeConfig:
+    where = f"nodes.{key}"
+    heading = _table(where, table).get("initial_heading_rad")
+    return NodeConfig(
+        id=_id(where, key),
+        kind=table.get("kind", "moving"),
+        vehicle=table.get("vehicle", "none"),
+        initial_heading=None if heading is None else _number(f"{where}.initial_heading_rad", heading),
+    )
+
+
+def _antenna(key: str, table: Any) -> Antenna:
+    where = f"antennas.{key}"
+    offset = _table(where, table).get("offset_m")
+    if not isinstance(offset, list) or len(offset) != 3:
+        raise LogError(f"meta.toml, {where}.offset_m: expected three numbers, found {offset!r}")
+    x, y, z = (_number(f"{where}.offset_m", v) for v in offset)
+    return Antenna(id=_id(where, key), node=_id(f"{where}.node", table.get("node")), offset_b=(x, y, z))
+
+
+def _table(where: str, value: Any) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise LogError(f"meta.toml, {where}: expected a table, found {value!r}")
+    return value
+
+
+def _id(where: str, value: Any) -> int:
+    try:
+        return int(value)
+    except (TypeError, ValueError):
+        raise LogError(f"meta.toml, {where}: expected an integer id, found {value!r}") from None
+
+
+def _number(where: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or value != value:
+        raise LogError(f"meta.toml, {where}: expected a number, found {value!r}")
+    return float(value)

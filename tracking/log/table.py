@@ -1,0 +1,165 @@
+"""A CSV file as checked columns: every fault is named by file, row and field."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import io
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tracking.arrays import F64, I64, Bool
+from tracking.errors import LogError
+
+
+def find_table(folder: Path, stem: str) -> Path | None:
+    """The file of a table, plain or gzip-compressed."""
+    for suffix in (".csv", ".csv.gz"):
+        path = folder / (stem + suffix)
+        if path.is_file():
+            return path
+    return None
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Text columns of one file; row 1 is the header, so data row k stands in row k + 2."""
+
+    path: Path
+    columns: dict[str, list[str]]
+    n_rows: int
+
+    @classmethod
+    def read(cls, path: Path, required: tuple[str, ...]) -> Table:
+        """Read a file and check its header.
+
+        Raises:
+            LogError: Not text, no header, a required column missing, or a ragged row.
+        """
+        try:
+            raw = path.read_bytes()
+            text = (gzip.decompress(raw) if path.suffix == ".gz" else raw).decode("utf-8")
+        except (OSError, EOFError, UnicodeDecodeError, ValueError) as error:
+            raise LogError(f"{path.name}: cannot be read ({error})") from error
+        rows = list(csv.reader(io.StringIO(text)))
+        while rows and not any(rows[-1]):
+            rows.pop()
+        if not rows:
+            raise LogError(f"{path.name}: empty, expected a header with {', '.join(required)}")
+        header = [name.strip() for name in rows[0]]
+        missing = [name for name in required if name not in header]
+        if missing:
+            raise LogError(
+                f"{path.name}: column {missing[0]!r} is missing, found {', '.join(header)}"
+            )
+        for k, row in enumerate(rows[1:], start=2):
+            if len(row) != len(header):
+                raise LogError(
+                    f"{path.name} row {k}: expected {len(header)} fields, found {len(row)}"
+                )
+        data = list(zip(*rows[1:], strict=True)) if len(rows) > 1 else [()] * len(header)
+        columns = {name: list(column) for name, column in zip(header, data, strict=True)}
+        return cls(path, columns, len(rows) - 1)
+
+    def __contains__(self, column: str) -> bool:
+        return column in self.columns
+
+    def text(self, column: str) -> list[str]:
+        """A column as it stands."""
+        return self.columns[column]
+
+    def numbers(self, columns: tuple[str, ...]) -> tuple[F64, Bool]:
+        """Columns as numbers, (row, column), and where the fields are not empty.
+
+        Raises:
+            LogError: Text where a number should be.
+        """
+        values = np.zeros((self.n_rows, len(columns)))
+        filled = np.ones((self.n_rows, len(columns)), dtype=bool)
+        for k, name in enumerate(columns):
+            cells = self.columns[name]
+            try:
+                values[:, k] = np.array(cells, dtype=np.str_).astype(np.float64)
+            except ValueError:
+                for r, cell in enumerate(cells):
+                    if not cell.strip():
+                        filled[r, k] = False
+                        continue
+                    try:
+                        values[r, k] = float(cell)
+                    except ValueError:
+                        raise LogError(
+                            f"{self.path.name} row {r + 2}, {name}: expected a number, "
+                            f"found {cell!r}"
+                        ) from None
+        return values, filled
+
+    def times(self) -> F64:
+        """The column t_s, which must be finite and never go back.
+
+        Raises:
+            LogError: Otherwise.
+        """
+        values, filled = self.numbers(("t_s",))
+        t = values[:, 0]
+        bad = np.nonzero(~filled[:, 0] | ~np.isfinite(t))[0]
+        if len(bad):
+            raise LogError(
+                f"{self.path.name} row {bad[0] + 2}, t_s: expected seconds, "
+                f"found {self.columns['t_s'][bad[0]]!r}"
+            )
+        back = np.nonzero(np.diff(t) < 0.0)[0]
+        if len(back):
+            k = int(back[0]) + 1
+            raise LogError(
+                f"{self.path.name} row {k + 2}, t_s: time goes back from {t[k - 1]:g} to "
+                f"{t[k]:g} s, expected rows in time order"
+            )
+        return t
+
+    def nodes(self, column: str, index_of: dict[int, int]) -> I64:
+        """A column of node ids as indices.
+
+        Raises:
+            LogError: Not an integer, or a node that meta.toml does not name.
+        """
+        table: dict[str, int] = {}
+        for r, cell in enumerate(self.columns[column]):
+            if cell in table:
+                continue
+            try:
+                node_id = int(cell)
+            except ValueError:
+                raise LogError(
+                    f"{self.path.name} row {r + 2}, {column}: expected a node id, found {cell!r}"
+                ) from None
+            if node_id not in index_of:
+                raise LogError(
+                    f"{self.path.name} row {r + 2}, {column}: meta.toml names no node {node_id}, "
+                    f"it names {', '.join(map(str, index_of))}"
+                )
+            table[cell] = index_of[node_id]
+        return np.array([table[cell] for cell in self.columns[column]], dtype=np.int64)
+
+    def keep_good(self, good: Bool, expected: str, columns: tuple[str, ...]) -> Bool:
+        """Leave single bad rows out, but refuse a file of which most rows are bad.
+
+        Args:
+            good: True for usable rows.
+            expected: What a usable row holds, for the message.
+            columns: The fields concerned, for the message.
+
+        Raises:
+            LogError: More than half of the rows are bad.
+        """
+        n_bad = int(np.sum(~good))
+        if 2 * n_bad > len(good):
+            r = int(np.nonzero(~good)[0][0])
+            found = ", ".join(self.columns[name][r] for name in columns)
+            raise LogError(
+                f"{self.path.name} row {r + 2}, {', '.join(columns)}: expected {expected}, "
+                f"found {found!r}; {n_bad} of {len(good)} rows are like this"
+            )
+        return good

@@ -1,0 +1,152 @@
+"""Writing a log folder, whole or not at all."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import io
+import shutil
+import tempfile
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from tracking.errors import LogError
+from tracking.log.folder import ACC, FORMAT, GYR, MAG, POWERS, QUAT, Log
+from tracking.measurements import Kind, MeasurementBlock
+
+
+def write_log(folder: Path | str, log: Log) -> Path:
+    """Write a run so that `read_log` gives the same measurements, to the last bit.
+
+    The files are written beside the target and moved in place at the end.
+
+    Raises:
+        LogError: The target exists and is not an empty folder, or holds an event that a log
+            has no place for.
+    """
+    folder = Path(folder)
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise LogError(f"{folder}: exists already, expected a new or empty folder")
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    scratch = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+    try:
+        (scratch / "meta.toml").write_text(_meta(log), encoding="utf-8")
+        for stem, header, rows in _tables(log):
+            text = io.StringIO()
+            writer = csv.writer(text, lineterminator="\n")
+            writer.writerow(header)
+            writer.writerows(rows)
+            # No time stamp inside: the same run gives the same bytes.
+            packed = gzip.compress(text.getvalue().encode(), compresslevel=6, mtime=0)
+            (scratch / f"{stem}.csv.gz").write_bytes(packed)
+        scratch.chmod(0o755)
+        if folder.exists():
+            folder.rmdir()
+        scratch.rename(folder)
+    except BaseException:
+        shutil.rmtree(scratch, ignore_errors=True)
+        raise
+    return folder
+
+
+def _meta(log: Log) -> str:
+    c = log.constellation
+    lines = [
+        f"format = {FORMAT}",
+        f"name = {_quoted(log.name)}",
+        f"source = {_quoted(log.source)}",
+        f"licence = {_quoted(log.licence)}",
+        f"dimensions = {c.dimensions}",
+        f"heading = {_quoted(c.heading)}",
+    ]
+    for node in c.nodes:
+        lines += ["", f"[nodes.{node.id}]", f'kind = "{node.kind}"', f'vehicle = "{node.vehicle}"']
+        if node.initial_heading is not None:
+            lines.append(f"initial_heading_rad = {float(node.initial_heading)!r}")
+    for antenna in c.antennas:
+        offset = ", ".join(repr(float(v)) for v in antenna.offset_b)
+        lines += ["", f"[antennas.{antenna.id}]", f"node = {antenna.node}"]
+        lines.append(f"offset_m = [{offset}]")
+    return "\n".join(lines) + "\n"
+
+
+def _quoted(text: str) -> str:
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    return '"' + "".join(ch if ch >= " " else f"\\u{ord(ch):04x}" for ch in escaped) + '"'
+
+
+def _tables(log: Log) -> Iterable[tuple[str, Sequence[str], list[list[object]]]]:
+    """Name, header and rows of every file that the run needs."""
+    block = log.block
+    odd = block.valid[0] & np.isin(block.kind[0], (Kind.JOIN, Kind.LEAVE))
+    if odd.any():
+        raise LogError("a log has no place for JOIN and LEAVE events; silence says the same")
+    ids = np.array(log.constellation.ids)
+    yield "ranges", *_ranges(log, ids)
+    imu, mag = (_of_kind(block, kind) for kind in (Kind.IMU, Kind.MAG))
+    # One row where every sample has its own magnetometer reading, else a file of its own.
+    together = imu.t.shape == mag.t.shape and bool(
+        np.array_equal(imu.t, mag.t) and np.array_equal(imu.i, mag.i)
+    )
+    values = imu.values[0, :, :6]
+    if imu.n_events:
+        header = ["t_s", "node", *GYR, *ACC]
+        if together:
+            header += MAG
+            values = np.concatenate([values, mag.values[0, :, :3]], axis=1)
+        yield "imu", header, _rows(imu, ids, values)
+    if mag.n_events and not together:
+        yield "mag", ["t_s", "node", *MAG], _rows(mag, ids, mag.values[0, :, :3])
+    state = _of_kind(block, Kind.STATE)
+    if state.n_events:
+        yield "state", ["t_s", "node", *QUAT, "ax", "ay", "az"], _rows(state, ids, state.values[0])
+    truth = log.truth
+    if len(truth.t):
+        rows: list[list[object]] = []
+        for k in range(len(truth.t)):
+            quat = truth.q_wb[k].tolist() if truth.has_orientation[k] else [""] * 4
+            row = [float(truth.t[k]), int(ids[truth.node[k]]), *truth.pos_w[k].tolist(), *quat]
+            rows.append([*row, int(truth.valid[k])])
+        yield "truth", ["t_s", "node", "x", "y", "z", *QUAT, "valid"], rows
+
+
+def _ranges(log: Log, ids: np.ndarray) -> tuple[list[str], list[list[object]]]:
+    """Header and rows of ranges.csv."""
+    block = log.block
+    chosen = block.valid[0] & np.isin(block.kind[0], (Kind.RANGE, Kind.SURVEY))
+    r = block.take(chosen)
+    header = ["t_s", "node_i", "node_j", "range_m", *POWERS, "source"]
+    named = bool(log.constellation.antennas)
+    if named:
+        header += ["antenna_i", "antenna_j"]
+    if log.nlos is not None:
+        header.append("nlos")
+    antenna_ids = ["" if a.id < 0 else a.id for a in log.constellation.all_antennas]
+    labels = iter(() if log.nlos is None else log.nlos)
+    rows: list[list[object]] = []
+    for k in range(r.n_events):
+        is_range = r.kind[0, k] == Kind.RANGE
+        row: list[object] = [float(r.t[0, k]), int(ids[r.i[0, k]]), int(ids[r.j[0, k]])]
+        row.append(float(r.values[0, k, 0]))
+        row += r.values[0, k, 1:3].tolist() if r.has_power[0, k] else ["", ""]
+        row.append("uwb" if is_range else "survey")
+        if named:
+            row += [antenna_ids[r.antenna_i[0, k]], antenna_ids[r.antenna_j[0, k]]]
+        if log.nlos is not None:
+            row.append(int(next(labels)) if is_range else "")
+        rows.append(row)
+    return header, rows
+
+
+def _of_kind(block: MeasurementBlock, kind: Kind) -> MeasurementBlock:
+    return block.take(block.valid[0] & (block.kind[0] == kind))
+
+
+def _rows(block: MeasurementBlock, ids: np.ndarray, values: np.ndarray) -> list[list[object]]:
+    """Rows of time, node and values; floats are written so that they read back exactly."""
+    return [
+        [t, int(ids[i]), *row]
+        for t, i, row in zip(block.t[0].tolist(), block.i[0], values.tolist(), strict=True)
+    ]

@@ -1,0 +1,105 @@
+"""The tracker: orientation, then the position filter.
+
+    block -> Orientation (IMU to state) -> Filter (pair EKFs, MDS) -> TeamEstimate
+
+Late data are the business of `Horizon`, which stands in front of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from tracking.arrays import F64
+from tracking.constellation import Constellation
+from tracking.estimate import TeamEstimate
+from tracking.filters import DEFAULT_FILTER, filter_builder
+from tracking.filters.params import PairEkfParams
+from tracking.horizon import HorizonParams
+from tracking.measurements import MeasurementBlock
+from tracking.orientation import Orientation, OrientationParams
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrackerParams:
+    """Everything the tracker believes."""
+
+    orientation: OrientationParams = field(default_factory=OrientationParams)
+    filter: PairEkfParams = field(default_factory=PairEkfParams)
+    horizon: HorizonParams = field(default_factory=HorizonParams)
+
+
+class Tracker:
+    """Relative positions of a batch of groups from their measurements.
+
+    Laws: any split of the same events into blocks gives the same estimates, bit for bit;
+    saved and restored in mid-run equals uninterrupted.
+    """
+
+    def __init__(
+        self,
+        constellation: Constellation,
+        params: TrackerParams | None = None,
+        *,
+        filter: str = DEFAULT_FILTER,
+        n_envs: int = 1,
+    ) -> None:
+        params = params or TrackerParams()
+        self.constellation = constellation
+        self.n_envs = n_envs
+        self._orientation = Orientation(constellation, params.orientation, n_envs)
+        self._filter = filter_builder(filter)(constellation, params.filter, n_envs)
+
+    def step(self, block: MeasurementBlock, t: F64 | float) -> TeamEstimate:
+        """Handle a block and report at one time.
+
+        Args:
+            block: Events in order, none earlier than those handled before.
+            t: Time of the estimate, scalar or (env) [s], not before the last event.
+
+        Returns:
+            Estimates, arrays over (env, ...).
+        """
+        t_out = np.broadcast_to(np.asarray(t, dtype=np.float64), (self.n_envs,))[:, None]
+        history = self.run(block, t_out)
+        names = TeamEstimate.__slots__[1:]
+        return TeamEstimate(history.constellation, *(getattr(history, n)[:, 0] for n in names))
+
+    def run(self, block: MeasurementBlock, t_out: F64) -> TeamEstimate:
+        """Handle a block and report at several times.
+
+        Args:
+            block: Events in order, none earlier than those handled before.
+            t_out: Ascending times, (time) or (env, time) [s]. An estimate holds every event
+                up to its time.
+
+        Returns:
+            Estimates, arrays over (env, time, ...).
+        """
+        t_out = np.atleast_2d(np.asarray(t_out, dtype=np.float64))
+        t_out = np.broadcast_to(t_out, (self.n_envs, t_out.shape[1]))
+        return self._filter.run(self._orientation.step(block), t_out)
+
+    def reset(self, env: int) -> None:
+        """Forget everything of one environment."""
+        self._orientation.reset(env)
+        self._filter.reset(env)
+
+    def save(self) -> dict[str, Any]:
+        """A copy of everything that evolves."""
+        return {"orientation": self._orientation.save(), "filter": self._filter.save()}
+
+    def restore(self, saved: dict[str, Any]) -> None:
+        """Go on from a saved copy."""
+        self._orientation.restore(saved["orientation"])
+        self._filter.restore(saved["filter"])
+
+    def mean_nis(self) -> F64:
+        """Mean NIS over all accepted ranges, (env) [-]."""
+        return self._filter.mean_nis()
+
+    def n_rejected(self) -> F64:
+        """Ranges refused as outliers, (env)."""
+        return self._filter.n_rejected()
