@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from tracking.compiled import kernel
 
 from tracking.filters._mds_kernels import refine
+from tracking.filters._pair_kernels import correct
 
 
-@njit(cache=True)
+@kernel
 def refine_group(c, nodes, pairs, bank, e):
-    """Replace the positions of every hypothesis by their MDS refinement."""
+    """Correct every hypothesis with the MDS refinement of its positions."""
     n = nodes.present.shape[1]
     members = np.empty(n, np.int64)
     m = 0
@@ -35,20 +36,20 @@ def refine_group(c, nodes, pairs, bank, e):
         for a in range(m):
             for b in range(a + 1, m):
                 p = c.pair_index[members[a], members[b]]
-                replace_position(c, pairs.x[e, h, p], pairs.P[e, h, p], X[b] - X[a])
+                fuse_position(c, pairs.x[e, h, p], pairs.P[e, h, p], X[b] - X[a])
 
 
-@njit(cache=True)
-def replace_position(c, x, P, pos):
-    """Move a filter to a refined position; the velocity may follow by its correlation."""
+@kernel
+def fuse_position(c, x, P, pos):
+    """Correct a filter with a refined position, one axis after another."""
+    H = np.zeros(6)
     for k in range(c.d):
-        delta = pos[k] - x[k]
-        if c.mds_velocity_gain > 0.0 and P[k, k] > 0.0:
-            x[3 + k] += c.mds_velocity_gain * P[3 + k, k] / P[k, k] * delta
-        x[k] = pos[k]
+        H[k] = 1.0
+        correct(x, P, H, pos[k] - x[k], c.mds_var, c.d)
+        H[k] = 0.0
 
 
-@njit(cache=True)
+@kernel
 def prune_bank(c, nodes, pairs, bank, e):
     """Drop hypotheses that are unlikely or the same as a better one; choose the best."""
     n_hyps = bank.alive.shape[1]
@@ -79,7 +80,7 @@ def prune_bank(c, nodes, pairs, bank, e):
                 bank.alive[e, b] = False
 
 
-@njit(cache=True)
+@kernel
 def are_same(c, nodes, pairs, e, a, b):
     """True when two hypotheses agree in the position of every pair."""
     for p in range(c.pairs.shape[0]):
@@ -92,7 +93,7 @@ def are_same(c, nodes, pairs, e, a, b):
     return True
 
 
-@njit(cache=True)
+@kernel
 def remove_node(c, nodes, pairs, bank, e, i):
     """Destroy the filters of a node that left."""
     nodes.present[e, i] = False
@@ -107,7 +108,7 @@ def remove_node(c, nodes, pairs, bank, e, i):
         bank.alive[e, :] = False
 
 
-@njit(cache=True)
+@kernel
 def remove_silent(c, nodes, pairs, bank, e, t):
     """Remove the nodes that were not heard for so long that they must have left."""
     for i in range(nodes.present.shape[1]):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from tracking.compiled import kernel
 
 from tracking.filters._bank_kernels import (
     prune_bank,
@@ -20,7 +20,7 @@ JOIN, STATE, SURVEY, RANGE, LEAVE = 0, 3, 4, 5, 6
 ABSENT, STARTING, AMBIGUOUS, OK, LOST = 0, 1, 2, 3, 4
 
 
-@njit(cache=True)
+@kernel
 def run_events(c, nodes, pairs, bank, block, t_out, out):
     """Handle the events of every environment in order.
 
@@ -61,7 +61,7 @@ def run_events(c, nodes, pairs, bank, block, t_out, out):
             o += 1
 
 
-@njit(cache=True)
+@kernel
 def take_state(c, nodes, pairs, bank, e, i, t, values):
     """A new orientation and acceleration of node i, held until the next."""
     if nodes.present[e, i]:
@@ -74,7 +74,7 @@ def take_state(c, nodes, pairs, bank, e, i, t, values):
     nodes.has_state[e, i] = True
 
 
-@njit(cache=True)
+@kernel
 def take_range(c, nodes, pairs, bank, e, i, j, a_i, a_j, t, distance, is_survey):
     """A range or survey between i and j, i < j."""
     if t - bank.t_check[e] >= c.check_period:
@@ -108,7 +108,7 @@ def take_range(c, nodes, pairs, bank, e, i, j, a_i, a_j, t, distance, is_survey)
         bank.t_mds[e] = t
 
 
-@njit(cache=True)
+@kernel
 def write_estimate(c, nodes, pairs, bank, e, t, o, out):
     """The best hypothesis at time t, without touching the state."""
     pos, vel, cov, q_wb, has_q, age, nis, status = out

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from tracking.compiled import kernel
 
 
-@njit(cache=True)
+@kernel
 def refine(pos, d, X):
     """Consistent positions from the relative positions of all pairs.
 

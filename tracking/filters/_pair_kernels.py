@@ -7,13 +7,13 @@ vertical rows stay exactly zero: nothing is uncertain across the plane.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from tracking.compiled import kernel
 
 MIN_DISTANCE = 0.01
 """[m] Closer than this a direction has no meaning and a range is not used."""
 
 
-@njit(cache=True)
+@kernel
 def predict(x, P, dt, accel_i, accel_j, psd, d):
     """Dead reckoning over dt with constant accelerations.
 
@@ -46,7 +46,7 @@ def predict(x, P, dt, accel_i, accel_j, psd, d):
         P[3 + k, 3 + k] += q * dt
 
 
-@njit(cache=True)
+@kernel
 def correct(x, P, H, nu, R, d):
     """Scalar Kalman update with innovation nu and row H, Joseph form; returns the NIS.
 
@@ -74,7 +74,7 @@ def correct(x, P, H, nu, R, d):
     return nu * nu * inv_S
 
 
-@njit(cache=True)
+@kernel
 def range_model(x, lever, H):
     """Distance between two antennas and its Jacobian; ``lever`` is offset_j - offset_i [m]."""
     r0, r1, r2 = x[0] + lever[0], x[1] + lever[1], x[2] + lever[2]
@@ -85,7 +85,7 @@ def range_model(x, lever, H):
     return distance
 
 
-@njit(cache=True)
+@kernel
 def range_rate_model(x, lever, H):
     """Rate of the distance, ``u . vel`` with u the unit vector along it, and its Jacobian."""
     distance = max(range_model(x, lever, H), MIN_DISTANCE)
@@ -97,7 +97,7 @@ def range_rate_model(x, lever, H):
     return rate
 
 
-@njit(cache=True)
+@kernel
 def speed_model(x, H):
     """Relative speed ``|vel|`` and its Jacobian: the model that the paper's text writes."""
     speed = np.sqrt(x[3] * x[3] + x[4] * x[4] + x[5] * x[5])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from tracking.compiled import kernel
 
 from tracking.filters._pair_kernels import (
     correct,
@@ -16,7 +16,7 @@ from tracking.filters._pair_kernels import (
 LN_2PI = float(np.log(2.0 * np.pi))
 
 
-@njit(cache=True)
+@kernel
 def node_psd(c, nodes, e, n, t):
     """Acceleration noise that a node adds now, and whether its IMU is heard."""
     if c.is_static[n]:
@@ -26,7 +26,7 @@ def node_psd(c, nodes, e, n, t):
     return c.unaided_psd, False
 
 
-@njit(cache=True)
+@kernel
 def advance_pair(c, nodes, pairs, bank, e, p, t):
     """Predict pair p of every hypothesis to time t."""
     dt = t - pairs.t[e, p]
@@ -48,7 +48,7 @@ def advance_pair(c, nodes, pairs, bank, e, p, t):
     pairs.t[e, p] = t
 
 
-@njit(cache=True)
+@kernel
 def lever_arm(c, nodes, e, i, j, antenna_i, antenna_j, lever):
     """offset_j - offset_i of two antennas in the world frame, written to lever [m]."""
     for k in range(3):
@@ -64,7 +64,7 @@ def lever_arm(c, nodes, e, i, j, antenna_i, antenna_j, lever):
         lever[2] += sign * (o2 + 2.0 * (w * c2 + x * c1 - y * c0))
 
 
-@njit(cache=True)
+@kernel
 def passes_gate(c, pairs, bank, e, p, t, distance):
     """The outlier gate of the paper; updates the running average.
 
@@ -93,7 +93,7 @@ def passes_gate(c, pairs, bank, e, p, t, distance):
     return True
 
 
-@njit(cache=True)
+@kernel
 def fuse_survey(c, pairs, bank, e, p, distance):
     """Correct pair p of every hypothesis with a surveyed distance."""
     H, lever = np.empty(6), np.zeros(3)
@@ -104,7 +104,7 @@ def fuse_survey(c, pairs, bank, e, p, distance):
             correct(x, pairs.P[e, h, p], H, nu, c.survey_var, c.d)
 
 
-@njit(cache=True)
+@kernel
 def fuse_range(c, nodes, pairs, bank, e, p, t, distance, antenna_i, antenna_j):
     """Gate a range, then correct pair p of every hypothesis with it and with its rate."""
     if not passes_gate(c, pairs, bank, e, p, t, distance):

@@ -9,10 +9,10 @@ side it is, both sides become hypotheses. Velocities start at zero and P at the 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from tracking.compiled import kernel
 
 
-@njit(cache=True)
+@kernel
 def collect(c, pairs, e, p, t, distance, weight):
     """Add one of the first ranges of a pair; a survey counts as all k of them."""
     if pairs.start_n[e, p] > 0 and t - pairs.start_t[e, p] > c.start_max_age:
@@ -30,20 +30,20 @@ def collect(c, pairs, e, p, t, distance, weight):
         pairs.start_n[e, p] += 1
 
 
-@njit(cache=True)
+@kernel
 def is_ready(c, pairs, e, i, j):
     """True when a pair has its first k ranges."""
     return pairs.start_n[e, c.pair_index[i, j]] >= c.start_k
 
 
-@njit(cache=True)
+@kernel
 def start_distance(c, pairs, e, i, j):
     """Mean of the first ranges of a pair [m]."""
     p = c.pair_index[i, j]
     return pairs.start_sum[e, p] / pairs.start_n[e, p]
 
 
-@njit(cache=True)
+@kernel
 def begin_pair(c, pairs, e, h, p, pos, t):
     """Put a new filter at a relative position: v = 0, P = 1."""
     x, P = pairs.x[e, h, p], pairs.P[e, h, p]
@@ -61,7 +61,7 @@ def begin_pair(c, pairs, e, h, p, pos, t):
     pairs.rate[e, p] = 0.0
 
 
-@njit(cache=True)
+@kernel
 def try_start(c, nodes, pairs, bank, e, t):
     """Start the group with the nodes whose pairs are all ready; True if it did."""
     n = nodes.present.shape[1]
@@ -110,7 +110,7 @@ def try_start(c, nodes, pairs, bank, e, t):
     return True
 
 
-@njit(cache=True)
+@kernel
 def hypothesis_positions(c, nodes, pairs, e, h, pos):
     """Positions of the present nodes in one hypothesis, relative to their centre (node, 3)."""
     n = pos.shape[0]
@@ -127,7 +127,7 @@ def hypothesis_positions(c, nodes, pairs, e, h, pos):
             pos[j, k] = s / n_present
 
 
-@njit(cache=True)
+@kernel
 def place(c, known, distance, sides):
     """Where a node is, from its distances to known ones; both candidates if a mirror fits too.
 
@@ -172,7 +172,7 @@ def place(c, known, distance, sides):
     return 1 if spanned == d or height < c.merge_distance else 2
 
 
-@njit(cache=True)
+@kernel
 def try_join(c, nodes, pairs, bank, e, new, t):
     """Take a node in once it is ready with enough of the others; True if it joined."""
     n = nodes.present.shape[1]

@@ -34,9 +34,9 @@ class MdsParams:
 
     period: float = 0.012
     """[s] Shortest time between two refinements: one ranging round of three nodes."""
-    velocity_gain: float = 0.0
-    """[-] Share of the velocity correction that goes with a position correction by the
-    filter's own covariance. 0 corrects positions only, as the paper does."""
+    std: float = 0.2
+    """[m] Standard deviation of a refined position as a measurement of the filters. Towards 0
+    it replaces the position, as the paper has it; see `docs/tracker.md` for what that costs."""
     min_spread: float = 0.15
     """[m] Layouts flatter than this are not refined: their mirror image cannot be told."""
 

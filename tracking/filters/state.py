@@ -116,7 +116,7 @@ class Coefficients(NamedTuple):
     gate_min_speed: float
     gate_max_rejected: int
     mds_period: float
-    mds_velocity_gain: float
+    mds_var: float
     mds_min_spread: float
     start_k: int
     start_max_age: float
@@ -155,7 +155,7 @@ def make_coefficients(
         gate_min_speed=gate.min_speed,
         gate_max_rejected=gate.max_rejected,
         mds_period=mds.period,
-        mds_velocity_gain=mds.velocity_gain,
+        mds_var=mds.std**2,
         mds_min_spread=mds.min_spread,
         start_k=start.k,
         start_max_age=start.max_age,

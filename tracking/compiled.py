@@ -1,0 +1,34 @@
+"""The decorator of every compiled kernel.
+
+Numba keeps compiled code on disk and compiles a function anew when *its* file changes. A
+kernel that calls kernels of other files has their code compiled in, so here it is compiled
+anew when any kernel file of its package changes.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar
+
+from numba import config, njit
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def kernel(function: Function) -> Function:
+    """Compile a function with numba, without the interpreter, and keep the result on disk."""
+    compiled = njit(cache=True)(function)
+    if not config.DISABLE_JIT:
+        stamp = _stamp(Path(inspect.getfile(function)).parents[1])
+        compiled._cache._cache_file._source_stamp = stamp  # noqa: SLF001
+    return compiled  # type: ignore[no-any-return]
+
+
+@cache
+def _stamp(folder: Path) -> tuple[int, int]:
+    """Changes when a kernel file under the folder does: newest time, and a sum over all."""
+    stats = [path.stat() for path in sorted(folder.rglob("_*_kernels.py"))]
+    return max(s.st_mtime_ns for s in stats), sum(s.st_mtime_ns + s.st_size for s in stats)
