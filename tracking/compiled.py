@@ -22,8 +22,11 @@ def kernel(function: Function) -> Function:
     """Compile a function with numba, without the interpreter, and keep the result on disk."""
     compiled = njit(cache=True)(function)
     if not config.DISABLE_JIT:
-        stamp = _stamp(Path(inspect.getfile(function)).parents[1])
-        compiled._cache._cache_file._source_stamp = stamp  # noqa: SLF001
+        package = function.__module__.partition(".")[0]
+        folder = Path(inspect.getfile(function))
+        while folder.name != package:
+            folder = folder.parent
+        compiled._cache._cache_file._source_stamp = _stamp(folder)
     return compiled  # type: ignore[no-any-return]
 
 

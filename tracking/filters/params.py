@@ -34,7 +34,7 @@ class MdsParams:
 
     period: float = 0.012
     """[s] Shortest time between two refinements: one ranging round of three nodes."""
-    std: float = 0.2
+    std: float = 0.5
     """[m] Standard deviation of a refined position as a measurement of the filters. Towards 0
     it replaces the position, as the paper has it; see `docs/tracker.md` for what that costs."""
     min_spread: float = 0.15
@@ -55,11 +55,12 @@ class StartParams:
     """[s] The first k measurements must come within this time."""
     rotations_2d: int = 8
     """[-] Rotations tried in the plane, each with its mirror image."""
-    prune: float = 12.0
-    """[-] A hypothesis so much less likely than the best (log-likelihood) is dropped."""
+    prune: float = 30.0
+    """[-] A hypothesis so much less likely than the best (log-likelihood) is dropped. Errors
+    of real ranges are correlated over a second, so that their evidence counts too much."""
     merge_distance: float = 0.25
     """[m] Two hypotheses as near as this in every pair are one."""
-    max_nis: float = 9.0
+    max_nis: float = 6.0
     """[-] A single range counts for at most this in the likelihood, outlier or not."""
     check_period: float = 0.25
     """[s] Time between two looks at the bank."""
@@ -78,7 +79,7 @@ class PairEkfParams:
     """[s] A node whose IMU was silent for so long is unaided."""
     orientation_std: float = 0.05
     """[rad] Error of one axis of a node's orientation; VQF states none."""
-    range_std: float = 0.10
+    range_std: float = 0.08
     """[m] Standard deviation of a range, 5 to 10 cm in real buildings."""
     survey_std: float = 0.02
     """[m] Standard deviation of a surveyed distance."""

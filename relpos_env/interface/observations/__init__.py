@@ -1,0 +1,30 @@
+"""Observation modes. Adding one: a file beside `relative.py` and a line in `OBSERVATIONS`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+from relpos_env.errors import EnvError
+from relpos_env.interface.observations.base import Field, ObservationMode
+from relpos_env.interface.observations.relative import RelativePositions
+
+OBSERVATIONS: dict[str, Callable[[int], ObservationMode]] = {
+    "estimate": partial(RelativePositions, needs_truth=False),
+    "truth": partial(RelativePositions, needs_truth=True),
+}
+"""Name to builder ``(n_cars) -> ObservationMode``."""
+
+
+def observation_mode(name: str, n_cars: int) -> ObservationMode:
+    """Look a mode up.
+
+    Raises:
+        EnvError: No mode of that name.
+    """
+    if name not in OBSERVATIONS:
+        raise EnvError(f"observation: expected one of {', '.join(OBSERVATIONS)}, got {name!r}")
+    return OBSERVATIONS[name](n_cars)
+
+
+__all__ = ["OBSERVATIONS", "Field", "ObservationMode", "observation_mode"]

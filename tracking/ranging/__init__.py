@@ -1,0 +1,1 @@
+"""The ranging protocol: who sends when, and how long it takes."""
