@@ -120,10 +120,10 @@ class World:
         n = len(start)
         self._n_cars, self._tick = n, 0
         self._steering = np.zeros(n)
-        self._force = np.zeros((n, 3))
+        # pymunk lists the static body behind the cars, so the buffers have a row for it.
+        self._force = np.zeros((n + 1, 3))
         self._inbox, self._outbox = pymunk.batch.Buffer(), pymunk.batch.Buffer()
         self._outbox.set_float_buf(self._force)
-        self._touching: set[int] = set()
         self.n_collisions = np.zeros(n, dtype=np.int64)
         """Contacts that each car began, with a car, a wall or an obstacle, (car)."""
         self._space.on_collision(begin=self._count_collision)
@@ -146,7 +146,7 @@ class World:
             car.friction,
             (car.speed_gain, car.max_accel, car.max_speed),
             dt,
-            self._force,
+            self._force[: self._n_cars],
         )
         pymunk.batch.set_space_bodies(self._space, _WRITE, self._outbox)
         self._space.step(dt)
@@ -174,7 +174,8 @@ class World:
     def _read(self, last_vel: F64, dt: float) -> WorldState:
         self._inbox.clear()
         pymunk.batch.get_space_bodies(self._space, _READ, self._inbox)
-        rows = np.frombuffer(self._inbox.float_buf(), dtype=np.float64).reshape(-1, 6).copy()
+        rows = np.frombuffer(self._inbox.float_buf(), dtype=np.float64).reshape(-1, 6)
+        rows = rows[: self._n_cars].copy()
         vel = rows[:, 3:5]
         accel = (vel - last_vel) / dt if dt > 0.0 else np.zeros_like(vel)
         return WorldState(

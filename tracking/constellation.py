@@ -12,6 +12,8 @@ from tracking.arrays import F64, I64, Bool
 from tracking.errors import ConfigError
 
 VEHICLES = ("car", "human", "drone", "hand", "robot", "none")
+WHEELED = ("car", "robot")
+"""Vehicles that stay level and accelerate for seconds on end."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

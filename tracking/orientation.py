@@ -22,7 +22,7 @@ import numpy as np
 from vqf import VQF
 
 from tracking.arrays import F64
-from tracking.constellation import Constellation, NodeConfig
+from tracking.constellation import WHEELED, Constellation, NodeConfig
 from tracking.geometry import GRAVITY, quat_from_yaw, quat_multiply, rotate, yaw_of
 from tracking.measurements import Kind, MeasurementBlock
 
@@ -33,6 +33,9 @@ class OrientationParams:
 
     tau_acc: float = 3.0
     """[s] VQF's accelerometer time constant. Longer trusts the gyroscope more. VQF default."""
+    tau_acc_wheeled: float = 30.0
+    """[s] The same on cars and robots, which accelerate sideways for seconds in every turn: a
+    short time constant takes that for tilt and turns the acceleration by tens of degrees."""
     tau_mag: float = 9.0
     """[s] VQF's magnetometer time constant. VQF default."""
     max_gap: float = 0.5
@@ -204,11 +207,12 @@ class Orientation:
         return gravity
 
     def _make_vqf(self, node: NodeConfig) -> Any:
+        wheeled = node.vehicle in WHEELED
         return VQF(
             1.0 / node.imu_hz,
             -1.0,
             1.0 / (node.mag_hz or node.imu_hz),
-            tauAcc=self._params.tau_acc,
+            tauAcc=self._params.tau_acc_wheeled if wheeled else self._params.tau_acc,
             tauMag=self._params.tau_mag,
         )
 

@@ -31,22 +31,61 @@ def refine_group(c, nodes, pairs, bank, e):
                 for k in range(3):
                     pos[a, b, k] = x[k]
                     pos[b, a, k] = -x[k]
-        if refine(pos, c.d, X) < c.mds_min_spread:
+        spread = refine(pos, c.d, X)
+        if h == bank.best[e]:
+            watch_flat(c, nodes, pairs, bank, e, h, X, spread)
+        if spread < c.mds_min_spread:
             continue
         for a in range(m):
             for b in range(a + 1, m):
                 p = c.pair_index[members[a], members[b]]
-                fuse_position(c, pairs.x[e, h, p], pairs.P[e, h, p], X[b] - X[a])
+                move_to(c, pairs.x[e, h, p], pairs.P[e, h, p], X[b] - X[a])
 
 
 @kernel
-def fuse_position(c, x, P, pos):
-    """Correct a filter with a refined position, one axis after another."""
-    H = np.zeros(6)
+def move_to(c, x, P, pos):
+    """Replace the position of a filter; the velocity follows by the filter's covariance.
+
+    The covariance stays as it is: the refined position holds nothing that the filters of the
+    group did not know already.
+    """
+    H, scratch = np.zeros(6), P.copy()
     for k in range(c.d):
         H[k] = 1.0
-        correct(x, P, H, pos[k] - x[k], c.mds_var, c.d)
+        correct(x, scratch, H, pos[k] - x[k], c.mds_var, c.d)
         H[k] = 0.0
+
+
+@kernel
+def watch_flat(c, nodes, pairs, bank, e, h, X, spread):
+    """A layout that was flat and opens again may be its mirror image: make that a hypothesis."""
+    if spread < c.mds_min_spread:
+        bank.flat[e] = True
+    elif bank.flat[e] and spread > 2.0 * c.mds_min_spread:
+        bank.flat[e] = False
+        for target in range(bank.alive.shape[1]):
+            if not bank.alive[e, target]:
+                mirror_hypothesis(c, pairs, bank, e, h, target, X)
+                break
+
+
+@kernel
+def mirror_hypothesis(c, pairs, bank, e, h, target, X):
+    """Copy a hypothesis, mirrored across the line or plane that its layout X is nearest to."""
+    layout = np.ascontiguousarray(X[:, : c.d])
+    _, E = np.linalg.eigh(layout.T @ layout)
+    M = np.zeros((6, 6))
+    for r in range(3):
+        M[r, r] = M[3 + r, 3 + r] = 1.0
+    for r in range(c.d):
+        for k in range(c.d):
+            M[r, k] -= 2.0 * E[r, 0] * E[k, 0]
+            M[3 + r, 3 + k] -= 2.0 * E[r, 0] * E[k, 0]
+    for p in range(c.pairs.shape[0]):
+        pairs.x[e, target, p] = M @ np.ascontiguousarray(pairs.x[e, h, p])
+        pairs.P[e, target, p] = M @ np.ascontiguousarray(pairs.P[e, h, p]) @ M.T
+    bank.alive[e, target] = True
+    bank.loglik[e, target] = bank.loglik[e, h]
 
 
 @kernel

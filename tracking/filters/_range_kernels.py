@@ -22,7 +22,7 @@ def node_psd(c, nodes, e, n, t):
     if c.is_static[n]:
         return 0.0, False
     if nodes.has_state[e, n] and t - nodes.t_state[e, n] <= c.unaided_after:
-        return c.accel_psd, True
+        return c.accel_psd[n], True
     return c.unaided_psd, False
 
 

@@ -34,9 +34,9 @@ class MdsParams:
 
     period: float = 0.012
     """[s] Shortest time between two refinements: one ranging round of three nodes."""
-    std: float = 0.5
-    """[m] Standard deviation of a refined position as a measurement of the filters. Towards 0
-    it replaces the position, as the paper has it; see `docs/tracker.md` for what that costs."""
+    std: float = 0.3
+    """[m] Standard deviation of a refined position as a measurement of the filters. 0 replaces
+    the position outright, as the paper has it."""
     min_spread: float = 0.15
     """[m] Layouts flatter than this are not refined: their mirror image cannot be told."""
 
@@ -55,7 +55,7 @@ class StartParams:
     """[s] The first k measurements must come within this time."""
     rotations_2d: int = 8
     """[-] Rotations tried in the plane, each with its mirror image."""
-    prune: float = 30.0
+    prune: float = 40.0
     """[-] A hypothesis so much less likely than the best (log-likelihood) is dropped. Errors
     of real ranges are correlated over a second, so that their evidence counts too much."""
     merge_distance: float = 0.25
@@ -70,24 +70,27 @@ class StartParams:
 class PairEkfParams:
     """One extended Kalman filter per pair."""
 
-    accel_psd: float = 0.2
+    accel_psd: float = 0.15
     """[m/s2/sqrt(Hz)] Noise of one node's world acceleration: sensor noise, vibration and the
     slow error of a wrong tilt. Larger forgets dead reckoning sooner."""
+    wheeled_accel_psd: float = 0.07
+    """[m/s2/sqrt(Hz)] The same on cars and robots, which stay level."""
     unaided_accel_psd: float = 0.7
     """[m/s2/sqrt(Hz)] The same for a moving node whose IMU is not heard."""
     unaided_after: float = 0.3
     """[s] A node whose IMU was silent for so long is unaided."""
     orientation_std: float = 0.05
     """[rad] Error of one axis of a node's orientation; VQF states none."""
-    range_std: float = 0.08
+    range_std: float = 0.10
     """[m] Standard deviation of a range, 5 to 10 cm in real buildings."""
     survey_std: float = 0.02
     """[m] Standard deviation of a surveyed distance."""
     speed_model: Literal["range-rate", "speed-norm", "none"] = "range-rate"
     """What the derivative of the range is compared with: its true model, the rate of the
     distance, or the norm of the velocity as the paper writes."""
-    speed_std: float = 0.5
-    """[m/s] Standard deviation of the low-passed derivative."""
+    speed_std: float = 2.0
+    """[m/s] Standard deviation of the low-passed derivative. It is made of the same ranges,
+    so that a small value counts them twice."""
     speed_tau: float = 0.15
     """[s] Time constant of that low pass."""
     lost_after: float = 1.0
@@ -99,7 +102,7 @@ class PairEkfParams:
     start: StartParams = field(default_factory=StartParams)
 
     def __post_init__(self) -> None:
-        for name in ("accel_psd", "unaided_accel_psd", "range_std", "survey_std", "speed_std"):
+        for name in ("accel_psd", "wheeled_accel_psd", "unaided_accel_psd", "range_std", "survey_std", "speed_std"):
             if not getattr(self, name) > 0.0:
                 raise ConfigError(f"{name}: expected > 0, got {getattr(self, name)}")
         if self.speed_model not in ("range-rate", "speed-norm", "none"):

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracking.arrays import F64, I64, Bool
-from tracking.constellation import Constellation
+from tracking.constellation import WHEELED, Constellation
 from tracking.filters.params import PairEkfParams
 
 SPEED_MODELS = {"none": 0, "range-rate": 1, "speed-norm": 2}
@@ -81,6 +81,8 @@ class BankState(NamedTuple):
     """The hypothesis reported, (env)."""
     t_mds: F64
     """Time of the last MDS refinement, (env) [s]."""
+    flat: Bool
+    """True since the layout was too flat to tell its mirror image, (env)."""
     t_check: F64
     """Time of the last look at the bank, (env) [s]."""
     nis_sum: F64
@@ -101,7 +103,8 @@ class Coefficients(NamedTuple):
     """Starting rotations and mirror images, (hyp, 3, 3)."""
     use_mds: bool
     speed_model: int
-    accel_psd: float
+    accel_psd: F64
+    """Of each node, (node)."""
     unaided_psd: float
     unaided_after: float
     range_var: float
@@ -140,7 +143,12 @@ def make_coefficients(
         rotations=starting_rotations(constellation.dimensions, start.rotations_2d),
         use_mds=use_mds,
         speed_model=SPEED_MODELS[params.speed_model],
-        accel_psd=params.accel_psd,
+        accel_psd=np.array(
+            [
+                params.wheeled_accel_psd if node.vehicle in WHEELED else params.accel_psd
+                for node in constellation.nodes
+            ]
+        ),
         unaided_psd=params.unaided_accel_psd,
         unaided_after=params.unaided_after,
         range_var=params.range_std**2,
@@ -226,6 +234,6 @@ def make_state(
         start_t=floats(p),
     )
     bank = BankState(
-        bools(n_hyps), floats(n_hyps), ints(), floats(), floats(), floats(), ints()
+        bools(n_hyps), floats(n_hyps), ints(), floats(), bools(), floats(), floats(), ints()
     )
     return nodes, pairs, bank

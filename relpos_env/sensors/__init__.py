@@ -1,0 +1,17 @@
+"""Simulated sensors: what the world does to measurements, never what a filter believes."""
+
+from relpos_env.sensors.imu import Imu, ImuSimParams
+from relpos_env.sensors.magnetometer import Magnetometer, MagSimParams
+from relpos_env.sensors.odometer import Odometer, OdometerSimParams
+from relpos_env.sensors.radio import Radio, RadioSimParams
+
+__all__ = [
+    "Imu",
+    "ImuSimParams",
+    "MagSimParams",
+    "Magnetometer",
+    "Odometer",
+    "OdometerSimParams",
+    "Radio",
+    "RadioSimParams",
+]

@@ -1,0 +1,106 @@
+"""A six-axis IMU on a car: gyroscope and accelerometer with their errors.
+
+    reading = round(clip(truth + bias(t) + noise + vibration))
+
+The bias is what calibration at rest leaves: a constant and a slow first-order Markov part.
+Noise, range and resolution are those of the LSM6DSOX [1]; vibration is that of a car on a
+floor, white at the output rate and growing with speed.
+
+References:
+    [1] STMicroelectronics, LSM6DSOX data sheet DS12814.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tracking.arrays import F64
+from tracking.geometry import GRAVITY
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImuSimParams:
+    """What the simulated IMU does."""
+
+    rate_hz: float = 100.0
+    """[Hz] Samples a second."""
+    gyr_noise: float = 4.7e-4
+    """[rad/s] 3.8 mdps/sqrt(Hz) in 50 Hz of bandwidth."""
+    acc_noise: float = 5.0e-3
+    """[m/s2] 70 ug/sqrt(Hz) in 50 Hz of bandwidth."""
+    gyr_bias: float = 3.5e-3
+    """[rad/s] Left by calibration, 0.2 deg/s."""
+    acc_bias: float = 0.03
+    """[m/s2] Left by calibration, 3 mg."""
+    gyr_drift: float = 8.7e-4
+    """[rad/s] Standard deviation of the slow part, 0.05 deg/s."""
+    acc_drift: float = 0.01
+    """[m/s2] Standard deviation of the slow part."""
+    drift_tau: float = 100.0
+    """[s] Time constant of the slow part."""
+    vibration: float = 0.35
+    """[m/s2] Of an accelerometer axis at `vibration_speed` and above."""
+    gyr_vibration: float = 0.02
+    """[rad/s] Of a gyroscope axis, likewise."""
+    vibration_speed: float = 1.0
+    """[m/s]"""
+    gyr_range: float = 34.9
+    """[rad/s] 2000 deg/s."""
+    acc_range: float = 78.5
+    """[m/s2] 8 g."""
+    bits: int = 16
+    """[-] Resolution over the range; 0 for none."""
+
+
+class Imu:
+    """The IMUs of all cars. Laws: same seed, same stream; no errors, the truth."""
+
+    def __init__(self, params: ImuSimParams, n_cars: int, rng: np.random.Generator) -> None:
+        self._params = p = params
+        self._rng = rng
+        constant = np.repeat([p.gyr_bias, p.acc_bias], 3)
+        self._drift_std = np.repeat([p.gyr_drift, p.acc_drift], 3)
+        self._noise = np.repeat([p.gyr_noise, p.acc_noise], 3)
+        self._vibration = np.repeat([p.gyr_vibration, p.vibration], 3)
+        self._range = np.repeat([p.gyr_range, p.acc_range], 3)
+        self._bias = constant * rng.standard_normal((n_cars, 6))
+        self._drift = self._drift_std * rng.standard_normal((n_cars, 6))
+        self._keep = float(np.exp(-1.0 / (p.rate_hz * p.drift_tau)))
+
+    def sample(self, heading: F64, yaw_rate: F64, accel_w: F64, speed: F64) -> F64:
+        """One sample of every car.
+
+        Args:
+            heading: (car) [rad].
+            yaw_rate: (car) [rad/s].
+            accel_w: World acceleration in the plane, (car, 2) [m/s2].
+            speed: (car) [m/s].
+
+        Returns:
+            Gyroscope [rad/s] and specific force [m/s2] in the body frame, (car, 6).
+        """
+        n = len(heading)
+        truth = np.zeros((n, 6))
+        truth[:, 2] = yaw_rate
+        c, s = np.cos(heading), np.sin(heading)
+        truth[:, 3] = c * accel_w[:, 0] + s * accel_w[:, 1]
+        truth[:, 4] = -s * accel_w[:, 0] + c * accel_w[:, 1]
+        truth[:, 5] = GRAVITY
+        innovation = np.sqrt(1.0 - self._keep**2) * self._drift_std
+        self._drift = self._keep * self._drift + innovation * self._rng.standard_normal((n, 6))
+        share = np.minimum(np.abs(speed) / self._params.vibration_speed, 1.0)[:, None]
+        spread = np.hypot(self._noise, share * self._vibration)
+        reading = truth + self._bias + self._drift + spread * self._rng.standard_normal((n, 6))
+        return quantise(reading, self._range, self._params.bits)
+
+
+def quantise(reading: F64, full_scale: F64 | float, bits: int) -> F64:
+    """A reading clipped to +- full scale and rounded to the resolution of the converter."""
+    clipped = np.clip(reading, -full_scale, full_scale)
+    if bits == 0:
+        return clipped
+    step = np.asarray(full_scale) / 2 ** (bits - 1)
+    rounded: F64 = np.round(clipped / step) * step
+    return rounded

@@ -1,0 +1,73 @@
+"""A magnetometer on a car: the field of the earth, bent by the building.
+
+The disturbance is a smooth field fixed in the room: a few waves of a few metres' length, as
+steel in floors and walls makes it. Noise, range and resolution are those of the LIS3MDL [1].
+
+References:
+    [1] STMicroelectronics, LIS3MDL data sheet DS9463.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from relpos_env.sensors.imu import quantise
+from tracking.arrays import F64
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MagSimParams:
+    """What the simulated magnetometer and the field around it do."""
+
+    field_w: tuple[float, float, float] = (0.0, 20.0, -43.0)
+    """[uT] Of the earth in central Europe: x east, y north, z up."""
+    disturbance: float = 2.0
+    """[uT] Standard deviation of one axis of the building's field."""
+    wavelength: float = 4.0
+    """[m] Mean length of its waves."""
+    n_waves: int = 6
+    """[-]"""
+    hard_iron: float = 0.3
+    """[uT] Offset that calibration left, one axis."""
+    noise: float = 0.35
+    """[uT] Of a reading, one axis: 3.2 to 4.1 mgauss."""
+    full_scale: float = 800.0
+    """[uT] 8 gauss."""
+    bits: int = 16
+    """[-] Resolution over the range; 0 for none."""
+
+
+class Magnetometer:
+    """The magnetometers of all cars, in one room. Laws as for `Imu`."""
+
+    def __init__(self, params: MagSimParams, n_cars: int, rng: np.random.Generator) -> None:
+        self._params = p = params
+        self._rng = rng
+        angle = rng.uniform(0.0, 2.0 * np.pi, p.n_waves)
+        length = p.wavelength * rng.uniform(0.6, 1.6, p.n_waves)
+        self._wave = 2.0 * np.pi / length * np.stack([np.cos(angle), np.sin(angle)])
+        self._phase = rng.uniform(0.0, 2.0 * np.pi, p.n_waves)
+        scale = p.disturbance * np.sqrt(2.0 / max(p.n_waves, 1))
+        self._amplitude = scale * rng.standard_normal((p.n_waves, 3))
+        self._hard_iron = p.hard_iron * rng.standard_normal((n_cars, 3))
+
+    def field(self, pos_w: F64) -> F64:
+        """Field in the world frame at points of the plane, (point, 3) [uT]."""
+        waves = np.cos(pos_w @ self._wave + self._phase)
+        field: F64 = np.array(self._params.field_w) + waves @ self._amplitude
+        return field
+
+    def sample(self, pos_w: F64, heading: F64) -> F64:
+        """One reading of every car in its body frame, (car, 3) [uT]."""
+        field = self.field(pos_w)
+        c, s = np.cos(heading), np.sin(heading)
+        body = np.stack(
+            [c * field[:, 0] + s * field[:, 1], -s * field[:, 0] + c * field[:, 1], field[:, 2]],
+            axis=1,
+        )
+        noise = self._params.noise * self._rng.standard_normal(body.shape)
+        return quantise(
+            body + self._hard_iron + noise, self._params.full_scale, self._params.bits
+        )

@@ -1,0 +1,141 @@
+"""The simulation: a world with sensors, stepped by commands, giving blocks of measurements.
+
+It has no notion of agents, rewards or episodes. The blocks it gives are all that a tracker
+ever gets; recorded to a log and tracked from there they give the same estimates.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from relpos_env.interface.actions import DriveCommand
+from relpos_env.scenarios import Scenario
+from relpos_env.sensors import Imu, Magnetometer, Odometer, Radio
+from relpos_env.world import World, WorldState
+from tracking.arrays import F64, Bool
+from tracking.constellation import Antenna, Constellation, NodeConfig
+from tracking.geometry import quat_from_yaw
+from tracking.log import Log, Truth
+from tracking.measurements import Kind, MeasurementBlock
+
+DT = 0.01
+"""[s] One step of the physics, and of the IMUs."""
+
+
+def car_constellation(scenario: Scenario) -> Constellation:
+    """The nodes that the cars carry: ids from 1, antenna on a mast over the tracker."""
+    ids = range(1, scenario.n_cars + 1)
+    height = scenario.radio.antenna_height
+    return Constellation(
+        nodes=tuple(NodeConfig(id=k, vehicle="car", imu_hz=scenario.imu.rate_hz) for k in ids),
+        dimensions=2,
+        heading="magnetic",
+        antennas=tuple(Antenna(id=k, node=k, offset_b=(0.0, 0.0, height)) for k in ids),
+    )
+
+
+@dataclass(slots=True)
+class Recording:
+    """What a simulation keeps of its measurements and of the truth, to become a log."""
+
+    blocks: list[MeasurementBlock] = field(default_factory=list)
+    nlos: list[Bool] = field(default_factory=list)
+    states: list[WorldState] = field(default_factory=list)
+
+
+class Simulation:
+    """One group of cars. Law: same scenario, seed and commands, same everything, bit for bit."""
+
+    def __init__(self, scenario: Scenario, rng: np.random.Generator, *, record: bool = False):
+        self.scenario = scenario
+        self.constellation = car_constellation(scenario)
+        # A generator for each part, so that no part's draws depend on another's.
+        start, imu, mag, odometer, radio, self.driver_rng = rng.spawn(6)
+        n = scenario.n_cars
+        self.world = World(scenario.room, scenario.obstacles, scenario.car, scenario.start(start))
+        self._imu = Imu(scenario.imu, n, imu)
+        self._mag = Magnetometer(scenario.mag, n, mag)
+        self._odometer = Odometer(scenario.odometer, n, odometer)
+        self._radio = Radio(scenario.radio, n, radio)
+        self._nodes = np.arange(n, dtype=np.int64)
+        self.odometer_speed: F64 = np.zeros(n)
+        """Last odometer reading, (car) [m/s]."""
+        self.nlos_share = 0.0
+        """Share of the ranges of the last step that an obstacle was in the way of."""
+        self.recording = Recording() if record else None
+
+    @property
+    def state(self) -> WorldState:
+        """The truth now."""
+        return self.world.state
+
+    @property
+    def t(self) -> float:
+        """Time [s]."""
+        return self.world.state.t
+
+    def step(self, command: DriveCommand, n_steps: int = 10) -> MeasurementBlock:
+        """Drive for some steps of `DT` and return all that was measured, in order."""
+        blocks: list[MeasurementBlock] = []
+        labels: list[Bool] = []
+        for _ in range(n_steps):
+            before = self.world.state
+            after = self.world.step(command, DT)
+            blocks += self._sample_inertial(after)
+            ranges = self._radio.listen(self.world, before, after)
+            blocks.append(ranges.block)
+            labels.append(ranges.nlos)
+            if self.recording is not None:
+                self.recording.states.append(after)
+        self.odometer_speed = self._odometer.sample(self.world.state.speed)
+        nlos = np.concatenate(labels)
+        self.nlos_share = float(nlos.mean()) if len(nlos) else 0.0
+        block = MeasurementBlock.concatenate(blocks).sorted()
+        if self.recording is not None:
+            self.recording.blocks.append(block)
+            self.recording.nlos.append(nlos)
+        return block
+
+    def to_log(self, name: str, *, truth_every: int = 2) -> Log:
+        """What was recorded, as a log with truth.
+
+        Args:
+            name: Its name.
+            truth_every: Truth of every so-manieth step; 2 is 50 Hz.
+        """
+        if self.recording is None:
+            raise ValueError("the simulation was not made with record=True")
+        states = self.recording.states[truth_every - 1 :: truth_every]
+        n = self.scenario.n_cars
+        pos = np.zeros((len(states) * n, 3))
+        pos[:, :2] = np.concatenate([s.pos_w for s in states])
+        heading = np.concatenate([s.heading for s in states])
+        rows = len(pos)
+        return Log(
+            name=name,
+            source=f"relpos-env simulation, scenario {self.scenario.name}",
+            licence="CC0-1.0",
+            constellation=self.constellation,
+            block=MeasurementBlock.concatenate(self.recording.blocks),
+            nlos=np.concatenate(self.recording.nlos),
+            truth=Truth(
+                np.repeat([s.t for s in states], n),
+                np.tile(self._nodes, len(states)),
+                pos,
+                quat_from_yaw(heading),
+                np.ones(rows, dtype=bool),
+                np.ones(rows, dtype=bool),
+            ),
+        )
+
+    def _sample_inertial(self, state: WorldState) -> list[MeasurementBlock]:
+        """IMU and magnetometer of every car."""
+        imu = self._imu.sample(state.heading, state.yaw_rate, state.accel_w, state.speed)
+        mag = self._mag.sample(state.pos_w, state.heading)
+        t = np.full(len(self._nodes), state.t)
+        return [
+            MeasurementBlock.of_kind(Kind.MAG, t, self._nodes, mag),
+            MeasurementBlock.of_kind(Kind.IMU, t, self._nodes, imu),
+        ]
