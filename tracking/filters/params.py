@@ -53,7 +53,7 @@ class StartParams:
     """[-] Ranges per pair whose mean starts the shape, the paper's first k measurements."""
     max_age: float = 2.0
     """[s] The first k measurements must come within this time."""
-    rotations_2d: int = 8
+    rotations_2d: int = 16
     """[-] Rotations tried in the plane, each with its mirror image."""
     prune: float = 40.0
     """[-] A hypothesis so much less likely than the best (log-likelihood) is dropped. Errors
@@ -81,8 +81,9 @@ class PairEkfParams:
     """[s] A node whose IMU was silent for so long is unaided."""
     orientation_std: float = 0.05
     """[rad] Error of one axis of a node's orientation; VQF states none."""
-    range_std: float = 0.10
-    """[m] Standard deviation of a range, 5 to 10 cm in real buildings."""
+    range_std: float = 0.15
+    """[m] Standard deviation of a range. 5 to 10 cm in sight; the rest is for the bias of real
+    ranges, which lasts for seconds."""
     survey_std: float = 0.02
     """[m] Standard deviation of a surveyed distance."""
     speed_model: Literal["range-rate", "speed-norm", "none"] = "range-rate"

@@ -1,0 +1,1 @@
+"""Controllers, reports and the command line: what people run."""

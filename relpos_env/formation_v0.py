@@ -1,0 +1,5 @@
+"""Formation driving on estimated relative positions: ``formation_v0.parallel_env()``."""
+
+from relpos_env.parallel_env import FormationEnv as parallel_env
+
+__all__ = ["parallel_env"]

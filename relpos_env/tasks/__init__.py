@@ -1,0 +1,27 @@
+"""Tasks: what a formation should be, and what is asked of each car. Adding one: a file and a line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from relpos_env.errors import EnvError
+from relpos_env.scenarios import Scenario
+from relpos_env.tasks.base import Task
+from relpos_env.tasks.ring import RingFormation
+
+TASKS: dict[str, Callable[[Scenario], Task]] = {"ring": RingFormation}
+"""Name to builder ``(scenario) -> Task``."""
+
+
+def make_task(name: str, scenario: Scenario) -> Task:
+    """Look a task up and build it.
+
+    Raises:
+        EnvError: No task of that name.
+    """
+    if name not in TASKS:
+        raise EnvError(f"task: expected one of {', '.join(TASKS)}, got {name!r}")
+    return TASKS[name](scenario)
+
+
+__all__ = ["TASKS", "Task", "make_task"]
