@@ -7,6 +7,7 @@ tables of observations, actions and rewards.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from relpos_env.interface.actions import ContinuousActions, DriveCommand
 from relpos_env.interface.observations import observation_mode
 from relpos_env.interface.views import AgentView
 from relpos_env.loop import LoopConfig, TrackedSimulation
+from relpos_env.scenarios import Scenario
 from relpos_env.scenarios import scenario as find_scenario
 from relpos_env.tasks import make_task
 from tracking.arrays import F64
@@ -64,8 +66,6 @@ class FormationEnv(ParallelEnv):  # type: ignore[misc]
         Raises:
             EnvError: An unknown name or a number out of range; the argument is named.
         """
-        from dataclasses import replace
-
         if render_mode is not None:
             raise EnvError(f"render_mode: expected None, got {render_mode!r}")
         if max_cycles < 1:
@@ -97,6 +97,15 @@ class FormationEnv(ParallelEnv):  # type: ignore[misc]
     def fields(self) -> tuple[Any, ...]:
         """Names, sizes and units of the stretches of an observation."""
         return self._mode.fields
+
+    @property
+    def scenario(self) -> Scenario:
+        """Room, obstacles, cars and sensors."""
+        return self._config.scenario
+
+    def target(self) -> F64:
+        """Wanted relative positions now, (car, other, 2) [m]."""
+        return self._task.target(self._t)
 
     @property
     def loop(self) -> TrackedSimulation:

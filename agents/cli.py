@@ -1,0 +1,253 @@
+"""The command line `relpos`. Imports of a command happen when it runs, so that help is quick."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+
+from agents.errors import UsageError
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="relpos-env", prog_name="relpos")
+def cli() -> None:
+    """Relative positions without anchors: track, simulate, drive in formation, measure."""
+
+
+def main() -> None:
+    """Run the command line; what a user can mend ends in one line and status 2."""
+    from relpos_env.errors import EnvError
+    from tracking.errors import TrackingError
+
+    try:
+        cli(standalone_mode=False)
+    except click.exceptions.Abort:
+        sys.exit(130)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(2)
+    except (TrackingError, EnvError, UsageError) as error:
+        click.echo(f"Error: {error}", err=True)
+        sys.exit(2)
+
+
+@cli.command()
+@click.argument("logs", metavar="LOG [LOG ...]", nargs=-1, required=True, type=Path)
+@click.option("--filter", "filters", multiple=True, help="Filter to run; may be given again.")
+@click.option("--skip", default=10.0, show_default=True, help="Seconds that are not scored.")
+@click.option("--out", type=Path, help="Folder for estimates.csv and report.html.")
+@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+def track(
+    logs: tuple[Path, ...], filters: tuple[str, ...], skip: float, out: Path | None, as_json: bool
+) -> None:
+    """Track recorded runs and score them where they have truth."""
+    from agents.report.track_report import track_report
+    from agents.track import estimates_csv, track_log
+    from tracking.filters import DEFAULT_FILTER, filter_builder
+    from tracking.log import read_log
+
+    if not skip >= 0.0:
+        raise UsageError(f"--skip: expected 0 or more seconds, got {skip:g}")
+    names = filters or (DEFAULT_FILTER,)
+    for name in names:
+        filter_builder(name)
+    read = [read_log(path) for path in logs]
+    results = []
+    for log in read:
+        for name in names:
+            label = f"{log.name}, {name}"
+            with progress_bar(label, shown=log.duration > 20.0) as report:
+                results.append(track_log(log, filter=name, skip=skip, progress=report))
+    if out is not None:
+        from agents.output import write_results
+
+        many = len(results) > 1
+        files = {"report.html": track_report(results)}
+        for k, r in enumerate(results):
+            folder = f"{k + 1:02d}-{_file_name(r.log.name)}-{r.filter}/" if many else ""
+            files[f"{folder}estimates.csv"] = estimates_csv(r.estimate)
+        write_results(out, files)
+    if as_json:
+        emit_json(r.summary for r in results)
+        return
+    _print_tracks(results)
+    if out is not None:
+        click.echo(f"\nwritten: {out / 'report.html'} and estimates.csv")
+
+
+@cli.command()
+@click.argument("out", type=Path)
+@click.option("--scenario", default="cars-nlos", show_default=True)
+@click.option("--seconds", default=120.0, show_default=True)
+@click.option("--seed", default=0, show_default=True)
+@click.option("--cars", default=3, show_default=True)
+@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+def simulate(
+    out: Path, scenario: str, seconds: float, seed: int, cars: int, as_json: bool
+) -> None:
+    """Record a simulated drive as a log folder with truth."""
+    from agents.simulate import simulate as run
+
+    with progress_bar(f"{scenario}, seed {seed}") as report:
+        log = run(
+            scenario=scenario, seconds=seconds, seed=seed, cars=cars, out=out, progress=report
+        )
+    nlos = float(log.nlos.mean()) if log.nlos is not None and len(log.nlos) else 0.0
+    record = {
+        "log": log.name,
+        "out": str(out),
+        "nodes": log.constellation.n_nodes,
+        "duration_s": log.duration,
+        "ranges": log.n_ranges,
+        "nlos_share": nlos,
+    }
+    if as_json:
+        emit_json([record])
+    else:
+        click.echo(
+            f"{out}: {record['nodes']} nodes, {log.duration:.0f} s, {log.n_ranges} ranges, "
+            f"{100 * nlos:.0f} % of them behind an obstacle"
+        )
+
+
+@cli.command()
+@click.option("--scenario", default="ring-nlos", show_default=True)
+@click.option("--seconds", default=60.0, show_default=True)
+@click.option("--seed", default=0, show_default=True)
+@click.option("--cars", default=3, show_default=True)
+@click.option("--out", type=Path, default=Path("demo"), show_default=True)
+@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+def demo(
+    scenario: str, seconds: float, seed: int, cars: int, out: Path, as_json: bool
+) -> None:
+    """Cars keep a formation on estimated relative positions; writes report.html."""
+    from agents.demo import SETTLE
+    from agents.demo import demo as run
+    from agents.output import write_results
+    from agents.report.demo_report import demo_report
+
+    if not 15.0 <= seconds <= 3600.0:
+        raise UsageError(f"--seconds: expected 15 to 3600, got {seconds:g}")
+    if seed < 0:
+        raise UsageError(f"--seed: expected 0 or more, got {seed}")
+    with progress_bar(f"{scenario}, seed {seed}") as report:
+        result = run(scenario=scenario, seconds=seconds, seed=seed, cars=cars, progress=report)
+    write_results(out, {"report.html": demo_report(result)})
+    if as_json:
+        emit_json(result.summary)
+        return
+    _print_tracks(result.tracks)
+    print_table(
+        "Formation error",
+        ["the cars are told", f"mean after {SETTLE:.0f} s [m]"],
+        [
+            ["what the tracker estimates", f"{result.formation_error:.3f}"],
+            ["the truth", f"{result.formation_error_truth:.3f}"],
+        ],
+    )
+    click.echo(
+        f"{100 * result.nlos_share:.0f} % of the ranges behind the wall, "
+        f"{result.collisions} contacts\nopen {out / 'report.html'} to see the drive"
+    )
+
+
+@cli.group()
+def bench() -> None:
+    """Measure speed, each figure beside a peer in the same run."""
+
+
+@bench.command("tracker")
+@click.option("--rounds", default=2000, show_default=True, help="Ranging rounds per figure.")
+@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+def bench_tracker(rounds: int, as_json: bool) -> None:
+    """Microseconds per ranging round, beside filterpy doing the same pair updates."""
+    from agents.bench.tracker import bench_tracker as run
+
+    if rounds < 100:
+        raise UsageError(f"--rounds: expected at least 100, got {rounds}")
+    with progress_bar("tracker") as report:
+        rows = run(rounds=rounds, progress=report)
+    if as_json:
+        emit_json(rows)
+        return
+    print_table(
+        "Time of one ranging round",
+        ["case", "value", "unit", "peer", "peer value", "ratio"],
+        [
+            [r["case"], f"{r['value']:.2f}", r["unit"], r["peer"], f"{r['peer_value']:.1f}",
+             f"{r['ratio']:.0f}"]
+            for r in rows
+        ],
+    )
+
+
+def emit_json(records: Any) -> None:
+    """One JSON object a line."""
+    for record in records:
+        click.echo(json.dumps(record, allow_nan=False))
+
+
+@contextmanager
+def progress_bar(label: str, *, shown: bool = True) -> Iterator[Callable[[float], None]]:
+    """A bar on stderr, drawn only on a terminal; gives the function to report the share done."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+
+    console = Console(stderr=True)
+    columns = (
+        TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn()
+    )
+    with Progress(*columns, console=console, disable=not shown or not console.is_terminal) as bar:
+        task = bar.add_task(label, total=1.0)
+        yield lambda share: bar.update(task, completed=share)
+
+
+def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """A table on stdout."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left", box=box.SIMPLE)
+    for k, name in enumerate(header):
+        table.add_column(name, justify="left" if k == 0 else "right", no_wrap=True)
+    for row in rows:
+        table.add_row(*row)
+    width = None if sys.stdout.isatty() else 120
+    Console(width=width).print(table)
+
+
+def _print_tracks(results: Sequence[Any]) -> None:
+    """Errors over all pairs and for each of them."""
+    from agents.report.page import metres
+    from agents.track import pair_name
+
+    rows = []
+    for r in results:
+        s = r.summary
+        head = [f"{s['log']}  {s['filter']}", "all"]
+        rows.append([*head, *(metres(s[k]) for k in ("rmse", "rmse_yaw", "rmse_shape"))])
+        pairs = [p for p, e in enumerate(r.score.pair_rmse) if e == e]
+        for p in pairs:
+            figures = (r.score.pair_rmse, r.score.pair_rmse_yaw, r.score.pair_rmse_shape)
+            name = pair_name(r.log.constellation, p)
+            rows.append(["", name, *(metres(float(f[p])) for f in figures)])
+    header = ["log and filter", "pair", "rmse", "rmse_yaw", "rmse_shape"]
+    print_table("Errors of relative positions [m]", header, rows)
+    for r in results:
+        skipped = ", ".join(f"{n} in {name}" for name, n in r.log.skipped.items()) or "0"
+        click.echo(
+            f"{r.log.name}, {r.filter}: {r.log.n_ranges} ranges in {r.log.duration:.0f} s, "
+            f"{r.n_rejected} refused as outliers, bad rows skipped: {skipped}, "
+            f"{r.realtime_factor:.0f} times faster than real time"
+        )
+
+
+def _file_name(name: str) -> str:
+    return "".join(ch if ch.isalnum() or ch in "-_" else "_" for ch in name)

@@ -1,0 +1,109 @@
+"""An animation of a drive, drawn by the browser from numbers: small, smooth, no video codec."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+_SCRIPT = """
+<canvas id="stage" width="1000" height="720"></canvas>
+<div class="bar"><button id="play">pause</button><input id="at" type="range" min="0" value="0">
+<span id="clock"></span></div>
+<p class="key">Filled cars are true. Outlines are where the tracker of the blue car believes the
+others to be, with ellipses of two standard deviations. Lines between cars: green in sight, orange
+behind the wall. Crosses mark the wanted formation around the blue car.</p>
+<script>
+(() => {
+const D = __DATA__;
+const cv = document.getElementById("stage"), g = cv.getContext("2d");
+const at = document.getElementById("at"), play = document.getElementById("play");
+const clock = document.getElementById("clock");
+const colours = ["#2563eb", "#dc2626", "#059669", "#d97706", "#7c3aed", "#0891b2"];
+at.max = D.t.length - 1;
+const scale = Math.min(680 / D.room[1], 680 / D.room[0]);
+const X = x => 360 + x * scale, Y = y => 360 - y * scale;
+function car(x, y, h, fill, stroke) {
+  g.save(); g.translate(X(x), Y(y)); g.rotate(-h);
+  const l = D.car[0] * scale, w = D.car[1] * scale;
+  g.beginPath(); g.roundRect(-l / 2, -w / 2, l, w, 4);
+  if (fill) { g.fillStyle = fill; g.fill(); }
+  g.lineWidth = 2; g.strokeStyle = stroke; g.stroke();
+  g.beginPath(); g.moveTo(l / 2, 0); g.lineTo(l / 4, 0); g.stroke(); g.restore();
+}
+function draw(k) {
+  g.clearRect(0, 0, cv.width, cv.height);
+  g.fillStyle = "#fff"; g.strokeStyle = "#98a2b3"; g.lineWidth = 3;
+  const w = D.room[0] * scale, d = D.room[1] * scale;
+  g.beginPath(); g.rect(360 - w / 2, 360 - d / 2, w, d); g.fill(); g.stroke();
+  g.fillStyle = "#475467";
+  for (const box of D.obstacles) { g.beginPath();
+    box.forEach((p, n) => n ? g.lineTo(X(p[0]), Y(p[1])) : g.moveTo(X(p[0]), Y(p[1])));
+    g.closePath(); g.fill(); }
+  const P = D.pos[k], n = P.length;
+  let pair = 0;
+  for (let a = 0; a < n; a++) for (let b = a + 1; b < n; b++, pair++) {
+    g.beginPath(); g.moveTo(X(P[a][0]), Y(P[a][1])); g.lineTo(X(P[b][0]), Y(P[b][1]));
+    g.strokeStyle = D.sight[k][pair] ? "#34d39988" : "#f59e0bcc"; g.lineWidth = 2; g.stroke(); }
+  for (let a = 0; a < n; a++) {
+    g.beginPath(); g.strokeStyle = colours[a % 6] + "55"; g.lineWidth = 2;
+    for (let m = Math.max(0, k - 40); m <= k; m++)
+      m === Math.max(0, k - 40) ? g.moveTo(X(D.pos[m][a][0]), Y(D.pos[m][a][1]))
+                                : g.lineTo(X(D.pos[m][a][0]), Y(D.pos[m][a][1]));
+    g.stroke(); }
+  for (let a = 0; a < n; a++) car(P[a][0], P[a][1], D.heading[k][a], colours[a % 6], "#1c2430");
+  for (let b = 1; b < n; b++) {
+    const T = D.target[k][b - 1], c = colours[b % 6];
+    const tx = X(P[0][0] + T[0]), ty = Y(P[0][1] + T[1]);
+    g.strokeStyle = c; g.lineWidth = 2; g.beginPath();
+    g.moveTo(tx - 6, ty - 6); g.lineTo(tx + 6, ty + 6); g.moveTo(tx - 6, ty + 6);
+    g.lineTo(tx + 6, ty - 6); g.stroke();
+    const E = D.estimate[k][b - 1]; if (!E) continue;
+    const ex = P[0][0] + E[0], ey = P[0][1] + E[1];
+    g.setLineDash([5, 4]); car(ex, ey, D.heading[k][b], null, c); g.setLineDash([]);
+    g.beginPath(); g.ellipse(X(ex), Y(ey), 2 * E[2] * scale, 2 * E[3] * scale, -E[4], 0, 7);
+    g.strokeStyle = c + "88"; g.stroke(); }
+  plot(k, D.tracking, "tracking error [m]", 40, "#2563eb");
+  plot(k, D.formation, "formation error [m]", 290, "#059669");
+  clock.textContent = D.t[k].toFixed(1) + " s";
+}
+function plot(k, values, title, top, colour) {
+  const left = 745, width = 240, height = 180;
+  const peak = Math.max(0.5, ...values.filter(v => v !== null));
+  g.fillStyle = "#1c2430"; g.font = "14px system-ui"; g.fillText(title, left, top - 8);
+  g.strokeStyle = "#e4e7ec"; g.lineWidth = 1; g.strokeRect(left, top, width, height);
+  g.fillStyle = "#667085"; g.font = "12px system-ui";
+  g.fillText(peak.toFixed(1), left + 4, top + 14);
+  g.beginPath(); g.strokeStyle = colour; g.lineWidth = 1.6; let pen = false;
+  for (let m = 0; m <= k; m++) { const v = values[m];
+    if (v === null) { pen = false; continue; }
+    const x = left + width * m / (values.length - 1), y = top + height * (1 - v / peak);
+    pen ? g.lineTo(x, y) : g.moveTo(x, y); pen = true; }
+  g.stroke();
+  const now = values[k];
+  if (now !== null) { g.fillStyle = colour; g.font = "bold 16px system-ui";
+    g.fillText(now.toFixed(2) + " m", left + width - 66, top + 20); }
+}
+let k = 0, running = true, last = 0;
+function tick(stamp) {
+  if (running && stamp - last > 1000 * D.dt) { last = stamp; k = (k + 1) % D.t.length;
+    at.value = k; draw(k); }
+  requestAnimationFrame(tick);
+}
+at.oninput = () => { k = +at.value; draw(k); };
+play.onclick = () => { running = !running; play.textContent = running ? "pause" : "play"; };
+draw(Number(location.hash.slice(1)) || 0); k = Number(location.hash.slice(1)) || 0;
+if (location.hash) { running = false; play.textContent = "play"; at.value = k; }
+requestAnimationFrame(tick);
+})();
+</script>
+"""
+
+
+def animation_markup(frames: dict[str, Any]) -> str:
+    """The player with its data.
+
+    Args:
+        frames: room, car size, obstacles, dt, and per frame t, pos, heading, sight, target,
+            estimate, tracking and formation error; see `agents.demo.record_frames`.
+    """
+    return _SCRIPT.replace("__DATA__", json.dumps(frames, separators=(",", ":")))

@@ -1,0 +1,60 @@
+"""The report of a demonstration: the animation, errors by filter, formation error over time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from agents.demo import SETTLE, DemoResult
+from agents.report.animation import animation_markup
+from agents.report.page import Page, metres
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def demo_report(result: DemoResult) -> str:
+    """One page."""
+    page = Page(
+        "Three cars, one formation, no anchors" if len(result.frames["pos"][0]) == 3
+        else "One formation, no anchors",
+        f"Scenario {result.scenario}, seed {result.seed}, {result.seconds:.0f} s: the cars know "
+        "each other only through simulated UWB ranges, inertial sensors and the tracker.",
+    )
+    page.raw(animation_markup(result.frames))
+    page.heading("Tracking error by filter")
+    rows = [
+        [r.filter, *(metres(r.summary[k]) for k in ("rmse", "rmse_yaw", "rmse_shape"))]
+        for r in result.tracks
+    ]
+    page.table(["filter", "rmse [m]", "rmse_yaw [m]", "rmse_shape [m]"], rows)
+    page.heading("Formation error")
+    page.table(
+        ["the cars are told", f"mean after {SETTLE:.0f} s [m]"],
+        [
+            ["what the tracker estimates", metres(result.formation_error)],
+            ["the truth", metres(result.formation_error_truth)],
+        ],
+    )
+    page.text(
+        f"{100 * result.nlos_share:.0f} % of the ranges had the wall in their way; the cars "
+        f"touched something {result.collisions} times."
+    )
+    page.figure(_over_time(result), "Errors over time, the tracker in the loop.")
+    return page.render()
+
+
+def _over_time(result: DemoResult) -> Figure:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11, 3.2), layout="constrained")
+    ax = figure.subplots()
+    f = result.frames
+    tracking = [np.nan if v is None else v for v in f["tracking"]]
+    ax.plot(f["t"], tracking, color="tab:blue", label="tracking error")
+    ax.plot(f["t"], f["formation"], color="tab:green", label="formation error")
+    ax.set(xlabel="t [s]", ylabel="error [m]", ylim=(0, None))
+    ax.legend()
+    ax.grid(alpha=0.3)
+    return figure

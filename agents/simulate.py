@@ -1,0 +1,63 @@
+"""Recording a simulated drive: what `relpos simulate` does, as a function."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from relpos_env.drivers import LoopDrivers
+from relpos_env.errors import EnvError
+from relpos_env.interface.actions import DriveCommand
+from relpos_env.loop import STAND_STILL
+from relpos_env.scenarios import scenario as find_scenario
+from relpos_env.sim import DT, Simulation
+from tracking.log import Log, write_log
+
+DECISION = 10
+"""[-] Steps of the physics between two decisions of the drivers."""
+
+
+def simulate(
+    *,
+    scenario: str = "cars-nlos",
+    seconds: float = 120.0,
+    seed: int = 0,
+    cars: int = 3,
+    out: Path | str | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Log:
+    """Let people drive cars about and record what their trackers measure, with the truth.
+
+    Args:
+        scenario: One of `relpos_env.scenarios.SCENARIOS`.
+        seconds: Length of the recording; the cars stand for the first two.
+        seed: Same seed, same recording, bit for bit.
+        cars: Number of cars.
+        out: Where to write the log folder; None writes nothing.
+        progress: Called with the share done, 0 to 1.
+
+    Raises:
+        EnvError: No such scenario, or a number out of range.
+        LogError: `out` exists already.
+    """
+    if not 3.0 <= seconds <= 86400.0:
+        raise EnvError(f"seconds: expected 3 to 86400, got {seconds:g}")
+    if seed < 0:
+        raise EnvError(f"seed: expected 0 or more, got {seed}")
+    chosen = replace(find_scenario(scenario), n_cars=cars)
+    sim = Simulation(chosen, np.random.default_rng(seed), record=True)
+    drivers = LoopDrivers(chosen, sim.driver_rng)
+    still = DriveCommand(0.0, np.zeros(cars), np.zeros(cars))
+    n_decisions = round(seconds / (DECISION * DT))
+    for k in range(n_decisions):
+        parked = sim.t < STAND_STILL
+        sim.step(still if parked else drivers.command(sim.state), DECISION)
+        if progress is not None:
+            progress((k + 1) / n_decisions)
+    log = sim.to_log(f"{scenario}-{seed}")
+    if out is not None:
+        write_log(out, log)
+    return log

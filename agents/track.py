@@ -1,0 +1,183 @@
+"""Tracking a recorded run: what `relpos track` does, as a function."""
+
+from __future__ import annotations
+
+import csv
+import io
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tracking.arrays import F64, Bool
+from tracking.constellation import Constellation
+from tracking.estimate import Status, TeamEstimate
+from tracking.filters import DEFAULT_FILTER
+from tracking.log import Log, read_log
+from tracking.metrics import Score, score
+from tracking.tracker import Tracker, TrackerParams
+
+CSV_HZ = 20.0
+"""[Hz] Rate of estimates.csv."""
+N_CHUNKS = 50
+"""A log is tracked in so many pieces, so that progress can be shown."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrackResult:
+    """One log tracked by one filter."""
+
+    log: Log
+    filter: str
+    estimate: TeamEstimate
+    """Over (time, pair), at `CSV_HZ`."""
+    truth_ij_w: F64
+    """True relative positions at those times, (time, pair, 3) [m]."""
+    has_truth: Bool
+    """(time, pair)"""
+    score: Score
+    """At the truth's own times."""
+    nis: float
+    """Mean NIS of accepted ranges [-]."""
+    n_rejected: int
+    """Ranges that the gate refused."""
+    skip: float
+    """[s] Time after the first range that is not scored."""
+    realtime_factor: float
+    """[-] Duration of the log over the time that tracking took."""
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The figures, ready for JSON; what could not be scored is None."""
+        constellation, s = self.log.constellation, self.score
+        pair_rmse = {
+            pair_name(constellation, p): _number(s.pair_rmse[p])
+            for p in range(constellation.n_pairs)
+            if np.isfinite(s.pair_rmse[p])
+        }
+        return {
+            "log": self.log.name,
+            "filter": self.filter,
+            "nodes": constellation.n_nodes,
+            "duration_s": self.log.duration,
+            "ranges": self.log.n_ranges,
+            "rmse": _number(s.rmse),
+            "rmse_yaw": _number(s.rmse_yaw),
+            "yaw_deg": _number(s.yaw_deg),
+            "rmse_shape": _number(s.rmse_shape),
+            "pair_rmse": pair_rmse,
+            "nees": _number(s.nees),
+            "nis": _number(self.nis),
+            "realtime_factor": _number(self.realtime_factor),
+            "rejected": self.n_rejected,
+            "skipped": sum(self.log.skipped.values()),
+        }
+
+
+def track_log(
+    log: Log | Path | str,
+    *,
+    filter: str = DEFAULT_FILTER,
+    skip: float = 10.0,
+    params: TrackerParams | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> TrackResult:
+    """Track a recorded run and score it where there is truth.
+
+    Args:
+        log: A log, or its folder.
+        filter: One of `tracking.filters.FILTERS`.
+        skip: Times until so many seconds after the first range are not scored.
+        params: What the tracker believes.
+        progress: Called with the share done, 0 to 1.
+
+    Raises:
+        LogError: The folder cannot be read.
+        ConfigError: No such filter.
+    """
+    log = log if isinstance(log, Log) else read_log(log)
+    constellation, block = log.constellation, log.block
+    tracker = Tracker(constellation, params, filter=filter)
+    first, last = log.t_range
+    grid = np.arange(first, last + 1e-9, 1.0 / CSV_HZ)
+    t_truth = log.truth.times()
+    t_truth = t_truth[(t_truth >= first) & (t_truth <= last)]
+    t_out = np.union1d(grid, t_truth)
+
+    started = time.perf_counter()
+    edges = np.linspace(block.t[0, 0], block.t[0, -1], N_CHUNKS + 1)[1:]
+    edges[-1] = max(block.t[0, -1], t_out[-1])
+    parts, event, out = [], 0, 0
+    for k, edge in enumerate(edges):
+        # An estimate holds every event up to its time, so both are cut at the same edge.
+        next_event = int(np.searchsorted(block.t[0], edge, side="right"))
+        next_out = int(np.searchsorted(t_out, edge, side="right"))
+        parts.append(tracker.run(block.take(slice(event, next_event)), t_out[out:next_out]))
+        event, out = next_event, next_out
+        if progress is not None:
+            progress((k + 1) / N_CHUNKS)
+    elapsed = time.perf_counter() - started
+    estimate = _join(constellation, parts)
+
+    truth, has_truth = log.truth.pairs(constellation, t_out)
+    at_truth = np.isin(t_out, t_truth)
+    on_grid = np.isin(t_out, grid)
+    return TrackResult(
+        log=log,
+        filter=filter,
+        estimate=_at_times(estimate, on_grid),
+        truth_ij_w=truth[on_grid],
+        has_truth=has_truth[on_grid],
+        score=score(
+            _at_times(estimate, at_truth), truth[at_truth], has_truth[at_truth], first + skip
+        ),
+        nis=float(tracker.mean_nis()[0]),
+        n_rejected=int(tracker.n_rejected()[0]),
+        skip=skip,
+        realtime_factor=log.duration / max(elapsed, 1e-9),
+    )
+
+
+def pair_name(constellation: Constellation, pair: int) -> str:
+    """A pair by the ids of its nodes, "1-2"."""
+    i, j = constellation.pairs[pair]
+    return f"{constellation.ids[i]}-{constellation.ids[j]}"
+
+
+def estimates_csv(estimate: TeamEstimate) -> str:
+    """A run as text: one row per time and pair that has an estimate."""
+    constellation = estimate.constellation
+    ids = [(constellation.ids[i], constellation.ids[j]) for i, j in constellation.pairs]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow("t_s,node_i,node_j,x,y,z,vx,vy,vz,sx,sy,sz,status".split(","))
+    std = estimate.pos_std
+    for k, t in enumerate(estimate.t):
+        for p, (i, j) in enumerate(ids):
+            status = Status(int(estimate.status[k, p]))
+            if status in (Status.ABSENT, Status.STARTING):
+                continue
+            numbers = (*estimate.pos_ij_w[k, p], *estimate.vel_ij_w[k, p], *std[k, p])
+            row = [f"{t:.6f}", i, j, *(f"{v:.5f}" for v in numbers), status.name.lower()]
+            writer.writerow(row)
+    return text.getvalue()
+
+
+def _join(constellation: Constellation, parts: Sequence[TeamEstimate]) -> TeamEstimate:
+    """Runs one after another, the env axis removed."""
+    names = TeamEstimate.__slots__[1:]
+    joined = (np.concatenate([getattr(part, n)[0] for part in parts]) for n in names)
+    return TeamEstimate(constellation, *joined)
+
+
+def _at_times(estimate: TeamEstimate, chosen: Bool) -> TeamEstimate:
+    arrays = (getattr(estimate, n)[chosen] for n in TeamEstimate.__slots__[1:])
+    return TeamEstimate(estimate.constellation, *arrays)
+
+
+def _number(value: float | None) -> float | None:
+    """A finite number, or None."""
+    return None if value is None or not np.isfinite(value) else float(value)
