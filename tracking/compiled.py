@@ -20,7 +20,16 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 def kernel(function: Function) -> Function:
     """Compile a function with numba, without the interpreter, and keep the result on disk."""
-    compiled = njit(cache=True)(function)
+    return _compile(function, inline=False)
+
+
+def small_kernel(function: Function) -> Function:
+    """A kernel whose code is put in place of every call: calls with many arrays are not free."""
+    return _compile(function, inline=True)
+
+
+def _compile(function: Function, *, inline: bool) -> Function:
+    compiled = njit(cache=True, forceinline=inline, **({'_nrt': False} if inline else {}))(function)
     if not config.DISABLE_JIT:
         package = function.__module__.partition(".")[0]
         folder = Path(inspect.getfile(function))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -57,15 +57,21 @@ def bench_tracker(
     return rows
 
 
+DIMENSIONS: dict[int, Literal[2, 3]] = {3: 2, 6: 3}
+"""The cars and the body trackers of the paper: three nodes in a plane, six in space."""
+
+
 def moving_group(n: int, seconds: float) -> tuple[Constellation, MeasurementBlock]:
-    """Nodes on circles of their own in space, with exact measurements of every round."""
-    constellation = Constellation(nodes=tuple(NodeConfig(id=k) for k in range(n)), dimensions=3)
+    """Nodes on circles of their own, with exact measurements of every round."""
+    d = DIMENSIONS[n]
+    constellation = Constellation(nodes=tuple(NodeConfig(id=k) for k in range(n)), dimensions=d)
     hz = round_rate(PAPER_PHY, n)
     t = np.arange(1, int(seconds * hz)) / hz
     rate = 1.0 + 0.3 * np.arange(n)
     phase = rate * t[:, None] + np.arange(n)
     axes = np.stack([np.cos(phase), np.sin(phase), 0.4 * np.sin(1.3 * phase)], axis=-1)
     centre = np.stack([np.cos(np.arange(n)), np.sin(2.0 * np.arange(n)), 0.3 * np.arange(n)], -1)
+    axes[..., d:], centre[..., d:] = 0.0, 0.0
     pos = 2.0 * centre + axes
     accel = -((rate[:, None] * np.array([1.0, 1.0, 1.3])) ** 2) * axes
     blocks = []
@@ -110,27 +116,27 @@ def _filterpy(n: int, rounds: int) -> float:
     """The peer's time per round [us]: one prediction and one range update of every pair."""
     from filterpy.kalman import ExtendedKalmanFilter
 
-    dt = 1.0 / round_rate(PAPER_PHY, n)
-    F = np.eye(6)  # noqa: N806
-    F[:3, 3:] = dt * np.eye(3)
-    B = np.vstack([0.5 * dt * dt * np.eye(3), dt * np.eye(3)])  # noqa: N806
+    dt, d = 1.0 / round_rate(PAPER_PHY, n), DIMENSIONS[n]
+    eye = np.eye(d)
+    F = np.block([[eye, dt * eye], [0.0 * eye, eye]])  # noqa: N806
+    B = np.vstack([0.5 * dt * dt * eye, dt * eye])  # noqa: N806
 
     def jacobian(x: F64) -> F64:
-        row = np.zeros((1, 6))
-        row[0, :3] = x[:3, 0] / np.linalg.norm(x[:3, 0])
+        row = np.zeros((1, 2 * d))
+        row[0, :d] = x[:d, 0] / np.linalg.norm(x[:d, 0])
         return row
 
     def distance(x: F64) -> F64:
-        return np.array([[np.linalg.norm(x[:3, 0])]])
+        return np.array([[np.linalg.norm(x[:d, 0])]])
 
     filters = []
     for _ in range(n * (n - 1) // 2):
-        ekf = ExtendedKalmanFilter(dim_x=6, dim_z=1)
-        ekf.x = np.array([[2.0, 1.0, 0.5, 0.0, 0.0, 0.0]]).T
+        ekf = ExtendedKalmanFilter(dim_x=2 * d, dim_z=1)
+        ekf.x = np.concatenate([np.array([2.0, 1.0, 0.5])[:d], np.zeros(d)])[:, None]
         ekf.F, ekf.B = F, B
         ekf.Q, ekf.R = 1e-3 * B @ B.T / dt, np.array([[0.01]])
         filters.append(ekf)
-    accel, z = np.array([[0.1, 0.0, 0.0]]).T, np.array([[2.3]])
+    accel, z = np.full((d, 1), 0.1), np.array([[2.3]])
     best = np.inf
     for _ in range(REPEATS):
         began = time.perf_counter()

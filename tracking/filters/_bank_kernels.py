@@ -3,77 +3,111 @@
 from __future__ import annotations
 
 import numpy as np
-from tracking.compiled import kernel
 
+from tracking.compiled import kernel, small_kernel
 from tracking.filters._mds_kernels import refine
-from tracking.filters._pair_kernels import correct
+from tracking.filters._start_kernels import copy_hypothesis, hypothesis_positions
 
 
-@kernel
-def refine_group(c, nodes, pairs, bank, e):
-    """Correct every hypothesis with the MDS refinement of its positions."""
-    n = nodes.present.shape[1]
-    members = np.empty(n, np.int64)
+@small_kernel
+def refine_group(c, s, layout, scratch):
+    """Move the positions of every hypothesis to their MDS refinement.
+
+    Returns:
+        True if the reported layout was too flat to tell its mirror image and now is not.
+    """
+    n = s.nodes.shape[0]
     m = 0
     for i in range(n):
-        if nodes.present[e, i]:
-            members[m] = i
+        if s.nodes[i].present:
+            scratch.members[m] = i
             m += 1
+    opened = False
     if m < 3:
-        return
-    pos, X = np.zeros((m, m, 3)), np.empty((m, 3))
-    for h in range(bank.alive.shape[1]):
-        if not bank.alive[e, h]:
+        return opened
+    for h in range(s.alive.shape[0]):
+        if not s.alive[h]:
             continue
-        for a in range(m):
-            for b in range(a + 1, m):
-                x = pairs.x[e, h, c.pair_index[members[a], members[b]]]
-                for k in range(3):
-                    pos[a, b, k] = x[k]
-                    pos[b, a, k] = -x[k]
-        spread = refine(pos, c.d, X)
-        if h == bank.best[e]:
-            watch_flat(c, nodes, pairs, bank, e, h, X, spread)
+        gather(c, s, layout, scratch, m, h)
+        spread = refine(scratch.T, scratch.K, scratch.X, scratch.small, m, c.d)
+        if h == s.group[0].best:
+            if spread < c.mds_min_spread:
+                s.group[0].flat = True
+            elif s.group[0].flat and spread > 2.0 * c.mds_min_spread:
+                s.group[0].flat = False
+                opened = True
         if spread < c.mds_min_spread:
             continue
         for a in range(m):
             for b in range(a + 1, m):
-                p = c.pair_index[members[a], members[b]]
-                move_to(c, pairs.x[e, h, p], pairs.P[e, h, p], X[b] - X[a])
+                p = layout.pair_index[scratch.members[a], scratch.members[b]]
+                move_to(c, s, p, h, scratch.T, a, b)
+    return opened
 
 
-@kernel
-def move_to(c, x, P, pos):
+@small_kernel
+def gather(c, s, layout, scratch, m, h):
+    """Squared distances, and positions by least squares over all pairs of one hypothesis."""
+    for a in range(m):
+        scratch.K[a, a] = 0.0
+        for k in range(3):
+            scratch.T[a, k] = 0.0
+    for a in range(m):
+        for b in range(a + 1, m):
+            p = layout.pair_index[scratch.members[a], scratch.members[b]]
+            squared = 0.0
+            for k in range(c.d):
+                v = s.x[p, h, k]
+                squared += v * v
+                scratch.T[b, k] += v / m
+                scratch.T[a, k] -= v / m
+            scratch.K[a, b] = squared
+            scratch.K[b, a] = squared
+
+
+@small_kernel
+def move_to(c, s, p, h, T, a, b):
     """Replace the position of a filter; the velocity follows by the filter's covariance.
 
-    The covariance stays as it is: the refined position holds nothing that the filters of the
+    With ``G = (P_xx + R)^-1`` the state moves by ``P_xx G nu`` and ``P_vx G nu``. The
+    covariance stays as it is: the refined position holds nothing that the filters of the
     group did not know already.
     """
-    H, scratch = np.zeros(6), P.copy()
-    for k in range(c.d):
-        H[k] = 1.0
-        correct(x, scratch, H, pos[k] - x[k], c.mds_var, c.d)
-        H[k] = 0.0
+    x, P, d = s.x, s.P, c.d
+    y0, y1, y2 = 0.0, 0.0, 0.0
+    n0 = T[b, 0] - T[a, 0] - x[p, h, 0]
+    n1 = T[b, 1] - T[a, 1] - x[p, h, 1]
+    A00, A01, A11 = P[p, h, 0, 0] + c.mds_var, P[p, h, 0, 1], P[p, h, 1, 1] + c.mds_var
+    if d == 2:
+        inverse = 1.0 / (A00 * A11 - A01 * A01)
+        y0, y1 = (A11 * n0 - A01 * n1) * inverse, (A00 * n1 - A01 * n0) * inverse
+    else:
+        n2 = T[b, 2] - T[a, 2] - x[p, h, 2]
+        A02, A12, A22 = P[p, h, 0, 2], P[p, h, 1, 2], P[p, h, 2, 2] + c.mds_var
+        c00, c01, c02 = A11 * A22 - A12 * A12, A02 * A12 - A01 * A22, A01 * A12 - A02 * A11
+        inverse = 1.0 / (A00 * c00 + A01 * c01 + A02 * c02)
+        c11, c12, c22 = A00 * A22 - A02 * A02, A01 * A02 - A00 * A12, A00 * A11 - A01 * A01
+        y0 = (c00 * n0 + c01 * n1 + c02 * n2) * inverse
+        y1 = (c01 * n0 + c11 * n1 + c12 * n2) * inverse
+        y2 = (c02 * n0 + c12 * n1 + c22 * n2) * inverse
+    for k in range(6):
+        x[p, h, k] += P[p, h, k, 0] * y0 + P[p, h, k, 1] * y1 + P[p, h, k, 2] * y2
 
 
 @kernel
-def watch_flat(c, nodes, pairs, bank, e, h, X, spread):
-    """A layout that was flat and opens again may be its mirror image: make that a hypothesis."""
-    if spread < c.mds_min_spread:
-        bank.flat[e] = True
-    elif bank.flat[e] and spread > 2.0 * c.mds_min_spread:
-        bank.flat[e] = False
-        for target in range(bank.alive.shape[1]):
-            if not bank.alive[e, target]:
-                mirror_hypothesis(c, pairs, bank, e, h, target, X)
-                break
+def add_mirror_image(c, s, layout):
+    """Make the mirror image of the reported hypothesis one, if the bank has room.
 
-
-@kernel
-def mirror_hypothesis(c, pairs, bank, e, h, target, X):
-    """Copy a hypothesis, mirrored across the line or plane that its layout X is nearest to."""
-    layout = np.ascontiguousarray(X[:, : c.d])
-    _, E = np.linalg.eigh(layout.T @ layout)
+    It is mirrored across the line or plane that the layout is nearest to.
+    """
+    h = s.group[0].best
+    target = copy_hypothesis(s, h)
+    if target < 0:
+        return
+    pos = np.zeros((s.nodes.shape[0], 3))
+    hypothesis_positions(s, layout, h, pos)
+    flat = pos[:, : c.d].copy()
+    _, E = np.linalg.eigh(flat.T.copy() @ flat)
     M = np.zeros((6, 6))
     for r in range(3):
         M[r, r] = M[3 + r, 3 + r] = 1.0
@@ -81,75 +115,79 @@ def mirror_hypothesis(c, pairs, bank, e, h, target, X):
         for k in range(c.d):
             M[r, k] -= 2.0 * E[r, 0] * E[k, 0]
             M[3 + r, 3 + k] -= 2.0 * E[r, 0] * E[k, 0]
-    for p in range(c.pairs.shape[0]):
-        pairs.x[e, target, p] = M @ np.ascontiguousarray(pairs.x[e, h, p])
-        pairs.P[e, target, p] = M @ np.ascontiguousarray(pairs.P[e, h, p]) @ M.T
-    bank.alive[e, target] = True
-    bank.loglik[e, target] = bank.loglik[e, h]
+    for p in range(s.pairs.shape[0]):
+        s.x[p, target] = M @ s.x[p, h].copy()
+        s.P[p, target] = M @ s.P[p, h].copy() @ M.T.copy()
 
 
 @kernel
-def prune_bank(c, nodes, pairs, bank, e):
+def prune_bank(c, s):
     """Drop hypotheses that are unlikely or the same as a better one; choose the best."""
-    n_hyps = bank.alive.shape[1]
+    group = s.group[0]
+    if group.n_alive < 2:
+        return
+    n_hyps = s.alive.shape[0]
     best = -1
     for h in range(n_hyps):
-        if bank.alive[e, h] and (best < 0 or bank.loglik[e, h] > bank.loglik[e, best]):
+        if s.alive[h] and (best < 0 or s.loglik[h] > s.loglik[best]):
             best = h
-    if best < 0:
-        return
-    reported = bank.best[e]
     # The report changes only for a clear gain, or equal hypotheses would take turns.
-    if not bank.alive[e, reported] or bank.loglik[e, best] > bank.loglik[e, reported] + 2.0:
-        bank.best[e] = best
-    top = bank.loglik[e, best]
+    if not s.alive[group.best] or s.loglik[best] > s.loglik[group.best] + 2.0:
+        group.best = best
+    top = s.loglik[best]
     for h in range(n_hyps):
-        if bank.alive[e, h] and h != bank.best[e] and bank.loglik[e, h] < top - c.prune:
-            bank.alive[e, h] = False
+        if s.alive[h] and h != group.best and s.loglik[h] < top - c.prune:
+            s.alive[h] = False
     for a in range(n_hyps):
         for b in range(n_hyps):
             if (
                 a != b
-                and bank.alive[e, a]
-                and bank.alive[e, b]
-                and b != bank.best[e]
-                and (bank.loglik[e, a] >= bank.loglik[e, b] or a == bank.best[e])
-                and are_same(c, nodes, pairs, e, a, b)
+                and s.alive[a]
+                and s.alive[b]
+                and b != group.best
+                and (s.loglik[a] >= s.loglik[b] or a == group.best)
+                and are_same(c, s, a, b)
             ):
-                bank.alive[e, b] = False
+                s.alive[b] = False
+    group.n_alive = np.sum(s.alive)
 
 
 @kernel
-def are_same(c, nodes, pairs, e, a, b):
+def are_same(c, s, a, b):
     """True when two hypotheses agree in the position of every pair."""
-    for p in range(c.pairs.shape[0]):
-        if nodes.present[e, c.pairs[p, 0]] and nodes.present[e, c.pairs[p, 1]]:
-            s = 0.0
+    for p in range(s.pairs.shape[0]):
+        if s.nodes[s.pairs[p].i].present and s.nodes[s.pairs[p].j].present:
+            squared = 0.0
             for k in range(3):
-                s += (pairs.x[e, a, p, k] - pairs.x[e, b, p, k]) ** 2
-            if s > c.merge_distance**2:
+                squared += (s.x[p, a, k] - s.x[p, b, k]) ** 2
+            if squared > c.merge_distance**2:
                 return False
     return True
 
 
 @kernel
-def remove_node(c, nodes, pairs, bank, e, i):
+def remove_node(s, layout, i):
     """Destroy the filters of a node that left."""
-    nodes.present[e, i] = False
-    nodes.heard[e, i] = False
-    for k in range(nodes.present.shape[1]):
+    s.nodes[i].present = False
+    s.nodes[i].heard = False
+    n_present = 0
+    for k in range(s.nodes.shape[0]):
+        n_present += s.nodes[k].present
         if k != i:
-            p = c.pair_index[i, k]
-            pairs.start_n[e, p] = 0
-            pairs.n_ranges[e, p] = 0
-    if np.sum(nodes.present[e]) < 2:
-        nodes.present[e, :] = False
-        bank.alive[e, :] = False
+            pair = s.pairs[layout.pair_index[i, k]]
+            pair.start_n = 0
+            pair.n_ranges = 0
+    if n_present < 2:
+        for k in range(s.nodes.shape[0]):
+            s.nodes[k].present = False
+        s.alive[:] = False
+        s.group[0].n_alive = 0
+        s.group[0].started = False
 
 
 @kernel
-def remove_silent(c, nodes, pairs, bank, e, t):
+def remove_silent(c, s, layout, t):
     """Remove the nodes that were not heard for so long that they must have left."""
-    for i in range(nodes.present.shape[1]):
-        if nodes.present[e, i] and t - nodes.t_heard[e, i] > c.leave_after:
-            remove_node(c, nodes, pairs, bank, e, i)
+    for i in range(s.nodes.shape[0]):
+        if s.nodes[i].present and t - s.nodes[i].t_heard > c.leave_after:
+            remove_node(s, layout, i)

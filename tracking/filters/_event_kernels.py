@@ -2,147 +2,221 @@
 
 from __future__ import annotations
 
-import numpy as np
-from tracking.compiled import kernel
+import math
+from typing import NamedTuple
 
+import numpy as np
+
+from tracking.compiled import kernel, small_kernel
 from tracking.filters._bank_kernels import (
+    add_mirror_image,
     prune_bank,
     refine_group,
     remove_node,
     remove_silent,
 )
-from tracking.filters._range_kernels import advance_pair, fuse_range, fuse_survey, node_psd
 from tracking.filters._pair_kernels import predict
+from tracking.filters._range_kernels import (
+    advance_pair,
+    fuse_range,
+    fuse_survey,
+    is_aided,
+    node_variance,
+)
 from tracking.filters._start_kernels import collect, try_join, try_start
+from tracking.filters.state import FilterState
 
 # Plain numbers of `Kind` and `Status`: kernels do not know enums.
 JOIN, STATE, SURVEY, RANGE, LEAVE = 0, 3, 4, 5, 6
 ABSENT, STARTING, AMBIGUOUS, OK, LOST = 0, 1, 2, 3, 4
 
 
+class Scratch(NamedTuple):
+    """Room for intermediate results, so that no event allocates."""
+
+    work: np.ndarray
+    """Jacobian and its product with P, (2, 6)."""
+    members: np.ndarray
+    """Present nodes, (node)."""
+    T: np.ndarray
+    """Positions, (node, 3)."""
+    K: np.ndarray
+    """Kernel of the MDS, (node, node)."""
+    X: np.ndarray
+    """(node, 3)"""
+    small: np.ndarray
+    """(2, 3, 3)"""
+
+
 @kernel
-def run_events(c, nodes, pairs, bank, block, t_out, out):
+def run_events(coefficients, layout, state, block, t_out, out):
     """Handle the events of every environment in order.
 
     Args:
-        c: Coefficients.
-        nodes: NodeState, updated.
-        pairs: PairState, updated.
-        bank: BankState, updated.
+        coefficients: COEFFICIENTS, (1).
+        layout: Tables.
+        state: FilterState, updated.
         block: Events: t, kind, i, j, antenna_i, antenna_j, values, valid; (env, event, ...).
         t_out: Times at which estimates are due, ascending, (env, time) [s]. An estimate
             holds every event up to its time, that time included.
         out: Arrays written: pos, vel, cov, q, has_q, age, nis, status; (env, time, ...).
     """
     t, kind, node_i, node_j, antenna_i, antenna_j, values, valid = block
+    c = coefficients[0]
+    n = state.nodes.shape[1]
+    scratch = Scratch(
+        np.zeros((2, 6)),
+        np.zeros(n, np.int64),
+        np.zeros((n, 3)),
+        np.zeros((n, n)),
+        np.zeros((n, 3)),
+        np.zeros((2, 3, 3)),
+    )
     for e in range(t.shape[0]):
+        s = FilterState(
+            state.nodes[e],
+            state.held[e],
+            state.pairs[e],
+            state.group[e],
+            state.x[e],
+            state.P[e],
+            state.alive[e],
+            state.loglik[e],
+        )
         o = 0
         for k in range(t.shape[1]):
             if not valid[e, k]:
                 continue
             while o < t_out.shape[1] and t_out[e, o] < t[e, k]:
-                write_estimate(c, nodes, pairs, bank, e, t_out[e, o], o, out)
+                write_estimate(c, s, t_out[e, o], e, o, out)
                 o += 1
             i, j, what = node_i[e, k], node_j[e, k], kind[e, k]
             if what == STATE:
-                take_state(c, nodes, pairs, bank, e, i, t[e, k], values[e, k])
+                take_state(c, s, layout, i, t[e, k], values, e, k)
             elif what == RANGE or what == SURVEY:
                 a_i, a_j = antenna_i[e, k], antenna_j[e, k]
                 if i > j:
                     i, j, a_i, a_j = j, i, a_j, a_i
                 distance = values[e, k, 0]
-                take_range(
-                    c, nodes, pairs, bank, e, i, j, a_i, a_j, t[e, k], distance, what == SURVEY
-                )
-            elif what == LEAVE or (what == JOIN and nodes.present[e, i]):
-                remove_node(c, nodes, pairs, bank, e, i)
+                is_survey = what == SURVEY
+                if t[e, k] - s.group[0].t_check >= c.check_period:
+                    look_at_group(c, s, layout, t[e, k])
+                p, runs = hear(s, layout, i, j, t[e, k])
+                if not runs:
+                    take_first_range(c, s, layout, i, j, p, t[e, k], distance, is_survey)
+                elif take_range(
+                    c, s, layout, scratch, p, a_i, a_j, t[e, k], distance, is_survey
+                ):
+                    add_mirror_image(c, s, layout)
+            elif what == LEAVE or (what == JOIN and s.nodes[i].present):
+                remove_node(s, layout, i)
         while o < t_out.shape[1]:
-            write_estimate(c, nodes, pairs, bank, e, t_out[e, o], o, out)
+            write_estimate(c, s, t_out[e, o], e, o, out)
             o += 1
 
 
-@kernel
-def take_state(c, nodes, pairs, bank, e, i, t, values):
+@small_kernel
+def take_state(c, s, layout, i, t, values, e, k):
     """A new orientation and acceleration of node i, held until the next."""
-    if nodes.present[e, i]:
-        for k in range(nodes.present.shape[1]):
-            if k != i and nodes.present[e, k]:
-                advance_pair(c, nodes, pairs, bank, e, c.pair_index[i, k], t)
-    nodes.q_wb[e, i] = values[:4]
-    nodes.accel_w[e, i] = values[4:7]
-    nodes.t_state[e, i] = t
-    nodes.has_state[e, i] = True
+    node = s.nodes[i]
+    if node.present:
+        for other in range(s.nodes.shape[0]):
+            if other != i and s.nodes[other].present:
+                advance_pair(c, s, layout.pair_index[i, other], t)
+    for column in range(7):
+        s.held[i, column] = values[e, k, column]
+    node.t_state = t
+    node.has_state = True
 
 
-@kernel
-def take_range(c, nodes, pairs, bank, e, i, j, a_i, a_j, t, distance, is_survey):
-    """A range or survey between i and j, i < j."""
-    if t - bank.t_check[e] >= c.check_period:
-        remove_silent(c, nodes, pairs, bank, e, t)
-        prune_bank(c, nodes, pairs, bank, e)
-        bank.t_check[e] = t
-    p = c.pair_index[i, j]
-    for n in (i, j):
-        nodes.heard[e, n] = True
-        nodes.t_heard[e, n] = t
-    if not (nodes.present[e, i] and nodes.present[e, j]):
-        collect(c, pairs, e, p, t, distance, c.start_k if is_survey else 1)
-        if not np.any(nodes.present[e]):
-            try_start(c, nodes, pairs, bank, e, t)
-        else:
-            for n in (i, j):
-                if not nodes.present[e, n]:
-                    try_join(c, nodes, pairs, bank, e, n, t)
-        return
-    advance_pair(c, nodes, pairs, bank, e, p, t)
+@small_kernel
+def hear(s, layout, i, j, t):
+    """Note that i and j were heard; returns their pair and whether its filters run."""
+    node_i, node_j = s.nodes[i], s.nodes[j]
+    node_i.heard, node_j.heard = True, True
+    node_i.t_heard, node_j.t_heard = t, t
+    return layout.pair_index[i, j], node_i.present and node_j.present
+
+
+@small_kernel
+def take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, is_survey):
+    """A range or survey of a running pair; True if the layout opened after being flat."""
+    advance_pair(c, s, p, t)
     if is_survey:
-        fuse_survey(c, pairs, bank, e, p, distance)
-        pairs.t_range[e, p] = t
+        fuse_survey(c, s, p, distance, scratch.work)
+        s.pairs[p].t_range = t
     else:
-        fuse_range(c, nodes, pairs, bank, e, p, t, distance, a_i, a_j)
-    if c.use_mds and t - bank.t_mds[e] >= c.mds_period:
-        for q in range(c.pairs.shape[0]):
-            if nodes.present[e, c.pairs[q, 0]] and nodes.present[e, c.pairs[q, 1]]:
-                advance_pair(c, nodes, pairs, bank, e, q, t)
-        refine_group(c, nodes, pairs, bank, e)
-        bank.t_mds[e] = t
+        fuse_range(c, s, layout, p, t, distance, a_i, a_j, scratch.work)
+    if not c.use_mds or t - s.group[0].t_mds < c.mds_period:
+        return False
+    for q in range(s.pairs.shape[0]):
+        if s.nodes[s.pairs[q].i].present and s.nodes[s.pairs[q].j].present:
+            advance_pair(c, s, q, t)
+    s.group[0].t_mds = t
+    return refine_group(c, s, layout, scratch)
 
 
 @kernel
-def write_estimate(c, nodes, pairs, bank, e, t, o, out):
+def take_first_range(c, s, layout, i, j, p, t, distance, is_survey):
+    """A range or survey of a pair that does not run yet, i < j."""
+    collect(c, s.pairs[p], t, distance, is_survey)
+    if not s.group[0].started:
+        try_start(c, s, layout, t)
+        return
+    if not s.nodes[i].present:
+        try_join(c, s, layout, i, t)
+    if not s.nodes[j].present:
+        try_join(c, s, layout, j, t)
+
+
+@kernel
+def look_at_group(c, s, layout, t):
+    """From time to time: who left, and which hypotheses are still worth their time."""
+    remove_silent(c, s, layout, t)
+    prune_bank(c, s)
+    s.group[0].t_check = t
+
+
+@kernel
+def write_estimate(c, s, t, e, o, out):
     """The best hypothesis at time t, without touching the state."""
     pos, vel, cov, q_wb, has_q, age, nis, status = out
-    h = bank.best[e]
-    ambiguous = np.sum(bank.alive[e]) > 1
-    x, P = np.empty(6), np.empty((6, 6))
-    a_i, a_j = np.zeros(3), np.zeros(3)
-    q_wb[e, o] = nodes.q_wb[e]
-    has_q[e, o] = nodes.has_state[e]
-    for p in range(c.pairs.shape[0]):
-        i, j = c.pairs[p, 0], c.pairs[p, 1]
-        nis[e, o, p] = pairs.nis[e, p]
-        if not (nodes.present[e, i] and nodes.present[e, j]):
-            heard = nodes.heard[e, i] and nodes.heard[e, j]
-            status[e, o, p] = STARTING if heard else ABSENT
-            pos[e, o, p], vel[e, o, p], cov[e, o, p], age[e, o, p] = 0.0, 0.0, 0.0, 0.0
+    h = s.group[0].best
+    x, P = np.zeros((1, 1, 6)), np.zeros((1, 1, 6, 6))
+    for n in range(s.nodes.shape[0]):
+        has_q[e, o, n] = s.nodes[n].has_state
+        for k in range(4):
+            q_wb[e, o, n, k] = s.held[n, k]
+    for p in range(s.pairs.shape[0]):
+        pair = s.pairs[p]
+        node_i, node_j = s.nodes[pair.i], s.nodes[pair.j]
+        nis[e, o, p] = pair.nis
+        if not (node_i.present and node_j.present):
+            status[e, o, p] = STARTING if node_i.heard and node_j.heard else ABSENT
             continue
-        x[:] = pairs.x[e, h, p]
-        P[:] = pairs.P[e, h, p]
-        psd_i, aided_i = node_psd(c, nodes, e, i, t)
-        psd_j, aided_j = node_psd(c, nodes, e, j, t)
-        for k in range(3):
-            a_i[k] = nodes.accel_w[e, i, k] if aided_i else 0.0
-            a_j[k] = nodes.accel_w[e, j, k] if aided_j else 0.0
-        psd = np.sqrt(psd_i * psd_i + psd_j * psd_j)
-        predict(x, P, t - pairs.t[e, p], a_i, a_j, psd, c.d)
-        pos[e, o, p] = x[:3]
-        vel[e, o, p] = x[3:]
-        cov[e, o, p] = P
-        age[e, o, p] = t - pairs.t_range[e, p]
-        rigid = c.is_static[i] and c.is_static[j]
-        if ambiguous:
+        x[0, 0] = s.x[p, h]
+        P[0, 0] = s.P[p, h]
+        aided_i, aided_j = is_aided(c, node_i, t), is_aided(c, node_j, t)
+        w_i, w_j = 1.0 if aided_i else 0.0, 1.0 if aided_j else 0.0
+        predict(
+            x,
+            P,
+            0,
+            0,
+            t - pair.t,
+            w_j * s.held[pair.j, 4] - w_i * s.held[pair.i, 4],
+            w_j * s.held[pair.j, 5] - w_i * s.held[pair.i, 5],
+            w_j * s.held[pair.j, 6] - w_i * s.held[pair.i, 6],
+            math.sqrt(node_variance(c, node_i, aided_i) + node_variance(c, node_j, aided_j)),
+            c.d,
+        )
+        pos[e, o, p] = x[0, 0, :3]
+        vel[e, o, p] = x[0, 0, 3:]
+        cov[e, o, p] = P[0, 0]
+        age[e, o, p] = t - pair.t_range
+        if s.group[0].n_alive > 1:
             status[e, o, p] = AMBIGUOUS
-        elif age[e, o, p] > c.lost_after and not rigid:
+        elif age[e, o, p] > c.lost_after and not (node_i.static and node_j.static):
             status[e, o, p] = LOST
         else:
             status[e, o, p] = OK

@@ -1,108 +1,127 @@
 """The Kalman filter of one pair: prediction and scalar corrections, in place.
 
-State ``x = (pos_ij, vel_ij)``, six numbers, and covariance ``P``. In two dimensions the
-vertical rows stay exactly zero: nothing is uncertain across the plane.
+State ``x = (pos_ij, vel_ij)``, six numbers, and covariance ``P``, of pair p in hypothesis h.
+In two dimensions the vertical rows stay exactly zero: nothing is uncertain across the plane.
+Arrays are indexed inside the kernels, since handing on slices costs more than the algebra.
 """
 
 from __future__ import annotations
 
-import numpy as np
-from tracking.compiled import kernel
+import math
+
+from tracking.compiled import small_kernel
 
 MIN_DISTANCE = 0.01
 """[m] Closer than this a direction has no meaning and a range is not used."""
 
 
-@kernel
-def predict(x, P, dt, accel_i, accel_j, psd, d):
-    """Dead reckoning over dt with constant accelerations.
+@small_kernel
+def predict(x, P, p, h, dt, a0, a1, a2, psd, d):
+    """Dead reckoning over dt [s] with a constant relative acceleration a0 a1 a2 [m/s2].
 
-    ``pos += dt vel + dt^2/2 a``, ``vel += dt a``, ``a = accel_j - accel_i``, and
+    ``pos += dt vel + dt^2/2 a``, ``vel += dt a`` and
     ``P = F P F^T + W (psd^2 / dt) W^T`` with ``W = (dt^2/2, dt)`` per axis, [1] eq. 8-9.
     """
     if dt <= 0.0:
         return
     half = 0.5 * dt * dt
-    for k in range(d):
-        a = accel_j[k] - accel_i[k]
-        x[k] += dt * x[3 + k] + half * a
-        x[3 + k] += dt * a
+    x[p, h, 0] += dt * x[p, h, 3] + half * a0
+    x[p, h, 3] += dt * a0
+    x[p, h, 1] += dt * x[p, h, 4] + half * a1
+    x[p, h, 4] += dt * a1
+    if d == 3:
+        x[p, h, 2] += dt * x[p, h, 5] + half * a2
+        x[p, h, 5] += dt * a2
     for r in range(d):
-        for c in range(r, d):
-            p_vv = P[3 + r, 3 + c]
-            p_xx = P[r, c] + dt * (P[r, 3 + c] + P[3 + r, c]) + dt * dt * p_vv
-            P[r, c] = p_xx
-            P[c, r] = p_xx
+        for k in range(r, d):
+            p_vv = P[p, h, 3 + r, 3 + k]
+            p_xx = P[p, h, r, k] + dt * (P[p, h, r, 3 + k] + P[p, h, k, 3 + r]) + dt * dt * p_vv
+            P[p, h, r, k] = p_xx
+            P[p, h, k, r] = p_xx
     for r in range(d):
-        for c in range(d):
-            p_xv = P[r, 3 + c] + dt * P[3 + r, 3 + c]
-            P[r, 3 + c] = p_xv
-            P[3 + c, r] = p_xv
-    q = psd * psd
+        for k in range(d):
+            p_xv = P[p, h, r, 3 + k] + dt * P[p, h, 3 + r, 3 + k]
+            P[p, h, r, 3 + k] = p_xv
+            P[p, h, 3 + k, r] = p_xv
+    q = psd * psd * dt
     for k in range(d):
-        P[k, k] += 0.25 * q * dt * dt * dt
-        P[k, 3 + k] += 0.5 * q * dt * dt
-        P[3 + k, k] = P[k, 3 + k]
-        P[3 + k, 3 + k] += q * dt
+        P[p, h, k, k] += 0.25 * q * dt * dt
+        p_xv = P[p, h, k, 3 + k] + 0.5 * q * dt
+        P[p, h, k, 3 + k] = p_xv
+        P[p, h, 3 + k, k] = p_xv
+        P[p, h, 3 + k, 3 + k] += q
 
 
-@kernel
-def correct(x, P, H, nu, R, d):
-    """Scalar Kalman update with innovation nu and row H, Joseph form; returns the NIS.
+@small_kernel
+def correct(x, P, p, h, work, nu, R):
+    """Scalar Kalman update, Joseph form, with innovation nu; returns its variance S.
 
     ``P (I - KH)`` is expanded to ``P - K (PH)^T - (PH) K^T + K S K^T``, which keeps P
     symmetric and positive for every K.
+
+    Args:
+        x: States.
+        P: Covariances.
+        p: Pair.
+        h: Hypothesis.
+        work: Row 0 holds the Jacobian H; row 1 is scratch; (2, 6).
+        nu: Innovation.
+        R: Variance of the measurement.
     """
-    PH = np.empty(6)
     S = R
     for r in range(6):
         s = 0.0
-        for c in range(6):
-            s += P[r, c] * H[c]
-        PH[r] = s
-        S += H[r] * s
+        for k in range(6):
+            s += P[p, h, r, k] * work[0, k]
+        work[1, r] = s
+        S += work[0, r] * s
     inv_S = 1.0 / S
     for r in range(6):
-        x[r] += PH[r] * inv_S * nu
+        x[p, h, r] += work[1, r] * inv_S * nu
     for r in range(6):
-        K_r = PH[r] * inv_S
-        for c in range(r, 6):
-            K_c = PH[c] * inv_S
-            p = P[r, c] - K_r * PH[c] - PH[r] * K_c + K_r * S * K_c
-            P[r, c] = p
-            P[c, r] = p
-    return nu * nu * inv_S
+        K_r = work[1, r] * inv_S
+        for k in range(r, 6):
+            v = P[p, h, r, k] - K_r * work[1, k]
+            P[p, h, r, k] = v
+            P[p, h, k, r] = v
+    return S
 
 
-@kernel
-def range_model(x, lever, H):
-    """Distance between two antennas and its Jacobian; ``lever`` is offset_j - offset_i [m]."""
-    r0, r1, r2 = x[0] + lever[0], x[1] + lever[1], x[2] + lever[2]
-    distance = np.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
+@small_kernel
+def range_model(x, p, h, l0, l1, l2, work):
+    """Distance between two antennas; writes its Jacobian to row 0 of work.
+
+    ``l0 l1 l2`` is the antenna's offset on j minus that on i, world frame [m].
+    """
+    r0, r1, r2 = x[p, h, 0] + l0, x[p, h, 1] + l1, x[p, h, 2] + l2
+    distance = math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
     inverse = 1.0 / max(distance, MIN_DISTANCE)
-    H[0], H[1], H[2] = r0 * inverse, r1 * inverse, r2 * inverse
-    H[3] = H[4] = H[5] = 0.0
+    work[0, 0], work[0, 1], work[0, 2] = r0 * inverse, r1 * inverse, r2 * inverse
+    work[0, 3] = work[0, 4] = work[0, 5] = 0.0
     return distance
 
 
-@kernel
-def range_rate_model(x, lever, H):
+@small_kernel
+def range_rate_model(x, p, h, l0, l1, l2, work):
     """Rate of the distance, ``u . vel`` with u the unit vector along it, and its Jacobian."""
-    distance = max(range_model(x, lever, H), MIN_DISTANCE)
-    rate = H[0] * x[3] + H[1] * x[4] + H[2] * x[5]
+    distance = max(range_model(x, p, h, l0, l1, l2, work), MIN_DISTANCE)
+    rate = 0.0
     for k in range(3):
-        u = H[k]
-        H[k] = (x[3 + k] - rate * u) / distance
-        H[3 + k] = u
+        rate += work[0, k] * x[p, h, 3 + k]
+    for k in range(3):
+        u = work[0, k]
+        work[0, k] = (x[p, h, 3 + k] - rate * u) / distance
+        work[0, 3 + k] = u
     return rate
 
 
-@kernel
-def speed_model(x, H):
+@small_kernel
+def speed_model(x, p, h, work):
     """Relative speed ``|vel|`` and its Jacobian: the model that the paper's text writes."""
-    speed = np.sqrt(x[3] * x[3] + x[4] * x[4] + x[5] * x[5])
+    v0, v1, v2 = x[p, h, 3], x[p, h, 4], x[p, h, 5]
+    speed = math.sqrt(v0 * v0 + v1 * v1 + v2 * v2)
     inverse = 1.0 / max(speed, 1e-6)
     for k in range(3):
-        H[k] = 0.0
-        H[3 + k] = x[3 + k] * inverse
+        work[0, k] = 0.0
+        work[0, 3 + k] = x[p, h, 3 + k] * inverse
     return speed

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-from tracking.compiled import kernel
+import math
 
+from tracking.compiled import kernel, small_kernel
 from tracking.filters._pair_kernels import (
     correct,
     predict,
@@ -13,132 +13,145 @@ from tracking.filters._pair_kernels import (
     speed_model,
 )
 
-LN_2PI = float(np.log(2.0 * np.pi))
+LN_2PI = math.log(2.0 * math.pi)
 
 
-@kernel
-def node_psd(c, nodes, e, n, t):
-    """Acceleration noise that a node adds now, and whether its IMU is heard."""
-    if c.is_static[n]:
-        return 0.0, False
-    if nodes.has_state[e, n] and t - nodes.t_state[e, n] <= c.unaided_after:
-        return c.accel_psd[n], True
-    return c.unaided_psd, False
+@small_kernel
+def is_aided(c, node, t):
+    """True if the IMU of a node is heard."""
+    return node.has_state and t - node.t_state <= c.unaided_after
 
 
-@kernel
-def advance_pair(c, nodes, pairs, bank, e, p, t):
+@small_kernel
+def advance_pair(c, s, p, t):
     """Predict pair p of every hypothesis to time t."""
-    dt = t - pairs.t[e, p]
+    pair = s.pairs[p]
+    dt = t - pair.t
     if dt <= 0.0:
         return
-    i, j = c.pairs[p, 0], c.pairs[p, 1]
-    psd_i, aided_i = node_psd(c, nodes, e, i, t)
-    psd_j, aided_j = node_psd(c, nodes, e, j, t)
-    psd = np.sqrt(psd_i * psd_i + psd_j * psd_j)
-    a_i, a_j = np.zeros(3), np.zeros(3)
-    for k in range(3):
-        if aided_i:
-            a_i[k] = nodes.accel_w[e, i, k]
-        if aided_j:
-            a_j[k] = nodes.accel_w[e, j, k]
-    for h in range(bank.alive.shape[1]):
-        if bank.alive[e, h]:
-            predict(pairs.x[e, h, p], pairs.P[e, h, p], dt, a_i, a_j, psd, c.d)
-    pairs.t[e, p] = t
+    i, j = pair.i, pair.j
+    aided_i, aided_j = is_aided(c, s.nodes[i], t), is_aided(c, s.nodes[j], t)
+    q = node_variance(c, s.nodes[i], aided_i) + node_variance(c, s.nodes[j], aided_j)
+    w_i, w_j = 1.0 if aided_i else 0.0, 1.0 if aided_j else 0.0
+    a0 = w_j * s.held[j, 4] - w_i * s.held[i, 4]
+    a1 = w_j * s.held[j, 5] - w_i * s.held[i, 5]
+    a2 = w_j * s.held[j, 6] - w_i * s.held[i, 6]
+    psd = math.sqrt(q)
+    group = s.group[0]
+    first, end = (0, s.alive.shape[0]) if group.n_alive > 1 else (group.best, group.best + 1)
+    for h in range(first, end):
+        if s.alive[h]:
+            predict(s.x, s.P, p, h, dt, a0, a1, a2, psd, c.d)
+    pair.t = t
 
 
-@kernel
-def lever_arm(c, nodes, e, i, j, antenna_i, antenna_j, lever):
-    """offset_j - offset_i of two antennas in the world frame, written to lever [m]."""
-    for k in range(3):
-        lever[k] = 0.0
-    for side in range(2):
-        n, antenna, sign = (j, antenna_j, 1.0) if side else (i, antenna_i, -1.0)
-        w, x, y, z = nodes.q_wb[e, n]
-        o0, o1, o2 = c.antenna_b[antenna]
-        # v + 2 w (u x v) + 2 u x (u x v), with u the vector part
-        c0, c1, c2 = y * o2 - z * o1, z * o0 - x * o2, x * o1 - y * o0
-        lever[0] += sign * (o0 + 2.0 * (w * c0 + y * c2 - z * c1))
-        lever[1] += sign * (o1 + 2.0 * (w * c1 + z * c0 - x * c2))
-        lever[2] += sign * (o2 + 2.0 * (w * c2 + x * c1 - y * c0))
+@small_kernel
+def node_variance(c, node, aided):
+    """Squared acceleration noise density that a node adds."""
+    if node.static:
+        return 0.0
+    return node.psd * node.psd if aided else c.unaided_psd * c.unaided_psd
 
 
-@kernel
-def passes_gate(c, pairs, bank, e, p, t, distance):
+@small_kernel
+def antenna_offset(s, layout, n, antenna):
+    """Position of an antenna relative to its node in the world frame [m]."""
+    o0, o1, o2 = layout.antenna_b[antenna, 0], layout.antenna_b[antenna, 1], layout.antenna_b[antenna, 2]
+    w, x, y, z = s.held[n, 0], s.held[n, 1], s.held[n, 2], s.held[n, 3]
+    # o + 2 w (u x o) + 2 u x (u x o), with u the vector part
+    c0, c1, c2 = y * o2 - z * o1, z * o0 - x * o2, x * o1 - y * o0
+    return (
+        o0 + 2.0 * (w * c0 + y * c2 - z * c1),
+        o1 + 2.0 * (w * c1 + z * c0 - x * c2),
+        o2 + 2.0 * (w * c2 + x * c1 - y * c0),
+    )
+
+
+@small_kernel
+def passes_gate(c, s, p, t, distance):
     """The outlier gate of the paper; updates the running average.
 
     The allowed variation grows with the relative speed and with the age of the average, so
     that a node that was silent and came back passes.
     """
-    if pairs.n_ranges[e, p] == 0:
-        pairs.mean_distance[e, p] = distance
-        pairs.in_a_row[e, p] = 0
+    pair = s.pairs[p]
+    if pair.n_ranges == 0:
+        pair.mean_distance = distance
+        pair.in_a_row = 0
         return True
-    age = t - pairs.t_range[e, p]
-    x = pairs.x[e, bank.best[e], p]
-    speed = np.sqrt(x[3] * x[3] + x[4] * x[4] + x[5] * x[5])
+    age = t - pair.t_range
+    b = s.group[0].best
+    v0, v1, v2 = s.x[p, b, 3], s.x[p, b, 4], s.x[p, b, 5]
+    speed = math.sqrt(v0 * v0 + v1 * v1 + v2 * v2)
     lag = c.gate_tau + age
     allowed = c.gate_floor + c.gate_speed_gain * max(speed, c.gate_min_speed) * lag
-    jump = distance - pairs.mean_distance[e, p]
+    jump = distance - pair.mean_distance
     if abs(jump) > allowed:
-        pairs.n_rejected[e, p] += 1
-        pairs.in_a_row[e, p] += 1
-        if pairs.in_a_row[e, p] < c.gate_max_rejected:
+        pair.n_rejected += 1
+        pair.in_a_row += 1
+        if pair.in_a_row < c.gate_max_rejected:
             return False
-        pairs.mean_distance[e, p] = distance
+        pair.mean_distance = distance
     else:
-        pairs.mean_distance[e, p] += jump * age / lag
-    pairs.in_a_row[e, p] = 0
+        pair.mean_distance += jump * age / lag
+    pair.in_a_row = 0
     return True
 
 
 @kernel
-def fuse_survey(c, pairs, bank, e, p, distance):
+def fuse_survey(c, s, p, distance, work):
     """Correct pair p of every hypothesis with a surveyed distance."""
-    H, lever = np.empty(6), np.zeros(3)
-    for h in range(bank.alive.shape[1]):
-        if bank.alive[e, h]:
-            x = pairs.x[e, h, p]
-            nu = distance - range_model(x, lever, H)
-            correct(x, pairs.P[e, h, p], H, nu, c.survey_var, c.d)
+    for h in range(s.alive.shape[0]):
+        if s.alive[h]:
+            nu = distance - range_model(s.x, p, h, 0.0, 0.0, 0.0, work)
+            correct(s.x, s.P, p, h, work, nu, c.survey_var)
 
 
-@kernel
-def fuse_range(c, nodes, pairs, bank, e, p, t, distance, antenna_i, antenna_j):
+@small_kernel
+def update_rate(c, pair, t, distance):
+    """Low-pass the derivative of the range; True once the filter has settled."""
+    age = t - pair.t_range
+    if pair.n_ranges > 0 and 0.0 < age < 3.0 * c.speed_tau:
+        raw = (distance - pair.last_distance) / age
+        pair.rate += age / (c.speed_tau + age) * (raw - pair.rate)
+        return pair.n_ranges * age > 2.0 * c.speed_tau
+    if age > 0.0:
+        pair.rate = 0.0
+        pair.n_ranges = 0
+    return False
+
+
+@small_kernel
+def fuse_range(c, s, layout, p, t, distance, antenna_i, antenna_j, work):
     """Gate a range, then correct pair p of every hypothesis with it and with its rate."""
-    if not passes_gate(c, pairs, bank, e, p, t, distance):
-        return False
-    lever, H = np.empty(3), np.empty(6)
-    lever_arm(c, nodes, e, c.pairs[p, 0], c.pairs[p, 1], antenna_i, antenna_j, lever)
-    age = t - pairs.t_range[e, p]
-    has_rate = pairs.n_ranges[e, p] > 0 and 0.0 < age < 3.0 * c.speed_tau
-    if has_rate:
-        raw = (distance - pairs.last_distance[e, p]) / age
-        pairs.rate[e, p] += age / (c.speed_tau + age) * (raw - pairs.rate[e, p])
-    elif age > 0.0:
-        pairs.rate[e, p] = 0.0
-        pairs.n_ranges[e, p] = 0
-    has_rate = has_rate and pairs.n_ranges[e, p] * age > 2.0 * c.speed_tau
-    for h in range(bank.alive.shape[1]):
-        if not bank.alive[e, h]:
+    if not passes_gate(c, s, p, t, distance):
+        return
+    pair = s.pairs[p]
+    i0, i1, i2 = antenna_offset(s, layout, pair.i, antenna_i)
+    j0, j1, j2 = antenna_offset(s, layout, pair.j, antenna_j)
+    l0, l1, l2 = j0 - i0, j1 - i1, j2 - i2
+    has_rate = update_rate(c, pair, t, distance)
+    group = s.group[0]
+    many = group.n_alive > 1
+    first, end = (0, s.alive.shape[0]) if many else (group.best, group.best + 1)
+    for h in range(first, end):
+        if not s.alive[h]:
             continue
-        x, P = pairs.x[e, h, p], pairs.P[e, h, p]
-        nu = distance - range_model(x, lever, H)
-        nis = correct(x, P, H, nu, c.range_var, c.d)
-        S = nu * nu / max(nis, 1e-12) if nu != 0.0 else c.range_var
-        bank.loglik[e, h] -= 0.5 * (min(nis, c.max_nis) + np.log(S) + LN_2PI)
-        if h == bank.best[e]:
-            pairs.nis[e, p] = nis
-            bank.nis_sum[e] += nis
-            bank.nis_n[e] += 1
+        nu = distance - range_model(s.x, p, h, l0, l1, l2, work)
+        S = correct(s.x, s.P, p, h, work, nu, c.range_var)
+        nis = nu * nu / S
+        if many:
+            s.loglik[h] -= 0.5 * (min(nis, c.max_nis) + math.log(S) + LN_2PI)
+        if h == group.best:
+            pair.nis = nis
+            group.nis_sum += nis
+            group.nis_n += 1
         if has_rate and c.speed_model == 1:
-            nu = pairs.rate[e, p] - range_rate_model(x, lever, H)
-            correct(x, P, H, nu, c.speed_var, c.d)
+            nu = pair.rate - range_rate_model(s.x, p, h, l0, l1, l2, work)
+            correct(s.x, s.P, p, h, work, nu, c.speed_var)
         elif has_rate and c.speed_model == 2:
-            nu = abs(pairs.rate[e, p]) - speed_model(x, H)
-            correct(x, P, H, nu, c.speed_var, c.d)
-    pairs.last_distance[e, p] = distance
-    pairs.t_range[e, p] = t
-    pairs.n_ranges[e, p] += 1
-    return True
+            nu = abs(pair.rate) - speed_model(s.x, p, h, work)
+            correct(s.x, s.P, p, h, work, nu, c.speed_var)
+    pair.last_distance = distance
+    pair.t_range = t
+    pair.n_ranges += 1

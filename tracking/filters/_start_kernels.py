@@ -9,122 +9,133 @@ side it is, both sides become hypotheses. Velocities start at zero and P at the 
 from __future__ import annotations
 
 import numpy as np
+
 from tracking.compiled import kernel
 
-
-@kernel
-def collect(c, pairs, e, p, t, distance, weight):
-    """Add one of the first ranges of a pair; a survey counts as all k of them."""
-    if pairs.start_n[e, p] > 0 and t - pairs.start_t[e, p] > c.start_max_age:
-        if weight == 1 and pairs.start_n[e, p] < 1_000_000:
-            pairs.start_n[e, p] = 0
-    if weight > 1:
-        pairs.start_sum[e, p] = distance * 1_000_000
-        pairs.start_n[e, p] = 1_000_000
-        pairs.start_t[e, p] = t
-    elif pairs.start_n[e, p] < 1_000_000:
-        if pairs.start_n[e, p] == 0:
-            pairs.start_sum[e, p] = 0.0
-            pairs.start_t[e, p] = t
-        pairs.start_sum[e, p] += distance
-        pairs.start_n[e, p] += 1
+SURVEYED = 1_000_000
+"""So many ranges a surveyed distance counts as."""
 
 
 @kernel
-def is_ready(c, pairs, e, i, j):
+def collect(c, pair, t, distance, is_survey):
+    """Add one of the first ranges of a pair; a survey replaces them."""
+    if is_survey:
+        pair.start_sum = distance * SURVEYED
+        pair.start_n = SURVEYED
+        return
+    if pair.start_n >= SURVEYED:
+        return
+    if pair.start_n == 0 or t - pair.start_t > c.start_max_age:
+        pair.start_n = 0
+        pair.start_sum = 0.0
+        pair.start_t = t
+    pair.start_sum += distance
+    pair.start_n += 1
+
+
+@kernel
+def is_ready(c, s, layout, i, j):
     """True when a pair has its first k ranges."""
-    return pairs.start_n[e, c.pair_index[i, j]] >= c.start_k
+    return s.pairs[layout.pair_index[i, j]].start_n >= c.start_k
 
 
 @kernel
-def start_distance(c, pairs, e, i, j):
+def start_distance(s, layout, i, j):
     """Mean of the first ranges of a pair [m]."""
-    p = c.pair_index[i, j]
-    return pairs.start_sum[e, p] / pairs.start_n[e, p]
+    pair = s.pairs[layout.pair_index[i, j]]
+    return pair.start_sum / pair.start_n
 
 
 @kernel
-def begin_pair(c, pairs, e, h, p, pos, t):
+def begin_pair(c, s, h, p, pos, t):
     """Put a new filter at a relative position: v = 0, P = 1."""
-    x, P = pairs.x[e, h, p], pairs.P[e, h, p]
-    x[:] = 0.0
-    P[:] = 0.0
-    both_static = c.is_static[c.pairs[p, 0]] and c.is_static[c.pairs[p, 1]]
+    pair = s.pairs[p]
+    both_static = s.nodes[pair.i].static and s.nodes[pair.j].static
+    s.x[p, h, :] = 0.0
+    s.P[p, h, :, :] = 0.0
     for k in range(c.d):
-        x[k] = pos[k]
-        P[k, k] = 1.0
-        P[3 + k, 3 + k] = 0.0 if both_static else 1.0
-    pairs.t[e, p] = t
-    pairs.t_range[e, p] = t
-    pairs.n_ranges[e, p] = 0
-    pairs.in_a_row[e, p] = 0
-    pairs.rate[e, p] = 0.0
+        s.x[p, h, k] = pos[k]
+        s.P[p, h, k, k] = 1.0
+        s.P[p, h, 3 + k, 3 + k] = 0.0 if both_static else 1.0
+    pair.t = t
+    pair.t_range = t
+    pair.n_ranges = 0
+    pair.in_a_row = 0
+    pair.rate = 0.0
 
 
 @kernel
-def try_start(c, nodes, pairs, bank, e, t):
-    """Start the group with the nodes whose pairs are all ready; True if it did."""
-    n = nodes.present.shape[1]
-    members = np.empty(n, np.int64)
-    m = 0
+def choose_members(c, s, layout, members):
+    """Nodes of which all pairs are ready, written; returns how many, 0 if too few to start."""
+    n = s.nodes.shape[0]
     for first in range(n):
-        m = 0
         members[0] = first
         m = 1
         for k in range(n):
             fits = k != first
             for a in range(m):
-                if fits and (members[a] == k or not is_ready(c, pairs, e, members[a], k)):
+                if fits and (members[a] == k or not is_ready(c, s, layout, members[a], k)):
                     fits = False
             if fits:
                 members[m] = k
                 m += 1
         if m >= min(3, n):
-            break
-    if m < min(3, n):
-        return False
+            return m
+    return 0
+
+
+@kernel
+def try_start(c, s, layout, t):
+    """Start the group with the nodes whose pairs are all ready."""
+    members = np.empty(s.nodes.shape[0], np.int64)
+    m = choose_members(c, s, layout, members)
+    if m == 0:
+        return
     D2 = np.zeros((m, m))
     for a in range(m):
         for b in range(m):
             if a != b:
-                D2[a, b] = start_distance(c, pairs, e, members[a], members[b]) ** 2
+                D2[a, b] = start_distance(s, layout, members[a], members[b]) ** 2
     J = np.eye(m) - 1.0 / m
     eigenvalues, E = np.linalg.eigh(-0.5 * J @ D2 @ J)
     X = np.zeros((m, 3))
     for k in range(min(c.d, m)):
         X[:, k] = E[:, m - 1 - k] * np.sqrt(max(eigenvalues[m - 1 - k], 0.0))
     for a in range(m):
-        nodes.present[e, members[a]] = True
-    for h in range(c.rotations.shape[0]):
-        bank.alive[e, h] = True
-        bank.loglik[e, h] = 0.0
-        Y = X @ np.ascontiguousarray(c.rotations[h].T)
+        s.nodes[members[a]].present = True
+    for h in range(layout.rotations.shape[0]):
+        s.alive[h] = True
+        s.loglik[h] = 0.0
+        Y = X @ layout.rotations[h].T.copy()
         for a in range(m):
             for b in range(m):
-                i, j = members[a], members[b]
-                if i < j:
-                    begin_pair(c, pairs, e, h, c.pair_index[i, j], Y[b] - Y[a], t)
-    bank.best[e] = 0
-    bank.t_check[e] = t
-    bank.t_mds[e] = t
-    return True
+                if members[a] < members[b]:
+                    p = layout.pair_index[members[a], members[b]]
+                    begin_pair(c, s, h, p, Y[b] - Y[a], t)
+    group = s.group[0]
+    group.started = True
+    group.flat = False
+    group.n_alive = layout.rotations.shape[0]
+    group.best = 0
+    group.t_check = t
+    group.t_mds = t
 
 
 @kernel
-def hypothesis_positions(c, nodes, pairs, e, h, pos):
+def hypothesis_positions(s, layout, h, pos):
     """Positions of the present nodes in one hypothesis, relative to their centre (node, 3)."""
     n = pos.shape[0]
     n_present = 0
     for i in range(n):
-        n_present += nodes.present[e, i]
+        n_present += s.nodes[i].present
     for j in range(n):
         for k in range(3):
-            s = 0.0
+            total = 0.0
             for i in range(n):
-                if i != j and nodes.present[e, i] and nodes.present[e, j]:
-                    x = pairs.x[e, h, c.pair_index[i, j], k]
-                    s += x if i < j else -x
-            pos[j, k] = s / n_present
+                if i != j and s.nodes[i].present and s.nodes[j].present:
+                    v = s.x[layout.pair_index[i, j], h, k]
+                    total += v if i < j else -v
+            pos[j, k] = total / n_present
 
 
 @kernel
@@ -144,8 +155,8 @@ def place(c, known, distance, sides):
     centre = np.zeros(d)
     for a in range(m):
         centre += known[a, :d] / m
-    A = known[:, :d] - centre
-    _, S, Vt = np.linalg.svd(np.ascontiguousarray(A.T @ A))
+    A = known[:, :d].copy() - centre
+    _, S, Vt = np.linalg.svd(A.T.copy() @ A)
     spanned = 0
     for k in range(d):
         if np.sqrt(S[k] / m) > c.mds_min_spread:
@@ -157,7 +168,8 @@ def place(c, known, distance, sides):
     b -= np.mean(b)
     p = np.zeros(d)
     for k in range(spanned):
-        p += Vt[k] * (np.sum((A @ Vt[k]) * b) / S[k])
+        along = Vt[k].copy()
+        p += along * (np.sum((A @ along) * b) / S[k])
     sides[:, :] = 0.0
     height2 = 0.0
     for a in range(m):
@@ -173,55 +185,52 @@ def place(c, known, distance, sides):
 
 
 @kernel
-def try_join(c, nodes, pairs, bank, e, new, t):
-    """Take a node in once it is ready with enough of the others; True if it joined."""
-    n = nodes.present.shape[1]
+def try_join(c, s, layout, new, t):
+    """Take a node in once it is ready with enough of the others."""
+    n = s.nodes.shape[0]
     n_present, n_ready = 0, 0
     ready = np.empty(n, np.int64)
     for k in range(n):
-        if nodes.present[e, k]:
+        if s.nodes[k].present:
             n_present += 1
-            if is_ready(c, pairs, e, new, k):
+            if is_ready(c, s, layout, new, k):
                 ready[n_ready] = k
                 n_ready += 1
     if n_ready < min(c.d + 1, n_present):
-        return False
+        return
     pos, sides = np.zeros((n, 3)), np.empty((2, 3))
     known, distance = np.empty((n_ready, 3)), np.empty(n_ready)
-    n_hyps = bank.alive.shape[1]
-    was_alive = bank.alive[e].copy()
+    n_hyps = s.alive.shape[0]
+    was_alive = s.alive.copy()
     for h in range(n_hyps):
         if not was_alive[h]:
             continue
-        hypothesis_positions(c, nodes, pairs, e, h, pos)
+        hypothesis_positions(s, layout, h, pos)
         for a in range(n_ready):
             known[a] = pos[ready[a]]
-            distance[a] = start_distance(c, pairs, e, new, ready[a])
+            distance[a] = start_distance(s, layout, new, ready[a])
         n_sides = place(c, known, distance, sides)
         for side in range(n_sides):
-            target = h
-            if side == 1:
-                target = -1
-                for free in range(n_hyps):
-                    if not bank.alive[e, free] and target < 0:
-                        target = free
-                if target < 0:
-                    break
-                bank.alive[e, target] = True
-                bank.loglik[e, target] = bank.loglik[e, h]
-                pairs.x[e, target] = pairs.x[e, h]
-                pairs.P[e, target] = pairs.P[e, h]
+            target = h if side == 0 else copy_hypothesis(s, h)
+            if target < 0:
+                break
             for k in range(n):
-                if nodes.present[e, k]:
+                if s.nodes[k].present:
                     sign = 1.0 if k < new else -1.0
-                    begin_pair(
-                        c,
-                        pairs,
-                        e,
-                        target,
-                        c.pair_index[k, new],
-                        sign * (sides[side] - pos[k]),
-                        t,
-                    )
-    nodes.present[e, new] = True
-    return True
+                    p = layout.pair_index[k, new]
+                    begin_pair(c, s, target, p, sign * (sides[side] - pos[k]), t)
+    s.nodes[new].present = True
+
+
+@kernel
+def copy_hypothesis(s, h):
+    """A copy of a hypothesis in a free place of the bank; -1 if there is none."""
+    for free in range(s.alive.shape[0]):
+        if not s.alive[free]:
+            s.alive[free] = True
+            s.loglik[free] = s.loglik[h]
+            s.x[:, free] = s.x[:, h]
+            s.P[:, free] = s.P[:, h]
+            s.group[0].n_alive += 1
+            return free
+    return -1

@@ -16,8 +16,6 @@ References:
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from tracking.arrays import F64, Bool, I64
@@ -25,7 +23,7 @@ from tracking.constellation import Constellation
 from tracking.estimate import TeamEstimate
 from tracking.filters._event_kernels import run_events
 from tracking.filters.params import PairEkfParams
-from tracking.filters.state import BankState, NodeState, PairState, make_coefficients, make_state
+from tracking.filters.state import FilterState, make_coefficients, make_layout, make_state
 from tracking.measurements import MeasurementBlock
 
 
@@ -40,11 +38,10 @@ class PairEkf:
         *,
         use_mds: bool = True,
     ) -> None:
-        self._constellation = constellation
+        self._constellation, self._params, self._n_envs = constellation, params, n_envs
         self._coefficients = make_coefficients(constellation, params, use_mds=use_mds)
-        n_hyps = len(self._coefficients.rotations)
-        self._nodes, self._pairs, self._bank = make_state(constellation, n_envs, n_hyps)
-        self._n_envs = n_envs
+        self._layout = make_layout(constellation, params)
+        self._state = self._fresh(n_envs)
 
     def run(self, block: MeasurementBlock, t_out: F64) -> TeamEstimate:
         """Handle the events and report at the given times; see `Filter.run`."""
@@ -61,7 +58,7 @@ class PairEkf:
         )
         events = tuple(np.ascontiguousarray(a) for a in events)
         t_out = np.ascontiguousarray(t_out, dtype=np.float64)
-        run_events(self._coefficients, self._nodes, self._pairs, self._bank, events, t_out, out)
+        run_events(self._coefficients, self._layout, self._state, events, t_out, out)
         pos, vel, cov, q_wb, has_q, age, nis, status = out
         return TeamEstimate(
             constellation=self._constellation,
@@ -79,33 +76,32 @@ class PairEkf:
 
     def reset(self, env: int) -> None:
         """Forget everything of one environment."""
-        fresh = make_state(self._constellation, 1, len(self._coefficients.rotations))
-        for part, new in zip((self._nodes, self._pairs, self._bank), fresh, strict=True):
-            for array, value in zip(part, new, strict=True):
-                array[env] = value[0]
+        for array, fresh in zip(self._state, self._fresh(1), strict=True):
+            array[env] = fresh[0]
 
-    def save(self) -> tuple[NodeState, PairState, BankState]:
+    def save(self) -> FilterState:
         """A copy of everything that evolves."""
-        return (
-            NodeState(*(a.copy() for a in self._nodes)),
-            PairState(*(a.copy() for a in self._pairs)),
-            BankState(*(a.copy() for a in self._bank)),
-        )
+        return FilterState(*(array.copy() for array in self._state))
 
-    def restore(self, saved: Any) -> None:
+    def restore(self, saved: FilterState) -> None:
         """Go on from a saved copy."""
-        for part, old in zip((self._nodes, self._pairs, self._bank), saved, strict=True):
-            for array, value in zip(part, old, strict=True):
-                array[...] = value
+        for array, old in zip(self._state, saved, strict=True):
+            array[...] = old
 
     def mean_nis(self) -> F64:
         """Mean NIS over all accepted ranges, (env) [-]; NaN before the first."""
-        n = self._bank.nis_n
-        return np.where(n > 0, self._bank.nis_sum / np.maximum(n, 1), np.nan)
+        group = self._state.group[:, 0]
+        n = group["nis_n"]
+        mean: F64 = np.where(n > 0, group["nis_sum"] / np.maximum(n, 1), np.nan)
+        return mean
 
     def n_rejected(self) -> F64:
         """Ranges refused as outliers, (env)."""
-        return np.asarray(self._pairs.n_rejected.sum(axis=1), dtype=np.float64)
+        return np.asarray(self._state.pairs["n_rejected"].sum(axis=1), dtype=np.float64)
+
+    def _fresh(self, n_envs: int) -> FilterState:
+        n_hyps = len(self._layout.rotations)
+        return make_state(self._constellation, self._params, n_envs, n_hyps)
 
     def _make_outputs(self, n_times: int) -> tuple[F64 | Bool | I64, ...]:
         """Arrays that the kernel fills: pos, vel, cov, q, has_q, age, nis, status."""
