@@ -1,0 +1,132 @@
+"""The command line as a user meets it: results, JSON, and faults without a traceback."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+RELPOS = Path(sys.executable).with_name("relpos")
+
+
+def relpos(*args, cwd=None):
+    command = [str(RELPOS), *map(str, args)]
+    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, check=False)
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    out = tmp_path_factory.mktemp("sim") / "run"
+    done = relpos("simulate", out, "--seconds", 20, "--seed", 3, "--json")
+    assert done.returncode == 0, done.stderr
+    record = json.loads(done.stdout)
+    assert record["nodes"] == 3
+    assert record["ranges"] > 3000
+    return out
+
+
+def test_track_writes_results_and_json(recording, tmp_path):
+    out = tmp_path / "results"
+    done = relpos("track", recording, "--filter", "ekf", "--filter", "ekf-mds", "--json", "--out", out)
+    assert done.returncode == 0, done.stderr
+    records = [json.loads(line) for line in done.stdout.splitlines()]
+    assert [r["filter"] for r in records] == ["ekf", "ekf-mds"]
+    keys = {
+        "log", "filter", "nodes", "duration_s", "ranges", "rmse", "rmse_yaw", "yaw_deg",
+        "rmse_shape", "pair_rmse", "nees", "nis", "realtime_factor",
+    }  # fmt: skip
+    assert keys <= set(records[0])
+    assert set(records[0]["pair_rmse"]) == {"1-2", "1-3", "2-3"}
+    page = (out / "report.html").read_text()
+    assert page.count("data:image/png;base64") == 6
+    assert "http" not in page.replace("http-equiv", "")
+    tables = sorted(out.rglob("estimates.csv"))
+    assert len(tables) == 2
+    header = "t_s,node_i,node_j,x,y,z,vx,vy,vz,sx,sy,sz,status"
+    assert tables[0].read_text().splitlines()[0] == header
+
+
+def test_track_prints_a_table(recording):
+    done = relpos("track", recording, "--skip", 5)
+    assert done.returncode == 0
+    for word in ("rmse_yaw", "rmse_shape", "1-2", "all", "bad rows skipped: 0"):
+        assert word in done.stdout
+
+
+def test_single_bad_measurements_are_shown(recording, tmp_path):
+    import gzip
+    import shutil
+
+    copy = tmp_path / "copy"
+    shutil.copytree(recording, copy)
+    lines = gzip.decompress((copy / "ranges.csv.gz").read_bytes()).decode().splitlines()
+    cells = lines[100].split(",")
+    cells[3] = "-2.0"
+    lines[100] = ",".join(cells)
+    (copy / "ranges.csv.gz").write_bytes(gzip.compress("\n".join(lines).encode()))
+    done = relpos("track", copy)
+    assert done.returncode == 0
+    assert "1 in ranges.csv.gz" in done.stdout
+
+
+FAULTS = [
+    (["track", "nowhere"], "no such folder"),
+    (["track"], "Missing argument"),
+    (["track", ".", "--filter", "magic"], "filter: expected one of ekf, ekf-mds"),
+    (["track", ".", "--skip", "-1"], "--skip"),
+    (["track", "."], "no meta.toml"),
+    (["simulate", "x", "--scenario", "moon"], "scenario: expected one of"),
+    (["simulate", "x", "--cars", "1"], "cars: expected at least 2"),
+    (["simulate", "x", "--seconds", "nan"], "seconds: expected 3 to 86400"),
+    (["simulate", "x", "--seed", "-4"], "seed: expected 0 or more"),
+    (["simulate", "x", "--cars", "two"], "--cars"),
+    (["demo", "--seconds", "1"], "--seconds: expected 15"),
+    (["demo", "--scenario", "moon"], "scenario: expected one of"),
+    (["demo", "--cars", "40"], "do not fit"),
+    (["bench", "tracker", "--rounds", "3"], "--rounds"),
+    (["nonsense"], "No such command"),
+]
+
+
+@pytest.mark.parametrize(("args", "message"), FAULTS, ids=lambda v: " ".join(v) if isinstance(v, list) else "")
+def test_faults_end_in_one_clear_message_and_status_2(args, message, tmp_path):
+    done = relpos(*args, cwd=tmp_path)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stdout == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_simulate_does_not_overwrite(recording):
+    before = sorted((p.name, p.stat().st_mtime_ns) for p in recording.iterdir())
+    done = relpos("simulate", recording, "--seconds", 5)
+    assert done.returncode == 2
+    assert "exists already" in done.stderr
+    assert sorted((p.name, p.stat().st_mtime_ns) for p in recording.iterdir()) == before
+
+
+def test_simulate_is_repeatable(tmp_path):
+    for name in ("a", "b"):
+        assert relpos("simulate", tmp_path / name, "--seconds", 5, "--seed", 8).returncode == 0
+    for file in ("ranges.csv.gz", "imu.csv.gz", "truth.csv.gz", "meta.toml"):
+        assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
+
+
+def test_demo_tells_errors_and_draws_the_drive(tmp_path):
+    done = relpos("demo", "--seconds", 20, "--out", tmp_path / "demo", "--json")
+    assert done.returncode == 0, done.stderr
+    *tracks, formation = [json.loads(line) for line in done.stdout.splitlines()]
+    assert [t["filter"] for t in tracks] == ["ekf", "ekf-mds"]
+    assert 0.0 < formation["formation_error_truth"] < 0.3
+    assert "<canvas" in (tmp_path / "demo" / "report.html").read_text()
+
+
+def test_bench_lines_have_a_peer():
+    done = relpos("bench", "tracker", "--rounds", 200, "--json")
+    assert done.returncode == 0, done.stderr
+    for line in done.stdout.splitlines():
+        row = json.loads(line)
+        assert set(row) == {"bench", "case", "value", "unit", "peer", "peer_value", "ratio"}
+        assert row["ratio"] == pytest.approx(row["peer_value"] / row["value"])

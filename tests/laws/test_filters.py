@@ -1,0 +1,175 @@
+"""The laws of `tracking.filters.base.Filter`, for every registered filter."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from tracking import Status, TeamEstimate, Tracker
+from tracking.filters import FILTERS
+from tracking.measurements import MeasurementBlock
+
+pytestmark = pytest.mark.parametrize("name", FILTERS)
+
+
+def assert_identical(a: TeamEstimate, b: TeamEstimate) -> None:
+    for f in fields(TeamEstimate)[1:]:
+        np.testing.assert_array_equal(getattr(a, f.name), getattr(b, f.name), err_msg=f.name)
+
+
+def times(group, n=60):
+    return np.linspace(0.5, group.t[-1] + 0.05, n)
+
+
+def test_noiseless_data_keep_zero_error(name, make_group):
+    """Put on the truth, a filter stays on it: its models are those of the world."""
+    group = make_group(n=4, seconds=30.0, hz=100.0)
+    half = group.block.n_events // 2
+    tracker = Tracker(group.constellation, filter=name)
+    t_half = group.block.t[0, half - 1]
+    tracker.step(group.block.take(slice(0, half)), t_half)
+    saved = tracker.save()
+    state = saved["filter"]
+    h = 1e-4
+    t_pair = state.pairs["t"][0]
+    pos = np.array([group.pairs(t)[p] for p, t in enumerate(t_pair)])
+    vel = [(group.pairs(t + h)[p] - group.pairs(t - h)[p]) / (2 * h) for p, t in enumerate(t_pair)]
+    state.x[0, :, :, :3], state.x[0, :, :, 3:] = pos[:, None], np.array(vel)[:, None]
+    state.pairs["rate"] = 0.0
+    tracker.restore(saved)
+    estimate = tracker.step(group.block.take(slice(half, None)), group.t[-1])
+    error = np.linalg.norm(estimate.pos_ij_w[0] - group.pairs(group.t[-1]), axis=-1)
+    assert error.max() < 0.02
+
+
+def test_cold_start_finds_rotation_and_mirror_image(name, make_group):
+    group = make_group(n=4, seconds=40.0, hz=100.0)
+    estimate = Tracker(group.constellation, filter=name).step(group.block, group.t[-1])
+    assert (estimate.status == Status.OK).all()
+    error = np.linalg.norm(estimate.pos_ij_w[0] - group.pairs(group.t[-1]), axis=-1)
+    assert np.median(error) < 0.1
+
+
+def test_splits_change_nothing(name, group):
+    t_out = times(group)
+    whole = Tracker(group.constellation, filter=name).run(group.block, t_out)
+    rng = np.random.default_rng(3)
+    tracker = Tracker(group.constellation, filter=name)
+    edges = np.sort(rng.uniform(0.0, t_out[-1], 25))
+    edges[-1] = t_out[-1]
+    parts, event, out = [], 0, 0
+    for edge in edges:
+        e = int(np.searchsorted(group.block.t[0], edge, side="right"))
+        o = int(np.searchsorted(t_out, edge, side="right"))
+        parts.append(tracker.run(group.block.take(slice(event, e)), t_out[out:o]))
+        event, out = e, o
+    joined = TeamEstimate(
+        group.constellation,
+        *(
+            np.concatenate([getattr(p, f.name) for p in parts], axis=1)
+            for f in fields(TeamEstimate)[1:]
+        ),
+    )
+    assert_identical(joined, whole)
+
+
+def test_environments_of_a_batch_are_alone(name, make_group):
+    groups = [make_group(n=3, seconds=8.0, hz=hz) for hz in (50.0, 37.0)]
+    t_out = np.linspace(0.5, 7.5, 20)
+    batch = Tracker(groups[0].constellation, filter=name, n_envs=2).run(
+        MeasurementBlock.stack([g.block for g in groups]), t_out
+    )
+    for k, g in enumerate(groups):
+        alone = Tracker(g.constellation, filter=name).run(g.block, t_out)
+        for f in fields(TeamEstimate)[1:]:
+            np.testing.assert_array_equal(getattr(batch, f.name)[k], getattr(alone, f.name)[0])
+
+
+def test_restored_in_mid_run_is_uninterrupted(name, group):
+    half = group.block.n_events // 2
+    first, second = group.block.take(slice(0, half)), group.block.take(slice(half, None))
+    tracker = Tracker(group.constellation, filter=name)
+    tracker.step(first, first.t[0, -1])
+    saved = tracker.save()
+    expected = tracker.step(second, group.t[-1])
+    other = Tracker(group.constellation, filter=name)
+    other.restore(saved)
+    assert_identical(other.step(second, group.t[-1]), expected)
+
+
+def test_reset_is_new(name, group):
+    tracker = Tracker(group.constellation, filter=name)
+    expected = tracker.step(group.block, group.t[-1])
+    tracker.reset(0)
+    assert_identical(tracker.step(group.block, group.t[-1]), expected)
+
+
+def test_no_events_change_nothing(name, group):
+    tracker = Tracker(group.constellation, filter=name)
+    first = tracker.step(group.block, group.t[-1])
+    tracker.run(MeasurementBlock.empty(), np.linspace(group.t[-1], group.t[-1] + 3.0, 5))
+    assert_identical(tracker.step(MeasurementBlock.empty(), group.t[-1]), first)
+
+
+def test_numbering_nodes_the_other_way_mirrors(name, make_group):
+    group = make_group(n=3, seconds=20.0, hz=100.0)
+    n = 3
+    flip = n - 1 - np.arange(n)
+    b = group.block
+    turned = replace(
+        b, i=flip[b.i], j=flip[b.j], antenna_i=flip[b.antenna_i], antenna_j=flip[b.antenna_j]
+    ).sorted()
+    constellation = replace(group.constellation, nodes=group.constellation.nodes[::-1])
+    one = Tracker(group.constellation, filter=name).step(b, group.t[-1])
+    other = Tracker(constellation, filter=name).step(turned, group.t[-1])
+    for i in range(n):
+        for j in range(n):
+            if i != j:
+                a, c = one.between(i, j)[0], other.between(flip[i], flip[j])[0]
+                np.testing.assert_allclose(a, c, atol=0.05)
+
+
+def test_covariance_stays_symmetric_and_positive(name, group):
+    estimate = Tracker(group.constellation, filter=name).run(group.block, times(group, 200))
+    keep = [0, 1, 3, 4]  # the plane
+    running = np.isin(estimate.status, (Status.OK, Status.AMBIGUOUS))
+    P = estimate.cov[running][:, keep][:, :, keep]
+    np.testing.assert_array_equal(P, np.swapaxes(P, -1, -2))
+    assert (np.linalg.eigvalsh(P) > 0.0).all()
+
+
+@settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))
+@given(seed=st.integers(0, 2**32 - 1), share=st.floats(0.0, 0.9), wild=st.floats(0.0, 0.5))
+def test_survives_any_ranges(name, group, seed, share, wild):
+    """Lost, absurd and doubled measurements in any mixture: finite and positive definite."""
+    rng = np.random.default_rng(seed)
+    block = group.block.take(np.nonzero(rng.random(group.block.n_events) > share)[0])
+    values = block.values.copy()
+    odd = (rng.random(block.n_events) < wild) & (block.kind[0] >= 4)
+    values[0, odd, 0] = rng.uniform(0.0, 300.0, odd.sum())
+    block = replace(block, values=values)
+    block = block.take(np.sort(rng.integers(0, max(block.n_events, 1), block.n_events)))
+    estimate = Tracker(group.constellation, filter=name).run(block, times(group, 30))
+    assert np.isfinite(estimate.pos_ij_w).all()
+    assert np.isfinite(estimate.cov).all()
+    running = estimate.status >= Status.AMBIGUOUS
+    P = estimate.cov[running][:, [0, 1, 3, 4]][:, :, [0, 1, 3, 4]]
+    assert (np.linalg.eigvalsh(P) > 0.0).all()
+
+
+def test_a_node_that_is_silent_leaves_and_returns(name, make_group):
+    group = make_group(n=4, seconds=30.0)
+    b = group.block
+    silent = (b.t[0] > 10.0) & (b.t[0] < 18.0) & ((b.i[0] == 3) | (b.j[0] == 3))
+    tracker = Tracker(group.constellation, filter=name)
+    pair = group.constellation.pair_index[0, 3]
+    estimate = tracker.run(b.take(~silent), np.array([9.9, 12.0, 17.5, 29.0]))
+    status = estimate.status[0, :, pair]
+    assert status[0] == Status.OK
+    assert status[1] == Status.LOST
+    assert status[2] in (Status.ABSENT, Status.STARTING)
+    assert status[3] in (Status.OK, Status.AMBIGUOUS)
+    others = group.constellation.pair_index[0, 1]
+    assert (estimate.status[0, :3, others] == Status.OK).all()

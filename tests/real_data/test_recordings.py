@@ -1,0 +1,86 @@
+"""The tracker on recordings of real sensors, against what was measured with them."""
+
+import csv
+import gzip
+
+import numpy as np
+import pytest
+
+from agents.track import track_log
+from tracking.constellation import Constellation, NodeConfig
+from tracking.filters import FILTERS
+from tracking.geometry import quat_conjugate, quat_multiply
+from tracking.measurements import Kind, MeasurementBlock
+from tracking.orientation import Orientation, OrientationParams
+
+LOGS = ("isas_walk1", "inrol_env1", "tiers_run01", "tiers_short")
+
+
+@pytest.fixture(scope="module")
+def results(data):
+    return {(n, f): track_log(data / "logs" / n, filter=f) for n in LOGS for f in FILTERS}
+
+
+def test_every_log_gives_finite_figures(results):
+    for (name, filter_name), result in results.items():
+        summary = result.summary
+        for key in ("rmse", "rmse_yaw", "yaw_deg", "rmse_shape", "nees", "nis"):
+            assert summary[key] is not None, (name, filter_name, key)
+            assert np.isfinite(summary[key])
+        assert np.isfinite(result.estimate.pos_ij_w).all()
+
+
+@pytest.mark.parametrize(("name", "limit"), [("isas_walk1", 0.30), ("inrol_env1", 0.20)])
+def test_mds_keeps_the_shape(results, name, limit):
+    refined = results[name, "ekf-mds"].score
+    assert refined.rmse_shape <= limit
+    alone = results[name, "ekf"].score
+    for figure in ("rmse", "rmse_yaw", "rmse_shape"):
+        assert getattr(refined, figure) < getattr(alone, figure)
+
+
+def test_gross_outliers_are_refused(results):
+    """One fixed node of the walk throws ranges that are metres too long."""
+    assert results["isas_walk1", "ekf-mds"].n_rejected > 0
+
+
+BROAD = {
+    "02_undisturbed_slow_rotation_B": (0.40, 0.59),
+    "16_undisturbed_fast_translation_B": (0.58, 0.50),
+    "24_disturbed_tapping_A": (0.55, 0.90),
+    "34_disturbed_attached_magnet_3cm": (0.63, 2.94),
+}
+
+
+@pytest.mark.parametrize("trial", BROAD)
+def test_orientation_figures_of_broad(data, trial):
+    """Inclination RMSE and heading error std [deg] of VQF with its default parameters."""
+    with gzip.open(data / "imu_orientation" / f"{trial}.csv.gz", "rt") as file:
+        rows = list(csv.DictReader(file))
+
+    def columns(*names):
+        return np.array([[float(r[n] or "nan") for n in names] for r in rows])
+
+    n = len(rows)
+    node = np.zeros(n, dtype=np.int64)
+    t = np.arange(n) / 285.714
+    imu = columns("gx", "gy", "gz", "ax", "ay", "az")
+    mag = columns("mx", "my", "mz")
+    block = MeasurementBlock.concatenate(
+        [
+            MeasurementBlock.of_kind(Kind.IMU, t, node, imu),
+            MeasurementBlock.of_kind(Kind.MAG, t, node, mag),
+        ]
+    ).sorted()
+    nodes = (NodeConfig(id=1, vehicle="hand", imu_hz=285.714), NodeConfig(id=2))
+    out = Orientation(Constellation(nodes=nodes), OrientationParams()).step(block)
+    q = out.values[0, out.valid[0] & (out.kind[0] == Kind.STATE), :4]
+    truth = columns("qw", "qx", "qy", "qz")
+    scored = np.isfinite(truth).all(axis=1) & (columns("moving")[:, 0] == 1.0)
+    error = quat_multiply(q, quat_conjugate(truth))[scored]
+    heading = 2.0 * np.arctan2(error[:, 3], error[:, 0])
+    inclination = 2.0 * np.arccos(np.clip(np.hypot(error[:, 0], error[:, 3]), 0.0, 1.0))
+    heading = np.angle(np.exp(1j * heading))
+    heading = np.angle(np.exp(1j * (heading - np.angle(np.mean(np.exp(1j * heading))))))
+    figures = np.degrees([np.sqrt(np.mean(inclination**2)), np.std(heading)])
+    np.testing.assert_allclose(figures, BROAD[trial], atol=0.02)

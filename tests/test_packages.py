@@ -1,0 +1,35 @@
+"""Importing is cheap, and what the folders hold is registered."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+HEAVY = ("torch", "pygame", "matplotlib", "stable_baselines3", "serial", "rich", "filterpy")
+
+
+@pytest.mark.parametrize(
+    "module", ["tracking", "relpos_env", "relpos_env.formation_v0", "agents", "agents.cli",
+               "hardware_bridge"]
+)  # fmt: skip
+def test_imports_nothing_heavy(module):
+    code = f"import sys, {module}; print([m for m in {HEAVY!r} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("script", sorted((ROOT / "examples").glob("*.py")), ids=lambda p: p.name)
+def test_examples_run(script, tmp_path):
+    done = subprocess.run(
+        [sys.executable, str(script)], capture_output=True, text=True, cwd=tmp_path, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip()
+
+
+def test_no_file_is_long():
+    for package in ("tracking", "relpos_env", "agents", "hardware_bridge"):
+        for path in (ROOT / package).rglob("*.py"):
+            assert len(path.read_text().splitlines()) <= 320, path

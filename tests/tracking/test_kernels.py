@@ -1,0 +1,139 @@
+"""Compiled kernels against finite differences and plain twins."""
+
+import numpy as np
+import pytest
+
+from tracking.filters import _mds_kernels, _pair_kernels
+from tracking.filters.state import starting_rotations
+from tracking.mds import classical_mds, refine_positions
+
+
+def random_pair(rng, d=3):
+    A = rng.standard_normal((6, 6))
+    P = A @ A.T + 0.1 * np.eye(6)
+    x = rng.standard_normal(6) * 2.0
+    if d == 2:
+        x[[2, 5]] = 0.0
+        P[[2, 5]], P[:, [2, 5]] = 0.0, 0.0
+    return x[None, None].copy(), P[None, None].copy()
+
+
+MODELS = {
+    "range": lambda x, work: _pair_kernels.range_model(x, 0, 0, 0.1, -0.2, 0.05, work),
+    "range-rate": lambda x, work: _pair_kernels.range_rate_model(x, 0, 0, 0.1, -0.2, 0.05, work),
+    "speed-norm": lambda x, work: _pair_kernels.speed_model(x, 0, 0, work),
+}
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_jacobians_are_finite_differences(name):
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        x, _ = random_pair(rng)
+        work, scratch = np.zeros((2, 6)), np.zeros((2, 6))
+        MODELS[name](x, work)
+        for k in range(6):
+            up, down = x.copy(), x.copy()
+            up[..., k] += 1e-6
+            down[..., k] -= 1e-6
+            slope = (MODELS[name](up, scratch) - MODELS[name](down, scratch)) / 2e-6
+            assert slope == pytest.approx(work[0, k], abs=1e-7)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_predict_is_its_matrix_form(d):
+    rng = np.random.default_rng(2)
+    x, P = random_pair(rng, d)
+    accel, dt, psd = rng.standard_normal(3), 0.07, 0.4
+    eye = np.diag([1.0, 1.0, float(d == 3)])
+    F = np.block([[np.eye(3), dt * np.eye(3)], [np.zeros((3, 3)), np.eye(3)]])
+    W = np.vstack([0.5 * dt**2 * eye, dt * eye])
+    expected_x = F @ x[0, 0] + W @ accel
+    expected_P = F @ P[0, 0] @ F.T + W @ (psd**2 / dt * np.eye(3)) @ W.T
+    _pair_kernels.predict(x, P, 0, 0, dt, *accel, psd, d)
+    np.testing.assert_allclose(x[0, 0], expected_x, atol=1e-12)
+    np.testing.assert_allclose(P[0, 0], expected_P, atol=1e-12)
+
+
+def test_predict_over_no_time_changes_nothing():
+    x, P = random_pair(np.random.default_rng(3))
+    before = x.copy(), P.copy()
+    _pair_kernels.predict(x, P, 0, 0, 0.0, 1.0, 2.0, 3.0, 0.5, 3)
+    np.testing.assert_array_equal(x, before[0])
+    np.testing.assert_array_equal(P, before[1])
+
+
+def test_correct_is_the_joseph_form():
+    rng = np.random.default_rng(4)
+    x, P = random_pair(rng)
+    H, R, nu = rng.standard_normal(6), 0.3, 0.7
+    S = H @ P[0, 0] @ H + R
+    K = P[0, 0] @ H / S
+    A = np.eye(6) - np.outer(K, H)
+    expected = x[0, 0] + K * nu, A @ P[0, 0] @ A.T + R * np.outer(K, K)
+    work = np.zeros((2, 6))
+    work[0] = H
+    assert _pair_kernels.correct(x, P, 0, 0, work, nu, R) == pytest.approx(S)
+    np.testing.assert_allclose(x[0, 0], expected[0], atol=1e-12)
+    np.testing.assert_allclose(P[0, 0], expected[1], atol=1e-12)
+
+
+def test_covariance_survives_many_updates():
+    rng = np.random.default_rng(5)
+    x, P = random_pair(rng)
+    work = np.zeros((2, 6))
+    for k in range(20000):
+        x[0, 0, :3] = 3.0 * np.array([np.cos(k / 50), np.sin(k / 50), 0.2])
+        _pair_kernels.predict(x, P, 0, 0, 0.01, 0.0, 0.0, 0.0, 0.1, 3)
+        _pair_kernels.range_model(x, 0, 0, 0.0, 0.0, 0.0, work)
+        _pair_kernels.correct(x, P, 0, 0, work, 0.01, 1e-6)
+    np.testing.assert_array_equal(P, np.swapaxes(P, -1, -2))
+    assert np.linalg.eigvalsh(P[0, 0]).min() > 0.0
+
+
+def refine(pos, d):
+    n = len(pos)
+    T = pos.mean(axis=0).copy()
+    K = np.sum(pos[..., :d] ** 2, axis=-1)
+    spread = _mds_kernels.refine(T, K, np.zeros((n, 3)), np.zeros((2, 3, 3)), n, d)
+    return T, spread
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("n", [3, 4, 6, 20])
+def test_mds_kernel_is_its_plain_twin(n, d):
+    rng = np.random.default_rng(n)
+    for _ in range(10):
+        p = rng.uniform(-2.0, 2.0, (n, 3))
+        p[:, d:] = 0.0
+        exact = p[None, :] - p[:, None]
+        centred = p - p.mean(axis=0)
+        refined, spread = refine(exact, d)
+        np.testing.assert_allclose(refined, centred, atol=1e-6)
+        rank = min(d, n - 1)
+        least = np.sort(np.linalg.eigvalsh(centred.T @ centred))[::-1][rank - 1]
+        assert spread == pytest.approx(np.sqrt(least / n), rel=1e-3)
+
+        noise = 0.02 * rng.standard_normal((n, n, 3))
+        noisy = exact + noise - np.swapaxes(noise, 0, 1)
+        noisy[..., d:] = 0.0
+        twin = refine_positions(noisy, d)
+        if spread > 0.3 and n > d:
+            np.testing.assert_allclose(refine(noisy, d)[0], twin, atol=0.02)
+
+
+def test_classical_mds_reproduces_distances():
+    rng = np.random.default_rng(7)
+    p = rng.uniform(-3.0, 3.0, (7, 3))
+    distance = np.linalg.norm(p[None] - p[:, None], axis=-1)
+    X = classical_mds(distance, 3)
+    np.testing.assert_allclose(np.linalg.norm(X[None] - X[:, None], axis=-1), distance, atol=1e-9)
+
+
+@pytest.mark.parametrize(("d", "count"), [(2, 32), (3, 48)])
+def test_starting_rotations_are_orthogonal_and_half_of_them_mirror(d, count):
+    R = starting_rotations(d, 16)
+    assert len(R) == count
+    np.testing.assert_allclose(R @ np.swapaxes(R, 1, 2), np.broadcast_to(np.eye(3), R.shape), atol=1e-12)
+    assert np.sum(np.linalg.det(R) > 0) == count // 2
+    assert len({tuple(np.round(r.ravel(), 6)) for r in R}) == count

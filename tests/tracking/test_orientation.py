@@ -1,0 +1,95 @@
+"""The VQF wrapper: laws of blocks, and gravity-free acceleration."""
+
+import numpy as np
+import pytest
+from vqf import VQF
+
+from tracking.constellation import Constellation, NodeConfig
+from tracking.geometry import GRAVITY, rotate, yaw_of
+from tracking.measurements import Kind, MeasurementBlock
+from tracking.orientation import Orientation, OrientationParams
+
+
+def constellation(heading="magnetic", vehicle="hand"):
+    nodes = tuple(NodeConfig(id=k, vehicle=vehicle, initial_heading=0.7) for k in (1, 2))
+    return Constellation(nodes=nodes, heading=heading)
+
+
+def recording(n=400, mag=True, seed=0):
+    rng = np.random.default_rng(seed)
+    t = np.arange(1, n + 1) / 100.0
+    imu = 0.3 * rng.standard_normal((n, 6)) + [0, 0, 0.2, 0, 0, GRAVITY]
+    field = 0.5 * rng.standard_normal((n, 3)) + [20.0, 5.0, -40.0]
+    node = np.zeros(n, dtype=np.int64)
+    parts = [MeasurementBlock.of_kind(Kind.IMU, t, node, imu)]
+    if mag:
+        parts.append(MeasurementBlock.of_kind(Kind.MAG, t, node, field))
+    return MeasurementBlock.concatenate(parts).sorted(), imu, field
+
+
+def states(block):
+    keep = block.valid[0] & (block.kind[0] == Kind.STATE)
+    return block.values[0, keep]
+
+
+@pytest.mark.parametrize("mag", [True, False])
+def test_it_is_vqf(mag):
+    block, imu, field = recording(mag=mag)
+    c = constellation("magnetic" if mag else "initial")
+    out = states(Orientation(c, OrientationParams()).step(block))
+    args = [np.ascontiguousarray(imu[:, :3]), np.ascontiguousarray(imu[:, 3:])]
+    expected = VQF(0.01).updateBatch(*args, *([field] if mag else []))
+    if mag:
+        np.testing.assert_allclose(out[:, :4], expected["quat9D"], atol=1e-12)
+    else:
+        assert yaw_of(out[0, :4]) == pytest.approx(0.7)
+    lifted = rotate(out[:, :4], imu[:, 3:])
+    np.testing.assert_allclose(out[:, 4:6], lifted[:, :2], atol=1e-12)
+
+
+@pytest.mark.parametrize("mag", [True, False])
+def test_blocks_change_nothing(mag):
+    block, _, _ = recording(mag=mag)
+    c = constellation("magnetic" if mag else "initial")
+    whole = states(Orientation(c, OrientationParams()).step(block))
+    cut = Orientation(c, OrientationParams())
+    edges = [0, 1, 2, 7, 100, 101, 350, block.n_events]
+    parts = [cut.step(block.take(slice(a, b))) for a, b in zip(edges, edges[1:], strict=False)]
+    np.testing.assert_array_equal(np.concatenate([states(p) for p in parts]), whole)
+
+
+def test_restored_is_uninterrupted():
+    block, _, _ = recording()
+    a = Orientation(constellation(), OrientationParams())
+    a.step(block.take(slice(0, 333)))
+    b = Orientation(constellation(), OrientationParams())
+    b.restore(a.save())
+    rest = block.take(slice(333, None))
+    np.testing.assert_array_equal(states(b.step(rest)), states(a.step(rest)))
+
+
+def test_no_heading_no_state():
+    block, _, _ = recording(mag=False)
+    assert len(states(Orientation(constellation("magnetic"), OrientationParams()).step(block))) == 0
+
+
+def test_a_node_at_rest_does_not_accelerate_whatever_its_accelerometer_reads():
+    n = 600
+    t = np.arange(1, n + 1) / 100.0
+    imu = np.tile([0.0, 0.0, 0.0, 0.3, -0.2, 10.02], (n, 1))
+    block = MeasurementBlock.of_kind(Kind.IMU, t, np.zeros(n, dtype=np.int64), imu)
+    out = states(Orientation(constellation("initial"), OrientationParams()).step(block))
+    np.testing.assert_allclose(out[-1, 4:], 0.0, atol=0.01)
+
+
+def test_lost_samples_are_bridged():
+    """A turn at a constant rate goes on over a gap of 0.2 s."""
+    t = np.arange(1, 501) / 100.0
+    imu = np.tile([0.0, 0.0, 0.5, 0.0, 0.0, GRAVITY], (500, 1))
+    keep = (t < 3.0) | (t > 3.2)
+    whole = MeasurementBlock.of_kind(Kind.IMU, t, np.zeros(500, dtype=np.int64), imu)
+    c = constellation("initial")
+    full = states(Orientation(c, OrientationParams()).step(whole))
+    gapped = states(Orientation(c, OrientationParams()).step(whole.take(keep)))
+    difference = yaw_of(full[-1, :4]) - yaw_of(gapped[-1, :4])
+    assert abs(np.angle(np.exp(1j * difference))) < 0.01
