@@ -88,9 +88,7 @@ def track(
 @click.option("--seed", default=0, show_default=True)
 @click.option("--cars", default=3, show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
-def simulate(
-    out: Path, scenario: str, seconds: float, seed: int, cars: int, as_json: bool
-) -> None:
+def simulate(out: Path, scenario: str, seconds: float, seed: int, cars: int, as_json: bool) -> None:
     """Record a simulated drive as a log folder with truth."""
     from agents.simulate import simulate as run
 
@@ -123,9 +121,7 @@ def simulate(
 @click.option("--cars", default=3, show_default=True)
 @click.option("--out", type=Path, default=Path("demo"), show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
-def demo(
-    scenario: str, seconds: float, seed: int, cars: int, out: Path, as_json: bool
-) -> None:
+def demo(scenario: str, seconds: float, seed: int, cars: int, out: Path, as_json: bool) -> None:
     """Cars keep a formation on estimated relative positions; writes report.html."""
     from agents.demo import SETTLE
     from agents.demo import demo as run
@@ -180,8 +176,14 @@ def bench_tracker(rounds: int, as_json: bool) -> None:
         "Time of one ranging round",
         ["case", "value", "unit", "peer", "peer value", "ratio"],
         [
-            [r["case"], f"{r['value']:.2f}", r["unit"], r["peer"], f"{r['peer_value']:.1f}",
-             f"{r['ratio']:.0f}"]
+            [
+                r["case"],
+                f"{r['value']:.2f}",
+                r["unit"],
+                r["peer"],
+                f"{r['peer_value']:.1f}",
+                f"{r['ratio']:.0f}",
+            ]
             for r in rows
         ],
     )
@@ -201,7 +203,10 @@ def progress_bar(label: str, *, shown: bool = True) -> Iterator[Callable[[float]
 
     console = Console(stderr=True)
     columns = (
-        TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn()
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeElapsedColumn(),
     )
     with Progress(*columns, console=console, disable=not shown or not console.is_terminal) as bar:
         task = bar.add_task(label, total=1.0)

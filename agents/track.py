@@ -153,7 +153,9 @@ def estimates_csv(estimate: TeamEstimate) -> str:
     ids = [(constellation.ids[i], constellation.ids[j]) for i, j in constellation.pairs]
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow("t_s,node_i,node_j,x,y,z,vx,vy,vz,sx,sy,sz,status".split(","))
+    writer.writerow(
+        ["t_s", "node_i", "node_j", "x", "y", "z", "vx", "vy", "vz", "sx", "sy", "sz", "status"]
+    )
     std = estimate.pos_std
     for k, t in enumerate(estimate.t):
         for p, (i, j) in enumerate(ids):

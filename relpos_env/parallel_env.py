@@ -129,9 +129,12 @@ class FormationEnv(ParallelEnv):  # type: ignore[misc]
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Begin an episode; a seed makes this and all that follow it repeatable."""
-        if options:
-            raise EnvError(f"options: expected none, got {', '.join(options)}")
+        """Begin an episode; a seed makes this and all that follow it repeatable.
+
+        Args:
+            seed: None goes on with the generator of the episode before.
+            options: Not used.
+        """
         if seed is not None or self._rng is None:
             self._rng, _ = seeding.np_random(seed)
         episode = self._rng.spawn(1)[0]

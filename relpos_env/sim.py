@@ -48,7 +48,9 @@ class Recording:
 class Simulation:
     """One group of cars. Law: same scenario, seed and commands, same everything, bit for bit."""
 
-    def __init__(self, scenario: Scenario, rng: np.random.Generator, *, record: bool = False):
+    def __init__(
+        self, scenario: Scenario, rng: np.random.Generator, *, record: bool = False
+    ) -> None:
         self.scenario = scenario
         self.constellation = car_constellation(scenario)
         # A generator for each part, so that no part's draws depend on another's.

@@ -29,7 +29,7 @@ def small_kernel(function: Function) -> Function:
 
 
 def _compile(function: Function, *, inline: bool) -> Function:
-    compiled = njit(cache=True, forceinline=inline, **({'_nrt': False} if inline else {}))(function)
+    compiled = njit(cache=True, forceinline=inline, _nrt=not inline)(function)
     if not config.DISABLE_JIT:
         package = function.__module__.partition(".")[0]
         folder = Path(inspect.getfile(function))

@@ -29,7 +29,8 @@ def quat_multiply(a: F64, b: F64) -> F64:
 
 def quat_conjugate(q: F64) -> F64:
     """Inverse of a unit quaternion, (..., 4)."""
-    return np.asarray(q) * np.array([1.0, -1.0, -1.0, -1.0])
+    inverse: F64 = np.asarray(q) * np.array([1.0, -1.0, -1.0, -1.0])
+    return inverse
 
 
 def quat_to_matrix(q: F64) -> F64:
@@ -40,7 +41,8 @@ def quat_to_matrix(q: F64) -> F64:
         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
     ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    matrix: F64 = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    return matrix
 
 
 def rotate(q: F64, v: F64) -> F64:

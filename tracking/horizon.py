@@ -7,11 +7,11 @@ in order any more: it is dropped and counted.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tracking.arrays import F64, I64
+from tracking.arrays import F64, I64, Bool
 from tracking.measurements import MeasurementBlock
 
 
@@ -58,9 +58,7 @@ class Horizon:
 
     def flush(self) -> MeasurementBlock:
         """Hand on all that is left, at the end of a stream."""
-        return self._release(
-            MeasurementBlock.empty(self._n_envs), np.full(self._n_envs, np.inf)
-        )
+        return self._release(MeasurementBlock.empty(self._n_envs), np.full(self._n_envs, np.inf))
 
     def reset(self, env: int) -> None:
         """Forget what one environment still held."""
@@ -71,9 +69,7 @@ class Horizon:
     def _release(self, block: MeasurementBlock, until: F64) -> MeasurementBlock:
         late = block.valid & (block.t <= self._released[:, None])
         self.n_late += late.sum(axis=1)
-        fresh = MeasurementBlock(
-            *(getattr(block, name) for name in block.__slots__[:-1]), valid=block.valid & ~late
-        )
+        fresh = replace(block, valid=block.valid & ~late)
         waiting = MeasurementBlock.concatenate([self._pending, fresh]).sorted()
         due = waiting.valid & (waiting.t <= until[:, None])
         self._released = np.maximum(self._released, until)
@@ -81,10 +77,8 @@ class Horizon:
         return _compact(waiting, due)
 
 
-def _compact(block: MeasurementBlock, keep: np.ndarray) -> MeasurementBlock:
+def _compact(block: MeasurementBlock, keep: Bool) -> MeasurementBlock:
     """The kept events moved to the front, with no more padding than needed."""
     n: I64 = keep.sum(axis=1)
-    kept = MeasurementBlock(
-        *(getattr(block, name) for name in block.__slots__[:-1]), valid=keep
-    ).sorted()
+    kept = replace(block, valid=keep).sorted()
     return kept.take(slice(0, int(n.max(initial=0))))

@@ -111,9 +111,7 @@ def best_yaw(x: F64, truth: F64) -> float:
     return float(np.arctan2(cross, dot))
 
 
-def errors_after(
-    estimate: TeamEstimate, truth_ij_w: F64, yaw_rad: float
-) -> F64:
+def errors_after(estimate: TeamEstimate, truth_ij_w: F64, yaw_rad: float) -> F64:
     """Position errors of a run after a constant yaw, (time, pair, 3) [m]."""
     c, s = np.cos(yaw_rad), np.sin(yaw_rad)
     R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])  # noqa: N806

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 def demo_report(result: DemoResult) -> str:
     """One page."""
     page = Page(
-        "Three cars, one formation, no anchors" if len(result.frames["pos"][0]) == 3
+        "Three cars, one formation, no anchors"
+        if len(result.frames["pos"][0]) == 3
         else "One formation, no anchors",
         f"Scenario {result.scenario}, seed {result.seed}, {result.seconds:.0f} s: the cars know "
         "each other only through simulated UWB ranges, inertial sensors and the tracker.",

@@ -36,9 +36,7 @@ class Page:
 
     def __init__(self, title: str, lead: str) -> None:
         self._title = title
-        self._parts = [
-            f"<h1>{html.escape(title)}</h1><p class='lead'>{html.escape(lead)}</p>"
-        ]
+        self._parts = [f"<h1>{html.escape(title)}</h1><p class='lead'>{html.escape(lead)}</p>"]
 
     def heading(self, text: str) -> None:
         """Begin a section."""

@@ -96,7 +96,8 @@ class AgentView:
         R_bw = np.stack([np.stack([c, s], -1), np.stack([-s, c], -1)], axis=-2)  # noqa: N806
 
         def to_body(v: F64) -> F64:
-            return np.einsum("...ab,...ob->...oa", R_bw, v)
+            turned: F64 = np.einsum("...ab,...ob->...oa", R_bw, v)
+            return turned
 
         return cls(
             pos_b=to_body(belief.pos_w),

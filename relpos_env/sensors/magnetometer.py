@@ -68,6 +68,4 @@ class Magnetometer:
             axis=1,
         )
         noise = self._params.noise * self._rng.standard_normal(body.shape)
-        return quantise(
-            body + self._hard_iron + noise, self._params.full_scale, self._params.bits
-        )
+        return quantise(body + self._hard_iron + noise, self._params.full_scale, self._params.bits)

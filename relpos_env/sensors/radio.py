@@ -97,7 +97,9 @@ class Radio:
         measured += np.where(nlos, p.nlos_bias + p.nlos_excess * excess, 0.0)
         heard = luck >= np.where(nlos, p.nlos_loss, p.loss)
         heard &= (distance <= p.max_distance) & (measured > 0.0)
-        power = p.power_1m - 20.0 * np.log10(np.maximum(distance, 0.1)) + p.power_noise * power_noise
+        power = (
+            p.power_1m - 20.0 * np.log10(np.maximum(distance, 0.1)) + p.power_noise * power_noise
+        )
         gap_mean = np.where(nlos, p.gap_nlos[0], p.gap_los[0])
         gap_std = np.where(nlos, p.gap_nlos[1], p.gap_los[1])
         gap = np.maximum(gap_mean + gap_std * gap_noise, 0.0)

@@ -1,4 +1,4 @@
-"""Tasks: what a formation should be, and what is asked of each car. Adding one: a file and a line."""
+"""Tasks: what a formation should be, and what is asked of each car."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from relpos_env.tasks.base import Task
 from relpos_env.tasks.ring import RingFormation
 
 TASKS: dict[str, Callable[[Scenario], Task]] = {"ring": RingFormation}
-"""Name to builder ``(scenario) -> Task``."""
+"""Name to builder ``(scenario) -> Task``. Adding one: a file and a line here."""
 
 
 def make_task(name: str, scenario: Scenario) -> Task:

@@ -42,7 +42,8 @@ class RingFormation:
     def offsets(self, t: float) -> F64:
         """Wanted positions relative to the centre, (car, 2) [m]."""
         angle = self._phase + self._rate * t
-        return self._radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        offsets: F64 = self._radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        return offsets
 
     def target(self, t: float) -> F64:
         """Wanted relative positions, (car, other, 2) [m]."""
@@ -54,7 +55,8 @@ class RingFormation:
         ahead = self.offsets(t + LOOKAHEAD)
         circling = self._rate * np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
         trim = -TRIM_GAIN * state.pos_w.mean(axis=0)
-        return circling + trim
+        velocity: F64 = circling + trim
+        return velocity
 
     def error(self, state: WorldState, t: float) -> F64:
         """Mean distance of the others from where they should be, (car) [m]."""

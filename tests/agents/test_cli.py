@@ -28,7 +28,9 @@ def recording(tmp_path_factory):
 
 def test_track_writes_results_and_json(recording, tmp_path):
     out = tmp_path / "results"
-    done = relpos("track", recording, "--filter", "ekf", "--filter", "ekf-mds", "--json", "--out", out)
+    done = relpos(
+        "track", recording, "--filter", "ekf", "--filter", "ekf-mds", "--json", "--out", out
+    )
     assert done.returncode == 0, done.stderr
     records = [json.loads(line) for line in done.stdout.splitlines()]
     assert [r["filter"] for r in records] == ["ekf", "ekf-mds"]
@@ -89,7 +91,9 @@ FAULTS = [
 ]
 
 
-@pytest.mark.parametrize(("args", "message"), FAULTS, ids=lambda v: " ".join(v) if isinstance(v, list) else "")
+@pytest.mark.parametrize(
+    ("args", "message"), FAULTS, ids=lambda v: " ".join(v) if isinstance(v, list) else ""
+)
 def test_faults_end_in_one_clear_message_and_status_2(args, message, tmp_path):
     done = relpos(*args, cwd=tmp_path)
     assert done.returncode == 2

@@ -134,6 +134,8 @@ def test_classical_mds_reproduces_distances():
 def test_starting_rotations_are_orthogonal_and_half_of_them_mirror(d, count):
     R = starting_rotations(d, 16)
     assert len(R) == count
-    np.testing.assert_allclose(R @ np.swapaxes(R, 1, 2), np.broadcast_to(np.eye(3), R.shape), atol=1e-12)
+    np.testing.assert_allclose(
+        R @ np.swapaxes(R, 1, 2), np.broadcast_to(np.eye(3), R.shape), atol=1e-12
+    )
     assert np.sum(np.linalg.det(R) > 0) == count // 2
     assert len({tuple(np.round(r.ravel(), 6)) for r in R}) == count

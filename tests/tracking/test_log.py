@@ -150,8 +150,13 @@ def test_round_trip_is_exact(tmp_path_factory, times, distance, number, power, m
     values = np.column_stack([distance + 0 * t, -80.0 + 0 * t, -85.0 + 0 * t])
     parts = [
         MeasurementBlock.of_kind(
-            Kind.RANGE, t, zeros, values if power else values[:, :1], j=ones,
-            antennas=(zeros, ones), has_power=np.full(n, power),
+            Kind.RANGE,
+            t,
+            zeros,
+            values if power else values[:, :1],
+            j=ones,
+            antennas=(zeros, ones),
+            has_power=np.full(n, power),
         ),
         MeasurementBlock.of_kind(Kind.IMU, t, zeros, np.full((n, 6), number / 1e3)),
     ]
@@ -168,8 +173,12 @@ def test_round_trip_is_exact(tmp_path_factory, times, distance, number, power, m
         block=MeasurementBlock.concatenate(parts).sorted(),
         nlos=np.arange(n) % 2 == 0,
         truth=Truth(
-            t, zeros, np.full((n, 3), number), np.tile([1.0, 0, 0, 0], (n, 1)),
-            np.ones(n, dtype=bool), np.arange(n) % 3 > 0,
+            t,
+            zeros,
+            np.full((n, 3), number),
+            np.tile([1.0, 0, 0, 0], (n, 1)),
+            np.ones(n, dtype=bool),
+            np.arange(n) % 3 > 0,
         ),
     )
     again = read_log(write_log(tmp_path_factory.mktemp("logs") / "run", log))

@@ -93,7 +93,7 @@ def run_events(coefficients, layout, state, block, t_out, out):
             i, j, what = node_i[e, k], node_j[e, k], kind[e, k]
             if what == STATE:
                 take_state(c, s, layout, i, t[e, k], values, e, k)
-            elif what == RANGE or what == SURVEY:
+            elif what in (RANGE, SURVEY):
                 a_i, a_j = antenna_i[e, k], antenna_j[e, k]
                 if i > j:
                     i, j, a_i, a_j = j, i, a_j, a_i
@@ -104,9 +104,7 @@ def run_events(coefficients, layout, state, block, t_out, out):
                 p, runs = hear(s, layout, i, j, t[e, k])
                 if not runs:
                     take_first_range(c, s, layout, i, j, p, t[e, k], distance, is_survey)
-                elif take_range(
-                    c, s, layout, scratch, p, a_i, a_j, t[e, k], distance, is_survey
-                ):
+                elif take_range(c, s, layout, scratch, p, a_i, a_j, t[e, k], distance, is_survey):
                     add_mirror_image(c, s, layout)
             elif what == LEAVE or (what == JOIN and s.nodes[i].present):
                 remove_node(s, layout, i)

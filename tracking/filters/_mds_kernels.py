@@ -23,7 +23,7 @@ SWEEPS = 6
 
 @small_kernel
 def inverse_root(M, V, d, rank):
-    """``M^(-1/2)`` of a symmetric d x d matrix, in place; returns its least eigenvalue that is used.
+    """``M^(-1/2)`` of a symmetric matrix, in place; returns its least eigenvalue in use.
 
     Jacobi rotations, exact to rounding for d <= 3 in a few sweeps.
 

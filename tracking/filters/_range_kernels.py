@@ -56,7 +56,11 @@ def node_variance(c, node, aided):
 @small_kernel
 def antenna_offset(s, layout, n, antenna):
     """Position of an antenna relative to its node in the world frame [m]."""
-    o0, o1, o2 = layout.antenna_b[antenna, 0], layout.antenna_b[antenna, 1], layout.antenna_b[antenna, 2]
+    o0, o1, o2 = (
+        layout.antenna_b[antenna, 0],
+        layout.antenna_b[antenna, 1],
+        layout.antenna_b[antenna, 2],
+    )
     w, x, y, z = s.held[n, 0], s.held[n, 1], s.held[n, 2], s.held[n, 3]
     # o + 2 w (u x o) + 2 u x (u x o), with u the vector part
     c0, c1, c2 = y * o2 - z * o1, z * o0 - x * o2, x * o1 - y * o0

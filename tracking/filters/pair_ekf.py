@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.arrays import F64, Bool, I64
+from tracking.arrays import F64, I64, Bool
 from tracking.constellation import Constellation
 from tracking.estimate import TeamEstimate
 from tracking.filters._event_kernels import run_events
@@ -56,9 +56,9 @@ class PairEkf:
             block.values,
             block.valid,
         )
-        events = tuple(np.ascontiguousarray(a) for a in events)
+        contiguous = tuple(np.ascontiguousarray(a) for a in events)
         t_out = np.ascontiguousarray(t_out, dtype=np.float64)
-        run_events(self._coefficients, self._layout, self._state, events, t_out, out)
+        run_events(self._coefficients, self._layout, self._state, contiguous, t_out, out)
         pos, vel, cov, q_wb, has_q, age, nis, status = out
         return TeamEstimate(
             constellation=self._constellation,
@@ -81,7 +81,7 @@ class PairEkf:
 
     def save(self) -> FilterState:
         """A copy of everything that evolves."""
-        return FilterState(*(array.copy() for array in self._state))
+        return FilterState._make(array.copy() for array in self._state)
 
     def restore(self, saved: FilterState) -> None:
         """Go on from a saved copy."""
@@ -103,7 +103,7 @@ class PairEkf:
         n_hyps = len(self._layout.rotations)
         return make_state(self._constellation, self._params, n_envs, n_hyps)
 
-    def _make_outputs(self, n_times: int) -> tuple[F64 | Bool | I64, ...]:
+    def _make_outputs(self, n_times: int) -> tuple[F64, F64, F64, F64, Bool, F64, F64, I64]:
         """Arrays that the kernel fills: pos, vel, cov, q, has_q, age, nis, status."""
         lead = (self._n_envs, n_times)
         n, p = self._constellation.n_nodes, self._constellation.n_pairs

@@ -103,7 +103,14 @@ class PairEkfParams:
     start: StartParams = field(default_factory=StartParams)
 
     def __post_init__(self) -> None:
-        for name in ("accel_psd", "wheeled_accel_psd", "unaided_accel_psd", "range_std", "survey_std", "speed_std"):
+        for name in (
+            "accel_psd",
+            "wheeled_accel_psd",
+            "unaided_accel_psd",
+            "range_std",
+            "survey_std",
+            "speed_std",
+        ):
             if not getattr(self, name) > 0.0:
                 raise ConfigError(f"{name}: expected > 0, got {getattr(self, name)}")
         if self.speed_model not in ("range-rate", "speed-norm", "none"):

@@ -60,21 +60,32 @@ GROUP = np.dtype(
         ("nis_n", "i8"),
     ]
 )
+_NUMBERS = (
+    "unaided_psd",
+    "unaided_after",
+    "range_var",
+    "survey_var",
+    "speed_var",
+    "speed_tau",
+    "lost_after",
+    "leave_after",
+    "gate_tau",
+    "gate_floor",
+    "gate_speed_gain",
+    "gate_min_speed",
+    "gate_max_rejected",
+    "mds_period",
+    "mds_var",
+    "mds_min_spread",
+    "start_k",
+    "start_max_age",
+    "prune",
+    "merge_distance",
+    "max_nis",
+    "check_period",
+)
 COEFFICIENTS = np.dtype(
-    [
-        ("d", "i8"),
-        ("use_mds", "?"),
-        ("speed_model", "i8"),
-        *(
-            (name, "f8")
-            for name in (
-                "unaided_psd unaided_after range_var survey_var speed_var speed_tau lost_after "
-                "leave_after gate_tau gate_floor gate_speed_gain gate_min_speed "
-                "gate_max_rejected mds_period mds_var mds_min_spread start_k start_max_age prune "
-                "merge_distance max_nis check_period"
-            ).split()
-        ),
-    ]
+    [("d", "i8"), ("use_mds", "?"), ("speed_model", "i8"), *((name, "f8") for name in _NUMBERS)]
 )
 """Constants derived once from `PairEkfParams`, under the same names and units."""
 

@@ -67,7 +67,9 @@ def _node(key: str, table: Any) -> NodeConfig:
         id=_id(where, key),
         kind=table.get("kind", "moving"),
         vehicle=table.get("vehicle", "none"),
-        initial_heading=None if heading is None else _number(f"{where}.initial_heading_rad", heading),
+        initial_heading=None
+        if heading is None
+        else _number(f"{where}.initial_heading_rad", heading),
     )
 
 
@@ -77,7 +79,9 @@ def _antenna(key: str, table: Any) -> Antenna:
     if not isinstance(offset, list) or len(offset) != 3:
         raise LogError(f"meta.toml, {where}.offset_m: expected three numbers, found {offset!r}")
     x, y, z = (_number(f"{where}.offset_m", v) for v in offset)
-    return Antenna(id=_id(where, key), node=_id(f"{where}.node", table.get("node")), offset_b=(x, y, z))
+    return Antenna(
+        id=_id(where, key), node=_id(f"{where}.node", table.get("node")), offset_b=(x, y, z)
+    )
 
 
 def _table(where: str, value: Any) -> dict[str, Any]:

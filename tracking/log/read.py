@@ -99,7 +99,7 @@ def _read_ranges(
     values[:, 0] = d
     if all(name in table for name in POWERS):
         powers, power_filled = table.numbers(POWERS)
-        has_power = power_filled.all(axis=1) & np.isfinite(powers).all(axis=1)
+        has_power = np.asarray(power_filled.all(axis=1) & np.isfinite(powers).all(axis=1))
         values[has_power, 1:] = powers[has_power]
     block = MeasurementBlock.of_kind(
         Kind.RANGE,
@@ -209,10 +209,10 @@ def _read_truth(folder: Path, constellation: Constellation, skipped: dict[str, i
     table = Table.read(path, ("t_s", "node", "x", "y", "z", *QUAT))
     t, node = table.times(), table.nodes("node", constellation.index_of)
     pos, filled = table.numbers(("x", "y", "z"))
-    good = filled.all(axis=1) & np.isfinite(pos).all(axis=1)
+    good: Bool = np.asarray(filled.all(axis=1) & np.isfinite(pos).all(axis=1))
     skipped[path.name] = int(np.sum(~good))
     quat, quat_filled = table.numbers(QUAT)
-    has_orientation = quat_filled.all(axis=1) & np.isfinite(quat).all(axis=1)
+    has_orientation: Bool = np.asarray(quat_filled.all(axis=1) & np.isfinite(quat).all(axis=1))
     valid = np.ones(table.n_rows, dtype=bool)
     if "valid" in table:
         flags, flag_filled = table.numbers(("valid",))
@@ -224,8 +224,8 @@ def _read_truth(folder: Path, constellation: Constellation, skipped: dict[str, i
 def _within(values: F64, filled: Bool, limits: F64) -> Bool:
     """Rows whose values are all there, finite and not beyond the limits."""
     with np.errstate(invalid="ignore"):
-        ok: Bool = (filled & np.isfinite(values) & (np.abs(values) <= limits)).all(axis=1)
-    return ok
+        ok = filled & np.isfinite(values) & (np.abs(values) <= limits)
+    return np.asarray(ok.all(axis=1))
 
 
 def _rate(t: F64) -> float | None:

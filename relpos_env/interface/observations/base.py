@@ -29,9 +29,13 @@ class ObservationMode(Protocol):
     Law: the vector is inside `space`, and its layout is `fields` in order.
     """
 
-    needs_truth: bool
-    """True if the view must be made from the true positions."""
-    fields: tuple[Field, ...]
+    @property
+    def needs_truth(self) -> bool:
+        """True if the view must be made from the true positions."""
+
+    @property
+    def fields(self) -> tuple[Field, ...]:
+        """The stretches of the vector, in order."""
 
     def space(self) -> spaces.Box:
         """The observation space of one car."""

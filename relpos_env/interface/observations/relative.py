@@ -53,4 +53,5 @@ class RelativePositions:
             np.stack([np.cos(view.heading), np.sin(view.heading)], axis=1),
             np.stack([view.speed, view.steering], axis=1),
         ]
-        return np.clip(np.concatenate(parts, axis=1), -self._limit, self._limit)
+        rows_of_all: F64 = np.clip(np.concatenate(parts, axis=1), -self._limit, self._limit)
+        return rows_of_all

@@ -1,0 +1,11 @@
+"""Record a short simulated drive, track the recording, and look at the result."""
+
+from agents.simulate import simulate
+from agents.track import track_log
+
+log = simulate(scenario="cars-los", seconds=30, seed=1)
+result = track_log(log, filter="ekf-mds")
+print(f"{log.n_ranges} ranges between {log.constellation.n_nodes} cars")
+print(f"shape error {result.score.rmse_shape:.2f} m, world error {result.score.rmse:.2f} m")
+pos, vel = result.estimate.between(0, 1)
+print(f"at the end car 2 is {pos[-1, 0]:.2f} m east and {pos[-1, 1]:.2f} m north of car 1")
