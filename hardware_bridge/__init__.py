@@ -1,5 +1,4 @@
 """Streams of real nodes into the tracker, and policies onto real cars.
 
-The links, decoders and drivers are not part of this version; `docs/roadmap.md` says what
-comes. The package holds its place so that imports and tests keep to its borders.
+Empty in this version: the place is kept, with its borders, for links, decoders and drivers.
 """

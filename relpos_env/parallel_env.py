@@ -234,8 +234,9 @@ class FormationEnv(ParallelEnv):  # type: ignore[misc]
             known = own[np.isfinite(own)]
             infos[agent] = {
                 "formation_error": float(error[k]),
-                "tracking_error": float(known.mean()) if len(known) else -1.0,
-                "tracked": int(len(known)),
+                "tracked": len(known),
                 "rewards": {name: float(term[k]) for name, term in (terms or {}).items()},
             }
+            if len(known):
+                infos[agent]["tracking_error"] = float(known.mean())
         return infos

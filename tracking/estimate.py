@@ -9,7 +9,7 @@ import numpy as np
 
 from tracking.arrays import F64, I64, Bool
 from tracking.constellation import Constellation
-from tracking.geometry import quat_to_matrix
+from tracking.geometry import quat_conjugate, quat_multiply, quat_to_matrix
 
 
 class Status(IntEnum):
@@ -53,7 +53,8 @@ class TeamEstimate:
     nis: F64
     """Normalised innovation squared of the last range, (..., pair) [-]."""
     nlos_prob: F64
-    """Probability that the last range was not line of sight, (..., pair) [-]."""
+    """Probability that the last range was not line of sight, (..., pair) [-]; 0 from filters
+    that do not estimate it."""
     status: I64
     """A `Status`, (..., pair)."""
 
@@ -81,8 +82,6 @@ class TeamEstimate:
 
     def relative_orientation(self, i: int, j: int) -> F64:
         """q_ij = q_i^-1 q_j, the orientation of j's body in i's body frame, (..., 4)."""
-        from tracking.geometry import quat_conjugate, quat_multiply
-
         return quat_multiply(quat_conjugate(self.q_wb[..., i, :]), self.q_wb[..., j, :])
 
     def at(self, t: F64 | float) -> TeamEstimate:

@@ -79,8 +79,6 @@ class PairEkfParams:
     """[m/s2/sqrt(Hz)] The same for a moving node whose IMU is not heard."""
     unaided_after: float = 0.3
     """[s] A node whose IMU was silent for so long is unaided."""
-    orientation_std: float = 0.05
-    """[rad] Error of one axis of a node's orientation; VQF states none."""
     range_std: float = 0.15
     """[m] Standard deviation of a range. 5 to 10 cm in sight; the rest is for the bias of real
     ranges, which lasts for seconds."""
