@@ -145,6 +145,7 @@ def demo(scenario: str, seconds: float, seed: int, cars: int, out: Path, as_json
         [
             ["what the tracker estimates", f"{result.formation_error:.3f}"],
             ["the truth", f"{result.formation_error_truth:.3f}"],
+            ["nothing, only the command", f"{result.formation_error_blind:.3f}"],
         ],
     )
     click.echo(
@@ -250,6 +251,7 @@ def _print_tracks(results: Sequence[Any]) -> None:
         click.echo(
             f"{r.log.name}, {r.filter}: {r.log.n_ranges} ranges in {r.log.duration:.0f} s, "
             f"{r.n_rejected} refused as outliers, bad rows skipped: {skipped}, "
+            f"status ok {100 * r.score.ok_share:.0f} % of the scored time, "
             f"{r.realtime_factor:.0f} times faster than real time"
         )
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from agents.controllers import CONTROLLERS
+from agents.controllers.base import split_fields
 from agents.track import TrackResult, track_log
 from relpos_env import formation_v0
 from relpos_env.parallel_env import FormationEnv
@@ -30,6 +31,8 @@ class DemoResult:
     """[m] Mean distance of the others from where they should be, tracker in the loop."""
     formation_error_truth: float
     """[m] The same when the cars are told the truth."""
+    formation_error_blind: float
+    """[m] The same when they are told nothing and follow the operator's command alone."""
     nlos_share: float
     """[-] Share of the ranges that an obstacle was in the way of."""
     collisions: int
@@ -52,6 +55,7 @@ class DemoResult:
                 "seconds": self.seconds,
                 "formation_error": self.formation_error,
                 "formation_error_truth": self.formation_error_truth,
+                "formation_error_blind": self.formation_error_blind,
                 "nlos_share": self.nlos_share,
                 "collisions": self.collisions,
             },
@@ -76,11 +80,12 @@ def demo(
     drive = {}
     log: Log | None = None
     frames: dict[str, Any] = {}
-    for n, observation in enumerate(("estimate", "truth")):
+    told = ("estimate", "truth", "nothing")
+    for n, observation in enumerate(told):
         env = formation_v0.parallel_env(
             scenario=scenario,
             n_cars=cars,
-            observation=observation,
+            observation="truth" if observation == "truth" else "estimate",
             max_cycles=cycles,
             record=observation == "estimate",
         )
@@ -89,6 +94,8 @@ def demo(
         policy = CONTROLLERS[controller](env.fields)
         errors, nlos = [], []
         for k in range(cycles):
+            if observation == "nothing":
+                observations = {a: _blinded(env, o) for a, o in observations.items()}
             actions = {a: policy.act(o) for a, o in observations.items()}
             observations, _, _, _, infos = env.step(actions)
             errors.append(np.mean([info["formation_error"] for info in infos.values()]))
@@ -96,7 +103,7 @@ def demo(
             if recorder is not None:
                 recorder.add(infos)
             if progress is not None:
-                progress((n + (k + 1) / cycles) / 2.0)
+                progress((n + (k + 1) / cycles) / len(told))
         from_here = min(int(SETTLE * 10), cycles - 1)
         drive[observation] = float(np.mean(errors[from_here:]))
         if recorder is not None:
@@ -112,11 +119,19 @@ def demo(
         seconds=seconds,
         formation_error=drive["estimate"],
         formation_error_truth=drive["truth"],
+        formation_error_blind=drive["nothing"],
         nlos_share=share,
         collisions=collisions,
         tracks=tuple(track_log(log, filter=name) for name in FILTERS),
         frames=frames,
     )
+
+
+def _blinded(env: FormationEnv, observation: np.ndarray) -> np.ndarray:
+    """An observation in which no other car is known."""
+    blinded = observation.copy()
+    blinded[split_fields(env.fields)["mask"]] = 0.0
+    return blinded
 
 
 class FrameRecorder:

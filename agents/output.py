@@ -13,8 +13,8 @@ from agents.errors import UsageError
 def write_results(folder: Path, files: Mapping[str, str]) -> Path:
     """Write named text files into a folder, all of them or none.
 
-    They are written beside their places first and then moved, so that a full disk or a kill
-    leaves no half file. Files of the same names are replaced.
+    All are written beside their places first and only then moved, so that a full disk leaves
+    nothing and a kill no half file. Files of the same names are replaced.
 
     Raises:
         UsageError: The folder cannot be written to.

@@ -14,7 +14,7 @@ from relpos_env.interface.actions import DriveCommand
 from relpos_env.loop import STAND_STILL
 from relpos_env.scenarios import scenario as find_scenario
 from relpos_env.sim import DT, Simulation
-from tracking.log import Log, write_log
+from tracking.log import Log, check_target, write_log
 
 DECISION = 10
 """[-] Steps of the physics between two decisions of the drivers."""
@@ -47,6 +47,8 @@ def simulate(
         raise EnvError(f"seconds: expected 3 to 86400, got {seconds:g}")
     if seed < 0:
         raise EnvError(f"seed: expected 0 or more, got {seed}")
+    if out is not None:
+        check_target(Path(out))
     chosen = replace(find_scenario(scenario), n_cars=cars)
     sim = Simulation(chosen, np.random.default_rng(seed), record=True)
     drivers = LoopDrivers(chosen, sim.driver_rng)

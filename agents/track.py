@@ -72,6 +72,8 @@ class TrackResult:
             "nees": _number(s.nees),
             "nis": _number(self.nis),
             "realtime_factor": _number(self.realtime_factor),
+            "coverage": s.coverage,
+            "ok_share": s.ok_share,
             "rejected": self.n_rejected,
             "skipped": sum(self.log.skipped.values()),
         }
@@ -102,7 +104,8 @@ def track_log(
     constellation, block = log.constellation, log.block
     tracker = Tracker(constellation, params, filter=filter)
     first, last = log.t_range
-    grid = np.arange(first, last + 1e-9, 1.0 / CSV_HZ)
+    # From whole multiples, so that large times stay on the grid.
+    grid = first + np.arange(int((last - first) * CSV_HZ) + 1) / CSV_HZ
     t_truth = log.truth.times()
     t_truth = t_truth[(t_truth >= first) & (t_truth <= last)]
     t_out = np.union1d(grid, t_truth)

@@ -10,7 +10,7 @@ t = np.arange(1, 1500) / 100.0
 angle = t[:, None] * [0.9, 1.3, 1.7] + [0.0, 2.0, 4.0]
 centre = np.array([[0.0, 0.0], [3.0, 0.0], [1.0, 2.5]])
 pos = centre + np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-accel = -np.array([[0.9], [1.3], [1.7]]) ** 2 * (pos - centre)
+accel = -(np.array([[0.9], [1.3], [1.7]]) ** 2) * (pos - centre)
 
 blocks = []
 for k in range(3):

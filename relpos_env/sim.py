@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from relpos_env.errors import EnvError
 from relpos_env.interface.actions import DriveCommand
 from relpos_env.scenarios import Scenario
 from relpos_env.sensors import Imu, Magnetometer, Odometer, Radio
@@ -29,7 +30,7 @@ def car_constellation(scenario: Scenario) -> Constellation:
     ids = range(1, scenario.n_cars + 1)
     height = scenario.radio.antenna_height
     return Constellation(
-        nodes=tuple(NodeConfig(id=k, vehicle="car", imu_hz=scenario.imu.rate_hz) for k in ids),
+        nodes=tuple(NodeConfig(id=k, vehicle="car", imu_hz=1.0 / DT) for k in ids),
         dimensions=2,
         heading="magnetic",
         antennas=tuple(Antenna(id=k, node=k, offset_b=(0.0, 0.0, height)) for k in ids),
@@ -57,7 +58,7 @@ class Simulation:
         start, imu, mag, odometer, radio, self.driver_rng = rng.spawn(6)
         n = scenario.n_cars
         self.world = World(scenario.room, scenario.obstacles, scenario.car, scenario.start(start))
-        self._imu = Imu(scenario.imu, n, imu)
+        self._imu = Imu(scenario.imu, n, imu, DT)
         self._mag = Magnetometer(scenario.mag, n, mag)
         self._odometer = Odometer(scenario.odometer, n, odometer)
         self._radio = Radio(scenario.radio, n, radio)
@@ -108,7 +109,7 @@ class Simulation:
             truth_every: Truth of every so-manieth step; 2 is 50 Hz.
         """
         if self.recording is None:
-            raise ValueError("the simulation was not made with record=True")
+            raise EnvError("record: expected True when the simulation was made")
         states = self.recording.states[truth_every - 1 :: truth_every]
         n = self.scenario.n_cars
         pos = np.zeros((len(states) * n, 3))

@@ -13,7 +13,7 @@ from relpos_env.interface.actions import DriveCommand
 from relpos_env.vehicle import CarParams
 from tracking.arrays import F64, Bool
 
-CAR, OBSTACLE = 0b01, 0b10
+CAR, OBSTACLE, WALL = 0b001, 0b010, 0b100
 _READ = (
     pymunk.batch.BodyFields.POSITION
     | pymunk.batch.BodyFields.ANGLE
@@ -107,6 +107,8 @@ class World:
         ]
         for shape in [*solid, *blocking]:
             shape.friction, shape.elasticity = 0.3, 0.2
+        for shape in solid:
+            shape.filter = pymunk.ShapeFilter(categories=WALL)
         for shape in blocking:
             shape.filter = pymunk.ShapeFilter(categories=OBSTACLE)
         self._space.add(*solid, *blocking)

@@ -140,12 +140,6 @@ class Constellation:
         """Antenna positions in their node's body frame, (antenna, 3) [m]."""
         return np.array([a.offset_b for a in self.all_antennas], dtype=np.float64)
 
-    @cached_property
-    def default_antenna(self) -> I64:
-        """The antenna a node uses where a range names none, (node)."""
-        nodes = [a.node for a in self.all_antennas]
-        return np.array([nodes.index(node_id) for node_id in self.ids], dtype=np.int64)
-
     def antenna_index(self, node_id: int, antenna_id: int | None) -> int:
         """Array index of a node's antenna.
 

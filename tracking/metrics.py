@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tracking.arrays import F64, Bool
-from tracking.estimate import TeamEstimate
+from tracking.estimate import Status, TeamEstimate
 from tracking.geometry import best_rotation
 
 
@@ -47,6 +47,11 @@ class Score:
     """(pair) [m]"""
     n_scored: int
     """Relative positions that went into the figures."""
+    coverage: float
+    """[-] Share of the relative positions with truth that had an estimate; the rest is not
+    scored."""
+    ok_share: float
+    """[-] Share of those with truth whose status was ok."""
 
 
 def score(estimate: TeamEstimate, truth_ij_w: F64, has_truth: Bool, skip_until: float) -> Score:
@@ -62,13 +67,17 @@ def score(estimate: TeamEstimate, truth_ij_w: F64, has_truth: Bool, skip_until: 
     planar = constellation.dimensions == 2
     d = constellation.dimensions
     moving = ~constellation.is_static[constellation.pairs].all(axis=1)
-    scored = has_truth & moving & (estimate.t >= skip_until)[:, None]
+    wanted = has_truth & moving & (estimate.t >= skip_until)[:, None]
+    scored = wanted & ~np.isin(estimate.status, (Status.ABSENT, Status.STARTING))
+    n_wanted = max(int(wanted.sum()), 1)
+    coverage = float(scored.sum()) / n_wanted
+    ok_share = float((wanted & estimate.ok).sum()) / n_wanted
     rows = scored.any(axis=1)
     x, truth, scored = estimate.pos_ij_w[rows], truth_ij_w[rows], scored[rows]
     n_pairs = constellation.n_pairs
     if not scored.any():
         nothing = np.full(n_pairs, np.nan)
-        return Score(None, None, None, None, None, nothing, nothing, nothing, 0)
+        return Score(None, None, None, None, None, nothing, nothing, nothing, 0, 0.0, 0.0)
     x = np.where(scored[..., None], x, 0.0)
     truth = np.where(scored[..., None], truth, 0.0)
     if planar:
@@ -101,6 +110,8 @@ def score(estimate: TeamEstimate, truth_ij_w: F64, has_truth: Bool, skip_until: 
         pair_rmse_yaw=per_pair[1],
         pair_rmse_shape=per_pair[2],
         n_scored=int(scored.sum()),
+        coverage=coverage,
+        ok_share=ok_share,
     )
 
 

@@ -104,6 +104,6 @@ def animation_markup(frames: dict[str, Any]) -> str:
 
     Args:
         frames: room, car size, obstacles, dt, and per frame t, pos, heading, sight, target,
-            estimate, tracking and formation error; see `agents.demo.record_frames`.
+            estimate, tracking and formation error; see `agents.demo.FrameRecorder`.
     """
     return _SCRIPT.replace("__DATA__", json.dumps(frames, separators=(",", ":")))

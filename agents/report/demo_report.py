@@ -36,6 +36,7 @@ def demo_report(result: DemoResult) -> str:
         [
             ["what the tracker estimates", metres(result.formation_error)],
             ["the truth", metres(result.formation_error_truth)],
+            ["nothing, only the operator's command", metres(result.formation_error_blind)],
         ],
     )
     page.text(

@@ -49,7 +49,9 @@ def _add_result(page: Page, r: TrackResult) -> None:
     page.text(
         f"{log.constellation.n_nodes} nodes, {log.duration:.0f} s, {log.n_ranges} ranges, of "
         f"which {r.n_rejected} were refused as outliers; {sum(log.skipped.values())} bad rows "
-        f"skipped. Scored from {r.skip:g} s after the first range."
+        f"skipped. Scored from {r.skip:g} s after the first range; there was an estimate for "
+        f"{100 * r.score.coverage:.0f} % of that time, with status ok for "
+        f"{100 * r.score.ok_share:.0f} %."
     )
     constellation = log.constellation
     rows = []

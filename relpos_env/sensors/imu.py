@@ -24,8 +24,6 @@ from tracking.geometry import GRAVITY
 class ImuSimParams:
     """What the simulated IMU does."""
 
-    rate_hz: float = 100.0
-    """[Hz] Samples a second."""
     gyr_noise: float = 4.7e-4
     """[rad/s] 3.8 mdps/sqrt(Hz) in 50 Hz of bandwidth."""
     acc_noise: float = 5.0e-3
@@ -57,7 +55,9 @@ class ImuSimParams:
 class Imu:
     """The IMUs of all cars. Laws: same seed, same stream; no errors, the truth."""
 
-    def __init__(self, params: ImuSimParams, n_cars: int, rng: np.random.Generator) -> None:
+    def __init__(
+        self, params: ImuSimParams, n_cars: int, rng: np.random.Generator, dt: float = 0.01
+    ) -> None:
         self._params = p = params
         self._rng = rng
         constant = np.repeat([p.gyr_bias, p.acc_bias], 3)
@@ -67,7 +67,7 @@ class Imu:
         self._range = np.repeat([p.gyr_range, p.acc_range], 3)
         self._bias = constant * rng.standard_normal((n_cars, 6))
         self._drift = self._drift_std * rng.standard_normal((n_cars, 6))
-        self._keep = float(np.exp(-1.0 / (p.rate_hz * p.drift_tau)))
+        self._keep = float(np.exp(-dt / p.drift_tau))
 
     def sample(self, heading: F64, yaw_rate: F64, accel_w: F64, speed: F64) -> F64:
         """One sample of every car.

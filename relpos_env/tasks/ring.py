@@ -26,7 +26,7 @@ class RingFormation:
 
     def __init__(self, scenario: Scenario, speed: float = 1.0) -> None:
         self._n = scenario.n_cars
-        self._radius = float(np.mean(scenario.ring))
+        self._radius = float(np.min(scenario.ring))
         self._rate = speed / self._radius
         self._phase = np.zeros(self._n)
 

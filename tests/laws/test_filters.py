@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tracking import Status, TeamEstimate, Tracker, TrackerParams
 from tracking.filters import FILTERS
 from tracking.filters.params import PairEkfParams
-from tracking.measurements import MeasurementBlock
+from tracking.measurements import Kind, MeasurementBlock
 
 pytestmark = pytest.mark.parametrize("name", FILTERS)
 
@@ -177,3 +177,35 @@ def test_a_node_that_is_silent_leaves_and_returns(name, make_group):
     assert status[3] in (Status.OK, Status.AMBIGUOUS)
     others = group.constellation.pair_index[0, 1]
     assert (estimate.status[0, :3, others] == Status.OK).all()
+
+
+def test_a_surveyed_node_that_falls_silent_comes_back(name, make_group):
+    """A distance that was surveyed once is not forgotten with the node's filters."""
+    group = make_group(n=4, seconds=24.0)
+    nodes = list(group.constellation.nodes)
+    for k in (2, 3):
+        nodes[k] = replace(nodes[k], kind="static")
+    constellation = replace(group.constellation, nodes=tuple(nodes))
+    b = group.block
+    fixed = group.pos(np.array([0.0]))[0, 2:]
+    pos = group.pos(b.t[0])
+    pos[:, 2:] = fixed
+    rows = np.arange(b.n_events)
+    values = b.values.copy()
+    ranged = b.kind[0] == Kind.RANGE
+    length = np.linalg.norm(pos[rows, b.j[0]] - pos[rows, b.i[0]], axis=-1)
+    values[0, ranged, 0] = length[ranged]
+    both = ranged & (b.i[0] == 2) & (b.j[0] == 3)
+    inertial_of_fixed = (b.kind[0] == Kind.STATE) & (b.i[0] >= 2)
+    silent = ranged & (b.j[0] == 3) & (b.t[0] > 6.0) & (b.t[0] < 14.0)
+    kept = replace(b, values=values).take(~both & ~inertial_of_fixed & ~silent)
+    two, three = np.array([2]), np.array([3])
+    distance = np.array([[np.linalg.norm(fixed[1] - fixed[0])]])
+    survey = MeasurementBlock.of_kind(
+        Kind.SURVEY, np.array([0.001]), two, distance, j=three, antennas=(two, three)
+    )
+    block = MeasurementBlock.concatenate([survey, kept]).sorted()
+    status = Tracker(constellation, filter=name).run(block, np.array([13.0, 23.0])).status[0]
+    pair = constellation.pair_index[2, 3]
+    assert status[0, pair] in (Status.ABSENT, Status.STARTING)
+    assert status[1, pair] in (Status.OK, Status.AMBIGUOUS)

@@ -94,6 +94,33 @@ def test_a_file_of_bad_ranges_is_an_error(folder, value):
         read_log(folder)
 
 
+def test_other_structural_faults_are_named(folder):
+    ranges = folder / "ranges.csv"
+    good = ranges.read_text()
+    head, *rows = good.splitlines()
+    surveyed = "\n".join([head + ",source", *(row + ",survey" for row in rows)])
+    for text, word in (
+        (surveyed, "only surveyed"),
+        (good + '9.0,1,3,"2.0', "not a CSV"),
+        (good + "1.7e9,1,3,2.0\n", "row 32, t_s: jumps"),
+        (good + "9.0,1,3\n", "row 32: expected 4 fields"),
+        (good.replace("range_m", "node_i"), "stands there twice"),
+    ):
+        ranges.write_text(text)
+        with pytest.raises(LogError, match=word):
+            read_log(folder)
+    ranges.unlink()
+    (folder / "ranges.csv.gz").write_bytes(b"\x1f\x8b\x08\x00 no gzip at all")
+    with pytest.raises(LogError, match=r"ranges.csv.gz: cannot be read"):
+        read_log(folder)
+
+
+def test_byte_order_mark_and_crlf_are_fine(folder):
+    ranges = folder / "ranges.csv"
+    ranges.write_bytes(b"\xef\xbb\xbf" + ranges.read_text().replace("\n", "\r\n").encode())
+    assert read_log(folder).n_ranges == 30
+
+
 def test_missing_parts_are_named(folder, tmp_path):
     with pytest.raises(LogError, match="no such folder"):
         read_log(tmp_path / "nothing")

@@ -6,7 +6,7 @@ import numpy as np
 
 from tracking.compiled import kernel, small_kernel
 from tracking.filters._mds_kernels import refine
-from tracking.filters._start_kernels import copy_hypothesis, hypothesis_positions
+from tracking.filters._start_kernels import SURVEYED, copy_hypothesis, hypothesis_positions
 
 
 @small_kernel
@@ -154,11 +154,15 @@ def prune_bank(c, s):
 
 @kernel
 def are_same(c, s, a, b):
-    """True when two hypotheses agree in the position of every pair."""
+    """True when two hypotheses agree in position and velocity of every pair.
+
+    Velocities count over one second: a layout and its mirror image may meet in a line, but
+    they go on to different sides.
+    """
     for p in range(s.pairs.shape[0]):
         if s.nodes[s.pairs[p].i].present and s.nodes[s.pairs[p].j].present:
             squared = 0.0
-            for k in range(3):
+            for k in range(6):
                 squared += (s.x[p, a, k] - s.x[p, b, k]) ** 2
             if squared > c.merge_distance**2:
                 return False
@@ -175,8 +179,9 @@ def remove_node(s, layout, i):
         n_present += s.nodes[k].present
         if k != i:
             pair = s.pairs[layout.pair_index[i, k]]
-            pair.start_n = 0
             pair.n_ranges = 0
+            if pair.start_n < SURVEYED:
+                pair.start_n = 0
     if n_present < 2:
         for k in range(s.nodes.shape[0]):
             s.nodes[k].present = False

@@ -23,7 +23,13 @@ from tracking.constellation import Constellation
 from tracking.estimate import TeamEstimate
 from tracking.filters._event_kernels import run_events
 from tracking.filters.params import PairEkfParams
-from tracking.filters.state import FilterState, make_coefficients, make_layout, make_state
+from tracking.filters.state import (
+    FilterState,
+    as_records,
+    make_coefficients,
+    make_layout,
+    make_state,
+)
 from tracking.measurements import MeasurementBlock
 
 
@@ -58,7 +64,9 @@ class PairEkf:
         )
         contiguous = tuple(np.ascontiguousarray(a) for a in events)
         t_out = np.ascontiguousarray(t_out, dtype=np.float64)
-        run_events(self._coefficients, self._layout, self._state, contiguous, t_out, out)
+        run_events(
+            as_records(self._coefficients), self._layout, self._records(), contiguous, t_out, out
+        )
         pos, vel, cov, q_wb, has_q, age, nis, status = out
         return TeamEstimate(
             constellation=self._constellation,
@@ -98,6 +106,12 @@ class PairEkf:
     def n_rejected(self) -> F64:
         """Ranges refused as outliers, (env)."""
         return np.asarray(self._state.pairs["n_rejected"].sum(axis=1), dtype=np.float64)
+
+    def _records(self) -> FilterState:
+        """The state in the form the kernels take; shares its memory."""
+        s = self._state
+        nodes, pairs, group = (as_records(a) for a in (s.nodes, s.pairs, s.group))
+        return s._replace(nodes=nodes, pairs=pairs, group=group)
 
     def _fresh(self, n_envs: int) -> FilterState:
         n_hyps = len(self._layout.rotations)

@@ -8,6 +8,13 @@ from typing import Literal
 from tracking.errors import ConfigError
 
 
+def _expect_positive(params: object, names: str) -> None:
+    for name in names.split():
+        value = getattr(params, name)
+        if not 0.0 < value < float("inf"):
+            raise ConfigError(f"{name}: expected a number above 0, got {value}")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GateParams:
     """The outlier gate: a range against the running average of the past ones.
@@ -27,6 +34,9 @@ class GateParams:
     max_rejected: int = 8
     """[-] So many rejected in a row are believed after all: the average was wrong."""
 
+    def __post_init__(self) -> None:
+        _expect_positive(self, "tau floor speed_gain min_speed max_rejected")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MdsParams:
@@ -35,10 +45,13 @@ class MdsParams:
     period: float = 0.012
     """[s] Shortest time between two refinements: one ranging round of three nodes."""
     std: float = 0.3
-    """[m] Standard deviation of a refined position as a measurement of the filters. 0 replaces
-    the position outright, as the paper has it."""
+    """[m] Standard deviation of a refined position as a measurement of the filters. Towards 0
+    it replaces the position outright, as the paper has it."""
     min_spread: float = 0.15
     """[m] Layouts flatter than this are not refined: their mirror image cannot be told."""
+
+    def __post_init__(self) -> None:
+        _expect_positive(self, "period std min_spread")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,6 +77,9 @@ class StartParams:
     """[-] A single range counts for at most this in the likelihood, outlier or not."""
     check_period: float = 0.25
     """[s] Time between two looks at the bank."""
+
+    def __post_init__(self) -> None:
+        _expect_positive(self, "k max_age rotations_2d prune merge_distance max_nis check_period")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,16 +117,8 @@ class PairEkfParams:
     start: StartParams = field(default_factory=StartParams)
 
     def __post_init__(self) -> None:
-        for name in (
-            "accel_psd",
-            "wheeled_accel_psd",
-            "unaided_accel_psd",
-            "range_std",
-            "survey_std",
-            "speed_std",
-        ):
-            if not getattr(self, name) > 0.0:
-                raise ConfigError(f"{name}: expected > 0, got {getattr(self, name)}")
+        _expect_positive(self, "accel_psd wheeled_accel_psd unaided_accel_psd unaided_after")
+        _expect_positive(self, "range_std survey_std speed_std speed_tau lost_after leave_after")
         if self.speed_model not in ("range-rate", "speed-norm", "none"):
             raise ConfigError(
                 f"speed_model: expected 'range-rate', 'speed-norm' or 'none', "

@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba import config
 from numpy.typing import NDArray
 
 from tracking.arrays import F64, I64, Bool
@@ -41,7 +42,7 @@ PAIR = np.dtype(
         ("start_sum", "f8"),  # sum of the first ranges of a pair not started [m]
         ("start_t", "f8"),  # time of the first of them [s]
         ("start_n", "i8"),  # how many
-        ("n_ranges", "i8"),  # accepted ranges since the pair started
+        ("n_ranges", "i8"),  # accepted ranges since the pair started or was silent
         ("n_rejected", "i8"),  # ranges the gate has refused, ever
         ("in_a_row", "i8"),  # ranges refused since the last accepted one
         ("i", "i8"),  # constant: node indices, i < j
@@ -122,6 +123,11 @@ class Layout(NamedTuple):
     """(antenna, 3) [m]"""
     rotations: F64
     """Starting rotations and mirror images, (hyp, 3, 3)."""
+
+
+def as_records(array: Records) -> Records:
+    """An array of records whose fields the interpreter, too, finds under their names."""
+    return array.view(np.recarray) if config.DISABLE_JIT else array
 
 
 def make_coefficients(

@@ -3,6 +3,6 @@
 from tracking.log.folder import Log
 from tracking.log.read import read_log
 from tracking.log.truth import Truth
-from tracking.log.write import write_log
+from tracking.log.write import check_target, write_log
 
-__all__ = ["Log", "Truth", "read_log", "write_log"]
+__all__ = ["Log", "Truth", "check_target", "read_log", "write_log"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,7 +33,7 @@ def read_meta(path: Path) -> Meta:
         raise LogError(f"{path.parent}: no meta.toml, expected a log folder")
     try:
         raw = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
         raise LogError(f"meta.toml: not TOML ({error})") from error
     if raw.get("format") != FORMAT:
         raise LogError(f"meta.toml, format: expected {FORMAT}, found {raw.get('format')!r}")
@@ -42,7 +43,10 @@ def read_meta(path: Path) -> Meta:
     antennas = raw.get("antennas", {})
     if not isinstance(antennas, dict):
         raise LogError("meta.toml, antennas: expected a table [antennas.ID] for each antenna")
-    dimensions, heading = raw.get("dimensions", 3), raw.get("heading", "magnetic")
+    dimensions: Any = raw.get("dimensions", 3)
+    heading: Any = raw.get("heading", "magnetic")
+    if not isinstance(dimensions, int) or isinstance(dimensions, bool):
+        raise LogError(f"meta.toml, dimensions: expected 2 or 3, found {dimensions!r}")
     try:
         constellation = Constellation(
             nodes=tuple(_node(key, table) for key, table in nodes.items()),
@@ -91,13 +95,15 @@ def _table(where: str, value: Any) -> dict[str, Any]:
 
 
 def _id(where: str, value: Any) -> int:
-    try:
-        return int(value)
-    except (TypeError, ValueError):
-        raise LogError(f"meta.toml, {where}: expected an integer id, found {value!r}") from None
+    text = value.strip() if isinstance(value, str) else value
+    if isinstance(text, str) and text.isascii() and text.isdigit():
+        return int(text)
+    if isinstance(text, int) and not isinstance(text, bool) and text >= 0:
+        return text
+    raise LogError(f"meta.toml, {where}: expected an integer id, found {value!r}")
 
 
 def _number(where: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or value != value:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise LogError(f"meta.toml, {where}: expected a number, found {value!r}")
     return float(value)

@@ -44,7 +44,7 @@ def read_log(folder: Path | str) -> Log:
     constellation = meta.constellation
     skipped: dict[str, int] = {}
     ranges, nlos = _read_ranges(folder, constellation, skipped)
-    imu, constellation = _read_imu(folder, constellation, skipped)
+    imu = _read_imu(folder, constellation, skipped)
     blocks = [ranges, imu, *_read_optional(folder, constellation, skipped)]
     # RANGE events keep their order, since a stable sort by time, kind and nodes is used on
     # rows that come in time order; the labels must follow the same order.
@@ -59,7 +59,7 @@ def read_log(folder: Path | str) -> Log:
         name=meta.name,
         source=meta.source,
         licence=meta.licence,
-        constellation=constellation,
+        constellation=_with_rates(constellation, block),
         block=block.take(order),
         truth=_read_truth(folder, constellation, skipped),
         nlos=nlos,
@@ -85,7 +85,7 @@ def _read_ranges(
     d = distance[:, 0]
     with np.errstate(invalid="ignore"):
         good = filled[:, 0] & np.isfinite(d) & (d > 0.0) & (d <= MAX_DISTANCE)
-    table.keep_good(good, f"metres, above 0 and up to {MAX_DISTANCE:g}", ("range_m",))
+    table.check_share(good, f"metres, above 0 and up to {MAX_DISTANCE:g}", ("range_m",))
     skipped[path.name] = int(np.sum(~good))
     survey = np.zeros(table.n_rows, dtype=bool)
     if "source" in table:
@@ -111,6 +111,14 @@ def _read_ranges(
         has_power=has_power,
     )
     block.kind[0, survey] = Kind.SURVEY
+    if not np.any(good & ~survey):
+        raise LogError(f"{path.name}: only surveyed distances, expected UWB ranges")
+    moving = survey & ~(constellation.is_static[i] & constellation.is_static[j])
+    if moving.any():
+        raise LogError(
+            f"{path.name} row {np.nonzero(moving)[0][0] + 2}, source: a surveyed distance needs "
+            "two static nodes"
+        )
     nlos = None
     if "nlos" in table:
         labels, label_filled = table.numbers(("nlos",))
@@ -143,16 +151,16 @@ def _antennas(table: Table, constellation: Constellation, i: I64, j: I64) -> tup
 
 def _read_imu(
     folder: Path, constellation: Constellation, skipped: dict[str, int]
-) -> tuple[MeasurementBlock, Constellation]:
-    """IMU and MAG events of imu.csv, and the constellation with the rates found there."""
+) -> MeasurementBlock:
+    """IMU and MAG events of imu.csv."""
     path = find_table(folder, "imu")
     if path is None:
-        return MeasurementBlock.empty(), constellation
+        return MeasurementBlock.empty()
     table = Table.read(path, ("t_s", "node", *GYR, *ACC))
     t, node = table.times(), table.nodes("node", constellation.index_of)
     values, filled = table.numbers(GYR + ACC)
     good = _within(values, filled, np.repeat([MAX_GYR, MAX_ACC], 3))
-    table.keep_good(good, "rad/s and m/s2", GYR + ACC)
+    table.check_share(good, "rad/s and m/s2", GYR + ACC)
     skipped[path.name] = int(np.sum(~good))
     static = np.nonzero(constellation.is_static[node])[0]
     if len(static):
@@ -168,12 +176,7 @@ def _read_imu(
         blocks.append(
             MeasurementBlock.of_kind(Kind.MAG, t[mag_good], node[mag_good], mag[mag_good])
         )
-    rates = {n: _rate(t[good & (node == n)]) for n in np.unique(node)}
-    nodes = tuple(
-        replace(config, imu_hz=rates.get(k) or config.imu_hz)
-        for k, config in enumerate(constellation.nodes)
-    )
-    return MeasurementBlock.concatenate(blocks), replace(constellation, nodes=nodes)
+    return MeasurementBlock.concatenate(blocks)
 
 
 def _read_optional(
@@ -196,7 +199,7 @@ def _read_optional(
             norm = np.linalg.norm(np.where(good[:, None], values[:, :4], 1.0), axis=1)
             good &= np.abs(norm - 1.0) < 0.05
             values[:, :4] /= np.where(good, norm, 1.0)[:, None]
-        table.keep_good(good, "finite values in range", columns)
+        table.check_share(good, "finite values in range", columns)
         skipped[path.name] = int(np.sum(~good))
         blocks.append(MeasurementBlock.of_kind(kind, t[good], node[good], values[good]))
     return blocks
@@ -226,6 +229,17 @@ def _within(values: F64, filled: Bool, limits: F64) -> Bool:
     with np.errstate(invalid="ignore"):
         ok = filled & np.isfinite(values) & (np.abs(values) <= limits)
     return np.asarray(ok.all(axis=1))
+
+
+def _with_rates(constellation: Constellation, block: MeasurementBlock) -> Constellation:
+    """The constellation with the sensor rates that the recording shows."""
+    nodes = []
+    for n, config in enumerate(constellation.nodes):
+        mine = block.i[0] == n
+        imu_hz = _rate(block.t[0, mine & (block.kind[0] == Kind.IMU)]) or config.imu_hz
+        mag_hz = _rate(block.t[0, mine & (block.kind[0] == Kind.MAG)])
+        nodes.append(replace(config, imu_hz=imu_hz, mag_hz=None if mag_hz == imu_hz else mag_hz))
+    return replace(constellation, nodes=tuple(nodes))
 
 
 def _rate(t: F64) -> float | None:

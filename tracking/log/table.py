@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import gzip
 import io
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,12 +14,15 @@ import numpy as np
 from tracking.arrays import F64, I64, Bool
 from tracking.errors import LogError
 
+MAX_SILENCE = 86400.0
+"""[s] A longer jump between two rows is a broken clock."""
+
 
 def find_table(folder: Path, stem: str) -> Path | None:
     """The file of a table, plain or gzip-compressed."""
     for suffix in (".csv", ".csv.gz"):
         path = folder / (stem + suffix)
-        if path.is_file():
+        if path.exists() or path.is_symlink():
             return path
     return None
 
@@ -40,15 +44,21 @@ class Table:
         """
         try:
             raw = path.read_bytes()
-            text = (gzip.decompress(raw) if path.suffix == ".gz" else raw).decode("utf-8")
-        except (OSError, EOFError, UnicodeDecodeError, ValueError) as error:
+            text = (gzip.decompress(raw) if path.suffix == ".gz" else raw).decode("utf-8-sig")
+        except (OSError, EOFError, UnicodeDecodeError, zlib.error) as error:
             raise LogError(f"{path.name}: cannot be read ({error})") from error
-        rows = list(csv.reader(io.StringIO(text)))
+        try:
+            rows = list(csv.reader(io.StringIO(text), strict=True))
+        except csv.Error as error:
+            raise LogError(f"{path.name}: not a CSV table ({error})") from error
         while rows and not any(rows[-1]):
             rows.pop()
         if not rows:
             raise LogError(f"{path.name}: empty, expected a header with {', '.join(required)}")
         header = [name.strip() for name in rows[0]]
+        twice = [name for name in header if header.count(name) > 1]
+        if twice:
+            raise LogError(f"{path.name}: column {twice[0]!r} stands there twice")
         missing = [name for name in required if name not in header]
         if missing:
             raise LogError(
@@ -117,6 +127,13 @@ class Table:
                 f"{self.path.name} row {k + 2}, t_s: time goes back from {t[k - 1]:g} to "
                 f"{t[k]:g} s, expected rows in time order"
             )
+        jump = np.nonzero(np.diff(t) > MAX_SILENCE)[0]
+        if len(jump):
+            k = int(jump[0]) + 1
+            raise LogError(
+                f"{self.path.name} row {k + 2}, t_s: jumps from {t[k - 1]:g} to {t[k]:g} s, "
+                f"expected seconds on one clock"
+            )
         return t
 
     def nodes(self, column: str, index_of: dict[int, int]) -> I64:
@@ -143,8 +160,8 @@ class Table:
             table[cell] = index_of[node_id]
         return np.array([table[cell] for cell in self.columns[column]], dtype=np.int64)
 
-    def keep_good(self, good: Bool, expected: str, columns: tuple[str, ...]) -> Bool:
-        """Leave single bad rows out, but refuse a file of which most rows are bad.
+    def check_share(self, good: Bool, expected: str, columns: tuple[str, ...]) -> None:
+        """Refuse a file of which most rows are bad; single ones are left out by the caller.
 
         Args:
             good: True for usable rows.
@@ -162,4 +179,3 @@ class Table:
                 f"{self.path.name} row {r + 2}, {', '.join(columns)}: expected {expected}, "
                 f"found {found!r}; {n_bad} of {len(good)} rows are like this"
             )
-        return good

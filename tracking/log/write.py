@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import gzip
 import io
+import os
 import shutil
 import tempfile
 from collections.abc import Iterable, Sequence
@@ -27,10 +28,12 @@ def write_log(folder: Path | str, log: Log) -> Path:
             has no place for.
     """
     folder = Path(folder)
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise LogError(f"{folder}: exists already, expected a new or empty folder")
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    scratch = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+    check_target(folder)
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        scratch = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+    except OSError as error:
+        raise LogError(f"{folder}: cannot be written to ({error.strerror})") from error
     try:
         (scratch / "meta.toml").write_text(_meta(log), encoding="utf-8")
         for stem, header, rows in _tables(log):
@@ -49,6 +52,25 @@ def write_log(folder: Path | str, log: Log) -> Path:
         shutil.rmtree(scratch, ignore_errors=True)
         raise
     return folder
+
+
+def check_target(folder: Path) -> None:
+    """See that a log can be written there.
+
+    Raises:
+        LogError: It exists and is not an empty folder, or its parent is no folder.
+    """
+    try:
+        taken = folder.exists() and (not folder.is_dir() or any(folder.iterdir()))
+    except OSError as error:
+        raise LogError(f"{folder}: cannot be written to ({error.strerror})") from error
+    if taken:
+        raise LogError(f"{folder}: exists already, expected a new or empty folder")
+    parent = next(p for p in folder.absolute().parents if p.exists())
+    if not parent.is_dir():
+        raise LogError(f"{folder}: {parent} is not a folder")
+    if not os.access(parent, os.W_OK):
+        raise LogError(f"{folder}: {parent} cannot be written to")
 
 
 def _meta(log: Log) -> str:
