@@ -39,7 +39,9 @@ def main() -> None:
 
 @cli.command()
 @click.argument("logs", metavar="LOG [LOG ...]", nargs=-1, required=True, type=Path)
-@click.option("--filter", "filters", multiple=True, help="Filter to run; may be given again.")
+@click.option(
+    "--filter", "filters", multiple=True, help="ekf or ekf-mds (default); may be given again."
+)
 @click.option("--skip", default=10.0, show_default=True, help="Seconds that are not scored.")
 @click.option("--out", type=Path, help="Folder for estimates.csv and report.html.")
 @click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
@@ -52,9 +54,9 @@ def track(
     from tracking.filters import DEFAULT_FILTER, filter_builder
     from tracking.log import read_log
 
-    if not skip >= 0.0:
+    if not 0.0 <= skip < float("inf"):
         raise UsageError(f"--skip: expected 0 or more seconds, got {skip:g}")
-    names = filters or (DEFAULT_FILTER,)
+    names = tuple(dict.fromkeys(filters)) or (DEFAULT_FILTER,)
     for name in names:
         filter_builder(name)
     read = [read_log(path) for path in logs]
@@ -83,10 +85,15 @@ def track(
 
 @cli.command()
 @click.argument("out", type=Path)
-@click.option("--scenario", default="cars-nlos", show_default=True)
-@click.option("--seconds", default=120.0, show_default=True)
-@click.option("--seed", default=0, show_default=True)
-@click.option("--cars", default=3, show_default=True)
+@click.option(
+    "--scenario",
+    default="cars-nlos",
+    show_default=True,
+    help="cars-los, cars-nlos, ring-los or ring-nlos.",
+)
+@click.option("--seconds", default=120.0, show_default=True, help="Length, 3 to 86400.")
+@click.option("--seed", default=0, show_default=True, help="Same seed, same run.")
+@click.option("--cars", default=3, show_default=True, help="Number of cars, 2 or more.")
 @click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
 def simulate(out: Path, scenario: str, seconds: float, seed: int, cars: int, as_json: bool) -> None:
     """Record a simulated drive as a log folder with truth."""
@@ -115,10 +122,15 @@ def simulate(out: Path, scenario: str, seconds: float, seed: int, cars: int, as_
 
 
 @cli.command()
-@click.option("--scenario", default="ring-nlos", show_default=True)
-@click.option("--seconds", default=60.0, show_default=True)
-@click.option("--seed", default=0, show_default=True)
-@click.option("--cars", default=3, show_default=True)
+@click.option(
+    "--scenario",
+    default="ring-nlos",
+    show_default=True,
+    help="cars-los, cars-nlos, ring-los or ring-nlos.",
+)
+@click.option("--seconds", default=60.0, show_default=True, help="Length, 15 to 3600.")
+@click.option("--seed", default=0, show_default=True, help="Same seed, same run.")
+@click.option("--cars", default=3, show_default=True, help="Number of cars, 2 or more.")
 @click.option("--out", type=Path, default=Path("demo"), show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
 def demo(scenario: str, seconds: float, seed: int, cars: int, out: Path, as_json: bool) -> None:
@@ -204,7 +216,7 @@ def progress_bar(label: str, *, shown: bool = True) -> Iterator[Callable[[float]
 
     console = Console(stderr=True)
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         TaskProgressColumn(),
         TimeElapsedColumn(),
@@ -218,13 +230,14 @@ def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]
     """A table on stdout."""
     from rich import box
     from rich.console import Console
+    from rich.markup import escape
     from rich.table import Table
 
     table = Table(title=title, title_justify="left", box=box.SIMPLE)
     for k, name in enumerate(header):
         table.add_column(name, justify="left" if k == 0 else "right", no_wrap=True)
     for row in rows:
-        table.add_row(*row)
+        table.add_row(*(escape(cell) for cell in row))
     width = None if sys.stdout.isatty() else 120
     Console(width=width).print(table)
 
@@ -254,7 +267,14 @@ def _print_tracks(results: Sequence[Any]) -> None:
             f"status ok {100 * r.score.ok_share:.0f} % of the scored time, "
             f"{r.realtime_factor:.0f} times faster than real time"
         )
+        if r.score.rmse is None:
+            reason = (
+                "there is no truth"
+                if not len(r.log.truth.t)
+                else (f"no estimated pair has truth from {r.skip:g} s after the first range")
+            )
+            click.echo(f"{r.log.name}, {r.filter}: no errors, since {reason}")
 
 
 def _file_name(name: str) -> str:
-    return "".join(ch if ch.isalnum() or ch in "-_" else "_" for ch in name)
+    return "".join(ch if ch.isascii() and (ch.isalnum() or ch in "-_") else "_" for ch in name)[:60]

@@ -20,6 +20,8 @@ def write_results(folder: Path, files: Mapping[str, str]) -> Path:
         UsageError: The folder cannot be written to.
     """
     try:
+        for name in files:
+            _check_free(folder, name)
         folder.mkdir(parents=True, exist_ok=True)
         scratch = Path(tempfile.mkdtemp(prefix=".writing-", dir=folder))
     except OSError as error:
@@ -32,6 +34,20 @@ def write_results(folder: Path, files: Mapping[str, str]) -> Path:
         for name in files:
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             (scratch / name).replace(folder / name)
+    except OSError as error:
+        raise UsageError(f"--out {folder}: cannot be written to ({error.strerror})") from error
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
     return folder
+
+
+def _check_free(folder: Path, name: str) -> None:
+    """See that a file can take its place: no folder there, no file where a folder must be."""
+    target = folder / name
+    if target.is_dir():
+        raise UsageError(f"--out {folder}: {name} is a folder there, expected a file or nothing")
+    for parent in target.parents:
+        if parent.exists():
+            if not parent.is_dir():
+                raise UsageError(f"--out {folder}: {parent} is a file, expected a folder")
+            return

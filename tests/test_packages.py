@@ -33,3 +33,11 @@ def test_no_file_is_long():
     for package in ("tracking", "relpos_env", "agents", "hardware_bridge"):
         for path in (ROOT / package).rglob("*.py"):
             assert len(path.read_text().splitlines()) <= 320, path
+
+
+def test_links_between_documents_resolve():
+    import re
+
+    for page in [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]:
+        for target in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text()):
+            assert (page.parent / target).exists(), (page.name, target)

@@ -34,7 +34,8 @@ def bench_tracker(
         import filterpy
     except ImportError:
         raise UsageError(
-            "bench: filterpy is not installed, get it with: pip install 'relpos-env[dev]'"
+            "bench: filterpy is not installed, expected the development tools: "
+            ".venv/bin/pip install -e '.[dev]' -c constraints.txt"
         ) from None
     rows = []
     cases = [(n, name) for n in (3, 6) for name in FILTERS]

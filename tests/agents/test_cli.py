@@ -103,6 +103,31 @@ def test_faults_end_in_one_clear_message_and_status_2(args, message, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_results_are_whole_or_not_at_all(recording, tmp_path):
+    (tmp_path / "estimates.csv").mkdir()
+    done = relpos("track", recording, "--out", tmp_path)
+    assert done.returncode == 2
+    assert "estimates.csv is a folder" in done.stderr
+    assert [p.name for p in tmp_path.iterdir()] == ["estimates.csv"]
+    (tmp_path / "file").write_text("")
+    for args in (
+        ["track", recording, "--out", tmp_path / "file" / "x"],
+        ["simulate", tmp_path / "file" / "x", "--seconds", 4],
+    ):
+        done = relpos(*args)
+        assert done.returncode == 2
+        assert "Traceback" not in done.stderr
+
+
+def test_help_names_the_filters_and_scenarios():
+    from relpos_env.scenarios import SCENARIOS
+    from tracking.filters import FILTERS
+
+    assert all(name in relpos("track", "--help").stdout for name in FILTERS)
+    for command in ("simulate", "demo"):
+        assert all(name in relpos(command, "--help").stdout for name in SCENARIOS)
+
+
 def test_simulate_does_not_overwrite(recording):
     before = sorted((p.name, p.stat().st_mtime_ns) for p in recording.iterdir())
     done = relpos("simulate", recording, "--seconds", 5)

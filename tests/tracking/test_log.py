@@ -115,6 +115,18 @@ def test_other_structural_faults_are_named(folder):
         read_log(folder)
 
 
+def test_another_clock_is_an_error(folder):
+    imu = folder / "imu.csv"
+    head, *rows = imu.read_text().splitlines()
+    late = [f"{float(r.split(',')[0]) + 1.7e9:.2f},{r.split(',', 1)[1]}" for r in rows]
+    imu.write_text("\n".join([head, *late]) + "\n")
+    with pytest.raises(LogError, match="expected one clock"):
+        read_log(folder)
+    imu.write_text(head + "\n")
+    with pytest.raises(LogError, match=r"imu.csv: no rows"):
+        read_log(folder)
+
+
 def test_byte_order_mark_and_crlf_are_fine(folder):
     ranges = folder / "ranges.csv"
     ranges.write_bytes(b"\xef\xbb\xbf" + ranges.read_text().replace("\n", "\r\n").encode())
@@ -151,6 +163,12 @@ def test_missing_parts_are_named(folder, tmp_path):
         ('kind = "static"', 'kind = "flying"', "nodes.3.kind"),
         ("[nodes.3]", "[nodes.x]", "nodes.x"),
         ("format = 1", "format = ", "not TOML"),
+        ("format = 1", "format = true", "format: expected 1"),
+        ("dimensions = 2", "dimensions = 2.0", "dimensions"),
+        ('name = "small"', "name = 5", "name: expected text"),
+        ('heading = "initial"', 'heading = "magnetic"', "needs magnetometer readings"),
+        ("[nodes.3]", "[antennas.1]\nnode=1\noffset_m=[1e9,0,0]\n[nodes.3]", "offset_m"),
+        ("[nodes.2]", "initial_heading_rad = inf\n[nodes.2]", "initial_heading_rad"),
     ],
 )
 def test_faults_of_meta_are_named(folder, old, new, word):
@@ -195,7 +213,7 @@ def test_round_trip_is_exact(tmp_path_factory, times, distance, number, power, m
             nodes=(NodeConfig(id=4, initial_heading=number), NodeConfig(id=7)),
             dimensions=2,
             heading="initial",
-            antennas=(Antenna(id=1, node=4, offset_b=(number, 0.1, 1 / 3)),),
+            antennas=(Antenna(id=1, node=4, offset_b=(number / 20, 0.1, 1 / 3)),),
         ),
         block=MeasurementBlock.concatenate(parts).sorted(),
         nlos=np.arange(n) % 2 == 0,

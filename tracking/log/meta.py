@@ -12,6 +12,9 @@ from tracking.constellation import Antenna, Constellation, NodeConfig
 from tracking.errors import ConfigError, LogError
 from tracking.log.folder import FORMAT
 
+MAX_OFFSET = 100.0
+"""[m] An antenna farther from its body's origin is a mistake of units."""
+
 
 @dataclass(frozen=True, slots=True)
 class Meta:
@@ -32,10 +35,10 @@ def read_meta(path: Path) -> Meta:
     if not path.is_file():
         raise LogError(f"{path.parent}: no meta.toml, expected a log folder")
     try:
-        raw = tomllib.loads(path.read_text(encoding="utf-8"))
+        raw = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
         raise LogError(f"meta.toml: not TOML ({error})") from error
-    if raw.get("format") != FORMAT:
+    if type(raw.get("format")) is not int or raw["format"] != FORMAT:
         raise LogError(f"meta.toml, format: expected {FORMAT}, found {raw.get('format')!r}")
     nodes = raw.get("nodes")
     if not isinstance(nodes, dict) or not nodes:
@@ -45,23 +48,29 @@ def read_meta(path: Path) -> Meta:
         raise LogError("meta.toml, antennas: expected a table [antennas.ID] for each antenna")
     dimensions: Any = raw.get("dimensions", 3)
     heading: Any = raw.get("heading", "magnetic")
-    if not isinstance(dimensions, int) or isinstance(dimensions, bool):
+    if type(dimensions) is not int or dimensions not in (2, 3):
         raise LogError(f"meta.toml, dimensions: expected 2 or 3, found {dimensions!r}")
     try:
         constellation = Constellation(
             nodes=tuple(_node(key, table) for key, table in nodes.items()),
-            dimensions=dimensions,
+            dimensions=2 if dimensions == 2 else 3,
             heading=heading,
             antennas=tuple(_antenna(key, table) for key, table in antennas.items()),
         )
     except ConfigError as error:
         raise LogError(f"meta.toml, {error}") from error
     return Meta(
-        name=str(raw.get("name", path.parent.name)),
-        source=str(raw.get("source", "")),
-        licence=str(raw.get("licence", "")),
+        name=_text("name", raw.get("name", path.parent.name)),
+        source=_text("source", raw.get("source", "")),
+        licence=_text("licence", raw.get("licence", "")),
         constellation=constellation,
     )
+
+
+def _text(where: str, value: Any) -> str:
+    if not isinstance(value, str):
+        raise LogError(f"meta.toml, {where}: expected text, found {value!r}")
+    return value
 
 
 def _node(key: str, table: Any) -> NodeConfig:
@@ -83,6 +92,10 @@ def _antenna(key: str, table: Any) -> Antenna:
     if not isinstance(offset, list) or len(offset) != 3:
         raise LogError(f"meta.toml, {where}.offset_m: expected three numbers, found {offset!r}")
     x, y, z = (_number(f"{where}.offset_m", v) for v in offset)
+    if max(abs(x), abs(y), abs(z)) > MAX_OFFSET:
+        raise LogError(
+            f"meta.toml, {where}.offset_m: expected at most {MAX_OFFSET:g} m, found {offset!r}"
+        )
     return Antenna(
         id=_id(where, key), node=_id(f"{where}.node", table.get("node")), offset_b=(x, y, z)
     )

@@ -27,6 +27,8 @@ MAX_GYR = 80.0
 """[rad/s] Beyond any gyroscope's range (2000 deg/s is 35)."""
 MAX_ACC = 700.0
 """[m/s2] Beyond the range of accelerometers that trackers carry (16 g is 157)."""
+MAX_POSITION = 1e5
+"""[m] Farther from its origin no true position makes sense."""
 MAX_MAG = 5000.0
 """[uT] A hundred times the field of the earth."""
 
@@ -51,6 +53,7 @@ def read_log(folder: Path | str) -> Log:
     block = MeasurementBlock.concatenate(blocks)
     order = np.lexsort((block.j[0], block.i[0], block.kind[0], block.t[0]))
     is_range = block.kind[0][order] == Kind.RANGE
+    _check_inertial(block, constellation)
     if nlos is not None:
         all_labels = np.zeros(block.n_events, dtype=bool)
         all_labels[: len(nlos)] = nlos
@@ -90,11 +93,11 @@ def _read_ranges(
     survey = np.zeros(table.n_rows, dtype=bool)
     if "source" in table:
         for r, source in enumerate(table.text("source")):
-            if source not in ("", "uwb", "survey"):
+            if source.strip() not in ("", "uwb", "survey"):
                 raise LogError(
                     f"{path.name} row {r + 2}, source: expected 'uwb' or 'survey', found {source!r}"
                 )
-            survey[r] = source == "survey"
+            survey[r] = source.strip() == "survey"
     values, has_power = np.zeros((table.n_rows, 3)), np.zeros(table.n_rows, dtype=bool)
     values[:, 0] = d
     if all(name in table for name in POWERS):
@@ -157,6 +160,8 @@ def _read_imu(
     if path is None:
         return MeasurementBlock.empty()
     table = Table.read(path, ("t_s", "node", *GYR, *ACC))
+    if table.n_rows == 0:
+        raise LogError(f"{path.name}: no rows, expected samples or no such file")
     t, node = table.times(), table.nodes("node", constellation.index_of)
     values, filled = table.numbers(GYR + ACC)
     good = _within(values, filled, np.repeat([MAX_GYR, MAX_ACC], 3))
@@ -212,7 +217,8 @@ def _read_truth(folder: Path, constellation: Constellation, skipped: dict[str, i
     table = Table.read(path, ("t_s", "node", "x", "y", "z", *QUAT))
     t, node = table.times(), table.nodes("node", constellation.index_of)
     pos, filled = table.numbers(("x", "y", "z"))
-    good: Bool = np.asarray(filled.all(axis=1) & np.isfinite(pos).all(axis=1))
+    good = _within(pos, filled, np.full(3, MAX_POSITION))
+    table.check_share(good, f"metres, at most {MAX_POSITION:g}", ("x", "y", "z"))
     skipped[path.name] = int(np.sum(~good))
     quat, quat_filled = table.numbers(QUAT)
     has_orientation: Bool = np.asarray(quat_filled.all(axis=1) & np.isfinite(quat).all(axis=1))
@@ -229,6 +235,26 @@ def _within(values: F64, filled: Bool, limits: F64) -> Bool:
     with np.errstate(invalid="ignore"):
         ok = filled & np.isfinite(values) & (np.abs(values) <= limits)
     return np.asarray(ok.all(axis=1))
+
+
+def _check_inertial(block: MeasurementBlock, constellation: Constellation) -> None:
+    """See that inertial samples can be used: on the ranges' clock, and with a heading."""
+    kind, t = block.kind[0], block.t[0]
+    inertial = np.isin(kind, (Kind.IMU, Kind.STATE))
+    if not inertial.any():
+        return
+    ranges = t[kind == Kind.RANGE]
+    start, end = t[inertial].min(), t[inertial].max()
+    if start > ranges.max() or end < ranges.min():
+        raise LogError(
+            f"imu.csv, t_s: samples from {start:g} to {end:g} s, ranges from {ranges.min():g} to "
+            f"{ranges.max():g} s; expected one clock"
+        )
+    if constellation.heading == "magnetic" and not np.isin(kind, (Kind.MAG, Kind.STATE)).any():
+        raise LogError(
+            "meta.toml, heading: 'magnetic' needs magnetometer readings and there are none, "
+            "expected 'initial'"
+        )
 
 
 def _with_rates(constellation: Constellation, block: MeasurementBlock) -> Constellation:

@@ -48,7 +48,7 @@ class Table:
         except (OSError, EOFError, UnicodeDecodeError, zlib.error) as error:
             raise LogError(f"{path.name}: cannot be read ({error})") from error
         try:
-            rows = list(csv.reader(io.StringIO(text), strict=True))
+            rows = list(csv.reader(io.StringIO(text), strict=True, skipinitialspace=True))
         except csv.Error as error:
             raise LogError(f"{path.name}: not a CSV table ({error})") from error
         while rows and not any(rows[-1]):
