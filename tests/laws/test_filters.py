@@ -209,3 +209,31 @@ def test_a_surveyed_node_that_falls_silent_comes_back(name, make_group):
     pair = constellation.pair_index[2, 3]
     assert status[0, pair] in (Status.ABSENT, Status.STARTING)
     assert status[1, pair] in (Status.OK, Status.AMBIGUOUS)
+
+
+def test_turning_the_world_turns_the_estimate(name, group):
+    """A quarter turn of every acceleration and orientation, the ranges as they were."""
+    b = group.block
+    values = b.values.copy()
+    state = b.kind[0] == Kind.STATE
+    x, y = b.values[0, state, 4].copy(), b.values[0, state, 5].copy()
+    values[0, state, 4], values[0, state, 5] = -y, x
+    values[0, state, 0] = values[0, state, 3] = np.sqrt(0.5)
+    one = Tracker(group.constellation, filter=name).step(b, group.t[-1])
+    other = Tracker(group.constellation, filter=name).step(replace(b, values=values), group.t[-1])
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    np.testing.assert_allclose(other.pos_ij_w, one.pos_ij_w @ turn.T, atol=1e-6)
+    np.testing.assert_allclose(other.vel_ij_w, one.vel_ij_w @ turn.T, atol=1e-6)
+    for i, j in group.constellation.pairs:
+        for a, c in zip(one.between_b(i, j), other.between_b(i, j), strict=True):
+            np.testing.assert_allclose(a, c, atol=1e-6)
+    np.testing.assert_allclose(
+        one.relative_orientation(0, 1), other.relative_orientation(0, 1), atol=1e-9
+    )
+
+
+def test_shifting_the_clock_changes_nothing(name, group):
+    shifted = replace(group.block, t=group.block.t + 512.0)
+    one = Tracker(group.constellation, filter=name).step(group.block, group.t[-1])
+    other = Tracker(group.constellation, filter=name).step(shifted, group.t[-1] + 512.0)
+    np.testing.assert_allclose(one.pos_ij_w, other.pos_ij_w, atol=1e-4)

@@ -92,19 +92,26 @@ def test_the_formation_is_kept_on_estimates():
     assert estimate < 0.8 * blind
 
 
-def test_a_policy_sees_no_truth(monkeypatch):
-    """Moving the truth behind the sensors' backs leaves an estimate's observation as it is."""
-    env = formation_v0.parallel_env(max_cycles=60)
-    observations, _ = env.reset(seed=0)
-    for _ in range(50):
-        observations, *_ = env.step({a: np.array([0.4, 0.5], np.float32) for a in env.agents})
-    before = env.loop.belief()
-    state = env.loop.state
-    state.pos_w[:] += 1.0
-    state.vel_w[:] *= -1.0
-    after = env.loop.belief()
-    for name in ("pos_w", "vel_w", "pos_std", "ok", "heading"):
-        np.testing.assert_array_equal(getattr(before, name), getattr(after, name))
+def test_a_policy_sees_no_truth():
+    """Moving the truth behind the sensors' backs leaves an observation as it is.
+
+    All but the command, which comes from the operator, who sees the room.
+    """
+    for observation, sees_truth in (("estimate", False), ("truth", True)):
+        env = formation_v0.parallel_env(observation=observation, max_cycles=60)
+        env.reset(seed=0)
+        for _ in range(50):
+            env.step({a: np.array([0.4, 0.5], np.float32) for a in env.agents})
+        ends = np.cumsum([f.size for f in env.fields])
+        command = [f.name for f in env.fields].index("command")
+        keep = np.ones(ends[-1], dtype=bool)
+        keep[ends[command - 1] : ends[command]] = False
+        before = env._observe()
+        env.loop.state.pos_w[:] += [[0.5, 0.0], [0.0, 0.7], [-0.4, 0.2]]
+        env.loop.state.vel_w[:] *= -1.0
+        after = env._observe()
+        changed = any(not np.array_equal(before[a][keep], after[a][keep]) for a in env.agents)
+        assert changed == sees_truth
 
 
 def good_actions(env):

@@ -58,6 +58,14 @@ def test_reads_a_good_log(folder):
     assert (np.diff(log.block.t[0]) >= 0).all()
 
 
+def test_a_magnetometer_with_its_own_rate(folder):
+    rows = ["t_s,node,mag_x,mag_y,mag_z", *(f"{0.05 * k:.2f},1,20,0,-40" for k in range(20))]
+    (folder / "mag.csv").write_text("\n".join(rows) + "\n")
+    log = read_log(folder)
+    assert log.block.count(Kind.MAG) == 20
+    assert (log.constellation.nodes[0].imu_hz, log.constellation.nodes[0].mag_hz) == (100.0, 20.0)
+
+
 FAULTS = [
     ("ranges.csv", 5, "range_m", "abc", ["ranges.csv row 5", "range_m", "'abc'"]),
     ("ranges.csv", 5, "node_j", "9", ["ranges.csv row 5", "node_j", "no node 9"]),
