@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 
+from agents.console import emit_json, print_table, progress_bar
 from agents.errors import UsageError
 
 
@@ -200,46 +199,6 @@ def bench_tracker(rounds: int, as_json: bool) -> None:
             for r in rows
         ],
     )
-
-
-def emit_json(records: Any) -> None:
-    """One JSON object a line."""
-    for record in records:
-        click.echo(json.dumps(record, allow_nan=False))
-
-
-@contextmanager
-def progress_bar(label: str, *, shown: bool = True) -> Iterator[Callable[[float], None]]:
-    """A bar on stderr, drawn only on a terminal; gives the function to report the share done."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
-
-    console = Console(stderr=True)
-    columns = (
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeElapsedColumn(),
-    )
-    with Progress(*columns, console=console, disable=not shown or not console.is_terminal) as bar:
-        task = bar.add_task(label, total=1.0)
-        yield lambda share: bar.update(task, completed=share)
-
-
-def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """A table on stdout."""
-    from rich import box
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.table import Table
-
-    table = Table(title=title, title_justify="left", box=box.SIMPLE)
-    for k, name in enumerate(header):
-        table.add_column(name, justify="left" if k == 0 else "right", no_wrap=True)
-    for row in rows:
-        table.add_row(*(escape(cell) for cell in row))
-    width = None if sys.stdout.isatty() else 120
-    Console(width=width).print(table)
 
 
 def _print_tracks(results: Sequence[Any]) -> None:
