@@ -13,6 +13,7 @@ from agents.controllers.base import split_fields
 from agents.track import TrackResult, track_log
 from relpos_env import formation_v0
 from relpos_env.parallel_env import FormationEnv
+from relpos_env.registry import look_up
 from tracking.filters import FILTERS
 from tracking.log import Log
 
@@ -91,7 +92,7 @@ def demo(
         )
         recorder = FrameRecorder(env) if observation == "estimate" else None
         observations, _ = env.reset(seed=seed)
-        policy = CONTROLLERS[controller](env.fields)
+        policy = look_up(CONTROLLERS, controller, "controller")(env.fields)
         errors, nlos = [], []
         for k in range(cycles):
             if observation == "nothing":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from relpos_env.errors import EnvError
+from relpos_env.registry import look_up
 from relpos_env.scenarios.base import Scenario
 from relpos_env.scenarios.cars import CARS_LOS, CARS_NLOS
 from relpos_env.scenarios.ring import RING_LOS, RING_NLOS
@@ -21,9 +21,7 @@ def scenario(name: str) -> Scenario:
     Raises:
         EnvError: No scenario of that name.
     """
-    if name not in SCENARIOS:
-        raise EnvError(f"scenario: expected one of {', '.join(SCENARIOS)}, got {name!r}")
-    return SCENARIOS[name]
+    return look_up(SCENARIOS, name, "scenario")
 
 
 __all__ = ["SCENARIOS", "Scenario", "scenario"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from relpos_env.errors import EnvError
+from relpos_env.registry import look_up
 from relpos_env.scenarios import Scenario
 from relpos_env.tasks.base import Task
 from relpos_env.tasks.ring import RingFormation
@@ -19,9 +19,7 @@ def make_task(name: str, scenario: Scenario) -> Task:
     Raises:
         EnvError: No task of that name.
     """
-    if name not in TASKS:
-        raise EnvError(f"task: expected one of {', '.join(TASKS)}, got {name!r}")
-    return TASKS[name](scenario)
+    return look_up(TASKS, name, "task")(scenario)
 
 
 __all__ = ["TASKS", "Task", "make_task"]

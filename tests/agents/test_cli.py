@@ -159,3 +159,11 @@ def test_bench_lines_have_a_peer():
         row = json.loads(line)
         assert set(row) == {"bench", "case", "value", "unit", "peer", "peer_value", "ratio"}
         assert row["ratio"] == pytest.approx(row["peer_value"] / row["value"])
+
+
+def test_an_unknown_controller_is_named():
+    from agents.demo import demo
+    from relpos_env.errors import EnvError
+
+    with pytest.raises(EnvError, match="controller: expected one of consensus"):
+        demo(seconds=15.0, controller="magic")

@@ -123,6 +123,17 @@ def test_other_structural_faults_are_named(folder):
         read_log(folder)
 
 
+@pytest.mark.parametrize("value", ["nan", "inf", "1.5", "7", "left"])
+def test_antennas_that_do_not_exist_are_named(folder, value):
+    ranges = folder / "ranges.csv"
+    head, *rows = ranges.read_text().splitlines()
+    rows = [row + "," for row in rows]
+    rows[3] += value
+    ranges.write_text("\n".join([head + ",antenna_i", *rows]) + "\n")
+    with pytest.raises(LogError, match=r"ranges.csv row 5, antenna_i"):
+        read_log(folder)
+
+
 def test_another_clock_is_an_error(folder):
     imu = folder / "imu.csv"
     head, *rows = imu.read_text().splitlines()

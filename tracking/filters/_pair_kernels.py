@@ -54,10 +54,10 @@ def predict(x, P, p, h, dt, a0, a1, a2, psd, d):
 
 @small_kernel
 def correct(x, P, p, h, work, nu, R):
-    """Scalar Kalman update, Joseph form, with innovation nu; returns its variance S.
+    """Scalar Kalman update with innovation nu; returns its variance S.
 
-    ``P (I - KH)`` is expanded to ``P - K (PH)^T - (PH) K^T + K S K^T``, which keeps P
-    symmetric and positive for every K.
+    With the optimal gain ``K = PH / S`` the Joseph form reduces to ``P - K (PH)^T``. One
+    triangle is computed and mirrored, so that P stays symmetric to the last bit.
 
     Args:
         x: States.

@@ -133,11 +133,15 @@ def _antennas(table: Table, constellation: Constellation, i: I64, j: I64) -> tup
     """Antenna index of either end of every range."""
     ends = []
     for column, nodes in (("antenna_i", i), ("antenna_j", j)):
-        ids, filled = (
-            table.numbers((column,))
-            if column in table
-            else (np.zeros((table.n_rows, 1)), np.zeros((table.n_rows, 1), dtype=bool))
-        )
+        ids, filled = np.zeros((table.n_rows, 1)), np.zeros((table.n_rows, 1), dtype=bool)
+        if column in table:
+            ids, filled = table.numbers((column,))
+        odd = np.nonzero(filled[:, 0] & (ids[:, 0] % 1.0 != 0.0))[0]
+        if len(odd):
+            raise LogError(
+                f"{table.path.name} row {odd[0] + 2}, {column}: expected an antenna id, "
+                f"found {table.text(column)[odd[0]]!r}"
+            )
         known: dict[tuple[int, int | None], int] = {}
         index = np.empty(table.n_rows, dtype=np.int64)
         for r in range(table.n_rows):

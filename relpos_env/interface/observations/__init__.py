@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from relpos_env.errors import EnvError
 from relpos_env.interface.observations.base import Field, ObservationMode
 from relpos_env.interface.observations.relative import RelativePositions
+from relpos_env.registry import look_up
 
 OBSERVATIONS: dict[str, Callable[[int], ObservationMode]] = {
     "estimate": partial(RelativePositions, needs_truth=False),
@@ -22,9 +22,7 @@ def observation_mode(name: str, n_cars: int) -> ObservationMode:
     Raises:
         EnvError: No mode of that name.
     """
-    if name not in OBSERVATIONS:
-        raise EnvError(f"observation: expected one of {', '.join(OBSERVATIONS)}, got {name!r}")
-    return OBSERVATIONS[name](n_cars)
+    return look_up(OBSERVATIONS, name, "observation")(n_cars)
 
 
 __all__ = ["OBSERVATIONS", "Field", "ObservationMode", "observation_mode"]
