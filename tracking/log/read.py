@@ -136,7 +136,9 @@ def _antennas(table: Table, constellation: Constellation, i: I64, j: I64) -> tup
         ids, filled = np.zeros((table.n_rows, 1)), np.zeros((table.n_rows, 1), dtype=bool)
         if column in table:
             ids, filled = table.numbers((column,))
-        odd = np.nonzero(filled[:, 0] & (ids[:, 0] % 1.0 != 0.0))[0]
+        odd = np.nonzero(
+            filled[:, 0] & ~(np.isfinite(ids[:, 0]) & (np.trunc(ids[:, 0]) == ids[:, 0]))
+        )[0]
         if len(odd):
             raise LogError(
                 f"{table.path.name} row {odd[0] + 2}, {column}: expected an antenna id, "
