@@ -14,3 +14,7 @@ class LogError(TrackingError):
 
 class ConfigError(TrackingError):
     """A configuration that makes no sense: names the field and what is allowed."""
+
+
+class WireError(TrackingError):
+    """Bytes that are no ranging message: names the field."""

@@ -16,46 +16,88 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Phy:
-    """One radio setting and the message that is sent with it."""
-
-    preamble_symbols: int = 1024
-    """[-] Longer reaches farther and takes longer."""
-    sfd_symbols: int = 64
-    """[-]"""
-    symbol: float = 496 / 499.2e6
-    """[s] One preamble symbol at 16 MHz pulse repetition."""
-    bit: float = 8.2051e-6
-    """[s] One bit of header at the low rate, 110 kbit/s; also of payload."""
-    fixed_bytes: int = 16
-    """[-] MAC header 9, own transmit time stamp 5, check sum 2."""
-    bytes_per_node: int = 7
-    """[-] Receive time stamp 5, id and quality 2."""
-    gap: float = 0.0
-    """[s] Silence between two messages."""
-
-
-PAPER_PHY = Phy()
-"""The setting of the paper: DW1000, 110 kbit/s, preamble 1024, 16 MHz."""
+from tracking.ranging.wire import ENTRY_BYTES, FIXED_BYTES, entries_per_frame
 
 PHR_BITS = 21
 PARITY_BITS = 48
 BLOCK_BITS = 330
 
 
-def airtime(phy: Phy, payload_bytes: int) -> float:
-    """Time that a message of so many bytes is on the air [s]."""
-    data = 8 * payload_bytes
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Phy:
+    """One radio setting, and the pauses that the radio needs between messages."""
+
+    name: str
+    preamble_symbols: int
+    """[-] Longer reaches farther and takes longer."""
+    sfd_symbols: int
+    """[-]"""
+    header_bit: float
+    """[s] One bit of the PHR."""
+    data_bit: float
+    """[s] One bit of payload."""
+    symbol: float = 496 / 499.2e6
+    """[s] One preamble symbol at 16 MHz pulse repetition."""
+    sense: float = 48e-6
+    """[s] Listening that tells silence from a preamble: three chunks of 16 symbols."""
+    turnaround: float = 12e-6
+    """[s] From receiving to sending."""
+    processing: float = 0.0
+    """[s] From the end of a message to the answer being ready. 0 where the payload can be
+    written while the own preamble, 1 ms long, is already on the air."""
+    max_frame: int = 127
+    """[bytes] Longest frame; up to 1023 with the long frames of the DW1000."""
+
+    @property
+    def gap(self) -> float:
+        """Silence between two messages [s]: all listen in it, since a newcomer may speak."""
+        return max(self.sense + self.turnaround, self.processing)
+
+    @property
+    def header_time(self) -> float:
+        """From the start of a frame to the moment that its time stamp means [s]."""
+        return (self.preamble_symbols + self.sfd_symbols) * self.symbol
+
+
+PAPER_PHY = Phy(
+    name="110k",
+    preamble_symbols=1024,
+    sfd_symbols=64,
+    header_bit=8.2051e-6,
+    data_bit=8.2051e-6,
+)
+"""The setting of the paper: DW1000, 110 kbit/s, preamble 1024, 16 MHz."""
+
+FAST_PHY = Phy(
+    name="6M8",
+    preamble_symbols=128,
+    sfd_symbols=8,
+    header_bit=1.02564e-6,
+    data_bit=0.128205e-6,
+    sense=24e-6,
+    processing=300e-6,
+)
+"""6.8 Mbit/s, preamble 128: eight times the rate, and a shorter reach."""
+
+PHYS = {phy.name: phy for phy in (PAPER_PHY, FAST_PHY)}
+
+
+def airtime(phy: Phy, frame_bytes: int) -> float:
+    """Time that a frame of so many bytes is on the air [s]."""
+    data = 8 * frame_bytes
     coded = data + PARITY_BITS * math.ceil(data / BLOCK_BITS)
-    preamble = (phy.preamble_symbols + phy.sfd_symbols) * phy.symbol
-    return preamble + (PHR_BITS + coded) * phy.bit
+    return phy.header_time + PHR_BITS * phy.header_bit + coded * phy.data_bit
 
 
 def message_time(phy: Phy, n_nodes: int) -> float:
     """Time from one message of a round to the next, n nodes in the group [s]."""
-    return airtime(phy, phy.fixed_bytes + phy.bytes_per_node * n_nodes) + phy.gap
+    left, total, most = n_nodes - 1, 0.0, entries_per_frame(phy.max_frame)
+    while True:
+        entries = min(left, most)
+        total += airtime(phy, FIXED_BYTES + ENTRY_BYTES * entries) + phy.gap
+        left -= entries
+        if left <= 0:
+            return total
 
 
 def round_rate(phy: Phy, n_nodes: int) -> float:

@@ -1,0 +1,87 @@
+"""The records that the kernels of the air work on."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relpos_env.sensors.channel import ChannelParams
+
+Records = NDArray[Any]
+
+_CHANNEL_NUMBERS = (
+    "stamp_std", "carrier_std", "bias", "rise", "rise_length", "fast", "slow", "power_1m",
+    "attenuation", "shadowing", "ceiling", "knee", "power_noise", "gap", "gap_near", "gap_length",
+    "gap_nlos", "gap_skew", "gap_noise", "gap_noise_near", "gap_noise_length", "loss",
+    "loss_nlos", "max_distance",
+)  # fmt: skip
+_CHANNEL_DERIVED = (
+    "excess_mu", "excess_sigma", "excess_cap", "gap_place_l", "gap_place_n", "gap_share_excess",
+    "gap_share_shadow", "gap_skew_mean", "gap_skew_scale", "rho_fast", "rho_slow", "rho_excess",
+    "rho_shadow", "rho_place",
+)  # fmt: skip
+CHANNEL = np.dtype([(name, "f8") for name in (*_CHANNEL_NUMBERS, *_CHANNEL_DERIVED)])
+"""`ChannelParams` as the kernels take it, with what is derived from it."""
+
+LATENT = np.dtype(
+    [("knot", "i8")]
+    + [(f"{z}{k}", "f8") for k in (0, 1) for z in ("fast", "slow", "excess", "shadow", "place")]
+)
+"""The slowly changing part of one pair's channel, at two knots of the way travelled."""
+
+NODE = np.dtype(
+    [
+        ("on", "?"),
+        ("base", "i8"),  # local clock at the start of the window, whole ticks
+        ("frac", "f8"),  # and the rest of a tick
+        ("rate", "f8"),  # ticks per second of true time
+        ("path", "f8"),  # m travelled up to the start of the window
+        ("step", "f8"),  # m travelled in the window
+        ("antenna", "f8"),  # m that its antenna delay adds to a range
+        ("sent", "i8"),  # messages so far
+    ]
+)
+"""One radio: clock, motion and antenna."""
+
+RECEPTION = np.dtype(
+    [
+        ("src", "i8"),  # node whose message is coming in, -1 if none
+        ("bad", "?"),  # something else was on the air meanwhile
+        ("nlos", "?"),
+        ("stamp", "i8"),  # receiver's clock, ticks
+        ("rx_power", "f8"),  # dBm
+        ("fp_power", "f8"),  # dBm
+        ("carrier", "f8"),  # 1
+    ]
+)
+"""What a receiver is locked on."""
+
+
+def make_channel(params: ChannelParams, knot: float) -> Records:
+    """Derive the numbers of the kernels, (1)."""
+    c = np.zeros(1, dtype=CHANNEL)
+    k2 = params.gap_skew**2
+    lengths = {
+        "fast": params.fast_length,
+        "slow": params.slow_length,
+        "excess": params.excess_length,
+        "shadow": params.shadowing_length,
+        "place": params.gap_place_length,
+    }
+    derived = {
+        "excess_mu": params.excess[0],
+        "excess_sigma": params.excess[1],
+        "excess_cap": params.excess[2],
+        "gap_place_l": params.gap_place[0],
+        "gap_place_n": params.gap_place[1],
+        "gap_share_excess": params.gap_shares[0],
+        "gap_share_shadow": params.gap_shares[1],
+        "gap_skew_mean": np.exp(0.5 * k2),
+        "gap_skew_scale": 1.0 / np.sqrt((np.exp(k2) - 1.0) * np.exp(k2)),
+        **{f"rho_{name}": np.exp(-knot / length) for name, length in lengths.items()},
+    }
+    for name in CHANNEL.names or ():
+        c[name] = derived[name] if name in derived else getattr(params, name)
+    return c

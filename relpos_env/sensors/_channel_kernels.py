@@ -1,0 +1,104 @@
+"""The formulas of `relpos_env.sensors.channel`, for one message between two antennas."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from relpos_env.sensors._random_kernels import draw_key, normal_pair, uniform
+from tracking.compiled import small_kernel
+
+KNOT = 0.05
+"""[m] The processes are drawn every so far and straight between."""
+
+
+@small_kernel
+def bring_latents(c, latent, key, travelled):
+    """Bring the processes of a pair to the way travelled.
+
+    Args:
+        c: CHANNEL.
+        latent: LATENT of the pair, updated.
+        key: Of the pair's draws.
+        travelled: By both ends together [m]; never less than before.
+
+    Returns:
+        Weight of the later knot.
+    """
+    while latent.knot < 0 or travelled > (latent.knot + 1) * KNOT:
+        latent.knot += 1
+        if latent.knot == 0:
+            _draw_knot(c, latent, key, 0, False)
+        _draw_knot(c, latent, key, latent.knot + 1, True)
+    return travelled / KNOT - latent.knot
+
+
+@small_kernel
+def _draw_knot(c, latent, key, knot, correlated):
+    """Move on to a knot, from the one before."""
+    here = draw_key(key, np.uint64(knot))
+    a, b = normal_pair(here, 0)
+    d, e = normal_pair(here, 2)
+    f, _ = normal_pair(here, 4)
+    latent.fast0, latent.slow0, latent.excess0 = latent.fast1, latent.slow1, latent.excess1
+    latent.shadow0, latent.place0 = latent.shadow1, latent.place1
+    latent.fast1 = _step(c.rho_fast, latent.fast0, a, correlated)
+    latent.slow1 = _step(c.rho_slow, latent.slow0, b, correlated)
+    latent.excess1 = _step(c.rho_excess, latent.excess0, d, correlated)
+    latent.shadow1 = _step(c.rho_shadow, latent.shadow0, e, correlated)
+    latent.place1 = _step(c.rho_place, latent.place0, f, correlated)
+
+
+@small_kernel
+def _step(rho, last, noise, correlated):
+    if not correlated:
+        return noise
+    return rho * last + math.sqrt(1.0 - rho * rho) * noise
+
+
+@small_kernel
+def path_error(c, latent, weight, distance, nlos):
+    """What a range is wrong by, beside the noise of its stamps [m]."""
+    error = c.bias
+    if distance > 2.0 and c.rise != 0.0:
+        error += c.rise * (1.0 - math.exp(-(distance - 2.0) / c.rise_length))
+    error += c.fast * _mix(latent.fast0, latent.fast1, weight) + c.slow * _mix(latent.slow0, latent.slow1, weight)
+    if nlos:
+        z = _mix(latent.excess0, latent.excess1, weight)
+        error += c.excess_cap / (1.0 + math.exp(-(c.excess_mu + c.excess_sigma * z)))
+    return error
+
+
+@small_kernel
+def path_power(c, latent, weight, distance, nlos):
+    """Received power, before the noise of the reading [dBm]."""
+    p = c.power_1m - 20.0 * math.log10(max(distance, 0.1))
+    p += c.shadowing * _mix(latent.shadow0, latent.shadow1, weight) - (c.attenuation if nlos else 0.0)
+    excess = (c.ceiling - p) / c.knee
+    if excess > 30.0:
+        return p
+    return c.ceiling - c.knee * math.log1p(math.exp(excess))
+
+
+@small_kernel
+def power_gap(c, latent, weight, distance, nlos, key):
+    """Received minus first-path power [dB]."""
+    share_e = c.gap_share_excess if nlos else 0.0
+    rest = math.sqrt(1.0 - share_e * share_e - c.gap_share_shadow * c.gap_share_shadow)
+    z = rest * _mix(latent.place0, latent.place1, weight) + c.gap_share_shadow * _mix(latent.shadow0, latent.shadow1, weight)
+    z += share_e * _mix(latent.excess0, latent.excess1, weight)
+    k = c.gap_skew
+    place = (math.exp(k * z) - c.gap_skew_mean) * c.gap_skew_scale
+    gap = c.gap + (c.gap_nlos if nlos else 0.0) + (c.gap_place_n if nlos else c.gap_place_l) * place
+    noise = c.gap_noise
+    if c.gap_near != 0.0 or c.gap_noise_near != 0.0:
+        gap += c.gap_near * math.exp(-distance / c.gap_length)
+        noise += c.gap_noise_near * math.exp(-distance / c.gap_noise_length)
+    u = uniform(key, 5)
+    return gap + noise * (u * u - 1.0 / 3.0) / 0.298
+
+
+@small_kernel
+def _mix(before, after, weight):
+    return before + weight * (after - before)

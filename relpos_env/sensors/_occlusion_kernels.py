@@ -1,0 +1,65 @@
+"""What stands between two antennas: upright boxes, and capsules such as limbs in space."""
+
+from __future__ import annotations
+
+import math
+
+from tracking.compiled import small_kernel
+
+
+@small_kernel
+def crosses_box(ax, ay, bx, by, box):
+    """Whether the line from a to b in the plane passes through a box.
+
+    Args:
+        ax, ay, bx, by: Its ends [m].
+        box: Centre x y [m], half width, half depth [m], cosine and sine of its angle.
+    """
+    x, y, dx, dy = ax - box[0], ay - box[1], bx - ax, by - ay
+    length2 = dx * dx + dy * dy
+    # Nearest point to the centre first: most boxes are nowhere near.
+    along = 0.0 if length2 == 0.0 else min(max(-(x * dx + y * dy) / length2, 0.0), 1.0)
+    nx, ny = x + along * dx, y + along * dy
+    if nx * nx + ny * ny > box[2] * box[2] + box[3] * box[3]:
+        return False
+    c, s = box[4], box[5]
+    low, high = 0.0, 1.0
+    for axis in range(2):
+        if axis == 0:
+            start, step = c * x + s * y, c * dx + s * dy
+        else:
+            start, step = c * y - s * x, c * dy - s * dx
+        half = box[2 + axis]
+        if abs(step) < 1e-12:
+            if abs(start) > half:
+                return False
+            continue
+        first, last = (-half - start) / step, (half - start) / step
+        low, high = max(low, min(first, last)), min(high, max(first, last))
+    return low < high
+
+
+@small_kernel
+def crosses_capsule(ax, ay, az, bx, by, bz, capsule, skin):
+    """Whether the line from a to b passes through the inside of a capsule.
+
+    Args:
+        ax, ay, az, bx, by, bz: Its ends [m].
+        capsule: Ends of the axis, 3 and 3 [m], and the radius [m].
+        skin: Share of the radius that counts as inside, below 1: an antenna is worn on the
+            surface and is not hidden by that.
+    """
+    ux, uy, uz = bx - ax, by - ay, bz - az
+    vx, vy, vz = capsule[3] - capsule[0], capsule[4] - capsule[1], capsule[5] - capsule[2]
+    wx, wy, wz = ax - capsule[0], ay - capsule[1], az - capsule[2]
+    a, b, c = ux * ux + uy * uy + uz * uz, ux * vx + uy * vy + uz * vz, vx * vx + vy * vy + vz * vz
+    d, e = ux * wx + uy * wy + uz * wz, vx * wx + vy * wy + vz * wz
+    # Nearest points of two segments (Ericson, Real-Time Collision Detection, 5.1.9).
+    det = a * c - b * b
+    s = min(max((b * e - c * d) / det, 0.0), 1.0) if det > 1e-12 * a * c else 0.0
+    t = (b * s + e) / c if c > 0.0 else 0.0
+    if t < 0.0 or t > 1.0:
+        t = min(max(t, 0.0), 1.0)
+        s = min(max((b * t - d) / a, 0.0), 1.0) if a > 0.0 else 0.0
+    x, y, z = wx + s * ux - t * vx, wy + s * uy - t * vy, wz + s * uz - t * vz
+    return math.sqrt(x * x + y * y + z * z) < skin * capsule[6]

@@ -1,0 +1,143 @@
+"""One message on its way from an antenna to another, both of them moving."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from relpos_env.sensors._channel_kernels import (
+    bring_latents,
+    path_error,
+    path_power,
+    power_gap,
+)
+from relpos_env.sensors._occlusion_kernels import crosses_box, crosses_capsule
+from relpos_env.sensors._random_kernels import draw_key, normal_pair, uniform
+from tracking.compiled import small_kernel
+from tracking.ranging.timestamps import SPEED_OF_LIGHT
+
+MESSAGES, PAIRS, CLOCKS, STARTS = 1 << 40, 2 << 40, 3 << 40, 4 << 40
+"""Counters of what random numbers are for."""
+SKIN = 0.9
+"""Share of a capsule's radius that hides what is behind it."""
+
+
+@small_kernel
+def read_clock(node, t):
+    """Ticks of a node's clock at a time since the start of the window [s]."""
+    return node.base + int(math.floor(node.frac + t * node.rate))
+
+
+@small_kernel
+def nearest_tick(node, t):
+    """The tick nearest to a time: a stamp is rounded, not cut."""
+    return node.base + int(math.floor(node.frac + t * node.rate + 0.5))
+
+
+@small_kernel
+def true_time(node, ticks):
+    """Time since the start of the window [s] at which a node's clock shows so many ticks."""
+    return (float(ticks - node.base) - node.frac) / node.rate
+
+
+@small_kernel
+def advance_clock(node, dt, wander, noise):
+    """Go to the next window; the rate wanders.
+
+    Args:
+        node: NODE, updated.
+        dt: Length of the window [s].
+        wander: Standard deviation of the change of rate in a second [1].
+        noise: Standard normal number.
+    """
+    total = node.frac + dt * node.rate
+    whole = math.floor(total)
+    node.base += int(whole)
+    node.frac = total - whole
+    node.rate *= 1.0 + wander * math.sqrt(dt) * noise
+
+
+@small_kernel
+def receive(c, latent, seed, sender, receiver, s, r, t, share, pos0, pos1, dt, boxes, capsules, rx):
+    """Work out what a node hears of a message.
+
+    Args:
+        c: CHANNEL.
+        latent: LATENT of the pair, updated.
+        seed: Of the environment.
+        sender, receiver: NODE.
+        s, r: Their numbers.
+        t: Stamp moment of the message since the start of the window [s].
+        share: The same as a share of the window.
+        pos0, pos1: Antennas at the start and the end of the window, (node, 3) [m].
+        dt: Length of the window [s].
+        boxes: What stands in the plane, (box, 6).
+        capsules: What stands in space, (capsule, 7).
+        rx: RECEPTION, written.
+
+    Returns:
+        True if the radio detects it.
+    """
+    key = draw_key(seed, np.uint64(MESSAGES + sender.sent * 4096 + s * 64 + r))
+    ax, ay, az = _at(pos0, pos1, s, share)
+    bx, by, bz = _at(pos0, pos1, r, share)
+    dx, dy, dz = bx - ax, by - ay, bz - az
+    distance = math.sqrt(dx * dx + dy * dy + dz * dz)
+    if distance > c.max_distance:
+        return False
+    nlos = False
+    for k in range(boxes.shape[0]):
+        if crosses_box(ax, ay, bx, by, boxes[k]):
+            nlos = True
+            break
+    for k in range(capsules.shape[0]):
+        if nlos:
+            break
+        nlos = crosses_capsule(ax, ay, az, bx, by, bz, capsules[k], SKIN)
+    if uniform(key, 0) < (c.loss_nlos if nlos else c.loss):
+        return False
+    # The receiver moves on while the message flies.
+    inverse = 1.0 / max(distance, 1e-9)
+    vx, vy, vz = (
+        (pos1[r, 0] - pos0[r, 0]) / dt,
+        (pos1[r, 1] - pos0[r, 1]) / dt,
+        (pos1[r, 2] - pos0[r, 2]) / dt,
+    )
+    closing = (vx * dx + vy * dy + vz * dz) * inverse
+    flown = distance * (1.0 + closing / SPEED_OF_LIGHT)
+    travelled = sender.path + receiver.path + (sender.step + receiver.step) * share
+    lo, hi = min(s, r), max(s, r)
+    pair_key = draw_key(seed, np.uint64(PAIRS + lo * 64 + hi))
+    weight = bring_latents(c, latent, pair_key, travelled)
+    flown += path_error(c, latent, weight, distance, nlos)
+    flown += 0.5 * (sender.antenna + receiver.antenna)
+    stamp_noise, power_noise = normal_pair(key, 1)
+    carrier_noise, _ = normal_pair(key, 3)
+    arrival = t + flown / SPEED_OF_LIGHT + c.stamp_std * stamp_noise
+    power = path_power(c, latent, weight, distance, nlos) + c.power_noise * power_noise
+    rx.src, rx.bad, rx.nlos = s, False, nlos
+    rx.stamp = nearest_tick(receiver, arrival)
+    rx.rx_power = power
+    rx.fp_power = power - power_gap(c, latent, weight, distance, nlos, key)
+    ux, uy, uz = (
+        (pos1[s, 0] - pos0[s, 0]) / dt,
+        (pos1[s, 1] - pos0[s, 1]) / dt,
+        (pos1[s, 2] - pos0[s, 2]) / dt,
+    )
+    receding = ((vx - ux) * dx + (vy - uy) * dy + (vz - uz) * dz) * inverse
+    rx.carrier = (
+        (receiver.rate - sender.rate) / sender.rate
+        + receding / SPEED_OF_LIGHT
+        + c.carrier_std * carrier_noise
+    )
+    return True
+
+
+@small_kernel
+def _at(pos0, pos1, k, share):
+    return (
+        pos0[k, 0] + share * (pos1[k, 0] - pos0[k, 0]),
+        pos0[k, 1] + share * (pos1[k, 1] - pos0[k, 1]),
+        pos0[k, 2] + share * (pos1[k, 2] - pos0[k, 2]),
+    )

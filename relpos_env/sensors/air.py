@@ -1,0 +1,259 @@
+"""The air between nodes that run the reference session: every message, clock and collision.
+
+The compiled form for batches of environments, `relpos_env.sensors.radio`, is held to this one
+by a test. Time advances in windows of one step of the world; inside a window all true times
+are seconds since its start.
+
+A receiver that is free locks on a message when it detects its preamble, also late while the
+preamble lasts, and hears nothing else until it ends. Another message meanwhile spoils it
+unless it is weaker by the capture margin. A node that sends, or is about to, hears nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from relpos_env.sensors._air_kernels import (
+    hear_message,
+    local_now,
+    make_nodes,
+    next_window,
+    true_at,
+)
+from relpos_env.sensors._air_state import LATENT, NODE, RECEPTION, make_channel
+from relpos_env.sensors._channel_kernels import KNOT
+from relpos_env.sensors.radio_params import RadioSimParams
+from tracking.arrays import F64
+from tracking.ranging.airtime import airtime
+from tracking.ranging.events import Event, Output, Reception, Transmission
+from tracking.ranging.session import Session
+from tracking.ranging.timestamps import MODULUS, ticks, unwrap
+
+END, DETECT, DEADLINE, POWER = 0, 1, 2, 3
+NO_BOXES, NO_CAPSULES = np.zeros((0, 6)), np.zeros((0, 7))
+
+
+@dataclass(slots=True)
+class OnAir:
+    """One frame that is sent; times since the start of the window [s]."""
+
+    data: bytes
+    start: float
+    moment: float
+    """Of its stamp."""
+    detect: float
+    end: float
+    detected: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Sent:
+    """A frame that went out, for those who look on."""
+
+    t: float
+    """True time of its stamp moment [s]."""
+    node: int
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """An event that a session gave."""
+
+    t: float
+    """[s]"""
+    node: int
+    event: Event
+
+
+class Air:
+    """One group of nodes and the air between them.
+
+    Law: same parameters, seed and motion, same everything, bit for bit.
+    """
+
+    def __init__(self, params: RadioSimParams, n_nodes: int, seed: int, dt: float) -> None:
+        """Set everything up; no node is switched on.
+
+        Args:
+            params: What the radios do.
+            n_nodes: At most 64; node k has the ID k unless `switch_on` says otherwise.
+            seed: Any number.
+            dt: Length of a window [s].
+        """
+        self._params, self._dt = params, dt
+        self._seed = np.uint64(seed)
+        self._channel = make_channel(params.channel, KNOT)
+        self._nodes = np.zeros(n_nodes, dtype=NODE)
+        make_nodes(self._nodes, self._seed, params.clock_offset, params.antenna_delay_std)
+        self._latents = np.zeros((n_nodes, n_nodes), dtype=LATENT)
+        self._latents["knot"] = -1
+        self._heard = np.zeros(n_nodes, dtype=RECEPTION)
+        self._heard["src"] = -1
+        self.sessions: list[Session | None] = [None] * n_nodes
+        self._queue: list[list[OnAir]] = [[] for _ in range(n_nodes)]
+        self._due = np.full(n_nodes, np.inf)
+        self._switch: list[tuple[float, int, Session | None]] = []
+        self._window = 0
+        self.sent: list[Sent] = []
+        """Frames that went out; clear it when you like."""
+        self.told: list[Told] = []
+        """What the sessions told; clear it when you like."""
+
+    @property
+    def t(self) -> float:
+        """True time [s]."""
+        return self._window * self._dt
+
+    def switch_on(self, node: int, *, boot: int, at: float = 0.0, id: int | None = None) -> None:
+        """Give a node power, `at` seconds after the start of the next window."""
+        name = node if id is None else id
+        self._switch.append((at, node, Session(name, self._params.session, boot=boot)))
+
+    def switch_off(self, node: int, *, at: float = 0.0) -> None:
+        """Take a node's power, `at` seconds after the start of the next window."""
+        self._switch.append((at, node, None))
+
+    def step(
+        self, pos0: F64, pos1: F64, boxes: F64 = NO_BOXES, capsules: F64 = NO_CAPSULES
+    ) -> None:
+        """Go through one window.
+
+        Args:
+            pos0: Antennas at its start, (node, 3) [m].
+            pos1: Antennas at its end.
+            boxes: What stands in the plane, (box, 6).
+            capsules: What stands in space, (capsule, 7).
+        """
+        self._scene = (pos0, pos1, self._dt), boxes, capsules
+        self._nodes["step"] = np.linalg.norm(pos1 - pos0, axis=1)
+        for k in range(len(self._due)):
+            self._plan(k)
+        while True:
+            t, what, k = self._next()
+            if t > self._dt:
+                break
+            if what == END:
+                self._end(k, t)
+            elif what == DETECT:
+                self._queue[k][0].detected = True
+                self._detect(k, t, range(len(self._nodes)))
+            elif what == DEADLINE:
+                self._take(k, t, self._session(k).timeout(self._session(k).deadline))
+            else:
+                self._power(t)
+        next_window(
+            self._nodes, self._seed, self._window, self._params.clock_wander, self._dt
+        )
+        self._window += 1
+        self._switch = [(at - self._dt, k, session) for at, k, session in self._switch]
+        for queue in self._queue:
+            for m in queue:
+                for name in ("start", "moment", "detect", "end"):
+                    setattr(m, name, getattr(m, name) - self._dt)
+
+    def _session(self, k: int) -> Session:
+        session = self.sessions[k]
+        assert session is not None
+        return session
+
+    def _next(self) -> tuple[float, int, int]:
+        """Time, kind and node of what happens next."""
+        events = [(q[0].end, END, k) for k, q in enumerate(self._queue) if q]
+        events += [
+            (q[0].detect, DETECT, k)
+            for k, q in enumerate(self._queue)
+            if q and not q[0].detected
+        ]
+        events += [(float(t), DEADLINE, k) for k, t in enumerate(self._due)]
+        events += [(at, POWER, k) for at, k, _ in self._switch]
+        return min(events)
+
+    def _power(self, t: float) -> None:
+        at, k, session = min(self._switch, key=lambda s: (s[0], s[1]))
+        self._switch.remove((at, k, session))
+        if self._queue[k] and self._queue[k][0].detected:
+            for r in range(len(self._nodes)):
+                self._heard[r]["bad"] |= self._heard[r]["src"] == k
+            self._queue[k] = self._queue[k][:1]  # the broken frame still ends
+        else:
+            self._queue[k] = []
+        self._heard[k]["src"] = -1
+        self.sessions[k] = session
+        if session is None:
+            self._due[k] = np.inf
+        else:
+            self._take(k, t, session.start(local_now(self._nodes, k, t) % MODULUS))
+
+    def _detect(self, s: int, t: float, receivers: Iterable[int]) -> None:
+        """Nodes that are free lock on a message; those on another one have it spoilt."""
+        message = self._queue[s][0]
+        for r in receivers:
+            if r == s or self.sessions[r] is None or self._queue[r]:
+                continue
+            before = self._heard[r].copy()
+            if not hear_message(
+                self._channel, self._latents, self._seed, self._nodes, s, r, message.moment,
+                *self._scene, self._heard,
+            ):  # fmt: skip
+                continue
+            now = self._heard[r]
+            if before["src"] >= 0:
+                spoilt = now["rx_power"] > before["rx_power"] - self._params.capture
+                self._heard[r] = before
+                self._heard[r]["bad"] |= spoilt
+                continue
+            self._take(r, t, self._session(r).preamble(local_now(self._nodes, r, t) % MODULUS))
+
+    def _end(self, s: int, t: float) -> None:
+        """A message is over: whoever was locked on it has it, and all are free for others."""
+        message = self._queue[s].pop(0)
+        self._nodes[s]["sent"] += 1
+        free = [s]
+        for r in range(len(self._nodes)):
+            if self._heard[r]["src"] != s:
+                continue
+            heard = self._heard[r].copy()
+            self._heard[r]["src"] = -1
+            free.append(r)
+            now, session = local_now(self._nodes, r, t) % MODULUS, self._session(r)
+            if heard["bad"]:
+                self._take(r, t, session.broken(now))
+            else:
+                reception = Reception(
+                    int(heard["stamp"]) % MODULUS,
+                    float(heard["rx_power"]),
+                    float(heard["fp_power"]),
+                    float(heard["carrier"]),
+                )
+                self._take(r, t, session.frame(message.data, reception, now))
+        for m, queue in enumerate(self._queue):
+            if queue and queue[0].detected and t < queue[0].moment - self._params.detect:
+                self._detect(m, t, [r for r in free if self._heard[r]["src"] < 0])
+
+    def _take(self, k: int, t: float, outputs: list[Output]) -> None:
+        """Carry out what a session wants."""
+        for output in outputs:
+            if isinstance(output, Transmission):
+                self._send(k, output)
+            else:
+                self.told.append(Told(self.t + t, k, output))
+        self._plan(k)
+
+    def _plan(self, k: int) -> None:
+        session = self.sessions[k]
+        if session is not None:
+            near = local_now(self._nodes, k, 0.0)
+            self._due[k] = true_at(self._nodes, k, unwrap(session.deadline, near))
+
+    def _send(self, k: int, order: Transmission) -> None:
+        phy = self._params.session.phy
+        near = local_now(self._nodes, k, 0.0)
+        moment = true_at(self._nodes, k, unwrap(order.at, near))
+        start = moment - phy.header_time
+        end = start + airtime(phy, len(order.data))
+        self._queue[k].append(OnAir(order.data, start, moment, start + self._params.detect, end))
+        self.sent.append(Sent(self.t + moment, k, order.data))

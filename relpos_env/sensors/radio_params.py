@@ -1,0 +1,30 @@
+"""What the simulated radios do, beside what the place does to their messages."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from relpos_env.sensors.channel import INDOOR, ChannelParams
+from tracking.ranging.params import SessionParams
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RadioSimParams:
+    """What the simulated radios do."""
+
+    session: SessionParams = field(default_factory=SessionParams)
+    """The protocol that they run, and its radio setting."""
+    channel: ChannelParams = field(default=INDOOR)
+    """The place."""
+    clock_offset: float = 10e-6
+    """[1] Standard deviation of a clock's rate, cut at 20 ppm."""
+    clock_wander: float = 2e-9
+    """[1] Standard deviation of the change of its rate in a second."""
+    antenna_delay_std: float = 0.0
+    """[m] What the antenna delay of a node adds to its ranges; calibrated away by default."""
+    detect: float = 32e-6
+    """[s] Preamble that a receiver needs to lock on a message."""
+    capture: float = 8.0
+    """[dB] A message survives another one that is weaker by so much."""
+    antenna_height: float = 0.12
+    """[m] Of the antenna over the tracker; the same on every car."""

@@ -1,0 +1,89 @@
+"""What one node makes of the messages that it hears: who is there, and ranges of all pairs.
+
+Every message tells when it was sent and when its sender heard each of the others. Whoever
+also heard those others knows both ends of their messages, and so the range of two nodes that
+it is not one of.
+"""
+
+from __future__ import annotations
+
+from tracking.ranging.events import Reception
+from tracking.ranging.exchange import ExchangeParams, Exchanges, Passage, RangeEvent
+from tracking.ranging.peers import Peer, Peers
+from tracking.ranging.timestamps import MODULUS, difference
+from tracking.ranging.wire import Entry, Frame
+
+
+class Listener:
+    """The memory of one node."""
+
+    def __init__(self, node_id: int, params: ExchangeParams) -> None:
+        self._id = node_id
+        self.peers = Peers()
+        self._exchanges = Exchanges(params)
+        self._spoken: int | None = None
+
+    def forget(self) -> None:
+        """Begin anew: the own clock has jumped or the node was reset."""
+        self.peers.forget()
+        self._exchanges.forget()
+        self._spoken = None
+
+    def spoken(self, sent: int) -> None:
+        """Note that the own message leaves at a time of the own clock."""
+        self._spoken = sent
+        self.peers.spoken()
+
+    def take(self, frame: Frame, reception: Reception, arrived: int) -> list[RangeEvent] | None:
+        """Take a message that arrived at a time of the own clock.
+
+        Returns:
+            The ranges that it completes, None if it is a repeated or late one.
+        """
+        goes_on = self.peers.take(frame, arrived)
+        if goes_on is None:
+            return None
+        if not goes_on:
+            self._exchanges.forget(frame.src)
+        src = self.peers[frame.src]
+        src.rx_power, src.fp_power, src.fresh = reception.rx_power, reception.fp_power, True
+        events = [self._overhear(frame, src, row, arrived) for row in frame.entries]
+        events.append(self._receive(frame.src, src, reception, arrived))
+        return [event for event in events if event is not None]
+
+    def _overhear(self, frame: Frame, src: Peer, row: Entry, arrived: int) -> RangeEvent | None:
+        """Take one row of a table: the sender heard that node at that time."""
+        if row.stamp is None:
+            return None
+        ago = difference(frame.stamp, row.stamp)
+        if ago <= 0:
+            return None
+        when, received = arrived - ago, src.sent - ago
+        if row.id == self._id:
+            sent = local = self._spoken or 0
+        else:
+            self.peers.report(row.id, when)
+            sent, local = self.peers[row.id].sent, self.peers[row.id].heard
+        if not local or not self.peers.same(when, local, ago):
+            return None  # of another message than the last one that was heard here
+        passage = Passage(sent, received, local)
+        result = self._exchanges.add(row.id, frame.src, passage)
+        return self._event(result, (frame.src, row.id), (row.rx_power, row.fp_power))
+
+    def _receive(
+        self, sender: int, src: Peer, reception: Reception, arrived: int
+    ) -> RangeEvent | None:
+        """Take the message itself, from its sender to this node."""
+        if reception.carrier is not None:
+            self._exchanges.carrier(self._id, sender, arrived, reception.carrier)
+        result = self._exchanges.add(sender, self._id, Passage(src.sent, arrived, arrived))
+        return self._event(result, (self._id, sender), (reception.rx_power, reception.fp_power))
+
+    @staticmethod
+    def _event(
+        result: tuple[float, int] | None, pair: tuple[int, int], powers: tuple[float, float]
+    ) -> RangeEvent | None:
+        if result is None:
+            return None
+        distance, time = result
+        return RangeEvent(*pair, time % MODULUS, distance, *powers)

@@ -1,0 +1,40 @@
+"""How a node takes part in the protocol."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from tracking.ranging.airtime import PAPER_PHY, Phy
+from tracking.ranging.exchange import ExchangeParams
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SessionParams:
+    """What all nodes of a group agree on, and the antenna of one."""
+
+    phy: Phy = field(default=PAPER_PHY)
+    """The same in the whole group."""
+    pan: int = 0
+    """Group number; frames of other groups are ignored."""
+    succession: bool = True
+    """The next ID takes over from a silent initiator; False: only the watchdog, as in the paper."""
+    takeover: float = 2.0
+    """[messages] Silence of so many message times per place in the line of succession."""
+    watchdog: float = 0.6
+    """[s] A node that hears nothing for so long is reset."""
+    listen: tuple[float, float] = (0.04, 0.06)
+    """[s] A node that is switched on listens for a time between these before it speaks."""
+    idle: float = 0.01
+    """[s] Pause of an initiator that is alone."""
+    drop_after: int = 3
+    """[rounds] A member that nobody has heard for so long is dropped."""
+    first_check: tuple[float, float] = (0.2, 1.2)
+    """[s] After joining, a node once keeps silent in its own slot and listens whether another
+    one uses its ID; when, is drawn from this interval."""
+    check: tuple[float, float] = (8.0, 12.0)
+    """[s] Time between the checks after that."""
+    mute: tuple[float, float] = (1.0, 1.5)
+    """[s] Silence of a node that heard its own ID."""
+    antenna_delay: int = 0
+    """[ticks] From the radio's stamp to the antenna, and the same on the way in."""
+    exchange: ExchangeParams = field(default_factory=ExchangeParams)

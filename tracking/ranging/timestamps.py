@@ -1,0 +1,45 @@
+"""The time stamps of a UWB radio: integers of 40 bits that wrap every 17.2 s.
+
+One tick is 1 / (128 x 499.2 MHz), 15.65 ps or 4.69 mm of flight; a transmission can be ordered
+for a multiple of 512 ticks, 8.01 ns (DW1000 User Manual, sections 3.3 and 4.1.6). Everything
+here is arithmetic on integers: nothing is rounded until a difference becomes a distance.
+"""
+
+from __future__ import annotations
+
+TICK_HZ = 128 * 499.2e6
+"""[Hz] Ticks per second of a perfect clock."""
+SPEED_OF_LIGHT = 299_792_458.0
+"""[m/s]"""
+METRES_PER_TICK = SPEED_OF_LIGHT / TICK_HZ
+"""[m] Flown in one tick."""
+MODULUS = 1 << 40
+"""Stamps wrap here, every 17.2074 s."""
+GRID = 512
+"""[ticks] A transmission starts at a multiple of it."""
+
+
+def ticks(seconds: float) -> int:
+    """A duration in whole ticks, rounded up."""
+    return -int(-seconds * TICK_HZ // 1)
+
+
+def seconds(duration: float) -> float:
+    """A duration of so many ticks [s]."""
+    return duration / TICK_HZ
+
+
+def difference(later: int, earlier: int) -> int:
+    """Ticks from one stamp to another, in [-2^39, 2^39): right if they are less than 8.6 s apart."""
+    half = MODULUS // 2
+    return (later - earlier + half) % MODULUS - half
+
+
+def unwrap(stamp: int, near: int) -> int:
+    """The time without wraps that a stamp means, given a time within 8.6 s of it."""
+    return near + difference(stamp, near)
+
+
+def on_grid(time: int) -> int:
+    """The first time at or after the given one at which a transmission can start."""
+    return -(-time // GRID) * GRID
