@@ -2,7 +2,7 @@
 
 Numba keeps compiled code on disk and compiles a function anew when *its* file changes. A
 kernel that calls kernels of other files has their code compiled in, so here it is compiled
-anew when any kernel file of its package changes.
+anew when any kernel file of its package or of this one changes.
 """
 
 from __future__ import annotations
@@ -41,6 +41,7 @@ def _compile(function: Function, *, inline: bool) -> Function:
 
 @cache
 def _stamp(folder: Path) -> tuple[int, int]:
-    """Changes when a kernel file under the folder does: newest time, and a sum over all."""
-    stats = [path.stat() for path in sorted(folder.rglob("_*_kernels.py"))]
+    """Changes when a kernel file under the folder or this one's does: newest time, and a sum."""
+    folders = {folder, Path(__file__).parent}
+    stats = [path.stat() for f in sorted(folders) for path in sorted(f.rglob("_*_kernels.py"))]
     return max(s.st_mtime_ns for s in stats), sum(s.st_mtime_ns + s.st_size for s in stats)

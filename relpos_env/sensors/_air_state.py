@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relpos_env.sensors.channel import ChannelParams
+from tracking.arrays import F64, I64, Bool
 
 Records = NDArray[Any]
 
@@ -57,6 +58,41 @@ RECEPTION = np.dtype(
     ]
 )
 """What a receiver is locked on."""
+
+FLIGHT = np.dtype(
+    [
+        ("active", "?"),  # ordered, or on the air
+        ("moment", "f8"),  # of its stamp, s since the start of the window
+        ("detect", "f8"),  # when receivers can notice it; inf once that is past
+        ("end", "f8"),  # inf if there is none
+    ]
+)
+"""The message of one node on its way."""
+
+
+class RadioNumbers(NamedTuple):
+    """What the kernels need of `RadioSimParams`."""
+
+    header_time: float
+    detect: float
+    capture: float
+    wander: float
+    airtime: F64
+    """Of a message with k rows, (k) [s]."""
+
+
+class RangeBuffer(NamedTuple):
+    """Where ranges are written, (env, slot)."""
+
+    t: F64
+    """When it was so, s since the start of the window."""
+    i: I64
+    j: I64
+    values: F64
+    """Distance [m], received and first-path power [dBm], (env, slot, 3)."""
+    nlos: Bool
+    count: I64
+    """Ranges written, (env)."""
 
 
 def make_channel(params: ChannelParams, knot: float) -> Records:

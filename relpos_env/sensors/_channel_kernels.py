@@ -63,7 +63,9 @@ def path_error(c, latent, weight, distance, nlos):
     error = c.bias
     if distance > 2.0 and c.rise != 0.0:
         error += c.rise * (1.0 - math.exp(-(distance - 2.0) / c.rise_length))
-    error += c.fast * _mix(latent.fast0, latent.fast1, weight) + c.slow * _mix(latent.slow0, latent.slow1, weight)
+    error += c.fast * _mix(latent.fast0, latent.fast1, weight) + c.slow * _mix(
+        latent.slow0, latent.slow1, weight
+    )
     if nlos:
         z = _mix(latent.excess0, latent.excess1, weight)
         error += c.excess_cap / (1.0 + math.exp(-(c.excess_mu + c.excess_sigma * z)))
@@ -74,7 +76,9 @@ def path_error(c, latent, weight, distance, nlos):
 def path_power(c, latent, weight, distance, nlos):
     """Received power, before the noise of the reading [dBm]."""
     p = c.power_1m - 20.0 * math.log10(max(distance, 0.1))
-    p += c.shadowing * _mix(latent.shadow0, latent.shadow1, weight) - (c.attenuation if nlos else 0.0)
+    p += c.shadowing * _mix(latent.shadow0, latent.shadow1, weight) - (
+        c.attenuation if nlos else 0.0
+    )
     excess = (c.ceiling - p) / c.knee
     if excess > 30.0:
         return p
@@ -86,7 +90,9 @@ def power_gap(c, latent, weight, distance, nlos, key):
     """Received minus first-path power [dB]."""
     share_e = c.gap_share_excess if nlos else 0.0
     rest = math.sqrt(1.0 - share_e * share_e - c.gap_share_shadow * c.gap_share_shadow)
-    z = rest * _mix(latent.place0, latent.place1, weight) + c.gap_share_shadow * _mix(latent.shadow0, latent.shadow1, weight)
+    z = rest * _mix(latent.place0, latent.place1, weight) + c.gap_share_shadow * _mix(
+        latent.shadow0, latent.shadow1, weight
+    )
     z += share_e * _mix(latent.excess0, latent.excess1, weight)
     k = c.gap_skew
     place = (math.exp(k * z) - c.gap_skew_mean) * c.gap_skew_scale

@@ -30,7 +30,7 @@ from tracking.arrays import F64
 from tracking.ranging.airtime import airtime
 from tracking.ranging.events import Event, Output, Reception, Transmission
 from tracking.ranging.session import Session
-from tracking.ranging.timestamps import MODULUS, ticks, unwrap
+from tracking.ranging.timestamps import MODULUS, unwrap
 
 END, DETECT, DEADLINE, POWER = 0, 1, 2, 3
 NO_BOXES, NO_CAPSULES = np.zeros((0, 6)), np.zeros((0, 7))
@@ -145,9 +145,7 @@ class Air:
                 self._take(k, t, self._session(k).timeout(self._session(k).deadline))
             else:
                 self._power(t)
-        next_window(
-            self._nodes, self._seed, self._window, self._params.clock_wander, self._dt
-        )
+        next_window(self._nodes, self._seed, self._window, self._params.clock_wander, self._dt)
         self._window += 1
         self._switch = [(at - self._dt, k, session) for at, k, session in self._switch]
         for queue in self._queue:
@@ -164,9 +162,7 @@ class Air:
         """Time, kind and node of what happens next."""
         events = [(q[0].end, END, k) for k, q in enumerate(self._queue) if q]
         events += [
-            (q[0].detect, DETECT, k)
-            for k, q in enumerate(self._queue)
-            if q and not q[0].detected
+            (q[0].detect, DETECT, k) for k, q in enumerate(self._queue) if q and not q[0].detected
         ]
         events += [(float(t), DEADLINE, k) for k, t in enumerate(self._due)]
         events += [(at, POWER, k) for at, k, _ in self._switch]
@@ -231,7 +227,11 @@ class Air:
                 )
                 self._take(r, t, session.frame(message.data, reception, now))
         for m, queue in enumerate(self._queue):
-            if queue and queue[0].detected and t < queue[0].moment - self._params.detect:
+            if (
+                queue
+                and queue[0].detected
+                and t < queue[0].moment - self._params.session.phy.detect
+            ):
                 self._detect(m, t, [r for r in free if self._heard[r]["src"] < 0])
 
     def _take(self, k: int, t: float, outputs: list[Output]) -> None:
@@ -255,5 +255,5 @@ class Air:
         moment = true_at(self._nodes, k, unwrap(order.at, near))
         start = moment - phy.header_time
         end = start + airtime(phy, len(order.data))
-        self._queue[k].append(OnAir(order.data, start, moment, start + self._params.detect, end))
+        self._queue[k].append(OnAir(order.data, start, moment, start + phy.detect, end))
         self.sent.append(Sent(self.t + moment, k, order.data))

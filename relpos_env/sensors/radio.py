@@ -1,130 +1,170 @@
-"""UWB ranges at the rate of the broadcast protocol, with what obstacles do to them.
+"""The radios of a batch of environments: ranges by the protocol, message by message.
 
-In a round of n messages every node sends once; the range of a pair belongs to the middle
-between their two messages. In line of sight it is the distance with white noise. Behind an
-obstacle the first path is late: a bias and an exponential excess are added, the first path is
-weaker than the received power tells, and many messages are lost. The numbers are the
-prototype's of published indoor measurements: see `docs/simulator.md`.
+Every node runs the compiled session of `tracking.ranging`; the ranges that come out are those
+that the nodes resolve themselves, at the node with the smaller number. A range belongs to the
+moment at which that node spoke, and is known a good part of a round later.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from relpos_env.world import World, WorldState
+from relpos_env.errors import EnvError
+from relpos_env.sensors._air_kernels import make_nodes
+from relpos_env.sensors._air_state import (
+    FLIGHT,
+    LATENT,
+    NODE,
+    RECEPTION,
+    RadioNumbers,
+    RangeBuffer,
+    make_channel,
+)
+from relpos_env.sensors._channel_kernels import KNOT
+from relpos_env.sensors._radio_kernels import Air, Scene, power_nodes, run_window
+from relpos_env.sensors.radio_params import RadioSimParams
 from tracking.arrays import F64, I64, Bool
-from tracking.measurements import Kind, MeasurementBlock
-from tracking.ranging.airtime import PAPER_PHY, Phy, message_time
+from tracking.ranging._session_state import MAX_NODES, MESSAGE, make_sessions, session_numbers
+from tracking.ranging.airtime import airtime, round_rate
+from tracking.ranging.wire import ENTRY_BYTES, FIXED_BYTES, entries_per_frame
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RadioSimParams:
-    """What the simulated radio does."""
-
-    phy: Phy = field(default=PAPER_PHY)
-    """Sets the rate of rounds."""
-    noise: float = 0.06
-    """[m] Standard deviation of a range in sight."""
-    loss: float = 0.01
-    """[-] Share of ranges lost in sight."""
-    nlos_bias: float = 0.12
-    """[m] Least excess of a range behind an obstacle."""
-    nlos_excess: float = 0.12
-    """[m] Mean of the exponential excess on top."""
-    nlos_loss: float = 0.25
-    """[-] Share of ranges lost behind an obstacle."""
-    max_distance: float = 60.0
-    """[m] No range beyond."""
-    power_1m: float = -60.0
-    """[dBm] Received power at a metre; it falls with the square of the distance."""
-    power_noise: float = 1.0
-    """[dB]"""
-    gap_los: tuple[float, float] = (3.0, 0.7)
-    """[dB] Received minus first-path power in sight: mean, standard deviation."""
-    gap_nlos: tuple[float, float] = (8.0, 2.0)
-    """[dB] Likewise behind an obstacle."""
-    antenna_height: float = 0.12
-    """[m] Of the antenna over the tracker; the same on every car."""
+NO_BOXES, NO_CAPSULES = np.zeros((0, 6)), np.zeros((0, 7))
 
 
 @dataclass(frozen=True, slots=True)
 class Ranges:
-    """What the radio heard in one step."""
+    """What the radios resolved in one window, padded; (env, slot)."""
 
-    block: MeasurementBlock
+    t: F64
+    """When it was so [s]."""
+    i: I64
+    """The node with the smaller number."""
+    j: I64
+    values: F64
+    """Distance [m], received and first-path power [dBm], (env, slot, 3)."""
     nlos: Bool
-    """True where an obstacle stood between, (range)."""
+    """Whether an obstacle stood between."""
+    count: I64
+    """Slots used, (env)."""
 
 
 class Radio:
-    """The radios of all cars. Laws: same seed, same stream; no errors, the distance."""
+    """The radios and the air of all environments.
 
-    def __init__(self, params: RadioSimParams, n_cars: int, rng: np.random.Generator) -> None:
-        self._params, self._rng, self._n = params, rng, n_cars
-        self._pairs: I64 = np.stack(np.triu_indices(n_cars, k=1), axis=1).astype(np.int64)
-        t_msg = message_time(params.phy, n_cars)
-        self._round = n_cars * t_msg
-        # Middle of the messages of i and j, from the start of the round.
-        self._offset: F64 = 0.5 * (self._pairs.sum(axis=1) + 1.0) * t_msg
-        order = np.argsort(self._offset, kind="stable")
-        self._pairs, self._offset = self._pairs[order], self._offset[order]
-        self._next = 0
+    Laws: same seed and motion, same stream; environment k of a batch is that environment
+    alone, bit for bit; no errors and no clocks, the distance.
+    """
 
-    def listen(self, world: World, before: WorldState, after: WorldState) -> Ranges:
-        """The ranges of the step that led from one state to the next.
+    def __init__(self, params: RadioSimParams, n_nodes: int, seeds: list[int], dt: float) -> None:
+        """Set everything up; no node is switched on.
 
         Args:
-            world: Tells what stands between two points.
-            before: State at the start of the step.
-            after: State at its end.
-        """
-        p = self._params
-        times, pairs = self._due(before.t, after.t)
-        m = len(times)
-        share = (times - before.t) / (after.t - before.t)
-        # Every range draws as much, heard or not: what is lost changes no later draw.
-        noise, power_noise, gap_noise = self._rng.standard_normal((3, m))
-        excess, luck = self._rng.exponential(size=m), self._rng.random(m)
-        i, j = pairs[:, 0], pairs[:, 1]
-        pos = before.pos_w + share[:, None, None] * (after.pos_w - before.pos_w)
-        rows = np.arange(m)
-        a, b = pos[rows, i], pos[rows, j]
-        distance = np.linalg.norm(b - a, axis=1)
-        nlos = np.array([not world.line_of_sight(a[k], b[k]) for k in range(m)], dtype=bool)
-        measured = distance + p.noise * noise
-        measured += np.where(nlos, p.nlos_bias + p.nlos_excess * excess, 0.0)
-        heard = luck >= np.where(nlos, p.nlos_loss, p.loss)
-        heard &= (distance <= p.max_distance) & (measured > 0.0)
-        power = (
-            p.power_1m - 20.0 * np.log10(np.maximum(distance, 0.1)) + p.power_noise * power_noise
-        )
-        gap_mean = np.where(nlos, p.gap_nlos[0], p.gap_los[0])
-        gap_std = np.where(nlos, p.gap_nlos[1], p.gap_los[1])
-        gap = np.maximum(gap_mean + gap_std * gap_noise, 0.0)
-        values = np.stack([measured, power, power - gap], axis=1)[heard]
-        block = MeasurementBlock.of_kind(
-            Kind.RANGE,
-            times[heard],
-            i[heard],
-            values,
-            j=j[heard],
-            antennas=(i[heard], j[heard]),
-            has_power=np.ones(int(heard.sum()), dtype=bool),
-        )
-        return Ranges(block, nlos[heard])
+            params: What the radios do.
+            n_nodes: In each environment.
+            seeds: One for each environment, 0 to 2^63.
+            dt: Length of a window [s].
 
-    def _due(self, start: float, end: float) -> tuple[F64, I64]:
-        """Times and pairs of the ranges in (start, end]; counted, so none is lost or doubled."""
-        n_pairs = len(self._pairs)
-        times, pairs = [], []
-        while True:
-            number, k = divmod(self._next, n_pairs)
-            t = number * self._round + self._offset[k]
-            if t > end:
-                break
-            times.append(t)
-            pairs.append(self._pairs[k])
-            self._next += 1
-        return np.array(times), np.array(pairs, dtype=np.int64).reshape(-1, 2)
+        Raises:
+            EnvError: More nodes than a message has room for.
+        """
+        phy = params.session.phy
+        most = min(MAX_NODES, entries_per_frame(phy.max_frame) + 1)
+        if n_nodes > most:
+            raise EnvError(
+                f"radio: expected at most {most} nodes with frames of {phy.max_frame} bytes, "
+                f"got {n_nodes}"
+            )
+        self._dt, self._window = dt, 0
+        self._seeds = np.array(seeds, dtype=np.uint64)
+        self._numbers = session_numbers(params.session, n_nodes)
+        self._channel = make_channel(params.channel, KNOT)
+        rows = np.arange(len(self._numbers.frame))
+        self._radio = RadioNumbers(
+            phy.header_time,
+            phy.detect,
+            params.capture,
+            params.clock_wander,
+            np.array([airtime(phy, FIXED_BYTES + ENTRY_BYTES * int(k)) for k in rows]),
+        )
+        e, n = len(seeds), n_nodes
+        sessions, peers = make_sessions(e, n)
+        self._air = Air(
+            np.zeros((e, n), dtype=NODE),
+            np.zeros((e, n, n), dtype=LATENT),
+            sessions,
+            peers,
+            np.zeros((e, n), dtype=MESSAGE),
+            np.zeros((e, n, n), dtype=np.int64),
+            np.zeros((e, n + 1), dtype=RECEPTION),
+            np.zeros((e, n), dtype=FLIGHT),
+            np.full((e, n), np.inf),
+        )
+        self._air.latents["knot"] = -1
+        self._air.receptions["src"] = -1
+        self._air.flights["detect"] = self._air.flights["end"] = np.inf
+        for k in range(e):
+            make_nodes(
+                self._air.nodes[k], self._seeds[k], params.clock_offset, params.antenna_delay_std
+            )
+        pairs = n * (n - 1) // 2
+        room = pairs * (2 + int(np.ceil(dt * round_rate(phy, max(n, 2)))))
+        self._out = RangeBuffer(
+            np.zeros((e, room)),
+            np.zeros((e, room), dtype=np.int64),
+            np.zeros((e, room), dtype=np.int64),
+            np.zeros((e, room, 3)),
+            np.zeros((e, room), dtype=bool),
+            np.zeros(e, dtype=np.int64),
+        )
+
+    def switch_on(self, env: int, node: int, *, boot: int, after: float = 0.0) -> None:
+        """Give a node power, so many seconds after the start of the next window."""
+        power_nodes(self._numbers, self._air, env, node, True, boot, after)
+
+    def switch_off(self, env: int, node: int) -> None:
+        """Take a node's power at the start of the next window."""
+        power_nodes(self._numbers, self._air, env, node, False, 0, 0.0)
+
+    def step(
+        self, pos0: F64, pos1: F64, boxes: F64 | None = None, capsules: F64 | None = None
+    ) -> Ranges:
+        """Go through one window.
+
+        Args:
+            pos0: Antennas at its start, (env, node, 3) [m].
+            pos1: Antennas at its end.
+            boxes: What stands in the plane: centre x y, half width, half depth [m], cosine and
+                sine of the angle, (env, box, 6).
+            capsules: What stands in space: two ends and the radius [m], (env, capsule, 7).
+        """
+        e = len(self._seeds)
+        scene = Scene(
+            pos0,
+            pos1,
+            np.zeros((e, 0, 6)) if boxes is None else boxes,
+            np.zeros((e, 0, 7)) if capsules is None else capsules,
+        )
+        run_window(
+            self._numbers,
+            self._radio,
+            self._channel,
+            self._seeds,
+            self._window,
+            self._dt,
+            self._air,
+            scene,
+            self._out,
+        )
+        start = self._window * self._dt
+        self._window += 1
+        out, used = self._out, int(self._out.count.max())
+        return Ranges(
+            start + out.t[:, :used],
+            out.i[:, :used].copy(),
+            out.j[:, :used].copy(),
+            out.values[:, :used].copy(),
+            out.nlos[:, :used].copy(),
+            out.count.copy(),
+        )

@@ -18,12 +18,10 @@ class RadioSimParams:
     """The place."""
     clock_offset: float = 10e-6
     """[1] Standard deviation of a clock's rate, cut at 20 ppm."""
-    clock_wander: float = 2e-9
+    clock_wander: float = 5e-10
     """[1] Standard deviation of the change of its rate in a second."""
     antenna_delay_std: float = 0.0
     """[m] What the antenna delay of a node adds to its ranges; calibrated away by default."""
-    detect: float = 32e-6
-    """[s] Preamble that a receiver needs to lock on a message."""
     capture: float = 8.0
     """[dB] A message survives another one that is weaker by so much."""
     antenna_height: float = 0.12

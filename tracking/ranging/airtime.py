@@ -38,8 +38,10 @@ class Phy:
     """[s] One bit of payload."""
     symbol: float = 496 / 499.2e6
     """[s] One preamble symbol at 16 MHz pulse repetition."""
+    detect: float = 32e-6
+    """[s] Preamble that a receiver needs to notice a message: two chunks of 16 symbols."""
     sense: float = 48e-6
-    """[s] Listening that tells silence from a preamble: three chunks of 16 symbols."""
+    """[s] Listening that tells silence from a preamble: another chunk."""
     turnaround: float = 12e-6
     """[s] From receiving to sending."""
     processing: float = 0.0
@@ -74,6 +76,7 @@ FAST_PHY = Phy(
     sfd_symbols=8,
     header_bit=1.02564e-6,
     data_bit=0.128205e-6,
+    detect=16e-6,
     sense=24e-6,
     processing=300e-6,
 )

@@ -57,9 +57,7 @@ class SkewEstimate:
         self._predict(p, now)
         self.mean, self.var = take_carrier(p, self.mean, self.var, offset)
 
-    def interval(
-        self, p: ExchangeNumbers, now: int, received: int, sent: int
-    ) -> tuple[int, float]:
+    def interval(self, p: ExchangeNumbers, now: int, received: int, sent: int) -> tuple[int, float]:
         """Take the stamps of two messages; whether they fit, and the skew that they tell."""
         self._predict(p, now)
         fit, skew, self.mean, self.var, self.misfits = take_interval(

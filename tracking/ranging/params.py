@@ -24,15 +24,16 @@ class SessionParams:
     """[s] A node that hears nothing for so long is reset."""
     listen: tuple[float, float] = (0.04, 0.06)
     """[s] A node that is switched on listens for a time between these before it speaks."""
-    idle: float = 0.01
-    """[s] Pause of an initiator that is alone."""
+    idle: tuple[float, float] = (0.005, 0.02)
+    """[s] Pause of an initiator that is alone, drawn anew every time."""
     drop_after: int = 3
     """[rounds] A member that nobody has heard for so long is dropped."""
     first_check: tuple[float, float] = (0.2, 1.2)
-    """[s] After joining, a node once keeps silent in its own slot and listens whether another
-    one uses its ID; when, is drawn from this interval."""
+    """[s] After joining, a responder once keeps silent in its own slot and listens whether
+    another one uses its ID; when, is drawn from this interval."""
     check: tuple[float, float] = (8.0, 12.0)
-    """[s] Time between the checks after that."""
+    """[s] Time between the checks after that. An initiator listens for a message longer before
+    a request then, so that two groups that speak at the same times come out of step."""
     mute: tuple[float, float] = (1.0, 1.5)
     """[s] Silence of a node that heard its own ID."""
     antenna_delay: int = 0

@@ -15,9 +15,8 @@ times and with events. All times are 40-bit stamps of the node's own radio clock
 
 from __future__ import annotations
 
-from enum import Enum
-
 from tracking.errors import ConfigError, WireError
+from tracking.ranging.dice import Dice
 from tracking.ranging.events import (
     DuplicateId,
     MembersChanged,
@@ -25,27 +24,18 @@ from tracking.ranging.events import (
     Reception,
     Role,
     RoleChanged,
-    Transmission,
 )
 from tracking.ranging.listening import Listener
+from tracking.ranging.members import Members
 from tracking.ranging.params import SessionParams
 from tracking.ranging.slots import Slots
-from tracking.ranging.timestamps import MODULUS, on_grid, ticks, unwrap
-from tracking.ranging.wire import MAX_ID, Entry, Frame, Type, decode, encode, split
+from tracking.ranging.speaker import Speaker, Words
+from tracking.ranging.timestamps import MODULUS, ticks, unwrap
+from tracking.ranging.turns import Turns, Waiting
+from tracking.ranging.wire import MAX_ID, Frame, Type, decode
 
 _BACK = ticks(1e-3)
 """A clock that goes back by more has jumped."""
-
-
-class Waiting(Enum):
-    """What the deadline is for."""
-
-    START = "nobody may be there: become initiator"
-    FRAME = "a frame is coming in"
-    TURN = "own turn: speak if the gap stays silent"
-    SLOT = "the slot is silent if no preamble comes"
-    TAKEOVER = "the request is missing: take over"
-    WATCHDOG = "begin anew"
 
 
 class Session:
@@ -69,26 +59,25 @@ class Session:
         if not 0 <= node_id <= MAX_ID:
             raise ConfigError(f"node id: expected 0 to {MAX_ID}, got {node_id}")
         self.id, self._params, self._boot = node_id, params, boot & 0xFF
-        self._slots = Slots(params.phy)
-        self._random = (boot * 2654435761 + node_id + 1) % (1 << 32)
-        self._listener = Listener(node_id, params.exchange)
+        self.role, self.root, self.round = Role.LISTENING, node_id, 0
+        self._slots, self._dice = Slots(params.phy), Dice(node_id, boot)
+        self._speaker = Speaker(node_id, params, self._slots, self._boot)
+        self._listener, self._members = Listener(node_id, params.exchange), Members(node_id)
         self._peers = self._listener.peers
-        self._out: list[Output] = []
-        self._now = self._deadline = self._expected = self._heard_at = self._asked_at = 0
-        self._sequence = self.round = self._cursor = 0
-        self._check_at = self._attempts = self._backoff = 0
+        self._turns = Turns(node_id, params, self._slots, self._members, self._peers, self._dice)
+        self._now = self._asked_at = self._attempts = self._backoff = 0
         self._tried_round: int | None = None
-        self._rows: list[int] = []
-        self._waiting = self._before = Waiting.START
-        self._early = False
-        self._held_deadline = 0
-        self.role, self.root = Role.LISTENING, node_id
-        self.members: tuple[int, ...] = (node_id,)
+        self._out: list[Output] = []
+
+    @property
+    def members(self) -> tuple[int, ...]:
+        """IDs of the members of the round that this node knows."""
+        return self._members.ids
 
     @property
     def deadline(self) -> int:
         """When `timeout` is to be called, 40-bit stamp."""
-        return self._deadline % MODULUS
+        return self._turns.deadline % MODULUS
 
     def start(self, now: int) -> list[Output]:
         """Switch on."""
@@ -99,16 +88,12 @@ class Session:
     def preamble(self, now: int) -> list[Output]:
         """A preamble was detected: `frame` or `broken` will follow."""
         if self._advance(now) and self.role is not Role.MUTED:
-            if self._waiting is not Waiting.FRAME:
-                self._before, self._held_deadline = self._waiting, self._deadline
-            self._early = self._now < self._expected - self._slots.header
-            self._waiting = Waiting.FRAME
-            self._deadline = self._now + self._slots.longest + self._slots.header
+            self._turns.hold(self._now)
         return self._give()
 
     def broken(self, now: int) -> list[Output]:
         """What came in was no frame."""
-        if self._advance(now) and self._waiting is Waiting.FRAME:
+        if self._advance(now) and self._turns.waiting is Waiting.FRAME:
             self._unreadable()
         return self._give()
 
@@ -122,9 +107,9 @@ class Session:
         """
         if not self._advance(now) or self.role is Role.MUTED:
             return self._give()
-        if self._waiting is not Waiting.FRAME:
-            self._before, self._held_deadline = self._waiting, self._deadline
+        self._turns.hold(self._now)
         arrived = unwrap(reception.stamp, self._now) - self._params.antenna_delay
+        end = arrived + self._slots.frame(len(data))
         try:
             heard = decode(data)
         except WireError:
@@ -133,129 +118,74 @@ class Session:
         if heard is None or heard.pan != self._params.pan or not on_time:
             self._unreadable()
         elif heard.src == self.id:
-            self._own_id(heard, arrived, len(data))
+            self._own_id(heard, end)
         else:
-            self._hear(heard, reception, arrived, len(data))
+            self._hear(heard, reception, arrived, end)
         return self._give()
 
     def timeout(self, now: int) -> list[Output]:
         """The deadline has come."""
-        if not self._advance(now) or self._now < self._deadline:
+        turns = self._turns
+        if not self._advance(now) or self._now < turns.deadline:
             return self._give()
-        if self._waiting is Waiting.FRAME:
+        if turns.waiting is Waiting.FRAME:
             self._unreadable()
-        elif self._waiting is Waiting.TURN:
-            self._speak(max(self._expected, self._now + self._slots.header))
-        elif self._waiting is Waiting.SLOT:
+        elif turns.waiting is Waiting.TURN:
+            self._speak(max(turns.expected, self._now + self._slots.header))
+        elif turns.waiting is Waiting.SLOT:
             self._silent_slot()
-        elif self._waiting is Waiting.WATCHDOG:
+        elif turns.waiting is Waiting.PART:
+            turns.expected += self._slots.silent
+            self._await_slot()
+        elif turns.waiting is Waiting.WATCHDOG:
             self._begin()
         else:
             self._become_initiator()
         return self._give()
 
-    # Whose turn it is ---------------------------------------------------------------------
+    # Silence ------------------------------------------------------------------------------
 
     def _await_slot(self) -> None:
-        """Set the deadline for the slot at the cursor."""
-        s, at_request = self._slots, self._cursor >= len(self.members)
-        leads = self.role is Role.INITIATOR
-        mine = leads if at_request else self.members[self._cursor] == self.id
-        if mine and not leads and self._now >= self._check_at:
-            self._check_at, mine = self._now + self._draw(self._params.check), False
-        if mine:
-            self._waiting = Waiting.TURN
-            self._deadline = self._expected - s.header - s.turnaround
-        else:
-            self._waiting = Waiting.SLOT
-            self._deadline = self._expected - s.header + s.sense
+        self._turns.await_slot(self._now, leads=self.role is Role.INITIATOR)
 
     def _silent_slot(self) -> None:
-        """No preamble in the slot at the cursor."""
-        n, since = len(self.members), self._now - 2 * self._round_time()
-        at_request = self._cursor >= n
-        node = self.root if at_request else self.members[self._cursor]
-        hidden = node != self.id and self._peers.hidden(node, since)
-        if at_request and not hidden:
-            self._request_missing()
+        """No preamble came in the slot at the cursor."""
+        at_request = self._turns.at_request
+        if not self._turns.silent(self._now, self.root):
+            self._turns.request_missing(self.root)
             return
-        self._expected += self._slots.message(n) if hidden else self._slots.silent
         if at_request:  # others hear the initiator: its request went past here
             self.round = (self.round + 1) % 256
-        self._cursor = 1 if at_request else self._cursor + 1
         self._await_slot()
-
-    def _request_missing(self) -> None:
-        """The initiator is silent: wait for one's place in the line of succession."""
-        self._waiting = Waiting.WATCHDOG
-        self._deadline = self._heard_at + ticks(self._params.watchdog)
-        heirs = [k for k in self.members if k != self.root]
-        if self._params.succession and self.id in heirs:
-            patience = self._params.takeover * (heirs.index(self.id) + 1)
-            takeover = self._expected + int(patience * self._slots.message(len(self.members)))
-            if takeover < self._deadline:
-                self._waiting, self._deadline = Waiting.TAKEOVER, takeover
 
     def _become_initiator(self) -> None:
         """Start rounds of one's own: nobody else does."""
-        members = tuple(k for k in self.members if k != self.root or k == self.id)
+        if self.root != self.id:
+            self._members.ids = tuple(k for k in self.members if k != self.root)
         self._set_role(Role.INITIATOR, self.id)
-        self._set_members(members)
-        self._cursor, self._asked_at = len(members), self._now
+        self._asked_at = self._now
         self._speak(self._now + self._slots.turnaround + self._slots.header)
-
-    def _next_members(self) -> tuple[int, ...]:
-        """Members of the initiator's next round: who was heard in the last one stays or joins."""
-        members = set(self.members)
-        for k, peer in self._peers:
-            if self._peers.alive(k, self._asked_at):
-                peer.missed = 0
-                members.add(k)
-            else:
-                peer.missed += 1
-                if peer.missed >= self._params.drop_after:
-                    members.discard(k)
-        return tuple(sorted(members))
 
     # Speaking -----------------------------------------------------------------------------
 
     def _speak(self, at: int) -> None:
         """Send the own message, its first stamp moment at or after the given time."""
-        kind = Type.REPLY if self.id in self.members else Type.JOIN
+        turns, kind = self._turns, Type.REPLY if self.id in self._members else Type.JOIN
         if self.role is Role.INITIATOR:
-            self._set_members(self._next_members())
-            self.round, self._cursor, self._asked_at = (self.round + 1) % 256, 0, at
-            kind = Type.REQUEST
-        rows = self._peers.table(tuple(k for k in self.members if k != self.id))
-        parts = split(rows, self._params.phy.max_frame)
-        sent = at
-        for p, entries in enumerate(parts):
-            at = on_grid(at)
-            sent = at + self._params.antenna_delay
-            length = self._send(kind, at, self._cursor, len(self.members), entries, p, len(parts))
-            at += self._slots.frame(length) + self._slots.gap
+            kind, before = Type.REQUEST, self.members
+            self._members.renew(self._peers, self._asked_at, self._params.drop_after)
+            self._tell_members(before)
+            self.round, turns.cursor, self._asked_at = (self.round + 1) % 256, 0, at
+        rows = self._peers.table(self._members.others())
+        words = Words(kind, self.root, self.round, turns.cursor, len(self._members), rows)
+        frames, sent, turns.expected = self._speaker.say(words, at)
+        self._out += frames
         self._listener.spoken(sent)
-        self._expected = at
         if kind is not Type.JOIN:
-            self._cursor += 1
-        if len(self.members) == 1 and self.role is Role.INITIATOR:
-            self._expected += ticks(self._params.idle)
+            turns.cursor += 1
+        if kind is Type.REQUEST and len(self._members) == 1:
+            turns.expected += self._dice.pause(self._params.idle)
         self._await_slot()
-
-    def _send(
-        self, kind: Type, at: int, slot: int, n: int, entries: tuple[Entry, ...] = (),
-        part: int = 0, parts: int = 1,
-    ) -> int:
-        """Hand one frame out and return its length in bytes."""
-        stamp = (at + self._params.antenna_delay) % MODULUS
-        frame = Frame(
-            kind, self.id, self.root, self.round, slot, n, self._boot, stamp, entries,
-            self._params.pan, self._sequence, part, parts,
-        )  # fmt: skip
-        data = encode(frame)
-        self._sequence = (self._sequence + 1) % 256
-        self._out.append(Transmission(data, at % MODULUS))
-        return len(data)
 
     def _insert(self, at: int) -> None:
         """A newcomer speaks at the start of the gap, once a round and after drawn pauses."""
@@ -264,22 +194,23 @@ class Session:
         if self._backoff > 0:
             self._backoff -= 1
             return
-        self._attempts = min(self._attempts + 1, 6)
-        self._backoff = self._next_random() % (1 << self._attempts)
+        self._attempts = min(self._attempts + 1, 5)
+        self._backoff = self._dice.bits(self._attempts)
         self._tried_round = self.round
-        self._check_at = self._now + self._draw(self._params.first_check)
+        self._turns.check_at = self._now + self._dice.pause(self._params.first_check)
         if self.id < self.root:
             self._set_role(Role.INITIATOR, self.id)
         self._speak(at)
 
     # Hearing ------------------------------------------------------------------------------
 
-    def _hear(self, heard: Frame, reception: Reception, arrived: int, length: int) -> None:
+    def _hear(self, heard: Frame, reception: Reception, arrived: int, end: int) -> None:
         """Take a valid frame of another node, and one's place in the round that it tells."""
-        lost = self._before in (Waiting.TAKEOVER, Waiting.WATCHDOG, Waiting.START)
+        turns = self._turns
+        lost = turns.before in (Waiting.TAKEOVER, Waiting.WATCHDOG, Waiting.START)
         if self.role is Role.LISTENING and heard.root == self.id:
-            self._waiting, self._deadline = self._before, self._held_deadline
-            return  # an answer to who had this ID before
+            turns.resume()  # an answer to who had this ID before
+            return
         if heard.root > self.root and not lost:
             self._unreadable()  # of a group that will follow this one once it hears it
             return
@@ -288,34 +219,22 @@ class Session:
             self._unreadable()
             return
         self._out += events
-        self._heard_at = self._now
+        turns.heard_at = self._now
         if heard.root != self.id:
             self._set_role(Role.RESPONDER, heard.root)
-            self.round = heard.round
-            self._learn_members(heard)
-        whole = heard.part + 1 == heard.parts
-        speaks_in_turn = heard.type in (Type.REQUEST, Type.REPLY)
-        self._cursor = heard.slot + 1 if whole and speaks_in_turn else heard.slot
-        end = arrived + self._slots.frame(length)
-        self._expected = end + self._slots.gap
+            self.round, before = heard.round, self.members
+            self._members.learn(heard)
+            self._tell_members(before)
+        turns.cursor = heard.slot + (heard.type in (Type.REQUEST, Type.REPLY))
+        turns.expected = end + self._slots.gap
+        if heard.part + 1 < heard.parts:
+            turns.wait(Waiting.PART, turns.expected - self._slots.header + self._slots.sense)
+            return
         self._await_slot()
-        if whole and self.id not in self.members:
+        if self.id not in self._members:
             self._insert(end + self._slots.turnaround)
 
-    def _learn_members(self, heard: Frame) -> None:
-        """Take the members of the round from a table, once all its parts were heard."""
-        if heard.type is Type.ALERT:
-            return
-        ids = [e.id for e in heard.entries]
-        self._rows = ids if heard.part == 0 else self._rows + ids
-        others = heard.n if heard.type is Type.JOIN else heard.n - 1
-        if heard.part + 1 == heard.parts and len(self._rows) >= others:
-            members = self._rows[:others]
-            if heard.type is not Type.JOIN:
-                members.append(heard.src)
-            self._set_members(tuple(sorted(set(members))))
-
-    def _own_id(self, heard: Frame, arrived: int, length: int) -> None:
+    def _own_id(self, heard: Frame, end: int) -> None:
         """Another node uses this node's ID: report it, tell it, and keep silent for a while."""
         if heard.boot == self._boot:
             self._unreadable()  # an echo
@@ -324,27 +243,26 @@ class Session:
         if heard.type is Type.ALERT:
             self._unreadable()
             return
-        self.root, self.round = heard.root, heard.round
-        at = on_grid(arrived + self._slots.frame(length) + self._slots.turnaround)
-        self._send(Type.ALERT, at, min(heard.slot + 1, heard.n), heard.n)
+        words = Words(Type.ALERT, heard.root, heard.round, min(heard.slot + 1, heard.n), heard.n)
+        frames, _, _ = self._speaker.say(words, end + self._slots.turnaround)
+        self._out += frames
         self._forget()
         self._set_role(Role.MUTED, self.id)
-        self._waiting = Waiting.WATCHDOG
-        self._deadline = self._now + self._draw(self._params.mute)
+        self._turns.wait(Waiting.WATCHDOG, self._now + self._dice.pause(self._params.mute))
 
     def _unreadable(self) -> None:
         """Time went by with something on the air that tells nothing."""
         if self.role is Role.LISTENING:
             self._listen()
             return
-        self._expected = self._now + self._slots.gap + self._slots.header
-        if self._before in (Waiting.TAKEOVER, Waiting.WATCHDOG):
-            self._request_missing()
-            return
-        if not self._early:
-            at_request = self._cursor >= len(self.members)
-            self._cursor = 1 if at_request and self.role is Role.RESPONDER else self._cursor + 1
-        self._await_slot()
+        turns = self._turns
+        if self.role is Role.INITIATOR and self._dice.bits(2) == 0:
+            turns.check_at = self._now  # not in step with whoever spoke at the same time
+        turns.unreadable(self._now, follows=self.role is Role.RESPONDER)
+        if turns.before in (Waiting.TAKEOVER, Waiting.WATCHDOG):
+            turns.request_missing(self.root)
+        else:
+            self._await_slot()
 
     # Beginning ----------------------------------------------------------------------------
 
@@ -352,32 +270,29 @@ class Session:
         """Begin anew: listen before speaking."""
         self._forget()
         self._set_role(Role.LISTENING, self.id)
-        self._asked_at = self._heard_at = self._now
-        self._check_at = self._attempts = self._backoff = 0
+        self._asked_at = self._turns.heard_at = self._now
+        self._turns.check_at = self._attempts = self._backoff = 0
         self._tried_round = None
         self._listen()
 
     def _listen(self) -> None:
-        self._waiting = Waiting.START
-        self._deadline = self._now + self._draw(self._params.listen)
+        self._turns.wait(Waiting.START, self._now + self._dice.pause(self._params.listen))
 
     def _forget(self) -> None:
         self._listener.forget()
-        self._set_members((self.id,))
+        before, self._members.ids = self.members, (self.id,)
+        self._tell_members(before)
 
     def _set_role(self, role: Role, root: int) -> None:
         if (role, root) != (self.role, self.root):
             self.role, self.root = role, root
             self._out.append(RoleChanged(role, root))
 
-    def _set_members(self, members: tuple[int, ...]) -> None:
-        if members != self.members:
-            before, after = set(self.members), set(members)
-            joined, left = tuple(sorted(after - before)), tuple(sorted(before - after))
-            self.members = members
-            self._out.append(MembersChanged(members, joined, left))
-
-    # Time and chance ----------------------------------------------------------------------
+    def _tell_members(self, before: tuple[int, ...]) -> None:
+        if self.members != before:
+            old, new = set(before), set(self.members)
+            changed = tuple(sorted(new - old)), tuple(sorted(old - new))
+            self._out.append(MembersChanged(self.members, *changed))
 
     def _advance(self, now: int) -> bool:
         """Take the time; False if the clock has jumped back, and the node begins anew."""
@@ -387,20 +302,6 @@ class Session:
         if jumped:
             self._begin()
         return not jumped
-
-    def _round_time(self) -> int:
-        n = len(self.members)
-        return n * self._slots.message(n)
-
-    def _draw(self, interval: tuple[float, float]) -> int:
-        """A random duration [ticks]."""
-        low, high = ticks(interval[0]), ticks(interval[1])
-        return low + self._next_random() * (high - low) // (1 << 32)
-
-    def _next_random(self) -> int:
-        """32 random bits, by the generator of Numerical Recipes, section 7.1."""
-        self._random = (1664525 * self._random + 1013904223) % (1 << 32)
-        return self._random
 
     def _give(self) -> list[Output]:
         out, self._out = self._out, []

@@ -1,0 +1,271 @@
+"""The compiled air: every message of every environment, the twin of `relpos_env.sensors.air`."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from relpos_env.sensors._path_kernels import (
+    CLOCKS,
+    advance_clock,
+    read_clock,
+    receive,
+    true_time,
+)
+from relpos_env.sensors._random_kernels import draw_key, normal_pair
+from tracking.compiled import kernel, small_kernel
+from tracking.ranging._session_kernels import (
+    INITIATOR,
+    may_insert,
+    speak,
+    switch_on,
+    take_broken,
+    take_frame,
+    take_preamble,
+    take_timeout,
+)
+
+NOTHING, END, DETECT, DEADLINE = -1, 0, 1, 2
+
+
+class Air(NamedTuple):
+    """One environment; in the batch every array has a leading axis `env`."""
+
+    nodes: np.ndarray
+    """NODE, (node)."""
+    latents: np.ndarray
+    """LATENT, (node, node)."""
+    sessions: np.ndarray
+    """SESSION, (node)."""
+    peers: np.ndarray
+    """PEER, (node, node)."""
+    messages: np.ndarray
+    """MESSAGE, (node)."""
+    rows: np.ndarray
+    """Stamps of the tables, (node, node) [ticks]."""
+    receptions: np.ndarray
+    """RECEPTION, (node + 1); the last one is scratch."""
+    flights: np.ndarray
+    """FLIGHT, (node)."""
+    due: np.ndarray
+    """Deadlines, s since the start of the window, (node)."""
+
+
+class Scene(NamedTuple):
+    """Where everything is during the window."""
+
+    pos0: np.ndarray
+    """Antennas at its start, (node, 3) [m]."""
+    pos1: np.ndarray
+    """At its end."""
+    boxes: np.ndarray
+    """(box, 6)"""
+    capsules: np.ndarray
+    """(capsule, 7)"""
+
+
+@kernel
+def run_window(p, radio, channel, seeds, window, dt, batch, scenes, out):
+    """Let all environments send and hear for one window.
+
+    Args:
+        p: SessionNumbers.
+        radio: RadioNumbers.
+        channel: CHANNEL, (1).
+        seeds: Of each environment, uint64, (env).
+        window: Number of the window.
+        dt: Its length [s].
+        batch: Air of all environments, updated.
+        scenes: Scene of all environments.
+        out: RangeBuffer, written; it must have room for what a window can bring.
+    """
+    c = channel[0]
+    for e in range(seeds.shape[0]):
+        air = Air(
+            batch.nodes[e],
+            batch.latents[e],
+            batch.sessions[e],
+            batch.peers[e],
+            batch.messages[e],
+            batch.rows[e],
+            batch.receptions[e],
+            batch.flights[e],
+            batch.due[e],
+        )
+        scene = Scene(scenes.pos0[e], scenes.pos1[e], scenes.boxes[e], scenes.capsules[e])
+        n = air.nodes.shape[0]
+        out.count[e] = 0
+        for k in range(n):
+            air.nodes[k].step = distance_moved(scene, k)
+            plan(air, k)
+        while True:
+            what, k, t = next_event(air, dt)
+            if what == NOTHING:
+                break
+            if what == DETECT:
+                air.flights[k].detect = np.inf
+                for r in range(n):
+                    detect(p, radio, c, seeds[e], air, scene, k, r, t, dt)
+            elif what == DEADLINE:
+                take_timeout(p, air.sessions[k], air.peers, k, air.messages[k], air.rows)
+                launch(radio, air, k)
+            else:
+                end_message(p, radio, c, seeds[e], air, scene, k, t, dt, out, e)
+        close_window(radio, air, seeds[e], window, dt)
+
+
+@kernel
+def power_nodes(p, batch, e, k, on, boot, t):
+    """Switch one node on or off at a time since the start of the coming window [s]."""
+    node, session = batch.nodes[e, k], batch.sessions[e, k]
+    flight = batch.flights[e, k]
+    batch.receptions[e, k].src = -1
+    if flight.active and flight.detect == np.inf:
+        for r in range(batch.nodes.shape[1]):
+            if batch.receptions[e, r].src == k:
+                batch.receptions[e, r].bad = True
+    else:
+        flight.active, flight.detect, flight.end = False, np.inf, np.inf
+    node.on = on
+    if on:
+        switch_on(p, session, batch.peers[e], k, boot, read_clock(node, t))
+
+
+@small_kernel
+def distance_moved(scene, k):
+    """Way of an antenna in the window [m]."""
+    x, y, z = (
+        scene.pos1[k, 0] - scene.pos0[k, 0],
+        scene.pos1[k, 1] - scene.pos0[k, 1],
+        scene.pos1[k, 2] - scene.pos0[k, 2],
+    )
+    return math.sqrt(x * x + y * y + z * z)
+
+
+@small_kernel
+def plan(air, k):
+    """Note when a node's deadline comes."""
+    node = air.nodes[k]
+    air.due[k] = true_time(node, air.sessions[k].deadline) if node.on else np.inf
+
+
+@small_kernel
+def next_event(air, dt):
+    """Kind, node and time of what happens next in the window; of equal times the lower kind."""
+    best, what, which = dt, NOTHING, 0
+    for k in range(air.flights.shape[0]):
+        if air.flights[k].end <= best and (what != END or air.flights[k].end < best):
+            best, what, which = air.flights[k].end, END, k
+    for k in range(air.flights.shape[0]):
+        t = air.flights[k].detect
+        if t < best or (t == best and what == NOTHING):
+            best, what, which = t, DETECT, k
+    for k in range(air.due.shape[0]):
+        t = air.due[k]
+        if t < best or (t == best and what == NOTHING):
+            best, what, which = t, DEADLINE, k
+    return what, which, best
+
+
+@small_kernel
+def launch(radio, air, k):
+    """Put a message that a session wants to send on its way, and note the next deadline."""
+    session, node, flight = air.sessions[k], air.nodes[k], air.flights[k]
+    if session.speaks:
+        session.speaks = False
+        flight.active = True
+        flight.moment = true_time(node, session.speak_at)
+        start = flight.moment - radio.header_time
+        flight.detect = start + radio.detect
+        flight.end = start + radio.airtime[air.messages[k].rows]
+    plan(air, k)
+
+
+@small_kernel
+def detect(p, radio, c, seed, air, scene, s, r, t, dt):
+    """A node that is free locks on a message; of one that is not the message may be spoilt."""
+    node = air.nodes[r]
+    if r == s or not node.on or air.flights[r].active:
+        return
+    scratch, rx = air.receptions[air.nodes.shape[0]], air.receptions[r]
+    moment = air.flights[s].moment
+    lo, hi = min(s, r), max(s, r)
+    if not receive(
+        c, air.latents[lo, hi], seed, air.nodes[s], node, s, r, moment, moment / dt,
+        scene.pos0, scene.pos1, dt, scene.boxes, scene.capsules, scratch,
+    ):  # fmt: skip
+        return
+    if rx.src >= 0:
+        rx.bad = rx.bad or scratch.rx_power > rx.rx_power - radio.capture
+        return
+    rx.src, rx.bad, rx.nlos = s, False, scratch.nlos
+    rx.stamp, rx.rx_power = scratch.stamp, scratch.rx_power
+    rx.fp_power, rx.carrier = scratch.fp_power, scratch.carrier
+    take_preamble(p, air.sessions[r], read_clock(node, t))
+    plan(air, r)
+
+
+@small_kernel
+def end_message(p, radio, c, seed, air, scene, s, t, dt, out, e):
+    """A message is over: whoever was locked on it has it, and all are free for others."""
+    n = air.nodes.shape[0]
+    air.flights[s].active, air.flights[s].end = False, np.inf
+    air.nodes[s].sent += 1
+    free = 1 << s
+    for r in range(n):
+        rx, session = air.receptions[r], air.sessions[r]
+        if rx.src != s:
+            continue
+        rx.src = -1
+        free |= 1 << r
+        now = read_clock(air.nodes[r], t)
+        if rx.bad:
+            take_broken(p, session, r, now)
+        else:
+            newcomer, distance, time = take_frame(
+                p, session, air.peers, r, s, air.messages[s], air.rows, rx.stamp, rx.carrier, now
+            )
+            if distance > 0.0:
+                note_range(air, r, s, distance, time, rx, out, e)
+            if newcomer and may_insert(p, session):
+                if r < session.root:
+                    session.role, session.root = INITIATOR, r
+                at = rx.stamp + air.messages[s].ticks + p.turnaround
+                speak(p, session, air.peers, r, air.messages[r], air.rows, at)
+        launch(radio, air, r)
+    for m in range(n):
+        flight = air.flights[m]
+        # A preamble that goes on long enough can still be detected.
+        if flight.active and flight.detect == np.inf and t < flight.moment - radio.detect:
+            for r in range(n):
+                if (free >> r) & 1 and air.receptions[r].src < 0:
+                    detect(p, radio, c, seed, air, scene, m, r, t, dt)
+
+
+@small_kernel
+def note_range(air, i, j, distance, time, rx, out, e):
+    """Write a range down."""
+    k = out.count[e]
+    if k < out.t.shape[1]:
+        out.t[e, k] = true_time(air.nodes[i], time)
+        out.i[e, k], out.j[e, k] = i, j
+        out.values[e, k, 0] = distance
+        out.values[e, k, 1], out.values[e, k, 2] = rx.rx_power, rx.fp_power
+        out.nlos[e, k] = rx.nlos
+        out.count[e] = k + 1
+
+
+@small_kernel
+def close_window(radio, air, seed, window, dt):
+    """Make the end of the window the start of the next."""
+    for k in range(air.nodes.shape[0]):
+        node, flight = air.nodes[k], air.flights[k]
+        noise, _ = normal_pair(draw_key(seed, np.uint64(CLOCKS + window * 64 + k)), 0)
+        advance_clock(node, dt, radio.wander, noise)
+        node.path += node.step
+        if flight.active:
+            flight.moment -= dt
+            flight.detect -= dt
+            flight.end -= dt

@@ -1,0 +1,201 @@
+"""The session in compiled form, for batches of environments: the twin of `Session`.
+
+The same messages at the same times give the same roles, stamps and ranges; a test holds it to
+that. It leaves out what a simulation of one group of distinct nodes does not need: bytes and
+their errors, tables split over frames, other PANs, duplicate IDs (and so the muted role),
+clocks that jump, antenna delays that the node knows of, ranges overheard by third nodes and
+those that the node with the larger ID resolves a little later.
+
+`p`, `s`, `peers`, `me` as in `_turn_kernels`.
+"""
+
+from __future__ import annotations
+
+from tracking.compiled import small_kernel
+from tracking.ranging._hearing_kernels import forget_peers, take_message
+from tracking.ranging._turn_kernels import (
+    FRAME,
+    INITIATOR,
+    LISTENING,
+    RESPONDER,
+    SLOT,
+    START,
+    TAKEOVER,
+    TURN,
+    WATCHDOG,
+    await_slot,
+    count_bits,
+    hold,
+    listen,
+    pause,
+    random_bits,
+    set_members,
+    silent_slot,
+    unreadable,
+    wait,
+)
+from tracking.ranging.timestamps import GRID
+
+REQUEST, REPLY, JOIN = 1, 2, 3
+
+
+@small_kernel
+def switch_on(p, s, peers, me, boot, now):
+    """`Session.__init__` and `Session.start`."""
+    s.boot = boot & 255
+    s.dice = (boot * 2654435761 + me + 1) & 0xFFFFFFFF
+    s.round = s.cursor = s.expected = 0
+    s.now = now
+    begin(p, s, peers, me)
+
+
+@small_kernel
+def begin(p, s, peers, me):
+    """`Session._begin`."""
+    forget_peers(s, peers, me)
+    set_members(s, 1 << me)
+    s.role, s.root = LISTENING, me
+    s.asked_at = s.heard_at = s.now
+    s.check_at = s.attempts = s.backoff = 0
+    s.tried_round = -1
+    listen(p, s)
+
+
+@small_kernel
+def take_preamble(p, s, now):
+    """`Session.preamble`."""
+    s.now = max(now, s.now)
+    hold(p, s)
+
+
+@small_kernel
+def take_broken(p, s, me, now):
+    """`Session.broken`."""
+    s.now = max(now, s.now)
+    if s.waiting == FRAME:
+        unreadable(p, s, me)
+
+
+@small_kernel
+def take_timeout(p, s, peers, me, message, rows):
+    """`Session.timeout` at the deadline; it may speak."""
+    s.now = max(s.deadline, s.now)
+    waiting = s.waiting
+    if waiting == FRAME:
+        unreadable(p, s, me)
+    elif waiting == SLOT:
+        silent_slot(p, s, peers, me)
+    elif waiting == WATCHDOG:
+        begin(p, s, peers, me)
+    else:
+        at = max(s.expected, s.now + p.header)
+        if waiting != TURN:  # START or TAKEOVER: become initiator
+            if s.root != me:
+                set_members(s, s.members & ~(1 << s.root))
+            s.role, s.root = INITIATOR, me
+            s.asked_at = s.now
+            at = s.now + p.turnaround + p.header
+        speak(p, s, peers, me, message, rows, at)
+
+
+@small_kernel
+def take_frame(p, s, peers, me, src, message, rows, arrived, carrier, now):
+    """`Session.frame` of a valid frame, up to the moment at which a newcomer may speak.
+
+    Returns:
+        Whether a newcomer may speak, after the frame; a distance [m], negative if none; its
+        time.
+    """
+    s.now = max(now, s.now)
+    hold(p, s)
+    lost = s.before in (TAKEOVER, WATCHDOG, START)
+    if s.role == LISTENING and message.root == me:
+        wait(s, s.before, s.held_deadline)
+        return False, -1.0, 0
+    taken, distance, time = False, -1.0, 0
+    if message.root <= s.root or lost:
+        taken, distance, time = take_message(
+            p, s, peers, me, src, message, rows, arrived, carrier
+        )
+    if not taken:
+        unreadable(p, s, me)
+        return False, -1.0, 0
+    s.heard_at = s.now
+    if message.root != me:
+        s.role, s.root, s.round = RESPONDER, message.root, message.round
+        set_members(s, message.members)
+    s.cursor = message.slot + (0 if message.type == JOIN else 1)
+    s.expected = arrived + message.ticks + p.gap
+    await_slot(p, s, me)
+    return not (s.members >> me) & 1, distance, time
+
+
+@small_kernel
+def may_insert(p, s):
+    """The beginning of `Session._insert`: whether a newcomer speaks now."""
+    if s.round == s.tried_round:
+        return False
+    if s.backoff > 0:
+        s.backoff -= 1
+        return False
+    s.attempts = min(s.attempts + 1, 5)
+    s.backoff = random_bits(s, s.attempts)
+    s.tried_round = s.round
+    s.check_at = s.now + pause(s, p.first_check)
+    return True
+
+
+@small_kernel
+def speak(p, s, peers, me, message, rows, at):
+    """`Session._speak`; the message is written and waits to be sent.
+
+    Args:
+        p, s, peers, me: As said above.
+        message: MESSAGE of this node, written.
+        rows: When every node heard each other one, its own clock, (node, node); its row is
+            written.
+        at: First moment for the stamp, own clock.
+    """
+    kind = REPLY if (s.members >> me) & 1 else JOIN
+    if s.role == INITIATOR:
+        kind = REQUEST
+        renew_members(p, s, peers, me)
+        s.round = (s.round + 1) & 255
+        s.cursor = 0
+        s.asked_at = at
+    at = -(-at // GRID) * GRID
+    extra = s.fresh & ~(s.members | 1 << me)
+    n_rows = count_bits(s.members & ~(1 << me)) + count_bits(extra)
+    message.type, message.root, message.round = kind, s.root, s.round
+    message.slot, message.n, message.boot = s.cursor, s.n, s.boot
+    message.stamp, message.members, message.heard = at, s.members, s.fresh
+    message.rows, message.ticks = n_rows, p.frame[n_rows]
+    for k in range(peers.shape[0]):
+        rows[me, k] = peers[me, k].heard
+    s.fresh = 0
+    s.spoken = at
+    s.speaks, s.speak_at = True, at
+    s.expected = at + message.ticks + p.gap
+    if kind != JOIN:
+        s.cursor += 1
+    if kind == REQUEST and s.n == 1:
+        s.expected += pause(s, p.idle)
+    await_slot(p, s, me)
+
+
+@small_kernel
+def renew_members(p, s, peers, me):
+    """`Members.renew`."""
+    members = s.members | 1 << me
+    for k in range(peers.shape[0]):
+        peer = peers[me, k]
+        if not peer.known:
+            continue
+        if max(peer.heard, peer.reported) > s.asked_at:
+            peer.missed = 0
+            members |= 1 << k
+        else:
+            peer.missed += 1
+            if peer.missed >= p.drop_after:
+                members &= ~(1 << k)
+    set_members(s, members)

@@ -1,0 +1,55 @@
+"""Who takes part in a round, by rising ID: the routing table."""
+
+from __future__ import annotations
+
+from tracking.ranging.peers import Peers
+from tracking.ranging.wire import Frame, Type
+
+
+class Members:
+    """The members that one node knows; the initiator decides, the others read its table."""
+
+    def __init__(self, node_id: int) -> None:
+        self._id = node_id
+        self._rows: list[int] = []
+        self.ids: tuple[int, ...] = (node_id,)
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    def __contains__(self, node: int) -> bool:
+        return node in self.ids
+
+    def others(self) -> tuple[int, ...]:
+        """All but this node."""
+        return tuple(k for k in self.ids if k != self._id)
+
+    def learn(self, heard: Frame) -> None:
+        """Take the members from a message, once all parts of its table were heard."""
+        if heard.type is Type.ALERT:
+            return
+        ids = [e.id for e in heard.entries]
+        self._rows = ids if heard.part == 0 else self._rows + ids
+        others = heard.n if heard.type is Type.JOIN else heard.n - 1
+        if heard.part + 1 == heard.parts and len(self._rows) >= others:
+            speaker = () if heard.type is Type.JOIN else (heard.src,)
+            self.ids = tuple(sorted({*self._rows[:others], *speaker}))
+
+    def renew(self, peers: Peers, since: int, drop_after: int) -> None:
+        """Decide on the next round: who was heard in the last one stays or joins.
+
+        Args:
+            peers: Who was heard, by this node or by others.
+            since: Begin of the last round, own clock.
+            drop_after: Rounds in which nobody hears a member until it is dropped.
+        """
+        ids = {self._id, *self.ids}
+        for k, peer in peers:
+            if peers.alive(k, since):
+                peer.missed = 0
+                ids.add(k)
+            else:
+                peer.missed += 1
+                if peer.missed >= drop_after:
+                    ids.discard(k)
+        self.ids = tuple(sorted(ids))

@@ -1,0 +1,59 @@
+"""From what a node wants to say to frames with exact times, split where one is too short."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from tracking.ranging.events import Transmission
+from tracking.ranging.params import SessionParams
+from tracking.ranging.slots import Slots
+from tracking.ranging.timestamps import MODULUS, on_grid
+from tracking.ranging.wire import Entry, Frame, Type, encode, split
+
+
+@dataclass(frozen=True, slots=True)
+class Words:
+    """One message before it has bytes and times."""
+
+    type: Type
+    root: int
+    round: int
+    slot: int
+    n: int
+    rows: Sequence[Entry] = ()
+
+
+class Speaker:
+    """The outgoing side of one node."""
+
+    def __init__(self, node_id: int, params: SessionParams, slots: Slots, boot: int) -> None:
+        self._id, self._params, self._slots, self._boot = node_id, params, slots, boot
+        self._sequence = 0
+
+    def say(self, words: Words, at: int) -> tuple[list[Transmission], int, int]:
+        """Make the frames of a message.
+
+        Args:
+            words: What it says.
+            at: First stamp moment at the earliest, own clock without wraps.
+
+        Returns:
+            The frames; the stamp of the last one, own clock; when the next message's stamp
+            moment can be.
+        """
+        out = []
+        parts = split(words.rows, self._params.phy.max_frame)
+        stamp = at
+        for p, rows in enumerate(parts):
+            at = on_grid(at)
+            stamp = at + self._params.antenna_delay
+            frame = Frame(
+                words.type, self._id, words.root, words.round, words.slot, words.n, self._boot,
+                stamp % MODULUS, rows, self._params.pan, self._sequence, p, len(parts),
+            )  # fmt: skip
+            data = encode(frame)
+            self._sequence = (self._sequence + 1) % 256
+            out.append(Transmission(data, at % MODULUS))
+            at += self._slots.frame(len(data)) + self._slots.gap
+        return out, stamp, at

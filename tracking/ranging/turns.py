@@ -1,0 +1,135 @@
+"""Whose turn it is: the slots of a round as one node sees them pass."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+from tracking.ranging.dice import Dice
+from tracking.ranging.members import Members
+from tracking.ranging.params import SessionParams
+from tracking.ranging.peers import Peers
+from tracking.ranging.slots import Slots
+from tracking.ranging.timestamps import ticks
+
+
+class Waiting(Enum):
+    """What the deadline is for."""
+
+    START = "nobody may be there: become initiator"
+    FRAME = "a frame is coming in"
+    TURN = "own turn: speak if the gap stays silent"
+    SLOT = "the slot is silent if no preamble comes"
+    PART = "the next part of a message should come"
+    TAKEOVER = "the request is missing: take over"
+    WATCHDOG = "begin anew"
+
+
+class Turns:
+    """The cursor of one node. Times are stamps of the own clock without wraps.
+
+    Slot k belongs to member k; slot 0, and every slot behind the last member, is that of the
+    initiator's request.
+    """
+
+    def __init__(
+        self,
+        node_id: int,
+        params: SessionParams,
+        slots: Slots,
+        members: Members,
+        peers: Peers,
+        dice: Dice,
+    ) -> None:
+        self._id, self._params, self._slots = node_id, params, slots
+        self._members, self._peers, self._dice = members, peers, dice
+        self.cursor = 0
+        """The slot that comes next."""
+        self.expected = 0
+        """The stamp moment of its message."""
+        self.waiting = self.before = Waiting.START
+        """What the deadline is for, and what it was for before a frame came in."""
+        self.deadline = self.heard_at = self.check_at = 0
+        """When the wait ends; when anything valid was last heard; when to listen in the own slot
+        next."""
+        self._held_deadline = 0
+        self._early = False
+
+    @property
+    def at_request(self) -> bool:
+        """Whether the initiator's request comes next."""
+        return self.cursor >= len(self._members)
+
+    def wait(self, waiting: Waiting, deadline: int) -> None:
+        """Wait for something until then."""
+        self.waiting, self.deadline = waiting, deadline
+
+    def hold(self, now: int) -> None:
+        """A frame comes in: everything else waits for its end."""
+        if self.waiting is not Waiting.FRAME:
+            self.before, self._held_deadline = self.waiting, self.deadline
+            # A newcomer speaks before the member whose turn it is.
+            self._early = now < self.expected - self._slots.header
+        self.wait(Waiting.FRAME, now + self._slots.longest + self._slots.header)
+
+    def resume(self) -> None:
+        """The frame that came in changes nothing."""
+        self.wait(self.before, self._held_deadline)
+
+    def await_slot(self, now: int, *, leads: bool) -> None:
+        """Wait for the slot at the cursor.
+
+        Args:
+            now: The time.
+            leads: Whether this node is the initiator.
+        """
+        s = self._slots
+        mine = leads if self.at_request else self._members.ids[self.cursor] == self._id
+        if mine and now >= self.check_at:
+            self.check_at = now + self._dice.pause(self._params.check)
+            mine = leads  # a responder listens in its slot, an initiator a little longer
+            self.expected += s.message(len(self._members)) if leads else 0
+        if mine:
+            self.wait(Waiting.TURN, self.expected - s.header - s.turnaround)
+        else:
+            self.wait(Waiting.SLOT, self.expected - s.header + s.sense)
+
+    def silent(self, now: int, root: int) -> bool:
+        """No preamble came in the slot at the cursor: go on to the next slot.
+
+        Args:
+            now: The time.
+            root: The initiator that this node follows.
+
+        Returns:
+            False if it was the slot of the request and nobody hears the initiator any more.
+        """
+        n, missing = len(self._members), self.at_request
+        node = root if missing else self._members.ids[self.cursor]
+        since = now - 2 * n * self._slots.message(n)
+        hidden = node != self._id and self._peers.hidden(node, since)
+        if missing and not hidden:
+            return False
+        self.expected += self._slots.message(n) if hidden else self._slots.silent
+        self.cursor = 1 if missing else self.cursor + 1
+        return True
+
+    def unreadable(self, now: int, *, follows: bool) -> None:
+        """Something was on the air that tells nothing; it took the slot unless it was early.
+
+        Args:
+            now: The time, its end.
+            follows: Whether this node is a responder.
+        """
+        self.expected = now + self._slots.gap + self._slots.header
+        if not self._early and self.before is not Waiting.PART:
+            self.cursor = 1 if self.at_request and follows else self.cursor + 1
+
+    def request_missing(self, root: int) -> None:
+        """The initiator is silent: wait for one's place in the line of succession."""
+        self.wait(Waiting.WATCHDOG, self.heard_at + ticks(self._params.watchdog))
+        heirs = [k for k in self._members.ids if k != root]
+        if self._params.succession and self._id in heirs:
+            patience = self._params.takeover * (heirs.index(self._id) + 1)
+            takeover = self.expected + int(patience * self._slots.message(len(self._members)))
+            if takeover < self.deadline:
+                self.wait(Waiting.TAKEOVER, takeover)
