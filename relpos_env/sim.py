@@ -61,7 +61,9 @@ class Simulation:
         self._imu = Imu(scenario.imu, n, imu, DT)
         self._mag = Magnetometer(scenario.mag, n, mag)
         self._odometer = Odometer(scenario.odometer, n, odometer)
-        self._radio = Radio(scenario.radio, n, radio)
+        self._radio = Radio(scenario.radio, n, [int(radio.integers(1 << 63))], DT)
+        for k in range(n):
+            self._radio.switch_on(0, k, boot=int(radio.integers(256)))
         self._nodes = np.arange(n, dtype=np.int64)
         self.odometer_speed: F64 = np.zeros(n)
         """Last odometer reading, (car) [m/s]."""
@@ -87,19 +89,19 @@ class Simulation:
             before = self.world.state
             after = self.world.step(command, DT)
             blocks += self._sample_inertial(after)
-            ranges = self._radio.listen(self.world, before, after)
-            blocks.append(ranges.block)
-            labels.append(ranges.nlos)
+            ranges, nlos = self._range(before, after)
+            blocks.append(ranges)
+            labels.append(nlos)
             if self.recording is not None:
                 self.recording.states.append(after)
         self.odometer_speed = self._odometer.sample(self.world.state.speed)
         nlos = np.concatenate(labels)
         self.nlos_share = float(nlos.mean()) if len(nlos) else 0.0
-        block = MeasurementBlock.concatenate(blocks).sorted()
+        block = MeasurementBlock.concatenate(blocks)
         if self.recording is not None:
             self.recording.blocks.append(block)
             self.recording.nlos.append(nlos)
-        return block
+        return block.sorted()
 
     def to_log(self, name: str, *, truth_every: int = 2) -> Log:
         """What was recorded, as a log with truth.
@@ -116,13 +118,18 @@ class Simulation:
         pos[:, :2] = np.concatenate([s.pos_w for s in states])
         heading = np.concatenate([s.heading for s in states])
         rows = len(pos)
+        block = MeasurementBlock.concatenate(self.recording.blocks)
+        nlos = np.zeros(block.n_events, dtype=bool)
+        nlos[block.kind[0] == Kind.RANGE] = np.concatenate(self.recording.nlos)
+        order = block.order()[0]
+        block = block.take(order)
         return Log(
             name=name,
             source=f"relpos-env simulation, scenario {self.scenario.name}",
             licence="CC0-1.0",
             constellation=self.constellation,
-            block=MeasurementBlock.concatenate(self.recording.blocks),
-            nlos=np.concatenate(self.recording.nlos),
+            block=block,
+            nlos=nlos[order][block.kind[0] == Kind.RANGE],
             truth=Truth(
                 np.repeat([s.t for s in states], n),
                 np.tile(self._nodes, len(states)),
@@ -132,6 +139,30 @@ class Simulation:
                 np.ones(rows, dtype=bool),
             ),
         )
+
+    def _range(self, before: WorldState, after: WorldState) -> tuple[MeasurementBlock, Bool]:
+        """Ranges that the nodes resolved in a step, and which of them lacked line of sight."""
+        ranges = self._radio.step(
+            self._antennas(before), self._antennas(after), self.world.boxes[None]
+        )
+        n = int(ranges.count[0])
+        i, j = ranges.i[0, :n], ranges.j[0, :n]
+        block = MeasurementBlock.of_kind(
+            Kind.RANGE,
+            ranges.t[0, :n],
+            i,
+            ranges.values[0, :n],
+            j=j,
+            antennas=(i, j),
+            has_power=np.ones(n, dtype=bool),
+        )
+        return block, ranges.nlos[0, :n]
+
+    def _antennas(self, state: WorldState) -> F64:
+        """Where the antennas are, (1, car, 3) [m]."""
+        pos = np.full((1, len(self._nodes), 3), self.scenario.radio.antenna_height)
+        pos[0, :, :2] = state.pos_w
+        return pos
 
     def _sample_inertial(self, state: WorldState) -> list[MeasurementBlock]:
         """IMU and magnetometer of every car."""

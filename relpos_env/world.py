@@ -121,6 +121,13 @@ class World:
             self._space.add(body, shape)
         n = len(start)
         self._n_cars, self._tick = n, 0
+        self.boxes: F64 = np.array(
+            [
+                (o.x, o.y, 0.5 * o.width, 0.5 * o.height, np.cos(o.angle), np.sin(o.angle))
+                for o in obstacles
+            ]
+        ).reshape(-1, 6)
+        """Obstacles for the radio: centre, half width and depth [m], cosine and sine, (box, 6)."""
         self._steering = np.zeros(n)
         # pymunk lists the static body behind the cars, so the buffers have a row for it.
         self._force = np.zeros((n + 1, 3))

@@ -163,10 +163,14 @@ class MeasurementBlock:
         ok = self.valid[k]
         return MeasurementBlock(*(getattr(self, f.name)[k : k + 1, ok] for f in fields(self)))
 
+    def order(self) -> I64:
+        """Event columns in handling order: by time, then kind, then nodes; padding last."""
+        order: I64 = np.lexsort((self.j, self.i, self.kind, self.t, ~self.valid), axis=1)
+        return order
+
     def sorted(self) -> MeasurementBlock:
-        """The events in handling order: by time, then kind, then nodes; padding last."""
-        order = np.lexsort((self.j, self.i, self.kind, self.t, ~self.valid), axis=1)
-        rows = np.arange(self.n_envs)[:, None]
+        """The events in handling order."""
+        rows, order = np.arange(self.n_envs)[:, None], self.order()
         return MeasurementBlock(*(getattr(self, f.name)[rows, order] for f in fields(self)))
 
     def count(self, kind: Kind) -> int:

@@ -3,7 +3,8 @@
 from relpos_env.sensors.imu import Imu, ImuSimParams
 from relpos_env.sensors.magnetometer import Magnetometer, MagSimParams
 from relpos_env.sensors.odometer import Odometer, OdometerSimParams
-from relpos_env.sensors.radio import Radio, RadioSimParams
+from relpos_env.sensors.radio import Radio
+from relpos_env.sensors.radio_params import RadioSimParams
 
 __all__ = [
     "Imu",

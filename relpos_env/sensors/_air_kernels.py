@@ -77,6 +77,6 @@ def hear_message(channel, latents, seed, nodes, s, r, t, motion, boxes, capsules
     pos0, pos1, dt = motion
     latent = latents[min(s, r), max(s, r)]
     return receive(
-        channel[0], latent, seed, nodes[s], nodes[r], s, r, t, t / dt, pos0, pos1, dt,
-        boxes, capsules, receptions[r],
+        channel[0], latent, seed, nodes[s], nodes[r], s, r, t, pos0, pos1, dt,
+        boxes, capsules, True, receptions[r],
     )  # fmt: skip

@@ -52,7 +52,8 @@ RECEPTION = np.dtype(
         ("bad", "?"),  # something else was on the air meanwhile
         ("nlos", "?"),
         ("stamp", "i8"),  # receiver's clock, ticks
-        ("rx_power", "f8"),  # dBm
+        ("strength", "f8"),  # dBm, that arrives
+        ("rx_power", "f8"),  # dBm, as reported
         ("fp_power", "f8"),  # dBm
         ("carrier", "f8"),  # 1
     ]

@@ -9,6 +9,7 @@ import numpy as np
 from relpos_env.sensors._random_kernels import draw_key, normal_pair, uniform
 from tracking.compiled import small_kernel
 
+_DECIBEL = 20.0 / math.log(10.0)
 KNOT = 0.05
 """[m] The processes are drawn every so far and straight between."""
 
@@ -39,8 +40,8 @@ def _draw_knot(c, latent, key, knot, correlated):
     """Move on to a knot, from the one before."""
     here = draw_key(key, np.uint64(knot))
     a, b = normal_pair(here, 0)
-    d, e = normal_pair(here, 2)
-    f, _ = normal_pair(here, 4)
+    d, e = normal_pair(here, 1)
+    f, _ = normal_pair(here, 2)
     latent.fast0, latent.slow0, latent.excess0 = latent.fast1, latent.slow1, latent.excess1
     latent.shadow0, latent.place0 = latent.shadow1, latent.place1
     latent.fast1 = _step(c.rho_fast, latent.fast0, a, correlated)
@@ -73,16 +74,23 @@ def path_error(c, latent, weight, distance, nlos):
 
 
 @small_kernel
-def path_power(c, latent, weight, distance, nlos):
-    """Received power, before the noise of the reading [dBm]."""
-    p = c.power_1m - 20.0 * math.log10(max(distance, 0.1))
-    p += c.shadowing * _mix(latent.shadow0, latent.shadow1, weight) - (
-        c.attenuation if nlos else 0.0
+def path_strength(c, latent, weight, distance, nlos):
+    """Power that arrives [dBm]."""
+    p = c.power_1m - _DECIBEL * math.log(max(distance, 0.1))
+    return (
+        p
+        + c.shadowing * _mix(latent.shadow0, latent.shadow1, weight)
+        - (c.attenuation if nlos else 0.0)
     )
-    excess = (c.ceiling - p) / c.knee
-    if excess > 30.0:
-        return p
-    return c.ceiling - c.knee * math.log1p(math.exp(excess))
+
+
+@small_kernel
+def reported_power(c, strength):
+    """What the radio makes of it, before the noise of the reading [dBm]."""
+    below = (c.ceiling - strength) / c.knee
+    if below > 30.0:
+        return strength
+    return c.ceiling - c.knee * math.log1p(math.exp(below))
 
 
 @small_kernel

@@ -16,11 +16,9 @@ def crosses_box(ax, ay, bx, by, box):
         box: Centre x y [m], half width, half depth [m], cosine and sine of its angle.
     """
     x, y, dx, dy = ax - box[0], ay - box[1], bx - ax, by - ay
-    length2 = dx * dx + dy * dy
-    # Nearest point to the centre first: most boxes are nowhere near.
-    along = 0.0 if length2 == 0.0 else min(max(-(x * dx + y * dy) / length2, 0.0), 1.0)
-    nx, ny = x + along * dx, y + along * dy
-    if nx * nx + ny * ny > box[2] * box[2] + box[3] * box[3]:
+    # Most boxes are nowhere near: how far the line passes their centre, times its length.
+    across, half2 = x * dy - y * dx, box[2] * box[2] + box[3] * box[3]
+    if across * across > half2 * (dx * dx + dy * dy):
         return False
     c, s = box[4], box[5]
     low, high = 0.0, 1.0

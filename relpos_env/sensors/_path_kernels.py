@@ -9,8 +9,9 @@ import numpy as np
 from relpos_env.sensors._channel_kernels import (
     bring_latents,
     path_error,
-    path_power,
+    path_strength,
     power_gap,
+    reported_power,
 )
 from relpos_env.sensors._occlusion_kernels import crosses_box, crosses_capsule
 from relpos_env.sensors._random_kernels import draw_key, normal_pair, uniform
@@ -59,7 +60,9 @@ def advance_clock(node, dt, wander, noise):
 
 
 @small_kernel
-def receive(c, latent, seed, sender, receiver, s, r, t, share, pos0, pos1, dt, boxes, capsules, rx):
+def receive(
+    c, latent, seed, sender, receiver, s, r, t, pos0, pos1, dt, boxes, capsules, readings, rx
+):  # fmt: skip
     """Work out what a node hears of a message.
 
     Args:
@@ -69,17 +72,18 @@ def receive(c, latent, seed, sender, receiver, s, r, t, share, pos0, pos1, dt, b
         sender, receiver: NODE.
         s, r: Their numbers.
         t: Stamp moment of the message since the start of the window [s].
-        share: The same as a share of the window.
         pos0, pos1: Antennas at the start and the end of the window, (node, 3) [m].
         dt: Length of the window [s].
         boxes: What stands in the plane, (box, 6).
         capsules: What stands in space, (capsule, 7).
+        readings: Whether to work out powers and carrier offset too; nothing else depends on it.
         rx: RECEPTION, written.
 
     Returns:
         True if the radio detects it.
     """
     key = draw_key(seed, np.uint64(MESSAGES + sender.sent * 4096 + s * 64 + r))
+    share = t / dt
     ax, ay, az = _at(pos0, pos1, s, share)
     bx, by, bz = _at(pos0, pos1, r, share)
     dx, dy, dz = bx - ax, by - ay, bz - az
@@ -113,24 +117,24 @@ def receive(c, latent, seed, sender, receiver, s, r, t, share, pos0, pos1, dt, b
     flown += path_error(c, latent, weight, distance, nlos)
     flown += 0.5 * (sender.antenna + receiver.antenna)
     stamp_noise, power_noise = normal_pair(key, 1)
-    carrier_noise, _ = normal_pair(key, 3)
-    arrival = t + flown / SPEED_OF_LIGHT + c.stamp_std * stamp_noise
-    power = path_power(c, latent, weight, distance, nlos) + c.power_noise * power_noise
     rx.src, rx.bad, rx.nlos = s, False, nlos
-    rx.stamp = nearest_tick(receiver, arrival)
-    rx.rx_power = power
-    rx.fp_power = power - power_gap(c, latent, weight, distance, nlos, key)
-    ux, uy, uz = (
-        (pos1[s, 0] - pos0[s, 0]) / dt,
-        (pos1[s, 1] - pos0[s, 1]) / dt,
-        (pos1[s, 2] - pos0[s, 2]) / dt,
-    )
-    receding = ((vx - ux) * dx + (vy - uy) * dy + (vz - uz) * dz) * inverse
-    rx.carrier = (
-        (receiver.rate - sender.rate) / sender.rate
-        + receding / SPEED_OF_LIGHT
-        + c.carrier_std * carrier_noise
-    )
+    rx.stamp = nearest_tick(receiver, t + flown / SPEED_OF_LIGHT + c.stamp_std * stamp_noise)
+    rx.strength = path_strength(c, latent, weight, distance, nlos)
+    if readings:
+        rx.rx_power = reported_power(c, rx.strength) + c.power_noise * power_noise
+        rx.fp_power = rx.rx_power - power_gap(c, latent, weight, distance, nlos, key)
+        ux, uy, uz = (
+            (pos1[s, 0] - pos0[s, 0]) / dt,
+            (pos1[s, 1] - pos0[s, 1]) / dt,
+            (pos1[s, 2] - pos0[s, 2]) / dt,
+        )
+        receding = ((vx - ux) * dx + (vy - uy) * dy + (vz - uz) * dz) * inverse
+        carrier_noise, _ = normal_pair(key, 2)
+        rx.carrier = (
+            (receiver.rate - sender.rate) / sender.rate
+            + receding / SPEED_OF_LIGHT
+            + c.carrier_std * carrier_noise
+        )
     return True
 
 

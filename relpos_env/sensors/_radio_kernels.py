@@ -193,16 +193,16 @@ def detect(p, radio, c, seed, air, scene, s, r, t, dt):
     moment = air.flights[s].moment
     lo, hi = min(s, r), max(s, r)
     if not receive(
-        c, air.latents[lo, hi], seed, air.nodes[s], node, s, r, moment, moment / dt,
-        scene.pos0, scene.pos1, dt, scene.boxes, scene.capsules, scratch,
+        c, air.latents[lo, hi], seed, air.nodes[s], node, s, r, moment,
+        scene.pos0, scene.pos1, dt, scene.boxes, scene.capsules, r < s, scratch,
     ):  # fmt: skip
         return
     if rx.src >= 0:
-        rx.bad = rx.bad or scratch.rx_power > rx.rx_power - radio.capture
+        rx.bad = rx.bad or scratch.strength > rx.strength - radio.capture
         return
     rx.src, rx.bad, rx.nlos = s, False, scratch.nlos
-    rx.stamp, rx.rx_power = scratch.stamp, scratch.rx_power
-    rx.fp_power, rx.carrier = scratch.fp_power, scratch.carrier
+    rx.stamp, rx.strength, rx.carrier = scratch.stamp, scratch.strength, scratch.carrier
+    rx.rx_power, rx.fp_power = scratch.rx_power, scratch.fp_power
     take_preamble(p, air.sessions[r], read_clock(node, t))
     plan(air, r)
 

@@ -35,7 +35,12 @@ def uniform(key, k):
 
 @small_kernel
 def normal_pair(key, k):
-    """Two independent standard normal numbers, from the k-th and the next (Box, Muller 1958)."""
-    radius = math.sqrt(-2.0 * math.log(uniform(key, k)))
-    angle = 2.0 * math.pi * uniform(key, k + 1)
-    return radius * math.cos(angle), radius * math.sin(angle)
+    """Two independent standard normal numbers, the k-th of a key (polar method, Marsaglia 1964)."""
+    at = 64 * (k + 1)
+    while True:
+        x, y = 2.0 * uniform(key, at) - 1.0, 2.0 * uniform(key, at + 1) - 1.0
+        square = x * x + y * y
+        if square < 1.0:
+            scale = math.sqrt(-2.0 * math.log(square) / square)
+            return scale * x, scale * y
+        at += 2

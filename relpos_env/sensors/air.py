@@ -198,7 +198,7 @@ class Air:
                 continue
             now = self._heard[r]
             if before["src"] >= 0:
-                spoilt = now["rx_power"] > before["rx_power"] - self._params.capture
+                spoilt = now["strength"] > before["strength"] - self._params.capture
                 self._heard[r] = before
                 self._heard[r]["bad"] |= spoilt
                 continue

@@ -30,8 +30,6 @@ from tracking.ranging._session_state import MAX_NODES, MESSAGE, make_sessions, s
 from tracking.ranging.airtime import airtime, round_rate
 from tracking.ranging.wire import ENTRY_BYTES, FIXED_BYTES, entries_per_frame
 
-NO_BOXES, NO_CAPSULES = np.zeros((0, 6)), np.zeros((0, 7))
-
 
 @dataclass(frozen=True, slots=True)
 class Ranges:

@@ -15,7 +15,7 @@ from tracking.ranging._exchange_kernels import (
     take_carrier,
     take_interval,
 )
-from tracking.ranging.peers import DRIFT, PATIENCE, SLACK
+from tracking.ranging.peers import DOUBT, DRIFT, PATIENCE, SLACK
 
 
 @small_kernel
@@ -42,6 +42,7 @@ def forget_peers(s, peers, me):
         peer = peers[me, k]
         peer.known = False
         peer.boot = peer.sent = peer.heard = peer.reported = peer.missed = peer.misfits = 0
+        peer.silences = peer.doubt = 0
         forget_exchange(peer)
 
 
@@ -49,6 +50,8 @@ def forget_peers(s, peers, me):
 def take_stamp(peer, boot, stamp, arrived):
     """`Peers.take`: 1 if the clock goes on, 0 if it begins anew, -1 if it does not fit."""
     peer.known = True
+    peer.doubt = DOUBT if peer.silences else max(peer.doubt - 1, 0)
+    peer.silences = 0
     if peer.heard and peer.boot == boot:
         own = arrived - peer.heard
         if own > 0 and same_moment(stamp - peer.sent, own, own):

@@ -114,9 +114,7 @@ def take_frame(p, s, peers, me, src, message, rows, arrived, carrier, now):
         return False, -1.0, 0
     taken, distance, time = False, -1.0, 0
     if message.root <= s.root or lost:
-        taken, distance, time = take_message(
-            p, s, peers, me, src, message, rows, arrived, carrier
-        )
+        taken, distance, time = take_message(p, s, peers, me, src, message, rows, arrived, carrier)
     if not taken:
         unreadable(p, s, me)
         return False, -1.0, 0
@@ -127,7 +125,10 @@ def take_frame(p, s, peers, me, src, message, rows, arrived, carrier, now):
     s.cursor = message.slot + (0 if message.type == JOIN else 1)
     s.expected = arrived + message.ticks + p.gap
     await_slot(p, s, me)
-    return not (s.members >> me) & 1, distance, time
+    newcomer = not (s.members >> me) & 1
+    if not newcomer:
+        s.attempts = s.backoff = 0
+    return newcomer, distance, time
 
 
 @small_kernel

@@ -60,6 +60,8 @@ PEER = np.dtype(
         ("reported", "i8"),
         ("missed", "i8"),
         ("misfits", "i8"),
+        ("silences", "i8"),
+        ("doubt", "i8"),
         # Exchanges of the pair, used where the keeper has the smaller number
         ("asked", "?"),
         ("asked_sent", "i8"),

@@ -7,7 +7,7 @@ environment everywhere.
 from __future__ import annotations
 
 from tracking.compiled import small_kernel
-from tracking.ranging.peers import ELSEWHERE
+from tracking.ranging.peers import ELSEWHERE, MAX_SILENCES
 
 LISTENING, INITIATOR, RESPONDER = 0, 1, 2
 START, FRAME, TURN, SLOT, TAKEOVER, WATCHDOG = 0, 1, 2, 3, 4, 5
@@ -95,16 +95,21 @@ def await_slot(p, s, me):
 
 @small_kernel
 def silent_slot(p, s, peers, me):
-    """`Session._silent_slot` and `Turns.silent`."""
+    """`Session._silent_slot`, `Turns.silent` and `Peers.awaited`."""
     missing = s.cursor >= s.n
     node = s.root if missing else member_at(s.members, s.cursor)
     since = s.now - 2 * s.n * p.message[s.n]
     peer = peers[me, node]
-    hidden = node != me and peer.known and peer.reported > max(peer.heard + ELSEWHERE, since)
-    if missing and not hidden:
+    awaited = False
+    if node != me and peer.known:
+        awaited = peer.reported > max(peer.heard + ELSEWHERE, since) or (
+            peer.doubt > 0 and peer.silences < MAX_SILENCES
+        )
+        peer.silences += 1
+    if missing and not awaited:
         request_missing(p, s, me)
         return
-    s.expected += p.message[s.n] if hidden else p.silent
+    s.expected += p.message[s.n] if awaited else p.silent
     if missing:
         s.cursor = 1
         s.round = (s.round + 1) & 255

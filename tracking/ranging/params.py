@@ -26,7 +26,7 @@ class SessionParams:
     """[s] A node that is switched on listens for a time between these before it speaks."""
     idle: tuple[float, float] = (0.005, 0.02)
     """[s] Pause of an initiator that is alone, drawn anew every time."""
-    drop_after: int = 3
+    drop_after: int = 5
     """[rounds] A member that nobody has heard for so long is dropped."""
     first_check: tuple[float, float] = (0.2, 1.2)
     """[s] After joining, a responder once keeps silent in its own slot and listens whether

@@ -13,6 +13,10 @@ SLACK = ticks(5e-6)
 DRIFT = 100e-6
 ELSEWHERE = ticks(50e-6)
 """A message reported later than the last one heard, by more than this, went past here."""
+DOUBT = 16
+"""So many slots long a node is waited for, once a silence was none."""
+MAX_SILENCES = 2
+"""But not in more slots in a row."""
 PATIENCE = 3
 """After so many messages in a row that do not fit, the peer's clock must have jumped."""
 
@@ -36,6 +40,10 @@ class Peer:
     """Rounds in which nobody heard it."""
     misfits: int = 0
     """Messages in a row that do not fit its clock."""
+    silences: int = 0
+    """Slots of it in a row in which nothing was heard."""
+    doubt: int = 0
+    """Counts down from `DOUBT` since a silent slot after which it was heard again."""
 
 
 class Peers:
@@ -63,6 +71,8 @@ class Peers:
             repeated or late one and must be ignored.
         """
         peer = self._peers.setdefault(frame.src, Peer())
+        peer.doubt = DOUBT if peer.silences else max(peer.doubt - 1, 0)
+        peer.silences = 0
         if peer.heard and peer.boot == frame.boot:
             own = arrived - peer.heard
             sent = unwrap(frame.stamp, peer.sent + own)
@@ -89,6 +99,18 @@ class Peers:
         """Whether others hear a node that this one does not: its last message went past here."""
         peer = self._peers.get(node)
         return peer is not None and peer.reported > max(peer.heard + ELSEWHERE, since)
+
+    def awaited(self, node: int, since: int) -> bool:
+        """Whether a silent slot of a node is waited out: it may be speaking all the same.
+
+        Others hear it, or it was heard again after a silence not long ago.
+        """
+        peer = self._peers.get(node)
+        if peer is None:
+            return False
+        waits = self.hidden(node, since) or (peer.doubt > 0 and peer.silences < MAX_SILENCES)
+        peer.silences += 1
+        return waits
 
     def alive(self, node: int, since: int) -> bool:
         """Whether anyone has heard a node since a time of the own clock."""

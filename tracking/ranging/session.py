@@ -7,7 +7,8 @@ times and with events. All times are 40-bit stamps of the node's own radio clock
 - Messages follow each other with a gap in which everybody listens. Whoever is not a member of
   the round yet speaks right at its start; the member whose turn it is speaks at its end.
 - The initiator's request names the members; they answer by rising ID. A slot in which no
-  preamble is heard is over at once, unless others do hear that node: then it is waited out.
+  preamble is heard is over at once, unless others do hear that node or it was lost and heard
+  again lately: then it is waited out.
 - Whoever hears a smaller ID follows it. Nodes that nobody heard for some rounds are dropped.
 - If the initiator falls silent the next ID takes over (`succession`), or all are reset when
   their watchdog has run off, as in the paper.
@@ -154,7 +155,7 @@ class Session:
         if not self._turns.silent(self._now, self.root):
             self._turns.request_missing(self.root)
             return
-        if at_request:  # others hear the initiator: its request went past here
+        if at_request:  # the initiator is there: its request went past here
             self.round = (self.round + 1) % 256
         self._await_slot()
 
@@ -231,7 +232,9 @@ class Session:
             turns.wait(Waiting.PART, turns.expected - self._slots.header + self._slots.sense)
             return
         self._await_slot()
-        if self.id not in self._members:
+        if self.id in self._members:
+            self._attempts = self._backoff = 0
+        else:
             self._insert(end + self._slots.turnaround)
 
     def _own_id(self, heard: Frame, end: int) -> None:

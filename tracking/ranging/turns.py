@@ -106,10 +106,10 @@ class Turns:
         n, missing = len(self._members), self.at_request
         node = root if missing else self._members.ids[self.cursor]
         since = now - 2 * n * self._slots.message(n)
-        hidden = node != self._id and self._peers.hidden(node, since)
-        if missing and not hidden:
+        awaited = node != self._id and self._peers.awaited(node, since)
+        if missing and not awaited:
             return False
-        self.expected += self._slots.message(n) if hidden else self._slots.silent
+        self.expected += self._slots.message(n) if awaited else self._slots.silent
         self.cursor = 1 if missing else self.cursor + 1
         return True
 
