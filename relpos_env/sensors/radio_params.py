@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from relpos_env.sensors.channel import INDOOR, ChannelParams
+from relpos_env.sensors.channel import CALIBRATED, ChannelParams
 from tracking.ranging.params import SessionParams
 
 
@@ -14,7 +14,7 @@ class RadioSimParams:
 
     session: SessionParams = field(default_factory=SessionParams)
     """The protocol that they run, and its radio setting."""
-    channel: ChannelParams = field(default=INDOOR)
+    channel: ChannelParams = field(default=CALIBRATED)
     """The place."""
     clock_offset: float = 10e-6
     """[1] Standard deviation of a clock's rate, cut at 20 ppm."""

@@ -9,7 +9,8 @@ from relpos_env.drivers import LoopDrivers
 from relpos_env.errors import EnvError
 from relpos_env.interface.actions import DriveCommand
 from relpos_env.scenarios import SCENARIOS, scenario
-from relpos_env.sensors import Imu, ImuSimParams, Magnetometer, MagSimParams, Radio, RadioSimParams
+from relpos_env.sensors import Imu, ImuSimParams, Magnetometer, MagSimParams, RadioSimParams
+from relpos_env.sensors.channel import EXACT
 from relpos_env.sim import DT, Simulation
 from relpos_env.vehicle import CarParams
 from relpos_env.world import Obstacle, World
@@ -126,31 +127,18 @@ def errors(log):
     return (log.block.values[0, chosen, 0] - true)[ok], log.nlos[ok]
 
 
-def test_ranges_come_at_the_rate_of_the_protocol_with_the_errors_asked_for():
-    log = ranges(scenario("cars-nlos"))
+def test_ranges_come_at_the_rate_of_the_protocol_with_the_errors_of_the_place():
+    log = ranges(scenario("cars-nlos"), seconds=60.0)
     e, nlos = errors(log)
     assert 0.05 < nlos.mean() < 0.6
-    assert e[~nlos].std() == pytest.approx(0.06, rel=0.05)
-    assert e[~nlos].mean() == pytest.approx(0.0, abs=0.01)
-    assert e[nlos].mean() == pytest.approx(0.24, abs=0.03)
-    clear = ranges(replace(scenario("cars-los"), radio=RadioSimParams(loss=0.0)))
-    assert clear.n_ranges / (3 * 20.0) == pytest.approx(81.78, rel=0.01)
-    exact = ranges(replace(scenario("cars-los"), radio=RadioSimParams(noise=0.0)), seconds=5.0)
-    assert np.abs(errors(exact)[0]).max() < 0.002
-
-
-def test_what_is_lost_changes_no_later_draw():
-    params = RadioSimParams(loss=0.5)
-    rng = np.random.default_rng
-    state = lambda r: r._rng.bit_generator.state["state"]  # noqa: E731, SLF001
-    worlds = [World(BIG, (), CarParams(), np.array([[0.0, 0, 0], [3.0, 0, 0]])) for _ in range(2)]
-    radios = [Radio(params, 2, rng(3)), Radio(replace(params, loss=0.0), 2, rng(3))]
-    command = DriveCommand(0.0, np.ones(2), np.zeros(2))
-    for _ in range(50):
-        for world, radio in zip(worlds, radios, strict=True):
-            before = world.state
-            radio.listen(world, before, world.step(command, DT))
-    assert state(radios[0]) == state(radios[1])
+    # Errors are correlated over metres, so that a minute has few independent ones.
+    assert e[~nlos].std() == pytest.approx(0.06, rel=0.3)
+    assert e[~nlos].mean() == pytest.approx(0.0, abs=0.04)
+    assert 0.03 < e[nlos].mean() < 0.25
+    exact = ranges(replace(scenario("cars-los"), radio=RadioSimParams(channel=EXACT)))
+    rounds = exact.n_ranges / 3 / (20.0 - exact.t_range[0])
+    assert rounds == pytest.approx(80.6, rel=0.01)
+    assert np.abs(errors(exact)[0]).max() < 0.008
 
 
 @pytest.mark.parametrize("name", SCENARIOS)

@@ -58,8 +58,17 @@ class MembersChanged:
     """The group that ranges in each round is another one."""
 
     members: tuple[int, ...]
-    joined: tuple[int, ...]
-    left: tuple[int, ...]
+    before: tuple[int, ...]
+
+    @property
+    def joined(self) -> tuple[int, ...]:
+        """Members that were none before."""
+        return tuple(k for k in self.members if k not in self.before)
+
+    @property
+    def left(self) -> tuple[int, ...]:
+        """Members that are none any more."""
+        return tuple(k for k in self.before if k not in self.members)
 
 
 @dataclass(frozen=True, slots=True)

@@ -144,8 +144,6 @@ class Session:
             self._become_initiator()
         return self._give()
 
-    # Silence ------------------------------------------------------------------------------
-
     def _await_slot(self) -> None:
         self._turns.await_slot(self._now, leads=self.role is Role.INITIATOR)
 
@@ -166,8 +164,6 @@ class Session:
         self._set_role(Role.INITIATOR, self.id)
         self._asked_at = self._now
         self._speak(self._now + self._slots.turnaround + self._slots.header)
-
-    # Speaking -----------------------------------------------------------------------------
 
     def _speak(self, at: int) -> None:
         """Send the own message, its first stamp moment at or after the given time."""
@@ -202,8 +198,6 @@ class Session:
         if self.id < self.root:
             self._set_role(Role.INITIATOR, self.id)
         self._speak(at)
-
-    # Hearing ------------------------------------------------------------------------------
 
     def _hear(self, heard: Frame, reception: Reception, arrived: int, end: int) -> None:
         """Take a valid frame of another node, and one's place in the round that it tells."""
@@ -247,8 +241,7 @@ class Session:
             self._unreadable()
             return
         words = Words(Type.ALERT, heard.root, heard.round, min(heard.slot + 1, heard.n), heard.n)
-        frames, _, _ = self._speaker.say(words, end + self._slots.turnaround)
-        self._out += frames
+        self._out += self._speaker.say(words, end + self._slots.turnaround)[0]
         self._forget()
         self._set_role(Role.MUTED, self.id)
         self._turns.wait(Waiting.WATCHDOG, self._now + self._dice.pause(self._params.mute))
@@ -266,8 +259,6 @@ class Session:
             turns.request_missing(self.root)
         else:
             self._await_slot()
-
-    # Beginning ----------------------------------------------------------------------------
 
     def _begin(self) -> None:
         """Begin anew: listen before speaking."""
@@ -293,9 +284,7 @@ class Session:
 
     def _tell_members(self, before: tuple[int, ...]) -> None:
         if self.members != before:
-            old, new = set(before), set(self.members)
-            changed = tuple(sorted(new - old)), tuple(sorted(old - new))
-            self._out.append(MembersChanged(self.members, *changed))
+            self._out.append(MembersChanged(self.members, before))
 
     def _advance(self, now: int) -> bool:
         """Take the time; False if the clock has jumped back, and the node begins anew."""
