@@ -17,7 +17,6 @@ from relpos_env.sensors._path_kernels import (
 from relpos_env.sensors._random_kernels import draw_key, normal_pair
 from tracking.compiled import kernel, small_kernel
 from tracking.ranging._session_kernels import (
-    INITIATOR,
     may_insert,
     speak,
     switch_on,
@@ -230,8 +229,6 @@ def end_message(p, radio, c, seed, air, scene, s, t, dt, out, e):
             if distance > 0.0:
                 note_range(air, r, s, distance, time, rx, out, e)
             if newcomer and may_insert(p, session):
-                if r < session.root:
-                    session.role, session.root = INITIATOR, r
                 at = rx.stamp + air.messages[s].ticks + p.turnaround
                 speak(p, session, air.peers, r, air.messages[r], air.rows, at)
         launch(radio, air, r)

@@ -45,6 +45,7 @@ def switch_on(p, s, peers, me, boot, now):
     s.boot = boot & 255
     s.dice = (boot * 2654435761 + me + 1) & 0xFFFFFFFF
     s.round = s.cursor = s.expected = 0
+    s.role, s.root, s.confirmed = LISTENING, me, False
     s.now = now
     begin(p, s, peers, me)
 
@@ -54,11 +55,19 @@ def begin(p, s, peers, me):
     """`Session._begin`."""
     forget_peers(s, peers, me)
     set_members(s, 1 << me)
-    s.role, s.root = LISTENING, me
+    set_role(s, LISTENING, me)
     s.asked_at = s.heard_at = s.now
     s.check_at = s.attempts = s.backoff = 0
     s.tried_round = -1
     listen(p, s)
+
+
+@small_kernel
+def set_role(s, role, root):
+    """`Session._set_role`."""
+    if role != s.role or root != s.root:
+        s.confirmed = False
+    s.role, s.root = role, root
 
 
 @small_kernel
@@ -92,7 +101,7 @@ def take_timeout(p, s, peers, me, message, rows):
         if waiting != TURN:  # START or TAKEOVER: become initiator
             if s.root != me:
                 set_members(s, s.members & ~(1 << s.root))
-            s.role, s.root = INITIATOR, me
+            set_role(s, INITIATOR, me)
             s.asked_at = s.now
             at = s.now + p.turnaround + p.header
         speak(p, s, peers, me, message, rows, at)
@@ -108,27 +117,45 @@ def take_frame(p, s, peers, me, src, message, rows, arrived, carrier, now):
     """
     s.now = max(now, s.now)
     hold(p, s)
-    lost = s.before in (TAKEOVER, WATCHDOG, START)
+    lost = s.before in (TAKEOVER, WATCHDOG, START) or (s.role == INITIATOR and not s.confirmed)
     if s.role == LISTENING and message.root == me:
         wait(s, s.before, s.held_deadline)
         return False, -1.0, 0
+    in_turn = message.type != JOIN
+    follows = message.root == s.root and s.role != LISTENING
     taken, distance, time = False, -1.0, 0
-    if message.root <= s.root or lost:
-        taken, distance, time = take_message(p, s, peers, me, src, message, rows, arrived, carrier)
+    if follows or (in_turn and (message.root < s.root or lost)):
+        taken, distance, time = take_message(
+            p, s, peers, me, src, message, rows, arrived, carrier
+        )
     if not taken:
         unreadable(p, s, me)
         return False, -1.0, 0
     s.heard_at = s.now
-    if message.root != me:
-        s.role, s.root, s.round = RESPONDER, message.root, message.round
-        set_members(s, message.members)
-    s.cursor = message.slot + (0 if message.type == JOIN else 1)
+    if in_turn:
+        keep_step(s, me, message)
     s.expected = arrived + message.ticks + p.gap
     await_slot(p, s, me)
     newcomer = not (s.members >> me) & 1
     if not newcomer:
         s.attempts = s.backoff = 0
     return newcomer, distance, time
+
+
+@small_kernel
+def keep_step(s, me, message):
+    """`Session._keep_step`."""
+    in_step = message.root == s.root and message.round == s.round and message.n == s.n
+    s.cursor = message.slot + 1
+    if message.root == me:
+        s.confirmed = True
+        if not in_step:
+            s.cursor = s.n
+        return
+    if message.type == REQUEST or not in_step:
+        set_members(s, message.members)
+    set_role(s, RESPONDER, message.root)
+    s.round = message.round
 
 
 @small_kernel
@@ -158,6 +185,8 @@ def speak(p, s, peers, me, message, rows, at):
         at: First moment for the stamp, own clock.
     """
     kind = REPLY if (s.members >> me) & 1 else JOIN
+    if me < s.root:
+        set_role(s, INITIATOR, me)
     if s.role == INITIATOR:
         kind = REQUEST
         renew_members(p, s, peers, me)
@@ -166,9 +195,11 @@ def speak(p, s, peers, me, message, rows, at):
         s.asked_at = at
     at = -(-at // GRID) * GRID
     extra = s.fresh & ~(s.members | 1 << me)
-    n_rows = count_bits(s.members & ~(1 << me)) + count_bits(extra)
+    n_rows = count_bits(s.fresh)
+    if kind != JOIN:
+        n_rows = count_bits(s.members & ~(1 << me)) + count_bits(extra)
     message.type, message.root, message.round = kind, s.root, s.round
-    message.slot, message.n, message.boot = s.cursor, s.n, s.boot
+    message.slot, message.n, message.boot = min(s.cursor, s.n), s.n, s.boot
     message.stamp, message.members, message.heard = at, s.members, s.fresh
     message.rows, message.ticks = n_rows, p.frame[n_rows]
     for k in range(peers.shape[0]):

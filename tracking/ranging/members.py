@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tracking.ranging.peers import Peers
-from tracking.ranging.wire import Frame, Type
+from tracking.ranging.wire import Frame
 
 
 class Members:
@@ -25,15 +25,11 @@ class Members:
         return tuple(k for k in self.ids if k != self._id)
 
     def learn(self, heard: Frame) -> None:
-        """Take the members from a message, once all parts of its table were heard."""
-        if heard.type is Type.ALERT:
-            return
+        """Take the members from a request or reply, once all parts of its table were heard."""
         ids = [e.id for e in heard.entries]
         self._rows = ids if heard.part == 0 else self._rows + ids
-        others = heard.n if heard.type is Type.JOIN else heard.n - 1
-        if heard.part + 1 == heard.parts and len(self._rows) >= others:
-            speaker = () if heard.type is Type.JOIN else (heard.src,)
-            self.ids = tuple(sorted({*self._rows[:others], *speaker}))
+        if heard.part + 1 == heard.parts and len(self._rows) >= heard.n - 1:
+            self.ids = tuple(sorted({*self._rows[: heard.n - 1], heard.src}))
 
     def renew(self, peers: Peers, since: int, drop_after: int) -> None:
         """Decide on the next round: who was heard in the last one stays or joins.

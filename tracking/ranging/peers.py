@@ -117,10 +117,14 @@ class Peers:
         peer = self._peers[node]
         return max(peer.heard, peer.reported) > since
 
+    def rows(self) -> list[Entry]:
+        """Whoever was heard since the own last message, by rising ID."""
+        return [self._row(k) for k in sorted(k for k, peer in self if peer.fresh)]
+
     def table(self, members: tuple[int, ...]) -> list[Entry]:
-        """Rows of the next message: the other members, then whoever else was heard."""
-        others = sorted(k for k, peer in self if peer.fresh and k not in members)
-        return [self._row(k) for k in (*members, *others)]
+        """Rows of a member's message: the other members, then whoever else was heard."""
+        others = [row for row in self.rows() if row.id not in members]
+        return [self._row(k) for k in members] + others
 
     def spoken(self) -> None:
         """The own message is on its way: what is heard from now on goes into the next."""

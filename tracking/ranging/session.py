@@ -33,7 +33,7 @@ from tracking.ranging.slots import Slots
 from tracking.ranging.speaker import Speaker, Words
 from tracking.ranging.timestamps import MODULUS, ticks, unwrap
 from tracking.ranging.turns import Turns, Waiting
-from tracking.ranging.wire import MAX_ID, Frame, Type, decode
+from tracking.ranging.wire import MAX_ID, Frame, Type, decode, entries_per_frame
 
 _BACK = ticks(1e-3)
 """A clock that goes back by more has jumped."""
@@ -68,6 +68,7 @@ class Session:
         self._turns = Turns(node_id, params, self._slots, self._members, self._peers, self._dice)
         self._now = self._asked_at = self._attempts = self._backoff = 0
         self._tried_round: int | None = None
+        self._confirmed = False  # somebody follows this initiator
         self._out: list[Output] = []
 
     @property
@@ -168,19 +169,23 @@ class Session:
     def _speak(self, at: int) -> None:
         """Send the own message, its first stamp moment at or after the given time."""
         turns, kind = self._turns, Type.REPLY if self.id in self._members else Type.JOIN
+        if self.id < self.root:  # all follow the smallest ID
+            self._set_role(Role.INITIATOR, self.id)
         if self.role is Role.INITIATOR:
             kind, before = Type.REQUEST, self.members
             self._members.renew(self._peers, self._asked_at, self._params.drop_after)
             self._tell_members(before)
             self.round, turns.cursor, self._asked_at = (self.round + 1) % 256, 0, at
-        rows = self._peers.table(self._members.others())
-        words = Words(kind, self.root, self.round, turns.cursor, len(self._members), rows)
+        n, most = len(self._members), entries_per_frame(self._params.phy.max_frame)
+        join = kind is Type.JOIN
+        rows = self._peers.rows()[:most] if join else self._peers.table(self._members.others())
+        words = Words(kind, self.root, self.round, min(turns.cursor, n), n, rows)
         frames, sent, turns.expected = self._speaker.say(words, at)
         self._out += frames
         self._listener.spoken(sent)
         if kind is not Type.JOIN:
             turns.cursor += 1
-        if kind is Type.REQUEST and len(self._members) == 1:
+        if kind is Type.REQUEST and n == 1:
             turns.expected += self._dice.pause(self._params.idle)
         self._await_slot()
 
@@ -195,18 +200,18 @@ class Session:
         self._backoff = self._dice.bits(self._attempts)
         self._tried_round = self.round
         self._turns.check_at = self._now + self._dice.pause(self._params.first_check)
-        if self.id < self.root:
-            self._set_role(Role.INITIATOR, self.id)
         self._speak(at)
 
     def _hear(self, heard: Frame, reception: Reception, arrived: int, end: int) -> None:
         """Take a valid frame of another node, and one's place in the round that it tells."""
-        turns = self._turns
+        turns, in_turn = self._turns, heard.type in (Type.REQUEST, Type.REPLY)
         lost = turns.before in (Waiting.TAKEOVER, Waiting.WATCHDOG, Waiting.START)
+        lost |= self.role is Role.INITIATOR and not self._confirmed
         if self.role is Role.LISTENING and heard.root == self.id:
             turns.resume()  # an answer to who had this ID before
             return
-        if heard.root > self.root and not lost:
+        follows = heard.root == self.root and self.role is not Role.LISTENING
+        if not follows and not (in_turn and (heard.root < self.root or lost)):
             self._unreadable()  # of a group that will follow this one once it hears it
             return
         events = self._listener.take(heard, reception, arrived)
@@ -215,12 +220,8 @@ class Session:
             return
         self._out += events
         turns.heard_at = self._now
-        if heard.root != self.id:
-            self._set_role(Role.RESPONDER, heard.root)
-            self.round, before = heard.round, self.members
-            self._members.learn(heard)
-            self._tell_members(before)
-        turns.cursor = heard.slot + (heard.type in (Type.REQUEST, Type.REPLY))
+        if in_turn:
+            self._keep_step(heard)
         turns.expected = end + self._slots.gap
         if heard.part + 1 < heard.parts:
             turns.wait(Waiting.PART, turns.expected - self._slots.header + self._slots.sense)
@@ -230,6 +231,23 @@ class Session:
             self._attempts = self._backoff = 0
         else:
             self._insert(end + self._slots.turnaround)
+
+    def _keep_step(self, heard: Frame) -> None:
+        """Take round, slot and members from a request or a reply."""
+        here = self.root, self.round, len(self._members)
+        in_step = (heard.root, heard.round, heard.n) == here
+        self._turns.cursor = heard.slot + 1
+        if heard.root == self.id:
+            self._confirmed = True
+            if not in_step:  # the others have lost the request: ask again
+                self._turns.cursor = len(self._members)
+            return
+        if heard.type is Type.REQUEST or not in_step or heard.part > 0:
+            before = self.members
+            self._members.learn(heard)
+            self._tell_members(before)
+        self.round = heard.round
+        self._set_role(Role.RESPONDER, heard.root)
 
     def _own_id(self, heard: Frame, end: int) -> None:
         """Another node uses this node's ID: report it, tell it, and keep silent for a while."""
@@ -279,6 +297,7 @@ class Session:
 
     def _set_role(self, role: Role, root: int) -> None:
         if (role, root) != (self.role, self.root):
+            self._confirmed = False
             self.role, self.root = role, root
             self._out.append(RoleChanged(role, root))
 

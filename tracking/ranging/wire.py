@@ -19,8 +19,8 @@ Every node sends the same layout, little-endian, in an IEEE 802.15.4 data frame:
     21      7 k    the table: ID 1, receive time stamp 5, quality 1
     21+7k   2      check sum, CRC-16 of IEEE 802.15.4
 
-The first n - 1 rows of the table are the other members of the round by rising ID (all n of them
-in a `JOIN`), then come nodes heard that are none. A table too long for a frame is
+The first n - 1 rows of the table are the other members of the round by rising ID, then come nodes
+heard that are none; in a `JOIN` there are only nodes that were heard. A table too long for a frame is
 split: every part is a transmission of its own, with its own time stamp. Quality: high four
 bits the received power in steps of 3 dB below -60 dBm, 15 if the node was not heard since the
 sender's last message; low four bits received minus first-path power in dB.
