@@ -27,6 +27,7 @@ from tracking.ranging._turn_kernels import (
     count_bits,
     hold,
     listen,
+    member_at,
     pause,
     random_bits,
     set_members,
@@ -45,7 +46,6 @@ def switch_on(p, s, peers, me, boot, now):
     s.boot = boot & 255
     s.dice = (boot * 2654435761 + me + 1) & 0xFFFFFFFF
     s.round = s.cursor = s.expected = 0
-    s.role, s.root, s.confirmed = LISTENING, me, False
     s.now = now
     begin(p, s, peers, me)
 
@@ -55,19 +55,11 @@ def begin(p, s, peers, me):
     """`Session._begin`."""
     forget_peers(s, peers, me)
     set_members(s, 1 << me)
-    set_role(s, LISTENING, me)
+    s.role, s.root = LISTENING, me
     s.asked_at = s.heard_at = s.now
     s.check_at = s.attempts = s.backoff = 0
     s.tried_round = -1
     listen(p, s)
-
-
-@small_kernel
-def set_role(s, role, root):
-    """`Session._set_role`."""
-    if role != s.role or root != s.root:
-        s.confirmed = False
-    s.role, s.root = role, root
 
 
 @small_kernel
@@ -99,9 +91,8 @@ def take_timeout(p, s, peers, me, message, rows):
     else:
         at = max(s.expected, s.now + p.header)
         if waiting != TURN:  # START or TAKEOVER: become initiator
-            if s.root != me:
-                set_members(s, s.members & ~(1 << s.root))
-            set_role(s, INITIATOR, me)
+            set_members(s, s.members & ~((1 << me) - 1))
+            s.role, s.root = INITIATOR, me
             s.asked_at = s.now
             at = s.now + p.turnaround + p.header
         speak(p, s, peers, me, message, rows, at)
@@ -117,7 +108,7 @@ def take_frame(p, s, peers, me, src, message, rows, arrived, carrier, now):
     """
     s.now = max(now, s.now)
     hold(p, s)
-    lost = s.before in (TAKEOVER, WATCHDOG, START) or (s.role == INITIATOR and not s.confirmed)
+    lost = s.before in (TAKEOVER, WATCHDOG, START)
     if s.role == LISTENING and message.root == me:
         wait(s, s.before, s.held_deadline)
         return False, -1.0, 0
@@ -147,15 +138,15 @@ def keep_step(s, me, message):
     """`Session._keep_step`."""
     in_step = message.root == s.root and message.round == s.round and message.n == s.n
     s.cursor = message.slot + 1
-    if message.root == me:
-        s.confirmed = True
+    if s.role == INITIATOR and message.root == me:
         if not in_step:
             s.cursor = s.n
         return
     if message.type == REQUEST or not in_step:
         set_members(s, message.members)
-    set_role(s, RESPONDER, message.root)
-    s.round = message.round
+    s.round, s.root, s.role = message.round, message.root, RESPONDER
+    if message.root == me:
+        s.role, s.asked_at = INITIATOR, s.now
 
 
 @small_kernel
@@ -184,23 +175,23 @@ def speak(p, s, peers, me, message, rows, at):
             written.
         at: First moment for the stamp, own clock.
     """
-    kind = REPLY if (s.members >> me) & 1 else JOIN
-    if me < s.root:
-        set_role(s, INITIATOR, me)
-    if s.role == INITIATOR:
+    kind, root = JOIN, s.root
+    if s.role == INITIATOR and s.cursor >= s.n:
         kind = REQUEST
         renew_members(p, s, peers, me)
         s.round = (s.round + 1) & 255
         s.cursor = 0
         s.asked_at = at
+        root = member_at(s.members, 0)
+    elif (s.members >> me) & 1:
+        kind = REPLY
     at = -(-at // GRID) * GRID
-    extra = s.fresh & ~(s.members | 1 << me)
-    n_rows = count_bits(s.fresh)
-    if kind != JOIN:
-        n_rows = count_bits(s.members & ~(1 << me)) + count_bits(extra)
-    message.type, message.root, message.round = kind, s.root, s.round
+    others = (s.members | s.fresh) & ~(1 << me)
+    n_rows = 0 if kind == JOIN else count_bits(others)
+    message.type, message.root, message.round = kind, root, s.round
     message.slot, message.n, message.boot = min(s.cursor, s.n), s.n, s.boot
-    message.stamp, message.members, message.heard = at, s.members, s.fresh
+    message.stamp, message.members = at, s.members
+    message.heard = 0 if kind == JOIN else s.fresh
     message.rows, message.ticks = n_rows, p.frame[n_rows]
     for k in range(peers.shape[0]):
         rows[me, k] = peers[me, k].heard
@@ -212,6 +203,8 @@ def speak(p, s, peers, me, message, rows, at):
         s.cursor += 1
     if kind == REQUEST and s.n == 1:
         s.expected += pause(s, p.idle)
+    if root != s.root:
+        s.role, s.root = RESPONDER, root
     await_slot(p, s, me)
 
 

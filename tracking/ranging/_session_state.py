@@ -31,7 +31,6 @@ SESSION = np.dtype(
         ("attempts", "i8"),
         ("backoff", "i8"),
         ("tried_round", "i8"),  # -1: none
-        ("confirmed", "?"),
         ("dice", "i8"),
         # Turns
         ("cursor", "i8"),

@@ -95,21 +95,21 @@ def await_slot(p, s, me):
 
 @small_kernel
 def silent_slot(p, s, peers, me):
-    """`Session._silent_slot`, `Turns.silent` and `Peers.awaited`."""
+    """`Session._silent_slot` and `Turns.silent`."""
     missing = s.cursor >= s.n
     node = s.root if missing else member_at(s.members, s.cursor)
     since = s.now - 2 * s.n * p.message[s.n]
     peer = peers[me, node]
-    awaited = False
+    waits = False
     if node != me and peer.known:
-        awaited = peer.reported > max(peer.heard + ELSEWHERE, since) or (
-            peer.doubt > 0 and peer.silences < MAX_SILENCES
-        )
-        peer.silences += 1
-    if missing and not awaited:
+        waits = peer.reported > max(peer.heard + ELSEWHERE, since)
+    if missing and not waits:
         request_missing(p, s, me)
         return
-    s.expected += p.message[s.n] if awaited else p.silent
+    if node != me and peer.known and not missing:
+        peer.silences += 1
+        waits = waits or (peer.doubt > 0 and peer.silences <= MAX_SILENCES)
+    s.expected += p.message[s.n] if waits else p.silent
     if missing:
         s.cursor = 1
         s.round = (s.round + 1) & 255

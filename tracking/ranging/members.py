@@ -12,6 +12,7 @@ class Members:
     def __init__(self, node_id: int) -> None:
         self._id = node_id
         self._rows: list[int] = []
+        self._source = node_id, 0, 0
         self.ids: tuple[int, ...] = (node_id,)
 
     def __len__(self) -> int:
@@ -24,12 +25,19 @@ class Members:
         """All but this node."""
         return tuple(k for k in self.ids if k != self._id)
 
-    def learn(self, heard: Frame) -> None:
-        """Take the members from a request or reply, once all parts of its table were heard."""
+    def read(self, heard: Frame) -> tuple[int, ...] | None:
+        """Members that a request or reply names; None until all parts of its table were heard."""
         ids = [e.id for e in heard.entries]
-        self._rows = ids if heard.part == 0 else self._rows + ids
-        if heard.part + 1 == heard.parts and len(self._rows) >= heard.n - 1:
-            self.ids = tuple(sorted({*self._rows[: heard.n - 1], heard.src}))
+        if heard.part == 0:
+            self._rows = ids
+        elif self._source == (heard.src, heard.round, heard.part - 1):
+            self._rows = self._rows + ids
+        else:
+            return None
+        self._source = heard.src, heard.round, heard.part
+        if heard.part + 1 < heard.parts or len(self._rows) < heard.n - 1:
+            return None
+        return tuple(sorted({*self._rows[: heard.n - 1], heard.src}))
 
     def renew(self, peers: Peers, since: int, drop_after: int) -> None:
         """Decide on the next round: who was heard in the last one stays or joins.

@@ -100,31 +100,23 @@ class Peers:
         peer = self._peers.get(node)
         return peer is not None and peer.reported > max(peer.heard + ELSEWHERE, since)
 
-    def awaited(self, node: int, since: int) -> bool:
-        """Whether a silent slot of a node is waited out: it may be speaking all the same.
-
-        Others hear it, or it was heard again after a silence not long ago.
-        """
+    def doubtful(self, node: int) -> bool:
+        """Whether a node may be speaking though its slot is silent: it was lost and heard again."""
         peer = self._peers.get(node)
         if peer is None:
             return False
-        waits = self.hidden(node, since) or (peer.doubt > 0 and peer.silences < MAX_SILENCES)
         peer.silences += 1
-        return waits
+        return peer.doubt > 0 and peer.silences <= MAX_SILENCES
 
     def alive(self, node: int, since: int) -> bool:
         """Whether anyone has heard a node since a time of the own clock."""
         peer = self._peers[node]
         return max(peer.heard, peer.reported) > since
 
-    def rows(self) -> list[Entry]:
-        """Whoever was heard since the own last message, by rising ID."""
-        return [self._row(k) for k in sorted(k for k, peer in self if peer.fresh)]
-
     def table(self, members: tuple[int, ...]) -> list[Entry]:
-        """Rows of a member's message: the other members, then whoever else was heard."""
-        others = [row for row in self.rows() if row.id not in members]
-        return [self._row(k) for k in members] + others
+        """Rows of the next message: the other members, then whoever else was heard."""
+        others = sorted(k for k, peer in self if peer.fresh and k not in members)
+        return [self._row(k) for k in (*members, *others)]
 
     def spoken(self) -> None:
         """The own message is on its way: what is heard from now on goes into the next."""

@@ -33,7 +33,7 @@ from tracking.ranging.slots import Slots
 from tracking.ranging.speaker import Speaker, Words
 from tracking.ranging.timestamps import MODULUS, ticks, unwrap
 from tracking.ranging.turns import Turns, Waiting
-from tracking.ranging.wire import MAX_ID, Frame, Type, decode, entries_per_frame
+from tracking.ranging.wire import MAX_ID, Frame, Type, decode
 
 _BACK = ticks(1e-3)
 """A clock that goes back by more has jumped."""
@@ -68,7 +68,6 @@ class Session:
         self._turns = Turns(node_id, params, self._slots, self._members, self._peers, self._dice)
         self._now = self._asked_at = self._attempts = self._backoff = 0
         self._tried_round: int | None = None
-        self._confirmed = False  # somebody follows this initiator
         self._out: list[Output] = []
 
     @property
@@ -159,27 +158,27 @@ class Session:
         self._await_slot()
 
     def _become_initiator(self) -> None:
-        """Start rounds of one's own: nobody else does."""
-        if self.root != self.id:
-            self._members.ids = tuple(k for k in self.members if k != self.root)
+        """Start rounds of one's own: the initiator and all before this node are silent."""
+        before, self._members.ids = self.members, tuple(k for k in self.members if k >= self.id)
+        self._tell_members(before)
         self._set_role(Role.INITIATOR, self.id)
         self._asked_at = self._now
         self._speak(self._now + self._slots.turnaround + self._slots.header)
 
     def _speak(self, at: int) -> None:
         """Send the own message, its first stamp moment at or after the given time."""
-        turns, kind = self._turns, Type.REPLY if self.id in self._members else Type.JOIN
-        if self.id < self.root:  # all follow the smallest ID
-            self._set_role(Role.INITIATOR, self.id)
-        if self.role is Role.INITIATOR:
+        turns, kind, root = self._turns, Type.JOIN, self.root
+        if self.role is Role.INITIATOR and turns.at_request:
             kind, before = Type.REQUEST, self.members
             self._members.renew(self._peers, self._asked_at, self._params.drop_after)
             self._tell_members(before)
             self.round, turns.cursor, self._asked_at = (self.round + 1) % 256, 0, at
-        n, most = len(self._members), entries_per_frame(self._params.phy.max_frame)
-        join = kind is Type.JOIN
-        rows = self._peers.rows()[:most] if join else self._peers.table(self._members.others())
-        words = Words(kind, self.root, self.round, min(turns.cursor, n), n, rows)
+            root = self.members[0]
+        elif self.id in self._members:
+            kind = Type.REPLY
+        n = len(self._members)
+        rows = [] if kind is Type.JOIN else self._peers.table(self._members.others())
+        words = Words(kind, root, self.round, min(turns.cursor, n), n, rows)
         frames, sent, turns.expected = self._speaker.say(words, at)
         self._out += frames
         self._listener.spoken(sent)
@@ -187,6 +186,8 @@ class Session:
             turns.cursor += 1
         if kind is Type.REQUEST and n == 1:
             turns.expected += self._dice.pause(self._params.idle)
+        if root != self.root:  # a smaller ID has joined: the next request is its
+            self._set_role(Role.RESPONDER, root)
         self._await_slot()
 
     def _insert(self, at: int) -> None:
@@ -206,9 +207,8 @@ class Session:
         """Take a valid frame of another node, and one's place in the round that it tells."""
         turns, in_turn = self._turns, heard.type in (Type.REQUEST, Type.REPLY)
         lost = turns.before in (Waiting.TAKEOVER, Waiting.WATCHDOG, Waiting.START)
-        lost |= self.role is Role.INITIATOR and not self._confirmed
         if self.role is Role.LISTENING and heard.root == self.id:
-            turns.resume()  # an answer to who had this ID before
+            turns.resume()  # of those who followed this ID before it was switched on again
             return
         follows = heard.root == self.root and self.role is not Role.LISTENING
         if not follows and not (in_turn and (heard.root < self.root or lost)):
@@ -233,21 +233,23 @@ class Session:
             self._insert(end + self._slots.turnaround)
 
     def _keep_step(self, heard: Frame) -> None:
-        """Take round, slot and members from a request or a reply."""
+        """Take round, slot, members and initiator from a request or a reply."""
         here = self.root, self.round, len(self._members)
         in_step = (heard.root, heard.round, heard.n) == here
+        members = self._members.read(heard)
         self._turns.cursor = heard.slot + 1
-        if heard.root == self.id:
-            self._confirmed = True
+        if self.role is Role.INITIATOR and heard.root == self.id:
             if not in_step:  # the others have lost the request: ask again
                 self._turns.cursor = len(self._members)
             return
-        if heard.type is Type.REQUEST or not in_step or heard.part > 0:
-            before = self.members
-            self._members.learn(heard)
+        if members and (heard.type is Type.REQUEST or not in_step):
+            before, self._members.ids = self.members, members
             self._tell_members(before)
         self.round = heard.round
-        self._set_role(Role.RESPONDER, heard.root)
+        if heard.root == self.id:  # handed over by a larger ID
+            self._asked_at = self._now
+        leads = heard.root == self.id
+        self._set_role(Role.INITIATOR if leads else Role.RESPONDER, heard.root)
 
     def _own_id(self, heard: Frame, end: int) -> None:
         """Another node uses this node's ID: report it, tell it, and keep silent for a while."""
@@ -297,7 +299,6 @@ class Session:
 
     def _set_role(self, role: Role, root: int) -> None:
         if (role, root) != (self.role, self.root):
-            self._confirmed = False
             self.role, self.root = role, root
             self._out.append(RoleChanged(role, root))
 

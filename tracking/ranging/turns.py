@@ -106,10 +106,12 @@ class Turns:
         n, missing = len(self._members), self.at_request
         node = root if missing else self._members.ids[self.cursor]
         since = now - 2 * n * self._slots.message(n)
-        awaited = node != self._id and self._peers.awaited(node, since)
-        if missing and not awaited:
+        waits = node != self._id and self._peers.hidden(node, since)
+        if missing and not waits:
             return False
-        self.expected += self._slots.message(n) if awaited else self._slots.silent
+        if node != self._id and not missing:
+            waits |= self._peers.doubtful(node)
+        self.expected += self._slots.message(n) if waits else self._slots.silent
         self.cursor = 1 if missing else self.cursor + 1
         return True
 

@@ -20,7 +20,7 @@ Every node sends the same layout, little-endian, in an IEEE 802.15.4 data frame:
     21+7k   2      check sum, CRC-16 of IEEE 802.15.4
 
 The first n - 1 rows of the table are the other members of the round by rising ID, then come nodes
-heard that are none; in a `JOIN` there are only nodes that were heard. A table too long for a frame is
+heard that are none. A `JOIN` has no table. A table too long for a frame is
 split: every part is a transmission of its own, with its own time stamp. Quality: high four
 bits the received power in steps of 3 dB below -60 dBm, 15 if the node was not heard since the
 sender's last message; low four bits received minus first-path power in dB.
@@ -53,7 +53,8 @@ class Type(IntEnum):
     """What a message is."""
 
     REQUEST = 1
-    """Of an initiator: starts a round and names its members."""
+    """Of an initiator: starts a round and names its members. If the smallest of them is another
+    node, `root` is that one and the next request is its."""
     REPLY = 2
     """Of any other member."""
     JOIN = 3
@@ -161,7 +162,7 @@ def decode(data: bytes) -> Frame:
         raise WireError(f"type: unknown, {kind & 15}")
     if src > MAX_ID or root > MAX_ID:
         raise WireError(f"source, root: expected IDs up to {MAX_ID}, got {src}, {root}")
-    if root > src:
+    if root > src and kind & 15 in (Type.REQUEST, Type.REPLY):
         raise WireError(f"root: expected at most the source {src}, got {root}")
     part, parts = part >> 4, (part & 15) + 1
     if part >= parts:
