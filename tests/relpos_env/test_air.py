@@ -158,11 +158,6 @@ def rates_of_neighbours(group, order, seconds=4.0):
 ORDERS = list(itertools.permutations(range(3)))
 
 
-@pytest.mark.xfail(
-    strict=False,
-    reason="a JOIN of one end begins just before the message of the other end, which the middle "
-    "then loses as well: they meet only when the other end checks its ID, every 10 s",
-)
 @pytest.mark.parametrize("order", ORDERS)
 def test_the_ends_of_a_line_find_the_middle(order):
     group = Group(line(order), 3, max_distance=10.0)
@@ -172,11 +167,6 @@ def test_the_ends_of_a_line_find_the_middle(order):
     assert min(rates_of_neighbours(group, order)) >= 5.0
 
 
-@pytest.mark.xfail(
-    strict=False,
-    reason="the end two hops from the initiator is dropped, since what the middle hears of it is "
-    "reported when the next round has begun; ends that were lost do not come back, as above",
-)
 @pytest.mark.parametrize("order", ORDERS)
 def test_a_group_that_becomes_a_line(order):
     group = Group(0.5 * line(order), 3, max_distance=10.0)

@@ -12,6 +12,7 @@ from relpos_env.sensors.radio_params import RadioSimParams
 from tracking.ranging.airtime import FAST_PHY, PAPER_PHY
 from tracking.ranging.exchange import RangeEvent
 from tracking.ranging.params import SessionParams
+from tracking.ranging.timestamps import MODULUS
 
 DT = 0.01
 ROLES = ["listening", "initiator", "responder"]
@@ -45,9 +46,10 @@ def state(session):
     if session is None:
         return None
     turns = session._turns
+    times = turns.expected, turns.deadline, turns.check_at, turns.heard_at
     return (
         session.role.value, session.root, session.round, session.members, turns.cursor,
-        turns.expected, turns.deadline, turns.check_at, turns.heard_at, session._dice._state,
+        session._dice._state, *(t % MODULUS for t in times),
     )  # fmt: skip
 
 
@@ -57,8 +59,8 @@ def twin_state(radio, env, node):
     if not radio._air.nodes[env, node]["on"]:
         return None
     members = tuple(k for k in range(radio._air.sessions.shape[1]) if s["members"] >> k & 1)
-    numbers = (s[k] for k in ("cursor", "expected", "deadline", "check_at", "heard_at", "dice"))
-    return (ROLES[s["role"]], s["root"], s["round"], members, *numbers)
+    times = (s[k] % MODULUS for k in ("expected", "deadline", "check_at", "heard_at"))
+    return (ROLES[s["role"]], s["root"], s["round"], members, s["cursor"], s["dice"], *times)
 
 
 def rows(ranges, env=0):

@@ -46,6 +46,7 @@ def switch_on(p, s, peers, me, boot, now):
     s.boot = boot & 255
     s.dice = (boot * 2654435761 + me + 1) & 0xFFFFFFFF
     s.round = s.cursor = s.expected = 0
+    s.opened = -1
     s.now = now
     begin(p, s, peers, me)
 
@@ -56,7 +57,7 @@ def begin(p, s, peers, me):
     forget_peers(s, peers, me)
     set_members(s, 1 << me)
     s.role, s.root = LISTENING, me
-    s.asked_at = s.heard_at = s.now
+    s.asked_before = s.asked_at = s.heard_at = s.now
     s.check_at = s.attempts = s.backoff = 0
     s.tried_round = -1
     listen(p, s)
@@ -93,7 +94,7 @@ def take_timeout(p, s, peers, me, message, rows):
         if waiting != TURN:  # START or TAKEOVER: become initiator
             set_members(s, s.members & ~((1 << me) - 1))
             s.role, s.root = INITIATOR, me
-            s.asked_at = s.now
+            s.asked_before = s.asked_at = s.now
             at = s.now + p.turnaround + p.header
         speak(p, s, peers, me, message, rows, at)
 
@@ -116,9 +117,7 @@ def take_frame(p, s, peers, me, src, message, rows, arrived, carrier, now):
     follows = message.root == s.root and s.role != LISTENING
     taken, distance, time = False, -1.0, 0
     if follows or (in_turn and (message.root < s.root or lost)):
-        taken, distance, time = take_message(
-            p, s, peers, me, src, message, rows, arrived, carrier
-        )
+        taken, distance, time = take_message(p, s, peers, me, src, message, rows, arrived, carrier)
     if not taken:
         unreadable(p, s, me)
         return False, -1.0, 0
@@ -146,7 +145,8 @@ def keep_step(s, me, message):
         set_members(s, message.members)
     s.round, s.root, s.role = message.round, message.root, RESPONDER
     if message.root == me:
-        s.role, s.asked_at = INITIATOR, s.now
+        s.role = INITIATOR
+        s.asked_before = s.asked_at = s.now
 
 
 @small_kernel
@@ -181,7 +181,7 @@ def speak(p, s, peers, me, message, rows, at):
         renew_members(p, s, peers, me)
         s.round = (s.round + 1) & 255
         s.cursor = 0
-        s.asked_at = at
+        s.asked_before, s.asked_at = s.asked_at, at
         root = member_at(s.members, 0)
     elif (s.members >> me) & 1:
         kind = REPLY
@@ -216,7 +216,7 @@ def renew_members(p, s, peers, me):
         peer = peers[me, k]
         if not peer.known:
             continue
-        if max(peer.heard, peer.reported) > s.asked_at:
+        if max(peer.heard, peer.reported) > s.asked_before:
             peer.missed = 0
             members |= 1 << k
         else:

@@ -27,6 +27,7 @@ SESSION = np.dtype(
         ("members", "i8"),  # bit k: node k
         ("n", "i8"),  # their number
         ("now", "i8"),
+        ("asked_before", "i8"),
         ("asked_at", "i8"),
         ("attempts", "i8"),
         ("backoff", "i8"),
@@ -42,6 +43,7 @@ SESSION = np.dtype(
         ("heard_at", "i8"),
         ("check_at", "i8"),
         ("early", "?"),
+        ("opened", "i8"),
         # Listener and Speaker
         ("spoken", "i8"),
         ("fresh", "i8"),  # bit k: heard since the own last message
@@ -103,6 +105,7 @@ class SessionNumbers(NamedTuple):
     turnaround: int
     gap: int
     silent: int
+    join: int
     longest: int
     succession: bool
     takeover: float
@@ -138,6 +141,7 @@ def session_numbers(params: SessionParams, n_nodes: int) -> SessionNumbers:
         slots.turnaround,
         slots.gap,
         slots.silent,
+        slots.join,
         slots.longest,
         params.succession,
         params.takeover,

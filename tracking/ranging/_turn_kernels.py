@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from tracking.compiled import small_kernel
 from tracking.ranging.peers import ELSEWHERE, MAX_SILENCES
+from tracking.ranging.turns import OPEN
 
 LISTENING, INITIATOR, RESPONDER = 0, 1, 2
 START, FRAME, TURN, SLOT, TAKEOVER, WATCHDOG = 0, 1, 2, 3, 4, 5
@@ -82,6 +83,12 @@ def await_slot(p, s, me):
         mine = leads
     else:
         mine = member_at(s.members, s.cursor) == me
+    if s.cursor >= s.n and s.round % OPEN == OPEN - 1 and s.round != s.opened:
+        s.opened = s.round
+        if leads:
+            s.expected += p.join
+        elif s.attempts > 1 and not (s.members >> me) & 1:
+            mine = True
     if mine and s.now >= s.check_at:
         s.check_at = s.now + pause(s, p.check)
         mine = leads

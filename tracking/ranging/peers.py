@@ -113,10 +113,10 @@ class Peers:
         peer = self._peers[node]
         return max(peer.heard, peer.reported) > since
 
-    def table(self, members: tuple[int, ...]) -> list[Entry]:
-        """Rows of the next message: the other members, then whoever else was heard."""
+    def table(self, members: tuple[int, ...], most: int) -> list[Entry]:
+        """Rows of the next message, so many at most: the members, then whoever else was heard."""
         others = sorted(k for k, peer in self if peer.fresh and k not in members)
-        return [self._row(k) for k in (*members, *others)]
+        return [self._row(k) for k in (*members, *others)][:most]
 
     def spoken(self) -> None:
         """The own message is on its way: what is heard from now on goes into the next."""

@@ -33,7 +33,7 @@ from tracking.ranging.slots import Slots
 from tracking.ranging.speaker import Speaker, Words
 from tracking.ranging.timestamps import MODULUS, ticks, unwrap
 from tracking.ranging.turns import Turns, Waiting
-from tracking.ranging.wire import MAX_ID, Frame, Type, decode
+from tracking.ranging.wire import MAX_ID, MAX_PARTS, Frame, Type, decode, entries_per_frame
 
 _BACK = ticks(1e-3)
 """A clock that goes back by more has jumped."""
@@ -66,7 +66,8 @@ class Session:
         self._listener, self._members = Listener(node_id, params.exchange), Members(node_id)
         self._peers = self._listener.peers
         self._turns = Turns(node_id, params, self._slots, self._members, self._peers, self._dice)
-        self._now = self._asked_at = self._attempts = self._backoff = 0
+        self._now = self._attempts = self._backoff = 0
+        self._asked_at = 0, 0  # begin of the last two rounds of this initiator
         self._tried_round: int | None = None
         self._out: list[Output] = []
 
@@ -82,7 +83,7 @@ class Session:
 
     def start(self, now: int) -> list[Output]:
         """Switch on."""
-        self._now = now
+        self._now = now + MODULUS
         self._begin()
         return self._give()
 
@@ -145,7 +146,9 @@ class Session:
         return self._give()
 
     def _await_slot(self) -> None:
-        self._turns.await_slot(self._now, leads=self.role is Role.INITIATOR)
+        leads = self.role is Role.INITIATOR
+        shut_out = self._attempts > 1 and self.id not in self._members
+        self._turns.await_slot(self._now, self.round, leads=leads, shut_out=shut_out)
 
     def _silent_slot(self) -> None:
         """No preamble came in the slot at the cursor."""
@@ -162,7 +165,7 @@ class Session:
         before, self._members.ids = self.members, tuple(k for k in self.members if k >= self.id)
         self._tell_members(before)
         self._set_role(Role.INITIATOR, self.id)
-        self._asked_at = self._now
+        self._asked_at = self._now, self._now
         self._speak(self._now + self._slots.turnaround + self._slots.header)
 
     def _speak(self, at: int) -> None:
@@ -170,14 +173,17 @@ class Session:
         turns, kind, root = self._turns, Type.JOIN, self.root
         if self.role is Role.INITIATOR and turns.at_request:
             kind, before = Type.REQUEST, self.members
-            self._members.renew(self._peers, self._asked_at, self._params.drop_after)
+            # What the last to speak have heard is told a round later: look two rounds back.
+            self._members.renew(self._peers, self._asked_at[0], self._params.drop_after)
             self._tell_members(before)
-            self.round, turns.cursor, self._asked_at = (self.round + 1) % 256, 0, at
+            self.round, turns.cursor = (self.round + 1) % 256, 0
+            self._asked_at = self._asked_at[1], at
             root = self.members[0]
         elif self.id in self._members:
             kind = Type.REPLY
         n = len(self._members)
-        rows = [] if kind is Type.JOIN else self._peers.table(self._members.others())
+        most = MAX_PARTS * entries_per_frame(self._params.phy.max_frame)
+        rows = [] if kind is Type.JOIN else self._peers.table(self._members.others(), most)
         words = Words(kind, root, self.round, min(turns.cursor, n), n, rows)
         frames, sent, turns.expected = self._speaker.say(words, at)
         self._out += frames
@@ -192,7 +198,7 @@ class Session:
 
     def _insert(self, at: int) -> None:
         """A newcomer speaks at the start of the gap, once a round and after drawn pauses."""
-        if self.round == self._tried_round:
+        if self.round == self._tried_round or self._now + self._slots.header > at:
             return
         if self._backoff > 0:
             self._backoff -= 1
@@ -247,7 +253,7 @@ class Session:
             self._tell_members(before)
         self.round = heard.round
         if heard.root == self.id:  # handed over by a larger ID
-            self._asked_at = self._now
+            self._asked_at = self._now, self._now
         leads = heard.root == self.id
         self._set_role(Role.INITIATOR if leads else Role.RESPONDER, heard.root)
 
@@ -261,7 +267,8 @@ class Session:
             self._unreadable()
             return
         words = Words(Type.ALERT, heard.root, heard.round, min(heard.slot + 1, heard.n), heard.n)
-        self._out += self._speaker.say(words, end + self._slots.turnaround)[0]
+        at = max(end, self._now + self._slots.header) + self._slots.turnaround
+        self._out += self._speaker.say(words, at)[0]
         self._forget()
         self._set_role(Role.MUTED, self.id)
         self._turns.wait(Waiting.WATCHDOG, self._now + self._dice.pause(self._params.mute))
@@ -284,7 +291,7 @@ class Session:
         """Begin anew: listen before speaking."""
         self._forget()
         self._set_role(Role.LISTENING, self.id)
-        self._asked_at = self._turns.heard_at = self._now
+        self._asked_at, self._turns.heard_at = (self._now, self._now), self._now
         self._turns.check_at = self._attempts = self._backoff = 0
         self._tried_round = None
         self._listen()
@@ -310,7 +317,7 @@ class Session:
         """Take the time; False if the clock has jumped back, and the node begins anew."""
         time = unwrap(now, self._now)
         jumped = time < self._now - _BACK
-        self._now = time if jumped else max(time, self._now)
+        self._now = time + MODULUS if jumped else max(time, self._now)
         if jumped:
             self._begin()
         return not jumped

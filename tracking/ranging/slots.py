@@ -6,6 +6,7 @@ from functools import lru_cache
 
 from tracking.ranging.airtime import Phy, airtime, message_time
 from tracking.ranging.timestamps import ticks
+from tracking.ranging.wire import FIXED_BYTES
 
 
 class Slots:
@@ -22,6 +23,8 @@ class Slots:
         self.gap = ticks(phy.gap)
         self.silent = ticks(phy.sense + phy.turnaround)
         """What a slot costs in which nobody speaks."""
+        self.join = ticks(airtime(phy, FIXED_BYTES) + phy.gap)
+        """A message without a table, with its gap."""
         self.longest = ticks(airtime(phy, phy.max_frame) + phy.gap)
         self.frame = lru_cache(maxsize=None)(self._frame)
         self.message = lru_cache(maxsize=None)(self._message)

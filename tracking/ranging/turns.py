@@ -12,6 +12,11 @@ from tracking.ranging.slots import Slots
 from tracking.ranging.timestamps import ticks
 
 
+OPEN = 128
+"""Every so-manieth round ends with a free slot, for newcomers that the initiator cannot hear and
+that would always speak at the same time as it."""
+
+
 class Waiting(Enum):
     """What the deadline is for."""
 
@@ -52,6 +57,7 @@ class Turns:
         """When the wait ends; when anything valid was last heard; when to listen in the own slot
         next."""
         self._held_deadline = 0
+        self._opened = -1
         self._early = False
 
     @property
@@ -75,15 +81,21 @@ class Turns:
         """The frame that came in changes nothing."""
         self.wait(self.before, self._held_deadline)
 
-    def await_slot(self, now: int, *, leads: bool) -> None:
+    def await_slot(self, now: int, round: int, *, leads: bool, shut_out: bool) -> None:
         """Wait for the slot at the cursor.
 
         Args:
             now: The time.
+            round: Its number; every `OPEN`-th one ends with a slot for newcomers.
             leads: Whether this node is the initiator.
+            shut_out: Whether this node is a newcomer that has tried to speak in vain.
         """
         s = self._slots
         mine = leads if self.at_request else self._members.ids[self.cursor] == self._id
+        if self.at_request and round % OPEN == OPEN - 1 and round != self._opened:
+            self._opened = round
+            self.expected += s.join if leads else 0
+            mine |= shut_out
         if mine and now >= self.check_at:
             self.check_at = now + self._dice.pause(self._params.check)
             mine = leads  # a responder listens in its slot, an initiator a little longer

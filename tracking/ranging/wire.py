@@ -28,6 +28,7 @@ sender's last message; low four bits received minus first-path power in dB.
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -190,6 +191,8 @@ def quantised(rx_power: float, fp_power: float) -> tuple[float, float]:
 
 
 def _power_steps(rx_power: float, fp_power: float) -> tuple[int, int]:
+    if not (math.isfinite(rx_power) and math.isfinite(fp_power)):
+        return _NOT_HEARD - 1, 15  # an empty register of the radio: as weak as can be
     step = min(max(round((_POWER_TOP - rx_power) / _POWER_STEP), 0), _NOT_HEARD - 1)
     return step, min(max(round(rx_power - fp_power), 0), 15)
 

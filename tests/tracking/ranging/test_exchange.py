@@ -59,7 +59,7 @@ class Line:
         stamp = on_grid(node.local(self.t))
         t = node.true(stamp)
         others = tuple(sorted({k.id for k in self.nodes if k.id != node.id}))
-        rows = tuple(node.listener.peers.table(others))
+        rows = tuple(node.listener.peers.table(others, 14))
         n = len(others) + 1
         frame = Frame(Type.REPLY, node.id, 0, 0, 0, n, node.boot, stamp % MODULUS, rows)
         self.frame = decode(encode(self.edit(frame)))

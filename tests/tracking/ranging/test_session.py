@@ -254,13 +254,6 @@ def test_a_member_answers_in_its_slot():
     assert decode(alone.sent[-1].data).slot == 1
 
 
-PAST = pytest.mark.xfail(
-    strict=False,
-    reason="JOIN and ALERT are ordered a turnaround after the frame, however late it is known",
-)
-
-
-@PAST
 @pytest.mark.parametrize("delay", [20e-6, 1e-3, 4e-3, 9e-3])
 def test_a_newcomer_that_is_told_late_orders_nothing_in_the_past(delay):
     alone = Alone(id=3)
@@ -278,7 +271,6 @@ def test_a_member_that_is_told_late_orders_nothing_in_the_past(delay):
     alone.settle()
 
 
-@PAST
 def test_an_alert_after_a_late_frame_is_not_in_the_past():
     alone = Alone(id=3)
     alone.hear(request(src=3, boot=7), delay=4e-3)
@@ -295,10 +287,7 @@ def test_the_last_slot_of_all(type):
     alone.settle()
 
 
-TABLE = pytest.mark.xfail(strict=False, reason="WireError: more than 224 rows of a table")
-
-
-@pytest.mark.parametrize("rows", [60, *(pytest.param(k, marks=TABLE) for k in (230, 254))])
+@pytest.mark.parametrize("rows", [60, 230, 254])
 def test_more_nodes_than_a_message_has_room_for(rows):
     """A node of ID 0 that hears of very many others, one after the other."""
     alone = Alone(id=0)
@@ -320,7 +309,6 @@ def test_powers_out_of_reach(power):
     alone.settle()
 
 
-@pytest.mark.xfail(strict=False, reason="wire._power_steps rounds powers that are not finite")
 @pytest.mark.parametrize("power", [float("nan"), float("inf"), float("-inf")])
 def test_powers_that_are_no_numbers(power):
     alone = Alone(id=3)
@@ -350,10 +338,6 @@ def test_a_clock_step_in_every_role(step, role):
         0.0,
         pytest.param(
             -6.0,
-            marks=pytest.mark.xfail(
-                strict=False,
-                reason="below zero, `Peer.reported` = 0 is in the future: nobody is ever dropped",
-            ),
         ),
     ],
 )
