@@ -131,7 +131,7 @@ class Air:
         self._scene = (pos0, pos1, self._dt), boxes, capsules
         self._nodes["step"] = np.linalg.norm(pos1 - pos0, axis=1)
         for k in range(len(self._due)):
-            self._plan(k)
+            self._plan(k, 0.0)
         while True:
             t, what, k = self._next()
             if t > self._dt:
@@ -142,7 +142,8 @@ class Air:
                 self._queue[k][0].detected = True
                 self._detect(k, t, range(len(self._nodes)))
             elif what == DEADLINE:
-                self._take(k, t, self._session(k).timeout(self._session(k).deadline))
+                now = max(self._deadline(k), local_now(self._nodes, k, t))
+                self._take(k, t, self._session(k).timeout(now % MODULUS))
             else:
                 self._power(t)
         next_window(self._nodes, self._seed, self._window, self._params.clock_wander, self._dt)
@@ -241,13 +242,15 @@ class Air:
                 self._send(k, output)
             else:
                 self.told.append(Told(self.t + t, k, output))
-        self._plan(k)
+        self._plan(k, t)
 
-    def _plan(self, k: int) -> None:
-        session = self.sessions[k]
-        if session is not None:
-            near = local_now(self._nodes, k, 0.0)
-            self._due[k] = true_at(self._nodes, k, unwrap(session.deadline, near))
+    def _deadline(self, k: int) -> int:
+        return unwrap(self._session(k).deadline, local_now(self._nodes, k, 0.0))
+
+    def _plan(self, k: int, t: float) -> None:
+        """Note when a node's deadline comes: now, if it is past."""
+        if self.sessions[k] is not None:
+            self._due[k] = max(true_at(self._nodes, k, self._deadline(k)), t)
 
     def _send(self, k: int, order: Transmission) -> None:
         phy = self._params.session.phy

@@ -26,8 +26,9 @@ from relpos_env.sensors._channel_kernels import KNOT
 from relpos_env.sensors._radio_kernels import Air, Scene, power_nodes, run_window
 from relpos_env.sensors.radio_params import RadioSimParams
 from tracking.arrays import F64, I64, Bool
-from tracking.ranging._session_state import MAX_NODES, MESSAGE, make_sessions, session_numbers
+from tracking.ranging._session_state import MESSAGE, make_sessions, session_numbers
 from tracking.ranging.airtime import airtime, round_rate
+from tracking.ranging.members import MAX_MEMBERS
 from tracking.ranging.wire import ENTRY_BYTES, FIXED_BYTES, entries_per_frame
 
 
@@ -68,7 +69,7 @@ class Radio:
             EnvError: More nodes than a message has room for.
         """
         phy = params.session.phy
-        most = min(MAX_NODES, entries_per_frame(phy.max_frame) + 1)
+        most = min(MAX_MEMBERS, entries_per_frame(phy.max_frame) + 1)
         if n_nodes > most:
             raise EnvError(
                 f"radio: expected at most {most} nodes with frames of {phy.max_frame} bytes, "

@@ -15,9 +15,6 @@ from tracking.ranging.timestamps import ticks
 from tracking.ranging.wire import ENTRY_BYTES, FIXED_BYTES, entries_per_frame
 
 Records = NDArray[Any]
-MAX_NODES = 62
-"""Members are the bits of one integer."""
-
 SESSION = np.dtype(
     [
         ("role", "i8"),
@@ -127,7 +124,7 @@ def session_numbers(params: SessionParams, n_nodes: int) -> SessionNumbers:
 
     Args:
         params: As for `Session`; the antenna delay and the PAN play no part.
-        n_nodes: Of the group, at most 62, and so few that a table fits into one frame.
+        n_nodes: Of the group, at most `MAX_MEMBERS`, and so few that a table fits into one frame.
     """
     slots = Slots(params.phy)
 

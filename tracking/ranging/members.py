@@ -5,6 +5,9 @@ from __future__ import annotations
 from tracking.ranging.peers import Peers
 from tracking.ranging.wire import Frame
 
+MAX_MEMBERS = 62
+"""So many nodes take part in a round at most, those with the smallest IDs."""
+
 
 class Members:
     """The members that one node knows; the initiator decides, the others read its table."""
@@ -56,4 +59,4 @@ class Members:
                 peer.missed += 1
                 if peer.missed >= drop_after:
                     ids.discard(k)
-        self.ids = tuple(sorted(ids))
+        self.ids = tuple(sorted(ids)[:MAX_MEMBERS])
