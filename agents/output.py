@@ -10,8 +10,8 @@ from pathlib import Path
 from agents.errors import UsageError
 
 
-def write_results(folder: Path, files: Mapping[str, str]) -> Path:
-    """Write named text files into a folder, all of them or none.
+def write_results(folder: Path, files: Mapping[str, str | bytes]) -> Path:
+    """Write named texts and pictures into a folder, all of them or none.
 
     All are written beside their places first and only then moved, so that a full disk leaves
     nothing and a kill no half file. Files of the same names are replaced.
@@ -30,7 +30,7 @@ def write_results(folder: Path, files: Mapping[str, str]) -> Path:
         for name, text in files.items():
             path = scratch / name
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(text, encoding="utf-8")
+            path.write_bytes(text.encode() if isinstance(text, str) else text)
         for name in files:
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             (scratch / name).replace(folder / name)

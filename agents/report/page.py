@@ -57,9 +57,7 @@ class Page:
 
     def figure(self, figure: Figure, caption: str) -> None:
         """A matplotlib figure as an embedded picture."""
-        raw = io.BytesIO()
-        figure.savefig(raw, format="png", dpi=110)
-        data = base64.b64encode(raw.getvalue()).decode()
+        data = base64.b64encode(png(figure)).decode()
         key = f"<p class='key'>{html.escape(caption)}</p>"
         alt = html.escape(caption, quote=True)
         self._parts.append(
@@ -79,6 +77,13 @@ class Page:
             f"<title>{html.escape(self._title)}</title><style>{_STYLE}</style></head>"
             f"<body><main>{body}</main></body></html>\n"
         )
+
+
+def png(figure: Figure) -> bytes:
+    """A matplotlib figure as a picture."""
+    raw = io.BytesIO()
+    figure.savefig(raw, format="png", dpi=110)
+    return raw.getvalue()
 
 
 def metres(value: float | None) -> str:

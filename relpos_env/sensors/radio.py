@@ -29,6 +29,7 @@ from tracking.arrays import F64, I64, Bool
 from tracking.ranging._session_state import MESSAGE, make_sessions, session_numbers
 from tracking.ranging.airtime import airtime, round_rate
 from tracking.ranging.members import MAX_MEMBERS
+from tracking.ranging.timestamps import TICK_HZ
 from tracking.ranging.wire import ENTRY_BYTES, FIXED_BYTES, entries_per_frame
 
 
@@ -56,7 +57,14 @@ class Radio:
     alone, bit for bit; no errors and no clocks, the distance.
     """
 
-    def __init__(self, params: RadioSimParams, n_nodes: int, seeds: list[int], dt: float) -> None:
+    def __init__(
+        self,
+        params: RadioSimParams,
+        n_nodes: int,
+        seeds: list[int],
+        dt: float,
+        clocks: F64 | None = None,
+    ) -> None:
         """Set everything up; no node is switched on.
 
         Args:
@@ -64,6 +72,8 @@ class Radio:
             n_nodes: In each environment.
             seeds: One for each environment, 0 to 2^63.
             dt: Length of a window [s].
+            clocks: How much faster each node's clock runs than a perfect one, (node) [1];
+                drawn if it is None.
 
         Raises:
             EnvError: More nodes than a message has room for.
@@ -107,6 +117,8 @@ class Radio:
             make_nodes(
                 self._air.nodes[k], self._seeds[k], params.clock_offset, params.antenna_delay_std
             )
+        if clocks is not None:
+            self._air.nodes["rate"] = TICK_HZ * (1.0 + clocks)
         pairs = n * (n - 1) // 2
         room = pairs * (2 + int(np.ceil(dt * round_rate(phy, max(n, 2)))))
         self._out = RangeBuffer(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from tracking.compiled import small_kernel
 from tracking.ranging.peers import ELSEWHERE, MAX_SILENCES
-from tracking.ranging.turns import OPEN
+from tracking.ranging.turns import CHECK_ROUNDS, OPEN
 
 LISTENING, INITIATOR, RESPONDER = 0, 1, 2
 START, FRAME, TURN, SLOT, TAKEOVER, WATCHDOG = 0, 1, 2, 3, 4, 5
@@ -90,7 +90,8 @@ def await_slot(p, s, me):
         elif s.attempts > 1 and not (s.members >> me) & 1:
             mine = True
     if mine and s.now >= s.check_at:
-        s.check_at = s.now + pause(s, p.check)
+        rounds = CHECK_ROUNDS * s.n * p.message[s.n]
+        s.check_at = s.now + max(pause(s, p.check), rounds)
         mine = leads
         if leads:
             s.expected += p.message[s.n]

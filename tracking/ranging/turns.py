@@ -15,6 +15,8 @@ from tracking.ranging.timestamps import ticks
 OPEN = 128
 """Every so-manieth round ends with a free slot, for newcomers that the initiator cannot hear and
 that would always speak at the same time as it."""
+CHECK_ROUNDS = 64
+"""Between two checks of the own slot at least."""
 
 
 class Waiting(Enum):
@@ -97,7 +99,8 @@ class Turns:
             self.expected += s.join if leads else 0
             mine |= shut_out
         if mine and now >= self.check_at:
-            self.check_at = now + self._dice.pause(self._params.check)
+            rounds = CHECK_ROUNDS * len(self._members) * s.message(len(self._members))
+            self.check_at = now + max(self._dice.pause(self._params.check), rounds)
             mine = leads  # a responder listens in its slot, an initiator a little longer
             self.expected += s.message(len(self._members)) if leads else 0
         if mine:

@@ -1,0 +1,1 @@
+"""Experiments with the ranging protocol: `relpos protocol`."""

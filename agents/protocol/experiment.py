@@ -1,0 +1,65 @@
+"""All experiments with the protocol, one after the other: what `relpos protocol` does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from agents.errors import UsageError
+from agents.protocol.clock_error import measure_clock_error
+from agents.protocol.rates import NODES, measure_rates
+from agents.protocol.recovery import MODES, measure_recovery
+from agents.protocol.timeline import Timeline, run_timeline
+from tracking.ranging.members import MAX_MEMBERS
+
+
+@dataclass(frozen=True, slots=True)
+class ProtocolResult:
+    """What was measured."""
+
+    rates: list[dict[str, Any]]
+    recovery: list[dict[str, Any]]
+    clock: list[dict[str, Any]]
+    times: dict[tuple[str, str], list[float]]
+    """Every recovery time by event and mode [s]."""
+    timelines: list[Timeline]
+
+    @property
+    def records(self) -> list[dict[str, Any]]:
+        """One flat record for each figure."""
+        return [*self.rates, *self.recovery, *self.clock]
+
+
+def protocol(
+    *,
+    events: int = 200,
+    nodes: tuple[int, ...] = NODES,
+    seed: int = 0,
+    progress: Callable[[float], None] | None = None,
+) -> ProtocolResult:
+    """Measure rates, recovery and clock errors of the ranging protocol.
+
+    Args:
+        events: Of each kind and mode.
+        nodes: Sizes of the groups whose rate is measured.
+        seed: Same seed, same figures.
+        progress: Called with the share done, 0 to 1.
+
+    Raises:
+        UsageError: A number out of range; the argument is named.
+    """
+    if events < 1:
+        raise UsageError(f"--events: expected at least 1, got {events}")
+    if seed < 0:
+        raise UsageError(f"--seed: expected 0 or more, got {seed}")
+    for n in nodes:
+        if not 2 <= n <= MAX_MEMBERS:
+            raise UsageError(f"--nodes: expected 2 to {MAX_MEMBERS}, got {n}")
+    report = progress or (lambda share: None)
+    timelines = [run_timeline(seed, mode) for mode in MODES]
+    recovery, times = measure_recovery(seed, events, lambda share: report(0.3 * share))
+    clock = measure_clock_error(seed)
+    rates = measure_rates(seed, nodes, lambda share: report(0.3 + 0.7 * share))
+    report(1.0)
+    return ProtocolResult(rates, recovery, clock, times, timelines)

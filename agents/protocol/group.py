@@ -1,0 +1,75 @@
+"""A group of nodes in the reference air, and what it sent."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from relpos_env.sensors.air import Air
+from relpos_env.sensors.radio_params import RadioSimParams
+from tracking.ranging.airtime import airtime
+from tracking.ranging.params import SessionParams
+from tracking.ranging.wire import Frame, decode
+
+DT = 0.01
+"""[s] One window of the air."""
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """A message as an onlooker sees it."""
+
+    start: float
+    """When its preamble began [s]."""
+    end: float
+    """[s]"""
+    frame: Frame
+
+
+class Group:
+    """Nodes that stand in a room of 5 m x 5 m, all in sight of each other."""
+
+    def __init__(self, params: RadioSimParams, n_nodes: int, rng: np.random.Generator) -> None:
+        self._rng = rng
+        self._phy = params.session.phy
+        self._pos = rng.uniform(-2.5, 2.5, (n_nodes, 3)) * [1.0, 1.0, 0.1]
+        self.air = Air(params, n_nodes, int(rng.integers(1 << 62)), DT)
+
+    @property
+    def t(self) -> float:
+        """[s]"""
+        return self.air.t
+
+    def switch_on(self, node: int, after: float = 0.0) -> None:
+        """Give a node power."""
+        self.air.switch_on(node, boot=int(self._rng.integers(256)), at=after)
+
+    def run(self, seconds: float) -> None:
+        """Let time pass."""
+        for _ in range(round(seconds / DT)):
+            self.air.step(self._pos, self._pos)
+
+    def assemble(self, nodes: range, limit: float) -> bool:
+        """Run until all the given nodes, and no others, know each other; False if they do not."""
+        for _ in range(round(limit / DT)):
+            self.run(DT)
+            sessions = [self.air.sessions[k] for k in nodes]
+            if all(s is not None and s.members == tuple(nodes) for s in sessions):
+                return True
+        return False
+
+    def listen(self) -> list[Heard]:
+        """What was sent since the last call."""
+        heard = []
+        for sent in self.air.sent:
+            start = sent.t - self._phy.header_time
+            end = start + airtime(self._phy, len(sent.data))
+            heard.append(Heard(start, end, decode(sent.data)))
+        self.air.sent.clear()
+        return sorted(heard, key=lambda h: h.start)
+
+
+def radio_params(**session: object) -> RadioSimParams:
+    """The default place, with other settings of the session."""
+    return RadioSimParams(session=SessionParams(**session))  # type: ignore[arg-type]
