@@ -93,15 +93,15 @@ def track(
 @click.option("--seconds", default=120.0, show_default=True, help="Length, 3 to 86400.")
 @click.option("--seed", default=0, show_default=True, help="Same seed, same run.")
 @click.option("--cars", default=3, show_default=True, help="Number of cars, 2 or more.")
+@click.option("--channel", help="Radio: calibrated (default), indoor, hall, outdoor or exact.")
+@click.option("--antenna-delay", type=float, help="Uncalibrated antennas: std in metres.")
 @click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
-def simulate(out: Path, scenario: str, seconds: float, seed: int, cars: int, as_json: bool) -> None:
+def simulate(out: Path, as_json: bool, **options: Any) -> None:
     """Record a simulated drive as a log folder with truth."""
     from agents.simulate import simulate as run
 
-    with progress_bar(f"{scenario}, seed {seed}") as report:
-        log = run(
-            scenario=scenario, seconds=seconds, seed=seed, cars=cars, out=out, progress=report
-        )
+    with progress_bar(f"{options['scenario']}, seed {options['seed']}") as report:
+        log = run(out=out, progress=report, **options)
     nlos = float(log.nlos.mean()) if log.nlos is not None and len(log.nlos) else 0.0
     record = {
         "log": log.name,
@@ -215,24 +215,31 @@ def bench_tracker(rounds: int, as_json: bool) -> None:
         raise UsageError(f"--rounds: expected at least 100, got {rounds}")
     with progress_bar("tracker") as report:
         rows = run(rounds=rounds, progress=report)
+    _show_bench("Time of one ranging round", rows, as_json)
+
+
+@bench.command("radio")
+@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+def bench_radio(as_json: bool) -> None:
+    """Microseconds per message-level round in a batch, beside the reference session."""
+    from agents.bench.radio import bench_radio as run
+
+    with progress_bar("radio") as report:
+        rows = run(progress=report)
+    _show_bench("Time of one message-level round", rows, as_json)
+
+
+def _show_bench(title: str, rows: list[dict[str, Any]], as_json: bool) -> None:
     if as_json:
         emit_json(rows)
         return
-    print_table(
-        "Time of one ranging round",
-        ["case", "value", "unit", "peer", "peer value", "ratio"],
-        [
-            [
-                r["case"],
-                f"{r['value']:.2f}",
-                r["unit"],
-                r["peer"],
-                f"{r['peer_value']:.1f}",
-                f"{r['ratio']:.0f}",
-            ]
-            for r in rows
-        ],
-    )
+    header = ["case", "value", "unit", "peer", "peer value", "ratio"]
+    figures = [(f"{r['value']:.2f}", f"{r['peer_value']:.1f}", f"{r['ratio']:.0f}") for r in rows]
+    cells = [
+        [r["case"], value, r["unit"], r["peer"], peer, ratio]
+        for r, (value, peer, ratio) in zip(rows, figures, strict=True)
+    ]
+    print_table(title, header, cells)
 
 
 def _print_tracks(results: Sequence[Any]) -> None:

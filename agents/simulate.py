@@ -12,7 +12,9 @@ from relpos_env.drivers import LoopDrivers
 from relpos_env.errors import EnvError
 from relpos_env.interface.actions import DriveCommand
 from relpos_env.loop import STAND_STILL
+from relpos_env.registry import look_up
 from relpos_env.scenarios import scenario as find_scenario
+from relpos_env.sensors.channel import CHANNELS
 from relpos_env.sim import DT, Simulation
 from tracking.log import Log, check_target, write_log
 
@@ -26,6 +28,8 @@ def simulate(
     seconds: float = 120.0,
     seed: int = 0,
     cars: int = 3,
+    channel: str | None = None,
+    antenna_delay: float | None = None,
     out: Path | str | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Log:
@@ -36,11 +40,15 @@ def simulate(
         seconds: Length of the recording; the cars stand for the first two.
         seed: Same seed, same recording, bit for bit.
         cars: Number of cars.
+        channel: What the place does to the radio, one of `relpos_env.sensors.channel.CHANNELS`;
+            by default that of the scenario.
+        antenna_delay: Standard deviation of what each antenna adds to its ranges [m], for
+            recordings to calibrate with; by default that of the scenario.
         out: Where to write the log folder; None writes nothing.
         progress: Called with the share done, 0 to 1.
 
     Raises:
-        EnvError: No such scenario, or a number out of range.
+        EnvError: No such scenario or channel, or a number out of range.
         LogError: `out` exists already.
     """
     if not 3.0 <= seconds <= 86400.0:
@@ -50,6 +58,14 @@ def simulate(
     if out is not None:
         check_target(Path(out))
     chosen = replace(find_scenario(scenario), n_cars=cars)
+    radio = chosen.radio
+    if channel is not None:
+        radio = replace(radio, channel=look_up(CHANNELS, channel, "channel"))
+    if antenna_delay is not None:
+        if not 0.0 <= antenna_delay <= 10.0:
+            raise EnvError(f"antenna delay: expected 0 to 10 m, got {antenna_delay:g}")
+        radio = replace(radio, antenna_delay_std=antenna_delay)
+    chosen = replace(chosen, radio=radio)
     sim = Simulation(chosen, np.random.default_rng(seed), record=True)
     drivers = LoopDrivers(chosen, sim.driver_rng)
     still = DriveCommand(0.0, np.zeros(cars), np.zeros(cars))

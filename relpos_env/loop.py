@@ -18,11 +18,19 @@ from relpos_env.scenarios import Scenario
 from relpos_env.sim import DT, Simulation
 from relpos_env.world import WorldState
 from tracking.estimate import TeamEstimate
-from tracking.horizon import Horizon
+from tracking.horizon import Horizon, HorizonParams
+from tracking.ranging.airtime import round_rate
 from tracking.tracker import Tracker, TrackerParams
 
 STAND_STILL = 2.0
 """[s] The cars stand while their trackers are switched on, as real ones do."""
+
+
+def default_params(scenario: Scenario) -> TrackerParams:
+    """What the trackers believe by default: they wait for ranges as long as a round takes."""
+    radio = scenario.radio.for_nodes(scenario.n_cars)
+    rounds = 1.5 / round_rate(radio.session.phy, scenario.n_cars)
+    return TrackerParams(horizon=HorizonParams(delay=max(HorizonParams().delay, rounds)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

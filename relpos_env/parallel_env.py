@@ -19,7 +19,7 @@ from relpos_env.errors import EnvError
 from relpos_env.interface.actions import ContinuousActions, DriveCommand
 from relpos_env.interface.observations import observation_mode
 from relpos_env.interface.views import AgentView
-from relpos_env.loop import LoopConfig, TrackedSimulation
+from relpos_env.loop import LoopConfig, TrackedSimulation, default_params
 from relpos_env.scenarios import Scenario
 from relpos_env.scenarios import scenario as find_scenario
 from relpos_env.tasks import make_task
@@ -58,7 +58,7 @@ class FormationEnv(ParallelEnv):  # type: ignore[misc]
             n_cars: Number of cars, at least 2.
             observation: One of `relpos_env.interface.observations.OBSERVATIONS`.
             filter: Position filter of the trackers, one of `tracking.filters.FILTERS`.
-            params: What the trackers believe.
+            params: What the trackers believe; by default `relpos_env.loop.default_params`.
             max_cycles: Steps of 0.1 s until truncation.
             render_mode: None; this version draws nothing.
             record: Keep measurements and truth of the episode, see `recorded_log`.
@@ -75,10 +75,9 @@ class FormationEnv(ParallelEnv):  # type: ignore[misc]
         except ConfigError as error:
             raise EnvError(str(error)) from error
         self.render_mode = render_mode
+        chosen = replace(find_scenario(scenario), n_cars=n_cars)
         self._config = LoopConfig(
-            scenario=replace(find_scenario(scenario), n_cars=n_cars),
-            filter=filter,
-            params=params or TrackerParams(),
+            scenario=chosen, filter=filter, params=params or default_params(chosen)
         )
         self._task = make_task(task, self._config.scenario)
         self._mode = observation_mode(observation, n_cars)

@@ -61,7 +61,7 @@ class Simulation:
         self._imu = Imu(scenario.imu, n, imu, DT)
         self._mag = Magnetometer(scenario.mag, n, mag)
         self._odometer = Odometer(scenario.odometer, n, odometer)
-        self._radio = Radio(scenario.radio, n, [int(radio.integers(1 << 63))], DT)
+        self._radio = Radio(scenario.radio.for_nodes(n), n, [int(radio.integers(1 << 63))], DT)
         for k in range(n):
             self._radio.switch_on(0, k, boot=int(radio.integers(256)))
         self._nodes = np.arange(n, dtype=np.int64)

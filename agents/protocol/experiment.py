@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from agents.bench.radio import radio_cost
 from agents.errors import UsageError
 from agents.protocol.clock_error import measure_clock_error
 from agents.protocol.rates import NODES, measure_rates
@@ -21,6 +22,7 @@ class ProtocolResult:
     rates: list[dict[str, Any]]
     recovery: list[dict[str, Any]]
     clock: list[dict[str, Any]]
+    cost: list[dict[str, Any]]
     times: dict[tuple[str, str], list[float]]
     """Every recovery time by event and mode [s]."""
     timelines: list[Timeline]
@@ -28,7 +30,7 @@ class ProtocolResult:
     @property
     def records(self) -> list[dict[str, Any]]:
         """One flat record for each figure."""
-        return [*self.rates, *self.recovery, *self.clock]
+        return [*self.rates, *self.recovery, *self.clock, *self.cost]
 
 
 def protocol(
@@ -60,6 +62,10 @@ def protocol(
     timelines = [run_timeline(seed, mode) for mode in MODES]
     recovery, times = measure_recovery(seed, events, lambda share: report(0.3 * share))
     clock = measure_clock_error(seed)
+    cost = [
+        {"experiment": "cost", "n": n, "us_per_round": radio_cost(n, max(2, 256 // n**2))[0]}
+        for n in nodes
+    ]
     rates = measure_rates(seed, nodes, lambda share: report(0.3 + 0.7 * share))
     report(1.0)
-    return ProtocolResult(rates, recovery, clock, times, timelines)
+    return ProtocolResult(rates, recovery, clock, cost, times, timelines)

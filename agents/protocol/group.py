@@ -38,7 +38,7 @@ class Group:
 
     @property
     def t(self) -> float:
-        """[s]"""
+        """Time [s]."""
         return self.air.t
 
     def switch_on(self, node: int, after: float = 0.0) -> None:

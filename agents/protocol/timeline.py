@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from agents.protocol.group import Group, radio_params
+from tracking.arrays import F64
 from tracking.ranging.wire import Type
 
 SCRIPT = (
@@ -20,29 +21,39 @@ END = 8.0
 """[s]"""
 
 
+BIN = 0.1
+"""[s] Rounds are counted in bins of this length."""
+RUNS = 10
+"""The frequency is the mean over so many groups."""
+
+
 @dataclass(frozen=True, slots=True)
 class Timeline:
-    """Rounds of one run."""
+    """Ranging frequency over time in one mode."""
 
     mode: str
-    t: list[float]
-    """Begin of each round [s]."""
-    n: list[int]
-    """Members of each round."""
-
-    @property
-    def hz(self) -> list[float]:
-        """Frequency of the rounds, from each begin to the next."""
-        return [1.0 / (b - a) for a, b in zip(self.t[:-1], self.t[1:], strict=True)]
+    t: F64
+    """Middle of each bin [s]."""
+    hz: F64
+    """Rounds per second in which every node that is on spoke."""
 
 
 def run_timeline(seed: int, mode: str) -> Timeline:
-    """Let the script run off, once the first four nodes have found together."""
-    rng = np.random.default_rng([seed, 99])
+    """Let the script run off in several groups, once their first four nodes are together."""
+    edges = np.arange(0.0, END + 0.5 * BIN, BIN)
+    ends = np.concatenate([_whole_rounds(seed, mode, k) for k in range(RUNS)])
+    count, _ = np.histogram(ends, edges)
+    return Timeline(mode, edges[:-1] + 0.5 * BIN, count / (RUNS * BIN))
+
+
+def _whole_rounds(seed: int, mode: str, k: int) -> F64:
+    """Ends of the rounds in which every node that is on spoke [s]."""
+    rng = np.random.default_rng([seed, 99, k])
     group = Group(radio_params(succession=mode == "succession"), 6, rng)
-    for k in range(1, 5):
-        group.switch_on(k, float(rng.uniform(0.0, 0.02)))
+    for node in range(1, 5):
+        group.switch_on(node, float(rng.uniform(0.0, 0.02)))
     group.assemble(range(1, 5), limit=20.0)
+    group.run(float(rng.uniform(0.0, 0.1)))
     group.listen()
     start = group.t
     for t, _, node, on in SCRIPT:
@@ -52,5 +63,14 @@ def run_timeline(seed: int, mode: str) -> Timeline:
         else:
             group.air.switch_off(node)
     group.run(start + END - group.t)
-    rounds = [h for h in group.listen() if h.frame.type is Type.REQUEST]
-    return Timeline(mode, [h.start - start for h in rounds], [h.frame.n for h in rounds])
+    ends, spoken = [], set[int]()
+    for h in group.listen():
+        if h.frame.type is Type.REQUEST:
+            spoken = set()
+        spoken.add(h.frame.src)
+        here = {1, 2, 3, 4} | {k for t, _, k, powered in SCRIPT if powered and t <= h.end - start}
+        here -= {k for t, _, k, powered in SCRIPT if not powered and t <= h.end - start}
+        if h.frame.type is not Type.JOIN and spoken >= here:
+            ends.append(h.end - start)
+            spoken = set()
+    return np.array(ends)

@@ -67,7 +67,8 @@ def hear_message(channel, latents, seed, nodes, s, r, t, motion, boxes, capsules
         latents: LATENT, (node, node), the part above the diagonal is used and updated.
         seed: Of the environment, uint64.
         nodes: NODE, (node).
-        s, r: Sender and receiver.
+        s: Sender.
+        r: Receiver.
         t: Stamp moment since the start of the window [s].
         motion: Antennas at its start and end, (node, 3) [m], and its length [s].
         boxes: What stands in the plane, (box, 6).

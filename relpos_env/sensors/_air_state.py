@@ -92,7 +92,7 @@ class RangeBuffer(NamedTuple):
     values: F64
     """Distance [m], received and first-path power [dBm], (env, slot, 3)."""
     nlos: Bool
-    count: I64
+    used: I64
     """Ranges written, (env)."""
 
 

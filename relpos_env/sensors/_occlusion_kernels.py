@@ -12,7 +12,10 @@ def crosses_box(ax, ay, bx, by, box):
     """Whether the line from a to b in the plane passes through a box.
 
     Args:
-        ax, ay, bx, by: Its ends [m].
+        ax: Its one end [m].
+        ay: Likewise.
+        bx: Its other end [m].
+        by: Likewise.
         box: Centre x y [m], half width, half depth [m], cosine and sine of its angle.
     """
     x, y, dx, dy = ax - box[0], ay - box[1], bx - ax, by - ay
@@ -42,7 +45,12 @@ def crosses_capsule(ax, ay, az, bx, by, bz, capsule, skin):
     """Whether the line from a to b passes through the inside of a capsule.
 
     Args:
-        ax, ay, az, bx, by, bz: Its ends [m].
+        ax: Its one end [m].
+        ay: Likewise.
+        az: Likewise.
+        bx: Its other end [m].
+        by: Likewise.
+        bz: Likewise.
         capsule: Ends of the axis, 3 and 3 [m], and the radius [m].
         skin: Share of the radius that counts as inside, below 1: an antenna is worn on the
             surface and is not hidden by that.

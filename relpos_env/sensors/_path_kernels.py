@@ -69,10 +69,13 @@ def receive(
         c: CHANNEL.
         latent: LATENT of the pair, updated.
         seed: Of the environment.
-        sender, receiver: NODE.
-        s, r: Their numbers.
+        sender: NODE.
+        receiver: NODE.
+        s: Number of the sender.
+        r: Number of the receiver.
         t: Stamp moment of the message since the start of the window [s].
-        pos0, pos1: Antennas at the start and the end of the window, (node, 3) [m].
+        pos0: Antennas at the start of the window, (node, 3) [m].
+        pos1: Antennas at its end.
         dt: Length of the window [s].
         boxes: What stands in the plane, (box, 6).
         capsules: What stands in space, (capsule, 7).

@@ -95,7 +95,7 @@ def run_window(p, radio, channel, seeds, window, dt, batch, scenes, out):
         )
         scene = Scene(scenes.pos0[e], scenes.pos1[e], scenes.boxes[e], scenes.capsules[e])
         n = air.nodes.shape[0]
-        out.count[e] = 0
+        out.used[e] = 0
         for k in range(n):
             air.nodes[k].step = distance_moved(scene, k)
             plan(air, k)
@@ -244,14 +244,14 @@ def end_message(p, radio, c, seed, air, scene, s, t, dt, out, e):
 @small_kernel
 def note_range(air, i, j, distance, time, rx, out, e):
     """Write a range down."""
-    k = out.count[e]
+    k = out.used[e]
     if k < out.t.shape[1]:
         out.t[e, k] = true_time(air.nodes[i], time)
         out.i[e, k], out.j[e, k] = i, j
         out.values[e, k, 0] = distance
         out.values[e, k, 1], out.values[e, k, 2] = rx.rx_power, rx.fp_power
         out.nlos[e, k] = rx.nlos
-        out.count[e] = k + 1
+        out.used[e] = k + 1
 
 
 @small_kernel

@@ -170,12 +170,12 @@ class Radio:
         )
         start = self._window * self._dt
         self._window += 1
-        out, used = self._out, int(self._out.count.max())
+        out, used = self._out, int(self._out.used.max())
         return Ranges(
             start + out.t[:, :used],
             out.i[:, :used].copy(),
             out.j[:, :used].copy(),
             out.values[:, :used].copy(),
             out.nlos[:, :used].copy(),
-            out.count.copy(),
+            out.used.copy(),
         )

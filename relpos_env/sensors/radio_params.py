@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from relpos_env.sensors.channel import CALIBRATED, ChannelParams
 from tracking.ranging.params import SessionParams
+from tracking.ranging.wire import entries_per_frame
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,3 +27,10 @@ class RadioSimParams:
     """[dB] A message survives another one that is weaker by so much."""
     antenna_height: float = 0.12
     """[m] Of the antenna over the tracker; the same on every car."""
+
+    def for_nodes(self, n_nodes: int) -> RadioSimParams:
+        """The same, with the long frames of the radio where a table needs them."""
+        phy = self.session.phy
+        if n_nodes - 1 <= entries_per_frame(phy.max_frame):
+            return self
+        return replace(self, session=replace(self.session, phy=replace(phy, max_frame=1023)))

@@ -69,7 +69,10 @@ def take_message(p, s, peers, me, src, message, rows, arrived, carrier):
     """`Listener.take`.
 
     Args:
-        p, s, peers, me: As said above.
+        p: SessionNumbers.
+        s: SESSION of this node, updated.
+        peers: PEER, (node, node), updated.
+        me: Number of this node.
         src: Who sent it.
         message: MESSAGE.
         rows: When every node heard each other one, its own clock, (node, node).

@@ -169,7 +169,10 @@ def speak(p, s, peers, me, message, rows, at):
     """`Session._speak`; the message is written and waits to be sent.
 
     Args:
-        p, s, peers, me: As said above.
+        p: SessionNumbers.
+        s: SESSION of this node, updated.
+        peers: PEER, (node, node), updated.
+        me: Number of this node.
         message: MESSAGE of this node, written.
         rows: When every node heard each other one, its own clock, (node, node); its row is
             written.

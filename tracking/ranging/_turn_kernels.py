@@ -79,10 +79,7 @@ def hold(p, s):
 def await_slot(p, s, me):
     """`Turns.await_slot`."""
     leads = s.role == INITIATOR
-    if s.cursor >= s.n:
-        mine = leads
-    else:
-        mine = member_at(s.members, s.cursor) == me
+    mine = leads if s.cursor >= s.n else member_at(s.members, s.cursor) == me
     if s.cursor >= s.n and s.round % OPEN == OPEN - 1 and s.round != s.opened:
         s.opened = s.round
         if leads:

@@ -30,7 +30,7 @@ def seconds(duration: float) -> float:
 
 
 def difference(later: int, earlier: int) -> int:
-    """Ticks from one stamp to another, in [-2^39, 2^39): right if they are less than 8.6 s apart."""
+    """Ticks from one stamp to another, in [-2^39, 2^39): right if they are within 8.6 s."""
     half = MODULUS // 2
     return (later - earlier + half) % MODULUS - half
 

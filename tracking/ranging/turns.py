@@ -11,7 +11,6 @@ from tracking.ranging.peers import Peers
 from tracking.ranging.slots import Slots
 from tracking.ranging.timestamps import ticks
 
-
 OPEN = 128
 """Every so-manieth round ends with a free slot, for newcomers that the initiator cannot hear and
 that would always speak at the same time as it."""

@@ -179,7 +179,8 @@ def decode(data: bytes) -> Frame:
         raise WireError("table: an ID stands twice")
     stamp = int.from_bytes(data[16:21], "little")
     return Frame(
-        Type(kind & 15), src, root, round_, slot, n, boot, stamp, entries, pan, sequence, part, parts
+        Type(kind & 15), src, root, round_, slot, n, boot, stamp, entries, pan, sequence,
+        part, parts,
     )  # fmt: skip
 
 
