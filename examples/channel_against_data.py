@@ -6,7 +6,6 @@ project. With a path as argument, the picture of `docs/simulator.md` is saved th
 
 import os
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -69,7 +68,7 @@ def compare(path, copies=8):
     """Real and simulated values by quantity and class; every place as often as it was measured."""
     behind, place, real, distance, nlos = load(path)
     many, hidden = np.tile(distance, copies), np.tile(nlos, copies)
-    channel = replace(OUTDOOR, max_distance=61.0)  # the last places are a centimetre beyond 60 m
+    channel = OUTDOOR
     where, _, values = simulate(channel, many, hidden)
     weight = np.bincount(place)[where % len(distance)] / np.bincount(where)[where]
     return {

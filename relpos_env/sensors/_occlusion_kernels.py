@@ -64,6 +64,8 @@ def crosses_capsule(ax, ay, az, bx, by, bz, capsule, skin):
     det = a * c - b * b
     s = min(max((b * e - c * d) / det, 0.0), 1.0) if det > 1e-12 * a * c else 0.0
     t = (b * s + e) / c if c > 0.0 else 0.0
+    if c <= 0.0 < a:  # a ball
+        s = min(max(-d / a, 0.0), 1.0)
     if t < 0.0 or t > 1.0:
         t = min(max(t, 0.0), 1.0)
         s = min(max((b * t - d) / a, 0.0), 1.0) if a > 0.0 else 0.0

@@ -118,7 +118,7 @@ def receive(
     pair_key = draw_key(seed, np.uint64(PAIRS + lo * 64 + hi))
     weight = bring_latents(c, latent, pair_key, travelled)
     flown += path_error(c, latent, weight, distance, nlos)
-    flown += 0.5 * (sender.antenna + receiver.antenna)
+    flown += sender.antenna + receiver.antenna
     stamp_noise, power_noise = normal_pair(key, 1)
     rx.src, rx.bad, rx.nlos = s, False, nlos
     rx.stamp = nearest_tick(receiver, t + flown / SPEED_OF_LIGHT + c.stamp_std * stamp_noise)

@@ -102,7 +102,7 @@ HALL = replace(INDOOR, excess=(-1.497, 2.283, 3.125), excess_length=3.3, attenua
 """A hall full of steel: 0.94 +- 0.94 m behind obstacles, median 0.58 m."""
 
 OUTDOOR = ChannelParams(
-    stamp_std=129e-12,
+    stamp_std=134e-12,
     bias=-0.026,
     rise=0.331,
     fast=0.0246,
@@ -123,6 +123,7 @@ OUTDOOR = ChannelParams(
     gap_shares=(-0.2, -0.5),
     gap_noise=0.906,
     gap_noise_near=-0.860,
+    max_distance=100.0,
 )
 """An open field, fitted to 67,105 ranges of 2 m to 60 m with known truth (Hanyang University)."""
 

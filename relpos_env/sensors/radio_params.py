@@ -22,7 +22,7 @@ class RadioSimParams:
     clock_wander: float = 5e-10
     """[1] Standard deviation of the change of its rate in a second."""
     antenna_delay_std: float = 0.0
-    """[m] What the antenna delay of a node adds to its ranges; calibrated away by default."""
+    """[m] What the antenna of each node adds to all its ranges; calibrated away by default."""
     capture: float = 8.0
     """[dB] A message survives another one that is weaker by so much."""
     antenna_height: float = 0.12

@@ -83,6 +83,12 @@ FAULTS = [
     (["simulate", "x", "--seconds", "nan"], "seconds: expected 3 to 86400"),
     (["simulate", "x", "--seed", "-4"], "seed: expected 0 or more"),
     (["simulate", "x", "--cars", "two"], "--cars"),
+    (["simulate", "x", "--channel", "moon"], "channel: expected one of"),
+    (["simulate", "x", "--antenna-delay", "-1"], "antenna delay: expected 0 to 10"),
+    (["protocol", "--events", "0"], "--events: expected at least 1"),
+    (["protocol", "--nodes", "3,x"], "--nodes: expected numbers"),
+    (["protocol", "--nodes", "1"], "--nodes: expected 2 to 62"),
+    (["protocol", "--seed", "-1"], "--seed: expected 0 or more"),
     (["demo", "--seconds", "1"], "--seconds: expected 15"),
     (["demo", "--scenario", "moon"], "scenario: expected one of"),
     (["demo", "--cars", "40"], "do not fit"),
@@ -117,6 +123,25 @@ def test_results_are_whole_or_not_at_all(recording, tmp_path):
         done = relpos(*args)
         assert done.returncode == 2
         assert "Traceback" not in done.stderr
+
+
+def test_protocol_in_json_and_pictures(tmp_path):
+    done = relpos("protocol", "--events", 3, "--nodes", "3", "--json", "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    rows = [json.loads(line) for line in done.stdout.splitlines()]
+    rates = {(r["phy"], r["n"]): r for r in rows if r["experiment"] == "rate"}
+    assert rates["110k", 3]["rounds_hz"] == pytest.approx(rates["110k", 3]["paper_hz"], rel=0.02)
+    assert rates["6M8", 3]["paper_hz"] is None
+    recovery = {(r["event"], r["mode"]): r for r in rows if r["experiment"] == "recovery"}
+    assert len(recovery) == 6
+    assert recovery["initiator-loss", "succession"]["mean_ms"] < 100.0
+    assert 500.0 < recovery["initiator-loss", "watchdog"]["mean_ms"] < 1000.0
+    clock = [r for r in rows if r["experiment"] == "clock" and r["ppm"] == 20.0]
+    assert [r["slot"] for r in clock] == [1, 2, 3, 4, 5]
+    assert max(abs(r["bias_cm"]) for r in clock) < 2.0
+    assert all(r["std_ratio"] < 1.2 for r in clock)
+    names = {p.name for p in (tmp_path / "out").iterdir()}
+    assert {"report.html", "protocol-timeline.png", "protocol-rates.png"} <= names
 
 
 def test_help_names_the_filters_and_scenarios():

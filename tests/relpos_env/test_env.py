@@ -84,7 +84,7 @@ def formation_error(observation, seed, blind=False):
 
 def test_the_formation_is_kept_on_estimates():
     """Better than on the operator's command alone, which an oracle beats by far."""
-    seeds = range(4)
+    seeds = range(10)  # single runs differ by a factor of three
     truth = np.mean([formation_error("truth", s) for s in seeds])
     estimate = np.mean([formation_error("estimate", s) for s in seeds])
     blind = np.mean([formation_error("estimate", s, blind=True) for s in seeds])

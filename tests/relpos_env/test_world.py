@@ -141,6 +141,28 @@ def test_ranges_come_at_the_rate_of_the_protocol_with_the_errors_of_the_place():
     assert np.abs(errors(exact)[0]).max() < 0.008
 
 
+def test_recordings_to_calibrate_with_have_the_sum_of_both_antennas_in_every_range():
+    delays = replace(RadioSimParams(channel=EXACT), antenna_delay_std=0.2)
+    log = ranges(replace(scenario("cars-los"), radio=delays))
+    e, _ = errors(log)
+    chosen = log.block.kind[0] == Kind.RANGE
+    ends = log.block.i[0, chosen], log.block.j[0, chosen]
+    e = e[: len(ends[0])]
+    pairs = {
+        (i, j): e[(ends[0][: len(e)] == i) & (ends[1][: len(e)] == j)]
+        for i, j in ((0, 1), (0, 2), (1, 2))
+    }
+    assert all(np.ptp(values) < 0.02 for values in pairs.values())
+    assert max(abs(values.mean()) for values in pairs.values()) > 0.05
+
+
+def test_more_cars_than_a_short_frame_has_rows_for():
+    many = replace(scenario("ring-los"), name="big", room=(30.0, 30.0), ring=(8.0, 8.0), n_cars=18)
+    log = ranges(many, seconds=6.0)
+    heard = {(int(i), int(j)) for i, j in zip(log.block.i[0], log.block.j[0], strict=True)}
+    assert sum(i != j for i, j in heard) == 18 * 17 / 2
+
+
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_same_seed_same_recording(name):
     a, b = (ranges(scenario(name), seconds=3.0, seed=9) for _ in range(2))

@@ -7,7 +7,7 @@ from runpy import run_path
 import numpy as np
 import pytest
 from conftest import ROOT
-from hypothesis import assume, example, given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.stats import kstest
 
@@ -187,10 +187,10 @@ def test_power_gaps(in_sight, behind, place):
 
 def test_errors_indoors_follow_the_way():
     """As published for somebody who walks at 2 m/s: after 50 ms and after a second."""
-    tracks = circling(INDOOR, speed=2.0, seconds=8.0, pairs=1200)
+    tracks = circling(INDOOR, speed=2.0, seconds=8.0, pairs=800)
     assert np.concatenate([error for _, error in tracks]).std() == pytest.approx(0.11, rel=0.05)
-    assert autocorrelation(tracks, 0.1, 0.008) == pytest.approx(0.85, abs=0.035)
-    assert autocorrelation(tracks, 2.0, 0.008) == pytest.approx(0.50, abs=0.035)
+    assert autocorrelation(tracks, 0.1, 0.008) == pytest.approx(0.85, abs=0.03)
+    assert autocorrelation(tracks, 2.0, 0.008) == pytest.approx(0.50, abs=0.03)
 
 
 # No errors
@@ -339,11 +339,9 @@ def check_capsule(a, b, p, q, radius, skin):
 @example((-2.0, 0.1, 0.0), (2.0, 0.1, 0.0), (-0.5, 0.0, 0.0), (0.5, 0.0, 0.0), 0.2, 0.9)
 @example((-2.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (-0.5, 0.0, 0.0), (0.5, 0.0, 0.0), 0.2, 0.9)
 def test_capsules_hide_what_points_along_the_line_say(a, b, p, q, radius, skin):
-    assume(np.linalg.norm(np.subtract(q, p)) > 1e-3)
     check_capsule(a, b, p, q, radius, skin)
 
 
-@pytest.mark.xfail(strict=True, reason="a capsule without length hides only what is near a")
 def test_a_ball_hides_what_is_behind_it():
     check_capsule((-1.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.2, 0.9)
 

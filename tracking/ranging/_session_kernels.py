@@ -151,7 +151,7 @@ def keep_step(s, me, message):
 
 @small_kernel
 def may_insert(p, s):
-    """The beginning of `Session._insert`: whether a newcomer speaks now."""
+    """`Joining.speaks` and what `Session._insert` does then."""
     if s.round == s.tried_round:
         return False
     if s.backoff > 0:

@@ -16,6 +16,7 @@ class Members:
         self._id = node_id
         self._rows: list[int] = []
         self._source = node_id, 0, 0
+        self._asked = 0, 0
         self.ids: tuple[int, ...] = (node_id,)
 
     def __len__(self) -> int:
@@ -42,14 +43,20 @@ class Members:
             return None
         return tuple(sorted({*self._rows[: heard.n - 1], heard.src}))
 
-    def renew(self, peers: Peers, since: int, drop_after: int) -> None:
+    def ask_first(self, now: int) -> None:
+        """This node becomes initiator: all members are taken to be there."""
+        self._asked = now, now
+
+    def renew(self, peers: Peers, at: int, drop_after: int) -> None:
         """Decide on the next round: who was heard in the last one stays or joins.
 
         Args:
             peers: Who was heard, by this node or by others.
-            since: Begin of the last round, own clock.
+            at: Begin of the next round, own clock.
             drop_after: Rounds in which nobody hears a member until it is dropped.
         """
+        # What the last to speak have heard is told a round later: look two rounds back.
+        since, self._asked = self._asked[0], (self._asked[1], at)
         ids = {self._id, *self.ids}
         for k, peer in peers:
             if peers.alive(k, since):

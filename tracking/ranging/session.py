@@ -2,16 +2,8 @@
 
 The shell that owns the radio calls it when a preamble is detected, when a frame has arrived or
 broken off, and when the `deadline` has come; the session answers with frames to send at exact
-times and with events. All times are 40-bit stamps of the node's own radio clock. The rules:
-
-- Messages follow each other with a gap in which everybody listens. Whoever is not a member of
-  the round yet speaks right at its start; the member whose turn it is speaks at its end.
-- The initiator's request names the members; they answer by rising ID. A slot in which no
-  preamble is heard is over at once, unless others do hear that node or it was lost and heard
-  again lately: then it is waited out.
-- Whoever hears a smaller ID follows it. Nodes that nobody heard for some rounds are dropped.
-- If the initiator falls silent the next ID takes over (`succession`), or all are reset when
-  their watchdog has run off, as in the paper.
+times and with events. All times are 40-bit stamps of the node's own radio clock.
+`docs/protocol.md` has the rules, the bytes and the tables of states.
 """
 
 from __future__ import annotations
@@ -26,17 +18,15 @@ from tracking.ranging.events import (
     Role,
     RoleChanged,
 )
+from tracking.ranging.joining import Joining
 from tracking.ranging.listening import Listener
 from tracking.ranging.members import Members
 from tracking.ranging.params import SessionParams
 from tracking.ranging.slots import Slots
 from tracking.ranging.speaker import Speaker, Words
-from tracking.ranging.timestamps import MODULUS, ticks, unwrap
+from tracking.ranging.timestamps import MODULUS, OwnTime, unwrap
 from tracking.ranging.turns import Turns, Waiting
-from tracking.ranging.wire import MAX_ID, MAX_PARTS, Frame, Type, decode, entries_per_frame
-
-_BACK = ticks(1e-3)
-"""A clock that goes back by more has jumped."""
+from tracking.ranging.wire import MAX_ID, Frame, Type, decode
 
 
 class Session:
@@ -66,10 +56,9 @@ class Session:
         self._listener, self._members = Listener(node_id, params.exchange), Members(node_id)
         self._peers = self._listener.peers
         self._turns = Turns(node_id, params, self._slots, self._members, self._peers, self._dice)
-        self._now = self._attempts = self._backoff = 0
-        self._asked_at = 0, 0  # begin of the last two rounds of this initiator
-        self._tried_round: int | None = None
+        self._time, self._joining = OwnTime(), Joining(self._dice)
         self._out: list[Output] = []
+        self._told = (self.role, self.root), self.members
 
     @property
     def members(self) -> tuple[int, ...]:
@@ -83,14 +72,14 @@ class Session:
 
     def start(self, now: int) -> list[Output]:
         """Switch on."""
-        self._now = now + MODULUS
+        self._time.set(now)
         self._begin()
         return self._give()
 
     def preamble(self, now: int) -> list[Output]:
         """A preamble was detected: `frame` or `broken` will follow."""
         if self._advance(now) and self.role is not Role.MUTED:
-            self._turns.hold(self._now)
+            self._turns.hold(self._time.now)
         return self._give()
 
     def broken(self, now: int) -> list[Output]:
@@ -109,15 +98,14 @@ class Session:
         """
         if not self._advance(now) or self.role is Role.MUTED:
             return self._give()
-        self._turns.hold(self._now)
-        arrived = unwrap(reception.stamp, self._now) - self._params.antenna_delay
+        self._turns.hold(self._time.now)
+        arrived = unwrap(reception.stamp, self._time.now) - self._params.antenna_delay
         end = arrived + self._slots.frame(len(data))
         try:
             heard = decode(data)
         except WireError:
             heard = None
-        on_time = 0 <= self._now - arrived <= self._slots.longest + self._slots.header
-        if heard is None or heard.pan != self._params.pan or not on_time:
+        if heard is None or heard.pan != self._params.pan or not self._recent(arrived):
             self._unreadable()
         elif heard.src == self.id:
             self._own_id(heard, end)
@@ -128,12 +116,12 @@ class Session:
     def timeout(self, now: int) -> list[Output]:
         """The deadline has come."""
         turns = self._turns
-        if not self._advance(now) or self._now < turns.deadline:
+        if not self._advance(now) or self._time.now < turns.deadline:
             return self._give()
         if turns.waiting is Waiting.FRAME:
             self._unreadable()
         elif turns.waiting is Waiting.TURN:
-            self._speak(max(turns.expected, self._now + self._slots.header))
+            self._speak(max(turns.expected, self._time.now + self._slots.header))
         elif turns.waiting is Waiting.SLOT:
             self._silent_slot()
         elif turns.waiting is Waiting.PART:
@@ -147,43 +135,38 @@ class Session:
 
     def _await_slot(self) -> None:
         leads = self.role is Role.INITIATOR
-        shut_out = self._attempts > 1 and self.id not in self._members
-        self._turns.await_slot(self._now, self.round, leads=leads, shut_out=shut_out)
+        shut_out = self._joining.in_vain and self.id not in self._members
+        self._turns.await_slot(self._time.now, self.round, leads=leads, shut_out=shut_out)
 
     def _silent_slot(self) -> None:
         """No preamble came in the slot at the cursor."""
         at_request = self._turns.at_request
-        if not self._turns.silent(self._now, self.root):
+        if not self._turns.silent(self._time.now, self.root):
             self._turns.request_missing(self.root)
             return
-        if at_request:  # the initiator is there: its request went past here
+        if at_request:  # others hear the initiator: its request went past here
             self.round = (self.round + 1) % 256
         self._await_slot()
 
     def _become_initiator(self) -> None:
         """Start rounds of one's own: the initiator and all before this node are silent."""
-        before, self._members.ids = self.members, tuple(k for k in self.members if k >= self.id)
-        self._tell_members(before)
-        self._set_role(Role.INITIATOR, self.id)
-        self._asked_at = self._now, self._now
-        self._speak(self._now + self._slots.turnaround + self._slots.header)
+        self._members.ids = tuple(k for k in self.members if k >= self.id)
+        self.role, self.root = Role.INITIATOR, self.id
+        self._members.ask_first(self._time.now)
+        self._speak(self._time.now + self._slots.turnaround + self._slots.header)
 
     def _speak(self, at: int) -> None:
         """Send the own message, its first stamp moment at or after the given time."""
         turns, kind, root = self._turns, Type.JOIN, self.root
         if self.role is Role.INITIATOR and turns.at_request:
-            kind, before = Type.REQUEST, self.members
-            # What the last to speak have heard is told a round later: look two rounds back.
-            self._members.renew(self._peers, self._asked_at[0], self._params.drop_after)
-            self._tell_members(before)
-            self.round, turns.cursor = (self.round + 1) % 256, 0
-            self._asked_at = self._asked_at[1], at
-            root = self.members[0]
+            kind = Type.REQUEST
+            self._members.renew(self._peers, at, self._params.drop_after)
+            self.round, turns.cursor, root = (self.round + 1) % 256, 0, self.members[0]
         elif self.id in self._members:
             kind = Type.REPLY
         n = len(self._members)
-        most = MAX_PARTS * entries_per_frame(self._params.phy.max_frame)
-        rows = [] if kind is Type.JOIN else self._peers.table(self._members.others(), most)
+        table = self._peers.table(self._members.others(), self._speaker.room)
+        rows = [] if kind is Type.JOIN else table
         words = Words(kind, root, self.round, min(turns.cursor, n), n, rows)
         frames, sent, turns.expected = self._speaker.say(words, at)
         self._out += frames
@@ -193,21 +176,14 @@ class Session:
         if kind is Type.REQUEST and n == 1:
             turns.expected += self._dice.pause(self._params.idle)
         if root != self.root:  # a smaller ID has joined: the next request is its
-            self._set_role(Role.RESPONDER, root)
+            self.role, self.root = Role.RESPONDER, root
         self._await_slot()
 
     def _insert(self, at: int) -> None:
-        """A newcomer speaks at the start of the gap, once a round and after drawn pauses."""
-        if self.round == self._tried_round or self._now + self._slots.header > at:
-            return
-        if self._backoff > 0:
-            self._backoff -= 1
-            return
-        self._attempts = min(self._attempts + 1, 5)
-        self._backoff = self._dice.bits(self._attempts)
-        self._tried_round = self.round
-        self._turns.check_at = self._now + self._dice.pause(self._params.first_check)
-        self._speak(at)
+        """Speak at the start of the gap, as a newcomer whose attempt is due."""
+        if self._time.now + self._slots.header <= at and self._joining.speaks(self.round):
+            self._turns.check_at = self._time.now + self._dice.pause(self._params.first_check)
+            self._speak(at)
 
     def _hear(self, heard: Frame, reception: Reception, arrived: int, end: int) -> None:
         """Take a valid frame of another node, and one's place in the round that it tells."""
@@ -217,15 +193,14 @@ class Session:
             turns.resume()  # of those who followed this ID before it was switched on again
             return
         follows = heard.root == self.root and self.role is not Role.LISTENING
-        if not follows and not (in_turn and (heard.root < self.root or lost)):
-            self._unreadable()  # of a group that will follow this one once it hears it
-            return
-        events = self._listener.take(heard, reception, arrived)
-        if events is None:
+        events = None
+        if follows or (in_turn and (heard.root < self.root or lost)):
+            events = self._listener.take(heard, reception, arrived)
+        if events is None:  # a repeat, or of a group that will follow this one when it hears it
             self._unreadable()
             return
         self._out += events
-        turns.heard_at = self._now
+        turns.heard_at = self._time.now
         if in_turn:
             self._keep_step(heard)
         turns.expected = end + self._slots.gap
@@ -234,7 +209,7 @@ class Session:
             return
         self._await_slot()
         if self.id in self._members:
-            self._attempts = self._backoff = 0
+            self._joining.succeeded()
         else:
             self._insert(end + self._slots.turnaround)
 
@@ -249,29 +224,27 @@ class Session:
                 self._turns.cursor = len(self._members)
             return
         if members and (heard.type is Type.REQUEST or not in_step):
-            before, self._members.ids = self.members, members
-            self._tell_members(before)
+            self._members.ids = members
         self.round = heard.round
         if heard.root == self.id:  # handed over by a larger ID
-            self._asked_at = self._now, self._now
-        leads = heard.root == self.id
-        self._set_role(Role.INITIATOR if leads else Role.RESPONDER, heard.root)
+            self._members.ask_first(self._time.now)
+        self.role = Role.INITIATOR if heard.root == self.id else Role.RESPONDER
+        self.root = heard.root
 
     def _own_id(self, heard: Frame, end: int) -> None:
         """Another node uses this node's ID: report it, tell it, and keep silent for a while."""
-        if heard.boot == self._boot:
-            self._unreadable()  # an echo
-            return
-        self._out.append(DuplicateId(self.id, heard.boot))
-        if heard.type is Type.ALERT:
+        echo = heard.boot == self._boot
+        if not echo:
+            self._out.append(DuplicateId(self.id, heard.boot))
+        if echo or heard.type is Type.ALERT:  # after an alert it is the other one that is silent
             self._unreadable()
             return
         words = Words(Type.ALERT, heard.root, heard.round, min(heard.slot + 1, heard.n), heard.n)
-        at = max(end, self._now + self._slots.header) + self._slots.turnaround
+        at = max(end, self._time.now + self._slots.header) + self._slots.turnaround
         self._out += self._speaker.say(words, at)[0]
         self._forget()
-        self._set_role(Role.MUTED, self.id)
-        self._turns.wait(Waiting.WATCHDOG, self._now + self._dice.pause(self._params.mute))
+        self.role, self.root = Role.MUTED, self.id
+        self._turns.wait(Waiting.WATCHDOG, self._time.now + self._dice.pause(self._params.mute))
 
     def _unreadable(self) -> None:
         """Time went by with something on the air that tells nothing."""
@@ -280,8 +253,8 @@ class Session:
             return
         turns = self._turns
         if self.role is Role.INITIATOR and self._dice.bits(2) == 0:
-            turns.check_at = self._now  # not in step with whoever spoke at the same time
-        turns.unreadable(self._now, follows=self.role is Role.RESPONDER)
+            turns.check_at = self._time.now  # not in step with whoever spoke at the same time
+        turns.unreadable(self._time.now, follows=self.role is Role.RESPONDER)
         if turns.before in (Waiting.TAKEOVER, Waiting.WATCHDOG):
             turns.request_missing(self.root)
         else:
@@ -290,38 +263,36 @@ class Session:
     def _begin(self) -> None:
         """Begin anew: listen before speaking."""
         self._forget()
-        self._set_role(Role.LISTENING, self.id)
-        self._asked_at, self._turns.heard_at = (self._now, self._now), self._now
-        self._turns.check_at = self._attempts = self._backoff = 0
-        self._tried_round = None
+        self.role, self.root = Role.LISTENING, self.id
+        self._members.ask_first(self._time.now)
+        self._turns.heard_at, self._turns.check_at = self._time.now, 0
+        self._joining.begin()
         self._listen()
 
     def _listen(self) -> None:
-        self._turns.wait(Waiting.START, self._now + self._dice.pause(self._params.listen))
+        self._turns.wait(Waiting.START, self._time.now + self._dice.pause(self._params.listen))
 
     def _forget(self) -> None:
         self._listener.forget()
-        before, self._members.ids = self.members, (self.id,)
-        self._tell_members(before)
+        self._members.ids = (self.id,)
 
-    def _set_role(self, role: Role, root: int) -> None:
-        if (role, root) != (self.role, self.root):
-            self.role, self.root = role, root
-            self._out.append(RoleChanged(role, root))
-
-    def _tell_members(self, before: tuple[int, ...]) -> None:
-        if self.members != before:
-            self._out.append(MembersChanged(self.members, before))
+    def _recent(self, arrived: int) -> bool:
+        return 0 <= self._time.now - arrived <= self._slots.longest + self._slots.header
 
     def _advance(self, now: int) -> bool:
         """Take the time; False if the clock has jumped back, and the node begins anew."""
-        time = unwrap(now, self._now)
-        jumped = time < self._now - _BACK
-        self._now = time + MODULUS if jumped else max(time, self._now)
-        if jumped:
+        goes_on = self._time.take(now)
+        if not goes_on:
             self._begin()
-        return not jumped
+        return goes_on
 
     def _give(self) -> list[Output]:
+        """Hand out what there is, and what has changed since the last time."""
         out, self._out = self._out, []
+        role, members = self._told
+        if role != (self.role, self.root):
+            out.append(RoleChanged(self.role, self.root))
+        if members != self.members:
+            out.append(MembersChanged(self.members, members))
+        self._told = (self.role, self.root), self.members
         return out

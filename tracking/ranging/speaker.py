@@ -9,7 +9,15 @@ from tracking.ranging.events import Transmission
 from tracking.ranging.params import SessionParams
 from tracking.ranging.slots import Slots
 from tracking.ranging.timestamps import MODULUS, on_grid
-from tracking.ranging.wire import Entry, Frame, Type, encode, split
+from tracking.ranging.wire import (
+    MAX_PARTS,
+    Entry,
+    Frame,
+    Type,
+    encode,
+    entries_per_frame,
+    split,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +38,8 @@ class Speaker:
     def __init__(self, node_id: int, params: SessionParams, slots: Slots, boot: int) -> None:
         self._id, self._params, self._slots, self._boot = node_id, params, slots, boot
         self._sequence = 0
+        self.room = MAX_PARTS * entries_per_frame(params.phy.max_frame)
+        """Rows that a message can have."""
 
     def say(self, words: Words, at: int) -> tuple[list[Transmission], int, int]:
         """Make the frames of a message.

@@ -43,3 +43,23 @@ def unwrap(stamp: int, near: int) -> int:
 def on_grid(time: int) -> int:
     """The first time at or after the given one at which a transmission can start."""
     return -(-time // GRID) * GRID
+
+
+class OwnTime:
+    """A node's own clock without wraps, from its stamps; never below zero."""
+
+    def __init__(self) -> None:
+        self.now = 0
+
+    def set(self, stamp: int) -> None:
+        """Begin at a stamp."""
+        self.now = stamp + MODULUS
+
+    def take(self, stamp: int) -> bool:
+        """Go on to a stamp; False if the clock has jumped back, by more than a millisecond."""
+        time = unwrap(stamp, self.now)
+        if time < self.now - ticks(1e-3):
+            self.set(stamp)
+            return False
+        self.now = max(time, self.now)
+        return True

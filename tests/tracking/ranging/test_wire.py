@@ -1,6 +1,7 @@
 """The bytes of a message: what goes in comes out, and nothing else is a frame."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -45,10 +46,9 @@ VECTORS = [
     ),
     (
         Frame(
-            type=Type.JOIN, src=254, root=0, round=255, slot=1, n=1, boot=0, stamp=512,
-            entries=(Entry(0, 1, -60.0, -60.0),),
+            type=Type.JOIN, src=1, root=5, round=255, slot=2, n=2, boot=0, stamp=512, entries=(),
         ),
-        "4188000000fffffe001300ff01010000000200000000010000000000551e",
+        "4188000000ffff01001305ff020200000002000000d0bd",
     ),
 ]  # fmt: skip
 """Frames and their bytes, as in `docs/protocol.md`."""
@@ -253,3 +253,9 @@ def test_powers_are_quantised(rx_power, fp_power):
         assert abs(heard.rx_power - rx_power) <= 1.5
     gap = rx_power - fp_power
     assert abs(heard.rx_power - heard.fp_power - min(max(gap, 0.0), 15.0)) <= 0.5
+
+
+def test_the_documentation_has_these_vectors():
+    text = (Path(__file__).parents[3] / "docs" / "protocol.md").read_text()
+    hexes = text.replace(" ", "").replace("\n", "")
+    assert all(data in hexes for _, data in VECTORS)
