@@ -63,7 +63,7 @@ def protocol(
     recovery, times = measure_recovery(seed, events, lambda share: report(0.3 * share))
     clock = measure_clock_error(seed)
     cost = [
-        {"experiment": "cost", "n": n, "us_per_round": radio_cost(n, max(2, 256 // n**2))[0]}
+        {"experiment": "cost", "n": n, "us_per_round": radio_cost(n, max(4, 2000 // n**2))[0]}
         for n in nodes
     ]
     rates = measure_rates(seed, nodes, lambda share: report(0.3 + 0.7 * share))

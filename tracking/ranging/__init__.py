@@ -1,1 +1,25 @@
-"""The ranging protocol: who sends when, and how long it takes."""
+"""The ranging protocol, without a clock and without a radio; see `docs/protocol.md`."""
+
+from tracking.ranging.events import (
+    DuplicateId,
+    MembersChanged,
+    Reception,
+    Role,
+    RoleChanged,
+    Transmission,
+)
+from tracking.ranging.exchange import RangeEvent
+from tracking.ranging.params import SessionParams
+from tracking.ranging.session import Session
+
+__all__ = [
+    "DuplicateId",
+    "MembersChanged",
+    "RangeEvent",
+    "Reception",
+    "Role",
+    "RoleChanged",
+    "Session",
+    "SessionParams",
+    "Transmission",
+]
