@@ -35,6 +35,7 @@ LATENT = np.dtype(
 NODE = np.dtype(
     [
         ("on", "?"),
+        ("since", "f8"),  # s since the start of the window; deaf before
         ("base", "i8"),  # local clock at the start of the window, whole ticks
         ("frac", "f8"),  # and the rest of a tick
         ("rate", "f8"),  # ticks per second of true time

@@ -127,7 +127,7 @@ def power_nodes(p, batch, e, k, on, boot, t):
                 batch.receptions[e, r].bad = True
     else:
         flight.active, flight.detect, flight.end = False, np.inf, np.inf
-    node.on = on
+    node.on, node.since = on, t
     if on:
         switch_on(p, session, batch.peers[e], k, boot, read_clock(node, t))
 
@@ -186,7 +186,7 @@ def launch(radio, air, k):
 def detect(p, radio, c, seed, air, scene, s, r, t, dt):
     """A node that is free locks on a message; of one that is not the message may be spoilt."""
     node = air.nodes[r]
-    if r == s or not node.on or air.flights[r].active:
+    if r == s or not node.on or t < node.since or air.flights[r].active:
         return
     scratch, rx = air.receptions[air.nodes.shape[0]], air.receptions[r]
     moment = air.flights[s].moment
@@ -262,6 +262,7 @@ def close_window(radio, air, seed, window, dt):
         noise, _ = normal_pair(draw_key(seed, np.uint64(CLOCKS + window * 64 + k)), 0)
         advance_clock(node, dt, radio.wander, noise)
         node.path += node.step
+        node.since -= dt
         if flight.active:
             flight.moment -= dt
             flight.detect -= dt

@@ -32,7 +32,7 @@ def plan(n, seed, seconds):
     rng = np.random.default_rng(seed + 1)
     windows = int(seconds / DT)
     switches = [(0, k, int(rng.integers(256)), rng.uniform(0.0, 0.009)) for k in range(n - 1)]
-    switches.append((windows // 8, n - 1, int(rng.integers(256)), 0.0))
+    switches.append((windows // 8, n - 1, int(rng.integers(256)), float(rng.uniform(0.0, DT))))
     switches += [(windows // 3, 0, None, 0.0), (windows // 2, 0, 17, 0.0)]
     for at in range(windows // 2 + 40, windows - 60, 45):
         node = int(rng.integers(n))
@@ -121,7 +121,7 @@ def test_twin_with_losses_and_hidden_nodes(n, succession, seed):
 def test_twin_when_the_initiator_is_lost(succession):
     params = RadioSimParams(session=SessionParams(succession=succession))
     switches = [(0, k, 5 * k + 1, 0.001 * k) for k in range(4)]
-    switches += [(80, 0, None, 0.0), (200, 1, None, 0.0), (290, 0, 9, 0.0), (330, 1, 9, 0.0)]
+    switches += [(80, 0, None, 0.0), (200, 1, None, 0.0), (290, 0, 9, 0.0037), (330, 1, 9, 0.0081)]
     assert len(compare(params, 4, 21, 4.0, switches)) > 500
 
 
