@@ -175,7 +175,7 @@ def demo(scenario: str, seconds: float, seed: int, cars: int, out: Path, as_json
 @click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
 def protocol(events: int, nodes: str, seed: int, out: Path | None, as_json: bool) -> None:
     """Measure the ranging protocol: rate, recovery when nodes come and go, clock errors."""
-    from agents.output import write_results
+    from agents.output import check_folder, write_results
     from agents.protocol.experiment import protocol as run
     from agents.report import protocol_report as report
     from agents.report.page import png
@@ -184,11 +184,14 @@ def protocol(events: int, nodes: str, seed: int, out: Path | None, as_json: bool
         sizes = tuple(int(n) for n in nodes.split(","))
     except ValueError:
         raise UsageError(f"--nodes: expected numbers such as 3,6,10, got {nodes!r}") from None
+    if out is not None:
+        check_folder(out, ["report.html", *report.PICTURES])
     with progress_bar("protocol") as tell:
         result = run(events=events, nodes=sizes, seed=seed, progress=tell)
     if out is not None:
-        pictures = {name: png(figure) for name, figure in report.figures(result).items()}
-        write_results(out, {"report.html": report.protocol_report(result), **pictures})
+        figures = report.figures(result)
+        pictures = {name: png(figure) for name, figure in figures.items()}
+        write_results(out, {"report.html": report.protocol_report(result, figures), **pictures})
     if as_json:
         emit_json(result.records)
         return

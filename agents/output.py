@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from agents.errors import UsageError
@@ -19,9 +19,8 @@ def write_results(folder: Path, files: Mapping[str, str | bytes]) -> Path:
     Raises:
         UsageError: The folder cannot be written to.
     """
+    check_folder(folder, files)
     try:
-        for name in files:
-            _check_free(folder, name)
         folder.mkdir(parents=True, exist_ok=True)
         scratch = Path(tempfile.mkdtemp(prefix=".writing-", dir=folder))
     except OSError as error:
@@ -39,6 +38,19 @@ def write_results(folder: Path, files: Mapping[str, str | bytes]) -> Path:
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
     return folder
+
+
+def check_folder(folder: Path, names: Iterable[str]) -> None:
+    """See that files of these names can be written, before any work is done for them.
+
+    Raises:
+        UsageError: They cannot.
+    """
+    try:
+        for name in names:
+            _check_free(folder, name)
+    except OSError as error:
+        raise UsageError(f"--out {folder}: cannot be written to ({error.strerror})") from error
 
 
 def _check_free(folder: Path, name: str) -> None:

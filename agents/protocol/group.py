@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from agents.errors import UsageError
 from relpos_env.sensors.air import Air
 from relpos_env.sensors.radio_params import RadioSimParams
 from tracking.ranging.airtime import airtime
@@ -50,14 +51,18 @@ class Group:
         for _ in range(round(seconds / DT)):
             self.air.step(self._pos, self._pos)
 
-    def assemble(self, nodes: range, limit: float) -> bool:
-        """Run until all the given nodes, and no others, know each other; False if they do not."""
+    def assemble(self, nodes: range, limit: float) -> None:
+        """Run until all the given nodes, and no others, know each other.
+
+        Raises:
+            UsageError: They do not within so many seconds.
+        """
         for _ in range(round(limit / DT)):
             self.run(DT)
             sessions = [self.air.sessions[k] for k in nodes]
             if all(s is not None and s.members == tuple(nodes) for s in sessions):
-                return True
-        return False
+                return
+        raise UsageError(f"protocol: {len(nodes)} nodes did not find together in {limit:g} s")
 
     def listen(self) -> list[Heard]:
         """What was sent since the last call."""

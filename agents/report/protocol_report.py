@@ -18,18 +18,17 @@ PAPER_MS = {"responder-join": 12.3, "responder-leave": 12.3, "initiator-loss": 7
 """Mean recovery times of Armani and Holz, ICRA 2024."""
 
 
+PICTURES = ("protocol-timeline.png", "protocol-recovery.png", "protocol-rates.png")
+
+
 def figures(result: ProtocolResult) -> dict[str, Figure]:
     """The pictures by name."""
-    return {
-        "protocol-timeline.png": _timeline(result),
-        "protocol-recovery.png": _recovery(result),
-        "protocol-rates.png": _rates(result),
-    }
+    drawn = _timeline(result), _recovery(result), _rates(result)
+    return dict(zip(PICTURES, drawn, strict=True))
 
 
-def protocol_report(result: ProtocolResult) -> str:
-    """One page."""
-    pictures = figures(result)
+def protocol_report(result: ProtocolResult, pictures: dict[str, Figure]) -> str:
+    """One page with the pictures of `figures`."""
     page = Page(
         "The ranging protocol",
         "Nodes that run the real session in a simulated air: every message, clock and collision.",

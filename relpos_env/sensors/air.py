@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from relpos_env.errors import EnvError
 from relpos_env.sensors._air_kernels import (
     hear_message,
     local_now,
@@ -84,6 +85,8 @@ class Air:
             seed: Any number.
             dt: Length of a window [s].
         """
+        if n_nodes > 64:
+            raise EnvError(f"air: expected at most 64 nodes, got {n_nodes}")
         self._params, self._dt = params, dt
         self._seed = np.uint64(seed)
         self._channel = make_channel(params.channel, KNOT)

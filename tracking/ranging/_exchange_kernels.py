@@ -43,7 +43,7 @@ def predict_skew(p, var, elapsed):
 @small_kernel
 def take_carrier(p, mean, var, offset):
     """Mean and variance of a clock skew after a reading of the carrier offset [1]."""
-    if abs(offset) > p.max_skew:
+    if not abs(offset) <= p.max_skew:  # nor if it is no number
         return mean, var
     gain = var / (var + p.carrier_var)
     return mean + gain * (offset - mean), (1.0 - gain) * var

@@ -93,7 +93,7 @@ def await_slot(p, s, me):
         if leads:
             s.expected += p.message[s.n]
     if mine:
-        wait(s, TURN, s.expected - p.header - p.turnaround)
+        wait(s, TURN, s.expected - p.header - p.gap + p.sense)
     else:
         wait(s, SLOT, s.expected - p.header + p.sense)
 
@@ -139,7 +139,10 @@ def request_missing(p, s, me):
 def unreadable(p, s, me):
     """`Session._unreadable` and `Turns.unreadable`."""
     if s.role == LISTENING:
-        listen(p, s)
+        if s.now < s.heard_at + p.watchdog:
+            listen(p, s)
+        else:
+            wait(s, s.before, s.held_deadline)
         return
     if s.role == INITIATOR and random_bits(s, 2) == 0:
         s.check_at = s.now

@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from tracking.errors import ConfigError
 from tracking.ranging.wire import ENTRY_BYTES, FIXED_BYTES, entries_per_frame
 
 PHR_BITS = 21
@@ -45,10 +46,19 @@ class Phy:
     turnaround: float = 12e-6
     """[s] From receiving to sending."""
     processing: float = 0.0
-    """[s] From the end of a message to the answer being ready. 0 where the payload can be
-    written while the own preamble, 1 ms long, is already on the air."""
+    """[s] From the end of a message to the answer being loaded; the order comes after `sense` of
+    it. 0 where the payload can be written while the own preamble, 1 ms long, is on the air."""
     max_frame: int = 127
     """[bytes] Longest frame; up to 1023 with the long frames of the DW1000."""
+
+    def __post_init__(self) -> None:
+        least = FIXED_BYTES + ENTRY_BYTES
+        if not least <= self.max_frame <= 1023:
+            raise ConfigError(f"max_frame: expected {least} to 1023 bytes, got {self.max_frame}")
+        if not 0.0 < self.turnaround + self.detect < self.sense:
+            raise ConfigError(
+                f"sense: expected more than turnaround and detect, got {self.sense} s"
+            )
 
     @property
     def gap(self) -> float:
@@ -77,7 +87,7 @@ FAST_PHY = Phy(
     header_bit=1.02564e-6,
     data_bit=0.128205e-6,
     detect=16e-6,
-    sense=24e-6,
+    sense=32e-6,
     processing=300e-6,
 )
 """6.8 Mbit/s, preamble 128: eight times the rate, and a shorter reach."""

@@ -35,7 +35,7 @@ class ClockParams:
     jump: float = 2.0
     """[m] More than a range can change between two messages, reflections included; stamps that
     differ by more do not belong together."""
-    max_interval: float = 2.5
+    max_interval: float = 4.0
     """[s] Messages farther apart say nothing about each other's clocks."""
     patience: int = 3
     """[-] After so many misfits in a row it is the estimate that is wrong."""

@@ -26,8 +26,8 @@ class ExchangeParams:
     clocks: ClockParams = field(default_factory=ClockParams)
     max_distance: float = 200.0
     """[m] No radio reaches farther; a longer result is none."""
-    max_reply: float = 1.5
-    """[s] An older question is not answered any more."""
+    max_reply: float = 4.0
+    """[s] An older question is not answered any more; longer than a round of 62 nodes."""
     max_error: float = 0.05
     """[m] Largest error by clock skew, one sigma, of a range without a fresh interval."""
 

@@ -48,7 +48,7 @@ class Listener:
         src = self.peers[frame.src]
         src.rx_power, src.fp_power, src.fresh = reception.rx_power, reception.fp_power, True
         events = [self._overhear(frame, src, row, arrived) for row in frame.entries]
-        events.append(self._receive(frame.src, src, reception, arrived))
+        events.append(self._receive(frame, src, reception, arrived))
         return [event for event in events if event is not None]
 
     def _overhear(self, frame: Frame, src: Peer, row: Entry, arrived: int) -> RangeEvent | None:
@@ -71,13 +71,15 @@ class Listener:
         return self._event(result, (frame.src, row.id), (row.rx_power, row.fp_power))
 
     def _receive(
-        self, sender: int, src: Peer, reception: Reception, arrived: int
+        self, frame: Frame, src: Peer, reception: Reception, arrived: int
     ) -> RangeEvent | None:
-        """Take the message itself, from its sender to this node."""
+        """Take the message itself, from its sender to this node; of its parts the last counts."""
         if reception.carrier is not None:
-            self._exchanges.carrier(self._id, sender, arrived, reception.carrier)
-        result = self._exchanges.add(sender, self._id, Passage(src.sent, arrived, arrived))
-        return self._event(result, (self._id, sender), (reception.rx_power, reception.fp_power))
+            self._exchanges.carrier(self._id, frame.src, arrived, reception.carrier)
+        if frame.part + 1 < frame.parts:
+            return None
+        result = self._exchanges.add(frame.src, self._id, Passage(src.sent, arrived, arrived))
+        return self._event(result, (self._id, frame.src), (reception.rx_power, reception.fp_power))
 
     @staticmethod
     def _event(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from tracking.errors import ConfigError
 from tracking.ranging.airtime import PAPER_PHY, Phy
 from tracking.ranging.exchange import ExchangeParams
 
@@ -39,3 +40,19 @@ class SessionParams:
     antenna_delay: int = 0
     """[ticks] From the radio's stamp to the antenna, and the same on the way in."""
     exchange: ExchangeParams = field(default_factory=ExchangeParams)
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.pan <= 0xFFFF:
+            raise ConfigError(f"pan: expected 0 to 65535, got {self.pan}")
+        for name in ("takeover", "watchdog"):
+            value = getattr(self, name)
+            if not 0.0 < value <= 5.0:  # stamps tell times apart that are within 8.6 s
+                raise ConfigError(f"{name}: expected above 0 and at most 5, got {value}")
+        for name in ("listen", "idle", "first_check", "check", "mute"):
+            low, high = getattr(self, name)
+            if not 0.0 < low <= high <= 1e4:
+                raise ConfigError(f"{name}: expected 0 < low <= high, got {low}, {high}")
+        if self.drop_after < 1:
+            raise ConfigError(f"drop_after: expected at least 1, got {self.drop_after}")
+        if not isinstance(self.antenna_delay, int):
+            raise ConfigError(f"antenna_delay: expected whole ticks, got {self.antenna_delay}")

@@ -24,7 +24,7 @@ from tracking.ranging.members import Members
 from tracking.ranging.params import SessionParams
 from tracking.ranging.slots import Slots
 from tracking.ranging.speaker import Speaker, Words
-from tracking.ranging.timestamps import MODULUS, OwnTime, unwrap
+from tracking.ranging.timestamps import MODULUS, OwnTime, ticks, unwrap
 from tracking.ranging.turns import Turns, Waiting
 from tracking.ranging.wire import MAX_ID, Frame, Type, decode
 
@@ -106,6 +106,7 @@ class Session:
         except WireError:
             heard = None
         if heard is None or heard.pan != self._params.pan or not self._recent(arrived):
+            self._turns.foreign |= heard is not None
             self._unreadable()
         elif heard.src == self.id:
             self._own_id(heard, end)
@@ -249,7 +250,8 @@ class Session:
     def _unreadable(self) -> None:
         """Time went by with something on the air that tells nothing."""
         if self.role is Role.LISTENING:
-            self._listen()
+            patience = self._turns.heard_at + ticks(self._params.watchdog)
+            self._listen() if self._time.now < patience else self._turns.resume()
             return
         turns = self._turns
         if self.role is Role.INITIATOR and self._dice.bits(2) == 0:

@@ -59,7 +59,8 @@ class Turns:
         next."""
         self._held_deadline = 0
         self._opened = -1
-        self._early = False
+        self.foreign = False
+        """Whether what came in was none of this group's: it took no slot, only time."""
 
     @property
     def at_request(self) -> bool:
@@ -75,7 +76,7 @@ class Turns:
         if self.waiting is not Waiting.FRAME:
             self.before, self._held_deadline = self.waiting, self.deadline
             # A newcomer speaks before the member whose turn it is.
-            self._early = now < self.expected - self._slots.header
+            self.foreign = now < self.expected - self._slots.header
         self.wait(Waiting.FRAME, now + self._slots.longest + self._slots.header)
 
     def resume(self) -> None:
@@ -103,7 +104,7 @@ class Turns:
             mine = leads  # a responder listens in its slot, an initiator a little longer
             self.expected += s.message(len(self._members)) if leads else 0
         if mine:
-            self.wait(Waiting.TURN, self.expected - s.header - s.turnaround)
+            self.wait(Waiting.TURN, self.expected - s.header - s.gap + s.sense)
         else:
             self.wait(Waiting.SLOT, self.expected - s.header + s.sense)
 
@@ -137,7 +138,7 @@ class Turns:
             follows: Whether this node is a responder.
         """
         self.expected = now + self._slots.gap + self._slots.header
-        if not self._early and self.before is not Waiting.PART:
+        if not self.foreign and self.before is not Waiting.PART:
             self.cursor = 1 if self.at_request and follows else self.cursor + 1
 
     def request_missing(self, root: int) -> None:

@@ -286,3 +286,16 @@ def test_the_carrier_is_trusted_as_far_as_it_goes(skew, reply, readings, noise):
         assert found[0] == pytest.approx(20.0, abs=3.0 * params.max_error)
     if readings == 0 or reply > params.max_reply:
         assert found is None
+
+
+def test_a_carrier_that_is_no_number_is_not_taken():
+    numbers = ExchangeParams().numbers()
+    for offset in (float("nan"), float("inf"), 1.0):
+        assert take_carrier(numbers, 1e-6, 1e-12, offset) == (1e-6, 1e-12)
+
+
+def test_the_longest_round_has_ranges():
+    params = ExchangeParams()
+    longest = 62 * message_time(PAPER_PHY, 62)
+    assert params.max_reply > longest
+    assert params.clocks.max_interval > longest
