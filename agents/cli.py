@@ -31,7 +31,9 @@ def main() -> None:
     except click.ClickException as error:
         error.show()
         sys.exit(2)
-    except (TrackingError, EnvError, UsageError) as error:
+    except BrokenPipeError:
+        sys.exit(1)
+    except (TrackingError, EnvError, UsageError, OSError) as error:
         click.echo(f"Error: {error}", err=True)
         sys.exit(2)
 

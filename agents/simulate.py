@@ -76,6 +76,9 @@ def simulate(
         if progress is not None:
             progress((k + 1) / n_decisions)
     log = sim.to_log(f"{scenario}-{seed}")
+    if channel is not None or antenna_delay is not None:
+        place = f"channel {channel or 'of the scenario'}, antenna delays {antenna_delay or 0:g} m"
+        log = replace(log, source=f"{log.source}, {place}")
     if out is not None:
         write_log(out, log)
     return log

@@ -51,13 +51,14 @@ def protocol(
     Raises:
         UsageError: A number out of range; the argument is named.
     """
-    if events < 1:
-        raise UsageError(f"--events: expected at least 1, got {events}")
+    if not 1 <= events <= 100_000:
+        raise UsageError(f"--events: expected 1 to 100000, got {events}")
     if seed < 0:
         raise UsageError(f"--seed: expected 0 or more, got {seed}")
     for n in nodes:
         if not 2 <= n <= MAX_MEMBERS:
             raise UsageError(f"--nodes: expected 2 to {MAX_MEMBERS}, got {n}")
+    nodes = tuple(dict.fromkeys(nodes))
     report = progress or (lambda share: None)
     timelines = [run_timeline(seed, mode) for mode in MODES]
     recovery, times = measure_recovery(seed, events, lambda share: report(0.3 * share))

@@ -14,7 +14,7 @@ SCRIPT = (
     (1.0, "a responder joins", 5, True),
     (2.5, "it drops out", 5, False),
     (4.0, "a smaller ID joins", 0, True),
-    (5.5, "it drops out", 0, False),
+    (5.5, "it drops out, the initiator", 0, False),
 )
 """Time [s], what happens, node, whether it is switched on; nodes 1 to 4 are there all along."""
 END = 8.0

@@ -12,6 +12,7 @@ from agents.protocol.timeline import SCRIPT
 from agents.report.page import Page
 
 if TYPE_CHECKING:
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 PAPER_MS = {"responder-join": 12.3, "responder-leave": 12.3, "initiator-loss": 733.4}
@@ -132,10 +133,20 @@ def _recovery(result: ProtocolResult) -> Figure:
         ax.set(title=event, xlabel="ms", ylim=(0, 1.02))
         if event == "initiator-loss":
             ax.set_xscale("log")
+            _plain_ticks(ax.xaxis)
         ax.grid(alpha=0.3)
     figure.axes[0].set_ylabel("share of events")
     figure.axes[0].legend(fontsize=8)
     return figure
+
+
+def _plain_ticks(axis: Axis) -> None:
+    """Numbers at 1, 2 and 5 of every decade: a logarithmic axis may span less than one."""
+    from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
+
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=30))
+    axis.set_major_formatter(FormatStrFormatter("%g"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def _rates(result: ProtocolResult) -> Figure:
@@ -156,6 +167,7 @@ def _rates(result: ProtocolResult) -> Figure:
     right.set(ylabel="us per round, one core", title="cost in simulation, batch")
     for axis in (ax, right):
         axis.set(xscale="log", yscale="log", xlabel="nodes")
+        _plain_ticks(axis.yaxis)
         axis.set_xticks([r["n"] for r in result.cost], [str(r["n"]) for r in result.cost])
         axis.minorticks_off()
         axis.grid(alpha=0.3)

@@ -85,7 +85,7 @@ FAULTS = [
     (["simulate", "x", "--cars", "two"], "--cars"),
     (["simulate", "x", "--channel", "moon"], "channel: expected one of"),
     (["simulate", "x", "--antenna-delay", "-1"], "antenna delay: expected 0 to 10"),
-    (["protocol", "--events", "0"], "--events: expected at least 1"),
+    (["protocol", "--events", "0"], "--events: expected 1 to 100000"),
     (["protocol", "--nodes", "3,x"], "--nodes: expected numbers"),
     (["protocol", "--nodes", "1"], "--nodes: expected 2 to 62"),
     (["protocol", "--seed", "-1"], "--seed: expected 0 or more"),

@@ -10,7 +10,7 @@ from relpos_env.sensors.air import Air
 from relpos_env.sensors.channel import EXACT
 from relpos_env.sensors.radio_params import RadioSimParams
 from tracking.errors import ConfigError
-from tracking.ranging import RangeEvent, Role, SessionParams
+from tracking.ranging import RangeEvent, SessionParams
 from tracking.ranging.airtime import FAST_PHY, PAPER_PHY
 
 DT = 0.01
@@ -46,7 +46,7 @@ def test_every_node_knows_every_pair_also_when_tables_are_split(n):
     assert np.abs(error).max() < 0.2
 
 
-def test_groups_of_different_numbers_share_the_air():
+def test_groups_of_different_numbers_take_turns_in_one_air():
     params = RadioSimParams(channel=EXACT)
     air, pos = Air(params, 6, 4, DT), np.random.default_rng(4).uniform(-3.0, 3.0, (6, 3))
     for k in range(6):
@@ -56,10 +56,9 @@ def test_groups_of_different_numbers_share_the_air():
         if node >= 3:
             air._switch[k] = (at, node, type(session)(node, other, boot=node))
     run(air, pos, 10.0)
-    assert not any(s.role is Role.LISTENING for s in air.sessions)
     for members in ({0, 1, 2}, {3, 4, 5}):
         told = [t for t in air.told if t.node in members and isinstance(t.event, RangeEvent)]
-        assert len(told) > 20
+        assert len(told) > 600  # each group alone would have 7000; they take turns
         assert all({t.event.i, t.event.j} <= members for t in told)
 
 

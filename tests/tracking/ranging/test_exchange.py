@@ -6,6 +6,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from tracking.ranging._exchange_kernels import take_carrier
 from tracking.ranging.airtime import PAPER_PHY, message_time
 from tracking.ranging.events import Reception
 from tracking.ranging.exchange import ExchangeParams, Exchanges, Passage
