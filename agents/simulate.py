@@ -14,7 +14,7 @@ from relpos_env.interface.actions import DriveCommand
 from relpos_env.loop import STAND_STILL
 from relpos_env.registry import look_up
 from relpos_env.scenarios import scenario as find_scenario
-from relpos_env.sensors.channel import CHANNELS
+from relpos_env.sensors.radio.channel import CHANNELS
 from relpos_env.sim import DT, Simulation
 from tracking.log import Log, check_target, write_log
 
@@ -40,7 +40,8 @@ def simulate(
         seconds: Length of the recording; the cars stand for the first two.
         seed: Same seed, same recording, bit for bit.
         cars: Number of cars.
-        channel: What the place does to the radio, one of `relpos_env.sensors.channel.CHANNELS`;
+        channel: What the place does to the radio, one of
+            `relpos_env.sensors.radio.channel.CHANNELS`;
             by default that of the scenario.
         antenna_delay: Standard deviation of what each antenna adds to its ranges [m], for
             recordings to calibrate with; by default that of the scenario.

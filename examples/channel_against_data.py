@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from relpos_env.sensors.channel import OUTDOOR
-from relpos_env.sensors.radio import Radio
-from relpos_env.sensors.radio_params import RadioSimParams
+from relpos_env.sensors.radio.channel import OUTDOOR
+from relpos_env.sensors.radio.params import RadioSimParams
+from relpos_env.sensors.radio.radio import Radio
 
 DT = 0.01
 SHARES = (0.05, 0.25, 0.5, 0.75, 0.95)

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from relpos_env.sensors.air import Air
-from relpos_env.sensors.radio import Radio
-from relpos_env.sensors.radio_params import RadioSimParams
+from relpos_env.sensors.radio.air import Air
+from relpos_env.sensors.radio.params import RadioSimParams
+from relpos_env.sensors.radio.radio import Radio
 from tracking.arrays import F64
 from tracking.ranging.airtime import PAPER_PHY, round_rate
 from tracking.ranging.params import SessionParams

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from agents.protocol.group import DT, radio_params
-from relpos_env.sensors.channel import CALIBRATED, EXACT
-from relpos_env.sensors.radio import Radio
+from relpos_env.sensors.radio.channel import CALIBRATED, EXACT
+from relpos_env.sensors.radio.radio import Radio
 from tracking.arrays import F64
 from tracking.ranging.airtime import PAPER_PHY, message_time
 from tracking.ranging.timestamps import SPEED_OF_LIGHT

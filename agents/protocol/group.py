@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from agents.errors import UsageError
-from relpos_env.sensors.air import Air
-from relpos_env.sensors.radio_params import RadioSimParams
+from relpos_env.sensors.radio.air import Air
+from relpos_env.sensors.radio.params import RadioSimParams
 from tracking.ranging.airtime import airtime
 from tracking.ranging.params import SessionParams
 from tracking.ranging.wire import Frame, decode

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from agents.protocol.group import Group, radio_params
-from relpos_env.sensors.channel import EXACT
+from relpos_env.sensors.radio.channel import EXACT
 from tracking.ranging.airtime import PHYS, round_rate
 from tracking.ranging.exchange import RangeEvent
 from tracking.ranging.wire import Type

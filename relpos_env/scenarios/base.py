@@ -10,7 +10,7 @@ from relpos_env.errors import EnvError
 from relpos_env.sensors.imu import ImuSimParams
 from relpos_env.sensors.magnetometer import MagSimParams
 from relpos_env.sensors.odometer import OdometerSimParams
-from relpos_env.sensors.radio_params import RadioSimParams
+from relpos_env.sensors.radio.params import RadioSimParams
 from relpos_env.vehicle import CarParams
 from relpos_env.world import Obstacle
 from tracking.arrays import F64

@@ -3,8 +3,8 @@
 from relpos_env.sensors.imu import Imu, ImuSimParams
 from relpos_env.sensors.magnetometer import Magnetometer, MagSimParams
 from relpos_env.sensors.odometer import Odometer, OdometerSimParams
-from relpos_env.sensors.radio import Radio
-from relpos_env.sensors.radio_params import RadioSimParams
+from relpos_env.sensors.radio.params import RadioSimParams
+from relpos_env.sensors.radio.radio import Radio
 
 __all__ = [
     "Imu",

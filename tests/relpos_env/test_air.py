@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from relpos_env.sensors.air import Air
-from relpos_env.sensors.channel import EXACT
-from relpos_env.sensors.radio_params import RadioSimParams
+from relpos_env.sensors.radio.air import Air
+from relpos_env.sensors.radio.channel import EXACT
+from relpos_env.sensors.radio.params import RadioSimParams
 from tracking.ranging.events import DuplicateId, Role
 from tracking.ranging.exchange import RangeEvent
 from tracking.ranging.params import SessionParams

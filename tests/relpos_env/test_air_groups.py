@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from relpos_env.errors import EnvError
-from relpos_env.sensors.air import Air
-from relpos_env.sensors.channel import EXACT
-from relpos_env.sensors.radio_params import RadioSimParams
+from relpos_env.sensors.radio.air import Air
+from relpos_env.sensors.radio.channel import EXACT
+from relpos_env.sensors.radio.params import RadioSimParams
 from tracking.errors import ConfigError
 from tracking.ranging import RangeEvent, SessionParams
 from tracking.ranging.airtime import FAST_PHY, PAPER_PHY

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from relpos_env.sensors.air import Air
-from relpos_env.sensors.channel import CALIBRATED, INDOOR
-from relpos_env.sensors.radio import Radio
-from relpos_env.sensors.radio_params import RadioSimParams
+from relpos_env.sensors.radio.air import Air
+from relpos_env.sensors.radio.channel import CALIBRATED, INDOOR
+from relpos_env.sensors.radio.params import RadioSimParams
+from relpos_env.sensors.radio.radio import Radio
 from tracking.ranging.airtime import FAST_PHY, PAPER_PHY
 from tracking.ranging.exchange import RangeEvent
 from tracking.ranging.params import SessionParams

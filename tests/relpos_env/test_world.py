@@ -10,7 +10,7 @@ from relpos_env.errors import EnvError
 from relpos_env.interface.actions import DriveCommand
 from relpos_env.scenarios import SCENARIOS, scenario
 from relpos_env.sensors import Imu, ImuSimParams, Magnetometer, MagSimParams, RadioSimParams
-from relpos_env.sensors.channel import EXACT
+from relpos_env.sensors.radio.channel import EXACT
 from relpos_env.sim import DT, Simulation
 from relpos_env.vehicle import CarParams
 from relpos_env.world import Obstacle, World

@@ -11,14 +11,14 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.stats import kstest
 
-from relpos_env.sensors._air_kernels import hear_message, make_nodes, next_window
-from relpos_env.sensors._air_state import LATENT, NODE, RECEPTION, make_channel
-from relpos_env.sensors._channel_kernels import KNOT
-from relpos_env.sensors._occlusion_kernels import crosses_box, crosses_capsule
-from relpos_env.sensors._random_kernels import draw_key, normal_pair, uniform
-from relpos_env.sensors.channel import CALIBRATED, EXACT, HALL, INDOOR, OUTDOOR
-from relpos_env.sensors.radio import Radio
-from relpos_env.sensors.radio_params import RadioSimParams
+from relpos_env.sensors.radio._air_kernels import hear_message, make_nodes, next_window
+from relpos_env.sensors.radio._air_state import LATENT, NODE, RECEPTION, make_channel
+from relpos_env.sensors.radio._channel_kernels import KNOT
+from relpos_env.sensors.radio._occlusion_kernels import crosses_box, crosses_capsule
+from relpos_env.sensors.radio._random_kernels import draw_key, normal_pair, uniform
+from relpos_env.sensors.radio.channel import CALIBRATED, EXACT, HALL, INDOOR, OUTDOOR
+from relpos_env.sensors.radio.params import RadioSimParams
+from relpos_env.sensors.radio.radio import Radio
 from tracking.ranging.timestamps import METRES_PER_TICK, SPEED_OF_LIGHT
 
 EXAMPLE = run_path(str(ROOT / "examples" / "channel_against_data.py"))
@@ -74,7 +74,7 @@ def autocorrelation(tracks, lag, width):
 
 
 class Line:
-    """Nodes and the messages between them, one by one, as `relpos_env.sensors.air` does it."""
+    """Nodes and the messages between them, one by one, as `radio.air` does it."""
 
     def __init__(self, channel, pos, seed=1, clock_offset=0.0):
         n = len(pos)

@@ -1,4 +1,4 @@
-"""The compiled air: every message of every environment, the twin of `relpos_env.sensors.air`."""
+"""The compiled air: every message of every environment, the twin of `air`."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from relpos_env.sensors._path_kernels import (
+from relpos_env.sensors.radio._path_kernels import (
     CLOCKS,
     advance_clock,
     read_clock,
     receive,
     true_time,
 )
-from relpos_env.sensors._random_kernels import draw_key, normal_pair
+from relpos_env.sensors.radio._random_kernels import draw_key, normal_pair
 from tracking.compiled import kernel, small_kernel
 from tracking.ranging._session_kernels import (
     may_insert,

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from relpos_env.errors import EnvError
-from relpos_env.sensors._air_kernels import make_nodes
-from relpos_env.sensors._air_state import (
+from relpos_env.sensors.radio._air_kernels import make_nodes
+from relpos_env.sensors.radio._air_state import (
     FLIGHT,
     LATENT,
     NODE,
@@ -22,9 +22,9 @@ from relpos_env.sensors._air_state import (
     RangeBuffer,
     make_channel,
 )
-from relpos_env.sensors._channel_kernels import KNOT
-from relpos_env.sensors._radio_kernels import Air, Scene, power_nodes, run_window
-from relpos_env.sensors.radio_params import RadioSimParams
+from relpos_env.sensors.radio._channel_kernels import KNOT
+from relpos_env.sensors.radio._radio_kernels import Air, Scene, power_nodes, run_window
+from relpos_env.sensors.radio.params import RadioSimParams
 from tracking.arrays import F64, I64, Bool
 from tracking.ranging._session_state import MESSAGE, make_sessions, session_numbers
 from tracking.ranging.airtime import airtime, round_rate

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from relpos_env.sensors.channel import ChannelParams
+from relpos_env.sensors.radio.channel import ChannelParams
 from tracking.arrays import F64, I64, Bool
 
 Records = NDArray[Any]

@@ -1,4 +1,4 @@
-"""The formulas of `relpos_env.sensors.channel`, for one message between two antennas."""
+"""The formulas of `relpos_env.sensors.radio.channel`, for one message between two antennas."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from relpos_env.sensors._random_kernels import draw_key, normal_pair, uniform
+from relpos_env.sensors.radio._random_kernels import draw_key, normal_pair, uniform
 from tracking.compiled import small_kernel
 
 _DECIBEL = 20.0 / math.log(10.0)

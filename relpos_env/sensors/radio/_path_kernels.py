@@ -6,15 +6,15 @@ import math
 
 import numpy as np
 
-from relpos_env.sensors._channel_kernels import (
+from relpos_env.sensors.radio._channel_kernels import (
     bring_latents,
     path_error,
     path_strength,
     power_gap,
     reported_power,
 )
-from relpos_env.sensors._occlusion_kernels import crosses_box, crosses_capsule
-from relpos_env.sensors._random_kernels import draw_key, normal_pair, uniform
+from relpos_env.sensors.radio._occlusion_kernels import crosses_box, crosses_capsule
+from relpos_env.sensors.radio._random_kernels import draw_key, normal_pair, uniform
 from tracking.compiled import small_kernel
 from tracking.ranging.timestamps import SPEED_OF_LIGHT
 

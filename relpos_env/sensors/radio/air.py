@@ -1,7 +1,7 @@
 """The air between nodes that run the reference session: every message, clock and collision.
 
-The compiled form for batches of environments, `relpos_env.sensors.radio`, is held to this one
-by a test. Time advances in windows of one step of the world; inside a window all true times
+The compiled form for batches of environments, `radio`, is held to this one by a
+test. Time advances in windows of one step of the world; inside a window all true times
 are seconds since its start.
 
 A receiver that is free locks on a message when it detects its preamble, also late while the
@@ -17,16 +17,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from relpos_env.errors import EnvError
-from relpos_env.sensors._air_kernels import (
+from relpos_env.sensors.radio._air_kernels import (
     hear_message,
     local_now,
     make_nodes,
     next_window,
     true_at,
 )
-from relpos_env.sensors._air_state import LATENT, NODE, RECEPTION, make_channel
-from relpos_env.sensors._channel_kernels import KNOT
-from relpos_env.sensors.radio_params import RadioSimParams
+from relpos_env.sensors.radio._air_state import LATENT, NODE, RECEPTION, make_channel
+from relpos_env.sensors.radio._channel_kernels import KNOT
+from relpos_env.sensors.radio.params import RadioSimParams
 from tracking.arrays import F64
 from tracking.ranging.airtime import airtime
 from tracking.ranging.events import Event, Output, Reception, Transmission

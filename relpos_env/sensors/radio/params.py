@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from relpos_env.sensors.channel import CALIBRATED, ChannelParams
+from relpos_env.sensors.radio.channel import CALIBRATED, ChannelParams
 from tracking.ranging.params import SessionParams
 from tracking.ranging.wire import entries_per_frame
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from relpos_env.sensors._path_kernels import (
+from relpos_env.sensors.radio._path_kernels import (
     CLOCKS,
     STARTS,
     advance_clock,
@@ -12,7 +12,7 @@ from relpos_env.sensors._path_kernels import (
     receive,
     true_time,
 )
-from relpos_env.sensors._random_kernels import draw_key, normal_pair, uniform
+from relpos_env.sensors.radio._random_kernels import draw_key, normal_pair, uniform
 from tracking.compiled import kernel
 from tracking.ranging.timestamps import TICK_HZ
 

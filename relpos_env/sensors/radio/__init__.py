@@ -1,0 +1,1 @@
+"""The air between the nodes: clocks, paths, collisions; `docs/simulator.md` tells what it does."""
