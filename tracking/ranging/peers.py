@@ -100,8 +100,8 @@ class Peers:
         peer = self._peers.get(node)
         return peer is not None and peer.reported > max(peer.heard + ELSEWHERE, since)
 
-    def doubtful(self, node: int) -> bool:
-        """Whether a node may be speaking though its slot is silent: it was lost and heard again."""
+    def note_silence(self, node: int) -> bool:
+        """Note a silent slot; True if the node may be speaking all the same, as it was before."""
         peer = self._peers.get(node)
         if peer is None:
             return False

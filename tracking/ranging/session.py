@@ -166,14 +166,14 @@ class Session:
         elif self.id in self._members:
             kind = Type.REPLY
         n = len(self._members)
-        table = self._peers.table(self._members.others(), self._speaker.room)
-        rows = [] if kind is Type.JOIN else table
+        rows = []
+        if kind is not Type.JOIN:
+            rows = self._peers.table(self._members.others(), self._speaker.room)
         words = Words(kind, root, self.round, min(turns.cursor, n), n, rows)
         frames, sent, turns.expected = self._speaker.say(words, at)
         self._out += frames
         self._listener.spoken(sent)
-        if kind is not Type.JOIN:
-            turns.cursor += 1
+        turns.cursor += kind is not Type.JOIN
         if kind is Type.REQUEST and n == 1:
             turns.expected += self._dice.pause(self._params.idle)
         if root != self.root:  # a smaller ID has joined: the next request is its

@@ -125,7 +125,7 @@ class Turns:
         if missing and not waits:
             return False
         if node != self._id and not missing:
-            waits |= self._peers.doubtful(node)
+            waits |= self._peers.note_silence(node)
         self.expected += self._slots.message(n) if waits else self._slots.silent
         self.cursor = 1 if missing else self.cursor + 1
         return True

@@ -184,25 +184,14 @@ def decode(data: bytes) -> Frame:
     )  # fmt: skip
 
 
-def quantised(rx_power: float, fp_power: float) -> tuple[float, float]:
-    """Powers as they are after a trip through a table [dBm]."""
-    step, gap = _power_steps(rx_power, fp_power)
-    rx = _POWER_TOP - _POWER_STEP * step
-    return rx, rx - gap
-
-
-def _power_steps(rx_power: float, fp_power: float) -> tuple[int, int]:
-    if not (math.isfinite(rx_power) and math.isfinite(fp_power)):
-        return _NOT_HEARD - 1, 15  # an empty register of the radio: as weak as can be
-    step = min(max(round((_POWER_TOP - rx_power) / _POWER_STEP), 0), _NOT_HEARD - 1)
-    return step, min(max(round(rx_power - fp_power), 0), 15)
-
-
 def _quality(entry: Entry) -> int:
     if entry.stamp is None:
         return _NOT_HEARD << 4
-    step, gap = _power_steps(entry.rx_power, entry.fp_power)
-    return step << 4 | gap
+    rx, fp = entry.rx_power, entry.fp_power
+    if not (math.isfinite(rx) and math.isfinite(fp)):
+        return _NOT_HEARD - 1 << 4 | 15  # an empty register of the radio: as weak as can be
+    step = min(max(round((_POWER_TOP - rx) / _POWER_STEP), 0), _NOT_HEARD - 1)
+    return step << 4 | min(max(round(rx - fp), 0), 15)
 
 
 def _entry(row: bytes) -> Entry:

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from relpos_env.sensors.radio._path_kernels import (
-    CLOCKS,
     STARTS,
-    advance_clock,
+    enter_next_window,
     read_clock,
     receive,
     true_time,
@@ -40,10 +39,7 @@ def make_nodes(nodes, seed, clock_offset, antenna_std):
 def next_window(nodes, seed, window, wander, dt):
     """Move the clocks of one environment to the next window."""
     for k in range(nodes.shape[0]):
-        key = draw_key(seed, np.uint64(CLOCKS + window * 64 + k))
-        noise, _ = normal_pair(key, 0)
-        advance_clock(nodes[k], dt, wander, noise)
-        nodes[k].path += nodes[k].step
+        enter_next_window(nodes[k], seed, window, k, dt, wander)
 
 
 @kernel

@@ -43,20 +43,24 @@ def true_time(node, ticks):
 
 
 @small_kernel
-def advance_clock(node, dt, wander, noise):
-    """Go to the next window; the rate wanders.
+def enter_next_window(node, seed, window, k, dt, wander):
+    """Move the clock and the way travelled of a node to the next window; the rate wanders.
 
     Args:
         node: NODE, updated.
+        seed: Of the environment.
+        window: Number of the window that ends.
+        k: Number of the node.
         dt: Length of the window [s].
         wander: Standard deviation of the change of rate in a second [1].
-        noise: Standard normal number.
     """
+    noise, _ = normal_pair(draw_key(seed, np.uint64(CLOCKS + window * 64 + k)), 0)
     total = node.frac + dt * node.rate
     whole = math.floor(total)
     node.base += int(whole)
     node.frac = total - whole
     node.rate *= 1.0 + wander * math.sqrt(dt) * noise
+    node.path += node.step
 
 
 @small_kernel

@@ -8,13 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from relpos_env.sensors.radio._path_kernels import (
-    CLOCKS,
-    advance_clock,
+    enter_next_window,
     read_clock,
     receive,
     true_time,
 )
-from relpos_env.sensors.radio._random_kernels import draw_key, normal_pair
 from tracking.compiled import kernel, small_kernel
 from tracking.ranging._session_kernels import (
     may_insert,
@@ -259,9 +257,7 @@ def close_window(radio, air, seed, window, dt):
     """Make the end of the window the start of the next."""
     for k in range(air.nodes.shape[0]):
         node, flight = air.nodes[k], air.flights[k]
-        noise, _ = normal_pair(draw_key(seed, np.uint64(CLOCKS + window * 64 + k)), 0)
-        advance_clock(node, dt, radio.wander, noise)
-        node.path += node.step
+        enter_next_window(node, seed, window, k, dt, radio.wander)
         node.since -= dt
         if flight.active:
             flight.moment -= dt

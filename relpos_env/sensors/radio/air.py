@@ -42,7 +42,6 @@ class OnAir:
     """One frame that is sent; times since the start of the window [s]."""
 
     data: bytes
-    start: float
     moment: float
     """Of its stamp."""
     detect: float
@@ -154,7 +153,7 @@ class Air:
         self._switch = [(at - self._dt, k, session) for at, k, session in self._switch]
         for queue in self._queue:
             for m in queue:
-                for name in ("start", "moment", "detect", "end"):
+                for name in ("moment", "detect", "end"):
                     setattr(m, name, getattr(m, name) - self._dt)
 
     def _session(self, k: int) -> Session:
@@ -261,5 +260,5 @@ class Air:
         moment = true_at(self._nodes, k, unwrap(order.at, near))
         start = moment - phy.header_time
         end = start + airtime(phy, len(order.data))
-        self._queue[k].append(OnAir(order.data, start, moment, start + phy.detect, end))
+        self._queue[k].append(OnAir(order.data, moment, start + phy.detect, end))
         self.sent.append(Sent(self.t + moment, k, order.data))

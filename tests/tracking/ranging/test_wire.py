@@ -23,7 +23,6 @@ from tracking.ranging.wire import (
     encode,
     entries_per_frame,
     frame_lengths,
-    quantised,
     split,
 )
 
@@ -246,8 +245,10 @@ def test_longest_table_of_the_standard_frame():
 def test_powers_are_quantised(rx_power, fp_power):
     row = Entry(1, 512, rx_power, fp_power)
     heard = decode(encode(replace(PLAIN, entries=(row,)))).entries[0]
-    assert (heard.rx_power, heard.fp_power) == quantised(rx_power, fp_power)
-    assert quantised(heard.rx_power, heard.fp_power) == (heard.rx_power, heard.fp_power)
+    step = min(max(round((-60.0 - rx_power) / 3.0), 0), 14)
+    gap = min(max(round(rx_power - fp_power), 0), 15)
+    assert (heard.rx_power, heard.fp_power) == (-60.0 - 3.0 * step, -60.0 - 3.0 * step - gap)
+    assert decode(encode(replace(PLAIN, entries=(heard,)))).entries[0] == heard
     assert -102.0 <= heard.rx_power <= -60.0
     if -102.0 <= rx_power <= -60.0:
         assert abs(heard.rx_power - rx_power) <= 1.5
