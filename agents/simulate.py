@@ -1,4 +1,4 @@
-"""Recording a simulated drive: what `relpos simulate` does, as a function."""
+"""Recording a simulated run: what `relpos simulate` does, as a function."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from pathlib import Path
 
 import numpy as np
 
-from relpos_env.drivers import LoopDrivers
 from relpos_env.errors import EnvError
-from relpos_env.interface.actions import DriveCommand
-from relpos_env.loop import STAND_STILL
 from relpos_env.registry import look_up
-from relpos_env.scenarios import scenario as find_scenario
+from relpos_env.scenarios import HumanScenario, Scenario, recordable
 from relpos_env.sensors.radio.channel import CHANNELS
-from relpos_env.sim import DT, Simulation
+from relpos_env.sensors.radio.params import RadioSimParams
+from relpos_env.timing import DT, STAND_STILL
 from tracking.log import Log, check_target, write_log
 
 DECISION = 10
-"""[-] Steps of the physics between two decisions of the drivers."""
+"""[-] Steps of the world between two decisions of drivers."""
+
+Progress = Callable[[float], None]
 
 
 def simulate(
@@ -27,19 +27,19 @@ def simulate(
     scenario: str = "cars-nlos",
     seconds: float = 120.0,
     seed: int = 0,
-    cars: int = 3,
+    cars: int | None = None,
     channel: str | None = None,
     antenna_delay: float | None = None,
     out: Path | str | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Log:
-    """Let people drive cars about and record what their trackers measure, with the truth.
+    """Let people drive cars about, or exercise, and record what their trackers measure.
 
     Args:
-        scenario: One of `relpos_env.scenarios.SCENARIOS`.
-        seconds: Length of the recording; the cars stand for the first two.
+        scenario: One of `relpos_env.scenarios.RECORDABLE`.
+        seconds: Length of the recording; nobody moves in the first two.
         seed: Same seed, same recording, bit for bit.
-        cars: Number of cars.
+        cars: Number of cars; by default that of the scenario. People have none.
         channel: What the place does to the radio, one of
             `relpos_env.sensors.radio.channel.CHANNELS`;
             by default that of the scenario.
@@ -58,28 +58,72 @@ def simulate(
         raise EnvError(f"seed: expected 0 or more, got {seed}")
     if out is not None:
         check_target(Path(out))
-    chosen = replace(find_scenario(scenario), n_cars=cars)
-    radio = chosen.radio
-    if channel is not None:
-        radio = replace(radio, channel=look_up(CHANNELS, channel, "channel"))
-    if antenna_delay is not None:
-        if not 0.0 <= antenna_delay <= 10.0:
-            raise EnvError(f"antenna delay: expected 0 to 10 m, got {antenna_delay:g}")
-        radio = replace(radio, antenna_delay_std=antenna_delay)
-    chosen = replace(chosen, radio=radio)
-    sim = Simulation(chosen, np.random.default_rng(seed), record=True)
-    drivers = LoopDrivers(chosen, sim.driver_rng)
-    still = DriveCommand(0.0, np.zeros(cars), np.zeros(cars))
-    n_decisions = round(seconds / (DECISION * DT))
-    for k in range(n_decisions):
-        parked = sim.t < STAND_STILL
-        sim.step(still if parked else drivers.command(sim.state), DECISION)
-        if progress is not None:
-            progress((k + 1) / n_decisions)
-    log = sim.to_log(f"{scenario}-{seed}")
+    chosen = recordable(scenario)
+    radio = _radio(chosen.radio, channel, antenna_delay)
+    rng = np.random.default_rng(seed)
+    name = f"{scenario}-{seed}"
+    if isinstance(chosen, HumanScenario):
+        if cars is not None:
+            raise EnvError(f"cars: scenario {scenario!r} has a person and no cars, got {cars}")
+        log = _exercise(replace(chosen, radio=radio), seconds, rng, name, progress)
+    else:
+        n_cars = chosen.n_cars if cars is None else cars
+        log = _drive(replace(chosen, radio=radio, n_cars=n_cars), seconds, rng, name, progress)
     if channel is not None or antenna_delay is not None:
         place = f"channel {channel or 'of the scenario'}, antenna delays {antenna_delay or 0:g} m"
         log = replace(log, source=f"{log.source}, {place}")
     if out is not None:
         write_log(out, log)
     return log
+
+
+def _radio(
+    radio: RadioSimParams, channel: str | None, antenna_delay: float | None
+) -> RadioSimParams:
+    """The radio of the scenario with what the caller wants otherwise."""
+    if channel is not None:
+        radio = replace(radio, channel=look_up(CHANNELS, channel, "channel"))
+    if antenna_delay is not None:
+        if not 0.0 <= antenna_delay <= 10.0:
+            raise EnvError(f"antenna delay: expected 0 to 10 m, got {antenna_delay:g}")
+        radio = replace(radio, antenna_delay_std=antenna_delay)
+    return radio
+
+
+def _drive(
+    scenario: Scenario, seconds: float, rng: np.random.Generator, name: str, tell: Progress | None
+) -> Log:
+    """Cars with drivers."""
+    from relpos_env.drivers import LoopDrivers
+    from relpos_env.interface.actions import DriveCommand
+    from relpos_env.sim import Simulation
+
+    sim = Simulation(scenario, rng, record=True)
+    drivers = LoopDrivers(scenario, sim.driver_rng)
+    still = DriveCommand(0.0, np.zeros(scenario.n_cars), np.zeros(scenario.n_cars))
+    n_decisions = round(seconds / (DECISION * DT))
+    for k in range(n_decisions):
+        parked = sim.t < STAND_STILL
+        sim.step(still if parked else drivers.command(sim.state), DECISION)
+        if tell is not None:
+            tell((k + 1) / n_decisions)
+    return sim.to_log(name)
+
+
+def _exercise(
+    scenario: HumanScenario,
+    seconds: float,
+    rng: np.random.Generator,
+    name: str,
+    tell: Progress | None,
+) -> Log:
+    """A person who exercises."""
+    from relpos_env.body_sim import BodySimulation
+
+    n_chunks = round(seconds / (DECISION * DT))
+    sim = BodySimulation(scenario, rng, n_chunks * DECISION * DT, record=True)
+    for k in range(n_chunks):
+        sim.step(DECISION)
+        if tell is not None:
+            tell((k + 1) / n_chunks)
+    return sim.to_log(name)

@@ -15,15 +15,13 @@ import numpy as np
 from relpos_env.interface.actions import DriveCommand
 from relpos_env.interface.views import TeamBelief
 from relpos_env.scenarios import Scenario
-from relpos_env.sim import DT, Simulation
+from relpos_env.sim import Simulation
+from relpos_env.timing import DT, STAND_STILL
 from relpos_env.world import WorldState
 from tracking.estimate import TeamEstimate
 from tracking.horizon import Horizon, HorizonParams
 from tracking.ranging.airtime import round_rate
 from tracking.tracker import Tracker, TrackerParams
-
-STAND_STILL = 2.0
-"""[s] The cars stand while their trackers are switched on, as real ones do."""
 
 
 def default_params(scenario: Scenario) -> TrackerParams:

@@ -6,23 +6,20 @@ ever gets; recorded to a log and tracked from there they give the same estimates
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import numpy as np
 
 from relpos_env.errors import EnvError
 from relpos_env.interface.actions import DriveCommand
+from relpos_env.recording import Recording, inertial_blocks, range_block
 from relpos_env.scenarios import Scenario
 from relpos_env.sensors import Imu, Magnetometer, Odometer, Radio
+from relpos_env.timing import DT
 from relpos_env.world import World, WorldState
 from tracking.arrays import F64, Bool
 from tracking.constellation import Antenna, Constellation, NodeConfig
 from tracking.geometry import quat_from_yaw
-from tracking.log import Log, Truth
-from tracking.measurements import Kind, MeasurementBlock
-
-DT = 0.01
-"""[s] One step of the physics, and of the IMUs."""
+from tracking.log import Log
+from tracking.measurements import MeasurementBlock
 
 
 def car_constellation(scenario: Scenario) -> Constellation:
@@ -35,15 +32,6 @@ def car_constellation(scenario: Scenario) -> Constellation:
         heading="magnetic",
         antennas=tuple(Antenna(id=k, node=k, offset_b=(0.0, 0.0, height)) for k in ids),
     )
-
-
-@dataclass(slots=True)
-class Recording:
-    """What a simulation keeps of its measurements and of the truth, to become a log."""
-
-    blocks: list[MeasurementBlock] = field(default_factory=list)
-    nlos: list[Bool] = field(default_factory=list)
-    states: list[WorldState] = field(default_factory=list)
 
 
 class Simulation:
@@ -64,7 +52,6 @@ class Simulation:
         self._radio = Radio(scenario.radio.for_nodes(n), n, [int(radio.integers(1 << 63))], DT)
         for k in range(n):
             self._radio.switch_on(0, k, boot=int(radio.integers(256)))
-        self._nodes = np.arange(n, dtype=np.int64)
         self.odometer_speed: F64 = np.zeros(n)
         """Last odometer reading, (car) [m/s]."""
         self.nlos_share = 0.0
@@ -93,14 +80,14 @@ class Simulation:
             blocks.append(ranges)
             labels.append(nlos)
             if self.recording is not None:
-                self.recording.states.append(after)
+                pos = np.column_stack([after.pos_w, np.zeros(len(after.pos_w))])
+                self.recording.add_truth(after.t, pos, quat_from_yaw(after.heading))
         self.odometer_speed = self._odometer.sample(self.world.state.speed)
         nlos = np.concatenate(labels)
         self.nlos_share = float(nlos.mean()) if len(nlos) else 0.0
         block = MeasurementBlock.concatenate(blocks)
         if self.recording is not None:
-            self.recording.blocks.append(block)
-            self.recording.nlos.append(nlos)
+            self.recording.add_block(block, nlos)
         return block.sorted()
 
     def to_log(self, name: str, *, truth_every: int = 2) -> Log:
@@ -112,32 +99,8 @@ class Simulation:
         """
         if self.recording is None:
             raise EnvError("record: expected True when the simulation was made")
-        states = self.recording.states[truth_every - 1 :: truth_every]
-        n = self.scenario.n_cars
-        pos = np.zeros((len(states) * n, 3))
-        pos[:, :2] = np.concatenate([s.pos_w for s in states])
-        heading = np.concatenate([s.heading for s in states])
-        rows = len(pos)
-        block = MeasurementBlock.concatenate(self.recording.blocks)
-        nlos = np.zeros(block.n_events, dtype=bool)
-        nlos[block.kind[0] == Kind.RANGE] = np.concatenate(self.recording.nlos)
-        order = block.order()[0]
-        block = block.take(order)
-        return Log(
-            name=name,
-            source=f"relpos-env simulation, scenario {self.scenario.name}",
-            licence="CC0-1.0",
-            constellation=self.constellation,
-            block=block,
-            nlos=nlos[order][block.kind[0] == Kind.RANGE],
-            truth=Truth(
-                np.repeat([s.t for s in states], n),
-                np.tile(self._nodes, len(states)),
-                pos,
-                quat_from_yaw(heading),
-                np.ones(rows, dtype=bool),
-                np.ones(rows, dtype=bool),
-            ),
+        return self.recording.to_log(
+            name, self.scenario.name, self.constellation, truth_every=truth_every
         )
 
     def _range(self, before: WorldState, after: WorldState) -> tuple[MeasurementBlock, Bool]:
@@ -145,22 +108,11 @@ class Simulation:
         ranges = self._radio.step(
             self._antennas(before), self._antennas(after), self.world.boxes[None]
         )
-        n = int(ranges.count[0])
-        i, j = ranges.i[0, :n], ranges.j[0, :n]
-        block = MeasurementBlock.of_kind(
-            Kind.RANGE,
-            ranges.t[0, :n],
-            i,
-            ranges.values[0, :n],
-            j=j,
-            antennas=(i, j),
-            has_power=np.ones(n, dtype=bool),
-        )
-        return block, ranges.nlos[0, :n]
+        return range_block(ranges)
 
     def _antennas(self, state: WorldState) -> F64:
         """Where the antennas are, (1, car, 3) [m]."""
-        pos = np.full((1, len(self._nodes), 3), self.scenario.radio.antenna_height)
+        pos = np.full((1, self.scenario.n_cars, 3), self.scenario.radio.antenna_height)
         pos[0, :, :2] = state.pos_w
         return pos
 
@@ -168,8 +120,4 @@ class Simulation:
         """IMU and magnetometer of every car."""
         imu = self._imu.sample(state.heading, state.yaw_rate, state.accel_w, state.speed)
         mag = self._mag.sample(state.pos_w, state.heading)
-        t = np.full(len(self._nodes), state.t)
-        return [
-            MeasurementBlock.of_kind(Kind.MAG, t, self._nodes, mag),
-            MeasurementBlock.of_kind(Kind.IMU, t, self._nodes, imu),
-        ]
+        return inertial_blocks(state.t, imu, mag)

@@ -58,6 +58,24 @@ class TeamEstimate:
     status: I64
     """A `Status`, (..., pair)."""
 
+    @classmethod
+    def empty(cls, constellation: Constellation, t: F64) -> TeamEstimate:
+        """Zeros for the given times, (...), to be filled."""
+        n, p, lead = constellation.n_nodes, constellation.n_pairs, t.shape
+        return cls(
+            constellation=constellation,
+            t=t,
+            pos_ij_w=np.zeros((*lead, p, 3)),
+            vel_ij_w=np.zeros((*lead, p, 3)),
+            cov=np.zeros((*lead, p, 6, 6)),
+            q_wb=np.zeros((*lead, n, 4)),
+            has_orientation=np.zeros((*lead, n), dtype=bool),
+            age=np.zeros((*lead, p)),
+            nis=np.zeros((*lead, p)),
+            nlos_prob=np.zeros((*lead, p)),
+            status=np.zeros((*lead, p), dtype=np.int64),
+        )
+
     @property
     def ok(self) -> Bool:
         """True where the estimate can be used as it is, (..., pair)."""

@@ -9,7 +9,7 @@ rank-d fit of K otherwise [1]. (The text of the paper takes the square root twic
 do not see rotations, shifts and mirror images: X is then aligned to positions known otherwise
 by the orthogonal Procrustes problem [2], mirror images included.
 
-The compiled form for one group is in `tracking.filters._mds_kernels`; this is its plain twin.
+The compiled form for one group is in `tracking.filters.pair._mds_kernels`; this is its plain twin.
 
 References:
     [1] Torgerson, Psychometrika 17 (1952) 401.

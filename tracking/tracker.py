@@ -16,7 +16,7 @@ from tracking.arrays import F64
 from tracking.constellation import Constellation
 from tracking.estimate import TeamEstimate
 from tracking.filters import DEFAULT_FILTER, filter_builder
-from tracking.filters.params import PairEkfParams
+from tracking.filters.params import FilterParams
 from tracking.horizon import HorizonParams
 from tracking.measurements import MeasurementBlock
 from tracking.orientation import Orientation, OrientationParams
@@ -27,7 +27,7 @@ class TrackerParams:
     """Everything the tracker believes."""
 
     orientation: OrientationParams = field(default_factory=OrientationParams)
-    filter: PairEkfParams = field(default_factory=PairEkfParams)
+    filter: FilterParams = field(default_factory=FilterParams)
     horizon: HorizonParams = field(default_factory=HorizonParams)
 
 

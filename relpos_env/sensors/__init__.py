@@ -1,12 +1,13 @@
 """Simulated sensors: what the world does to measurements, never what a filter believes."""
 
-from relpos_env.sensors.imu import Imu, ImuSimParams
+from relpos_env.sensors.imu import HUMAN_IMU, Imu, ImuSimParams
 from relpos_env.sensors.magnetometer import Magnetometer, MagSimParams
 from relpos_env.sensors.odometer import Odometer, OdometerSimParams
 from relpos_env.sensors.radio.params import RadioSimParams
 from relpos_env.sensors.radio.radio import Radio
 
 __all__ = [
+    "HUMAN_IMU",
     "Imu",
     "ImuSimParams",
     "MagSimParams",

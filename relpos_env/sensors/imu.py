@@ -1,10 +1,10 @@
-"""A six-axis IMU on a car: gyroscope and accelerometer with their errors.
+"""A six-axis IMU on a car or a body: gyroscope and accelerometer with their errors.
 
     reading = round(clip(truth + bias(t) + noise + vibration))
 
 The bias is what calibration at rest leaves: a constant and a slow first-order Markov part.
 Noise, range and resolution are those of the LSM6DSOX [1]; vibration is that of a car on a
-floor, white at the output rate and growing with speed.
+floor or of a strap on skin, white at the output rate and growing with speed.
 
 References:
     [1] STMicroelectronics, LSM6DSOX data sheet DS12814.
@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tracking.arrays import F64
-from tracking.geometry import GRAVITY
+from tracking.geometry import GRAVITY, quat_conjugate, rotate
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,11 +52,16 @@ class ImuSimParams:
     """[-] Resolution over the range; 0 for none."""
 
 
+HUMAN_IMU = ImuSimParams(vibration=0.5, gyr_vibration=0.05, vibration_speed=2.0)
+"""On a person: skin and straps shake behind heel strikes and swings. The size is assumed: soft
+tissue moves by millimetres at 10 Hz to 20 Hz, of which 0.5 m/s2 is a modest share."""
+
+
 class Imu:
-    """The IMUs of all cars. Laws: same seed, same stream; no errors, the truth."""
+    """The IMUs of all nodes. Laws: same seed, same stream; no errors, the truth."""
 
     def __init__(
-        self, params: ImuSimParams, n_cars: int, rng: np.random.Generator, dt: float = 0.01
+        self, params: ImuSimParams, n_nodes: int, rng: np.random.Generator, dt: float = 0.01
     ) -> None:
         self._params = p = params
         self._rng = rng
@@ -65,12 +70,12 @@ class Imu:
         self._noise = np.repeat([p.gyr_noise, p.acc_noise], 3)
         self._vibration = np.repeat([p.gyr_vibration, p.vibration], 3)
         self._range = np.repeat([p.gyr_range, p.acc_range], 3)
-        self._bias = constant * rng.standard_normal((n_cars, 6))
-        self._drift = self._drift_std * rng.standard_normal((n_cars, 6))
+        self._bias = constant * rng.standard_normal((n_nodes, 6))
+        self._drift = self._drift_std * rng.standard_normal((n_nodes, 6))
         self._keep = float(np.exp(-dt / p.drift_tau))
 
     def sample(self, heading: F64, yaw_rate: F64, accel_w: F64, speed: F64) -> F64:
-        """One sample of every car.
+        """One sample of every car, which moves in the plane.
 
         Args:
             heading: (car) [rad].
@@ -88,6 +93,26 @@ class Imu:
         truth[:, 3] = c * accel_w[:, 0] + s * accel_w[:, 1]
         truth[:, 4] = -s * accel_w[:, 0] + c * accel_w[:, 1]
         truth[:, 5] = GRAVITY
+        return self._read(truth, speed)
+
+    def sample_3d(self, q_wb: F64, rate_b: F64, accel_w: F64, speed: F64) -> F64:
+        """One sample of every node, which moves in space.
+
+        Args:
+            q_wb: Orientation, body to world, (node, 4).
+            rate_b: Angular rate in the body frame, (node, 3) [rad/s].
+            accel_w: World acceleration, (node, 3) [m/s2].
+            speed: (node) [m/s].
+
+        Returns:
+            Gyroscope [rad/s] and specific force [m/s2] in the body frame, (node, 6).
+        """
+        force_w = accel_w + np.array([0.0, 0.0, GRAVITY])
+        return self._read(np.hstack([rate_b, rotate(quat_conjugate(q_wb), force_w)]), speed)
+
+    def _read(self, truth: F64, speed: F64) -> F64:
+        """What the IMUs make of the true rates and specific forces, (node, 6)."""
+        n = len(truth)
         innovation = np.sqrt(1.0 - self._keep**2) * self._drift_std
         self._drift = self._keep * self._drift + innovation * self._rng.standard_normal((n, 6))
         share = np.minimum(np.abs(speed) / self._params.vibration_speed, 1.0)[:, None]

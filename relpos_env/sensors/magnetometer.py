@@ -1,7 +1,9 @@
-"""A magnetometer on a car: the field of the earth, bent by the building.
+"""A magnetometer on a car or a body: the field of the earth, bent by the building.
 
 The disturbance is a smooth field fixed in the room: a few waves of a few metres' length, as
-steel in floors and walls makes it. Noise, range and resolution are those of the LIS3MDL [1].
+steel in floors and walls makes it. It is the same at every height: real fields are bent most
+near the floor, so that a person's knees would see more of it than the arms. Noise, range and
+resolution are those of the LIS3MDL [1].
 
 References:
     [1] STMicroelectronics, LIS3MDL data sheet DS9463.
@@ -15,6 +17,7 @@ import numpy as np
 
 from relpos_env.sensors.imu import quantise
 from tracking.arrays import F64
+from tracking.geometry import quat_conjugate, rotate
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,9 +43,9 @@ class MagSimParams:
 
 
 class Magnetometer:
-    """The magnetometers of all cars, in one room. Laws as for `Imu`."""
+    """The magnetometers of all nodes, in one room. Laws as for `Imu`."""
 
-    def __init__(self, params: MagSimParams, n_cars: int, rng: np.random.Generator) -> None:
+    def __init__(self, params: MagSimParams, n_nodes: int, rng: np.random.Generator) -> None:
         self._params = p = params
         self._rng = rng
         angle = rng.uniform(0.0, 2.0 * np.pi, p.n_waves)
@@ -51,7 +54,7 @@ class Magnetometer:
         self._phase = rng.uniform(0.0, 2.0 * np.pi, p.n_waves)
         scale = p.disturbance * np.sqrt(2.0 / max(p.n_waves, 1))
         self._amplitude = scale * rng.standard_normal((p.n_waves, 3))
-        self._hard_iron = p.hard_iron * rng.standard_normal((n_cars, 3))
+        self._hard_iron = p.hard_iron * rng.standard_normal((n_nodes, 3))
 
     def field(self, pos_w: F64) -> F64:
         """Field in the world frame at points of the plane, (point, 3) [uT]."""
@@ -67,5 +70,20 @@ class Magnetometer:
             [c * field[:, 0] + s * field[:, 1], -s * field[:, 0] + c * field[:, 1], field[:, 2]],
             axis=1,
         )
+        return self._read(body)
+
+    def sample_3d(self, pos_w: F64, q_wb: F64) -> F64:
+        """One reading of every node in space, in its body frame.
+
+        Args:
+            pos_w: (node, 3) [m].
+            q_wb: Orientation, body to world, (node, 4).
+
+        Returns:
+            (node, 3) [uT].
+        """
+        return self._read(rotate(quat_conjugate(q_wb), self.field(pos_w[:, :2])))
+
+    def _read(self, body: F64) -> F64:
         noise = self._params.noise * self._rng.standard_normal(body.shape)
         return quantise(body + self._hard_iron + noise, self._params.full_scale, self._params.bits)

@@ -75,7 +75,7 @@ def test_single_bad_measurements_are_shown(recording, tmp_path):
 FAULTS = [
     (["track", "nowhere"], "no such folder"),
     (["track"], "Missing argument"),
-    (["track", ".", "--filter", "magic"], "filter: expected one of ekf, ekf-mds"),
+    (["track", ".", "--filter", "magic"], "filter: expected one of joint, ekf-mds, ekf"),
     (["track", ".", "--skip", "-1"], "--skip"),
     (["track", "."], "no meta.toml"),
     (["simulate", "x", "--scenario", "moon"], "scenario: expected one of"),
@@ -172,7 +172,7 @@ def test_demo_tells_errors_and_draws_the_drive(tmp_path):
     done = relpos("demo", "--seconds", 20, "--out", tmp_path / "demo", "--json")
     assert done.returncode == 0, done.stderr
     *tracks, formation = [json.loads(line) for line in done.stdout.splitlines()]
-    assert [t["filter"] for t in tracks] == ["ekf", "ekf-mds"]
+    assert [t["filter"] for t in tracks] == ["joint", "ekf-mds", "ekf"]
     assert 0.0 < formation["formation_error_truth"] < 0.3
     assert "<canvas" in (tmp_path / "demo" / "report.html").read_text()
 

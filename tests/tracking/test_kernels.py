@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tracking.filters import _mds_kernels, _pair_kernels
-from tracking.filters.state import starting_rotations
+from tracking.filters.pair import _mds_kernels, _pair_kernels
+from tracking.filters.rotations import starting_rotations
 from tracking.mds import classical_mds, refine_positions
 
 

@@ -1,24 +1,27 @@
-"""Position filters. Adding one: a file beside `pair_ekf.py` and a line in `FILTERS`."""
+"""Position filters. Adding one: a folder beside `joint` and a line in `FILTERS`."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 
+from tracking.constellation import Constellation
 from tracking.errors import ConfigError
 from tracking.filters.base import Filter
-from tracking.filters.pair_ekf import PairEkf
+from tracking.filters.joint import JointEkf
+from tracking.filters.pair import PairEkf
+from tracking.filters.params import FilterParams
 
-FILTERS: dict[str, Callable[..., Filter]] = {
-    "ekf": partial(PairEkf, use_mds=False),
-    "ekf-mds": PairEkf,
+FILTERS: dict[str, Callable[[Constellation, FilterParams, int], Filter]] = {
+    "joint": lambda who, params, n_envs: JointEkf(who, params.joint, n_envs),
+    "ekf-mds": lambda who, params, n_envs: PairEkf(who, params.pair, n_envs),
+    "ekf": lambda who, params, n_envs: PairEkf(who, params.pair, n_envs, use_mds=False),
 }
 """Name to builder ``(constellation, params, n_envs) -> Filter``."""
 
-DEFAULT_FILTER = "ekf-mds"
+DEFAULT_FILTER = "joint"
 
 
-def filter_builder(name: str) -> Callable[..., Filter]:
+def filter_builder(name: str) -> Callable[[Constellation, FilterParams, int], Filter]:
     """Look a filter up.
 
     Raises:
@@ -29,4 +32,4 @@ def filter_builder(name: str) -> Callable[..., Filter]:
     return FILTERS[name]
 
 
-__all__ = ["DEFAULT_FILTER", "FILTERS", "Filter", "PairEkf", "filter_builder"]
+__all__ = ["DEFAULT_FILTER", "FILTERS", "Filter", "FilterParams", "filter_builder"]

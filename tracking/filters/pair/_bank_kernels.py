@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from tracking.compiled import kernel, small_kernel
-from tracking.filters._mds_kernels import refine
-from tracking.filters._start_kernels import SURVEYED, copy_hypothesis, hypothesis_positions
+from tracking.filters._shape_kernels import SURVEYED
+from tracking.filters.pair._mds_kernels import refine
+from tracking.filters.pair._start_kernels import copy_hypothesis, hypothesis_positions
 
 
 @small_kernel

@@ -11,39 +11,13 @@ from __future__ import annotations
 import numpy as np
 
 from tracking.compiled import kernel
-
-SURVEYED = 1_000_000
-"""So many ranges a surveyed distance counts as."""
-
-
-@kernel
-def collect(c, pair, t, distance, is_survey):
-    """Add one of the first ranges of a pair; a survey replaces them."""
-    if is_survey:
-        pair.start_sum = distance * SURVEYED
-        pair.start_n = SURVEYED
-        return
-    if pair.start_n >= SURVEYED:
-        return
-    if pair.start_n == 0 or t - pair.start_t > c.start_max_age:
-        pair.start_n = 0
-        pair.start_sum = 0.0
-        pair.start_t = t
-    pair.start_sum += distance
-    pair.start_n += 1
-
-
-@kernel
-def is_ready(c, s, layout, i, j):
-    """True when a pair has its first k ranges."""
-    return s.pairs[layout.pair_index[i, j]].start_n >= c.start_k
-
-
-@kernel
-def start_distance(s, layout, i, j):
-    """Mean of the first ranges of a pair [m]."""
-    pair = s.pairs[layout.pair_index[i, j]]
-    return pair.start_sum / pair.start_n
+from tracking.filters._shape_kernels import (
+    choose_members,
+    first_shape,
+    is_ready,
+    place,
+    start_distance,
+)
 
 
 @kernel
@@ -65,42 +39,13 @@ def begin_pair(c, s, h, p, pos, t):
 
 
 @kernel
-def choose_members(c, s, layout, members):
-    """Nodes of which all pairs are ready, written; returns how many, 0 if too few to start."""
-    n = s.nodes.shape[0]
-    for first in range(n):
-        members[0] = first
-        m = 1
-        for k in range(n):
-            fits = k != first
-            for a in range(m):
-                if fits and (members[a] == k or not is_ready(c, s, layout, members[a], k)):
-                    fits = False
-            if fits:
-                members[m] = k
-                m += 1
-        if m >= min(3, n):
-            return m
-    return 0
-
-
-@kernel
 def try_start(c, s, layout, t):
     """Start the group with the nodes whose pairs are all ready."""
     members = np.empty(s.nodes.shape[0], np.int64)
     m = choose_members(c, s, layout, members)
     if m == 0:
         return
-    D2 = np.zeros((m, m))
-    for a in range(m):
-        for b in range(m):
-            if a != b:
-                D2[a, b] = start_distance(s, layout, members[a], members[b]) ** 2
-    J = np.eye(m) - 1.0 / m
-    eigenvalues, E = np.linalg.eigh(-0.5 * J @ D2 @ J)
-    X = np.zeros((m, 3))
-    for k in range(min(c.d, m)):
-        X[:, k] = E[:, m - 1 - k] * np.sqrt(max(eigenvalues[m - 1 - k], 0.0))
+    X = first_shape(s, layout, members, m, c.d)
     for a in range(m):
         s.nodes[members[a]].present = True
     for h in range(layout.rotations.shape[0]):
@@ -139,52 +84,6 @@ def hypothesis_positions(s, layout, h, pos):
 
 
 @kernel
-def place(c, known, distance, sides):
-    """Where a node is, from its distances to known ones; both candidates if a mirror fits too.
-
-    Args:
-        c: Coefficients.
-        known: Positions, (known, 3) [m].
-        distance: Distances to them, (known) [m].
-        sides: The candidates, (2, 3), written.
-
-    Returns:
-        1 if the known nodes span the space, 2 if they are too flat to tell the side.
-    """
-    m, d = known.shape[0], c.d
-    centre = np.zeros(d)
-    for a in range(m):
-        centre += known[a, :d] / m
-    A = known[:, :d].copy() - centre
-    _, S, Vt = np.linalg.svd(A.T.copy() @ A)
-    spanned = 0
-    for k in range(d):
-        if np.sqrt(S[k] / m) > c.mds_min_spread:
-            spanned += 1
-    # |p|^2 - 2 a.p + |a|^2 = d^2: its differences from the mean are linear in p.
-    b = np.zeros(m)
-    for a in range(m):
-        b[a] = 0.5 * (np.sum(A[a] * A[a]) - distance[a] ** 2)
-    b -= np.mean(b)
-    p = np.zeros(d)
-    for k in range(spanned):
-        along = Vt[k].copy()
-        p += along * (np.sum((A @ along) * b) / S[k])
-    sides[:, :] = 0.0
-    height2 = 0.0
-    for a in range(m):
-        height2 += (distance[a] ** 2 - np.sum((p - A[a]) ** 2)) / m
-    height = np.sqrt(max(height2, 0.0)) if spanned < d else 0.0
-    for side in range(2):
-        up = height if side == 0 else -height
-        for k in range(d):
-            sides[side, k] = centre[k] + p[k]
-            if spanned < d:
-                sides[side, k] += up * Vt[spanned, k]
-    return 1 if spanned == d or height < c.merge_distance else 2
-
-
-@kernel
 def try_join(c, s, layout, new, t):
     """Take a node in once it is ready with enough of the others."""
     n = s.nodes.shape[0]
@@ -209,7 +108,7 @@ def try_join(c, s, layout, new, t):
         for a in range(n_ready):
             known[a] = pos[ready[a]]
             distance[a] = start_distance(s, layout, new, ready[a])
-        n_sides = place(c, known, distance, sides)
+        n_sides = place(c.d, c.mds_min_spread, c.merge_distance, known, distance, sides)
         for side in range(n_sides):
             target = h if side == 0 else copy_hypothesis(s, h)
             if target < 0:

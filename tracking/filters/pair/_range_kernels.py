@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from tracking.compiled import kernel, small_kernel
-from tracking.filters._pair_kernels import (
+from tracking.filters.pair._pair_kernels import (
     correct,
     predict,
     range_model,

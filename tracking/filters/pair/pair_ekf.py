@@ -18,12 +18,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.arrays import F64, I64, Bool
+from tracking.arrays import F64
 from tracking.constellation import Constellation
 from tracking.estimate import TeamEstimate
-from tracking.filters._event_kernels import run_events
-from tracking.filters.params import PairEkfParams
-from tracking.filters.state import (
+from tracking.filters.pair._event_kernels import run_events
+from tracking.filters.pair.params import PairEkfParams
+from tracking.filters.pair.state import (
     FilterState,
     as_records,
     make_coefficients,
@@ -51,7 +51,6 @@ class PairEkf:
 
     def run(self, block: MeasurementBlock, t_out: F64) -> TeamEstimate:
         """Handle the events and report at the given times; see `Filter.run`."""
-        out = self._make_outputs(t_out.shape[1])
         events = (
             block.t,
             block.kind,
@@ -64,23 +63,21 @@ class PairEkf:
         )
         contiguous = tuple(np.ascontiguousarray(a) for a in events)
         t_out = np.ascontiguousarray(t_out, dtype=np.float64)
+        estimate = TeamEstimate.empty(self._constellation, t_out)
+        out = (
+            estimate.pos_ij_w,
+            estimate.vel_ij_w,
+            estimate.cov,
+            estimate.q_wb,
+            estimate.has_orientation,
+            estimate.age,
+            estimate.nis,
+            estimate.status,
+        )
         run_events(
             as_records(self._coefficients), self._layout, self._records(), contiguous, t_out, out
         )
-        pos, vel, cov, q_wb, has_q, age, nis, status = out
-        return TeamEstimate(
-            constellation=self._constellation,
-            t=t_out,
-            pos_ij_w=pos,
-            vel_ij_w=vel,
-            cov=cov,
-            q_wb=q_wb,
-            has_orientation=has_q,
-            age=age,
-            nis=nis,
-            nlos_prob=np.zeros_like(age),
-            status=status,
-        )
+        return estimate
 
     def reset(self, env: int) -> None:
         """Forget everything of one environment."""
@@ -116,18 +113,3 @@ class PairEkf:
     def _fresh(self, n_envs: int) -> FilterState:
         n_hyps = len(self._layout.rotations)
         return make_state(self._constellation, self._params, n_envs, n_hyps)
-
-    def _make_outputs(self, n_times: int) -> tuple[F64, F64, F64, F64, Bool, F64, F64, I64]:
-        """Arrays that the kernel fills: pos, vel, cov, q, has_q, age, nis, status."""
-        lead = (self._n_envs, n_times)
-        n, p = self._constellation.n_nodes, self._constellation.n_pairs
-        return (
-            np.zeros((*lead, p, 3)),
-            np.zeros((*lead, p, 3)),
-            np.zeros((*lead, p, 6, 6)),
-            np.zeros((*lead, n, 4)),
-            np.zeros((*lead, n), dtype=bool),
-            np.zeros((*lead, p)),
-            np.zeros((*lead, p)),
-            np.zeros((*lead, p), dtype=np.int64),
-        )

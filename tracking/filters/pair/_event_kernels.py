@@ -8,23 +8,24 @@ from typing import NamedTuple
 import numpy as np
 
 from tracking.compiled import kernel, small_kernel
-from tracking.filters._bank_kernels import (
+from tracking.filters._shape_kernels import collect
+from tracking.filters.pair._bank_kernels import (
     add_mirror_image,
     prune_bank,
     refine_group,
     remove_node,
     remove_silent,
 )
-from tracking.filters._pair_kernels import predict
-from tracking.filters._range_kernels import (
+from tracking.filters.pair._pair_kernels import predict
+from tracking.filters.pair._range_kernels import (
     advance_pair,
     fuse_range,
     fuse_survey,
     is_aided,
     node_variance,
 )
-from tracking.filters._start_kernels import collect, try_join, try_start
-from tracking.filters.state import FilterState
+from tracking.filters.pair._start_kernels import try_join, try_start
+from tracking.filters.pair.state import FilterState
 
 # Plain numbers of `Kind` and `Status`: kernels do not know enums.
 JOIN, STATE, SURVEY, RANGE, LEAVE = 0, 3, 4, 5, 6

@@ -1,0 +1,112 @@
+"""`relpos track`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from agents.console import emit_json, print_table, progress_bar
+from agents.errors import UsageError
+
+
+@click.command()
+@click.argument("logs", metavar="LOG [LOG ...]", nargs=-1, required=True, type=Path)
+@click.option(
+    "--filter",
+    "filters",
+    multiple=True,
+    help="joint (default), ekf-mds or ekf; may be given again.",
+)
+@click.option(
+    "--calibration",
+    "calibrations",
+    multiple=True,
+    type=Path,
+    help="A calibration.toml to correct measurements with; may be given again.",
+)
+@click.option("--skip", default=10.0, show_default=True, help="Seconds that are not scored.")
+@click.option("--out", type=Path, help="Folder for estimates.csv and report.html.")
+@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+def track(
+    logs: tuple[Path, ...],
+    filters: tuple[str, ...],
+    calibrations: tuple[Path, ...],
+    skip: float,
+    out: Path | None,
+    as_json: bool,
+) -> None:
+    """Track recorded runs and score them where they have truth."""
+    from agents.calibrate import apply_calibrations
+    from agents.report.track_report import track_report
+    from agents.track import estimates_csv, track_log
+    from tracking.filters import DEFAULT_FILTER, filter_builder
+    from tracking.log import read_log
+
+    if not 0.0 <= skip < float("inf"):
+        raise UsageError(f"--skip: expected 0 or more seconds, got {skip:g}")
+    names = tuple(dict.fromkeys(filters)) or (DEFAULT_FILTER,)
+    for name in names:
+        filter_builder(name)
+    read = [apply_calibrations(read_log(path), calibrations) for path in logs]
+    results = []
+    for log in read:
+        for name in names:
+            label = f"{log.name}, {name}"
+            with progress_bar(label, shown=log.duration > 20.0) as report:
+                results.append(track_log(log, filter=name, skip=skip, progress=report))
+    if out is not None:
+        from agents.output import write_results
+
+        many = len(results) > 1
+        files = {"report.html": track_report(results)}
+        for k, r in enumerate(results):
+            folder = f"{k + 1:02d}-{_file_name(r.log.name)}-{r.filter}/" if many else ""
+            files[f"{folder}estimates.csv"] = estimates_csv(r.estimate)
+        write_results(out, files)
+    if as_json:
+        emit_json(r.summary for r in results)
+        return
+    print_tracks(results)
+    if out is not None:
+        click.echo(f"\nwritten: {out / 'report.html'} and estimates.csv")
+
+
+def print_tracks(results: Sequence[Any]) -> None:
+    """Errors over all pairs and for each of them."""
+    from agents.report.page import metres
+    from agents.track import pair_name
+
+    rows = []
+    for r in results:
+        s = r.summary
+        head = [f"{s['log']}  {s['filter']}", "all"]
+        rows.append([*head, *(metres(s[k]) for k in ("rmse", "rmse_yaw", "rmse_shape"))])
+        pairs = [p for p, e in enumerate(r.score.pair_rmse) if e == e]
+        for p in pairs:
+            figures = (r.score.pair_rmse, r.score.pair_rmse_yaw, r.score.pair_rmse_shape)
+            name = pair_name(r.log.constellation, p)
+            rows.append(["", name, *(metres(float(f[p])) for f in figures)])
+    header = ["log and filter", "pair", "rmse", "rmse_yaw", "rmse_shape"]
+    print_table("Errors of relative positions [m]", header, rows)
+    for r in results:
+        skipped = ", ".join(f"{n} in {name}" for name, n in r.log.skipped.items()) or "0"
+        click.echo(
+            f"{r.log.name}, {r.filter}: {r.log.n_ranges} ranges in {r.log.duration:.0f} s, "
+            f"{r.n_rejected} refused as outliers, bad rows skipped: {skipped}, "
+            f"status ok {100 * r.score.ok_share:.0f} % of the scored time, "
+            f"{r.realtime_factor:.0f} times faster than real time"
+        )
+        if r.score.rmse is None:
+            reason = (
+                "there is no truth"
+                if not len(r.log.truth.t)
+                else (f"no estimated pair has truth from {r.skip:g} s after the first range")
+            )
+            click.echo(f"{r.log.name}, {r.filter}: no errors, since {reason}")
+
+
+def _file_name(name: str) -> str:
+    return "".join(ch if ch.isascii() and (ch.isalnum() or ch in "-_") else "_" for ch in name)[:60]

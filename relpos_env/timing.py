@@ -1,0 +1,6 @@
+"""The clock of the simulated world."""
+
+DT = 0.01
+"""[s] One step of the physics, of the IMUs, and of the air."""
+STAND_STILL = 2.0
+"""[s] Cars and people stand while their trackers are switched on, as real ones do."""

@@ -1,0 +1,81 @@
+"""True distances between the antennas of every range of a log."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tracking.arrays import F64, I64, Bool
+from tracking.constellation import Constellation
+from tracking.geometry import rotate
+from tracking.log.truth import MAX_GAP, Truth
+from tracking.measurements import Kind, MeasurementBlock
+
+
+@dataclass(frozen=True, slots=True)
+class RangeTable:
+    """The ranges of one environment, in order."""
+
+    i: I64
+    """Node index, (range)."""
+    j: I64
+    """Other node index, (range)."""
+    measured: F64
+    """(range) [m]"""
+    true: F64
+    """Distance between the antennas, (range) [m]; 0 where not known."""
+    known: Bool
+    """(range)"""
+
+
+def range_table(block: MeasurementBlock, constellation: Constellation, truth: Truth) -> RangeTable:
+    """Put beside every range of environment 0 what it should have been.
+
+    A distance is known where both positions are and, for an antenna that is not at the
+    origin of its body, the orientation too.
+
+    Args:
+        block: Measurements; RANGE events are used.
+        constellation: Nodes and antennas.
+        truth: True positions and orientations.
+    """
+    r = block.take(block.valid[0] & (block.kind[0] == Kind.RANGE))
+    t, inverse = np.unique(r.t[0], return_inverse=True)
+    pos, known = truth.positions(constellation, t)
+    ends, ok = [], np.ones(r.n_events, dtype=bool)
+    for node, antenna in ((r.i[0], r.antenna_i[0]), (r.j[0], r.antenna_j[0])):
+        end = pos[inverse, node]
+        ok &= known[inverse, node]
+        offset = constellation.antenna_offset_b[antenna]
+        levered = np.any(offset != 0.0, axis=1)
+        for n in np.unique(node[levered]):
+            mine = levered & (node == n)
+            q, has = _orientation(truth, int(n), bool(constellation.is_static[n]), r.t[0, mine])
+            end[mine] += rotate(q, offset[mine])
+            ok[mine] &= has
+        ends.append(end)
+    true = np.linalg.norm(ends[1] - ends[0], axis=1)
+    return RangeTable(r.i[0], r.j[0], r.values[0, :, 0], np.where(ok, true, 0.0), ok)
+
+
+def _orientation(truth: Truth, node: int, static: bool, t: F64) -> tuple[F64, Bool]:
+    """Orientation of a node between rows of truth, (time, 4), and where it is known, (time)."""
+    rows = np.nonzero(truth.valid & truth.has_orientation & (truth.node == node))[0]
+    if len(rows) == 0:
+        return np.tile([1.0, 0.0, 0.0, 0.0], (len(t), 1)), np.zeros(len(t), dtype=bool)
+    t_n, q_n = truth.t[rows], truth.q_wb[rows]
+    if static:
+        return np.tile(q_n[0], (len(t), 1)), np.ones(len(t), dtype=bool)
+    after = np.searchsorted(t_n, t, side="left").clip(0, len(t_n) - 1)
+    before = np.maximum(after - 1, 0)
+    span = t_n[after] - t_n[before]
+    share = np.where(span > 0.0, (t - t_n[before]) / np.where(span > 0.0, span, 1.0), 1.0)
+    share = share.clip(0.0, 1.0)[:, None]
+    # The shorter way round: q and -q are the same rotation.
+    sign = np.where(np.sum(q_n[before] * q_n[after], axis=1) < 0.0, -1.0, 1.0)[:, None]
+    q = (1.0 - share) * q_n[before] + share * sign * q_n[after]
+    norm = np.linalg.norm(q, axis=1, keepdims=True)
+    inside = (t >= t_n[0]) & (t <= t_n[-1]) & (span <= MAX_GAP)
+    known = (inside | (t_n[after] == t)) & (norm[:, 0] > 0.0)
+    return q / np.where(norm > 0.0, norm, 1.0), known

@@ -1,0 +1,205 @@
+"""The bank of hypotheses: mirror images that become possible, and which ones are kept.
+
+A layout and its mirror image have the same ranges; motion tells them apart. While the nodes
+pass through a line (or a plane, in space) the two are one, and the filter may come out on the
+wrong side. So its mirror image is followed beside it from there, until one is unlikely.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tracking.compiled import kernel
+from tracking.filters._shape_kernels import SURVEYED
+from tracking.filters.joint._linear_kernels import decouple
+from tracking.filters.joint._start_kernels import copy_hypothesis
+
+FLAT, OPEN = 2.5, 4.0
+"""Extent of a layout across itself, in standard deviations: less is flat, more is open again."""
+MISFIT = 3.0
+"""[-] Ranges that fit so badly, as a running mean of NIS, bring the mirror image up too."""
+
+
+@kernel
+def centred(c, s, h):
+    """Positions and velocities round their means in hypothesis h, (2, node, d), and how many.
+
+    Velocities are those of the moving nodes. Rows of nodes that are not there are 0.
+    """
+    n, d = s.nodes.shape[0], c.d
+    out = np.zeros((2, n, d))
+    present, moving = 0, 0
+    for i in range(n):
+        node = s.nodes[i]
+        if node.present:
+            present += 1
+            out[0, i] = s.x[h, node.at_p : node.at_p + d]
+            if not node.static:
+                moving += 1
+                out[1, i] = s.x[h, node.at_v : node.at_v + d]
+    for k in range(d):
+        mean_p = np.sum(out[0, :, k]) / max(present, 1)
+        mean_v = np.sum(out[1, :, k]) / max(moving, 1) if moving == present else 0.0
+        for i in range(n):
+            if s.nodes[i].present:
+                out[0, i, k] -= mean_p
+                if not s.nodes[i].static:
+                    out[1, i, k] -= mean_v
+    return out, present
+
+
+@kernel
+def flatness(c, s, h):
+    """Extent of the layout across itself over its standard deviation; large for few nodes."""
+    n, d = s.nodes.shape[0], c.d
+    out, present = centred(c, s, h)
+    if present <= d:
+        return np.inf
+    pos = out[0].copy()
+    eigenvalues, E = np.linalg.eigh(pos.T.copy() @ pos)
+    variance = 0.0
+    for k in range(d):
+        for q in range(d):
+            total, own = 0.0, 0.0
+            for i in range(n):
+                if not s.nodes[i].present:
+                    continue
+                at_i = s.nodes[i].at_p + k
+                own += s.P[h, at_i, s.nodes[i].at_p + q]
+                for j in range(n):
+                    if s.nodes[j].present:
+                        total += s.P[h, at_i, s.nodes[j].at_p + q]
+            variance += E[k, 0] * E[q, 0] * (own - total / present)
+    return np.sqrt(max(eigenvalues[0], 0.0) / max(variance, 1e-12))
+
+
+@kernel
+def add_mirror_image(c, s):
+    """Make the mirror image of the reported hypothesis one, if the bank has room.
+
+    It is mirrored across the line or plane that the layout is nearest to, velocities as well.
+    """
+    h, d = s.group[0].best, c.d
+    target = copy_hypothesis(s, h)
+    if target < 0:
+        return
+    out, _ = centred(c, s, h)
+    pos = out[0].copy()
+    _, E = np.linalg.eigh(pos.T.copy() @ pos)
+    M = np.eye(c.n)
+    for i in range(s.nodes.shape[0]):
+        node = s.nodes[i]
+        if not node.present:
+            continue
+        for r in range(d):
+            for k in range(d):
+                M[node.at_p + r, node.at_p + k] -= 2.0 * E[r, 0] * E[k, 0]
+                s.x[target, node.at_p + r] -= 2.0 * E[r, 0] * E[k, 0] * out[0, i, k]
+                if not node.static:
+                    M[node.at_v + r, node.at_v + k] -= 2.0 * E[r, 0] * E[k, 0]
+                    s.x[target, node.at_v + r] -= 2.0 * E[r, 0] * E[k, 0] * out[1, i, k]
+    s.P[target] = M @ s.P[h].copy() @ M.T.copy()
+
+
+@kernel
+def watch_mirror(c, s):
+    """Bring the mirror image up where it can no longer be excluded."""
+    group = s.group[0]
+    if group.n_alive != 1:
+        return
+    ratio = flatness(c, s, group.best)
+    if ratio < FLAT:
+        group.flat = True
+    elif group.flat and ratio > OPEN:
+        group.flat = False
+        add_mirror_image(c, s)
+    elif group.misfit > MISFIT and ratio > OPEN and ratio < np.inf:
+        group.misfit = 1.0
+        add_mirror_image(c, s)
+
+
+@kernel
+def prune_bank(c, s):
+    """Drop hypotheses that are unlikely or the same as a better one; choose the best."""
+    group = s.group[0]
+    if group.n_alive < 2:
+        return
+    n_hyps = s.alive.shape[0]
+    best = -1
+    for h in range(n_hyps):
+        if s.alive[h] and (best < 0 or s.loglik[h] > s.loglik[best]):
+            best = h
+    # The report changes only for a clear gain, or equal hypotheses would take turns.
+    if not s.alive[group.best] or s.loglik[best] > s.loglik[group.best] + 2.0:
+        group.best = best
+    top = s.loglik[best]
+    for h in range(n_hyps):
+        if s.alive[h] and h != group.best and s.loglik[h] < top - c.prune:
+            s.alive[h] = False
+    for a in range(n_hyps):
+        for b in range(n_hyps):
+            if (
+                a != b
+                and s.alive[a]
+                and s.alive[b]
+                and b != group.best
+                and (s.loglik[a] >= s.loglik[b] or a == group.best)
+                and are_same(c, s, a, b)
+            ):
+                s.alive[b] = False
+    group.n_alive = np.sum(s.alive)
+    for h in range(n_hyps):
+        s.loglik[h] -= top
+
+
+@kernel
+def are_same(c, s, a, b):
+    """True when two hypotheses agree in position and velocity of every node round the centre.
+
+    Velocities count over one second: a layout and its mirror image may meet in a line, but
+    they go on to different sides.
+    """
+    one, _ = centred(c, s, a)
+    other, _ = centred(c, s, b)
+    for i in range(s.nodes.shape[0]):
+        if np.sum((one[:, i] - other[:, i]) ** 2) > c.merge_distance**2:
+            return False
+    return True
+
+
+@kernel
+def remove_node(c, s, layout, i):
+    """Forget a node that left."""
+    node = s.nodes[i]
+    node.present, node.heard = False, False
+    n_present = 0
+    for k in range(s.nodes.shape[0]):
+        n_present += s.nodes[k].present
+        if k != i:
+            pair = s.pairs[layout.pair_index[i, k]]
+            pair.n_ranges = 0
+            if pair.start_n < SURVEYED:
+                pair.start_n = 0
+    for h in range(s.alive.shape[0]):
+        if s.alive[h]:
+            for r in range(node.at_p, node.at_p + (c.d if node.static else 3 * c.d + 1)):
+                decouple(s.x, s.P, h, c.n, r, 1.0)
+            for k in range(s.nodes.shape[0]):
+                at = s.pairs[layout.pair_index[i, k]].at_e if k != i else -1
+                if at >= 0:
+                    decouple(s.x, s.P, h, c.n, at, 1.0)
+                    decouple(s.x, s.P, h, c.n, at + 1, 1.0)
+    if n_present < 2:
+        for k in range(s.nodes.shape[0]):
+            s.nodes[k].present = False
+        s.alive[:] = False
+        s.group[0].n_alive = 0
+        s.group[0].started = False
+
+
+@kernel
+def remove_silent(c, s, layout, t):
+    """Remove the nodes that were not heard for so long that they must have left."""
+    for i in range(s.nodes.shape[0]):
+        if s.nodes[i].present and t - s.nodes[i].t_heard > c.leave_after:
+            remove_node(c, s, layout, i)

@@ -1,0 +1,138 @@
+"""What is known without measuring: cars do not slide sideways, a still node is still.
+
+Also the gauge: ranges and accelerations say nothing about where the group as a whole is. Its
+centre is moved back to the origin from time to time, with a fixed uncertainty that is
+independent of all else; differences between nodes do not feel it.
+"""
+
+from __future__ import annotations
+
+import math
+
+from tracking.compiled import small_kernel
+from tracking.filters.joint._linear_kernels import absorb, project, symmetrise
+
+CENTRE_VAR = 1.0
+"""[m2] Variance of the centre after it was moved back."""
+
+
+@small_kernel
+def apply_carriers(c, s, h, t, dt, scratch):
+    """Use what is known about the carriers, in hypothesis h.
+
+    Args:
+        c: Coefficients.
+        s: JointState of one environment, at time t.
+        h: Hypothesis.
+        t: Time [s].
+        dt: Time since the last use [s].
+        scratch: Room.
+    """
+    for i in range(s.nodes.shape[0]):
+        node = s.nodes[i]
+        if not node.present or node.static or t - node.t_state > c.unaided_after:
+            continue
+        if node.rests and t - node.t_moved > c.rest_after:
+            for k in range(c.d):
+                scratch.idx[0], scratch.val[0] = node.at_v + k, 1.0
+                judge(c, s, h, -s.x[h, node.at_v + k], 1, c.rest_var, scratch)
+        elif node.sideways_var > 0.0:
+            hold_on_wheels(c, s, h, i, scratch)
+    hold_speed(c, s, h, dt, scratch)
+
+
+@small_kernel
+def judge(c, s, h, nu, m, variance, scratch):
+    """Correct with a constraint, and let it speak for or against the hypothesis."""
+    S = project(s.P, h, c.n, m, scratch.idx, scratch.val, scratch.w) + variance
+    s.loglik[h] -= 0.5 * (min(nu * nu / S, c.max_nis) + math.log(S))
+    if nu * nu > 25.0 * S:
+        S = nu * nu / 25.0  # a jolt or a skid: it counts for less
+    absorb(s.x, s.P, h, c.n, scratch.w, nu, S)
+
+
+@small_kernel
+def hold_on_wheels(c, s, h, i, scratch):
+    """The rear axle does not move sideways; in space, a wheeled node does not rise."""
+    node = s.nodes[i]
+    angle = node.yaw + s.x[h, node.at_h]
+    cos_y, sin_y = math.cos(angle), math.sin(angle)
+    v0, v1 = s.x[h, node.at_v], s.x[h, node.at_v + 1]
+    sideways = -sin_y * v0 + cos_y * v1
+    idx, val = scratch.idx, scratch.val
+    idx[0], idx[1], idx[2] = node.at_v, node.at_v + 1, node.at_h
+    val[0], val[1], val[2] = -sin_y, cos_y, -(cos_y * v0 + sin_y * v1)
+    judge(c, s, h, node.rear_axle * node.yaw_rate - sideways, 3, node.sideways_var, scratch)
+    if c.d == 3:
+        idx[0], val[0] = node.at_v + 2, 1.0
+        judge(c, s, h, -s.x[h, node.at_v + 2], 1, node.sideways_var, scratch)
+
+
+@small_kernel
+def hold_speed(c, s, h, dt, scratch):
+    """The mean velocity of the moving nodes is that of things that are carried.
+
+    Once a second by weight: `dt` spreads it evenly.
+    """
+    m, variance = 0, 0.0
+    for i in range(s.nodes.shape[0]):
+        if s.nodes[i].present and not s.nodes[i].static:
+            m += 1
+            variance += s.nodes[i].speed_var
+    if m == 0:
+        return
+    variance /= m * max(dt, 1e-3)
+    for k in range(c.d):
+        a, mean = 0, 0.0
+        for i in range(s.nodes.shape[0]):
+            if s.nodes[i].present and not s.nodes[i].static:
+                at = s.nodes[i].at_v + k
+                scratch.idx[a], scratch.val[a] = at, 1.0 / m
+                mean += s.x[h, at] / m
+                a += 1
+        S = project(s.P, h, c.n, m, scratch.idx, scratch.val, scratch.w) + variance
+        absorb(s.x, s.P, h, c.n, scratch.w, -mean, S)
+
+
+@small_kernel
+def centre(c, s, h, w):
+    """Move the centre of the group to the origin: ``p <- p - mean p``, and P with it.
+
+    The covariance becomes ``T P T^T`` with the projection T, plus a common variance, so that
+    it stays positive definite and bounded.
+    """
+    n_nodes = s.nodes.shape[0]
+    present = 0
+    for i in range(n_nodes):
+        present += s.nodes[i].present
+    if present == 0:
+        return
+    for k in range(c.d):
+        mean = 0.0
+        for r in range(c.n):
+            w[r] = 0.0
+        for i in range(n_nodes):
+            if s.nodes[i].present:
+                at = s.nodes[i].at_p + k
+                mean += s.x[h, at] / present
+                for r in range(c.n):
+                    w[r] += s.P[h, at, r] / present
+        for i in range(n_nodes):
+            if s.nodes[i].present:
+                at = s.nodes[i].at_p + k
+                s.x[h, at] -= mean
+                for r in range(c.n):
+                    s.P[h, at, r] -= w[r]
+        for r in range(c.n):
+            total = 0.0
+            for i in range(n_nodes):
+                if s.nodes[i].present:
+                    total += s.P[h, r, s.nodes[i].at_p + k]
+            for i in range(n_nodes):
+                if s.nodes[i].present:
+                    s.P[h, r, s.nodes[i].at_p + k] -= total / present
+        for i in range(n_nodes):
+            for j in range(n_nodes):
+                if s.nodes[i].present and s.nodes[j].present:
+                    s.P[h, s.nodes[i].at_p + k, s.nodes[j].at_p + k] += CENTRE_VAR
+    symmetrise(s.P, h, c.n)

@@ -1,0 +1,102 @@
+"""The report: relative positions, velocities and covariances of the best hypothesis."""
+
+from __future__ import annotations
+
+from tracking.compiled import kernel
+from tracking.filters.joint._motion_kernels import predict, sum_inertial
+from tracking.filters.joint.state import JointState
+
+# Plain numbers of `Status`: kernels do not know enums.
+ABSENT, STARTING, AMBIGUOUS, OK, LOST = 0, 1, 2, 3, 4
+
+
+@kernel
+def write_estimate(c, s, scratch, t, e, o, out):
+    """The best hypothesis at time t, without touching the state."""
+    pos, vel, cov, q_wb, has_q, age, nis, nlos, status = out
+    group = s.group[0]
+    h, d, n = group.best, c.d, s.nodes.shape[0]
+    for i in range(n):
+        has_q[e, o, i] = s.nodes[i].has_state
+        for k in range(4):
+            q_wb[e, o, i, k] = s.held[i, k]
+    if group.started:
+        look_ahead(c, s, scratch, t)
+    x, P = scratch.x[0], scratch.P[0]
+    for p in range(s.pairs.shape[0]):
+        pair = s.pairs[p]
+        node_i, node_j = s.nodes[pair.i], s.nodes[pair.j]
+        nis[e, o, p] = pair.nis
+        if not (node_i.present and node_j.present):
+            status[e, o, p] = STARTING if node_i.heard and node_j.heard else ABSENT
+            continue
+        nlos[e, o, p] = s.nlos[h, p]
+        age[e, o, p] = t - pair.t_range
+        worst = 0.0
+        for k in range(d):
+            pos[e, o, p, k] = x[node_j.at_p + k] - x[node_i.at_p + k]
+            if not node_j.static:
+                vel[e, o, p, k] += x[node_j.at_v + k]
+            if not node_i.static:
+                vel[e, o, p, k] -= x[node_i.at_v + k]
+        for a in range(2 * d):
+            for b in range(a, 2 * d):
+                v = pair_covariance(P, node_i, node_j, a, b, d)
+                r, q = (a if a < d else 3 + a - d), (b if b < d else 3 + b - d)
+                cov[e, o, p, r, q] = v
+                cov[e, o, p, q, r] = v
+            if a < d:
+                worst = max(worst, cov[e, o, p, a, a])
+        if group.n_alive > 1:
+            status[e, o, p] = AMBIGUOUS
+        elif node_i.static and node_j.static:
+            status[e, o, p] = OK
+        elif age[e, o, p] > c.lost_after or worst > c.ok_var:
+            status[e, o, p] = LOST
+        else:
+            status[e, o, p] = OK
+
+
+@kernel
+def pair_covariance(P, node_i, node_j, a, b, d):
+    """Covariance of two components of ``(p_j - p_i, v_j - v_i)``."""
+    total = 0.0
+    for one in range(2):
+        node_a = node_j if one == 1 else node_i
+        at_a = node_a.at_p + a if a < d else (-1 if node_a.static else node_a.at_v + a - d)
+        for other in range(2):
+            node_b = node_j if other == 1 else node_i
+            at_b = node_b.at_p + b if b < d else (-1 if node_b.static else node_b.at_v + b - d)
+            if at_a >= 0 and at_b >= 0:
+                total += P[at_a, at_b] if one == other else -P[at_a, at_b]
+    return total
+
+
+@kernel
+def look_ahead(c, s, scratch, t):
+    """The states at time t, written to the scratch."""
+    h, n = s.group[0].best, s.nodes.shape[0]
+    scratch.x[0] = s.x[h]
+    scratch.P[0] = s.P[h]
+    scratch.pre[:] = s.pre
+    for i in range(n):
+        scratch.t_pre[i] = s.nodes[i].t_pre
+        if s.nodes[i].present and not s.nodes[i].static:
+            sum_inertial(c, s.nodes, s.held, scratch.pre, i, t)
+    if t > s.group[0].t:
+        scratch.nlos[0] = s.nlos[h]
+        ahead = JointState(
+            s.nodes,
+            s.held,
+            scratch.pre,
+            s.pairs,
+            s.group,
+            scratch.x,
+            scratch.P,
+            scratch.nlos,
+            s.alive,
+            s.loglik,
+        )
+        predict(c, ahead, 0, t - s.group[0].t, scratch)
+    for i in range(n):
+        s.nodes[i].t_pre = scratch.t_pre[i]

@@ -1,0 +1,251 @@
+"""The loop over events: one pass in time order, estimates written where they are due."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tracking.compiled import kernel, small_kernel
+from tracking.filters._shape_kernels import collect
+from tracking.filters.joint._bank_kernels import (
+    prune_bank,
+    remove_node,
+    remove_silent,
+    watch_mirror,
+)
+from tracking.filters.joint._carrier_kernels import apply_carriers, centre
+from tracking.filters.joint._estimate_kernels import write_estimate
+from tracking.filters.joint._motion_kernels import predict, sum_inertial, take_state
+from tracking.filters.joint._range_kernels import (
+    antenna_offset,
+    fuse_range,
+    fuse_survey,
+    gap_evidence,
+)
+from tracking.filters.joint._start_kernels import try_join, try_start
+from tracking.filters.joint.state import N_PRE, JointState
+
+# Plain numbers of `Kind`: kernels do not know enums.
+JOIN, STATE, SURVEY, RANGE, LEAVE = 0, 3, 4, 5, 6
+GAUGE_PERIOD = 1.0
+"""[s] Time between two moves of the centre to the origin."""
+
+
+class Scratch(NamedTuple):
+    """Room for intermediate results, so that no event allocates."""
+
+    idx: np.ndarray
+    """States of a measurement."""
+    val: np.ndarray
+    """Derivatives by them."""
+    w: np.ndarray
+    """(state)"""
+    scale: np.ndarray
+    """(state)"""
+    step: np.ndarray
+    """(node, 9)"""
+    speed: np.ndarray
+    """(node)"""
+    none: np.ndarray
+    """Zeros, (3)."""
+    x: np.ndarray
+    """States of an estimate, (1, state)."""
+    P: np.ndarray
+    """Its covariance, (1, state, state)."""
+    pre: np.ndarray
+    """Its sums, (node, N_PRE)."""
+    t_pre: np.ndarray
+    """(node) [s]"""
+    nlos: np.ndarray
+    """(1, pair)"""
+
+
+@kernel
+def run_events(coefficients, layout, state, block, t_out, out):
+    """Handle the events of every environment in order.
+
+    Args:
+        coefficients: COEFFICIENTS, (1).
+        layout: Tables.
+        state: JointState, updated.
+        block: Events: t, kind, i, j, antenna_i, antenna_j, values, has_power, valid;
+            (env, event, ...).
+        t_out: Times at which estimates are due, ascending, (env, time) [s]. An estimate
+            holds every event up to its time, that time included.
+        out: Arrays written: pos, vel, cov, q, has_q, age, nis, nlos, status; (env, time, ...).
+    """
+    t, kind, node_i, node_j, antenna_i, antenna_j, values, has_power, valid = block
+    c = coefficients[0]
+    n = state.nodes.shape[1]
+    scratch = Scratch(
+        np.zeros(max(16, n), np.int64),
+        np.zeros(max(16, n)),
+        np.zeros(c.n),
+        np.zeros(c.n),
+        np.zeros((n, 9)),
+        np.zeros(n),
+        np.zeros(3),
+        np.zeros((1, c.n)),
+        np.zeros((1, c.n, c.n)),
+        np.zeros((n, N_PRE)),
+        np.zeros(n),
+        np.zeros((1, state.pairs.shape[1])),
+    )
+    for e in range(t.shape[0]):
+        s = JointState(
+            state.nodes[e],
+            state.held[e],
+            state.pre[e],
+            state.pairs[e],
+            state.group[e],
+            state.x[e],
+            state.P[e],
+            state.nlos[e],
+            state.alive[e],
+            state.loglik[e],
+        )
+        o = 0
+        for k in range(t.shape[1]):
+            if not valid[e, k]:
+                continue
+            while o < t_out.shape[1] and t_out[e, o] < t[e, k]:
+                write_estimate(c, s, scratch, t_out[e, o], e, o, out)
+                o += 1
+            i, j, what = node_i[e, k], node_j[e, k], kind[e, k]
+            if what == STATE:
+                take_state(c, s.nodes, s.held, s.pre, i, t[e, k], values, e, k)
+            elif what in (RANGE, SURVEY):
+                a_i, a_j = antenna_i[e, k], antenna_j[e, k]
+                if i > j:
+                    i, j, a_i, a_j = j, i, a_j, a_i
+                evidence = 0.0
+                if has_power[e, k]:
+                    evidence = gap_evidence(c, values[e, k, 1] - values[e, k, 2])
+                hear(
+                    c,
+                    s,
+                    layout,
+                    scratch,
+                    i,
+                    j,
+                    a_i,
+                    a_j,
+                    t[e, k],
+                    values[e, k, 0],
+                    evidence,
+                    what == SURVEY,
+                )
+            elif what == LEAVE or (what == JOIN and s.nodes[i].present):
+                remove_node(c, s, layout, i)
+        while o < t_out.shape[1]:
+            write_estimate(c, s, scratch, t_out[e, o], e, o, out)
+            o += 1
+
+
+@small_kernel
+def hear(c, s, layout, scratch, i, j, a_i, a_j, t, distance, evidence, is_survey):
+    """A range or survey between nodes i < j."""
+    node_i, node_j = s.nodes[i], s.nodes[j]
+    node_i.heard, node_j.heard = True, True
+    node_i.t_heard, node_j.t_heard = t, t
+    if s.group[0].started:
+        advance(c, s, scratch, t)
+        if t - s.group[0].t_check >= c.check_period:
+            look_at_group(c, s, layout, t)
+    p = layout.pair_index[i, j]
+    if node_i.present and node_j.present:
+        take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, evidence, is_survey)
+    else:
+        take_first_range(c, s, layout, i, j, p, t, distance, is_survey)
+
+
+@small_kernel
+def advance(c, s, scratch, t):
+    """Carry every hypothesis to time t, and use what is known about the carriers."""
+    group = s.group[0]
+    if t > group.t:
+        for i in range(s.nodes.shape[0]):
+            if s.nodes[i].present and not s.nodes[i].static:
+                sum_inertial(c, s.nodes, s.held, s.pre, i, t)
+        first, end = bank_range(s)
+        for h in range(first, end):
+            if s.alive[h]:
+                predict(c, s, h, t - group.t, scratch)
+        for i in range(s.nodes.shape[0]):
+            for k in range(N_PRE):
+                s.pre[i, k] = 0.0
+        group.t = t
+    if t - group.t_carrier >= c.carrier_period:
+        first, end = bank_range(s)
+        for h in range(first, end):
+            if s.alive[h]:
+                apply_carriers(c, s, h, t, t - group.t_carrier, scratch)
+        group.t_carrier = t
+    if t - group.t_gauge >= GAUGE_PERIOD:
+        first, end = bank_range(s)
+        for h in range(first, end):
+            if s.alive[h]:
+                centre(c, s, h, scratch.w)
+        group.t_gauge = t
+
+
+@small_kernel
+def bank_range(s):
+    """Hypotheses to go through: all, or the only one."""
+    group = s.group[0]
+    if group.n_alive > 1:
+        return 0, s.alive.shape[0]
+    return group.best, group.best + 1
+
+
+@small_kernel
+def take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, evidence, is_survey):
+    """A range or survey of a running pair, at the time of the states."""
+    pair, group = s.pairs[p], s.group[0]
+    i0, i1, i2 = antenna_offset(s.held, layout, pair.i, a_i)
+    j0, j1, j2 = antenna_offset(s.held, layout, pair.j, a_j)
+    levers = (i0, i1, i2, j0, j1, j2)
+    dt = max(t - pair.t_range, 0.0)
+    first, end = bank_range(s)
+    for h in range(first, end):
+        if not s.alive[h]:
+            continue
+        if is_survey:
+            fuse_survey(c, s, h, p, distance, scratch)
+            continue
+        nis, weight = fuse_range(c, s, h, p, dt, distance, levers, evidence, scratch)
+        if h == group.best:
+            pair.nis = nis
+            capped = min(nis, 25.0)
+            pair.misfit += 0.05 * (capped - pair.misfit)
+            group.misfit += 0.01 * (weight * capped - group.misfit)
+            if weight > 0.5:
+                group.nis_sum += nis
+                group.nis_n += 1
+            else:
+                pair.n_rejected += 1
+    pair.t_range = t
+    pair.n_ranges += 1
+
+
+@kernel
+def take_first_range(c, s, layout, i, j, p, t, distance, is_survey):
+    """A range or survey of a pair that does not run yet, i < j."""
+    collect(c, s.pairs[p], t, distance, is_survey)
+    if not s.group[0].started:
+        try_start(c, s, layout, t)
+        return
+    if not s.nodes[i].present:
+        try_join(c, s, layout, i, t)
+    if not s.nodes[j].present:
+        try_join(c, s, layout, j, t)
+
+
+@kernel
+def look_at_group(c, s, layout, t):
+    """From time to time: who left, and which hypotheses are worth their time."""
+    remove_silent(c, s, layout, t)
+    prune_bank(c, s)
+    watch_mirror(c, s)
+    s.group[0].t_check = t

@@ -1,0 +1,271 @@
+"""Dead reckoning: inertial samples are summed per node, and applied when a measurement comes.
+
+Between two STATE events the acceleration a goes straight from one to the other; until the
+second comes, the first is held, and what that was wrong by is added then. With T the time
+since the last measurement, the sums ``dv = int a``, ``dp = int int a`` and, for a bias b that
+turns with the body by ``B``, ``Bv = int B``, ``Bp = int int B`` give
+
+    p += T v + R dp - R Bp b,    v += R dv - R Bv b,    R = rotation by the heading error
+
+exactly, for every hypothesis at once; the samples themselves cost next to nothing. Bias,
+heading error and range errors decay towards zero (first-order Markov): the first two with
+time, the last with the way of both ends, so that they stay while nobody moves.
+"""
+
+from __future__ import annotations
+
+import math
+
+from tracking.compiled import small_kernel
+
+GRAVITY = 9.81
+
+
+@small_kernel
+def is_aided(c, node, t):
+    """True if the IMU of a node is heard."""
+    return node.has_state and t - node.t_state <= c.unaided_after
+
+
+@small_kernel
+def decay(ratio):
+    """``exp(-ratio)``, to second order: between 0 and 1 for any ratio above 0."""
+    return 1.0 / (1.0 + ratio * (1.0 + 0.5 * ratio))
+
+
+@small_kernel
+def sum_inertial(c, nodes, held, pre, i, t):
+    """Add what node i did until time t, with the acceleration it reported last."""
+    node = nodes[i]
+    dt = t - node.t_pre
+    if dt <= 0.0:
+        return
+    node.t_pre = t
+    half = 0.5 * dt * dt
+    aided = is_aided(c, node, t)
+    for k in range(3):
+        a = held[i, 4 + k] if aided else 0.0
+        pre[i, 11] += dt * a * a
+        pre[i, 4 + k] += dt * pre[i, 1 + k] + half * a
+        pre[i, 1 + k] += dt * a
+    cos_b, sin_b = (1.0, 0.0) if aided else (0.0, 0.0)
+    if node.levelled and aided:
+        cos_b, sin_b = math.cos(node.yaw), math.sin(node.yaw)
+    pre[i, 9] += dt * pre[i, 7] + half * cos_b
+    pre[i, 10] += dt * pre[i, 8] + half * sin_b
+    pre[i, 7] += dt * cos_b
+    pre[i, 8] += dt * sin_b
+    pre[i, 0] += dt
+
+
+@small_kernel
+def take_state(c, nodes, held, pre, i, t, values, e, k):
+    """A new orientation and acceleration of node i, held until the next."""
+    node = nodes[i]
+    sum_inertial(c, nodes, held, pre, i, t)
+    w, x, y, z = values[e, k, 0], values[e, k, 1], values[e, k, 2], values[e, k, 3]
+    yaw = math.atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
+    a0, a1, a2 = values[e, k, 4], values[e, k, 5], values[e, k, 6]
+    dt = t - node.t_state
+    fresh = not node.has_state or dt > c.unaided_after
+    if not fresh and dt > 1e-4:
+        # The angle between two orientations, from the vector part of their quotient.
+        qw, qx, qy, qz = held[i, 0], held[i, 1], held[i, 2], held[i, 3]
+        cosine = abs(w * qw + x * qx + y * qy + z * qz)
+        angle = 2.0 * math.sqrt(max(2.0 * (1.0 - min(cosine, 1.0)), 0.0))
+        turn = yaw - node.yaw
+        turn -= 2.0 * math.pi * math.floor(turn / (2.0 * math.pi) + 0.5)
+        keep = decay(dt / 0.05)
+        node.yaw_rate = keep * node.yaw_rate + (1.0 - keep) * turn / dt
+        keep = decay(dt / 0.1)
+        node.turning = keep * node.turning + (1.0 - keep) * angle / dt
+    held[i, 0], held[i, 1], held[i, 2], held[i, 3] = w, x, y, z
+    if node.levelled:
+        # Specific force in the body, f = R^T (a + g), taken as if the body were level.
+        f0 = (1.0 - 2.0 * (y * y + z * z)) * a0 + 2.0 * (x * y + w * z) * a1
+        f0 += 2.0 * (x * z - w * y) * (a2 + GRAVITY)
+        f1 = 2.0 * (x * y - w * z) * a0 + (1.0 - 2.0 * (x * x + z * z)) * a1
+        f1 += 2.0 * (y * z + w * x) * (a2 + GRAVITY)
+        cos_b, sin_b = math.cos(yaw), math.sin(yaw)
+        a0, a1 = cos_b * f0 - sin_b * f1, sin_b * f0 + cos_b * f1
+    if not fresh:
+        # The first sample was held; the mean of both is nearer to what happened.
+        half_v, half_p = 0.5 * dt, 0.25 * dt * dt
+        pre[i, 1] += half_v * (a0 - held[i, 4])
+        pre[i, 2] += half_v * (a1 - held[i, 5])
+        pre[i, 3] += half_v * (a2 - held[i, 6])
+        pre[i, 4] += half_p * (a0 - held[i, 4])
+        pre[i, 5] += half_p * (a1 - held[i, 5])
+        pre[i, 6] += half_p * (a2 - held[i, 6])
+    held[i, 4], held[i, 5], held[i, 6] = a0, a1, a2
+    node.yaw = yaw
+    node.t_state = t
+    node.has_state = True
+    watch_rest(c, node, t, dt, math.sqrt(a0 * a0 + a1 * a1 + a2 * a2), fresh)
+
+
+@small_kernel
+def watch_rest(c, node, t, dt, accel, fresh):
+    """Note when a node last moved, by how much its acceleration varies and by its turning."""
+    if fresh:
+        node.accel_mean = accel
+        node.accel_var = c.rest_accel * c.rest_accel
+        node.turning = c.rest_rate
+        node.yaw_rate = 0.0
+        node.t_moved = t
+        return
+    keep = decay(dt / 0.1)
+    off = accel - node.accel_mean
+    node.accel_mean += (1.0 - keep) * off
+    node.accel_var = keep * node.accel_var + (1.0 - keep) * off * off
+    shaken = node.accel_var + 0.25 * node.accel_mean * node.accel_mean
+    if shaken >= c.rest_accel * c.rest_accel or node.turning >= c.rest_rate:
+        node.t_moved = t
+
+
+@small_kernel
+def predict(c, s, h, step, scratch):
+    """Carry hypothesis h over the summed time of every node.
+
+    Args:
+        c: Coefficients.
+        s: JointState of one environment.
+        h: Hypothesis.
+        step: How long that is [s].
+        scratch: Room: `scale`, how much of a state's error stays; `step`, time and derivatives
+            of each node; `speed`.
+    """
+    nodes, pairs, x, P = s.nodes, s.pairs, s.x, s.P
+    scale, w, speed = scratch.scale, scratch.step, scratch.speed
+    n, d = c.n, c.d
+    for r in range(n):
+        scale[r] = 1.0
+    for i in range(nodes.shape[0]):
+        speed[i] = 0.0
+        if nodes[i].present and not nodes[i].static:
+            move_mean(c, nodes[i], s.pre, x, h, i, scale, w, speed)
+    for p in range(pairs.shape[0]):
+        at = pairs[p].at_e
+        if at < 0 or not (nodes[pairs[p].i].present and nodes[pairs[p].j].present):
+            continue
+        way = (speed[pairs[p].i] + speed[pairs[p].j]) * step
+        scale[at] = decay(way / c.fast_length)
+        hidden = s.nlos[h, p]
+        scale[at + 1] = decay(way * ((1.0 - hidden) / c.slow_length + hidden / c.excess_length))
+        x[h, at] *= scale[at]
+        x[h, at + 1] *= scale[at + 1]
+        x[h, at + 1] += (1.0 - scale[at + 1]) * hidden * c.excess
+    # Rows, then columns: P <- F P F^T.
+    for i in range(nodes.shape[0]):
+        if nodes[i].present and not nodes[i].static:
+            move_rows(d, n, nodes[i], P, h, i, w)
+    for r in range(n):
+        for i in range(nodes.shape[0]):
+            if nodes[i].present and not nodes[i].static:
+                move_columns(d, nodes[i], P, h, r, i, w)
+        s_r = scale[r]
+        for k in range(n):
+            P[h, r, k] *= s_r * scale[k]
+    for i in range(nodes.shape[0]):
+        if nodes[i].present:
+            add_noise(c, nodes[i], s.pre, P, h, i, scale, step)
+    for p in range(pairs.shape[0]):
+        at = pairs[p].at_e
+        if at >= 0 and scale[at] < 1.0:
+            slow_var = c.slow_var + s.nlos[h, p] * c.excess_var
+            P[h, at, at] += (1.0 - scale[at] * scale[at]) * c.fast_var
+            P[h, at + 1, at + 1] += (1.0 - scale[at + 1] * scale[at + 1]) * slow_var
+
+
+@small_kernel
+def move_mean(c, node, pre, x, h, i, scale, w, speed):
+    """The states of node i, and the derivatives of the step, written to row i of w."""
+    d, T = c.d, pre[i, 0]
+    p, v, b, y = node.at_p, node.at_v, node.at_b, node.at_h
+    psi = x[h, y]
+    cos_r, sin_r = math.cos(psi), math.sin(psi)
+    dv0, dv1 = cos_r * pre[i, 1] - sin_r * pre[i, 2], sin_r * pre[i, 1] + cos_r * pre[i, 2]
+    dp0, dp1 = cos_r * pre[i, 4] - sin_r * pre[i, 5], sin_r * pre[i, 4] + cos_r * pre[i, 5]
+    if not node.levelled:
+        cos_r, sin_r = 1.0, 0.0
+    vc, vs = cos_r * pre[i, 7] - sin_r * pre[i, 8], sin_r * pre[i, 7] + cos_r * pre[i, 8]
+    pc, ps = cos_r * pre[i, 9] - sin_r * pre[i, 10], sin_r * pre[i, 9] + cos_r * pre[i, 10]
+    b0, b1 = x[h, b], x[h, b + 1]
+    bv0, bv1 = vc * b0 - vs * b1, vs * b0 + vc * b1
+    bp0, bp1 = pc * b0 - ps * b1, ps * b0 + pc * b1
+    w[i, 0], w[i, 1], w[i, 2], w[i, 3], w[i, 4] = T, pc, ps, vc, vs
+    share = 1.0 if node.levelled else 0.0
+    w[i, 5], w[i, 6] = -(dp1 - share * bp1), dp0 - share * bp0
+    w[i, 7], w[i, 8] = -(dv1 - share * bv1), dv0 - share * bv0
+    x[h, p] += T * x[h, v] + dp0 - bp0
+    x[h, p + 1] += T * x[h, v + 1] + dp1 - bp1
+    x[h, v] += dv0 - bv0
+    x[h, v + 1] += dv1 - bv1
+    squared = x[h, v] ** 2 + x[h, v + 1] ** 2
+    if d == 3:
+        x[h, p + 2] += T * x[h, v + 2] + pre[i, 6] - 0.5 * T * T * x[h, b + 2]
+        x[h, v + 2] += pre[i, 3] - T * x[h, b + 2]
+        squared += x[h, v + 2] ** 2
+    speed[i] = math.sqrt(squared)
+    keep = decay(T / node.bias_tau)
+    for k in range(d):
+        scale[b + k] = keep
+        x[h, b + k] *= keep
+    scale[y] = decay(T / node.heading_tau)
+    x[h, y] *= scale[y]
+
+
+@small_kernel
+def move_rows(d, n, node, P, h, i, w):
+    """``F P``: the rows of position and velocity of node i."""
+    p, v, b, y = node.at_p, node.at_v, node.at_b, node.at_h
+    T, pc, ps, vc, vs = w[i, 0], w[i, 1], w[i, 2], w[i, 3], w[i, 4]
+    yp0, yp1, yv0, yv1 = w[i, 5], w[i, 6], w[i, 7], w[i, 8]
+    for k in range(n):
+        b0, b1, y0 = P[h, b, k], P[h, b + 1, k], P[h, y, k]
+        P[h, p, k] += T * P[h, v, k] - pc * b0 + ps * b1 + yp0 * y0
+        P[h, p + 1, k] += T * P[h, v + 1, k] - ps * b0 - pc * b1 + yp1 * y0
+        P[h, v, k] += -vc * b0 + vs * b1 + yv0 * y0
+        P[h, v + 1, k] += -vs * b0 - vc * b1 + yv1 * y0
+    if d == 3:
+        half = 0.5 * T * T
+        for k in range(n):
+            P[h, p + 2, k] += T * P[h, v + 2, k] - half * P[h, b + 2, k]
+            P[h, v + 2, k] -= T * P[h, b + 2, k]
+
+
+@small_kernel
+def move_columns(d, node, P, h, r, i, w):
+    """``(F P) F^T``: row r, the columns of position and velocity of node i."""
+    p, v, b = node.at_p, node.at_v, node.at_b
+    T, pc, ps, vc, vs = w[i, 0], w[i, 1], w[i, 2], w[i, 3], w[i, 4]
+    b0, b1, y0 = P[h, r, b], P[h, r, b + 1], P[h, r, node.at_h]
+    P[h, r, p] += T * P[h, r, v] - pc * b0 + ps * b1 + w[i, 5] * y0
+    P[h, r, p + 1] += T * P[h, r, v + 1] - ps * b0 - pc * b1 + w[i, 6] * y0
+    P[h, r, v] += -vc * b0 + vs * b1 + w[i, 7] * y0
+    P[h, r, v + 1] += -vs * b0 - vc * b1 + w[i, 8] * y0
+    if d == 3:
+        P[h, r, p + 2] += T * P[h, r, v + 2] - 0.5 * T * T * P[h, r, b + 2]
+        P[h, r, v + 2] -= T * P[h, r, b + 2]
+
+
+@small_kernel
+def add_noise(c, node, pre, P, h, i, scale, step):
+    """Process noise of one node: white acceleration, and what keeps the Markov parts alive."""
+    p = node.at_p
+    if node.static:
+        for k in range(c.d):
+            P[h, p + k, p + k] += c.static_drift2 * step
+        return
+    v, b, y = node.at_v, node.at_b, node.at_h
+    T = pre[i, 0]
+    q = c.unaided_psd2 * T
+    if is_aided(c, node, node.t_pre):
+        q = node.psd2 * T + node.turn_psd2 * pre[i, 11]
+    for k in range(c.d):
+        P[h, p + k, p + k] += q * T * T / 3.0
+        P[h, p + k, v + k] += 0.5 * q * T
+        P[h, v + k, p + k] += 0.5 * q * T
+        P[h, v + k, v + k] += q
+        P[h, b + k, b + k] += (1.0 - scale[b + k] * scale[b + k]) * node.bias_var
+    P[h, y, y] += (1.0 - scale[y] * scale[y]) * node.heading_var

@@ -1,0 +1,250 @@
+"""A range: its model, whether it was line of sight, and the correction.
+
+    z = |p_j + l_j - p_i - l_i| + fast + slow + noise
+
+with the antenna offsets l turned by the nodes' orientations and heading errors. Behind an
+obstacle an excess is added. Which it was is judged by Bayes' rule, from the residual, from the
+gap between received and first-path power where it is reported, and from what it was before
+(a Markov chain of two states for every pair and hypothesis). The correction is that of both
+cases by their probabilities: information adds up, so a range that is surely hidden hardly
+counts. A few ranges mean nothing; one that fits neither case counts for nothing.
+"""
+
+from __future__ import annotations
+
+import math
+
+from tracking.compiled import small_kernel
+from tracking.filters.joint._linear_kernels import absorb, project
+from tracking.filters.joint._motion_kernels import decay
+
+MIN_DISTANCE = 0.01
+"""[m] Closer than this a direction has no meaning."""
+MIN_PROB = 1e-4
+SQRT_2PI = math.sqrt(2.0 * math.pi)
+
+
+@small_kernel
+def antenna_offset(held, layout, n, antenna):
+    """Position of an antenna relative to its node, world frame as measured [m]."""
+    o0, o1, o2 = (
+        layout.antenna_b[antenna, 0],
+        layout.antenna_b[antenna, 1],
+        layout.antenna_b[antenna, 2],
+    )
+    w, x, y, z = held[n, 0], held[n, 1], held[n, 2], held[n, 3]
+    # o + 2 w (u x o) + 2 u x (u x o), with u the vector part
+    c0, c1, c2 = y * o2 - z * o1, z * o0 - x * o2, x * o1 - y * o0
+    return (
+        o0 + 2.0 * (w * c0 + y * c2 - z * c1),
+        o1 + 2.0 * (w * c1 + z * c0 - x * c2),
+        o2 + 2.0 * (w * c2 + x * c1 - y * c0),
+    )
+
+
+@small_kernel
+def range_model(c, s, h, p, lever_i, lever_j, idx, val):
+    """Predicted range of pair p [m] and its derivatives.
+
+    Args:
+        c: Coefficients.
+        s: JointState of one environment.
+        h: Hypothesis.
+        p: Pair.
+        lever_i: Antenna of i relative to its node, as measured, 3 numbers [m].
+        lever_j: The same of j.
+        idx: States, written.
+        val: Derivatives, written.
+
+    Returns:
+        The range, and how many derivatives there are.
+    """
+    pair = s.pairs[p]
+    node_i, node_j = s.nodes[pair.i], s.nodes[pair.j]
+    i0, i1 = lever_i[0], lever_i[1]
+    j0, j1 = lever_j[0], lever_j[1]
+    if not node_i.static:
+        a = s.x[h, node_i.at_h]
+        i0, i1 = math.cos(a) * i0 - math.sin(a) * i1, math.sin(a) * i0 + math.cos(a) * i1
+    if not node_j.static:
+        a = s.x[h, node_j.at_h]
+        j0, j1 = math.cos(a) * j0 - math.sin(a) * j1, math.sin(a) * j0 + math.cos(a) * j1
+    at_i, at_j = node_i.at_p, node_j.at_p
+    r0 = s.x[h, at_j] - s.x[h, at_i] + j0 - i0
+    r1 = s.x[h, at_j + 1] - s.x[h, at_i + 1] + j1 - i1
+    r2 = lever_j[2] - lever_i[2]
+    if c.d == 3:
+        r2 += s.x[h, at_j + 2] - s.x[h, at_i + 2]
+    distance = math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
+    inverse = 1.0 / max(distance, MIN_DISTANCE)
+    u0, u1, u2 = r0 * inverse, r1 * inverse, r2 * inverse
+    idx[0], idx[1], idx[2], idx[3] = at_i, at_i + 1, at_j, at_j + 1
+    val[0], val[1], val[2], val[3] = -u0, -u1, u0, u1
+    m = 4
+    if c.d == 3:
+        idx[4], idx[5] = at_i + 2, at_j + 2
+        val[4], val[5] = -u2, u2
+        m = 6
+    if not node_i.static and (i0 != 0.0 or i1 != 0.0):
+        idx[m], val[m] = node_i.at_h, u0 * i1 - u1 * i0
+        m += 1
+    if not node_j.static and (j0 != 0.0 or j1 != 0.0):
+        idx[m], val[m] = node_j.at_h, u1 * j0 - u0 * j1
+        m += 1
+    if pair.at_e >= 0:
+        idx[m], idx[m + 1] = pair.at_e, pair.at_e + 1
+        val[m], val[m + 1] = 1.0, 1.0
+        m += 2
+        distance += s.x[h, pair.at_e] + s.x[h, pair.at_e + 1]
+    return distance, m
+
+
+@small_kernel
+def bend(c, s, h, p, val):
+    """What the straight line misses: how much longer the range is on average than predicted [m].
+
+    To second order ``tr(P_across) / (2 d)``, with P_across the covariance of the relative
+    position across the line of sight.
+    """
+    node_i, node_j = s.nodes[s.pairs[p].i], s.nodes[s.pairs[p].j]
+    trace, along, squared = 0.0, 0.0, 0.0
+    for a in range(c.d):
+        u_a = val[2 + a] if a < 2 else val[5]
+        i_a, j_a = node_i.at_p + a, node_j.at_p + a
+        r = s.x[h, j_a] - s.x[h, i_a]
+        squared += r * r
+        for b in range(a, c.d):
+            u_b = val[2 + b] if b < 2 else val[5]
+            i_b, j_b = node_i.at_p + b, node_j.at_p + b
+            P_ab = s.P[h, i_a, i_b] + s.P[h, j_a, j_b] - s.P[h, i_a, j_b] - s.P[h, j_a, i_b]
+            along += u_a * P_ab * u_b * (1.0 if a == b else 2.0)
+            if a == b:
+                trace += P_ab
+    return 0.5 * max(trace - along, 0.0) / math.sqrt(squared + 0.01)
+
+
+@small_kernel
+def gap_evidence(c, gap):
+    """Log-likelihood ratio of no sight against sight, of a power gap [dB]."""
+    los = max(gap - c.gap_los, 0.0) / c.gap_los_std
+    nlos = min(gap - c.gap_nlos, 0.0) / c.gap_nlos_std
+    ratio = 0.5 * (los * los - nlos * nlos) - math.log(c.gap_nlos_std / c.gap_los_std)
+    return min(max(c.gap_weight * ratio, -4.0), 4.0)
+
+
+@small_kernel
+def fuse_range(c, s, h, p, dt, distance, levers, evidence, scratch):
+    """Correct hypothesis h with a range of pair p.
+
+    Args:
+        c: Coefficients.
+        s: JointState of one environment, at the time of the range.
+        h: Hypothesis.
+        p: Pair.
+        dt: Time since the pair's last range [s].
+        distance: The range [m].
+        levers: Antennas of i and j relative to their nodes, six numbers [m].
+        evidence: Of the power gap, log-likelihood ratio; 0 where there is none.
+        scratch: Room.
+
+    Returns:
+        NIS, and the probability that the range meant anything, 0 to 1.
+    """
+    predicted, m = range_model(c, s, h, p, levers[:3], levers[3:], scratch.idx, scratch.val)
+    nu = distance - predicted
+    variance = project(s.P, h, c.n, m, scratch.idx, scratch.val, scratch.w)
+    S = variance + c.white_var
+    switched, sane, loglik = judge_sight(c, s, h, p, dt, nu, variance, evidence, scratch.w)
+    s.loglik[h] += max(loglik, -0.5 * (c.max_nis + math.log(S)))
+    nis = nu * nu / S
+    if switched > 0.01:
+        change_sight(c, s, h, p, switched)
+        predicted, m = range_model(c, s, h, p, levers[:3], levers[3:], scratch.idx, scratch.val)
+        nu = distance - predicted
+        variance = project(s.P, h, c.n, m, scratch.idx, scratch.val, scratch.w)
+    bent = min(c.bend_gain * bend(c, s, h, p, scratch.val), 0.2)
+    R = c.white_var + bent * bent + s.nlos[h, p] * c.excess_white_var
+    if sane > 1e-3:
+        absorb(s.x, s.P, h, c.n, scratch.w, nu, variance + R / sane)
+    return nis, sane
+
+
+@small_kernel
+def judge_sight(c, s, h, p, dt, nu, variance, evidence, w):
+    """Bayes' rule over what the sight was and is; updates the pair's NLOS probability.
+
+    The slow error holds the excess while there is no sight. So in sight before and after, or
+    in neither, the range is predicted as it is; entering adds an excess, leaving takes the
+    slow error away.
+
+    Args:
+        c: Coefficients.
+        s: JointState of one environment.
+        h: Hypothesis.
+        p: Pair.
+        dt: Time since the pair's last range [s].
+        nu: Innovation [m].
+        variance: Of the prediction [m2].
+        evidence: Of the power gap.
+        w: ``P H``.
+
+    Returns:
+        Probability that the sight changed; that the range meant anything; log-likelihood.
+    """
+    at = s.pairs[p].at_e + 1
+    before = s.nlos[h, p]
+    enter, leave = 1.0 - decay(c.enter_rate * dt), 1.0 - decay(c.leave_rate * dt)
+    S = variance + c.white_var
+    off = nu - c.excess
+    S_enter = S + c.excess_var
+    nu_leave, S_leave = nu, S
+    if at > 0:
+        nu_leave = nu + s.x[h, at]
+        S_leave += max(s.P[h, at, at] - 2.0 * w[at], -0.9 * variance) + c.slow_var
+    hidden = math.exp(evidence)
+    stays = math.exp(-0.5 * nu * nu / S) / math.sqrt(S)
+    los_los = (1.0 - before) * (1.0 - enter) * stays
+    los_nlos = (1.0 - before) * enter * math.exp(-0.5 * off * off / S_enter) / math.sqrt(S_enter)
+    nlos_los = before * leave * math.exp(-0.5 * nu_leave * nu_leave / S_leave) / math.sqrt(S_leave)
+    nlos_nlos = before * (1.0 - leave) * stays
+    if at <= 0:
+        # Without a state for the excess, no sight is a range that is worse.
+        nlos_nlos = (
+            before * (1.0 - leave) * math.exp(-0.5 * off * off / S_enter) / math.sqrt(S_enter)
+        )
+    los_nlos *= hidden
+    nlos_nlos *= hidden
+    wild = SQRT_2PI * c.outlier_prob / c.outlier_span
+    total = los_los + los_nlos + nlos_los + nlos_nlos
+    s.nlos[h, p] = min(max((los_nlos + nlos_nlos) / max(total, 1e-300), MIN_PROB), 1.0 - MIN_PROB)
+    if total < 1e-300:
+        s.nlos[h, p] = before
+        return 0.0, 0.0, math.log(wild)
+    # The power says nothing about where the nodes are: it is no evidence for a hypothesis.
+    norm = 1.0 + (s.nlos[h, p]) * (hidden - 1.0) if hidden > 1.0 else 1.0
+    switched = (los_nlos + nlos_los) / total
+    return switched, total / (total + wild), math.log(total / norm + wild)
+
+
+@small_kernel
+def change_sight(c, s, h, p, switched):
+    """Forget the slow error of a pair by the probability that its sight changed."""
+    at = s.pairs[p].at_e + 1
+    if at <= 0:
+        return
+    stays = 1.0 - switched
+    for r in range(c.n):
+        s.P[h, at, r] *= stays
+        s.P[h, r, at] *= stays
+    hidden = s.nlos[h, p]
+    s.P[h, at, at] += (1.0 - stays * stays) * (c.slow_var + hidden * c.excess_var)
+    s.x[h, at] = stays * s.x[h, at] + switched * hidden * c.excess
+
+
+@small_kernel
+def fuse_survey(c, s, h, p, distance, scratch):
+    """Correct hypothesis h with a surveyed distance between the origins of two nodes."""
+    none = scratch.none
+    predicted, m = range_model(c, s, h, p, none, none, scratch.idx, scratch.val)
+    variance = project(s.P, h, c.n, m, scratch.idx, scratch.val, scratch.w)
+    absorb(s.x, s.P, h, c.n, scratch.w, distance - predicted, variance + c.survey_var)

@@ -1,0 +1,198 @@
+"""Starting a group and joining it: from the first k ranges of each pair to running states.
+
+A group starts with MDS on the mean of the first k ranges, once for every rotation and mirror
+image of the bank; the covariance holds the gap between two rotations. A node that joins is
+placed by least squares on its distances to the others, in every hypothesis; where those are
+too few or too flat to tell on which side it is, both sides become hypotheses.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tracking.compiled import kernel
+from tracking.filters._shape_kernels import (
+    choose_members,
+    first_shape,
+    is_ready,
+    place,
+    start_distance,
+)
+from tracking.filters.joint._carrier_kernels import CENTRE_VAR
+from tracking.filters.joint._linear_kernels import decouple
+
+
+@kernel
+def try_start(c, s, layout, t):
+    """Start the group with the nodes whose pairs are all ready."""
+    n = s.nodes.shape[0]
+    members = np.empty(n, np.int64)
+    m = choose_members(c, s, layout, members)
+    if m == 0:
+        return
+    X = first_shape(s, layout, members, m, c.d)
+    for a in range(m):
+        s.nodes[members[a]].present = True
+        forget_sums(s, members[a], t)
+    for h in range(layout.rotations.shape[0]):
+        s.alive[h] = True
+        s.loglik[h] = 0.0
+        s.nlos[h, :] = c.enter_rate / (c.enter_rate + c.leave_rate)
+        Y = X @ layout.rotations[h].T.copy()
+        s.x[h, :] = 0.0
+        s.P[h, :, :] = 0.0
+        for r in range(c.n):
+            s.P[h, r, r] = 1.0
+        for a in range(m):
+            begin_node(c, s, h, members[a], t)
+            at = s.nodes[members[a]].at_p
+            for k in range(c.d):
+                s.x[h, at + k] = Y[a, k]
+                s.P[h, at + k, at + k] = c.position_var
+        spread_rotation(c, s, h, members, m, Y)
+        for p in range(s.pairs.shape[0]):
+            if s.nodes[s.pairs[p].i].present and s.nodes[s.pairs[p].j].present:
+                begin_pair(c, s, h, p)
+    for p in range(s.pairs.shape[0]):
+        s.pairs[p].t_range = t
+        s.pairs[p].misfit = 1.0
+    group = s.group[0]
+    group.started = True
+    group.flat = False
+    group.n_alive = layout.rotations.shape[0]
+    group.best = 0
+    group.t, group.t_check, group.t_carrier, group.t_gauge = t, t, t, t
+    group.misfit = 1.0
+
+
+@kernel
+def spread_rotation(c, s, h, members, m, Y):
+    """Add the uncertainty of the rotation, and of where the centre is, to P of hypothesis h."""
+    for axis in range(3 if c.d == 3 else 1):
+        up = 2 - axis  # z first: the only axis of the plane
+        for a in range(m):
+            g_a = np.zeros(3)
+            g_a[(up + 1) % 3], g_a[(up + 2) % 3] = -Y[a, (up + 2) % 3], Y[a, (up + 1) % 3]
+            for b in range(m):
+                g_b = np.zeros(3)
+                g_b[(up + 1) % 3], g_b[(up + 2) % 3] = -Y[b, (up + 2) % 3], Y[b, (up + 1) % 3]
+                at_a, at_b = s.nodes[members[a]].at_p, s.nodes[members[b]].at_p
+                for k in range(c.d):
+                    for q in range(c.d):
+                        s.P[h, at_a + k, at_b + q] += c.rotation_var * g_a[k] * g_b[q]
+    for a in range(m):
+        for b in range(m):
+            for k in range(c.d):
+                at_a, at_b = s.nodes[members[a]].at_p, s.nodes[members[b]].at_p
+                s.P[h, at_a + k, at_b + k] += CENTRE_VAR
+
+
+@kernel
+def forget_sums(s, i, t):
+    """Start the sums of a node's inertial samples anew."""
+    s.pre[i, :] = 0.0
+    s.nodes[i].t_pre = t
+
+
+@kernel
+def begin_node(c, s, h, i, t):
+    """Velocity, bias and heading error of a node that nothing is known of yet."""
+    node = s.nodes[i]
+    if node.static:
+        return
+    still = node.rests and node.has_state and t - node.t_moved > c.rest_after
+    for k in range(c.d):
+        speed_var = c.rest_var if still else c.start_speed_var
+        decouple(s.x, s.P, h, c.n, node.at_v + k, speed_var)
+        decouple(s.x, s.P, h, c.n, node.at_b + k, node.bias_var)
+    decouple(s.x, s.P, h, c.n, node.at_h, node.heading_var)
+
+
+@kernel
+def begin_pair(c, s, h, p):
+    """Range errors that nothing is known of yet."""
+    at = s.pairs[p].at_e
+    if at >= 0:
+        decouple(s.x, s.P, h, c.n, at, max(c.fast_var, 1e-12))
+        decouple(s.x, s.P, h, c.n, at + 1, max(c.slow_var, 1e-12))
+
+
+@kernel
+def try_join(c, s, layout, new, t):
+    """Take a node in once it is ready with enough of the others."""
+    n = s.nodes.shape[0]
+    n_present, n_ready = 0, 0
+    ready = np.empty(n, np.int64)
+    for k in range(n):
+        if s.nodes[k].present:
+            n_present += 1
+            if is_ready(c, s, layout, new, k):
+                ready[n_ready] = k
+                n_ready += 1
+    if n_ready < min(c.d + 1, n_present):
+        return
+    sides = np.empty((2, 3))
+    known, distance = np.zeros((n_ready, 3)), np.empty(n_ready)
+    was_alive = s.alive.copy()
+    forget_sums(s, new, t)
+    for h in range(s.alive.shape[0]):
+        if not was_alive[h]:
+            continue
+        for a in range(n_ready):
+            at = s.nodes[ready[a]].at_p
+            for k in range(c.d):
+                known[a, k] = s.x[h, at + k]
+            distance[a] = start_distance(s, layout, new, ready[a])
+        n_sides = place(c.d, 0.15, c.merge_distance, known, distance, sides)
+        for side in range(n_sides):
+            target = h if side == 0 else copy_hypothesis(s, h)
+            if target >= 0:
+                add_node(c, s, layout, target, new, sides[side], t)
+    s.nodes[new].present = True
+
+
+@kernel
+def add_node(c, s, layout, h, new, pos, t):
+    """Put a node at a position, as uncertain as the centre of the others and its own error."""
+    begin_node(c, s, h, new, t)
+    n = s.nodes.shape[0]
+    for k in range(c.d):
+        at = s.nodes[new].at_p + k
+        decouple(s.x, s.P, h, c.n, at, 0.0)
+        row, present = np.zeros(c.n), 0
+        for i in range(n):
+            if s.nodes[i].present and i != new:
+                row += s.P[h, s.nodes[i].at_p + k]
+                present += 1
+        row /= present
+        mean_var = 0.0
+        for i in range(n):
+            if s.nodes[i].present and i != new:
+                mean_var += row[s.nodes[i].at_p + k] / present
+        s.P[h, at, :] = row
+        s.P[h, :, at] = row
+        s.P[h, at, at] = mean_var + c.position_var
+        s.x[h, at] = pos[k]
+    for i in range(n):
+        if i != new and s.nodes[i].present:
+            p = layout.pair_index[i, new]
+            begin_pair(c, s, h, p)
+            s.nlos[h, p] = c.enter_rate / (c.enter_rate + c.leave_rate)
+            s.pairs[p].t_range = t
+            s.pairs[p].n_ranges = 0
+            s.pairs[p].misfit = 1.0
+
+
+@kernel
+def copy_hypothesis(s, h):
+    """A copy of a hypothesis in a free place of the bank; -1 if there is none."""
+    for free in range(s.alive.shape[0]):
+        if not s.alive[free]:
+            s.alive[free] = True
+            s.loglik[free] = s.loglik[h]
+            s.x[free] = s.x[h]
+            s.P[free] = s.P[h]
+            s.nlos[free] = s.nlos[h]
+            s.group[0].n_alive += 1
+            return free
+    return -1

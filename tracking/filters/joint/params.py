@@ -1,0 +1,206 @@
+"""What the joint filter believes: every number with its unit, its effect and its source."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields, replace
+
+from tracking.errors import ConfigError
+
+
+def _expect_positive(params: object, *but: str) -> None:
+    """Every float is above 0, but for those named."""
+    for f in fields(params):  # type: ignore[arg-type]
+        value = getattr(params, f.name)
+        if isinstance(value, float) and f.name not in but and not 0.0 < value < float("inf"):
+            raise ConfigError(f"{f.name}: expected a number above 0, got {value}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CarrierParams:
+    """What is known about a node from what carries it."""
+
+    accel_psd: float = 0.15
+    """[m/s2/sqrt(Hz)] White noise of the acceleration: sensor, vibration, tilt jitter."""
+    turn_psd: float = 0.015
+    """[rad/sqrt(Hz)] Error of the orientation while it moves, times the acceleration: limbs are
+    off by a degree or two for a fraction of a second, with accelerations of several g."""
+    bias_std: float = 0.15
+    """[m/s2] Slow error of the acceleration, mostly gravity seen through a wrong tilt."""
+    bias_tau: float = 3.0
+    """[s] How long it stays the same."""
+    levelled: bool = False
+    """The body stays level: the acceleration is taken in the plane of the body, free of tilt
+    errors, and its slow error turns with the body."""
+    heading_std: float = 0.05
+    """[rad] Error of a magnetic heading that changes with place and time."""
+    heading_tau: float = 8.0
+    """[s] How long it stays the same."""
+    speed_std: float = 2.0
+    """[m/s] Speed of the group as a whole; keeps a group without any reference from drifting."""
+    sideways_std: float | None = None
+    """[m/s] Sideways speed of the rear axle, 20 times a second; None for what may move sideways."""
+    rear_axle: float = 0.0
+    """[m] How far the tracker is ahead of the axle that cannot move sideways."""
+    rests: bool = True
+    """It stands still now and then, and its IMU tells."""
+
+    def __post_init__(self) -> None:
+        _expect_positive(self, "rear_axle")
+
+
+BODY = CarrierParams()
+CARRIERS = {
+    "car": CarrierParams(
+        accel_psd=0.045,
+        turn_psd=0.002,
+        bias_std=0.05,
+        bias_tau=100.0,
+        levelled=True,
+        heading_std=0.03,
+        heading_tau=5.0,
+        sideways_std=0.08,
+        rear_axle=0.15,
+    ),
+    "robot": CarrierParams(accel_psd=0.07, bias_std=0.1, bias_tau=30.0, levelled=True),
+    "human": CarrierParams(
+        accel_psd=0.06,
+        bias_std=0.08,
+        bias_tau=5.0,
+        heading_std=0.08,
+        heading_tau=30.0,
+    ),
+    "hand": BODY,
+    "drone": replace(BODY, speed_std=10.0, rests=False),
+    "none": replace(BODY, speed_std=10.0, rests=False),
+}
+"""By `NodeConfig.vehicle`."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RangeErrorParams:
+    """How a range errs in sight: white noise, and parts that stay while nobody moves."""
+
+    white_std: float = 0.04
+    """[m] Of a single range."""
+    fast_std: float = 0.03
+    """[m] Multipath that changes within decimetres."""
+    fast_length: float = 0.4
+    """[m] Way of both ends after which it is another."""
+    slow_std: float = 0.045
+    """[m] Multipath and antennas, changing within metres."""
+    slow_length: float = 8.0
+    """[m]"""
+    bend_gain: float = 4.0
+    """[-] Trust lost where the filter is uncertain across a short line of sight, in units of the
+    second-order error there. That error lasts, so it weighs more than once."""
+    max_nodes: int = 8
+    """[-] Larger groups have no states for these errors: their ranges count as whiter and worse."""
+
+    def __post_init__(self) -> None:
+        _expect_positive(self, "fast_std", "slow_std", "bend_gain")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NlosParams:
+    """Ranges that are not line of sight, and those that are plainly wrong."""
+
+    enter_rate: float = 1.0
+    """[1/s] How often a pair loses sight."""
+    leave_rate: float = 3.0
+    """[1/s] How often it regains it."""
+    excess: float = 0.1
+    """[m] Mean of what is added to a range behind an obstacle."""
+    excess_std: float = 0.2
+    """[m] Its standard deviation."""
+    excess_length: float = 2.0
+    """[m] Way of both ends after which the excess is another."""
+    white_std: float = 0.05
+    """[m] White noise that is added behind an obstacle."""
+    repeats: float = 20.0
+    """[-] So many ranges in a row have the same excess: together they count as one."""
+    gap_los: float = 3.0
+    """[dB] Received minus first-path power in sight."""
+    gap_los_std: float = 1.2
+    """[dB]"""
+    gap_nlos: float = 8.0
+    """[dB] The same behind an obstacle."""
+    gap_nlos_std: float = 3.0
+    """[dB]"""
+    gap_weight: float = 0.2
+    """[-] Gaps of successive ranges are alike, so that each counts for less than one."""
+    outlier_prob: float = 1e-3
+    """[-] Share of ranges that mean nothing."""
+    outlier_span: float = 20.0
+    """[m] They lie anywhere in so much."""
+
+    def __post_init__(self) -> None:
+        _expect_positive(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointStartParams:
+    """Starting a group, or a node that joins it, and the bank of hypotheses."""
+
+    k: int = 8
+    """[-] Ranges per pair whose mean starts the shape, the paper's first k measurements."""
+    max_age: float = 2.0
+    """[s] The first k measurements must come within this time."""
+    rotations_2d: int = 16
+    """[-] Rotations tried in the plane, each with its mirror image."""
+    position_std: float = 0.25
+    """[m] Error of a node in the first shape."""
+    speed_std: float = 1.5
+    """[m/s] Of a node that was not seen at rest."""
+    prune: float = 15.0
+    """[-] A hypothesis so much less likely than the best (log-likelihood) is dropped."""
+    merge_distance: float = 0.15
+    """[m] Two hypotheses as near as this in every pair are one."""
+    max_nis: float = 9.0
+    """[-] A single measurement counts for at most this in the likelihood."""
+    check_period: float = 0.1
+    """[s] Time between two looks at the bank."""
+
+    def __post_init__(self) -> None:
+        _expect_positive(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointParams:
+    """One filter over all nodes."""
+
+    carriers: dict[str, CarrierParams] = field(default_factory=lambda: dict(CARRIERS))
+    """By `NodeConfig.vehicle`."""
+    range_error: RangeErrorParams = field(default_factory=RangeErrorParams)
+    nlos: NlosParams = field(default_factory=NlosParams)
+    start: JointStartParams = field(default_factory=JointStartParams)
+    initial_heading_std: float = 0.1
+    """[rad] Error of headings that start from `NodeConfig.initial_heading`."""
+    initial_heading_tau: float = 300.0
+    """[s] How long they keep it."""
+    unaided_accel_psd: float = 0.7
+    """[m/s2/sqrt(Hz)] Acceleration of a moving node whose IMU is not heard."""
+    unaided_after: float = 0.3
+    """[s] A node whose IMU was silent for so long is unaided."""
+    static_drift: float = 1e-4
+    """[m/sqrt(s)] Static nodes may creep so much: keeps the covariance positive for ever."""
+    survey_std: float = 0.02
+    """[m] Standard deviation of a surveyed distance."""
+    rest_accel: float = 0.12
+    """[m/s2] A node whose acceleration varies less than this, and does not turn, may rest."""
+    rest_rate: float = 0.06
+    """[rad/s] A node that turns faster does not rest."""
+    rest_after: float = 0.5
+    """[s] It must have done so for so long."""
+    rest_std: float = 0.02
+    """[m/s] Speed of a node at rest."""
+    carrier_period: float = 0.05
+    """[s] Time between two uses of what is known about the carriers."""
+    lost_after: float = 1.0
+    """[s] A pair without a range for so long is lost."""
+    leave_after: float = 5.0
+    """[s] A node not heard for so long has left; its states are forgotten."""
+    ok_std: float = 1.0
+    """[m] A pair is not ok while its position is less certain than this along an axis."""
+
+    def __post_init__(self) -> None:
+        _expect_positive(self)

@@ -1,0 +1,126 @@
+"""What the pair filters believe: every number with its unit, its effect and its source."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from tracking.errors import ConfigError
+
+
+def _expect_positive(params: object, names: str) -> None:
+    for name in names.split():
+        value = getattr(params, name)
+        if not 0.0 < value < float("inf"):
+            raise ConfigError(f"{name}: expected a number above 0, got {value}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GateParams:
+    """The outlier gate: a range against the running average of the past ones.
+
+    A range passes when it differs from the average by less than
+    ``floor + speed_gain * |vel_ij| * lag``, where lag is how old the average is.
+    """
+
+    tau: float = 0.1
+    """[s] Time constant of the running average. Longer is steadier and lags more."""
+    floor: float = 0.35
+    """[m] What is allowed at rest: about four standard deviations of a range in sight."""
+    speed_gain: float = 1.5
+    """[-] How much of the motion since the average is allowed for."""
+    min_speed: float = 0.5
+    """[m/s] Relative speed assumed at least, since the estimate may still be wrong."""
+    max_rejected: int = 8
+    """[-] So many rejected in a row are believed after all: the average was wrong."""
+
+    def __post_init__(self) -> None:
+        _expect_positive(self, "tau floor speed_gain min_speed max_rejected")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MdsParams:
+    """The refinement over the group."""
+
+    period: float = 0.012
+    """[s] Shortest time between two refinements: one ranging round of three nodes."""
+    std: float = 0.3
+    """[m] Standard deviation of a refined position as a measurement of the filters. Towards 0
+    it replaces the position outright, as the paper has it."""
+    min_spread: float = 0.15
+    """[m] Layouts flatter than this are not refined: their mirror image cannot be told."""
+
+    def __post_init__(self) -> None:
+        _expect_positive(self, "period std min_spread")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StartParams:
+    """Starting a group, or a node that joins it, and the bank of hypotheses.
+
+    Ranges give the shape of a group but neither its rotation nor its mirror image. Both are
+    tried: the filter starts as a bank of turned and mirrored copies, and motion tells.
+    """
+
+    k: int = 8
+    """[-] Ranges per pair whose mean starts the shape, the paper's first k measurements."""
+    max_age: float = 2.0
+    """[s] The first k measurements must come within this time."""
+    rotations_2d: int = 16
+    """[-] Rotations tried in the plane, each with its mirror image."""
+    prune: float = 40.0
+    """[-] A hypothesis so much less likely than the best (log-likelihood) is dropped. Errors
+    of real ranges are correlated over a second, so that their evidence counts too much."""
+    merge_distance: float = 0.25
+    """[m] Two hypotheses as near as this in every pair are one."""
+    max_nis: float = 6.0
+    """[-] A single range counts for at most this in the likelihood, outlier or not."""
+    check_period: float = 0.25
+    """[s] Time between two looks at the bank."""
+
+    def __post_init__(self) -> None:
+        _expect_positive(self, "k max_age rotations_2d prune merge_distance max_nis check_period")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PairEkfParams:
+    """One extended Kalman filter per pair."""
+
+    accel_psd: float = 0.15
+    """[m/s2/sqrt(Hz)] Noise of one node's world acceleration: sensor noise, vibration and the
+    slow error of a wrong tilt. Larger forgets dead reckoning sooner."""
+    wheeled_accel_psd: float = 0.07
+    """[m/s2/sqrt(Hz)] The same on cars and robots, which stay level."""
+    unaided_accel_psd: float = 0.7
+    """[m/s2/sqrt(Hz)] The same for a moving node whose IMU is not heard."""
+    unaided_after: float = 0.3
+    """[s] A node whose IMU was silent for so long is unaided."""
+    range_std: float = 0.15
+    """[m] Standard deviation of a range. 5 to 10 cm in sight; the rest is for the bias of real
+    ranges, which lasts for seconds."""
+    survey_std: float = 0.02
+    """[m] Standard deviation of a surveyed distance."""
+    speed_model: Literal["range-rate", "speed-norm", "none"] = "range-rate"
+    """What the derivative of the range is compared with: its true model, the rate of the
+    distance, or the norm of the velocity as the paper writes."""
+    speed_std: float = 2.0
+    """[m/s] Standard deviation of the low-passed derivative. It is made of the same ranges,
+    so that a small value counts them twice."""
+    speed_tau: float = 0.15
+    """[s] Time constant of that low pass."""
+    lost_after: float = 1.0
+    """[s] A pair without an accepted range for so long is lost."""
+    leave_after: float = 5.0
+    """[s] A node not heard for so long has left; its filters are destroyed."""
+    gate: GateParams = field(default_factory=GateParams)
+    mds: MdsParams = field(default_factory=MdsParams)
+    start: StartParams = field(default_factory=StartParams)
+
+    def __post_init__(self) -> None:
+        _expect_positive(self, "accel_psd wheeled_accel_psd unaided_accel_psd unaided_after")
+        _expect_positive(self, "range_std survey_std speed_std speed_tau lost_after leave_after")
+        if self.speed_model not in ("range-rate", "speed-norm", "none"):
+            raise ConfigError(
+                f"speed_model: expected 'range-rate', 'speed-norm' or 'none', "
+                f"got {self.speed_model!r}"
+            )
