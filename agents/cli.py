@@ -9,6 +9,7 @@ import click
 from agents.commands.bench import bench
 from agents.commands.calibrate import calibrate
 from agents.commands.demo import demo
+from agents.commands.evaluate import evaluate
 from agents.commands.protocol import protocol
 from agents.commands.simulate import simulate
 from agents.commands.track import track
@@ -21,7 +22,7 @@ def cli() -> None:
     """Relative positions without anchors: track, simulate, drive in formation, measure."""
 
 
-for command in (track, calibrate, simulate, demo, protocol, bench):
+for command in (track, calibrate, simulate, demo, evaluate, protocol, bench):
     cli.add_command(command)
 
 

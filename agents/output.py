@@ -53,6 +53,20 @@ def check_folder(folder: Path, names: Iterable[str]) -> None:
         raise UsageError(f"--out {folder}: cannot be written to ({error.strerror})") from error
 
 
+def check_new(folder: Path) -> None:
+    """See that a folder is new or empty, for results that must not mix with others.
+
+    Raises:
+        UsageError: It exists and is no empty folder.
+    """
+    try:
+        taken = folder.exists() and (not folder.is_dir() or any(folder.iterdir()))
+    except OSError as error:
+        raise UsageError(f"--out {folder}: cannot be written to ({error.strerror})") from error
+    if taken:
+        raise UsageError(f"--out {folder}: exists already, expected a new or empty folder")
+
+
 def _check_free(folder: Path, name: str) -> None:
     """See that a file can take its place: no folder there, no file where a folder must be."""
     target = folder / name

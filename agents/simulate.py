@@ -59,22 +59,43 @@ def simulate(
     if out is not None:
         check_target(Path(out))
     chosen = recordable(scenario)
-    radio = _radio(chosen.radio, channel, antenna_delay)
-    rng = np.random.default_rng(seed)
-    name = f"{scenario}-{seed}"
+    chosen = replace(chosen, radio=_radio(chosen.radio, channel, antenna_delay))
     if isinstance(chosen, HumanScenario):
         if cars is not None:
             raise EnvError(f"cars: scenario {scenario!r} has a person and no cars, got {cars}")
-        log = _exercise(replace(chosen, radio=radio), seconds, rng, name, progress)
-    else:
-        n_cars = chosen.n_cars if cars is None else cars
-        log = _drive(replace(chosen, radio=radio, n_cars=n_cars), seconds, rng, name, progress)
+    elif cars is not None:
+        chosen = replace(chosen, n_cars=cars)
+    log = record(chosen, seconds=seconds, seed=seed, progress=progress)
     if channel is not None or antenna_delay is not None:
         place = f"channel {channel or 'of the scenario'}, antenna delays {antenna_delay or 0:g} m"
         log = replace(log, source=f"{log.source}, {place}")
     if out is not None:
         write_log(out, log)
     return log
+
+
+def record(
+    scenario: Scenario | HumanScenario,
+    *,
+    seconds: float,
+    seed: int,
+    progress: Progress | None = None,
+) -> Log:
+    """Record any world, those that have no name too.
+
+    Args:
+        scenario: The world and its sensors.
+        seconds: Length of the recording; nobody moves in the first two.
+        seed: Same seed, same recording, bit for bit.
+        progress: Called with the share done, 0 to 1.
+
+    Raises:
+        EnvError: A person cannot be recorded for so long.
+    """
+    rng, name = np.random.default_rng(seed), f"{scenario.name}-{seed}"
+    if isinstance(scenario, HumanScenario):
+        return _exercise(scenario, seconds, rng, name, progress)
+    return _drive(scenario, seconds, rng, name, progress)
 
 
 def _radio(

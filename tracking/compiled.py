@@ -35,8 +35,22 @@ def _compile(function: Function, *, inline: bool) -> Function:
         folder = Path(inspect.getfile(function))
         while folder.name != package:
             folder = folder.parent
-        compiled._cache._cache_file._source_stamp = _stamp(folder)
+        index = compiled._cache._cache_file
+        index._source_stamp = _stamp(folder)
+        index._load_index = _tolerant(index._load_index)
     return compiled  # type: ignore[no-any-return]
+
+
+def _tolerant(load: Callable[[], Any]) -> Callable[[], Any]:
+    """An index that names classes which have moved since is as good as none."""
+
+    def load_or_start_anew() -> Any:
+        try:
+            return load()
+        except (AttributeError, ImportError):
+            return {}
+
+    return load_or_start_anew
 
 
 @cache

@@ -25,6 +25,8 @@ class Status(IntEnum):
     """Position, velocity and covariance hold."""
     LOST = 4
     """No range for so long that the position is dead reckoning."""
+    DOUBTFUL = 5
+    """Its ranges contradict all else: a liar, a wrong calibration, or a filter gone astray."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,6 +37,13 @@ class Horizon:
         self._released = np.full(n_envs, -np.inf)
         self.n_late = np.zeros(n_envs, dtype=np.int64)
         """Measurements dropped because they came too late, (env)."""
+        self.n_doubled = np.zeros(n_envs, dtype=np.int64)
+        """Measurements dropped because they had come before, (env)."""
+
+    @property
+    def waiting(self) -> MeasurementBlock:
+        """Measurements that came and were not handed on yet, in order."""
+        return self._pending
 
     @property
     def t(self) -> F64:
@@ -71,10 +78,25 @@ class Horizon:
         self.n_late += late.sum(axis=1)
         fresh = replace(block, valid=block.valid & ~late)
         waiting = MeasurementBlock.concatenate([self._pending, fresh]).sorted()
+        doubled = _same_as_before(waiting)
+        self.n_doubled += doubled.sum(axis=1)
+        waiting = replace(waiting, valid=waiting.valid & ~doubled)
         due = waiting.valid & (waiting.t <= until[:, None])
         self._released = np.maximum(self._released, until)
         self._pending = _compact(waiting, waiting.valid & ~due)
         return _compact(waiting, due)
+
+
+def _same_as_before(block: MeasurementBlock) -> Bool:
+    """True for events that equal the one before them in everything, (env, event)."""
+    same = np.zeros(block.t.shape, dtype=bool)
+    if block.n_events < 2:
+        return same
+    same[:, 1:] = block.valid[:, 1:] & block.valid[:, :-1]
+    for field in (block.t, block.kind, block.i, block.j, block.antenna_i, block.antenna_j):
+        same[:, 1:] &= field[:, 1:] == field[:, :-1]
+    same[:, 1:] &= (block.values[:, 1:] == block.values[:, :-1]).all(axis=-1)
+    return same
 
 
 def _compact(block: MeasurementBlock, keep: Bool) -> MeasurementBlock:

@@ -15,15 +15,17 @@ References:
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+import itertools
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
 from vqf import VQF
 
-from tracking.arrays import F64
+from tracking.arrays import F64, Bool
 from tracking.constellation import WHEELED, Constellation, NodeConfig
 from tracking.geometry import GRAVITY, quat_from_yaw, quat_multiply, rotate, yaw_of
+from tracking.inertial_faults import InertialHealth, inspect
 from tracking.measurements import Kind, MeasurementBlock
 
 
@@ -40,7 +42,8 @@ class OrientationParams:
     """[s] VQF's magnetometer time constant. VQF default."""
     max_gap: float = 0.5
     """[s] Missing samples up to here are filled by interpolation, so that the gyroscope is
-    integrated over them; a longer silence is jumped."""
+    integrated over them. After a longer silence the orientation is found anew, where there is a
+    magnetometer; elsewhere it goes on from where it was."""
     gravity_tau: float = 0.5
     """[s] Time constant with which a node at rest learns the length of gravity that its own
     accelerometer reads, which removes the vertical part of its offset."""
@@ -58,6 +61,7 @@ class _NodeState:
     acc: F64 | None = None
     mag: F64 | None = None
     mag_seen: bool = False
+    health: InertialHealth = field(default_factory=InertialHealth)
 
 
 class Orientation:
@@ -85,7 +89,7 @@ class Orientation:
         """A copy of everything that evolves."""
         return {
             "vqf": {k: v.state for k, v in self._vqf.items()},
-            "node": {k: replace(s) for k, s in self._state.items()},
+            "node": {k: _copy(s) for k, s in self._state.items()},
         }
 
     def restore(self, saved: dict[str, Any]) -> None:
@@ -94,7 +98,7 @@ class Orientation:
         for key, state in saved["vqf"].items():
             self._vqf[key] = self._make_vqf(self._nodes[key[1]])
             self._vqf[key].state = state
-        self._state = {k: replace(s) for k, s in saved["node"].items()}
+        self._state = {k: _copy(s) for k, s in saved["node"].items()}
 
     def step(self, block: MeasurementBlock) -> MeasurementBlock:
         """The block with every IMU sample replaced by the state it leads to.
@@ -119,48 +123,47 @@ class Orientation:
     ) -> None:
         """Feed one node's samples, in runs that VQF can take as a batch."""
         state = self._state.setdefault((env, node), _NodeState())
-        run: list[int] = []
-        run_mag: list[F64] = []
-
-        def flush() -> None:
-            if run:
-                self._feed(env, node, np.array(run), np.array(run_mag), block, out)
-                run.clear()
-                run_mag.clear()
-
-        for e in events:
-            if block.kind[env, e] == Kind.MAG:
-                state.mag = block.values[env, e, :3].copy()
-                out.valid[env, e] = False
-                continue
-            has_mag = state.mag is not None
-            previous_t = block.t[env, run[-1]] if run else state.t
-            gap = (run or state.n_samples) and block.t[env, e] - previous_t > (
-                1.5 / self._nodes[node].imu_hz
-            )
-            if gap or (run and has_mag != bool(run_mag)):
-                flush()
-            run.append(int(e))
-            if has_mag:
-                assert state.mag is not None
-                run_mag.append(state.mag)
-                state.mag = None
-        flush()
+        is_mag = block.kind[env, events] == Kind.MAG
+        out.valid[env, events[is_mag]] = False
+        imu = events[~is_mag]
+        mag, has_mag = _latest_before(block.values[env, events, :3], is_mag, state)
+        if len(imu) == 0:
+            return
+        samples, usable = inspect(state.health, block.values[env, imu, :6])
+        out.valid[env, imu[~usable]] = False
+        imu, samples, mag, has_mag = imu[usable], samples[usable], mag[usable], has_mag[usable]
+        if len(imu) == 0:
+            return
+        t = block.t[env, imu]
+        gap = np.diff(t, prepend=state.t if state.n_samples else t[0])
+        cut = gap > 1.5 / self._nodes[node].imu_hz
+        cut[1:] |= has_mag[1:] != has_mag[:-1]
+        edges = [0, *np.nonzero(cut[1:])[0] + 1, len(imu)]
+        for a, b in itertools.pairwise(edges):
+            used = mag[a:b] if has_mag[a] else mag[:0]
+            self._feed(env, node, imu[a:b], samples[a:b], used, block, out)
 
     def _feed(
         self,
         env: int,
         node: int,
         run: Any,
+        samples: F64,
         mag: F64,
         block: MeasurementBlock,
         out: MeasurementBlock,
     ) -> None:
         """One run of evenly spaced samples, all with magnetometer or all without."""
         key, state = (env, node), self._state[env, node]
-        t, gyr, acc = block.t[env, run], block.values[env, run, :3], block.values[env, run, 3:6]
+        t, gyr, acc = block.t[env, run], samples[:, :3], samples[:, 3:]
         if key not in self._vqf:
             self._vqf[key] = self._make_vqf(self._nodes[node])
+        elif t[0] - state.t > self._params.max_gap and self._magnetic:
+            # Where it points now, nobody knows; what its gyroscope reads at rest is still true.
+            bias, sigma = self._vqf[key].getBiasEstimate()
+            self._vqf[key] = self._make_vqf(self._nodes[node])
+            self._vqf[key].setBiasEstimate(bias, sigma)
+            state.mag_seen = False
         vqf = self._vqf[key]
         self._bridge_gap(vqf, state, t[0], gyr[0], acc[0], self._nodes[node].imu_hz)
 
@@ -215,6 +218,36 @@ class Orientation:
             tauAcc=self._params.tau_acc_wheeled if wheeled else self._params.tau_acc,
             tauMag=self._params.tau_mag,
         )
+
+
+def _copy(state: _NodeState) -> _NodeState:
+    return replace(state, health=replace(state.health))
+
+
+def _latest_before(values: F64, is_mag: Bool, state: _NodeState) -> tuple[F64, Bool]:
+    """The field that came since the sample before, for every inertial sample.
+
+    Args:
+        values: Fields where `is_mag`, (event, 3) [uT].
+        is_mag: True for magnetometer readings, False for inertial samples, (event).
+        state: Of the node; a reading that no sample followed yet waits in it.
+
+    Returns:
+        Fields, (sample, 3) [uT], and where there was one, (sample).
+    """
+    index = np.arange(len(is_mag))
+    latest = np.maximum.accumulate(np.where(is_mag, index, -1))
+    imu = index[~is_mag]
+    before = np.concatenate([[-1], imu[:-1]]) if len(imu) else imu
+    has_mag = latest[imu] > before
+    mag = values[np.maximum(latest[imu], 0)]
+    if len(imu) and not has_mag[0] and state.mag is not None:
+        mag[0], has_mag[0] = state.mag, True
+    if len(imu):
+        state.mag = None
+    if len(index) and latest[-1] > (imu[-1] if len(imu) else -1):
+        state.mag = values[latest[-1]].copy()
+    return mag, has_mag
 
 
 def _turn(q_6d: F64, vqf: Any) -> F64:

@@ -14,8 +14,10 @@ import numpy as np
 
 from tracking.arrays import F64
 from tracking.constellation import Constellation
+from tracking.errors import ConfigError
 from tracking.estimate import TeamEstimate
 from tracking.filters import DEFAULT_FILTER, filter_builder
+from tracking.filters.joint import JointEkf
 from tracking.filters.params import FilterParams
 from tracking.horizon import HorizonParams
 from tracking.measurements import MeasurementBlock
@@ -81,6 +83,30 @@ class Tracker:
         t_out = np.atleast_2d(np.asarray(t_out, dtype=np.float64))
         t_out = np.broadcast_to(t_out, (self.n_envs, t_out.shape[1]))
         return self._filter.run(self._orientation.step(block), t_out)
+
+    def smooth(self, later: MeasurementBlock, t: F64 | float) -> TeamEstimate:
+        """Report at one time with the help of later measurements, and stay where it is.
+
+        Late and out-of-order data lose nothing: whatever came in order into `later` counts as
+        if it had been there in time (see `Horizon.waiting`).
+
+        Args:
+            later: Events after t, in order.
+            t: Time of the estimate, not before the last event handled, scalar or (env) [s].
+
+        Returns:
+            Estimates, arrays over (env, ...).
+
+        Raises:
+            ConfigError: The filter cannot smooth; `joint` can.
+        """
+        if not isinstance(self._filter, JointEkf):
+            raise ConfigError("smoothing: expected filter 'joint', the others cannot look back")
+        at = np.broadcast_to(np.asarray(t, dtype=np.float64), (self.n_envs,))
+        saved = self._orientation.save()
+        states = self._orientation.step(later)
+        self._orientation.restore(saved)
+        return self._filter.smooth(states, at.copy())
 
     def reset(self, env: int) -> None:
         """Forget everything of one environment."""

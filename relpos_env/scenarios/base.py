@@ -27,6 +27,8 @@ class Scenario:
     n_cars: int = 3
     ring: tuple[float, float]
     """[m] Half axes of the loop on which the cars start and drive round the centre."""
+    in_line: bool = False
+    """The cars start on one straight line beside the centre, in place of on the loop."""
     car: CarParams = field(default_factory=CarParams)
     imu: ImuSimParams = field(default_factory=ImuSimParams)
     mag: MagSimParams = field(default_factory=MagSimParams)
@@ -44,8 +46,16 @@ class Scenario:
             )
 
     def start(self, rng: np.random.Generator) -> F64:
-        """Starting poses, evenly on the loop with some disorder, (car, 3) [m, m, rad]."""
+        """Starting poses, evenly on the loop with some disorder, (car, 3) [m, m, rad].
+
+        On a line (`in_line`) the spacing is even and only the headings are in disorder.
+        """
         n = self.n_cars
+        if self.in_line:
+            a, b = self.ring
+            y = (np.arange(n) - 0.5 * (n - 1)) * 2.0 * b / n
+            heading = 0.5 * np.pi + rng.uniform(-0.1, 0.1, n)
+            return np.stack([np.full(n, a), y, heading], axis=1)
         spacing = 2.0 * np.pi / n
         phase = rng.uniform(0.0, 2.0 * np.pi) + spacing * np.arange(n)
         phase += rng.uniform(-0.1, 0.1, n) * spacing

@@ -1,11 +1,16 @@
 """The VQF wrapper: laws of blocks, and gravity-free acceleration."""
 
+import itertools
+
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from vqf import VQF
 
 from tracking.constellation import Constellation, NodeConfig
 from tracking.geometry import GRAVITY, rotate, yaw_of
+from tracking.inertial_faults import InertialHealth, inspect
 from tracking.measurements import Kind, MeasurementBlock
 from tracking.orientation import Orientation, OrientationParams
 
@@ -77,9 +82,52 @@ def test_a_node_at_rest_does_not_accelerate_whatever_its_accelerometer_reads():
     n = 600
     t = np.arange(1, n + 1) / 100.0
     imu = np.tile([0.0, 0.0, 0.0, 0.3, -0.2, 10.02], (n, 1))
+    imu += 1e-4 * np.random.default_rng(0).standard_normal(imu.shape)
     block = MeasurementBlock.of_kind(Kind.IMU, t, np.zeros(n, dtype=np.int64), imu)
     out = states(Orientation(constellation("initial"), OrientationParams()).step(block))
     np.testing.assert_allclose(out[-1, 4:], 0.0, atol=0.01)
+
+
+def test_a_sensor_that_sticks_gives_no_states():
+    """Nor does it turn the node, and it is heard again as soon as it moves."""
+    n = 400
+    t = np.arange(1, n + 1) / 100.0
+    imu = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, GRAVITY], (n, 1))
+    imu += 1e-3 * np.random.default_rng(0).standard_normal(imu.shape)
+    imu[100:300] = [0.0, 0.0, 3.0, 0.0, 0.0, GRAVITY]
+    block = MeasurementBlock.of_kind(Kind.IMU, t, np.zeros(n, dtype=np.int64), imu)
+    orientation = Orientation(constellation("initial"), OrientationParams())
+    out = orientation.step(block)
+    assert out.valid[0, :100].all()
+    assert out.valid[0, 300:].all()
+    assert not out.valid[0, 120:300].any()
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=st.integers(0, 2**31), cuts=st.lists(st.integers(1, 399), max_size=6))
+def test_any_cut_into_blocks_judges_samples_the_same(seed, cuts):
+    rng = np.random.default_rng(seed)
+    samples = rng.standard_normal((400, 6))
+    samples[rng.random(400) < 0.05] *= 100.0
+    for a in rng.integers(0, 380, 3):
+        samples[a : a + rng.integers(5, 60)] = samples[a]
+    whole = inspect(InertialHealth(), samples)
+    health, parts = InertialHealth(), []
+    edges = [0, *sorted(set(cuts)), 400]
+    for a, b in itertools.pairwise(edges):
+        parts.append(inspect(health, samples[a:b]))
+    for k in range(2):
+        np.testing.assert_array_equal(np.concatenate([p[k] for p in parts]), whole[k])
+
+
+def test_single_absurd_readings_are_replaced():
+    samples = np.zeros((50, 6)) + 1e-3 * np.random.default_rng(1).standard_normal((50, 6))
+    spoilt = samples.copy()
+    spoilt[20] *= 1e5
+    judged, usable = inspect(InertialHealth(), spoilt)
+    assert usable.all()
+    np.testing.assert_array_equal(judged[20], samples[19])
+    np.testing.assert_array_equal(np.delete(judged, 20, 0), np.delete(samples, 20, 0))
 
 
 def test_lost_samples_are_bridged():

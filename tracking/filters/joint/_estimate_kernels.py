@@ -7,7 +7,7 @@ from tracking.filters.joint._motion_kernels import predict, sum_inertial
 from tracking.filters.joint.state import JointState
 
 # Plain numbers of `Status`: kernels do not know enums.
-ABSENT, STARTING, AMBIGUOUS, OK, LOST = 0, 1, 2, 3, 4
+ABSENT, STARTING, AMBIGUOUS, OK, LOST, DOUBTFUL = 0, 1, 2, 3, 4, 5
 
 
 @kernel
@@ -53,6 +53,8 @@ def write_estimate(c, s, scratch, t, e, o, out):
             status[e, o, p] = OK
         elif age[e, o, p] > c.lost_after or worst > c.ok_var:
             status[e, o, p] = LOST
+        elif pair.misfit > c.doubt:
+            status[e, o, p] = DOUBTFUL
         else:
             status[e, o, p] = OK
 

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
-import numpy as np
-
 from tracking.compiled import kernel, small_kernel
 from tracking.filters._shape_kernels import collect
 from tracking.filters.joint._bank_kernels import (
@@ -32,43 +28,15 @@ GAUGE_PERIOD = 1.0
 """[s] Time between two moves of the centre to the origin."""
 
 
-class Scratch(NamedTuple):
-    """Room for intermediate results, so that no event allocates."""
-
-    idx: np.ndarray
-    """States of a measurement."""
-    val: np.ndarray
-    """Derivatives by them."""
-    w: np.ndarray
-    """(state)"""
-    scale: np.ndarray
-    """(state)"""
-    step: np.ndarray
-    """(node, 9)"""
-    speed: np.ndarray
-    """(node)"""
-    none: np.ndarray
-    """Zeros, (3)."""
-    x: np.ndarray
-    """States of an estimate, (1, state)."""
-    P: np.ndarray
-    """Its covariance, (1, state, state)."""
-    pre: np.ndarray
-    """Its sums, (node, N_PRE)."""
-    t_pre: np.ndarray
-    """(node) [s]"""
-    nlos: np.ndarray
-    """(1, pair)"""
-
-
 @kernel
-def run_events(coefficients, layout, state, block, t_out, out):
+def run_events(coefficients, layout, state, scratch, block, t_out, out):
     """Handle the events of every environment in order.
 
     Args:
         coefficients: COEFFICIENTS, (1).
         layout: Tables.
         state: JointState, updated.
+        scratch: Room.
         block: Events: t, kind, i, j, antenna_i, antenna_j, values, has_power, valid;
             (env, event, ...).
         t_out: Times at which estimates are due, ascending, (env, time) [s]. An estimate
@@ -77,34 +45,8 @@ def run_events(coefficients, layout, state, block, t_out, out):
     """
     t, kind, node_i, node_j, antenna_i, antenna_j, values, has_power, valid = block
     c = coefficients[0]
-    n = state.nodes.shape[1]
-    scratch = Scratch(
-        np.zeros(max(16, n), np.int64),
-        np.zeros(max(16, n)),
-        np.zeros(c.n),
-        np.zeros(c.n),
-        np.zeros((n, 9)),
-        np.zeros(n),
-        np.zeros(3),
-        np.zeros((1, c.n)),
-        np.zeros((1, c.n, c.n)),
-        np.zeros((n, N_PRE)),
-        np.zeros(n),
-        np.zeros((1, state.pairs.shape[1])),
-    )
     for e in range(t.shape[0]):
-        s = JointState(
-            state.nodes[e],
-            state.held[e],
-            state.pre[e],
-            state.pairs[e],
-            state.group[e],
-            state.x[e],
-            state.P[e],
-            state.nlos[e],
-            state.alive[e],
-            state.loglik[e],
-        )
+        s = one_env(state, e)
         o = 0
         for k in range(t.shape[1]):
             if not valid[e, k]:
@@ -141,6 +83,32 @@ def run_events(coefficients, layout, state, block, t_out, out):
         while o < t_out.shape[1]:
             write_estimate(c, s, scratch, t_out[e, o], e, o, out)
             o += 1
+
+
+@kernel
+def one_env(state, e):
+    """The state of environment e; shares its memory."""
+    return JointState(
+        state.nodes[e],
+        state.held[e],
+        state.pre[e],
+        state.pairs[e],
+        state.group[e],
+        state.x[e],
+        state.P[e],
+        state.nlos[e],
+        state.alive[e],
+        state.loglik[e],
+    )
+
+
+@kernel
+def advance_all(coefficients, state, scratch, t):
+    """Carry every environment to its time t, (env) [s]."""
+    for e in range(t.shape[0]):
+        s = one_env(state, e)
+        if s.group[0].started:
+            advance(coefficients[0], s, scratch, t[e])
 
 
 @small_kernel
@@ -217,7 +185,7 @@ def take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, evidence, is_sur
         nis, weight = fuse_range(c, s, h, p, dt, distance, levers, evidence, scratch)
         if h == group.best:
             pair.nis = nis
-            capped = min(nis, 25.0)
+            capped = min(nis, 25.0) if weight > 0.5 else 25.0
             pair.misfit += 0.05 * (capped - pair.misfit)
             group.misfit += 0.01 * (weight * capped - group.misfit)
             if weight > 0.5:

@@ -17,8 +17,7 @@ from __future__ import annotations
 import math
 
 from tracking.compiled import small_kernel
-
-GRAVITY = 9.81
+from tracking.filters._level_kernels import level
 
 
 @small_kernel
@@ -81,13 +80,7 @@ def take_state(c, nodes, held, pre, i, t, values, e, k):
         node.turning = keep * node.turning + (1.0 - keep) * angle / dt
     held[i, 0], held[i, 1], held[i, 2], held[i, 3] = w, x, y, z
     if node.levelled:
-        # Specific force in the body, f = R^T (a + g), taken as if the body were level.
-        f0 = (1.0 - 2.0 * (y * y + z * z)) * a0 + 2.0 * (x * y + w * z) * a1
-        f0 += 2.0 * (x * z - w * y) * (a2 + GRAVITY)
-        f1 = 2.0 * (x * y - w * z) * a0 + (1.0 - 2.0 * (x * x + z * z)) * a1
-        f1 += 2.0 * (y * z + w * x) * (a2 + GRAVITY)
-        cos_b, sin_b = math.cos(yaw), math.sin(yaw)
-        a0, a1 = cos_b * f0 - sin_b * f1, sin_b * f0 + cos_b * f1
+        a0, a1 = level(w, x, y, z, a0, a1, a2)
     if not fresh:
         # The first sample was held; the mean of both is nearer to what happened.
         half_v, half_p = 0.5 * dt, 0.25 * dt * dt

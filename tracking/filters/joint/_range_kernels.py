@@ -164,6 +164,10 @@ def fuse_range(c, s, h, p, dt, distance, levers, evidence, scratch):
         variance = project(s.P, h, c.n, m, scratch.idx, scratch.val, scratch.w)
     bent = min(c.bend_gain * bend(c, s, h, p, scratch.val), 0.2)
     R = c.white_var + bent * bent + s.nlos[h, p] * c.excess_white_var
+    # A pair whose ranges have long contradicted all else is believed less and less.
+    doubt = s.pairs[p].misfit / (0.7 * c.doubt)
+    if doubt > 1.0:
+        sane /= doubt * doubt * doubt * doubt
     if sane > 1e-3:
         absorb(s.x, s.P, h, c.n, scratch.w, nu, variance + R / sane)
     return nis, sane

@@ -18,10 +18,13 @@ import numpy as np
 from tracking.arrays import F64
 from tracking.constellation import Constellation
 from tracking.estimate import TeamEstimate
-from tracking.filters.joint._event_kernels import run_events
+from tracking.filters.joint._event_kernels import advance_all, run_events
 from tracking.filters.joint.params import JointParams
+from tracking.filters.joint.scratch import Scratch, make_scratch
+from tracking.filters.joint.smoothing import read_clones, with_clones
 from tracking.filters.joint.state import (
     JointState,
+    Records,
     as_records,
     make_coefficients,
     make_layout,
@@ -38,38 +41,43 @@ class JointEkf:
         self._coefficients = make_coefficients(constellation, params)
         self._layout = make_layout(constellation, params)
         self._state = self._fresh(n_envs)
+        self._scratch = make_scratch(
+            constellation.n_nodes, constellation.n_pairs, int(self._coefficients[0]["n"])
+        )
 
     def run(self, block: MeasurementBlock, t_out: F64) -> TeamEstimate:
         """Handle the events and report at the given times; see `Filter.run`."""
-        events = (
-            block.t,
-            block.kind,
-            block.i,
-            block.j,
-            block.antenna_i,
-            block.antenna_j,
-            block.values,
-            block.has_power,
-            block.valid,
+        estimate = TeamEstimate.empty(
+            self._constellation, np.ascontiguousarray(t_out, dtype=np.float64)
         )
-        contiguous = tuple(np.ascontiguousarray(a) for a in events)
-        t_out = np.ascontiguousarray(t_out, dtype=np.float64)
-        estimate = TeamEstimate.empty(self._constellation, t_out)
-        out = (
-            estimate.pos_ij_w,
-            estimate.vel_ij_w,
-            estimate.cov,
-            estimate.q_wb,
-            estimate.has_orientation,
-            estimate.age,
-            estimate.nis,
-            estimate.nlos_prob,
-            estimate.status,
-        )
-        run_events(
-            as_records(self._coefficients), self._layout, self._records(), contiguous, t_out, out
-        )
+        self._pass(self._state, self._coefficients, self._scratch, block, estimate)
         return estimate
+
+    def smooth(self, later: MeasurementBlock, t: F64) -> TeamEstimate:
+        """Report at one time with the help of later measurements, and stay where it is.
+
+        Args:
+            later: Events after t, in order. STATE, not IMU.
+            t: Time of the estimate, not before the last event handled, (env) [s].
+
+        Returns:
+            Estimates, arrays over (env, ...).
+        """
+        saved = self.save()
+        now = self.run(MeasurementBlock.empty(self._n_envs), t[:, None])
+        names = TeamEstimate.__slots__[1:]
+        estimate = TeamEstimate(now.constellation, *(getattr(now, name)[:, 0] for name in names))
+        advance_all(as_records(self._coefficients), _records(self._state), self._scratch, t)
+        clones, coefficients, source = with_clones(
+            self._state, self._coefficients, self._constellation
+        )
+        self.restore(saved)
+        scratch = make_scratch(
+            self._constellation.n_nodes, self._constellation.n_pairs, int(coefficients[0]["n"])
+        )
+        nothing = TeamEstimate.empty(self._constellation, np.zeros((self._n_envs, 0)))
+        self._pass(clones, coefficients, scratch, later, nothing)
+        return read_clones(clones, source, estimate, self._state.x.shape[2])
 
     def reset(self, env: int) -> None:
         """Forget everything of one environment."""
@@ -96,12 +104,53 @@ class JointEkf:
         """Ranges that hardly counted, taken for no line of sight or for nonsense, (env)."""
         return np.asarray(self._state.pairs["n_rejected"].sum(axis=1), dtype=np.float64)
 
-    def _records(self) -> JointState:
-        """The state in the form the kernels take; shares its memory."""
-        s = self._state
-        nodes, pairs, group = (as_records(a) for a in (s.nodes, s.pairs, s.group))
-        return s._replace(nodes=nodes, pairs=pairs, group=group)
+    def _pass(
+        self,
+        state: JointState,
+        coefficients: Records,
+        scratch: Scratch,
+        block: MeasurementBlock,
+        estimate: TeamEstimate,
+    ) -> None:
+        """Handle events and fill the estimate for its times."""
+        events = (
+            block.t,
+            block.kind,
+            block.i,
+            block.j,
+            block.antenna_i,
+            block.antenna_j,
+            block.values,
+            block.has_power,
+            block.valid,
+        )
+        out = (
+            estimate.pos_ij_w,
+            estimate.vel_ij_w,
+            estimate.cov,
+            estimate.q_wb,
+            estimate.has_orientation,
+            estimate.age,
+            estimate.nis,
+            estimate.nlos_prob,
+            estimate.status,
+        )
+        run_events(
+            as_records(coefficients),
+            self._layout,
+            _records(state),
+            scratch,
+            tuple(np.ascontiguousarray(a) for a in events),
+            estimate.t,
+            out,
+        )
 
     def _fresh(self, n_envs: int) -> JointState:
         n_hyps = len(self._layout.rotations)
         return make_state(self._constellation, self._params, n_envs, n_hyps)
+
+
+def _records(s: JointState) -> JointState:
+    """The state in the form the kernels take; shares its memory."""
+    nodes, pairs, group = (as_records(a) for a in (s.nodes, s.pairs, s.group))
+    return s._replace(nodes=nodes, pairs=pairs, group=group)

@@ -80,7 +80,7 @@ CARRIERS = {
 class RangeErrorParams:
     """How a range errs in sight: white noise, and parts that stay while nobody moves."""
 
-    white_std: float = 0.04
+    white_std: float = 0.05
     """[m] Of a single range."""
     fast_std: float = 0.03
     """[m] Multipath that changes within decimetres."""
@@ -128,7 +128,7 @@ class NlosParams:
     """[dB]"""
     gap_weight: float = 0.2
     """[-] Gaps of successive ranges are alike, so that each counts for less than one."""
-    outlier_prob: float = 1e-3
+    outlier_prob: float = 1e-2
     """[-] Share of ranges that mean nothing."""
     outlier_span: float = 20.0
     """[m] They lie anywhere in so much."""
@@ -199,6 +199,8 @@ class JointParams:
     """[s] A pair without a range for so long is lost."""
     leave_after: float = 5.0
     """[s] A node not heard for so long has left; its states are forgotten."""
+    doubt: float = 6.0
+    """[-] A pair whose ranges misfit so badly, as a running mean of NIS, is doubtful."""
     ok_std: float = 1.0
     """[m] A pair is not ok while its position is less certain than this along an axis."""
 

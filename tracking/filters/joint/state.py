@@ -131,6 +131,7 @@ _NUMBERS = (
     "lost_after",
     "leave_after",
     "ok_var",
+    "doubt",
 )
 COEFFICIENTS = np.dtype([("d", "i8"), ("n", "i8"), *((name, "f8") for name in _NUMBERS)])
 """Constants derived once from `JointParams`, under the same names; ``_var`` and ``2``: squared."""

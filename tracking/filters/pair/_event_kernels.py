@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracking.compiled import kernel, small_kernel
+from tracking.filters._level_kernels import level
 from tracking.filters._shape_kernels import collect
 from tracking.filters.pair._bank_kernels import (
     add_mirror_image,
@@ -57,12 +58,13 @@ def run_events(coefficients, layout, state, block, t_out, out):
         coefficients: COEFFICIENTS, (1).
         layout: Tables.
         state: FilterState, updated.
-        block: Events: t, kind, i, j, antenna_i, antenna_j, values, valid; (env, event, ...).
+        block: Events: t, kind, i, j, antenna_i, antenna_j, values, has_power, valid;
+            (env, event, ...).
         t_out: Times at which estimates are due, ascending, (env, time) [s]. An estimate
             holds every event up to its time, that time included.
         out: Arrays written: pos, vel, cov, q, has_q, age, nis, status; (env, time, ...).
     """
-    t, kind, node_i, node_j, antenna_i, antenna_j, values, valid = block
+    t, kind, node_i, node_j, antenna_i, antenna_j, values, has_power, valid = block
     c = coefficients[0]
     n = state.nodes.shape[1]
     scratch = Scratch(
@@ -100,12 +102,17 @@ def run_events(coefficients, layout, state, block, t_out, out):
                     i, j, a_i, a_j = j, i, a_j, a_i
                 distance = values[e, k, 0]
                 is_survey = what == SURVEY
+                R = c.range_var
+                if has_power[e, k] and values[e, k, 1] - values[e, k, 2] > c.nlos_gap:
+                    R += c.nlos_var
                 if t[e, k] - s.group[0].t_check >= c.check_period:
                     look_at_group(c, s, layout, t[e, k])
                 p, runs = hear(s, layout, i, j, t[e, k])
                 if not runs:
                     take_first_range(c, s, layout, i, j, p, t[e, k], distance, is_survey)
-                elif take_range(c, s, layout, scratch, p, a_i, a_j, t[e, k], distance, is_survey):
+                elif take_range(
+                    c, s, layout, scratch, p, a_i, a_j, t[e, k], distance, R, is_survey
+                ):
                     add_mirror_image(c, s, layout)
             elif what == LEAVE or (what == JOIN and s.nodes[i].present):
                 remove_node(s, layout, i)
@@ -124,6 +131,10 @@ def take_state(c, s, layout, i, t, values, e, k):
                 advance_pair(c, s, layout.pair_index[i, other], t)
     for column in range(7):
         s.held[i, column] = values[e, k, column]
+    if node.levelled:
+        w, x, y, z = s.held[i, 0], s.held[i, 1], s.held[i, 2], s.held[i, 3]
+        a0, a1 = level(w, x, y, z, s.held[i, 4], s.held[i, 5], s.held[i, 6])
+        s.held[i, 4], s.held[i, 5] = a0, a1
     node.t_state = t
     node.has_state = True
 
@@ -138,14 +149,14 @@ def hear(s, layout, i, j, t):
 
 
 @small_kernel
-def take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, is_survey):
+def take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, R, is_survey):
     """A range or survey of a running pair; True if the layout opened after being flat."""
     advance_pair(c, s, p, t)
     if is_survey:
         fuse_survey(c, s, p, distance, scratch.work)
         s.pairs[p].t_range = t
     else:
-        fuse_range(c, s, layout, p, t, distance, a_i, a_j, scratch.work)
+        fuse_range(c, s, layout, p, t, distance, R, a_i, a_j, scratch.work)
     if not c.use_mds or t - s.group[0].t_mds < c.mds_period:
         return False
     for q in range(s.pairs.shape[0]):

@@ -126,7 +126,7 @@ def update_rate(c, pair, t, distance):
 
 
 @small_kernel
-def fuse_range(c, s, layout, p, t, distance, antenna_i, antenna_j, work):
+def fuse_range(c, s, layout, p, t, distance, R, antenna_i, antenna_j, work):
     """Gate a range, then correct pair p of every hypothesis with it and with its rate."""
     if not passes_gate(c, s, p, t, distance):
         return
@@ -142,7 +142,7 @@ def fuse_range(c, s, layout, p, t, distance, antenna_i, antenna_j, work):
         if not s.alive[h]:
             continue
         nu = distance - range_model(s.x, p, h, l0, l1, l2, work)
-        S = correct(s.x, s.P, p, h, work, nu, c.range_var)
+        S = correct(s.x, s.P, p, h, work, nu, R)
         nis = nu * nu / S
         if many:
             s.loglik[h] -= 0.5 * (min(nis, c.max_nis) + math.log(S) + LN_2PI)

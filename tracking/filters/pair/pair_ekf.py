@@ -59,6 +59,7 @@ class PairEkf:
             block.antenna_i,
             block.antenna_j,
             block.values,
+            block.has_power,
             block.valid,
         )
         contiguous = tuple(np.ascontiguousarray(a) for a in events)

@@ -89,8 +89,8 @@ class PairEkfParams:
     accel_psd: float = 0.15
     """[m/s2/sqrt(Hz)] Noise of one node's world acceleration: sensor noise, vibration and the
     slow error of a wrong tilt. Larger forgets dead reckoning sooner."""
-    wheeled_accel_psd: float = 0.07
-    """[m/s2/sqrt(Hz)] The same on cars and robots, which stay level."""
+    wheeled_accel_psd: float = 0.035
+    """[m/s2/sqrt(Hz)] The same on cars and robots, whose acceleration is free of tilt errors."""
     unaided_accel_psd: float = 0.7
     """[m/s2/sqrt(Hz)] The same for a moving node whose IMU is not heard."""
     unaided_after: float = 0.3
@@ -98,6 +98,10 @@ class PairEkfParams:
     range_std: float = 0.15
     """[m] Standard deviation of a range. 5 to 10 cm in sight; the rest is for the bias of real
     ranges, which lasts for seconds."""
+    nlos_gap: float = 5.5
+    """[dB] A range whose first path is so much weaker than all it received is no line of sight."""
+    nlos_std: float = 0.3
+    """[m] Added standard deviation of such a range: a stretch of them counts as a single one."""
     survey_std: float = 0.02
     """[m] Standard deviation of a surveyed distance."""
     speed_model: Literal["range-rate", "speed-norm", "none"] = "range-rate"
@@ -118,7 +122,10 @@ class PairEkfParams:
 
     def __post_init__(self) -> None:
         _expect_positive(self, "accel_psd wheeled_accel_psd unaided_accel_psd unaided_after")
-        _expect_positive(self, "range_std survey_std speed_std speed_tau lost_after leave_after")
+        _expect_positive(
+            self,
+            "range_std nlos_gap nlos_std survey_std speed_std speed_tau lost_after leave_after",
+        )
         if self.speed_model not in ("range-rate", "speed-norm", "none"):
             raise ConfigError(
                 f"speed_model: expected 'range-rate', 'speed-norm' or 'none', "

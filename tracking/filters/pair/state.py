@@ -29,6 +29,7 @@ NODE = np.dtype(
         ("heard", "?"),  # after the first range
         ("present", "?"),  # in the group, with filters
         ("static", "?"),  # constant: never moves
+        ("levelled", "?"),  # constant: its carrier stays level
         ("psd", "f8"),  # constant: acceleration noise with an IMU [m/s2/sqrt(Hz)]
     ]
 )
@@ -67,6 +68,8 @@ _NUMBERS = (
     "unaided_after",
     "range_var",
     "survey_var",
+    "nlos_gap",
+    "nlos_var",
     "speed_var",
     "speed_tau",
     "lost_after",
@@ -144,6 +147,8 @@ def make_coefficients(
         "unaided_after": params.unaided_after,
         "range_var": params.range_std**2,
         "survey_var": params.survey_std**2,
+        "nlos_gap": params.nlos_gap,
+        "nlos_var": params.nlos_std**2,
         "speed_var": params.speed_std**2,
         "speed_tau": params.speed_tau,
         "lost_after": params.lost_after,
@@ -185,6 +190,7 @@ def make_state(
         else params.accel_psd
         for node in constellation.nodes
     ]
+    nodes["levelled"] = [node.vehicle in WHEELED for node in constellation.nodes]
     held = np.zeros((n_envs, n, 7))
     held[..., 0] = 1.0
     pairs = np.zeros((n_envs, p), dtype=PAIR)

@@ -1,0 +1,91 @@
+"""The tracker's own time: a step of a group that has started, and an hour of a recording."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+from math import ceil
+
+import numpy as np
+
+from agents.bench.tracker.workload import Workload
+from tracking.log import Log
+from tracking.tracker import Tracker
+
+REPEATS = 5
+"""The fastest of so many runs counts, for us and for the peers."""
+WARM_UP, PATIENCE = 15.0, 60.0
+"""[s] Time a group is given to settle, and time by which it must be ok."""
+FIRST_ROUNDS = 10
+"""Enough to start the group."""
+
+
+def step_cost(workload: Workload, name: str, steps: int) -> float:
+    """Time of a step [us], once one hypothesis is left.
+
+    Args:
+        workload: The group and its steps.
+        name: One of `tracking.filters.FILTERS`.
+        steps: How many to time.
+
+    Raises:
+        RuntimeError: The group does not start.
+    """
+    tracker, done = started(workload, name)
+    chunk = workload.block(done, steps)
+    end = float(chunk.t[0, -1])
+    saved = tracker.save()
+    best = np.inf
+    for _ in range(REPEATS):
+        tracker.restore(saved)
+        began = time.perf_counter()
+        tracker.step(chunk, end)
+        best = min(best, time.perf_counter() - began)
+    return 1e6 * float(best) / steps
+
+
+def started(workload: Workload, name: str) -> tuple[Tracker, int]:
+    """A tracker whose pairs are all ok, and the number of the next step.
+
+    Raises:
+        RuntimeError: The group does not start.
+    """
+    tracker = Tracker(workload.constellation, filter=name)
+    # The first ranges of all pairs come in rounds, whatever the steps are.
+    rounds = replace(workload, step="round")
+    first = rounds.block(0, FIRST_ROUNDS)
+    until = float(first.t[0, -1])
+    tracker.step(first, until)
+    done = ceil(until / workload.dt)
+    second = max(round(1.0 / workload.dt), 1)
+    while done * workload.dt < PATIENCE:
+        chunk = workload.block(done, second)
+        estimate = tracker.step(chunk, float(chunk.t[0, -1]))
+        done += second
+        enough = estimate.ok.all() if name == "joint" else True
+        if done * workload.dt > WARM_UP and enough:
+            return tracker, done
+    raise RuntimeError(f"bench: {workload.n} nodes did not start within {PATIENCE:g} s")
+
+
+@dataclass(frozen=True)
+class HourCost:
+    """An hour of a recording."""
+
+    seconds: float
+    """[s] Its time, orientation filters included."""
+    rounds: float
+    """Rounds in it."""
+
+
+def hour_cost(log: Log) -> HourCost:
+    """Time of an hour like a shorter recording, ten estimates a second."""
+    t_out = np.arange(log.block.t[0, 0], log.block.t[0, -1], 0.1)
+    best = np.inf
+    for _ in range(3):
+        tracker = Tracker(log.constellation)
+        began = time.perf_counter()
+        tracker.run(log.block, t_out)
+        best = min(best, time.perf_counter() - began)
+    share = 3600.0 / log.duration
+    return HourCost(float(best) * share, log.n_ranges / log.constellation.n_pairs * share)

@@ -1,0 +1,124 @@
+"""Groups whose measurements are computed, for timing: the same for us and for the peers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from tracking.arrays import F64, I64
+from tracking.constellation import Constellation, NodeConfig
+from tracking.geometry import quat_from_yaw
+from tracking.measurements import Kind, MeasurementBlock
+from tracking.ranging.airtime import PAPER_PHY, round_rate
+
+RANGE_STD = 0.05
+"""[m]"""
+REAR_AXLE = 0.15
+"""[m] Axle of the cars behind their tracker: what they do fits what the filter knows of cars."""
+TURN = 0.8
+"""[rad/s] Of the first node round its circle of 1 m; the others are up to a half faster."""
+
+
+@dataclass(frozen=True)
+class Workload:
+    """Nodes on circles of their own that range in steps."""
+
+    n: int
+    """Number of nodes."""
+    dimensions: Literal[2, 3]
+    """2: cars; 3: trackers on a body."""
+    step: Literal["round", "message"]
+    """Every pair ranges at once, or one node after another with half the group."""
+
+    @cached_property
+    def constellation(self) -> Constellation:
+        """The nodes."""
+        vehicle = "car" if self.dimensions == 2 else "human"
+        nodes = tuple(NodeConfig(id=k, vehicle=vehicle) for k in range(self.n))
+        return Constellation(nodes=nodes, dimensions=self.dimensions)
+
+    @property
+    def rounds_hz(self) -> float:
+        """Rounds per second that the airtime allows [1/s]."""
+        return round_rate(PAPER_PHY, self.n)
+
+    @property
+    def dt(self) -> float:
+        """Time between two steps [s]; two rounds a second, at least, as shorter frames allow."""
+        return 1.0 / max(self.rounds_hz, 2.0) / (self.n if self.step == "message" else 1)
+
+    @cached_property
+    def pairs(self) -> I64:
+        """Who ranges in a step, (step, pair, 2), i < j; the steps repeat."""
+        if self.step == "round":
+            return self.constellation.pairs[None]
+        i = np.arange(self.n)[:, None]
+        j = (i + np.arange(1, max(self.n // 2, 1) + 1)) % self.n
+        i = np.broadcast_to(i, j.shape)
+        return np.stack([np.minimum(i, j), np.maximum(i, j)], axis=-1)
+
+    @cached_property
+    def _centres(self) -> F64:
+        """Spread evenly over a disc, a third of them raised in space, (node, 3) [m]."""
+        k = np.arange(self.n)
+        radius, angle = 3.0 * np.sqrt(k + 0.7), k * 2.4
+        height = 1.5 * (k % 3) if self.dimensions == 3 else 0.0 * k
+        return np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=-1)
+
+    @cached_property
+    def _rates(self) -> F64:
+        return TURN * (1.0 + 0.5 * np.arange(self.n) / self.n)
+
+    def _on_circle(self, t: F64) -> F64:
+        phase = self._rates * t[:, None] + np.arange(self.n)
+        heave = 0.4 * np.sin(1.3 * phase) if self.dimensions == 3 else 0.0 * phase
+        return np.stack([np.cos(phase), np.sin(phase), heave], axis=-1)
+
+    def pos(self, t: F64) -> F64:
+        """Positions, (time, node, 3) [m]."""
+        return self._centres + self._on_circle(t)
+
+    def accel(self, t: F64) -> F64:
+        """Accelerations, (time, node, 3) [m/s2]."""
+        scale = self._rates[:, None] * np.array([1.0, 1.0, 1.3])
+        return -(scale**2) * self._on_circle(t)
+
+    def distances(self, t: F64, first: int) -> F64:
+        """Measured ranges of the steps at the times t, (time, pair) [m]; the first is step `first`."""
+        who = self.pairs[(first + np.arange(len(t))) % len(self.pairs)]
+        pos, rows = self.pos(t), np.arange(len(t))[:, None]
+        exact = np.linalg.norm(pos[rows, who[..., 1]] - pos[rows, who[..., 0]], axis=-1)
+        noise = np.random.default_rng(first).normal(0.0, RANGE_STD, exact.shape)
+        return np.maximum(exact + noise, 0.1)
+
+    def block(self, first: int, steps: int) -> MeasurementBlock:
+        """Measurements of some steps, in order.
+
+        Args:
+            first: Number of the first; step k is at the time ``(k + 1) dt``.
+            steps: How many.
+        """
+        t = (first + 1.0 + np.arange(steps)) * self.dt
+        values = np.zeros((steps, self.n, 7))
+        slip = np.arcsin(REAR_AXLE) if self.dimensions == 2 else 0.0
+        yaw = self._rates * t[:, None] + np.arange(self.n) + 0.5 * np.pi - slip
+        values[..., :4], values[..., 4:] = quat_from_yaw(yaw), self.accel(t)
+        node = np.broadcast_to(np.arange(self.n), (steps, self.n)).ravel()
+        states = MeasurementBlock.of_kind(
+            Kind.STATE, np.repeat(t, self.n), node, values.reshape(-1, 7)
+        )
+        who = self.pairs[(first + np.arange(steps)) % len(self.pairs)].reshape(-1, 2)
+        i, j = np.ascontiguousarray(who[:, 0]), np.ascontiguousarray(who[:, 1])
+        distance = self.distances(t, first)
+        ranges = MeasurementBlock.of_kind(
+            Kind.RANGE,
+            np.repeat(t, distance.shape[1]),
+            i,
+            distance.reshape(-1, 1),
+            j=j,
+            antennas=(i, j),
+        )
+        return MeasurementBlock.concatenate([states, ranges]).sorted()

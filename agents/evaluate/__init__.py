@@ -1,0 +1,1 @@
+"""Errors, consistency and cost of the filters over many simulated runs."""

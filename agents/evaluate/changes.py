@@ -1,0 +1,65 @@
+"""What can be done to a recorded run to make it harder, each change a function of the log.
+
+    change(log, rng) -> log
+
+The truth stays; ranges stay in their order, so that the labels of the log still fit them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tracking.arrays import Bool
+from tracking.log import Log
+from tracking.measurements import Kind, MeasurementBlock
+
+DROPOUT = 10.0
+"""[s] For so long the IMU of a node is silent."""
+CLOCK_OFFSET = 0.05
+"""[s] So late are the IMU stamps of a node."""
+OUTLIER_SHARE = 0.02
+"""[-] So many ranges are outliers."""
+OUTLIER_SPAN = 20.0
+"""[m] They lie anywhere between 0 and this."""
+
+
+def without_powers(log: Log, rng: np.random.Generator) -> Log:
+    """Ranges without received and first-path power, as from radios that do not report them."""
+    ranges = log.block.kind == Kind.RANGE
+    values, has_power = log.block.values.copy(), log.block.has_power.copy()
+    values[ranges, 1:] = 0.0
+    has_power[ranges] = False
+    return replace(log, block=replace(log.block, values=values, has_power=has_power))
+
+
+def imu_dropout(log: Log, rng: np.random.Generator) -> Log:
+    """No IMU and magnetometer of the first node for `DROPOUT` in the middle of the run."""
+    first, last = log.t_range
+    middle = 0.5 * (first + last)
+    silent = np.abs(log.block.t[0] - middle) < 0.5 * DROPOUT
+    return replace(log, block=log.block.take(~(silent & _inertial(log.block, 0))))
+
+
+def clock_offset(log: Log, rng: np.random.Generator) -> Log:
+    """IMU and magnetometer of the first node are stamped `CLOCK_OFFSET` too late."""
+    t = log.block.t.copy()
+    t[0, _inertial(log.block, 0)] += CLOCK_OFFSET
+    return replace(log, block=replace(log.block, t=t).sorted())
+
+
+def range_outliers(log: Log, rng: np.random.Generator) -> Log:
+    """A share of the ranges, `OUTLIER_SHARE`, anywhere between 0 and `OUTLIER_SPAN`."""
+    ranges = np.nonzero(log.block.kind[0] == Kind.RANGE)[0]
+    hit = ranges[rng.random(len(ranges)) < OUTLIER_SHARE]
+    values = log.block.values.copy()
+    # 1 - random() is above 0, as a range has to be.
+    values[0, hit, 0] = OUTLIER_SPAN * (1.0 - rng.random(len(hit)))
+    return replace(log, block=replace(log.block, values=values))
+
+
+def _inertial(block: MeasurementBlock, node: int) -> Bool:
+    """Events of the IMU and magnetometer of a node, (event)."""
+    of_kind = np.isin(block.kind[0], (Kind.IMU, Kind.MAG))
+    return np.asarray(of_kind & (block.i[0] == node))

@@ -1,0 +1,228 @@
+"""Every case, seed and filter of a suite: what `relpos evaluate` does, as a function."""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from agents.errors import UsageError
+from agents.evaluate.run import RunResult, run_seed
+from agents.evaluate.suites import SUITES, Case, Suite
+from tracking.filters import FILTERS
+
+SHORTEST, LONGEST = 15.0, 1800.0
+"""[s] The first ten seconds are not scored; a person is simulated for half an hour at most."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CaseResult:
+    """One case and filter over all seeds: medians of errors, means of consistency."""
+
+    suite: str
+    case: Case
+    filter: str
+    runs: tuple[RunResult, ...]
+    """By seed."""
+
+    @property
+    def paper(self) -> float | None:
+        """Error that the paper reports [m]."""
+        return self.case.paper.get(self.filter)
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """The figures, ready for JSON; what could not be scored is None."""
+        medians = ("rmse", "rmse_yaw", "rmse_shape", "bound", "bound_shape")
+        ratios = ("ratio_bound", "ratio_shape")
+        return {
+            "suite": self.suite,
+            "case": self.case.name,
+            "scenario": self.case.scenario.name,
+            "filter": self.filter,
+            "nodes": self.runs[0].nodes,
+            "seeds": len(self.runs),
+            **{name: self.median(name) for name in (*medians, *ratios)},
+            "lost_runs": sum(r.lost for r in self.runs),
+            "nees": _mean(r.nees for r in self.runs),
+            "nis": _mean(r.nis for r in self.runs),
+            "coverage": _mean(r.coverage for r in self.runs),
+            "ok_share": _mean(r.ok_share for r in self.runs),
+            "us_per_round": self.median("us_per_round"),
+            "paper": self.paper,
+        }
+
+    def values(self, name: str) -> list[float]:
+        """A figure of every run that has it.
+
+        Args:
+            name: One of `RunResult`.
+        """
+        found = (getattr(r, name) for r in self.runs)
+        return [v for v in found if v is not None]
+
+    def median(self, name: str) -> float | None:
+        """Median of a figure over the runs that have it.
+
+        Args:
+            name: One of `RunResult`.
+        """
+        values = self.values(name)
+        return float(np.median(values)) if values else None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EvaluateResult:
+    """A suite evaluated."""
+
+    suite: Suite
+    filters: tuple[str, ...]
+    seeds: int
+    seconds: float
+    """[s] Length of every run."""
+    cases: tuple[CaseResult, ...]
+    """By case, then filter."""
+
+    @property
+    def by_case(self) -> list[tuple[Case, list[CaseResult]]]:
+        """Cases with the result of every filter."""
+        return [(case, [c for c in self.cases if c.case is case]) for case in self.suite.cases]
+
+    @property
+    def records(self) -> list[dict[str, Any]]:
+        """One flat record for each case and filter."""
+        return [c.record for c in self.cases]
+
+    @property
+    def run_records(self) -> list[dict[str, Any]]:
+        """One flat record for each run."""
+        return [{"suite": c.suite, **r.record} for c in self.cases for r in c.runs]
+
+
+def evaluate(
+    *,
+    suite: str | Suite = "paper",
+    filters: Sequence[str] = tuple(FILTERS),
+    seeds: int | None = None,
+    seconds: float | None = None,
+    jobs: int = 1,
+    progress: Callable[[float], None] | None = None,
+) -> EvaluateResult:
+    """Track simulated runs of every case and seed with every filter, and score them.
+
+    With more than one job the calling script must be importable: its work belongs below
+    `if __name__ == "__main__"`, and the functions that change logs into modules.
+
+    Args:
+        suite: One of `agents.evaluate.suites.SUITES`, or one of your own.
+        filters: Names in `tracking.filters.FILTERS`.
+        seeds: So many runs of each case, seeds 0, 1, ...; by default those of the suite.
+        seconds: Length of a run [s]; by default that of the suite.
+        jobs: Processes at a time. Nothing but the time of a round depends on it.
+        progress: Called with the share done, 0 to 1.
+
+    Raises:
+        UsageError: A name that is not known or a number out of range, or too many jobs for the
+            machine; the option is named.
+    """
+    chosen = suite if isinstance(suite, Suite) else find_suite(suite)
+    names = check_filters(filters)
+    seeds = chosen.seeds if seeds is None else seeds
+    seconds = chosen.seconds if seconds is None else seconds
+    if not 1 <= seeds <= 100_000:
+        raise UsageError(f"--seeds: expected 1 to 100000, got {seeds}")
+    if not SHORTEST <= seconds <= LONGEST:
+        raise UsageError(f"--seconds: expected {SHORTEST:g} to {LONGEST:g}, got {seconds:g}")
+    if not 1 <= jobs <= 1024:
+        raise UsageError(f"--jobs: expected 1 to 1024, got {jobs}")
+    tasks = [(case, seed, names, seconds) for seed in range(seeds) for case in chosen.cases]
+    done: dict[tuple[str, int], list[RunResult]] = {}
+    for case, seed, runs in _run_all(tasks, jobs):
+        done[case, seed] = runs
+        if progress is not None:
+            progress(len(done) / len(tasks))
+    cases = tuple(
+        CaseResult(
+            suite=chosen.name,
+            case=case,
+            filter=name,
+            runs=tuple(done[case.name, seed][k] for seed in range(seeds)),
+        )
+        for case in chosen.cases
+        for k, name in enumerate(names)
+    )
+    return EvaluateResult(suite=chosen, filters=names, seeds=seeds, seconds=seconds, cases=cases)
+
+
+def find_suite(name: str) -> Suite:
+    """Look a suite up.
+
+    Args:
+        name: One of `SUITES`.
+
+    Raises:
+        UsageError: No suite of that name.
+    """
+    if name not in SUITES:
+        raise UsageError(f"--suite: expected one of {', '.join(SUITES)}, got {name!r}")
+    return SUITES[name]
+
+
+def check_filters(names: Iterable[str]) -> tuple[str, ...]:
+    """Filters as they were named, each once.
+
+    Args:
+        names: Names in `tracking.filters.FILTERS`.
+
+    Raises:
+        UsageError: No such filter, or none at all.
+    """
+    chosen = tuple(dict.fromkeys(names))
+    wrong = [n for n in chosen if n not in FILTERS]
+    if wrong or not chosen:
+        got = repr(wrong[0]) if wrong else "none"
+        raise UsageError(f"--filters: expected names of {', '.join(FILTERS)}, got {got}")
+    return chosen
+
+
+Task = tuple[Case, int, tuple[str, ...], float]
+
+
+def _run_all(tasks: Sequence[Task], jobs: int) -> Iterator[tuple[str, int, list[RunResult]]]:
+    """Results by case and seed, in any order."""
+    jobs = min(jobs, len(tasks))
+    if jobs == 1:
+        for task in tasks:
+            yield task[0].name, task[1], run_seed(*task)
+        return
+    # New processes, since a forked one would share the threads of compiled libraries.
+    spawn = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(jobs, mp_context=spawn, initializer=_leave_interrupts)
+    try:
+        waiting = {pool.submit(run_seed, *task): task for task in tasks}
+        for future in as_completed(waiting):
+            case, seed, _, _ = waiting.pop(future)
+            yield case.name, seed, future.result()
+    except BrokenProcessPool as error:
+        raise UsageError(
+            "--jobs: a process was ended from outside, perhaps for want of memory; "
+            f"expected fewer than {jobs}"
+        ) from error
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _leave_interrupts() -> None:
+    """An interrupt from the keyboard is the business of the first process."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _mean(values: Iterable[float | None]) -> float | None:
+    found = [v for v in values if v is not None]
+    return float(np.mean(found)) if found else None

@@ -1,0 +1,163 @@
+"""One run: a simulated log, tracked by one filter and scored."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from agents.evaluate.lost import converged_at, lost_at
+from agents.evaluate.over_time import OverTime, over_time
+from agents.evaluate.suites import Case
+from relpos_env.matched import matched_params
+from tracking.bounds import Bound, posterior_bound
+from tracking.log import Log
+from tracking.measurements import Kind
+from tracking.metrics import score
+from tracking.tracker import Tracker
+
+SKIP = 10.0
+"""[s] After the first range, not scored."""
+WARM_UP = 200
+"""[-] So many events are tracked before the clock runs, so that compiling is not timed."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunResult:
+    """One case, seed and filter; figures are None where there was nothing to score."""
+
+    case: str
+    scenario: str
+    filter: str
+    seed: int
+    nodes: int
+    rmse: float | None
+    """[m]"""
+    rmse_yaw: float | None
+    """[m]"""
+    rmse_shape: float | None
+    """[m]"""
+    bound: float | None
+    """[m] Least possible `rmse`."""
+    bound_shape: float | None
+    """[m] Least possible `rmse_shape`."""
+    nees: float | None
+    """[-]"""
+    nis: float | None
+    """[-]"""
+    coverage: float
+    """[-] Share of the scored time with an estimate."""
+    ok_share: float
+    """[-] Share of the scored time with status ok."""
+    converged_s: float
+    """[s] From the first range until all pairs were ok, at most 10."""
+    lost_s: float | None
+    """[s] When the run was lost, None if never."""
+    rejected: int
+    """Ranges refused as outliers."""
+    rounds_hz: float
+    """[1/s] Ranges over pairs and time."""
+    us_per_round: float
+    """[us] Time of the tracker, orientation and reports too, over rounds; the only figure that is
+    not repeatable."""
+    over_time: OverTime
+
+    @property
+    def lost(self) -> bool:
+        """Whether a pair was wrong for too long."""
+        return self.lost_s is not None
+
+    @property
+    def ratio_bound(self) -> float | None:
+        """`rmse_yaw` over the bound [-]."""
+        return _ratio(self.rmse_yaw, self.bound)
+
+    @property
+    def ratio_shape(self) -> float | None:
+        """`rmse_shape` over its bound [-]."""
+        return _ratio(self.rmse_shape, self.bound_shape)
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """The figures, ready for JSON."""
+        names = [n for n in self.__slots__ if n != "over_time"]
+        return {n: getattr(self, n) for n in names} | {
+            "ratio_bound": self.ratio_bound,
+            "ratio_shape": self.ratio_shape,
+        }
+
+
+def run(case: Case, log: Log, filter: str, seed: int, bound: Bound | None) -> RunResult:
+    """Track the log of a case and score it.
+
+    Args:
+        case: What kind of run it is.
+        log: Its log, with truth.
+        filter: One of `tracking.filters.FILTERS`.
+        seed: That of the log.
+        bound: The least possible errors of the log, None for unknown.
+    """
+    constellation, block = log.constellation, log.block
+    first, last = log.t_range
+    t = log.truth.times()
+    t = t[(t >= first) & (t <= last)]
+    n_warm = int(np.searchsorted(block.t[0], first)) + WARM_UP
+    warm = block.take(slice(0, n_warm))
+    Tracker(constellation, filter=filter).step(warm, float(warm.t[0, -1]))
+
+    tracker = Tracker(constellation, filter=filter)
+    began = time.perf_counter()
+    estimate = tracker.run(block, t).take(0)
+    elapsed = time.perf_counter() - began
+
+    truth, has_truth = log.truth.pairs(constellation, t)
+    s = score(estimate, truth, has_truth, first + SKIP)
+    end = float(log.truth.t.max())
+    n_rounds = block.count(Kind.RANGE) / constellation.n_pairs
+    return RunResult(
+        case=case.name,
+        scenario=case.scenario.name,
+        filter=filter,
+        seed=seed,
+        nodes=constellation.n_nodes,
+        rmse=_number(s.rmse),
+        rmse_yaw=_number(s.rmse_yaw),
+        rmse_shape=_number(s.rmse_shape),
+        bound=None if bound is None else _number(bound.rmse),
+        bound_shape=None if bound is None else _number(bound.rmse_shape),
+        nees=_number(s.nees),
+        nis=_number(float(tracker.mean_nis()[0])),
+        coverage=s.coverage,
+        ok_share=s.ok_share,
+        converged_s=converged_at(estimate, first) - first,
+        lost_s=lost_at(estimate, truth, has_truth, first),
+        rejected=int(tracker.n_rejected()[0]),
+        rounds_hz=n_rounds / (last - first),
+        us_per_round=1e6 * elapsed / n_rounds,
+        over_time=over_time(estimate, truth, has_truth, np.radians(s.yaw_deg or 0.0), end),
+    )
+
+
+def run_seed(case: Case, seed: int, filters: tuple[str, ...], seconds: float) -> list[RunResult]:
+    """All filters on the run of one seed.
+
+    Args:
+        case: What kind of run it is.
+        seed: Same seed, same figures but for the time.
+        filters: Names in `tracking.filters.FILTERS`.
+        seconds: Length of the run.
+    """
+    log = case.log(seed, seconds)
+    bound = posterior_bound(log, matched_params(case.scenario), skip=SKIP)
+    return [run(case, log, name, seed, bound) for name in filters]
+
+
+def _number(value: float | None) -> float | None:
+    """A finite number, or None."""
+    return None if value is None or not np.isfinite(value) else float(value)
+
+
+def _ratio(value: float | None, bound: float | None) -> float | None:
+    return None if value is None or not bound else value / bound

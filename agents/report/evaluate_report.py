@@ -1,0 +1,90 @@
+"""The report of an evaluation: figures beside the paper's, and pictures of all runs."""
+
+from __future__ import annotations
+
+import json
+
+from agents.evaluate.evaluate import EvaluateResult
+from agents.evaluate.lost import FOR, WRONG
+from agents.evaluate.run import SKIP
+from agents.report import evaluate_figures as figures
+from agents.report.page import Page, metres, png
+
+_FIGURES = [
+    "rmse", "rmse_yaw", "rmse_shape", "bound", "yaw/b", "shape/b",
+    "lost", "nees", "nis", "us",
+]  # fmt: skip
+
+
+def header(result: EvaluateResult) -> list[str]:
+    """Names of the columns; the paper's only where it has a figure."""
+    return ["case", "filter", *(["paper"] if has_paper(result) else []), *_FIGURES]
+
+
+def has_paper(result: EvaluateResult) -> bool:
+    """Whether the paper reports an error of any case."""
+    return any(c.paper is not None for c in result.cases)
+
+
+def rows(result: EvaluateResult) -> list[list[str]]:
+    """Cells of the table, one line for each case and filter."""
+    cells = []
+    before = ""
+    for r in result.records:
+        lengths = [metres(r[k]) for k in ("rmse", "rmse_yaw", "rmse_shape", "bound")]
+        ratios = [_number(r[k]) for k in ("ratio_bound", "ratio_shape")]
+        rest = [f"{r['lost_runs']}/{r['seeds']}", *(_number(r[k]) for k in ("nees", "nis"))]
+        name = r["case"] if r["case"] != before else ""
+        before = r["case"]
+        head = [name, r["filter"], *([metres(r["paper"])] if has_paper(result) else [])]
+        cells.append([*head, *lengths, *ratios, *rest, f"{r['us_per_round']:.0f}"])
+    return cells
+
+
+def notes(result: EvaluateResult) -> list[str]:
+    """What a reader of the table must know, a line each."""
+    lines = [
+        f"{result.seeds} seeds of {result.seconds:g} s, scored from {SKIP:g} s after the first "
+        "range. Errors [m], the bound and the ratios to it are medians over the seeds.",
+        f"lost: a pair was off by more than {WRONG:g} m for more than {FOR:g} s in one go. "
+        "nees and nis are means, 1 is right.",
+        "us: time of the tracker for a ranging round [us]; compare it only at --jobs 1 on an "
+        "idle machine.",
+    ]
+    if has_paper(result):
+        lines.append(
+            "paper: Armani and Holz, ICRA 2024 [m]. The paper does not say which of the three "
+            "errors it reports."
+        )
+    return lines
+
+
+def evaluate_files(result: EvaluateResult) -> dict[str, str | bytes]:
+    """Everything that goes into the folder, by name."""
+    drawn = figures.figures(result)
+    page = Page(
+        f"Evaluation: {result.suite.title.lower()}",
+        f"{len(result.suite.cases)} cases, {result.seeds} seeds, {result.seconds:g} s each",
+    )
+    page.heading("Errors")
+    page.table(header(result), rows(result))
+    for line in notes(result):
+        page.text(line)
+    page.heading("Cases")
+    page.table(["case", "what is special"], [[c.name, c.about] for c in result.suite.cases])
+    for name, (title, figure, caption) in drawn.items():
+        page.heading(title)
+        page.figure(figure, f"{caption} ({name})")
+    lines = [*result.records, *result.run_records]
+    return {
+        "report.html": page.render(),
+        "results.jsonl": "".join(json.dumps(r, allow_nan=False) + "\n" for r in lines),
+        **{name: png(figure) for name, (_, figure, _) in drawn.items()},
+    }
+
+
+def _number(value: float | None) -> str:
+    """A number of about 1 for a table, or a dash."""
+    if value is None:
+        return "-"
+    return f"{value:.2f}" if value < 100.0 else f"{value:.0f}"

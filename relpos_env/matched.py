@@ -1,0 +1,79 @@
+"""What a filter would believe if it knew the simulated world: for bounds and consistency tests.
+
+Filters and worlds have parameters of different types on purpose. This is the one place that
+translates. Noise of sensors follows from their parameters; what the orientation stage makes of
+them (heading and slow acceleration errors) was measured on simulated runs, as written beside
+the numbers.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from relpos_env.scenarios import HumanScenario, Scenario
+from relpos_env.sensors.radio.channel import ChannelParams
+from relpos_env.timing import DT
+from tracking.filters.joint.params import CARRIERS, JointParams, NlosParams, RangeErrorParams
+from tracking.ranging.timestamps import SPEED_OF_LIGHT
+
+STAMPS = 0.61
+"""[-] White noise of a range over that of its three receive stamps' worth of way."""
+
+
+def matched_params(scenario: Scenario | HumanScenario) -> JointParams:
+    """Parameters of the joint filter that are those of a scenario."""
+    channel, imu = scenario.radio.channel, scenario.imu
+    mean, std = excess_moments(channel)
+    white = STAMPS * channel.stamp_std * SPEED_OF_LIGHT
+    carriers = dict(CARRIERS)
+    if isinstance(scenario, HumanScenario):
+        carriers["human"] = replace(
+            carriers["human"],
+            accel_psd=math.hypot(imu.acc_noise, 0.6 * imu.vibration) * math.sqrt(DT),
+            # Tilt of VQF under limb accelerations, over three seconds: 0.03 to 0.1 m/s2.
+            bias_std=0.08,
+            bias_tau=5.0,
+            # World yaw of VQF against the truth: 1 to 3 degrees and constant offsets to 5.
+            heading_std=0.07,
+            heading_tau=15.0,
+        )
+    else:
+        carriers["car"] = replace(
+            carriers["car"],
+            accel_psd=math.hypot(imu.acc_noise, imu.vibration) * math.sqrt(DT),
+            bias_std=math.hypot(imu.acc_bias, imu.acc_drift),
+            bias_tau=imu.drift_tau,
+            # World yaw of VQF against the truth: 0.6 to 1.4 degrees round offsets of a degree.
+            heading_std=0.022,
+            heading_tau=8.0,
+        )
+    return JointParams(
+        carriers=carriers,
+        range_error=RangeErrorParams(
+            white_std=max(white, 1e-3),
+            fast_std=max(channel.fast, 1e-4),
+            fast_length=channel.fast_length,
+            slow_std=max(channel.slow, 1e-4),
+            slow_length=channel.slow_length,
+        ),
+        nlos=NlosParams(
+            excess=max(mean, 1e-3),
+            excess_std=max(std, 1e-3),
+            excess_length=channel.excess_length,
+            gap_los=channel.gap,
+            gap_nlos=channel.gap + max(channel.gap_nlos, 0.1),
+        ),
+    )
+
+
+def excess_moments(channel: ChannelParams) -> tuple[float, float]:
+    """Mean and standard deviation of what is added behind an obstacle [m]."""
+    mu, sigma, cap = channel.excess
+    z, weight = np.polynomial.hermite_e.hermegauss(64)
+    excess = cap / (1.0 + np.exp(-(mu + sigma * z)))
+    weight = weight / weight.sum()
+    mean = float(weight @ excess)
+    return mean, math.sqrt(max(float(weight @ excess**2) - mean**2, 0.0))

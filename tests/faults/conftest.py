@@ -1,0 +1,139 @@
+"""Recorded runs, what the tracker makes of them with and without a fault, and how to compare."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from agents.simulate import simulate
+from tracking import Status, Tracker
+from tracking.geometry import best_rotation
+from tracking.measurements import Kind, MeasurementBlock
+
+BAD = 1
+"""The car that has the fault."""
+BEGIN, END = 30.0, 40.0
+"""[s] When a passing fault is there."""
+SETTLED = 10.0
+"""[s] Errors count from here on."""
+SEEDS = (1, 2, 3, 5)
+PLANE = np.array([1.0, 1.0, 0.0])
+
+
+class Edit:
+    """A recording to spoil: which events belong to whom, and how to change them."""
+
+    def __init__(self, block):
+        self.block = block
+        self.t, self.kind = block.t[0], block.kind[0]
+
+    def sent_by(self, *kinds, begin=0.0, end=np.inf):
+        """Events of the bad car: its own, and ranges it takes part in; bool per event."""
+        who = (self.block.i[0] == BAD) | (self.block.j[0] == BAD)
+        return who & np.isin(self.kind, kinds) & (self.t >= begin) & (self.t < end)
+
+    def imu(self, begin=BEGIN, end=END):
+        return self.sent_by(Kind.IMU, begin=begin, end=end)
+
+    def ranges(self, begin=BEGIN, end=END):
+        return self.sent_by(Kind.RANGE, begin=begin, end=end)
+
+    def without(self, rows):
+        return self.block.take(~rows)
+
+    def changed(self, rows, columns, change):
+        """Values of some rows and columns replaced by `change` of them."""
+        values = self.block.values.copy()
+        part = np.ix_([0], np.nonzero(rows)[0], columns)
+        values[part] = change(values[part][0])
+        return replace(self.block, values=values)
+
+    def later(self, rows, dt):
+        t = self.block.t.copy()
+        t[0, rows] += dt
+        return replace(self.block, t=t).sorted()
+
+
+class Run:
+    """Estimates of all recordings beside the truth; pairs with the bad car, and the others."""
+
+    def __init__(self, logs, fault):
+        self.t = np.arange(SETTLED, 60.0, 0.05)
+        constellation = logs[0].constellation
+        blocks = MeasurementBlock.stack([fault(Edit(log.block)) for log in logs])
+        tracker = Tracker(constellation, n_envs=len(logs))
+        self.estimate = tracker.run(blocks, self.t)
+        self.touched = (constellation.pairs == BAD).any(axis=1)
+        truth = [log.truth.pairs(constellation, self.t)[0] for log in logs]
+        self._truth = np.stack(truth) * PLANE
+        self._pos = self.estimate.pos_ij_w * PLANE
+        self._check()
+
+    def _check(self):
+        """What no fault may change: finite figures, symmetric and positive covariances."""
+        e = self.estimate
+        for array in (e.pos_ij_w, e.vel_ij_w, e.cov, e.q_wb, e.nis):
+            assert np.isfinite(array).all()
+        plane = [0, 1, 3, 4]
+        P = e.cov[self.runs][:, plane][:, :, plane]
+        np.testing.assert_array_equal(P, np.swapaxes(P, -1, -2))
+        assert (np.linalg.eigvalsh(P) > 0.0).all()
+
+    @property
+    def runs(self):
+        """Where there is an estimate, (recording, time, pair)."""
+        return self.estimate.status >= Status.AMBIGUOUS
+
+    def error(self, begin=SETTLED, end=np.inf):
+        """Root mean square position error of the bad car's pairs over a time [m]."""
+        keep = self.runs & self.touched & self._during(begin, end)[:, None]
+        return rms((self._pos - self._truth)[keep])
+
+    def shape_error(self, begin=SETTLED, end=np.inf):
+        """The same of the other pairs, after the rotation that fits them best [m]."""
+        rows = self._during(begin, end)
+        x, truth = (a[:, rows][:, :, ~self.touched] for a in (self._pos, self._truth))
+        R = best_rotation(x, truth, planar=True)
+        return rms(x @ np.swapaxes(R, -1, -2) - truth)
+
+    def ok_share(self, begin, end):
+        """Share of a time in which the bad car's pairs are ok."""
+        return float(self.estimate.ok[:, self._during(begin, end)][..., self.touched].mean())
+
+    def sigma(self, begin, end):
+        """Mean standard deviation of the bad car's positions over a time [m]."""
+        std = self.estimate.pos_std[:, self._during(begin, end)][:, :, self.touched, :2]
+        return float(std.mean())
+
+    def _during(self, begin, end):
+        return (self.t >= begin) & (self.t < end)
+
+
+def rms(errors):
+    return float(np.sqrt(np.mean(np.sum(errors**2, axis=-1))))
+
+
+class Faults:
+    """Recordings of four cars, their clean runs, and runs with a fault."""
+
+    def __init__(self):
+        self.logs = [simulate(scenario="cars-nlos", cars=4, seconds=60.0, seed=s) for s in SEEDS]
+        self.clean = Run(self.logs, lambda edit: edit.block)
+
+    def run(self, fault):
+        """All recordings through the tracker, each spoilt by `fault(edit)`."""
+        return Run(self.logs, fault)
+
+    def assert_others_as_before(self, run, begin=BEGIN, end=END):
+        """Pairs without the bad car keep their accuracy: 10 % and a centimetre."""
+        allowed = 1.1 * self.clean.shape_error(begin, end) + 0.01
+        assert run.shape_error(begin, end) < allowed
+
+    def assert_as_good(self, run, begin=SETTLED, end=np.inf):
+        """Pairs of the bad car keep theirs: a quarter more and a centimetre."""
+        assert run.error(begin, end) < 1.25 * self.clean.error(begin, end) + 0.01
+
+
+@pytest.fixture(scope="session")
+def faults():
+    return Faults()

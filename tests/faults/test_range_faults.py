@@ -1,0 +1,90 @@
+"""Ranges that are missing, late, wrongly calibrated, absurd or made up.
+
+Every run also checks what no fault may change: figures stay finite, covariances symmetric and
+positive.
+"""
+
+import numpy as np
+
+BEGIN, END = 30.0, 40.0
+RANGE = [0]
+
+
+def test_a_silent_radio_loses_its_pairs_and_no_others(faults):
+    """Three seconds without ranges: not ok after the first, ok again one second after the last."""
+    run = faults.run(lambda edit: edit.without(edit.ranges(BEGIN, BEGIN + 3.0)))
+    assert run.ok_share(BEGIN + 1.2, BEGIN + 3.0) == 0.0
+    assert run.ok_share(BEGIN + 4.0, END) == 1.0
+    assert run.error(BEGIN, BEGIN + 3.0) < 0.3
+    faults.assert_others_as_before(run, BEGIN, BEGIN + 3.0)
+    faults.assert_as_good(run, BEGIN + 4.0)
+
+
+def test_a_radio_that_is_silent_for_long_leaves_and_comes_back(faults):
+    """Eight seconds: the car is forgotten, joins again, and is as good as before."""
+    run = faults.run(lambda edit: edit.without(edit.ranges(BEGIN, BEGIN + 8.0)))
+    assert not run.runs[:, np.abs(run.t - BEGIN - 7.5).argmin()][:, run.touched].any()
+    faults.assert_others_as_before(run, BEGIN, BEGIN + 8.0)
+    faults.assert_as_good(run, BEGIN + 11.0)
+
+
+def test_late_ranges_cost_little(faults):
+    """A car whose ranges come 50 ms late: as good as before, and so the others."""
+    run = faults.run(lambda edit: edit.later(edit.ranges(0.0, np.inf), 0.05))
+    faults.assert_as_good(run)
+    faults.assert_others_as_before(run, 10.0)
+
+
+def test_a_wrong_slope_costs_little(faults):
+    """Ranges five per cent too long: as good as before, and so the others."""
+    run = faults.run(lambda edit: edit.changed(edit.ranges(0.0, np.inf), RANGE, lambda v: 1.05 * v))
+    faults.assert_as_good(run)
+    faults.assert_others_as_before(run, 10.0)
+
+
+def test_a_wrong_offset_costs_no_more_than_itself(faults):
+    """Ranges 0.3 m too long: the pairs of that car are off by less than that."""
+    run = faults.run(lambda edit: edit.changed(edit.ranges(0.0, np.inf), RANGE, lambda v: v + 0.3))
+    assert run.error() < 0.3
+    assert run.shape_error() < 2.0 * faults.clean.shape_error()
+
+
+def test_absurd_ranges_count_for_nothing(faults):
+    """Every tenth range fifty times as long: nothing changes."""
+
+    def absurd(edit):
+        rows = np.zeros(edit.t.shape, dtype=bool)
+        rows[np.nonzero(edit.ranges())[0][::10]] = True
+        return edit.changed(rows, RANGE, lambda v: 50.0 * v)
+
+    run = faults.run(absurd)
+    faults.assert_as_good(run, BEGIN, END)
+    faults.assert_others_as_before(run)
+
+
+def test_a_car_that_makes_its_ranges_up_is_believed_again(faults):
+    """Ten seconds of random ranges: three seconds later the estimates are as good as before."""
+    rng = np.random.default_rng(9)
+    made_up = lambda v: rng.uniform(0.5, 5.0, v.shape)  # noqa: E731
+    run = faults.run(lambda edit: edit.changed(edit.ranges(), RANGE, made_up))
+    faults.assert_as_good(run, END + 3.0)
+    faults.assert_others_as_before(run, END + 3.0, np.inf)
+
+
+def test_ranges_a_metre_too_long_break_nothing(faults):
+    """Ten seconds of a lie that could be true: the group still has all its estimates."""
+    run = faults.run(lambda edit: edit.changed(edit.ranges(), RANGE, lambda v: v + 1.0))
+    assert run.runs[:, -1].all()
+
+
+def test_ranges_that_stick_break_nothing(faults):
+    """Ten seconds of each pair's last range: the group still has all its estimates."""
+
+    def stuck(edit):
+        for other in (0, 2, 3):
+            rows = edit.ranges() & ((edit.block.i[0] == other) | (edit.block.j[0] == other))
+            edit.block = edit.changed(rows, RANGE, lambda v: 0.0 * v + v[0])
+        return edit.block
+
+    run = faults.run(stuck)
+    assert run.runs[:, -1].all()

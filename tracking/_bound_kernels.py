@@ -1,0 +1,130 @@
+"""The recursion of `tracking.bounds`: the joint filter's covariance along the true motion."""
+
+from __future__ import annotations
+
+from tracking.compiled import kernel, small_kernel
+from tracking.filters.joint._carrier_kernels import apply_carriers, centre
+from tracking.filters.joint._linear_kernels import absorb, project
+from tracking.filters.joint._motion_kernels import predict, sum_inertial, take_state
+from tracking.filters.joint._range_kernels import antenna_offset, change_sight, range_model
+from tracking.filters.joint._start_kernels import begin_node, begin_pair, forget_sums
+from tracking.filters.joint.state import N_PRE
+
+STATE, SURVEY, RANGE = 3, 4, 5
+GAUGE_PERIOD = 1.0
+
+
+@kernel
+def begin(c, s, t):
+    """Every node in its place, as uncertain as a first shape is; rotation and mirror known."""
+    s.alive[0] = True
+    for i in range(s.nodes.shape[0]):
+        s.nodes[i].present = True
+        forget_sums(s, i, t)
+        begin_node(c, s, 0, i, t)
+        for k in range(c.d):
+            s.P[0, s.nodes[i].at_p + k, s.nodes[i].at_p + k] = c.position_var
+    for p in range(s.pairs.shape[0]):
+        begin_pair(c, s, 0, p)
+    group = s.group[0]
+    group.started, group.n_alive = True, 1
+    group.t, group.t_carrier, group.t_gauge = t, t, t
+
+
+@small_kernel
+def put_on_truth(c, s, truth, k):
+    """Linearise at the truth: positions, velocities and heading errors as they are."""
+    pos, vel, heading = truth
+    s.x[0, :] = 0.0
+    for i in range(s.nodes.shape[0]):
+        node = s.nodes[i]
+        for a in range(c.d):
+            s.x[0, node.at_p + a] = pos[k, i, a]
+            if not node.static:
+                s.x[0, node.at_v + a] = vel[k, i, a]
+        if not node.static:
+            s.x[0, node.at_h] = heading[k, i]
+
+
+@kernel
+def run_bound(coefficients, layout, s, scratch, block, hidden, truth, t_out, out):
+    """Carry the covariance through the events of one environment.
+
+    Args:
+        coefficients: COEFFICIENTS, (1).
+        layout: Tables.
+        s: JointState of one environment and one hypothesis, updated.
+        scratch: Room, as that of the filter's events.
+        block: t, kind, i, j, antenna_i, antenna_j, values of one environment, (event, ...).
+        hidden: True for ranges without line of sight, (event).
+        truth: Positions [m], velocities [m/s], (event, node, 3), heading errors, (event, node).
+        t_out: Times, ascending, (time) [s].
+        out: Covariance of all positions, (time, node * d, node * d), written.
+    """
+    t, kind, node_i, node_j, antenna_i, antenna_j, values = block
+    c = coefficients[0]
+    n, d = s.nodes.shape[0], c.d
+    group = s.group[0]
+    o = 0
+    for k in range(t.shape[1]):
+        what, now = kind[0, k], t[0, k]
+        while o < t_out.shape[0] and t_out[o] < now:
+            write_positions(s, d, n, o, out)
+            o += 1
+        if what == STATE:
+            take_state(c, s.nodes, s.held, s.pre, node_i[0, k], now, values, 0, k)
+        if what not in (RANGE, SURVEY):
+            continue
+        if not group.started:
+            begin(c, s, now)
+        if now > group.t:
+            for i in range(n):
+                if not s.nodes[i].static:
+                    sum_inertial(c, s.nodes, s.held, s.pre, i, now)
+            predict(c, s, 0, now - group.t, scratch)
+            s.pre[:, :N_PRE] = 0.0
+            group.t = now
+        put_on_truth(c, s, truth, k)
+        if now - group.t_carrier >= c.carrier_period:
+            apply_carriers(c, s, 0, now, now - group.t_carrier, scratch)
+            group.t_carrier = now
+            put_on_truth(c, s, truth, k)
+        if now - group.t_gauge >= GAUGE_PERIOD:
+            centre(c, s, 0, scratch.w)
+            group.t_gauge = now
+            put_on_truth(c, s, truth, k)
+        i, j, a_i, a_j = node_i[0, k], node_j[0, k], antenna_i[0, k], antenna_j[0, k]
+        if i > j:
+            i, j, a_i, a_j = j, i, a_j, a_i
+        learn_range(c, s, layout, scratch, layout.pair_index[i, j], a_i, a_j, hidden[k], what)
+    while o < t_out.shape[0]:
+        write_positions(s, d, n, o, out)
+        o += 1
+
+
+@small_kernel
+def learn_range(c, s, layout, scratch, p, a_i, a_j, is_hidden, what):
+    """What a range of pair p adds, its sight known."""
+    pair = s.pairs[p]
+    i0, i1, i2 = antenna_offset(s.held, layout, pair.i, a_i)
+    j0, j1, j2 = antenna_offset(s.held, layout, pair.j, a_j)
+    variance = c.survey_var
+    if what == RANGE:
+        was_hidden = s.nlos[0, p] > 0.5
+        s.nlos[0, p] = 1.0 if is_hidden else 0.0
+        if was_hidden != is_hidden:
+            change_sight(c, s, 0, p, 1.0)
+        variance = c.white_var + s.nlos[0, p] * c.excess_white_var
+    _, m = range_model(c, s, 0, p, (i0, i1, i2), (j0, j1, j2), scratch.idx, scratch.val)
+    S = project(s.P, 0, c.n, m, scratch.idx, scratch.val, scratch.w) + variance
+    absorb(s.x, s.P, 0, c.n, scratch.w, 0.0, S)
+
+
+@small_kernel
+def write_positions(s, d, n, o, out):
+    """The covariance of all positions."""
+    for i in range(n):
+        for j in range(n):
+            for a in range(d):
+                for b in range(d):
+                    out[o, i * d + a, j * d + b] = s.P[0, s.nodes[i].at_p + a, s.nodes[j].at_p + b]

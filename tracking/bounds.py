@@ -1,0 +1,173 @@
+"""What is possible: the posterior Cramer-Rao bound along a recorded run.
+
+No estimator has a smaller mean square error than the inverse of the posterior information,
+which for white Gaussian noise obeys the Riccati recursion linearised at the truth [1]. The
+model is that of the joint filter (`tracking.filters.joint`): its motion, its range errors and
+what it knows of the carriers. Given are the true motion, which ranges had no line of sight,
+and the rotation and mirror image of the group at the start; an estimator has to find these.
+The bound is as good as its parameters: give it those of the world that made the run. Errors
+behind obstacles are not Gaussian; their variance is used, so that there the bound is that of
+the best linear estimator.
+
+References:
+    [1] Tichavsky, Muravchik, Nehorai, Posterior Cramer-Rao bounds for discrete-time nonlinear
+        filtering, IEEE Trans. Signal Processing 46 (1998) 1386.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tracking._bound_kernels import run_bound
+from tracking.arrays import F64, Bool
+from tracking.constellation import Constellation
+from tracking.errors import LogError
+from tracking.filters.joint.params import JointParams
+from tracking.filters.joint.scratch import make_scratch
+from tracking.filters.joint.state import (
+    JointState,
+    as_records,
+    make_coefficients,
+    make_layout,
+    make_state,
+)
+from tracking.geometry import quat_conjugate, quat_multiply, yaw_of
+from tracking.log import Log
+from tracking.measurements import Kind, MeasurementBlock
+from tracking.orientation import Orientation, OrientationParams
+
+RATE = 5.0
+"""[Hz] How often the bound is written down."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bound:
+    """The least root mean square errors of the relative positions of a run."""
+
+    t: F64
+    """(time) [s]"""
+    pair_rms: F64
+    """In the world frame, (time, pair) [m]."""
+    shape_rms: F64
+    """Over all pairs after the best rotation at each instant, (time) [m]."""
+    rmse: float
+    """In the world frame, over the scored time [m]."""
+    rmse_shape: float
+    """After the best rotation at each instant, over the scored time [m]."""
+
+
+def posterior_bound(
+    log: Log,
+    params: JointParams,
+    *,
+    orientation: OrientationParams | None = None,
+    skip: float = 10.0,
+) -> Bound:
+    """The bound of a recorded run.
+
+    Args:
+        log: A run with truth; its NLOS labels are used where it has them.
+        params: What the world did, in the terms of the joint filter.
+        orientation: Parameters of the orientation stage.
+        skip: Times until so many seconds after the first range do not count.
+
+    Raises:
+        LogError: The log has no truth.
+    """
+    if len(log.truth.t) == 0:
+        raise LogError("truth: expected a log with truth, a bound is taken along the true motion")
+    constellation, d = log.constellation, log.constellation.dimensions
+    block = Orientation(constellation, orientation or OrientationParams()).step(log.block)
+    is_range = block.kind[0] == Kind.RANGE
+    hidden = np.zeros(block.n_events, dtype=bool)
+    if log.nlos is not None:
+        hidden[is_range] = log.nlos
+    keep = block.valid[0]
+    block, hidden = block.env(0), hidden[keep]
+    first = float(block.t[0][block.kind[0] == Kind.RANGE][0])
+    last = min(float(block.t[0, -1]), float(log.truth.t.max()))
+    t_out = np.arange(first + skip, last, 1.0 / RATE)
+    if len(t_out) == 0:
+        raise LogError(f"truth: expected more than {skip:g} s after the first range")
+    truth = _truth_at_events(log, block)
+
+    n = constellation.n_nodes
+    cov = np.zeros((len(t_out), n * d, n * d))
+    batch = make_state(constellation, params, 1, 1)
+    fields = (as_records(a[0]) if a.dtype.names else a[0] for a in batch)
+    coefficients = as_records(make_coefficients(constellation, params))
+    events = (block.t, block.kind, block.i, block.j, block.antenna_i, block.antenna_j, block.values)
+    run_bound(
+        coefficients,
+        make_layout(constellation, params),
+        JointState._make(fields),
+        make_scratch(n, constellation.n_pairs, int(coefficients[0]["n"])),
+        tuple(np.ascontiguousarray(a) for a in events),
+        hidden,
+        truth,
+        t_out,
+        cov,
+    )
+    pos, known = log.truth.positions(constellation, t_out)
+    return _summarise(constellation, t_out, cov, pos[..., :d], known)
+
+
+def _truth_at_events(log: Log, block: MeasurementBlock) -> tuple[F64, F64, F64]:
+    """Positions, velocities (event, node, 3) and heading errors (event, node) when they happen."""
+    constellation, t, h = log.constellation, block.t[0], 0.02
+    pos, _ = log.truth.positions(constellation, t)
+    ahead, _ = log.truth.positions(constellation, t + h)
+    behind, _ = log.truth.positions(constellation, t - h)
+    heading = np.zeros((len(t), constellation.n_nodes))
+    for node in range(constellation.n_nodes):
+        rows = (log.truth.node == node) & log.truth.has_orientation
+        states = (block.kind[0] == Kind.STATE) & (block.i[0] == node)
+        if not rows.any() or not states.any():
+            continue
+        nearest = np.clip(np.searchsorted(log.truth.t[rows], t[states]), 0, rows.sum() - 1)
+        q_error = quat_multiply(
+            log.truth.q_wb[rows][nearest], quat_conjugate(block.values[0, states, :4])
+        )
+        heading[:, node] = np.interp(t, t[states], np.unwrap(yaw_of(q_error)))
+    return np.nan_to_num(pos), np.nan_to_num((ahead - behind) / (2.0 * h)), heading
+
+
+def _summarise(constellation: Constellation, t: F64, cov: F64, pos: F64, known: Bool) -> Bound:
+    """From covariances of positions (time, node * d, node * d) to errors of pairs."""
+    n, d = constellation.n_nodes, constellation.dimensions
+    i, j = constellation.pairs.T
+    moving = ~constellation.is_static[constellation.pairs].all(axis=1)
+    difference = np.zeros((constellation.n_pairs * d, n * d))
+    for p in range(constellation.n_pairs):
+        for k in range(d):
+            difference[p * d + k, j[p] * d + k], difference[p * d + k, i[p] * d + k] = 1.0, -1.0
+    wanted = known[:, i] & known[:, j] & moving
+    pair_cov = difference @ cov @ difference.T
+    variance = np.diagonal(pair_cov, axis1=1, axis2=2).reshape(len(t), -1, d).sum(axis=2)
+    shape = np.zeros(len(t))
+    for k in range(len(t)):
+        used = np.repeat(wanted[k], d)
+        generators = _rotations((pos[k, j] - pos[k, i]).reshape(-1, d), d)[used]
+        basis, size, _ = np.linalg.svd(generators, full_matrices=False)
+        basis = basis[:, size > 1e-9 * max(float(size.max(initial=0.0)), 1e-300)]
+        left = pair_cov[k][np.ix_(used, used)]
+        total = np.trace(left) - np.trace(basis.T @ left @ basis)
+        shape[k] = total / max(int(wanted[k].sum()), 1)
+    counted = wanted.any(axis=1)
+    return Bound(
+        t=t,
+        pair_rms=np.sqrt(variance),
+        shape_rms=np.sqrt(np.maximum(shape, 0.0)),
+        rmse=float(np.sqrt(variance[wanted].mean())),
+        rmse_shape=float(np.sqrt(np.maximum(shape[counted], 0.0).mean())),
+    )
+
+
+def _rotations(relative: F64, d: int) -> F64:
+    """How relative positions (pair, d) change with a rotation, (pair * d, 1 or 3)."""
+    if d == 2:
+        return np.stack([-relative[:, 1], relative[:, 0]], axis=1).reshape(-1, 1)
+    axes = [np.cross(axis, relative).reshape(-1) for axis in np.eye(3)]
+    return np.stack(axes, axis=1)

@@ -1,0 +1,58 @@
+"""Room for the intermediate results of the joint filter's kernels."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tracking.arrays import F64, I64
+from tracking.filters.joint.state import N_PRE
+
+
+class Scratch(NamedTuple):
+    """Room for intermediate results, so that no event allocates."""
+
+    idx: I64
+    """States of a measurement."""
+    val: F64
+    """Derivatives by them."""
+    w: F64
+    """(state)"""
+    scale: F64
+    """(state)"""
+    step: F64
+    """(node, 9)"""
+    speed: F64
+    """(node)"""
+    none: F64
+    """Zeros, (3)."""
+    x: F64
+    """States of an estimate, (1, state)."""
+    P: F64
+    """Its covariance, (1, state, state)."""
+    pre: F64
+    """Its sums, (node, N_PRE)."""
+    t_pre: F64
+    """(node) [s]"""
+    nlos: F64
+    """(1, pair)"""
+
+
+def make_scratch(n_nodes: int, n_pairs: int, n_states: int) -> Scratch:
+    """Room for a group of the given size."""
+    most = max(16, n_nodes)
+    return Scratch(
+        idx=np.zeros(most, dtype=np.int64),
+        val=np.zeros(most),
+        w=np.zeros(n_states),
+        scale=np.zeros(n_states),
+        step=np.zeros((n_nodes, 9)),
+        speed=np.zeros(n_nodes),
+        none=np.zeros(3),
+        x=np.zeros((1, n_states)),
+        P=np.zeros((1, n_states, n_states)),
+        pre=np.zeros((n_nodes, N_PRE)),
+        t_pre=np.zeros(n_nodes),
+        nlos=np.zeros((1, n_pairs)),
+    )
