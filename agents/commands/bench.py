@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import click
@@ -17,16 +18,36 @@ def bench() -> None:
 
 @bench.command("tracker")
 @click.option("--rounds", default=2000, show_default=True, help="Ranging rounds per figure.")
+@click.option("--out", type=Path, help="Folder for a picture of the time over the group's size.")
 @click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
-def bench_tracker(rounds: int, as_json: bool) -> None:
-    """Microseconds per ranging round, beside filterpy doing the same pair updates."""
+def bench_tracker(rounds: int, out: Path | None, as_json: bool) -> None:
+    """Time of ranging rounds, messages and an hour, beside filterpy and GTSAM."""
     from agents.bench.tracker import bench_tracker as run
+    from agents.output import check_folder
+    from agents.report.bench_figures import PICTURE
 
     if rounds < 100:
         raise UsageError(f"--rounds: expected at least 100, got {rounds}")
+    if out is not None:
+        check_folder(out, [PICTURE])
     with progress_bar("tracker") as report:
-        rows = run(rounds=rounds, progress=report)
-    _show_bench("Time of one ranging round", rows, as_json)
+        rows = run(rounds=rounds, progress=report, tell=lambda note: click.echo(note, err=True))
+    if out is not None:
+        _draw_growth(out)
+    _show_bench("Time of the tracker", rows, as_json)
+    if out is not None and not as_json:
+        click.echo(f"written: {out / PICTURE}")
+
+
+def _draw_growth(out: Path) -> None:
+    from agents.bench.tracker.growth import growth
+    from agents.output import write_results
+    from agents.report.bench_figures import PICTURE, cost_figure
+    from agents.report.page import png
+
+    with progress_bar("sizes of groups") as report:
+        result = growth(progress=report)
+    write_results(out, {PICTURE: png(cost_figure(result))})
 
 
 @bench.command("radio")

@@ -47,8 +47,14 @@ class Workload:
 
     @property
     def dt(self) -> float:
-        """Time between two steps [s]; two rounds a second, at least, as shorter frames allow."""
-        return 1.0 / max(self.rounds_hz, 2.0) / (self.n if self.step == "message" else 1)
+        """Time between two steps [s].
+
+        At least 20 rounds a second or messages for two, which large groups reach with a radio
+        of a higher rate.
+        """
+        if self.step == "round":
+            return 1.0 / max(self.rounds_hz, 20.0)
+        return 1.0 / (max(self.rounds_hz, 2.0) * self.n)
 
     @cached_property
     def pairs(self) -> I64:

@@ -19,6 +19,9 @@ FLAT, OPEN = 2.5, 4.0
 MISFIT = 3.0
 """[-] Ranges that fit so badly, as a running mean of NIS, bring the mirror image up too."""
 
+LOST_SPEED = 0.7
+"""[m/sqrt(s), m/s/sqrt(s)] How fast a lost filter forgets positions and velocities."""
+
 
 @kernel
 def centred(c, s, h):
@@ -165,6 +168,19 @@ def are_same(c, s, a, b):
         if np.sum((one[:, i] - other[:, i]) ** 2) > c.merge_distance**2:
             return False
     return True
+
+
+@kernel
+def open_up(c, s, dt):
+    """Know less about where everything is, in a filter that most ranges contradict."""
+    for h in range(s.alive.shape[0]):
+        if s.alive[h]:
+            for i in range(s.nodes.shape[0]):
+                node = s.nodes[i]
+                if node.present and not node.static:
+                    for k in range(c.d):
+                        s.P[h, node.at_p + k, node.at_p + k] += LOST_SPEED**2 * dt
+                        s.P[h, node.at_v + k, node.at_v + k] += LOST_SPEED**2 * dt
 
 
 @kernel

@@ -5,6 +5,7 @@ from __future__ import annotations
 from tracking.compiled import kernel, small_kernel
 from tracking.filters._shape_kernels import collect
 from tracking.filters.joint._bank_kernels import (
+    open_up,
     prune_bank,
     remove_node,
     remove_silent,
@@ -14,6 +15,7 @@ from tracking.filters.joint._carrier_kernels import apply_carriers, centre
 from tracking.filters.joint._estimate_kernels import write_estimate
 from tracking.filters.joint._motion_kernels import predict, sum_inertial, take_state
 from tracking.filters.joint._range_kernels import (
+    MOST,
     antenna_offset,
     fuse_range,
     fuse_survey,
@@ -187,6 +189,8 @@ def take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, evidence, is_sur
             pair.nis = nis
             capped = min(nis, 25.0) if weight > 0.5 else 25.0
             pair.misfit += 0.05 * (capped - pair.misfit)
+            fits = 1.0 if weight > 0.5 and nis < 6.0 else 0.0
+            group.fit += 0.01 * (fits - group.fit)
             group.misfit += 0.01 * (weight * capped - group.misfit)
             if weight > 0.5:
                 group.nis_sum += nis
@@ -216,4 +220,6 @@ def look_at_group(c, s, layout, t):
     remove_silent(c, s, layout, t)
     prune_bank(c, s)
     watch_mirror(c, s)
+    if s.group[0].fit < MOST:
+        open_up(c, s, t - s.group[0].t_check)
     s.group[0].t_check = t

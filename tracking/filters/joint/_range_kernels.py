@@ -21,6 +21,8 @@ from tracking.filters.joint._motion_kernels import decay
 MIN_DISTANCE = 0.01
 """[m] Closer than this a direction has no meaning."""
 MIN_PROB = 1e-4
+MOST = 0.4
+"""[-] While fewer of the ranges fit, the filter is lost."""
 SQRT_2PI = math.sqrt(2.0 * math.pi)
 
 
@@ -155,7 +157,7 @@ def fuse_range(c, s, h, p, dt, distance, levers, evidence, scratch):
     variance = project(s.P, h, c.n, m, scratch.idx, scratch.val, scratch.w)
     S = variance + c.white_var
     switched, sane, loglik = judge_sight(c, s, h, p, dt, nu, variance, evidence, scratch.w)
-    s.loglik[h] += max(loglik, -0.5 * (c.max_nis + math.log(S)))
+    s.loglik[h] += c.evidence * max(loglik, -0.5 * (c.max_nis + math.log(S)))
     nis = nu * nu / S
     if switched > 0.01:
         change_sight(c, s, h, p, switched)
@@ -164,12 +166,14 @@ def fuse_range(c, s, h, p, dt, distance, levers, evidence, scratch):
         variance = project(s.P, h, c.n, m, scratch.idx, scratch.val, scratch.w)
     bent = min(c.bend_gain * bend(c, s, h, p, scratch.val), 0.2)
     R = c.white_var + bent * bent + s.nlos[h, p] * c.excess_white_var
-    # A pair whose ranges have long contradicted all else is believed less and less.
+    # A pair whose ranges have long contradicted all else is believed less and less; where most
+    # contradict the filter, it is the filter that is wrong.
     doubt = s.pairs[p].misfit / (0.7 * c.doubt)
-    if doubt > 1.0:
-        sane /= doubt * doubt * doubt * doubt
-    if sane > 1e-3:
-        absorb(s.x, s.P, h, c.n, scratch.w, nu, variance + R / sane)
+    trust = sane
+    if doubt > 1.0 and s.group[0].fit > MOST:
+        trust /= doubt * doubt * doubt * doubt
+    if trust > 1e-3:
+        absorb(s.x, s.P, h, c.n, scratch.w, nu, variance + R / trust)
     return nis, sane
 
 

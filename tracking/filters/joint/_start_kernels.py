@@ -21,6 +21,10 @@ from tracking.filters._shape_kernels import (
 from tracking.filters.joint._carrier_kernels import CENTRE_VAR
 from tracking.filters.joint._linear_kernels import decouple
 
+JOIN_SPREAD = 0.75
+"""[m] Others that extend less than this along an axis leave the side of a newcomer open: along
+it, an error of a range counts several times."""
+
 
 @kernel
 def try_start(c, s, layout, t):
@@ -62,7 +66,7 @@ def try_start(c, s, layout, t):
     group.n_alive = layout.rotations.shape[0]
     group.best = 0
     group.t, group.t_check, group.t_carrier, group.t_gauge = t, t, t, t
-    group.misfit = 1.0
+    group.misfit, group.fit = 1.0, 1.0
 
 
 @kernel
@@ -143,7 +147,7 @@ def try_join(c, s, layout, new, t):
             for k in range(c.d):
                 known[a, k] = s.x[h, at + k]
             distance[a] = start_distance(s, layout, new, ready[a])
-        n_sides = place(c.d, 0.15, c.merge_distance, known, distance, sides)
+        n_sides = place(c.d, JOIN_SPREAD, c.merge_distance, known, distance, sides)
         for side in range(n_sides):
             target = h if side == 0 else copy_hypothesis(s, h)
             if target >= 0:

@@ -177,7 +177,7 @@ class JointParams:
     """[rad] Error of headings that start from `NodeConfig.initial_heading`."""
     initial_heading_tau: float = 300.0
     """[s] How long they keep it."""
-    unaided_accel_psd: float = 0.7
+    unaided_accel_psd: float = 1.5
     """[m/s2/sqrt(Hz)] Acceleration of a moving node whose IMU is not heard."""
     unaided_after: float = 0.3
     """[s] A node whose IMU was silent for so long is unaided."""

@@ -86,6 +86,7 @@ GROUP = np.dtype(
         ("t_carrier", "f8"),
         ("t_gauge", "f8"),
         ("misfit", "f8"),  # running mean of the NIS of ranges in the best hypothesis [-]
+        ("fit", "f8"),  # running share of ranges that fit [-]
         ("nis_sum", "f8"),
         ("nis_n", "i8"),
     ]
@@ -132,6 +133,7 @@ _NUMBERS = (
     "leave_after",
     "ok_var",
     "doubt",
+    "evidence",
 )
 COEFFICIENTS = np.dtype([("d", "i8"), ("n", "i8"), *((name, "f8") for name in _NUMBERS)])
 """Constants derived once from `JointParams`, under the same names; ``_var`` and ``2``: squared."""
@@ -196,6 +198,8 @@ def make_coefficients(constellation: Constellation, params: JointParams) -> Reco
         "fast_var": e.fast_std**2,
         "slow_var": e.slow_std**2,
         "excess_var": v.excess_std**2,
+        # Errors that last and have no state make successive ranges say the same thing.
+        "evidence": 1.0 if has_states else 0.1,
         "excess_white_var": v.white_std**2 if has_states else v.repeats * v.excess_std**2,
         "start_k": s.k,
         "start_max_age": s.max_age,

@@ -1,0 +1,59 @@
+"""How the time of a step grows with the group."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from agents.bench.tracker.ours import step_cost
+from agents.bench.tracker.peer_filterpy import filterpy_name, group_cost
+from agents.bench.tracker.peer_gtsam import gtsam_name, smoother_cost
+from agents.bench.tracker.workload import Workload
+from tracking.filters import DEFAULT_FILTER
+
+SIZES = (2, 3, 4, 6, 8, 10, 15, 20, 30, 50)
+GTSAM_UP_TO = 20
+"""[-] Nodes; larger groups take the smoother seconds."""
+
+
+@dataclass(frozen=True)
+class Growth:
+    """Cars that range message by message: one prediction, and half the group as ranges."""
+
+    n: tuple[int, ...]
+    """Nodes."""
+    ours: list[float]
+    """[us] A message, joint filter."""
+    ranges: list[int]
+    """[-] Ranges of a message."""
+    peers: dict[str, list[float | None]]
+    """[us] The same of each peer, by name; None where it was not measured."""
+
+
+def growth(
+    *,
+    sizes: tuple[int, ...] = SIZES,
+    steps: int = 200,
+    progress: Callable[[float], None] | None = None,
+) -> Growth:
+    """Time of a message for groups of several sizes, and of the peers.
+
+    Args:
+        sizes: Numbers of nodes.
+        steps: Messages timed in small groups.
+        progress: Called with the share done, 0 to 1.
+    """
+    filterpy, gtsam = filterpy_name(), gtsam_name()
+    result = Growth(sizes, [], [], {filterpy: []} | ({gtsam: []} if gtsam else {}))
+    for k, n in enumerate(sizes):
+        workload = Workload(n, 2, "message")
+        few = max(min(steps, 400 // n), 1)
+        result.ours.append(step_cost(workload, DEFAULT_FILTER, max(steps, n)))
+        result.ranges.append(workload.pairs.shape[1])
+        result.peers[filterpy].append(group_cost(workload, few if n < 20 else 1))
+        if gtsam is not None:
+            theirs = smoother_cost(workload, few) if n <= GTSAM_UP_TO else None
+            result.peers[gtsam].append(theirs)
+        if progress is not None:
+            progress((k + 1) / len(sizes))
+    return result
