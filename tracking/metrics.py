@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tracking.arrays import F64, Bool
+from tracking.consistency import pair_nees
 from tracking.estimate import Status, TeamEstimate
 from tracking.geometry import best_rotation
 
@@ -65,7 +66,6 @@ def score(estimate: TeamEstimate, truth_ij_w: F64, has_truth: Bool, skip_until: 
     """
     constellation = estimate.constellation
     planar = constellation.dimensions == 2
-    d = constellation.dimensions
     moving = ~constellation.is_static[constellation.pairs].all(axis=1)
     wanted = has_truth & moving & (estimate.t >= skip_until)[:, None]
     scored = wanted & ~np.isin(estimate.status, (Status.ABSENT, Status.STARTING))
@@ -90,10 +90,8 @@ def score(estimate: TeamEstimate, truth_ij_w: F64, has_truth: Bool, skip_until: 
     R_shape = best_rotation(x, truth, planar=planar)  # noqa: N806
     errors = [x - truth, x @ R_yaw.T - truth, x @ np.swapaxes(R_shape, -1, -2) - truth]
 
-    cov = estimate.cov[rows][..., :d, :d]
-    known = scored & (np.linalg.eigvalsh(cov)[..., 0] > 0.0)
-    e = errors[0][known][:, :d]
-    whitened = np.einsum("ki,ki->k", e, np.linalg.solve(cov[known], e[..., None])[..., 0])
+    nees, known = pair_nees(estimate, truth_ij_w)
+    nees, known = nees[rows], known[rows] & scored
     squared = [np.sum(e * e, axis=-1) for e in errors]
     overall = [float(np.sqrt(sq[scored].mean())) for sq in squared]
     count = np.maximum(scored.sum(axis=0), 1)
@@ -105,7 +103,7 @@ def score(estimate: TeamEstimate, truth_ij_w: F64, has_truth: Bool, skip_until: 
         rmse_yaw=overall[1],
         yaw_deg=float(np.degrees(yaw)),
         rmse_shape=overall[2],
-        nees=float(whitened.mean() / d) if known.any() else None,
+        nees=float(nees[known].mean()) if known.any() else None,
         pair_rmse=per_pair[0],
         pair_rmse_yaw=per_pair[1],
         pair_rmse_shape=per_pair[2],

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tracking.arrays import F64, I64, Bool
+from tracking.consistency import pair_nees
 from tracking.estimate import Status, TeamEstimate
 from tracking.metrics import errors_after
 
@@ -53,26 +54,6 @@ def over_time(
         nees=_bin_means(bins, nees, known & has_nees, n_bins),
         nis_counts=_count_nis(estimate),
     )
-
-
-def pair_nees(estimate: TeamEstimate, truth_ij_w: F64) -> tuple[F64, Bool]:
-    """e^T P^-1 e / d of the position errors e of every pair, and where P is known.
-
-    Args:
-        estimate: Of one run, arrays over (time, pair).
-        truth_ij_w: True relative positions, (time, pair, 3) [m].
-
-    Returns:
-        (time, pair) [-] and (time, pair).
-    """
-    d = estimate.constellation.dimensions
-    cov = estimate.cov[..., :d, :d]
-    known = np.linalg.eigvalsh(cov)[..., 0] > 0.0
-    e = (estimate.pos_ij_w - truth_ij_w)[known][:, :d]
-    nees = np.full(known.shape, np.nan)
-    whitened = np.linalg.solve(cov[known], e[..., None])[..., 0]
-    nees[known] = np.sum(e * whitened, axis=-1) / d
-    return nees, known
 
 
 def _bin_means(bins: I64, values: F64, used: Bool, n_bins: int) -> F64:

@@ -10,6 +10,7 @@ import numpy as np
 from agents.evaluate.evaluate import CaseResult, EvaluateResult
 from agents.evaluate.over_time import NIS_EDGES
 from agents.evaluate.run import SKIP
+from tracking.consistency import chi_square_band
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -131,7 +132,6 @@ def _over_seeds(result: EvaluateResult) -> Figure:
 
 
 def _nees(result: EvaluateResult) -> Figure:
-    from scipy.stats import chi2
 
     figure, panels = _panels(result, 3.7, 2.9)
     highest = 3.0
@@ -140,7 +140,7 @@ def _nees(result: EvaluateResult) -> Figure:
         # n - 1 independent positions.
         dimensions = 3 if rows[0].case.scenario.name.startswith("human") else 2
         free = dimensions * (rows[0].runs[0].nodes - 1) * result.seeds
-        low, high = (float(chi2.ppf(p, free)) / free for p in (0.5 - BAND / 2, 0.5 + BAND / 2))
+        low, high = chi_square_band(free, 1, BAND)
         ax.axhspan(low, high, color="0.8")
         top = 2.0
         for colour, c in zip(COLOURS, rows, strict=False):

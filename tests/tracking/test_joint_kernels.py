@@ -1,0 +1,143 @@
+"""The joint filter's algebra: derivatives, gauge, long runs."""
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from tracking import Constellation, NodeConfig
+from tracking.filters.joint import _carrier_kernels, _linear_kernels, _motion_kernels
+from tracking.filters.joint._range_kernels import range_model
+from tracking.filters.joint.params import JointParams
+from tracking.filters.joint.scratch import make_scratch
+from tracking.filters.joint.state import (
+    JointState,
+    as_records,
+    make_coefficients,
+    make_layout,
+    make_state,
+)
+
+
+def running(dimensions, vehicle="car", seed=0, static=()):
+    """One environment, three nodes, one hypothesis, random states and sums."""
+    nodes = tuple(
+        NodeConfig(id=k, vehicle=vehicle, kind="static" if k in static else "moving")
+        for k in (1, 2, 3)
+    )
+    constellation = Constellation(nodes=nodes, dimensions=dimensions)
+    params = JointParams()
+    c = as_records(make_coefficients(constellation, params))
+    batch = make_state(constellation, params, 1, 1)
+    s = JointState._make(as_records(a[0]) if a.dtype.names else a[0] for a in batch)
+    rng = np.random.default_rng(seed)
+    n = int(c[0]["n"])
+    s.x[0] = rng.uniform(-2.0, 2.0, n)
+    s.nodes["present"], s.alive[0] = True, True
+    s.group["n_alive"], s.group["started"] = 1, True
+    for k in range(3):
+        if not s.nodes["static"][k]:
+            s.x[0, s.nodes["at_h"][k]] *= 0.05
+        s.held[k, :4] = rng.standard_normal(4)
+        s.held[k, :4] /= np.linalg.norm(s.held[k, :4])
+        s.held[k, 4:] = rng.standard_normal(3)
+        s.nodes["yaw"][k] = rng.uniform(-3.0, 3.0)
+    s.nodes["has_state"], s.nodes["t_state"] = True, 0.0
+    s.nlos[:] = 0.0
+    return c[0], s, make_scratch(3, 3, n), make_layout(constellation, params)
+
+
+def carry(c, s, scratch, x, P, t=0.05):  # noqa: N803
+    """States and covariance after dead reckoning from x, P to t."""
+    s.x[0], s.P[0] = x, P
+    s.pre[:], s.nodes["t_pre"] = 0.0, 0.0
+    for k in range(3):
+        if not s.nodes["static"][k]:
+            _motion_kernels.sum_inertial(c, s.nodes, s.held, s.pre, k, 0.5 * t)
+            _motion_kernels.sum_inertial(c, s.nodes, s.held, s.pre, k, t)
+    _motion_kernels.predict(c, s, 0, t, scratch)
+    return s.x[0].copy(), s.P[0].copy()
+
+
+@pytest.mark.parametrize("vehicle", ["car", "human"])
+@pytest.mark.parametrize("dimensions", [2, 3])
+@pytest.mark.parametrize("static", [(), (3,)])
+def test_prediction_is_that_of_its_own_derivatives(dimensions, vehicle, static):
+    """P -> F P F^T + Q with F from finite differences and Q from P = 0."""
+    c, s, scratch, _ = running(dimensions, vehicle, static=static)
+    n = s.x.shape[1]
+    # Range errors forget with the speed; their derivative by it is left out on purpose.
+    x0 = s.x[0].copy()
+    first_error = s.pairs["at_e"][s.pairs["at_e"] >= 0].min()
+    x0[first_error:] = 0.0
+    A = np.random.default_rng(1).standard_normal((n, n))
+    P0 = A @ A.T / n
+    _, P1 = carry(c, s, scratch, x0, P0)
+    _, Q = carry(c, s, scratch, x0, np.zeros((n, n)))
+    F, h = np.zeros((n, n)), 1e-6
+    for k in range(n):
+        step = np.zeros(n)
+        step[k] = h
+        ahead, _ = carry(c, s, scratch, x0 + step, P0)
+        behind, _ = carry(c, s, scratch, x0 - step, P0)
+        F[:, k] = (ahead - behind) / (2.0 * h)
+    np.testing.assert_allclose(P1, F @ P0 @ F.T + Q, atol=2e-7)
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+@pytest.mark.parametrize("seed", range(4))
+def test_range_has_its_own_derivatives(dimensions, seed):
+    c, s, scratch, _ = running(dimensions, seed=seed)
+    lever_i, lever_j = np.array([0.3, -0.2, 0.1]), np.array([-0.1, 0.4, 0.2])
+    _, m = range_model(c, s, 0, 1, lever_i, lever_j, scratch.idx, scratch.val)
+    written = np.zeros(s.x.shape[1])
+    written[scratch.idx[:m]] = scratch.val[:m]
+    for k in range(len(written)):
+        values = []
+        for h in (1e-6, -1e-6):
+            s.x[0, k] += h
+            idx, val = scratch.idx.copy(), scratch.val.copy()
+            values.append(range_model(c, s, 0, 1, lever_i, lever_j, idx, val)[0])
+            s.x[0, k] -= h
+        assert written[k] == pytest.approx((values[0] - values[1]) / 2e-6, abs=1e-7)
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_moving_the_centre_changes_nothing_relative(dimensions):
+    c, s, scratch, _ = running(dimensions)
+    n, d = s.x.shape[1], dimensions
+    A = np.random.default_rng(2).standard_normal((n, n))
+    s.P[0] = A @ A.T / n + 0.01 * np.eye(n)
+    at = s.nodes["at_p"]
+    difference = np.zeros((2 * d, n))
+    for k in range(d):
+        difference[k, at[1] + k], difference[k, at[0] + k] = 1.0, -1.0
+        difference[d + k, at[2] + k], difference[d + k, at[0] + k] = 1.0, -1.0
+    x0, P0 = difference @ s.x[0], difference @ s.P[0] @ difference.T
+    _carrier_kernels.centre(c, s, 0, scratch.w)
+    np.testing.assert_allclose(difference @ s.x[0], x0, atol=1e-12)
+    np.testing.assert_allclose(difference @ s.P[0] @ difference.T, P0, atol=1e-12)
+    centre = np.mean([s.x[0, a : a + d] for a in at], axis=0)
+    np.testing.assert_allclose(centre, 0.0, atol=1e-12)
+    assert np.linalg.eigvalsh(s.P[0])[0] > 0.0
+
+
+@settings(max_examples=30, deadline=None, suppress_health_check=list(HealthCheck))
+@given(seed=st.integers(0, 2**31), n=st.integers(2, 20), m=st.integers(1, 6))
+def test_a_correction_is_the_textbook_one(seed, n, m):
+    rng = np.random.default_rng(seed)
+    A = rng.standard_normal((n, n))
+    P = A @ A.T + 0.1 * np.eye(n)
+    x, idx = rng.standard_normal(n), rng.permutation(n)[: min(m, n)].astype(np.int64)
+    val, nu, R = rng.standard_normal(len(idx)), 0.7, 0.3
+    H = np.zeros(n)
+    H[idx] = val
+    S = H @ P @ H + R
+    K = P @ H / S
+    states, covariance, w = x[None].copy(), P[None].copy(), np.zeros(n)
+    variance = _linear_kernels.project(covariance, 0, n, len(idx), idx, val, w)
+    _linear_kernels.absorb(states, covariance, 0, n, w, nu, variance + R)
+    np.testing.assert_allclose(states[0], x + K * nu, atol=1e-9)
+    joseph = (np.eye(n) - np.outer(K, H)) @ P @ (np.eye(n) - np.outer(K, H)).T + R * np.outer(K, K)
+    np.testing.assert_allclose(covariance[0], joseph, atol=1e-8)
+    np.testing.assert_array_equal(covariance[0], covariance[0].T)

@@ -1,0 +1,62 @@
+"""Does an estimate know how wrong it is: NEES and NIS with their chi-square bands.
+
+The squared error over the covariance, ``e^T P^-1 e / d``, and the squared innovation over its
+variance have mean 1 where the filter's beliefs are right; over n independent samples the mean
+lies in a band of the chi-square distribution [1]. Larger is too sure, smaller too modest.
+
+References:
+    [1] Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking and Navigation,
+        Wiley 2001, ch. 5.4.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.stats import chi2
+
+from tracking.arrays import F64, Bool
+from tracking.errors import ConfigError
+from tracking.estimate import TeamEstimate
+
+
+def chi_square_band(n: int, dof: int, probability: float = 0.95) -> tuple[float, float]:
+    """Where the mean of n independent normalised squares lies, each divided by its dimension.
+
+    Args:
+        n: Independent samples.
+        dof: Dimension of each: 1 for a range, 2 or 3 for a position.
+        probability: Of the band.
+
+    Returns:
+        Its ends [-].
+
+    Raises:
+        ConfigError: A number is out of range.
+    """
+    if n < 1 or dof < 1:
+        raise ConfigError(f"chi-square band: expected n and dof of 1 or more, got {n} and {dof}")
+    if not 0.0 < probability < 1.0:
+        raise ConfigError(f"probability: expected 0 to 1, got {probability:g}")
+    tail = 0.5 * (1.0 - probability)
+    total = n * dof
+    return float(chi2.ppf(tail, total)) / total, float(chi2.ppf(1.0 - tail, total)) / total
+
+
+def pair_nees(estimate: TeamEstimate, truth_ij_w: F64) -> tuple[F64, Bool]:
+    """e^T P^-1 e / d of the position errors e of every pair, and where P is known.
+
+    Args:
+        estimate: Of one run, arrays over (time, pair).
+        truth_ij_w: True relative positions, (time, pair, 3) [m].
+
+    Returns:
+        (time, pair) [-], NaN where P is not known, and where it is, (time, pair).
+    """
+    d = estimate.constellation.dimensions
+    cov = estimate.cov[..., :d, :d]
+    known = np.linalg.eigvalsh(cov)[..., 0] > 0.0
+    e = (estimate.pos_ij_w - truth_ij_w)[known][:, :d]
+    nees = np.full(known.shape, np.nan)
+    whitened = np.linalg.solve(cov[known], e[..., None])[..., 0]
+    nees[known] = np.sum(e * whitened, axis=-1) / d
+    return nees, known
