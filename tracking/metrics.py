@@ -6,8 +6,9 @@ Relative positions are scored in the world frame over the pairs with at least on
 - ``rmse_yaw``: after one constant yaw for the whole run, since magnetic north and the frame
   of a motion-capture room differ by a constant.
 - ``rmse_shape``: after the best rotation at each instant. A mirror image stays an error.
-- ``nees``: mean of e^T P^-1 e over the position errors e, per dimension: 1 where the
-  covariance P is right, larger where the filter is too sure [1].
+- ``nees``: mean of e^T P^-1 e over the position errors e after that yaw, per dimension: 1 where
+  the covariance P is right, larger where the filter is too sure [1]. P is meant in the frame of
+  the filter's own north, which no measurement can compare with another.
 
 References:
     [1] Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking and Navigation,
@@ -90,7 +91,7 @@ def score(estimate: TeamEstimate, truth_ij_w: F64, has_truth: Bool, skip_until: 
     R_shape = best_rotation(x, truth, planar=planar)  # noqa: N806
     errors = [x - truth, x @ R_yaw.T - truth, x @ np.swapaxes(R_shape, -1, -2) - truth]
 
-    nees, known = pair_nees(estimate, truth_ij_w)
+    nees, known = pair_nees(estimate, truth_ij_w @ R_yaw)
     nees, known = nees[rows], known[rows] & scored
     squared = [np.sum(e * e, axis=-1) for e in errors]
     overall = [float(np.sqrt(sq[scored].mean())) for sq in squared]

@@ -47,7 +47,9 @@ def over_time(
     bins = np.minimum((estimate.t / BIN).astype(np.int64), n_bins - 1)
     known = has_truth & ~np.isin(estimate.status, (Status.ABSENT, Status.STARTING))
     error = np.linalg.norm(errors_after(estimate, truth_ij_w, yaw_rad), axis=-1)
-    nees, has_nees = pair_nees(estimate, truth_ij_w)
+    c, s = np.cos(yaw_rad), np.sin(yaw_rad)
+    R_yaw = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])  # noqa: N806
+    nees, has_nees = pair_nees(estimate, truth_ij_w @ R_yaw)
     return OverTime(
         t=BIN * (np.arange(n_bins, dtype=np.float64) + 0.5),
         error=_bin_means(bins, error, known, n_bins),

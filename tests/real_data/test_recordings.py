@@ -39,6 +39,12 @@ def test_mds_keeps_the_shape(results, name, limit):
         assert getattr(refined, figure) < getattr(alone, figure)
 
 
+def test_one_filter_over_all_nodes_follows_a_hand_among_reflections(results):
+    found = results["inrol_env1", "joint"].score
+    assert found.rmse_yaw <= 0.15
+    assert found.rmse_shape <= 0.12
+
+
 def test_gross_outliers_are_refused(results):
     """One fixed node of the walk throws ranges that are metres too long."""
     assert results["isas_walk1", "ekf-mds"].n_rejected > 0

@@ -44,16 +44,17 @@ def growth(
         progress: Called with the share done, 0 to 1.
     """
     filterpy, gtsam = filterpy_name(), gtsam_name()
-    result = Growth(sizes, [], [], {filterpy: []} | ({gtsam: []} if gtsam else {}))
+    peers: dict[str, list[float | None]] = {name: [] for name in (filterpy, gtsam) if name}
+    result = Growth(sizes, [], [], peers)
     for k, n in enumerate(sizes):
         workload = Workload(n, 2, "message")
         few = max(min(steps, 400 // n), 1)
         result.ours.append(step_cost(workload, DEFAULT_FILTER, max(steps, n)))
         result.ranges.append(workload.pairs.shape[1])
-        result.peers[filterpy].append(group_cost(workload, few if n < 20 else 1))
+        peers[filterpy].append(group_cost(workload, few if n < 20 else 1))
         if gtsam is not None:
             theirs = smoother_cost(workload, few) if n <= GTSAM_UP_TO else None
-            result.peers[gtsam].append(theirs)
+            peers[gtsam].append(theirs)
         if progress is not None:
             progress((k + 1) / len(sizes))
     return result

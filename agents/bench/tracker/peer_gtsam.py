@@ -32,7 +32,7 @@ def gtsam_name() -> str | None:
         return None
     from importlib.metadata import version
 
-    return f"GTSAM {version('gtsam')}, lag {LAG:g} s"
+    return f"GTSAM {version('gtsam')}"
 
 
 def smoother_cost(workload: Workload, steps: int) -> float:

@@ -90,27 +90,39 @@ class Workload:
     def accel(self, t: F64) -> F64:
         """Accelerations, (time, node, 3) [m/s2]."""
         scale = self._rates[:, None] * np.array([1.0, 1.0, 1.3])
-        return -(scale**2) * self._on_circle(t)
+        accel: F64 = -(scale**2) * self._on_circle(t)
+        return accel
+
+    def times(self, first: int, steps: int) -> F64:
+        """When some steps are, (time) [s]; the first of all is at dt."""
+        t: F64 = np.arange(first + 1, first + steps + 1, dtype=np.float64) * self.dt
+        return t
 
     def distances(self, t: F64, first: int) -> F64:
-        """Measured ranges of the steps at the times t, (time, pair) [m]; the first is step `first`."""
+        """Measured ranges of steps, (time, pair) [m].
+
+        Args:
+            t: Their times, (time) [s].
+            first: Number of the first.
+        """
         who = self.pairs[(first + np.arange(len(t))) % len(self.pairs)]
         pos, rows = self.pos(t), np.arange(len(t))[:, None]
         exact = np.linalg.norm(pos[rows, who[..., 1]] - pos[rows, who[..., 0]], axis=-1)
         noise = np.random.default_rng(first).normal(0.0, RANGE_STD, exact.shape)
-        return np.maximum(exact + noise, 0.1)
+        measured: F64 = np.maximum(exact + noise, 0.1)
+        return measured
 
     def block(self, first: int, steps: int) -> MeasurementBlock:
         """Measurements of some steps, in order.
 
         Args:
-            first: Number of the first; step k is at the time ``(k + 1) dt``.
+            first: Number of the first.
             steps: How many.
         """
-        t = (first + 1.0 + np.arange(steps)) * self.dt
+        t = self.times(first, steps)
         values = np.zeros((steps, self.n, 7))
         slip = np.arcsin(REAR_AXLE) if self.dimensions == 2 else 0.0
-        yaw = self._rates * t[:, None] + np.arange(self.n) + 0.5 * np.pi - slip
+        yaw: F64 = self._rates * t[:, None] + np.arange(self.n) + 0.5 * np.pi - slip
         values[..., :4], values[..., 4:] = quat_from_yaw(yaw), self.accel(t)
         node = np.broadcast_to(np.arange(self.n), (steps, self.n)).ravel()
         states = MeasurementBlock.of_kind(
