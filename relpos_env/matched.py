@@ -63,6 +63,7 @@ def matched_params(scenario: Scenario | HumanScenario) -> JointParams:
             excess=max(mean, 1e-3),
             excess_std=max(std, 1e-3),
             excess_length=channel.excess_length,
+            white_std=1e-3,
             gap_los=channel.gap,
             gap_nlos=channel.gap + max(channel.gap_nlos, 0.1),
         ),

@@ -24,15 +24,11 @@ from tracking._bound_kernels import run_bound
 from tracking.arrays import F64, Bool
 from tracking.constellation import Constellation
 from tracking.errors import LogError
+from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.params import JointParams
+from tracking.filters.joint.records import as_records
 from tracking.filters.joint.scratch import make_scratch
-from tracking.filters.joint.state import (
-    JointState,
-    as_records,
-    make_coefficients,
-    make_layout,
-    make_state,
-)
+from tracking.filters.joint.state import JointState, make_layout, make_state
 from tracking.geometry import quat_conjugate, quat_multiply, yaw_of
 from tracking.log import Log
 from tracking.measurements import Kind, MeasurementBlock

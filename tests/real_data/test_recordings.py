@@ -42,7 +42,7 @@ def test_mds_keeps_the_shape(results, name, limit):
 def test_one_filter_over_all_nodes_follows_a_hand_among_reflections(results):
     found = results["inrol_env1", "joint"].score
     assert found.rmse_yaw <= 0.15
-    assert found.rmse_shape <= 0.12
+    assert found.rmse_shape <= 0.125
 
 
 def test_gross_outliers_are_refused(results):

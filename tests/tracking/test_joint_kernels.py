@@ -8,15 +8,11 @@ from hypothesis import strategies as st
 from tracking import Constellation, NodeConfig
 from tracking.filters.joint import _carrier_kernels, _linear_kernels, _motion_kernels
 from tracking.filters.joint._range_kernels import range_model
+from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.params import JointParams
+from tracking.filters.joint.records import as_records
 from tracking.filters.joint.scratch import make_scratch
-from tracking.filters.joint.state import (
-    JointState,
-    as_records,
-    make_coefficients,
-    make_layout,
-    make_state,
-)
+from tracking.filters.joint.state import JointState, make_layout, make_state
 
 
 def running(dimensions, vehicle="car", seed=0, static=()):

@@ -14,8 +14,8 @@ import numpy as np
 from agents.bench.tracker.workload import Workload
 from agents.errors import UsageError
 from tracking.arrays import F64
+from tracking.filters.joint.coefficients import count_states
 from tracking.filters.joint.params import JointParams
-from tracking.filters.joint.state import count_states
 
 if TYPE_CHECKING:
     from filterpy.kalman import ExtendedKalmanFilter

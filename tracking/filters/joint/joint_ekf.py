@@ -19,17 +19,12 @@ from tracking.arrays import F64
 from tracking.constellation import Constellation
 from tracking.estimate import TeamEstimate
 from tracking.filters.joint._event_kernels import advance_all, run_events
+from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.params import JointParams
+from tracking.filters.joint.records import Records, as_records
 from tracking.filters.joint.scratch import Scratch, make_scratch
 from tracking.filters.joint.smoothing import read_clones, with_clones
-from tracking.filters.joint.state import (
-    JointState,
-    Records,
-    as_records,
-    make_coefficients,
-    make_layout,
-    make_state,
-)
+from tracking.filters.joint.state import JointState, make_layout, make_state
 from tracking.measurements import MeasurementBlock
 
 

@@ -93,8 +93,8 @@ class RangeErrorParams:
     bend_gain: float = 4.0
     """[-] Trust lost where the filter is uncertain across a short line of sight, in units of the
     second-order error there. That error lasts, so it weighs more than once."""
-    max_nodes: int = 8
-    """[-] Larger groups have no states for these errors: their ranges count as whiter and worse."""
+    max_pairs: int = 28
+    """[-] Larger groups have no states for these errors: their ranges count as worse and white."""
 
     def __post_init__(self) -> None:
         _expect_positive(self, "fast_std", "slow_std", "bend_gain")
@@ -114,8 +114,8 @@ class NlosParams:
     """[m] Its standard deviation."""
     excess_length: float = 2.0
     """[m] Way of both ends after which the excess is another."""
-    white_std: float = 0.05
-    """[m] White noise that is added behind an obstacle."""
+    white_std: float = 0.25
+    """[m] White noise that is added behind an obstacle: the excess jumps where paths change."""
     repeats: float = 20.0
     """[-] So many ranges in a row have the same excess: together they count as one."""
     gap_los: float = 3.0

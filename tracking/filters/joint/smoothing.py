@@ -18,7 +18,8 @@ import numpy as np
 from tracking.arrays import F64, I64
 from tracking.constellation import Constellation
 from tracking.estimate import Status, TeamEstimate
-from tracking.filters.joint.state import JointState, Records
+from tracking.filters.joint.records import Records
+from tracking.filters.joint.state import JointState
 
 
 def with_clones(

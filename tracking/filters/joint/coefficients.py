@@ -1,0 +1,112 @@
+"""The constants of the kernels, derived once from the parameters and the constellation."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tracking.arrays import Bool
+from tracking.constellation import Constellation
+from tracking.filters.joint.params import JointParams
+from tracking.filters.joint.records import Records
+
+_NUMBERS = (
+    "bend_gain",
+    "white_var",
+    "fast_var",
+    "fast_length",
+    "slow_var",
+    "slow_length",
+    "enter_rate",
+    "leave_rate",
+    "excess",
+    "excess_var",
+    "excess_length",
+    "excess_white_var",
+    "gap_los",
+    "gap_los_std",
+    "gap_nlos",
+    "gap_nlos_std",
+    "gap_weight",
+    "outlier_prob",
+    "outlier_span",
+    "start_k",
+    "start_max_age",
+    "rotation_var",
+    "position_var",
+    "start_speed_var",
+    "prune",
+    "merge_distance",
+    "max_nis",
+    "check_period",
+    "unaided_psd2",
+    "unaided_after",
+    "static_drift2",
+    "survey_var",
+    "rest_accel",
+    "rest_rate",
+    "rest_after",
+    "rest_var",
+    "carrier_period",
+    "lost_after",
+    "leave_after",
+    "ok_var",
+    "doubt",
+    "evidence",
+)
+COEFFICIENTS = np.dtype([("d", "i8"), ("n", "i8"), *((name, "f8") for name in _NUMBERS)])
+"""Constants derived once from `JointParams`, under the same names; ``_var`` and ``2``: squared."""
+
+
+def make_coefficients(constellation: Constellation, params: JointParams) -> Records:
+    """Derive the constants of the kernels, (1)."""
+    e, v, s = params.range_error, params.nlos, params.start
+    has_states = has_range_errors(constellation, params)
+    white_var = e.white_std**2
+    if not has_states:
+        # What lasts counts as white noise of the same weight over a second of driving.
+        white_var += 10.0 * (e.fast_std**2 + e.slow_std**2)
+    values = {
+        "white_var": white_var,
+        "fast_var": e.fast_std**2,
+        "slow_var": e.slow_std**2,
+        "excess_var": v.excess_std**2,
+        # Errors that last and have no state make successive ranges say the same thing.
+        "evidence": 1.0 if has_states else 0.1,
+        "excess_white_var": v.white_std**2 if has_states else v.repeats * v.excess_std**2,
+        "start_k": s.k,
+        "start_max_age": s.max_age,
+        "rotation_var": (0.4 if constellation.dimensions == 3 else 2.4 / s.rotations_2d) ** 2,
+        "position_var": s.position_std**2,
+        "start_speed_var": s.speed_std**2,
+        "unaided_psd2": params.unaided_accel_psd**2,
+        "static_drift2": params.static_drift**2,
+        "survey_var": params.survey_std**2,
+        "rest_var": params.rest_std**2,
+        "ok_var": params.ok_std**2,
+    }
+    c = np.zeros(1, dtype=COEFFICIENTS)
+    c["d"] = constellation.dimensions
+    c["n"] = count_states(constellation, params)
+    for name in _NUMBERS:
+        sources = [p for p in (e, v, s, params) if hasattr(p, name)]
+        c[name] = values[name] if name in values else getattr(sources[0], name)
+    return c
+
+
+def count_states(constellation: Constellation, params: JointParams) -> int:
+    """Length of the state vector."""
+    d = constellation.dimensions
+    n = sum(d if static else 3 * d + 1 for static in constellation.is_static)
+    if has_range_errors(constellation, params):
+        n += 2 * int(moving_pairs(constellation).sum())
+    return n
+
+
+def moving_pairs(constellation: Constellation) -> Bool:
+    """True for pairs with a node that moves: those that are ranged, (pair)."""
+    return np.asarray(~constellation.is_static[constellation.pairs].all(axis=1))
+
+
+def has_range_errors(constellation: Constellation, params: JointParams) -> bool:
+    """True if the errors of ranges have states: in groups with not too many pairs."""
+    return int(moving_pairs(constellation).sum()) <= params.range_error.max_pairs

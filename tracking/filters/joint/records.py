@@ -1,0 +1,80 @@
+"""What is kept of every node, pair and group, as records, so that kernels get few arguments."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import config
+from numpy.typing import NDArray
+
+Records = NDArray[Any]
+
+NODE = np.dtype(
+    [
+        ("t_pre", "f8"),  # time up to which the inertial samples are summed [s]
+        ("t_state", "f8"),  # time of the last STATE event [s]
+        ("t_heard", "f8"),  # time of the last range it took part in [s]
+        ("yaw", "f8"),  # of the last STATE event, as measured [rad]
+        ("yaw_rate", "f8"),  # [rad/s]
+        ("accel_mean", "f8"),  # running mean of |accel| [m/s2]
+        ("accel_var", "f8"),  # running mean square of accel about its mean [m2/s4]
+        ("turning", "f8"),  # running mean of the angular rate [rad/s]
+        ("t_moved", "f8"),  # last time it was not at rest [s]
+        ("has_state", "?"),
+        ("heard", "?"),
+        ("present", "?"),
+        ("static", "?"),  # constant from here on
+        ("levelled", "?"),
+        ("rests", "?"),
+        ("psd2", "f8"),
+        ("turn_psd2", "f8"),
+        ("bias_var", "f8"),
+        ("bias_tau", "f8"),
+        ("heading_var", "f8"),
+        ("heading_tau", "f8"),
+        ("speed_var", "f8"),
+        ("sideways_var", "f8"),  # 0 for what may move sideways
+        ("rear_axle", "f8"),
+        ("at_p", "i8"),  # first state of its position
+        ("at_v", "i8"),  # of its velocity; -1 for static nodes, like the next two
+        ("at_b", "i8"),
+        ("at_h", "i8"),
+    ]
+)
+PAIR = np.dtype(
+    [
+        ("t_range", "f8"),  # time of the last range that counted [s]
+        ("nis", "f8"),  # NIS of the last range in the best hypothesis [-]
+        ("misfit", "f8"),  # running mean of it [-]
+        ("start_sum", "f8"),  # sum of the first ranges of a pair not started [m]
+        ("start_t", "f8"),  # time of the first of them [s]
+        ("start_n", "i8"),  # how many
+        ("n_ranges", "i8"),
+        ("n_rejected", "i8"),  # ranges that hardly counted
+        ("i", "i8"),  # constant: node indices, i < j
+        ("j", "i8"),
+        ("at_e", "i8"),  # constant: first state of its range error, -1 for none
+    ]
+)
+GROUP = np.dtype(
+    [
+        ("started", "?"),
+        ("flat", "?"),  # the layout was too flat to tell its mirror image
+        ("n_alive", "i8"),
+        ("best", "i8"),
+        ("t", "f8"),  # time of the states [s]
+        ("t_check", "f8"),
+        ("t_carrier", "f8"),
+        ("t_gauge", "f8"),
+        ("misfit", "f8"),  # running mean of the NIS of ranges in the best hypothesis [-]
+        ("fit", "f8"),  # running share of ranges that fit [-]
+        ("nis_sum", "f8"),
+        ("nis_n", "i8"),
+    ]
+)
+
+
+def as_records(array: Records) -> Records:
+    """An array of records whose fields the interpreter, too, finds under their names."""
+    return array.view(np.recarray) if config.DISABLE_JIT else array
