@@ -4,7 +4,7 @@ from agents.simulate import simulate
 from agents.track import track_log
 
 log = simulate(scenario="cars-los", seconds=30, seed=1)
-result = track_log(log, filter="ekf-mds")
+result = track_log(log)
 print(f"{log.n_ranges} ranges between {log.constellation.n_nodes} cars")
 print(f"shape error {result.score.rmse_shape:.2f} m, world error {result.score.rmse:.2f} m")
 pos, vel = result.estimate.between(0, 1)

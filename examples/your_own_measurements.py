@@ -5,7 +5,7 @@ import numpy as np
 from tracking import Constellation, Kind, MeasurementBlock, NodeConfig, Tracker
 
 constellation = Constellation(nodes=tuple(NodeConfig(id=k) for k in (1, 2, 3)), dimensions=2)
-tracker = Tracker(constellation, filter="ekf-mds")
+tracker = Tracker(constellation)
 t = np.arange(1, 1500) / 100.0
 angle = t[:, None] * [0.9, 1.3, 1.7] + [0.0, 2.0, 4.0]
 centre = np.array([[0.0, 0.0], [3.0, 0.0], [1.0, 2.5]])

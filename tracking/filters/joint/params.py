@@ -62,11 +62,12 @@ CARRIERS = {
         rear_axle=0.15,
     ),
     "robot": CarrierParams(accel_psd=0.07, bias_std=0.1, bias_tau=30.0, levelled=True),
+    # Limbs: larger slow errors are measured, but a filter that may move them also makes them up.
     "human": CarrierParams(
         accel_psd=0.06,
-        bias_std=0.08,
+        bias_std=0.03,
         bias_tau=5.0,
-        heading_std=0.08,
+        heading_std=0.02,
         heading_tau=30.0,
     ),
     "hand": BODY,
