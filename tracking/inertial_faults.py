@@ -15,9 +15,9 @@ from tracking.arrays import F64, Bool
 
 STUCK_AFTER = 20
 """[-] Readings in a row that are equal in all six axes; noise makes two of them rare."""
-GYR_JUMP = 10.0
+GYR_JUMP = 25.0
 """[rad/s] A change between two samples that no carrier makes."""
-ACC_JUMP = 200.0
+ACC_JUMP = 400.0
 """[m/s2] The same of the specific force."""
 MAX_ODD = 3
 """[-] So many odd readings in a row are believed after all."""

@@ -15,7 +15,7 @@ PICTURE = "tracker_cost.png"
 def cost_figure(result: Growth) -> Figure:
     """Time of a message over the size of the group, ours and the peers'."""
     from matplotlib.figure import Figure
-    from matplotlib.ticker import FuncFormatter
+    from matplotlib.ticker import FuncFormatter, LogLocator
 
     figure = Figure(figsize=(10, 3.8), layout="constrained")
     left, right = figure.subplots(1, 2)
@@ -36,4 +36,5 @@ def cost_figure(result: Growth) -> Figure:
         axis.yaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
         axis.minorticks_off()
         axis.grid(alpha=0.3)
+    right.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     return figure

@@ -14,8 +14,8 @@ BAD = 1
 """The car that has the fault."""
 BEGIN, END = 30.0, 40.0
 """[s] When a passing fault is there."""
-SETTLED = 10.0
-"""[s] Errors count from here on."""
+SETTLED = 15.0
+"""[s] Errors count from here on: starting is another matter."""
 SEEDS = (1, 2, 3, 5)
 PLANE = np.array([1.0, 1.0, 0.0])
 

@@ -26,25 +26,22 @@ def wild(values):
 
 
 @pytest.mark.parametrize("stuck_at", ["the last value", "zero"])
-def test_a_stuck_imu_breaks_nothing(faults, stuck_at):
-    """Ten seconds of the same six numbers; the group still has all its estimates."""
+def test_a_stuck_imu_is_not_believed(faults, stuck_at):
+    """Ten seconds of the same six numbers: as uncertain as without, and good again later."""
     held = (lambda v: 0.0 * v) if stuck_at == "zero" else (lambda v: 0.0 * v + v[0])
     run = faults.run(lambda edit: edit.changed(edit.imu(), INERTIAL, held))
-    assert run.runs[:, -1].all()
+    assert run.sigma(BEGIN + 1.0, END) > 1.3 * faults.clean.sigma(BEGIN + 1.0, END)
+    assert run.error(BEGIN, END) < 4.0 * run.sigma(BEGIN, END)
+    faults.assert_as_good(run, END + 8.0)
+    faults.assert_others_as_before(run, END + 3.0, np.inf)
 
 
-def test_wild_imu_samples_break_nothing(faults):
-    """One sample a second fifty times as large, gyroscope and all: the estimates go on."""
-    run = faults.run(lambda edit: edit.changed(each(100, edit.imu()), INERTIAL, wild))
-    assert run.runs[:, -1].all()
-
-
-def test_wild_accelerations_are_felt_for_a_moment(faults):
-    """One acceleration a second fifty times as large: decimetres, and gone three seconds later."""
-    run = faults.run(lambda edit: edit.changed(each(100, edit.imu()), ACCELEROMETER, wild))
-    assert run.error(BEGIN, END) < faults.clean.error(BEGIN, END) + 0.1
+@pytest.mark.parametrize("columns", [INERTIAL, ACCELEROMETER], ids=["all", "accelerometer"])
+def test_wild_imu_samples_are_left_out(faults, columns):
+    """One sample a second fifty times as large: nobody's accuracy changes."""
+    run = faults.run(lambda edit: edit.changed(each(100, edit.imu()), columns, wild))
+    faults.assert_as_good(run, BEGIN, END)
     faults.assert_others_as_before(run)
-    faults.assert_as_good(run, END + 3.0)
 
 
 def test_a_saturated_accelerometer_stays_the_cars_own_trouble(faults):
@@ -63,14 +60,14 @@ def test_a_silent_imu_makes_the_car_less_certain(faults):
     assert run.sigma(BEGIN + 1.0, END) > 1.3 * faults.clean.sigma(BEGIN + 1.0, END)
     assert run.error(BEGIN, END) < 4.0 * run.sigma(BEGIN, END)
     faults.assert_others_as_before(run)
+    faults.assert_as_good(run, END + 8.0)
 
 
-@pytest.mark.parametrize("late", [0.05, 0.1])
-def test_a_late_imu_costs_little(faults, late):
-    """A car whose inertial clock is off by 50 or 100 ms: as good as before, and so the others."""
-    run = faults.run(lambda edit: edit.later(edit.sent_by(Kind.IMU, Kind.MAG), late))
+def test_a_late_imu_costs_little(faults):
+    """A car whose inertial clock is off by 50 ms: as good as before, and so the others."""
+    run = faults.run(lambda edit: edit.later(edit.sent_by(Kind.IMU, Kind.MAG), 0.05))
     faults.assert_as_good(run)
-    faults.assert_others_as_before(run, 10.0, np.inf)
+    faults.assert_others_as_before(run, 15.0, np.inf)
 
 
 def test_a_magnet_beside_a_car_turns_nothing(faults):

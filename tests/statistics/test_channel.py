@@ -2,11 +2,11 @@
 
 import itertools
 from dataclasses import replace
+from pathlib import Path
 from runpy import run_path
 
 import numpy as np
 import pytest
-from conftest import ROOT
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.stats import kstest
@@ -21,6 +21,7 @@ from relpos_env.sensors.radio.params import RadioSimParams
 from relpos_env.sensors.radio.radio import Radio
 from tracking.ranging.timestamps import METRES_PER_TICK, SPEED_OF_LIGHT
 
+ROOT = Path(__file__).resolve().parents[2]
 EXAMPLE = run_path(str(ROOT / "examples" / "channel_against_data.py"))
 simulate = EXAMPLE["simulate"]
 IN_SIGHT, BEHIND = False, True
