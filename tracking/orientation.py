@@ -111,9 +111,10 @@ class Orientation:
         out = MeasurementBlock(*(getattr(block, f.name) for f in fields(block)))
         kind, values, valid = block.kind.copy(), block.values.copy(), block.valid.copy()
         out = replace(out, kind=kind, values=values, valid=valid)
-        for env, node in np.unique(
-            np.stack([np.nonzero(inertial)[0], block.i[inertial]], axis=1), axis=0
-        ):
+        present = np.zeros((block.n_envs, len(self._nodes)), dtype=bool)
+        rows, columns = np.nonzero(inertial)
+        present[rows, block.i[rows, columns]] = True
+        for env, node in np.argwhere(present):
             events = np.nonzero(inertial[env] & (block.i[env] == node))[0]
             self._step_node(int(env), int(node), events, block, out)
         return out

@@ -26,6 +26,8 @@ from tracking.filters.joint.state import N_PRE, JointState
 
 # Plain numbers of `Kind`: kernels do not know enums.
 JOIN, STATE, SURVEY, RANGE, LEAVE = 0, 3, 4, 5, 6
+SAME = 1e-5
+"""[s] Ranges of one message differ by their rounding only: they share a prediction."""
 GAUGE_PERIOD = 1.0
 """[s] Time between two moves of the centre to the origin."""
 
@@ -134,7 +136,7 @@ def hear(c, s, layout, scratch, i, j, a_i, a_j, t, distance, evidence, is_survey
 def advance(c, s, scratch, t):
     """Carry every hypothesis to time t, and use what is known about the carriers."""
     group = s.group[0]
-    if t > group.t:
+    if t - group.t > SAME:
         for i in range(s.nodes.shape[0]):
             if s.nodes[i].present and not s.nodes[i].static:
                 sum_inertial(c, s.nodes, s.held, s.pre, i, t)

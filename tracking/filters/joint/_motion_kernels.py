@@ -16,6 +16,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from tracking.compiled import small_kernel
 from tracking.filters._level_kernels import level
 
@@ -152,13 +154,10 @@ def predict(c, s, h, step, scratch):
     for i in range(nodes.shape[0]):
         if nodes[i].present and not nodes[i].static:
             move_rows(d, n, nodes[i], P, h, i, w)
-    for r in range(n):
-        for i in range(nodes.shape[0]):
-            if nodes[i].present and not nodes[i].static:
-                move_columns(d, nodes[i], P, h, r, i, w)
-        s_r = scale[r]
-        for k in range(n):
-            P[h, r, k] *= s_r * scale[k]
+    for i in range(nodes.shape[0]):
+        if nodes[i].present and not nodes[i].static:
+            move_columns(d, n, nodes[i], P, h, i, w, scale)
+    fade(P, h, n, pairs, scale)
     for i in range(nodes.shape[0]):
         if nodes[i].present:
             add_noise(c, nodes[i], s.pre, P, h, i, scale, step)
@@ -228,18 +227,39 @@ def move_rows(d, n, node, P, h, i, w):
 
 
 @small_kernel
-def move_columns(d, node, P, h, r, i, w):
-    """``(F P) F^T``: row r, the columns of position and velocity of node i."""
-    p, v, b = node.at_p, node.at_v, node.at_b
+def move_columns(d, n, node, P, h, i, w, scale):
+    """``(F P) F^T``: the columns of node i; those of bias and heading error fade as well."""
+    p, v, b, y = node.at_p, node.at_v, node.at_b, node.at_h
     T, pc, ps, vc, vs = w[i, 0], w[i, 1], w[i, 2], w[i, 3], w[i, 4]
-    b0, b1, y0 = P[h, r, b], P[h, r, b + 1], P[h, r, node.at_h]
-    P[h, r, p] += T * P[h, r, v] - pc * b0 + ps * b1 + w[i, 5] * y0
-    P[h, r, p + 1] += T * P[h, r, v + 1] - ps * b0 - pc * b1 + w[i, 6] * y0
-    P[h, r, v] += -vc * b0 + vs * b1 + w[i, 7] * y0
-    P[h, r, v + 1] += -vs * b0 - vc * b1 + w[i, 8] * y0
-    if d == 3:
-        P[h, r, p + 2] += T * P[h, r, v + 2] - 0.5 * T * T * P[h, r, b + 2]
-        P[h, r, v + 2] -= T * P[h, r, b + 2]
+    yp0, yp1, yv0, yv1 = w[i, 5], w[i, 6], w[i, 7], w[i, 8]
+    keep_b, keep_y, half = scale[b], scale[y], 0.5 * T * T
+    for r in range(n):
+        b0, b1, y0, v0, v1 = P[h, r, b], P[h, r, b + 1], P[h, r, y], P[h, r, v], P[h, r, v + 1]
+        P[h, r, p] += T * v0 - pc * b0 + ps * b1 + yp0 * y0
+        P[h, r, p + 1] += T * v1 - ps * b0 - pc * b1 + yp1 * y0
+        P[h, r, v] = v0 - vc * b0 + vs * b1 + yv0 * y0
+        P[h, r, v + 1] = v1 - vs * b0 - vc * b1 + yv1 * y0
+        P[h, r, b], P[h, r, b + 1], P[h, r, y] = keep_b * b0, keep_b * b1, keep_y * y0
+        if d == 3:
+            v2, b2 = P[h, r, v + 2], P[h, r, b + 2]
+            P[h, r, p + 2] += T * v2 - half * b2
+            P[h, r, v + 2] = v2 - T * b2
+            P[h, r, b + 2] = keep_b * b2
+
+
+@small_kernel
+def fade(P, h, n, pairs, scale):
+    """What decays: the columns of range errors, and the rows of all that does."""
+    first = n
+    for p in range(pairs.shape[0]):
+        if pairs[p].at_e >= 0:
+            first = min(first, pairs[p].at_e)
+    for r in range(n):
+        for k in range(np.uint64(first), np.uint64(n)):  # unsigned: no index from the end
+            P[h, r, k] *= scale[k]
+        if scale[r] != 1.0:
+            for k in range(n):
+                P[h, r, k] *= scale[r]
 
 
 @small_kernel

@@ -159,7 +159,7 @@ def fuse_range(c, s, h, p, dt, distance, levers, evidence, scratch):
     switched, sane, loglik = judge_sight(c, s, h, p, dt, nu, variance, evidence, scratch.w)
     s.loglik[h] += c.evidence * max(loglik, -0.5 * (c.max_nis + math.log(S)))
     nis = nu * nu / S
-    if switched > 0.01:
+    if switched > 0.01 and s.pairs[p].at_e >= 0:
         change_sight(c, s, h, p, switched)
         predicted, m = range_model(c, s, h, p, levers[:3], levers[3:], scratch.idx, scratch.val)
         nu = distance - predicted
