@@ -6,7 +6,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from tracking import Constellation, NodeConfig
-from tracking.filters.joint import _carrier_kernels, _linear_kernels, _motion_kernels
+from tracking.filters.joint import (
+    _carrier_kernels,
+    _linear_kernels,
+    _motion_kernels,
+    _rotation_kernels,
+)
 from tracking.filters.joint._range_kernels import range_model
 from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.params import JointParams
@@ -130,10 +135,41 @@ def test_a_correction_is_the_textbook_one(seed, n, m):
     H[idx] = val
     S = H @ P @ H + R
     K = P @ H / S
-    states, covariance, w = x[None].copy(), P[None].copy(), np.zeros(n)
+    states, covariance, w, moved = x[None].copy(), P[None].copy(), np.zeros(n), np.zeros((1, n))
     variance = _linear_kernels.project(covariance, 0, n, len(idx), idx, val, w)
-    _linear_kernels.absorb(states, covariance, 0, n, w, nu, variance + R)
+    _linear_kernels.absorb(states, covariance, moved, 0, n, w, nu, variance + R)
     np.testing.assert_allclose(states[0], x + K * nu, atol=1e-9)
+    np.testing.assert_allclose(moved[0], K * nu, atol=1e-12)
     joseph = (np.eye(n) - np.outer(K, H)) @ P @ (np.eye(n) - np.outer(K, H)).T + R * np.outer(K, K)
     np.testing.assert_allclose(covariance[0], joseph, atol=1e-8)
     np.testing.assert_array_equal(covariance[0], covariance[0].T)
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_the_covariance_of_a_rotation_follows_the_estimate(dimensions):
+    """A group of which only the rotation is unknown stays one after it was moved."""
+    c, s, scratch, _ = running(dimensions, "human")
+    n, h = s.x.shape[1], 1e-3
+    axes = range(3) if dimensions == 3 else [0]
+
+    def blind(x):
+        directions = np.zeros((n, len(axes)))
+        for q in axes:
+            u, v = (3 - q) % 3, (4 - q) % 3
+            for at, mean in ((s.nodes["at_p"], True), (s.nodes["at_v"], False)):
+                values = x[at[:, None] + np.arange(dimensions)]
+                values = values - values.mean(axis=0) * mean
+                directions[at + u, q], directions[at + v, q] = -values[:, v], values[:, u]
+        return directions
+
+    before = s.x[0].copy()
+    N0 = blind(before)
+    s.P[0] = N0 @ N0.T
+    s.moved[0] = h * np.random.default_rng(3).standard_normal(n)
+    s.x[0] += s.moved[0]
+    N1 = blind(s.x[0])
+    _rotation_kernels.turn_covariance(c, s, 0, 1.0)
+    moved, left = np.abs(N1 @ N1.T - N0 @ N0.T).max(), np.abs(s.P[0] - N1 @ N1.T).max()
+    assert left < 0.02 * moved
+    np.testing.assert_allclose(s.P[0], s.P[0].T, atol=1e-12)
+    assert not s.moved.any()

@@ -101,6 +101,7 @@ def add_mirror_image(c, s):
                 if not node.static:
                     M[node.at_v + r, node.at_v + k] -= 2.0 * E[r, 0] * E[k, 0]
                     s.x[target, node.at_v + r] -= 2.0 * E[r, 0] * E[k, 0] * out[1, i, k]
+    s.moved[target, :] = 0.0
     s.P[target] = M @ s.P[h].copy() @ M.T.copy()
 
 

@@ -48,7 +48,7 @@ def judge(c, s, h, nu, m, variance, scratch):
     s.loglik[h] -= 0.5 * (min(nu * nu / S, c.max_nis) + math.log(S))
     if nu * nu > 25.0 * S:
         S = nu * nu / 25.0  # a jolt or a skid: it counts for less
-    absorb(s.x, s.P, h, c.n, scratch.w, nu, S)
+    absorb(s.x, s.P, s.moved, h, c.n, scratch.w, nu, S)
 
 
 @small_kernel
@@ -91,7 +91,7 @@ def hold_speed(c, s, h, dt, scratch):
                 mean += s.x[h, at] / m
                 a += 1
         S = project(s.P, h, c.n, m, scratch.idx, scratch.val, scratch.w) + variance
-        absorb(s.x, s.P, h, c.n, scratch.w, -mean, S)
+        absorb(s.x, s.P, s.moved, h, c.n, scratch.w, -mean, S)
 
 
 @small_kernel

@@ -95,6 +95,7 @@ def look_ahead(c, s, scratch, t):
             s.group,
             scratch.x,
             scratch.P,
+            scratch.x,
             scratch.nlos,
             s.alive,
             s.loglik,

@@ -21,6 +21,7 @@ from tracking.filters.joint._range_kernels import (
     fuse_survey,
     gap_evidence,
 )
+from tracking.filters.joint._rotation_kernels import follow_rotation
 from tracking.filters.joint._start_kernels import try_join, try_start
 from tracking.filters.joint.state import N_PRE, JointState
 
@@ -100,6 +101,7 @@ def one_env(state, e):
         state.group[e],
         state.x[e],
         state.P[e],
+        state.moved[e],
         state.nlos[e],
         state.alive[e],
         state.loglik[e],
@@ -143,6 +145,7 @@ def advance(c, s, scratch, t):
         first, end = bank_range(s)
         for h in range(first, end):
             if s.alive[h]:
+                follow_rotation(c, s, h)
                 predict(c, s, h, t - group.t, scratch)
         for i in range(s.nodes.shape[0]):
             for k in range(N_PRE):

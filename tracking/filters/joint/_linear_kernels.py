@@ -39,11 +39,15 @@ def project(P, h, n, m, idx, val, w):
 
 
 @small_kernel
-def absorb(x, P, h, n, w, nu, S):
-    """Correct hypothesis h with an innovation nu of variance S; w is ``P H``, overwritten."""
+def absorb(x, P, moved, h, n, w, nu, S):
+    """Correct hypothesis h with an innovation nu of variance S; w is ``P H``, overwritten.
+
+    What the states are moved by is added to `moved`, (hyp, state).
+    """
     gain = nu / S
     for r in range(n):
         x[h, r] += w[r] * gain
+        moved[h, r] += w[r] * gain
     scale = 1.0 / math.sqrt(S)
     for r in range(n):
         w[r] *= scale

@@ -139,6 +139,8 @@ def predict(c, s, h, step, scratch):
         speed[i] = 0.0
         if nodes[i].present and not nodes[i].static:
             move_mean(c, nodes[i], s.pre, x, h, i, scale, w, speed)
+            for k in range(d):
+                s.moved[h, nodes[i].at_p + k] += s.pre[i, 0] * s.moved[h, nodes[i].at_v + k]
     for p in range(pairs.shape[0]):
         at = pairs[p].at_e
         if at < 0 or not (nodes[pairs[p].i].present and nodes[pairs[p].j].present):

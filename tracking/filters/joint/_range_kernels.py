@@ -173,7 +173,7 @@ def fuse_range(c, s, h, p, dt, distance, levers, evidence, scratch):
     if doubt > 1.0 and s.group[0].fit > MOST:
         trust /= doubt * doubt * doubt * doubt
     if trust > 1e-3:
-        absorb(s.x, s.P, h, c.n, scratch.w, nu, variance + R / trust)
+        absorb(s.x, s.P, s.moved, h, c.n, scratch.w, nu, variance + R / trust)
     return nis, sane
 
 
@@ -255,4 +255,4 @@ def fuse_survey(c, s, h, p, distance, scratch):
     none = scratch.none
     predicted, m = range_model(c, s, h, p, none, none, scratch.idx, scratch.val)
     variance = project(s.P, h, c.n, m, scratch.idx, scratch.val, scratch.w)
-    absorb(s.x, s.P, h, c.n, scratch.w, distance - predicted, variance + c.survey_var)
+    absorb(s.x, s.P, s.moved, h, c.n, scratch.w, distance - predicted, variance + c.survey_var)

@@ -44,6 +44,7 @@ def try_start(c, s, layout, t):
         s.nlos[h, :] = c.enter_rate / (c.enter_rate + c.leave_rate)
         Y = X @ layout.rotations[h].T.copy()
         s.x[h, :] = 0.0
+        s.moved[h, :] = 0.0
         s.P[h, :, :] = 0.0
         for r in range(c.n):
             s.P[h, r, r] = 1.0
@@ -196,6 +197,7 @@ def copy_hypothesis(s, h):
             s.loglik[free] = s.loglik[h]
             s.x[free] = s.x[h]
             s.P[free] = s.P[h]
+            s.moved[free] = s.moved[h]
             s.nlos[free] = s.nlos[h]
             s.group[0].n_alive += 1
             return free

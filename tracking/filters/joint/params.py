@@ -91,7 +91,7 @@ class RangeErrorParams:
     """[m] Multipath and antennas, changing within metres."""
     slow_length: float = 8.0
     """[m]"""
-    bend_gain: float = 4.0
+    bend_gain: float = 1.0
     """[-] Trust lost where the filter is uncertain across a short line of sight, in units of the
     second-order error there. That error lasts, so it weighs more than once."""
     max_pairs: int = 28

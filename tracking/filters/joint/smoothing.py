@@ -57,6 +57,7 @@ def with_clones(
         group=group,
         x=np.ascontiguousarray(state.x[envs, best][:, None, every]),
         P=np.ascontiguousarray(state.P[envs, best][:, None, every][..., every]),
+        moved=np.zeros((len(envs), 1, len(every))),
         nlos=state.nlos[envs, best][:, None].copy(),
         alive=state.alive[envs, best][:, None].copy(),
         loglik=np.zeros((len(envs), 1)),

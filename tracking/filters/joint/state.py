@@ -49,6 +49,8 @@ class JointState(NamedTuple):
     """States, (env, hyp, state)."""
     P: F64
     """Covariance, (env, hyp, state, state)."""
+    moved: F64
+    """How far measurements moved the states since P last followed, (env, hyp, state)."""
     nlos: F64
     """Probability that a pair has no line of sight, (env, hyp, pair)."""
     alive: Bool
@@ -127,6 +129,7 @@ def make_state(
         group=np.zeros((n_envs, 1), dtype=GROUP),
         x=np.zeros((n_envs, n_hyps, n_states)),
         P=P,
+        moved=np.zeros((n_envs, n_hyps, n_states)),
         nlos=np.zeros((n_envs, n_hyps, p)),
         alive=np.zeros((n_envs, n_hyps), dtype=bool),
         loglik=np.zeros((n_envs, n_hyps)),

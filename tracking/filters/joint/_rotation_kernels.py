@@ -1,0 +1,113 @@
+"""The rotation of the whole group: what the covariance says of it follows the estimate.
+
+No range tells how the group is turned as a whole. At every estimate p the derivatives of the
+ranges are blind to one direction per axis, ``axis x p``. But the estimate moves from one range
+to the next, and with it the blind direction: what was blind to the first range is not quite
+blind to the second, and the filter comes to believe in a rotation that nothing has measured
+[1, 2]. It is worst where errors are as large as the group, as on a body.
+
+So the error is thought of as a rotation of the group and the rest: ``e = N a + r``, with N the
+velocities and positions turned by one radian, and a the best rotation of the positions' errors.
+When measurements move the estimate, N becomes N + G, a and r stay: ``P <- T P T^T`` with
+``T = I + G A^T`` and A the functional that reads a from e. It is invariance under rotations,
+kept by the filter of section 4 of [2], in the states that are used here anyway.
+
+References:
+    [1] Huang, Mourikis, Roumeliotis, Observability-based rules for designing consistent EKF
+        SLAM estimators, Int. J. Robotics Research 29 (2010) 502.
+    [2] Barrau, Bonnabel, An EKF-SLAM algorithm with consistency properties, arXiv:1510.06263.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tracking.compiled import kernel, small_kernel
+
+ENOUGH = 0.01
+"""[-] The covariance follows once the positions have moved by this share of the group's extent."""
+MOST = 0.3
+"""[-] It follows a move by at most this share at once."""
+
+
+@small_kernel
+def follow_rotation(c, s, h):
+    """Let the covariance of hypothesis h follow what measurements have moved."""
+    present, extent2, moved2 = 0, 0.0, 0.0
+    for k in range(c.d):
+        mean, shift, present = 0.0, 0.0, 0
+        for i in range(s.nodes.shape[0]):
+            if s.nodes[i].present:
+                at = s.nodes[i].at_p + k
+                mean += s.x[h, at]
+                shift += s.moved[h, at]
+                present += 1
+        for i in range(s.nodes.shape[0]):
+            if s.nodes[i].present:
+                at = s.nodes[i].at_p + k
+                extent2 += (s.x[h, at] - mean / present) ** 2
+                moved2 += (s.moved[h, at] - shift / present) ** 2
+    if present > 2 and moved2 > ENOUGH * ENOUGH * extent2:
+        turn_covariance(c, s, h, min(1.0, MOST * math.sqrt(extent2 / moved2)))
+
+
+@kernel
+def turn_covariance(c, s, h, share):
+    """``P <- T P T^T`` for the given share of what was moved."""
+    n, axes = c.n, 3 if c.d == 3 else 1
+    N, G = np.zeros((axes, n)), np.zeros((axes, n))
+    turned(c, s, h, N, G)
+    NN = N @ N.T.copy()
+    # A line has no rotation about itself.
+    A = np.linalg.solve(NN + (1e-3 * np.trace(NN) + 1e-9) * np.eye(axes), N)
+    B = np.zeros((axes, n))
+    for r in range(n):
+        for a in range(axes):
+            if A[a, r] != 0.0:
+                for k in range(n):
+                    B[a, k] += A[a, r] * s.P[h, r, k]
+    G *= share
+    B += 0.5 * (A @ B.T.copy()) @ G
+    for a in range(axes):
+        for r in range(n):
+            g, b = G[a, r], B[a, r]
+            for k in range(n):
+                s.P[h, r, k] += g * B[a, k] + b * G[a, k]
+    s.moved[h, :] = 0.0
+
+
+@kernel
+def turned(c, s, h, N, G):
+    """The positions before the move, turned about the centre, and the move, turned as well.
+
+    Args:
+        c: Coefficients.
+        s: JointState of one environment.
+        h: Hypothesis.
+        N: Positions turned by one radian about each axis, z first, (axis, state), written.
+        G: Moves of positions and velocities turned likewise, (axis, state), written.
+    """
+    mean, shift, present = np.zeros(3), np.zeros(3), 0
+    for i in range(s.nodes.shape[0]):
+        if s.nodes[i].present:
+            present += 1
+            for k in range(c.d):
+                at = s.nodes[i].at_p + k
+                mean[k] += s.x[h, at] - s.moved[h, at]
+                shift[k] += s.moved[h, at]
+    for i in range(s.nodes.shape[0]):
+        node = s.nodes[i]
+        if not node.present:
+            continue
+        for a in range(N.shape[0]):
+            u, v = (3 - a) % 3, (4 - a) % 3
+            at_u, at_v = node.at_p + u, node.at_p + v
+            N[a, at_u] = -(s.x[h, at_v] - s.moved[h, at_v] - mean[v] / present)
+            N[a, at_v] = s.x[h, at_u] - s.moved[h, at_u] - mean[u] / present
+            G[a, at_u] = -(s.moved[h, at_v] - shift[v] / present)
+            G[a, at_v] = s.moved[h, at_u] - shift[u] / present
+            if not node.static:
+                G[a, node.at_v + u] = -s.moved[h, node.at_v + v]
+                G[a, node.at_v + v] = s.moved[h, node.at_v + u]
