@@ -22,6 +22,7 @@ from tracking.filters.joint._range_kernels import (
     gap_evidence,
 )
 from tracking.filters.joint._start_kernels import try_join, try_start
+from tracking.filters.joint._stuck_kernels import is_stuck
 from tracking.filters.joint.state import N_PRE, JointState
 
 # Plain numbers of `Kind`: kernels do not know enums.
@@ -118,6 +119,9 @@ def advance_all(coefficients, state, scratch, t):
 @small_kernel
 def hear(c, s, layout, scratch, i, j, a_i, a_j, t, distance, evidence, is_survey):
     """A range or survey between nodes i < j."""
+    p = layout.pair_index[i, j]
+    if not is_survey and is_stuck(c, s, p, t, distance):
+        return
     node_i, node_j = s.nodes[i], s.nodes[j]
     node_i.heard, node_j.heard = True, True
     node_i.t_heard, node_j.t_heard = t, t
@@ -125,7 +129,6 @@ def hear(c, s, layout, scratch, i, j, a_i, a_j, t, distance, evidence, is_survey
         advance(c, s, scratch, t)
         if t - s.group[0].t_check >= c.check_period:
             look_at_group(c, s, layout, t)
-    p = layout.pair_index[i, j]
     if node_i.present and node_j.present:
         take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, evidence, is_survey)
     else:

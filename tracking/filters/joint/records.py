@@ -47,6 +47,10 @@ PAIR = np.dtype(
         ("t_range", "f8"),  # time of the last range that counted [s]
         ("nis", "f8"),  # NIS of the last range in the best hypothesis [-]
         ("misfit", "f8"),  # running mean of it [-]
+        ("last", "f8"),  # its last range as reported [m]
+        ("t_last", "f8"),  # when it came [s]
+        ("n_same", "i8"),  # ranges before it that were equal
+        ("way", "f8"),  # what both ends travelled meanwhile [m]
         ("start_sum", "f8"),  # sum of the first ranges of a pair not started [m]
         ("start_t", "f8"),  # time of the first of them [s]
         ("start_n", "i8"),  # how many
