@@ -1,16 +1,18 @@
-"""Inertial samples that cannot be: a sensor that sticks, single readings that jump.
+"""Inertial samples that cannot be: a sensor that sticks, jumps, or is at the end of its scale.
 
-Both are dropped before the orientation filter sees them. A gyroscope that repeats one reading
-turns the node for ever, and a single absurd one by half a radian; either takes tens of seconds
-of magnetometer to undo.
+The first two are dropped before the orientation filter sees them. A gyroscope that repeats one
+reading turns the node for ever, and a single absurd one by half a radian; either takes tens of
+seconds of magnetometer to undo. An acceleration that was cut off tells no tilt, and its node is
+as uncertain as one whose accelerometer is silent.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from tracking._limit_kernels import N_LIMIT, find_limits
 from tracking.arrays import F64, Bool
 
 STUCK_AFTER = 20
@@ -35,6 +37,8 @@ class InertialHealth:
     """Equal readings in a row before the last."""
     n_odd: int = 0
     """Odd readings in a row."""
+    limits: F64 = field(default_factory=lambda: np.zeros((3, N_LIMIT)))
+    """Of each axis of the accelerometer, see `_limit_kernels`."""
 
 
 def inspect(health: InertialHealth, samples: F64) -> tuple[F64, Bool]:
@@ -69,6 +73,19 @@ def inspect(health: InertialHealth, samples: F64) -> tuple[F64, Bool]:
     else:
         health.good = samples[-1].copy()
     return samples, usable
+
+
+def at_limit(health: InertialHealth, accel_b: F64) -> Bool:
+    """Where the accelerometer is at the end of its scale, (sample, 3).
+
+    Args:
+        health: Of the node, updated.
+        accel_b: Specific force, (sample, 3) [m/s2].
+    """
+    cut = np.zeros(accel_b.shape, dtype=bool)
+    health.limits = health.limits.copy()  # a saved copy of the health may share it
+    find_limits(health.limits, np.ascontiguousarray(accel_b), cut)
+    return cut
 
 
 def _run_lengths(equal: Bool, start: int) -> F64:

@@ -12,6 +12,7 @@ from tracking.filters.joint._bank_kernels import (
     watch_mirror,
 )
 from tracking.filters.joint._carrier_kernels import apply_carriers, centre
+from tracking.filters.joint._cut_off_kernels import doubt_acceleration
 from tracking.filters.joint._estimate_kernels import write_estimate
 from tracking.filters.joint._motion_kernels import predict, sum_inertial, take_state
 from tracking.filters.joint._range_kernels import (
@@ -61,6 +62,7 @@ def run_events(coefficients, layout, state, scratch, block, t_out, out):
                 o += 1
             i, j, what = node_i[e, k], node_j[e, k], kind[e, k]
             if what == STATE:
+                doubt_acceleration(c, s.nodes[i], s.pre, i, t[e, k], values[e, k, 7])
                 take_state(c, s.nodes, s.held, s.pre, i, t[e, k], values, e, k)
             elif what in (RANGE, SURVEY):
                 a_i, a_j = antenna_i[e, k], antenna_j[e, k]

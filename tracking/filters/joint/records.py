@@ -21,6 +21,7 @@ NODE = np.dtype(
         ("accel_var", "f8"),  # running mean square of accel about its mean [m2/s4]
         ("turning", "f8"),  # running mean of the angular rate [rad/s]
         ("t_moved", "f8"),  # last time it was not at rest [s]
+        ("cut_off", "?"),  # its last acceleration was at the end of the sensor's scale
         ("has_state", "?"),
         ("heard", "?"),
         ("present", "?"),
