@@ -13,10 +13,10 @@ from tracking.filters.joint._bank_kernels import (
 )
 from tracking.filters.joint._carrier_kernels import apply_carriers, centre
 from tracking.filters.joint._cut_off_kernels import doubt_acceleration
+from tracking.filters.joint._doubt_kernels import note_fit, watch_nodes
 from tracking.filters.joint._estimate_kernels import write_estimate
 from tracking.filters.joint._motion_kernels import predict, sum_inertial, take_state
 from tracking.filters.joint._range_kernels import (
-    MOST,
     antenna_offset,
     fuse_range,
     fuse_survey,
@@ -198,6 +198,7 @@ def take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, evidence, is_sur
             pair.misfit += 0.05 * (capped - pair.misfit)
             fits = 1.0 if weight > 0.5 and nis < 6.0 else 0.0
             group.fit += 0.01 * (fits - group.fit)
+            note_fit(s, p, fits)
             group.misfit += 0.01 * (weight * capped - group.misfit)
             if weight > 0.5:
                 group.nis_sum += nis
@@ -227,6 +228,7 @@ def look_at_group(c, s, layout, t):
     remove_silent(c, s, layout, t)
     prune_bank(c, s)
     watch_mirror(c, s)
-    if s.group[0].fit < MOST:
+    watch_nodes(c, s, layout, t)
+    if s.group[0].lost:
         open_up(c, s, t - s.group[0].t_check)
     s.group[0].t_check = t

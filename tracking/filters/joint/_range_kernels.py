@@ -170,7 +170,7 @@ def fuse_range(c, s, h, p, dt, distance, levers, evidence, scratch):
     # contradict the filter, it is the filter that is wrong.
     doubt = s.pairs[p].misfit / (0.7 * c.doubt)
     trust = sane
-    if doubt > 1.0 and s.group[0].fit > MOST:
+    if doubt > 1.0 and not s.group[0].lost:
         trust /= doubt * doubt * doubt * doubt
     if trust > 1e-3:
         absorb(s.x, s.P, h, c.n, scratch.w, nu, variance + R / trust)

@@ -22,6 +22,9 @@ NODE = np.dtype(
         ("turning", "f8"),  # running mean of the angular rate [rad/s]
         ("t_moved", "f8"),  # last time it was not at rest [s]
         ("cut_off", "?"),  # its last acceleration was at the end of the sensor's scale
+        ("astray", "f8"),  # running share of its ranges that do not fit [-]
+        ("t_doubted", "f8"),  # when it last disagreed with the group [s]
+        ("doubted", "?"),  # it has, lately
         ("has_state", "?"),
         ("heard", "?"),
         ("present", "?"),
@@ -74,6 +77,7 @@ GROUP = np.dtype(
         ("t_gauge", "f8"),
         ("misfit", "f8"),  # running mean of the NIS of ranges in the best hypothesis [-]
         ("fit", "f8"),  # running share of ranges that fit [-]
+        ("lost", "?"),  # most ranges do not fit, and no single node is to blame
         ("nis_sum", "f8"),
         ("nis_n", "i8"),
     ]
