@@ -20,20 +20,23 @@ from tracking.filters.joint._range_kernels import MIN_PROB, MOST
 
 RECENT = 0.02
 """[-] Weight of a range in the share of a node's ranges that do not fit."""
+LATELY = 0.1
+"""[-] The same of what it ranges beyond what is predicted."""
 OFFSET = 0.36
 """[m] Every range of a node errs by so much, over the root of how many there are: an offset."""
 STAYS = 0.5
 """[-] It remains one down to this part of it."""
 HELD = 2.0
 """[s] A node is doubted until nothing has been found for so long."""
-SPEED, WANDER = 0.7, 0.5
+SPEED, WANDER, JUMP = 0.7, 1.0, 0.7
 """[m/sqrt(s), m/s/sqrt(s)] How fast the position and velocity of a doubted node, and the offset
 of its ranges [m/sqrt(s)], may become others."""
 
 
 @small_kernel
-def note_fit(s, p, fits):
-    """Count a range of pair p that fits, 1, or does not, 0, for both of its nodes."""
+def note_fit(s, p, fits, nu):
+    """Count a range of pair p, which fits, 1, or not, 0, and was predicted shorter by nu [m]."""
+    s.pairs[p].residual += LATELY * (nu - s.pairs[p].residual)
     for i in (s.pairs[p].i, s.pairs[p].j):
         s.nodes[i].astray += RECENT * (1.0 - fits - s.nodes[i].astray)
 
@@ -62,9 +65,13 @@ def watch_nodes(c, s, layout, t):
         astray = i == worst and blames and node.astray > 1.0 - MOST
         limit = OFFSET / math.sqrt(n) * (STAYS if node.doubted else 1.0)
         if astray or offset > limit:
-            if astray or not node.doubted:
-                open_node(c, s, i, dt)
-            free_offset(s, layout, i, dt, not node.doubted)
+            if not node.doubted:
+                free_offset(s, layout, i, JUMP**2)
+                open_node(c, s, i, 0.0 if astray else 0.0, 0.0)
+            else:
+                free_offset(s, layout, i, WANDER**2 * dt)
+                if astray:
+                    open_node(c, s, i, SPEED**2 * dt, SPEED**2 * dt)
             node.doubted, node.t_doubted = True, t
         elif node.doubted and t - node.t_doubted > HELD:
             node.doubted = False
@@ -102,7 +109,9 @@ def common_error(c, s, layout, i, t):
         if not ranges_now(c, s, p, t):
             continue
         n += 1
-        error = s.x[h, s.pairs[p].at_e + 1] if s.pairs[p].at_e >= 0 else 0.0
+        error = s.pairs[p].residual
+        if s.pairs[p].at_e >= 0:
+            error += s.x[h, s.pairs[p].at_e + 1]
         if sign == 0.0:
             sign = 1.0 if error > 0.0 else -1.0
         least = min(least, sign * error)
@@ -110,18 +119,18 @@ def common_error(c, s, layout, i, t):
 
 
 @kernel
-def open_node(c, s, i, dt):
+def open_node(c, s, i, position_var, velocity_var):
     """Know less about where node i is and how it moves."""
     node = s.nodes[i]
     for h in range(s.alive.shape[0]):
         if s.alive[h] and not node.static:
             for k in range(c.d):
-                s.P[h, node.at_p + k, node.at_p + k] += SPEED**2 * dt
-                s.P[h, node.at_v + k, node.at_v + k] += SPEED**2 * dt
+                s.P[h, node.at_p + k, node.at_p + k] += position_var
+                s.P[h, node.at_v + k, node.at_v + k] += velocity_var
 
 
 @kernel
-def free_offset(s, layout, i, dt, is_new):
+def free_offset(s, layout, i, variance):
     """Let the slow errors of all ranges of node i move together; none is for want of sight."""
     n = s.nodes.shape[0]
     for h in range(s.alive.shape[0]):
@@ -131,9 +140,8 @@ def free_offset(s, layout, i, dt, is_new):
             p = layout.pair_index[i, k] if k != i else -1
             if p < 0 or s.pairs[p].at_e < 0 or not s.nodes[k].present:
                 continue
-            if is_new:
-                s.nlos[h, p] = MIN_PROB
+            s.nlos[h, p] = 1.0 - MIN_PROB
             for m in range(n):
                 q = layout.pair_index[i, m] if m != i else -1
                 if q >= 0 and s.pairs[q].at_e >= 0 and s.nodes[m].present:
-                    s.P[h, s.pairs[p].at_e + 1, s.pairs[q].at_e + 1] += WANDER**2 * dt
+                    s.P[h, s.pairs[p].at_e + 1, s.pairs[q].at_e + 1] += variance

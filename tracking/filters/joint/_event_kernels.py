@@ -191,14 +191,14 @@ def take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, evidence, is_sur
         if is_survey:
             fuse_survey(c, s, h, p, distance, scratch)
             continue
-        nis, weight = fuse_range(c, s, h, p, dt, distance, levers, evidence, scratch)
+        nu, nis, weight = fuse_range(c, s, h, p, dt, distance, levers, evidence, scratch)
         if h == group.best:
             pair.nis = nis
             capped = min(nis, 25.0) if weight > 0.5 else 25.0
             pair.misfit += 0.05 * (capped - pair.misfit)
             fits = 1.0 if weight > 0.5 and nis < 6.0 else 0.0
             group.fit += 0.01 * (fits - group.fit)
-            note_fit(s, p, fits)
+            note_fit(s, p, fits, nu)
             group.misfit += 0.01 * (weight * capped - group.misfit)
             if weight > 0.5:
                 group.nis_sum += nis

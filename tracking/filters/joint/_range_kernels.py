@@ -21,6 +21,8 @@ from tracking.filters.joint._motion_kernels import decay
 MIN_DISTANCE = 0.01
 """[m] Closer than this a direction has no meaning."""
 MIN_PROB = 1e-4
+DOUBTED = 0.01
+"""[-] What a range of a doubted node counts."""
 MOST = 0.4
 """[-] While fewer of the ranges fit, the filter is lost."""
 SQRT_2PI = math.sqrt(2.0 * math.pi)
@@ -150,7 +152,7 @@ def fuse_range(c, s, h, p, dt, distance, levers, evidence, scratch):
         scratch: Room.
 
     Returns:
-        NIS, and the probability that the range meant anything, 0 to 1.
+        Innovation [m], NIS, and the probability that the range meant anything, 0 to 1.
     """
     predicted, m = range_model(c, s, h, p, levers[:3], levers[3:], scratch.idx, scratch.val)
     nu = distance - predicted
@@ -158,7 +160,7 @@ def fuse_range(c, s, h, p, dt, distance, levers, evidence, scratch):
     S = variance + c.white_var
     switched, sane, loglik = judge_sight(c, s, h, p, dt, nu, variance, evidence, scratch.w)
     s.loglik[h] += c.evidence * max(loglik, -0.5 * (c.max_nis + math.log(S)))
-    nis = nu * nu / S
+    before, nis = nu, nu * nu / S
     if switched > 0.01 and s.pairs[p].at_e >= 0:
         change_sight(c, s, h, p, switched)
         predicted, m = range_model(c, s, h, p, levers[:3], levers[3:], scratch.idx, scratch.val)
@@ -172,9 +174,11 @@ def fuse_range(c, s, h, p, dt, distance, levers, evidence, scratch):
     trust = sane
     if doubt > 1.0 and not s.group[0].lost:
         trust /= doubt * doubt * doubt * doubt
-    if trust > 1e-3:
+    if s.nodes[s.pairs[p].i].doubted or s.nodes[s.pairs[p].j].doubted:
+        trust *= DOUBTED
+    if trust > 1e-4:
         absorb(s.x, s.P, h, c.n, scratch.w, nu, variance + R / trust)
-    return nis, sane
+    return before, nis, sane
 
 
 @small_kernel

@@ -55,6 +55,7 @@ PAIR = np.dtype(
         ("t_last", "f8"),  # when it came [s]
         ("n_same", "i8"),  # ranges before it that were equal
         ("way", "f8"),  # what both ends travelled meanwhile [m]
+        ("residual", "f8"),  # running mean of its innovations [m]
         ("start_sum", "f8"),  # sum of the first ranges of a pair not started [m]
         ("start_t", "f8"),  # time of the first of them [s]
         ("start_n", "i8"),  # how many
