@@ -21,8 +21,6 @@ from tracking.filters.joint._motion_kernels import decay
 MIN_DISTANCE = 0.01
 """[m] Closer than this a direction has no meaning."""
 MIN_PROB = 1e-4
-DOUBTED = 0.01
-"""[-] What a range of a doubted node counts."""
 MOST = 0.4
 """[-] While fewer of the ranges fit, the filter is lost."""
 SQRT_2PI = math.sqrt(2.0 * math.pi)
@@ -174,9 +172,7 @@ def fuse_range(c, s, h, p, dt, distance, levers, evidence, scratch):
     trust = sane
     if doubt > 1.0 and not s.group[0].lost:
         trust /= doubt * doubt * doubt * doubt
-    if s.nodes[s.pairs[p].i].doubted or s.nodes[s.pairs[p].j].doubted:
-        trust *= DOUBTED
-    if trust > 1e-4:
+    if trust > 1e-3:
         absorb(s.x, s.P, h, c.n, scratch.w, nu, variance + R / trust)
     return before, nis, sane
 
