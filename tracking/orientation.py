@@ -133,7 +133,7 @@ class Orientation:
         samples, usable = inspect(state.health, block.values[env, imu, :6])
         out.valid[env, imu[~usable]] = False
         imu, samples, mag, has_mag = imu[usable], samples[usable], mag[usable], has_mag[usable]
-        cut_off = at_limit(state.health, samples[:, 3:])
+        cut_off, upright = at_limit(state.health, samples[:, 3:])
         if len(imu) == 0:
             return
         t = block.t[env, imu]
@@ -143,7 +143,9 @@ class Orientation:
         edges = [0, *np.nonzero(cut[1:])[0] + 1, len(imu)]
         for a, b in itertools.pairwise(edges):
             used = mag[a:b] if has_mag[a] else mag[:0]
-            self._feed(env, node, imu[a:b], samples[a:b], cut_off[a:b], used, block, out)
+            self._feed(
+                env, node, imu[a:b], samples[a:b], cut_off[a:b], upright[a:b], used, block, out
+            )
 
     def _feed(
         self,
@@ -152,6 +154,7 @@ class Orientation:
         run: Any,
         samples: F64,
         cut_off: Bool,
+        upright: Bool,
         mag: F64,
         block: MeasurementBlock,
         out: MeasurementBlock,
@@ -171,8 +174,8 @@ class Orientation:
         self._bridge_gap(vqf, state, t[0], gyr[0], acc[0], self._nodes[node].imu_hz)
 
         gyr, acc = np.ascontiguousarray(gyr), np.ascontiguousarray(acc)
-        # VQF leaves zeros out: what was cut off does not point up.
-        tilt = np.where(cut_off.any(axis=1)[:, None], 0.0, acc)
+        # VQF leaves zeros out.
+        tilt = np.where(upright[:, None], acc, 0.0)
         result = vqf.updateBatch(gyr, tilt, mag if len(mag) else None)
         state.mag_seen |= bool(len(mag))
         if self._magnetic:
@@ -182,7 +185,7 @@ class Orientation:
                 heading = self._nodes[node].initial_heading or 0.0
                 state.yaw = heading - float(yaw_of(result["quat6D"][0]))
             q = quat_multiply(quat_from_yaw(state.yaw), result["quat6D"])
-        resting = result["restDetected"] & ~cut_off.any(axis=1)
+        resting = result["restDetected"] & upright
         gravity = self._learn_gravity(state, acc, resting, self._nodes[node].imu_hz)
         accel_w = rotate(q, acc)
         accel_w[:, 2] -= gravity
