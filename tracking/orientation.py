@@ -133,9 +133,9 @@ class Orientation:
         samples, usable = inspect(state.health, block.values[env, imu, :6])
         out.valid[env, imu[~usable]] = False
         imu, samples, mag, has_mag = imu[usable], samples[usable], mag[usable], has_mag[usable]
-        cut_off, upright = at_limit(state.health, samples[:, 3:])
         if len(imu) == 0:
             return
+        cut_off, upright = at_limit(state.health, samples[:, 3:])
         t = block.t[env, imu]
         gap = np.diff(t, prepend=state.t if state.n_samples else t[0])
         cut = gap > 1.5 / self._nodes[node].imu_hz
