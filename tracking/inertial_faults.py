@@ -1,16 +1,19 @@
-"""Inertial samples that cannot be: a sensor that sticks, single readings that jump.
+"""Inertial samples that cannot be: a sensor that sticks, jumps, or is at the end of its scale.
 
-Both are dropped before the orientation filter sees them. A gyroscope that repeats one reading
-turns the node for ever, and a single absurd one by half a radian; either takes tens of seconds
-of magnetometer to undo.
+The first two are dropped before the orientation filter sees them. A gyroscope that repeats one
+reading turns the node for ever, and a single absurd one by half a radian; either takes tens of
+seconds of magnetometer to undo. What is cut off at the end of the scale is used and doubted; but
+it tells no tilt, nor do the readings about it: the largest left out, the mean acceleration of a
+motion is no longer zero.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from tracking._limit_kernels import N_LIMIT, find_limits
 from tracking.arrays import F64, Bool
 
 STUCK_AFTER = 20
@@ -21,6 +24,9 @@ ACC_JUMP = 400.0
 """[m/s2] The same of the specific force."""
 MAX_ODD = 3
 """[-] So many odd readings in a row are believed after all."""
+
+WHOLE_AFTER = 100
+"""[-] Readings in a row within the scale before they tell the tilt again."""
 
 
 @dataclass(slots=True)
@@ -35,6 +41,10 @@ class InertialHealth:
     """Equal readings in a row before the last."""
     n_odd: int = 0
     """Odd readings in a row."""
+    limits: F64 = field(default_factory=lambda: np.zeros((3, N_LIMIT)))
+    """Of each axis of the accelerometer, see `_limit_kernels`."""
+    n_whole: int = WHOLE_AFTER
+    """Readings in a row within the scale of the accelerometer."""
 
 
 def inspect(health: InertialHealth, samples: F64) -> tuple[F64, Bool]:
@@ -69,6 +79,24 @@ def inspect(health: InertialHealth, samples: F64) -> tuple[F64, Bool]:
     else:
         health.good = samples[-1].copy()
     return samples, usable
+
+
+def at_limit(health: InertialHealth, accel_b: F64) -> tuple[Bool, Bool]:
+    """Where the accelerometer is at the end of its scale, and where it tells the tilt.
+
+    Args:
+        health: Of the node, updated.
+        accel_b: Specific force, (sample, 3) [m/s2].
+
+    Returns:
+        True for axes that are cut off, (sample, 3); True for samples that tell it, (sample).
+    """
+    cut = np.zeros(accel_b.shape, dtype=bool)
+    health.limits = health.limits.copy()  # a saved copy of the health may share it
+    find_limits(health.limits, np.ascontiguousarray(accel_b), cut)
+    n_whole = _run_lengths(~cut.any(axis=1), health.n_whole)
+    health.n_whole = int(n_whole[-1])
+    return cut, n_whole >= WHOLE_AFTER
 
 
 def _run_lengths(equal: Bool, start: int) -> F64:

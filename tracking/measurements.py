@@ -14,7 +14,7 @@ import numpy as np
 
 from tracking.arrays import F64, I64, Bool
 
-N_VALUES = 7
+N_VALUES = 8
 """Columns of `MeasurementBlock.values`."""
 
 
@@ -31,7 +31,9 @@ class Kind(IntEnum):
     IMU = 2
     """IMU sample of node i: gyroscope x y z [rad/s], specific force x y z [m/s2]."""
     STATE = 3
-    """Node i's own orientation filter: q_wb (w x y z), gravity-free accel_w x y z [m/s2]."""
+    """Node i's own orientation filter: q_wb (w x y z), gravity-free accel_w x y z [m/s2], then
+    which part of it means nothing because the sensor is at the end of its scale: 0 none, 1 what
+    is along the body's z, 2 more than that."""
     SURVEY = 4
     """Distance between static nodes i and j that was surveyed, not ranged [m]."""
     RANGE = 5

@@ -25,7 +25,7 @@ from vqf import VQF
 from tracking.arrays import F64, Bool
 from tracking.constellation import WHEELED, Constellation, NodeConfig
 from tracking.geometry import GRAVITY, quat_from_yaw, quat_multiply, rotate, yaw_of
-from tracking.inertial_faults import InertialHealth, inspect
+from tracking.inertial_faults import InertialHealth, at_limit, inspect
 from tracking.measurements import Kind, MeasurementBlock
 
 
@@ -135,6 +135,7 @@ class Orientation:
         imu, samples, mag, has_mag = imu[usable], samples[usable], mag[usable], has_mag[usable]
         if len(imu) == 0:
             return
+        cut_off, upright = at_limit(state.health, samples[:, 3:])
         t = block.t[env, imu]
         gap = np.diff(t, prepend=state.t if state.n_samples else t[0])
         cut = gap > 1.5 / self._nodes[node].imu_hz
@@ -142,7 +143,9 @@ class Orientation:
         edges = [0, *np.nonzero(cut[1:])[0] + 1, len(imu)]
         for a, b in itertools.pairwise(edges):
             used = mag[a:b] if has_mag[a] else mag[:0]
-            self._feed(env, node, imu[a:b], samples[a:b], used, block, out)
+            self._feed(
+                env, node, imu[a:b], samples[a:b], cut_off[a:b], upright[a:b], used, block, out
+            )
 
     def _feed(
         self,
@@ -150,6 +153,8 @@ class Orientation:
         node: int,
         run: Any,
         samples: F64,
+        cut_off: Bool,
+        upright: Bool,
         mag: F64,
         block: MeasurementBlock,
         out: MeasurementBlock,
@@ -169,7 +174,9 @@ class Orientation:
         self._bridge_gap(vqf, state, t[0], gyr[0], acc[0], self._nodes[node].imu_hz)
 
         gyr, acc = np.ascontiguousarray(gyr), np.ascontiguousarray(acc)
-        result = vqf.updateBatch(gyr, acc, mag if len(mag) else None)
+        # VQF leaves zeros out.
+        tilt = np.where(upright[:, None], acc, 0.0)
+        result = vqf.updateBatch(gyr, tilt, mag if len(mag) else None)
         state.mag_seen |= bool(len(mag))
         if self._magnetic:
             q = result["quat9D"] if len(mag) else _turn(result["quat6D"], vqf)
@@ -178,13 +185,15 @@ class Orientation:
                 heading = self._nodes[node].initial_heading or 0.0
                 state.yaw = heading - float(yaw_of(result["quat6D"][0]))
             q = quat_multiply(quat_from_yaw(state.yaw), result["quat6D"])
-        gravity = self._learn_gravity(state, acc, result["restDetected"], self._nodes[node].imu_hz)
+        resting = result["restDetected"] & upright
+        gravity = self._learn_gravity(state, acc, resting, self._nodes[node].imu_hz)
         accel_w = rotate(q, acc)
         accel_w[:, 2] -= gravity
 
         out.kind[env, run] = Kind.STATE
         out.values[env, run, :4] = q
         out.values[env, run, 4:7] = accel_w
+        out.values[env, run, 7] = np.where(cut_off[:, :2].any(axis=1), 2, cut_off[:, 2])
         out.valid[env, run] = state.mag_seen or not self._magnetic
         state.t, state.gyr, state.acc = float(t[-1]), gyr[-1].copy(), acc[-1].copy()
         state.n_samples += len(run)

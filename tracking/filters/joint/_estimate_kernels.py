@@ -53,7 +53,7 @@ def write_estimate(c, s, scratch, t, e, o, out):
             status[e, o, p] = OK
         elif age[e, o, p] > c.lost_after or worst > c.ok_var:
             status[e, o, p] = LOST
-        elif pair.misfit > c.doubt:
+        elif pair.misfit > c.doubt or node_i.doubted or node_j.doubted:
             status[e, o, p] = DOUBTFUL
         else:
             status[e, o, p] = OK

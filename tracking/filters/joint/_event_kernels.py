@@ -12,10 +12,11 @@ from tracking.filters.joint._bank_kernels import (
     watch_mirror,
 )
 from tracking.filters.joint._carrier_kernels import apply_carriers, centre
+from tracking.filters.joint._cut_off_kernels import doubt_acceleration
+from tracking.filters.joint._doubt_kernels import note_fit, watch_nodes
 from tracking.filters.joint._estimate_kernels import write_estimate
 from tracking.filters.joint._motion_kernels import predict, sum_inertial, take_state
 from tracking.filters.joint._range_kernels import (
-    MOST,
     antenna_offset,
     fuse_range,
     fuse_survey,
@@ -23,6 +24,7 @@ from tracking.filters.joint._range_kernels import (
 )
 from tracking.filters.joint._rotation_kernels import follow_rotation
 from tracking.filters.joint._start_kernels import try_join, try_start
+from tracking.filters.joint._stuck_kernels import is_stuck
 from tracking.filters.joint.state import N_PRE, JointState
 
 # Plain numbers of `Kind`: kernels do not know enums.
@@ -61,6 +63,7 @@ def run_events(coefficients, layout, state, scratch, block, t_out, out):
                 o += 1
             i, j, what = node_i[e, k], node_j[e, k], kind[e, k]
             if what == STATE:
+                doubt_acceleration(c, s.nodes[i], s.pre, i, t[e, k], values[e, k, 7])
                 take_state(c, s.nodes, s.held, s.pre, i, t[e, k], values, e, k)
             elif what in (RANGE, SURVEY):
                 a_i, a_j = antenna_i[e, k], antenna_j[e, k]
@@ -120,6 +123,9 @@ def advance_all(coefficients, state, scratch, t):
 @small_kernel
 def hear(c, s, layout, scratch, i, j, a_i, a_j, t, distance, evidence, is_survey):
     """A range or survey between nodes i < j."""
+    p = layout.pair_index[i, j]
+    if not is_survey and is_stuck(c, s, p, t, distance):
+        return
     node_i, node_j = s.nodes[i], s.nodes[j]
     node_i.heard, node_j.heard = True, True
     node_i.t_heard, node_j.t_heard = t, t
@@ -127,7 +133,6 @@ def hear(c, s, layout, scratch, i, j, a_i, a_j, t, distance, evidence, is_survey
         advance(c, s, scratch, t)
         if t - s.group[0].t_check >= c.check_period:
             look_at_group(c, s, layout, t)
-    p = layout.pair_index[i, j]
     if node_i.present and node_j.present:
         take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, evidence, is_survey)
     else:
@@ -189,13 +194,14 @@ def take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, evidence, is_sur
         if is_survey:
             fuse_survey(c, s, h, p, distance, scratch)
             continue
-        nis, weight = fuse_range(c, s, h, p, dt, distance, levers, evidence, scratch)
+        nu, nis, weight = fuse_range(c, s, h, p, dt, distance, levers, evidence, scratch)
         if h == group.best:
             pair.nis = nis
             capped = min(nis, 25.0) if weight > 0.5 else 25.0
             pair.misfit += 0.05 * (capped - pair.misfit)
             fits = 1.0 if weight > 0.5 and nis < 6.0 else 0.0
             group.fit += 0.01 * (fits - group.fit)
+            note_fit(s, p, fits, nu)
             group.misfit += 0.01 * (weight * capped - group.misfit)
             if weight > 0.5:
                 group.nis_sum += nis
@@ -225,6 +231,7 @@ def look_at_group(c, s, layout, t):
     remove_silent(c, s, layout, t)
     prune_bank(c, s)
     watch_mirror(c, s)
-    if s.group[0].fit < MOST:
+    watch_nodes(c, s, layout, t)
+    if s.group[0].lost:
         open_up(c, s, t - s.group[0].t_check)
     s.group[0].t_check = t

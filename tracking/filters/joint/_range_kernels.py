@@ -150,7 +150,7 @@ def fuse_range(c, s, h, p, dt, distance, levers, evidence, scratch):
         scratch: Room.
 
     Returns:
-        NIS, and the probability that the range meant anything, 0 to 1.
+        Innovation [m], NIS, and the probability that the range meant anything, 0 to 1.
     """
     predicted, m = range_model(c, s, h, p, levers[:3], levers[3:], scratch.idx, scratch.val)
     nu = distance - predicted
@@ -158,7 +158,7 @@ def fuse_range(c, s, h, p, dt, distance, levers, evidence, scratch):
     S = variance + c.white_var
     switched, sane, loglik = judge_sight(c, s, h, p, dt, nu, variance, evidence, scratch.w)
     s.loglik[h] += c.evidence * max(loglik, -0.5 * (c.max_nis + math.log(S)))
-    nis = nu * nu / S
+    before, nis = nu, nu * nu / S
     if switched > 0.01 and s.pairs[p].at_e >= 0:
         change_sight(c, s, h, p, switched)
         predicted, m = range_model(c, s, h, p, levers[:3], levers[3:], scratch.idx, scratch.val)
@@ -170,11 +170,11 @@ def fuse_range(c, s, h, p, dt, distance, levers, evidence, scratch):
     # contradict the filter, it is the filter that is wrong.
     doubt = s.pairs[p].misfit / (0.7 * c.doubt)
     trust = sane
-    if doubt > 1.0 and s.group[0].fit > MOST:
+    if doubt > 1.0 and not s.group[0].lost:
         trust /= doubt * doubt * doubt * doubt
     if trust > 1e-3:
         absorb(s.x, s.P, s.moved, h, c.n, scratch.w, nu, variance + R / trust)
-    return nis, sane
+    return before, nis, sane
 
 
 @small_kernel

@@ -21,6 +21,10 @@ NODE = np.dtype(
         ("accel_var", "f8"),  # running mean square of accel about its mean [m2/s4]
         ("turning", "f8"),  # running mean of the angular rate [rad/s]
         ("t_moved", "f8"),  # last time it was not at rest [s]
+        ("cut_off", "?"),  # its last acceleration was at the end of the sensor's scale
+        ("astray", "f8"),  # running share of its ranges that do not fit [-]
+        ("t_doubted", "f8"),  # when it last disagreed with the group [s]
+        ("doubted", "?"),  # it has, lately
         ("has_state", "?"),
         ("heard", "?"),
         ("present", "?"),
@@ -47,6 +51,11 @@ PAIR = np.dtype(
         ("t_range", "f8"),  # time of the last range that counted [s]
         ("nis", "f8"),  # NIS of the last range in the best hypothesis [-]
         ("misfit", "f8"),  # running mean of it [-]
+        ("last", "f8"),  # its last range as reported [m]
+        ("t_last", "f8"),  # when it came [s]
+        ("n_same", "i8"),  # ranges before it that were equal
+        ("way", "f8"),  # what both ends travelled meanwhile [m]
+        ("residual", "f8"),  # running mean of its innovations [m]
         ("start_sum", "f8"),  # sum of the first ranges of a pair not started [m]
         ("start_t", "f8"),  # time of the first of them [s]
         ("start_n", "i8"),  # how many
@@ -69,6 +78,7 @@ GROUP = np.dtype(
         ("t_gauge", "f8"),
         ("misfit", "f8"),  # running mean of the NIS of ranges in the best hypothesis [-]
         ("fit", "f8"),  # running share of ranges that fit [-]
+        ("lost", "?"),  # most ranges do not fit, and no single node is to blame
         ("nis_sum", "f8"),
         ("nis_n", "i8"),
     ]

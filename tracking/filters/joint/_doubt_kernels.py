@@ -1,0 +1,147 @@
+"""Nodes that disagree with the group: wrong calibrations, liars, and nodes that lost their way.
+
+Two signs are looked for, ten times a second, in nodes that range with two others or more:
+
+    astray   most ranges of the node fit nothing, while those among the others do
+    offset   the errors of all its ranges are large and of one sign: an obstacle hides a node from
+             some, a wrong calibration lengthens all of its ranges alike
+
+Such a node is doubted: its pairs are reported so, its position and velocity become uncertain,
+and an offset common to its ranges becomes possible. What it ranges then moves the node and the
+offset, and hardly the others; where the node only lost its way, it is found again.
+"""
+
+from __future__ import annotations
+
+import math
+
+from tracking.compiled import kernel, small_kernel
+from tracking.filters.joint._range_kernels import MIN_PROB, MOST
+
+RECENT = 0.02
+"""[-] Weight of a range in the share of a node's ranges that do not fit."""
+LATELY = 0.1
+"""[-] The same of what it ranges beyond what is predicted."""
+OFFSET = 0.36
+"""[m] Every range of a node errs by so much, over the root of how many there are: an offset."""
+STAYS = 0.5
+"""[-] It remains one down to this part of it."""
+HELD = 2.0
+"""[s] A node is doubted until nothing has been found for so long."""
+SPEED, WANDER, JUMP = 0.7, 1.0, 0.7
+"""[m/sqrt(s), m/s/sqrt(s)] How fast the position and velocity of a doubted node, and the offset
+of its ranges [m/sqrt(s)], may become others."""
+
+
+@small_kernel
+def note_fit(s, p, fits, nu):
+    """Count a range of pair p, which fits, 1, or not, 0, and was predicted shorter by nu [m]."""
+    s.pairs[p].residual += LATELY * (nu - s.pairs[p].residual)
+    for i in (s.pairs[p].i, s.pairs[p].j):
+        s.nodes[i].astray += RECENT * (1.0 - fits - s.nodes[i].astray)
+
+
+@kernel
+def watch_nodes(c, s, layout, t):
+    """Doubt nodes that disagree with the group; tell whether it is the group that is lost."""
+    group = s.group[0]
+    dt = t - group.t_check
+    worst = -1
+    for i in range(s.nodes.shape[0]):
+        node = s.nodes[i]
+        if not node.present:
+            node.astray, node.doubted = 0.0, False
+        elif worst < 0 or node.astray > s.nodes[worst].astray:
+            worst = i
+    blames = worst >= 0 and others_fit(c, s, worst, t)
+    group.lost = group.fit < MOST and not blames
+    for i in range(s.nodes.shape[0]):
+        node = s.nodes[i]
+        if not node.present:
+            continue
+        n, offset = common_error(c, s, layout, i, t)
+        if n < 2:
+            continue
+        astray = i == worst and blames and node.astray > 1.0 - MOST
+        limit = OFFSET / math.sqrt(n) * (STAYS if node.doubted else 1.0)
+        if astray or offset > limit:
+            if not node.doubted:
+                free_offset(s, layout, i, JUMP**2)
+                open_node(c, s, i, 0.0 if astray else 0.0, 0.0)
+            else:
+                free_offset(s, layout, i, WANDER**2 * dt)
+                if astray:
+                    open_node(c, s, i, SPEED**2 * dt, SPEED**2 * dt)
+            node.doubted, node.t_doubted = True, t
+        elif node.doubted and t - node.t_doubted > HELD:
+            node.doubted = False
+
+
+@kernel
+def others_fit(c, s, i, t):
+    """True if there are pairs without node i, and none of them contradicts the rest."""
+    n = 0
+    for p in range(s.pairs.shape[0]):
+        pair = s.pairs[p]
+        if pair.i != i and pair.j != i and ranges_now(c, s, p, t):
+            n += 1
+            if pair.misfit > c.doubt:
+                return False
+    return n > 0
+
+
+@small_kernel
+def ranges_now(c, s, p, t):
+    """True if both nodes of pair p are there and it was ranged lately."""
+    pair = s.pairs[p]
+    both = s.nodes[pair.i].present and s.nodes[pair.j].present
+    return both and pair.n_ranges > 0 and t - pair.t_range < c.lost_after
+
+
+@kernel
+def common_error(c, s, layout, i, t):
+    """How many others node i ranges with; the least slow error of those, 0 if signs differ [m]."""
+    h, n, sign, least = s.group[0].best, 0, 0.0, math.inf
+    for k in range(s.nodes.shape[0]):
+        if k == i:
+            continue
+        p = layout.pair_index[i, k]
+        if not ranges_now(c, s, p, t):
+            continue
+        n += 1
+        error = s.pairs[p].residual
+        if s.pairs[p].at_e >= 0:
+            error += s.x[h, s.pairs[p].at_e + 1]
+        if sign == 0.0:
+            sign = 1.0 if error > 0.0 else -1.0
+        least = min(least, sign * error)
+    return n, max(least, 0.0) if n > 0 else 0.0
+
+
+@kernel
+def open_node(c, s, i, position_var, velocity_var):
+    """Know less about where node i is and how it moves."""
+    node = s.nodes[i]
+    for h in range(s.alive.shape[0]):
+        if s.alive[h] and not node.static:
+            for k in range(c.d):
+                s.P[h, node.at_p + k, node.at_p + k] += position_var
+                s.P[h, node.at_v + k, node.at_v + k] += velocity_var
+
+
+@kernel
+def free_offset(s, layout, i, variance):
+    """Let the slow errors of all ranges of node i move together; none is for want of sight."""
+    n = s.nodes.shape[0]
+    for h in range(s.alive.shape[0]):
+        if not s.alive[h]:
+            continue
+        for k in range(n):
+            p = layout.pair_index[i, k] if k != i else -1
+            if p < 0 or s.pairs[p].at_e < 0 or not s.nodes[k].present:
+                continue
+            s.nlos[h, p] = 1.0 - MIN_PROB
+            for m in range(n):
+                q = layout.pair_index[i, m] if m != i else -1
+                if q >= 0 and s.pairs[q].at_e >= 0 and s.nodes[m].present:
+                    s.P[h, s.pairs[p].at_e + 1, s.pairs[q].at_e + 1] += variance

@@ -1,0 +1,53 @@
+"""Ranges that stick: a radio that reports one number again and again while its nodes move.
+
+Radios round to a millimetre or a centimetre, and some report every range twice, so that a few
+equal ranges mean nothing: of the recordings that the filter was tried on, those rounded to a
+centimetre have runs of up to 11. Nodes at rest may repeat one for ever. But noise of several
+centimetres does not repeat while the ends travel.
+"""
+
+from __future__ import annotations
+
+import math
+
+from tracking.compiled import small_kernel
+
+MANY = 5
+"""[-] Equal ranges after the first that may be chance."""
+FAR = 0.3
+"""[m] Way of both ends over which a range cannot stay the same to the last digit."""
+SLOW = 0.1
+"""[m/s] A node that is slower may stand."""
+
+
+@small_kernel
+def is_stuck(c, s, p, t, distance):
+    """True if a range repeats what pair p has reported all along; notes it in any case.
+
+    It is taken as not heard until another number comes, also when its nodes have left by then.
+    """
+    pair = s.pairs[p]
+    if distance != pair.last:
+        pair.last, pair.t_last = distance, t
+        pair.n_same, pair.way = 0, 0.0
+        return False
+    pair.n_same += 1
+    pair.way += (t - pair.t_last) * (
+        sure_speed(c, s, s.nodes[pair.i], t) + sure_speed(c, s, s.nodes[pair.j], t)
+    )
+    pair.t_last = t
+    return pair.n_same > MANY and pair.way > FAR
+
+
+@small_kernel
+def sure_speed(c, s, node, t):
+    """Speed of a node in the best hypothesis [m/s]; 0 where it may stand."""
+    if node.static or not node.present:
+        return 0.0
+    if node.rests and node.has_state and t - node.t_moved > c.rest_after:
+        return 0.0
+    h, squared = s.group[0].best, 0.0
+    for k in range(c.d):
+        squared += s.x[h, node.at_v + k] ** 2
+    speed = math.sqrt(squared)
+    return speed if speed > SLOW else 0.0
