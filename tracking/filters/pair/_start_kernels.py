@@ -18,6 +18,7 @@ from tracking.filters._shape_kernels import (
     place,
     start_distance,
 )
+from tracking.filters.pair._sight_kernels import E
 
 
 @kernel
@@ -31,6 +32,8 @@ def begin_pair(c, s, h, p, pos, t):
         s.x[p, h, k] = pos[k]
         s.P[p, h, k, k] = 1.0
         s.P[p, h, 3 + k, 3 + k] = 0.0 if both_static else 1.0
+    s.P[p, h, E, E] = c.slow_var
+    s.nlos[p, h] = 0.1
     pair.t = t
     pair.t_range = t
     pair.n_ranges = 0
@@ -51,6 +54,9 @@ def try_start(c, s, layout, t):
     for h in range(layout.rotations.shape[0]):
         s.alive[h] = True
         s.loglik[h] = 0.0
+        s.mean_v[h, :] = 0.0
+        s.mean_P[h, :, :] = 0.0
+        s.mean_P[h, 0, 0] = s.mean_P[h, 1, 1] = 4.0
         Y = X @ layout.rotations[h].T.copy()
         for a in range(m):
             for b in range(m):
@@ -64,6 +70,8 @@ def try_start(c, s, layout, t):
     group.best = 0
     group.t_check = t
     group.t_mds = t
+    group.t_wheels = t
+    group.misfit = 0.0
 
 
 @kernel
@@ -130,6 +138,9 @@ def copy_hypothesis(s, h):
             s.loglik[free] = s.loglik[h]
             s.x[:, free] = s.x[:, h]
             s.P[:, free] = s.P[:, h]
+            s.nlos[:, free] = s.nlos[:, h]
+            s.mean_v[free] = s.mean_v[h]
+            s.mean_P[free] = s.mean_P[h]
             s.group[0].n_alive += 1
             return free
     return -1

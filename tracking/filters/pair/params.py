@@ -44,14 +44,55 @@ class MdsParams:
 
     period: float = 0.012
     """[s] Shortest time between two refinements: one ranging round of three nodes."""
-    std: float = 0.3
-    """[m] Standard deviation of a refined position as a measurement of the filters. Towards 0
-    it replaces the position outright, as the paper has it."""
     min_spread: float = 0.15
-    """[m] Layouts flatter than this are not refined: their mirror image cannot be told."""
+    """[m] A newcomer is placed on both sides of a layout that is flatter than this."""
+    flat: float = 1.0
+    """[-] A layout flatter than so many of its standard deviations may turn over unseen."""
+    flat_open: float = 2.0
+    """[-] When it opens to so many, its mirror image becomes a hypothesis."""
+    misfit: float = 3.0
+    """[-] Ranges whose running mean of NIS is above this bring up the mirror image, too."""
+    mirror_mean: float = 0.0
 
     def __post_init__(self) -> None:
-        _expect_positive(self, "period std min_spread")
+        _expect_positive(self, "period min_spread")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RangeErrorParams:
+    """How a range errs in sight."""
+
+    white_std: float = 0.06
+    slow_std: float = 0.05
+    slow_length: float = 4.0
+    bend_gain: float = 1.0
+    bend_most: float = 0.1
+    evidence: float = 0.3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NlosParams:
+    enter_rate: float = 1.0
+    leave_rate: float = 3.0
+    excess: float = 0.1
+    excess_std: float = 0.2
+    excess_length: float = 2.0
+    white_std: float = 0.25
+    gap_los: float = 3.0
+    gap_los_std: float = 1.2
+    gap_nlos: float = 8.0
+    gap_nlos_std: float = 3.0
+    gap_weight: float = 0.2
+    outlier_prob: float = 1e-2
+    outlier_span: float = 20.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WheelParams:
+    std: float = 0.15
+    rear_axle: float = 0.15
+    period: float = 0.05
+    evidence: float = 0.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,13 +136,6 @@ class PairEkfParams:
     """[m/s2/sqrt(Hz)] The same for a moving node whose IMU is not heard."""
     unaided_after: float = 0.3
     """[s] A node whose IMU was silent for so long is unaided."""
-    range_std: float = 0.15
-    """[m] Standard deviation of a range. 5 to 10 cm in sight; the rest is for the bias of real
-    ranges, which lasts for seconds."""
-    nlos_gap: float = 5.5
-    """[dB] A range whose first path is so much weaker than all it received is no line of sight."""
-    nlos_std: float = 0.3
-    """[m] Added standard deviation of such a range: a stretch of them counts as a single one."""
     survey_std: float = 0.02
     """[m] Standard deviation of a surveyed distance."""
     speed_model: Literal["range-rate", "speed-norm", "none"] = "range-rate"
@@ -118,13 +152,16 @@ class PairEkfParams:
     """[s] A node not heard for so long has left; its filters are destroyed."""
     gate: GateParams = field(default_factory=GateParams)
     mds: MdsParams = field(default_factory=MdsParams)
+    range_error: RangeErrorParams = field(default_factory=RangeErrorParams)
+    nlos: NlosParams = field(default_factory=NlosParams)
+    wheels: WheelParams = field(default_factory=WheelParams)
     start: StartParams = field(default_factory=StartParams)
 
     def __post_init__(self) -> None:
         _expect_positive(self, "accel_psd wheeled_accel_psd unaided_accel_psd unaided_after")
         _expect_positive(
             self,
-            "range_std nlos_gap nlos_std survey_std speed_std speed_tau lost_after leave_after",
+            "survey_std speed_std speed_tau lost_after leave_after",
         )
         if self.speed_model not in ("range-rate", "speed-norm", "none"):
             raise ConfigError(
