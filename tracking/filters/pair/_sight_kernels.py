@@ -40,7 +40,7 @@ def fade_error(c, s, p, h, dt):
     """Carry the range error of a pair over dt [s]: it fades with the way travelled."""
     x, P = s.x, s.P
     v0, v1, v2 = x[p, h, 3], x[p, h, 4], x[p, h, 5]
-    way = math.sqrt(v0 * v0 + v1 * v1 + v2 * v2) * dt
+    way = math.sqrt(v0 * v0 + v1 * v1 + v2 * v2 + c.least_speed * c.least_speed) * dt
     hidden = s.nlos[p, h]
     keep = decay(way * ((1.0 - hidden) / c.slow_length + hidden / c.excess_length))
     x[p, h, E] = keep * x[p, h, E] + (1.0 - keep) * hidden * c.excess

@@ -64,19 +64,20 @@ class RangeErrorParams:
 
     white_std: float = 0.06
     slow_std: float = 0.05
-    slow_length: float = 4.0
-    bend_gain: float = 1.0
+    slow_length: float = 1.5
+    least_speed: float = 1.0
+    bend_gain: float = 0.1
     bend_most: float = 0.1
     evidence: float = 0.3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NlosParams:
-    enter_rate: float = 1.0
-    leave_rate: float = 3.0
+    enter_rate: float = 0.5
+    leave_rate: float = 5.0
     excess: float = 0.1
-    excess_std: float = 0.2
-    excess_length: float = 2.0
+    excess_std: float = 0.12
+    excess_length: float = 1.5
     white_std: float = 0.25
     gap_los: float = 3.0
     gap_los_std: float = 1.2
@@ -130,8 +131,9 @@ class PairEkfParams:
     accel_psd: float = 0.15
     """[m/s2/sqrt(Hz)] Noise of one node's world acceleration: sensor noise, vibration and the
     slow error of a wrong tilt. Larger forgets dead reckoning sooner."""
-    wheeled_accel_psd: float = 0.035
+    wheeled_accel_psd: float = 0.07
     """[m/s2/sqrt(Hz)] The same on cars and robots, whose acceleration is free of tilt errors."""
+    hand_accel_psd: float = 0.3
     unaided_accel_psd: float = 0.7
     """[m/s2/sqrt(Hz)] The same for a moving node whose IMU is not heard."""
     unaided_after: float = 0.3

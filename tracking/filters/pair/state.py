@@ -79,6 +79,7 @@ _NUMBERS = (
     "survey_var",
     "slow_var",
     "slow_length",
+    "least_speed",
     "bend_gain",
     "bend_most",
     "range_evidence",
@@ -185,6 +186,7 @@ def make_coefficients(
         "range_var": e.white_std**2,
         "slow_var": e.slow_std**2,
         "slow_length": e.slow_length,
+        "least_speed": e.least_speed,
         "bend_gain": e.bend_gain,
         "bend_most": e.bend_most,
         "range_evidence": e.evidence,
@@ -235,6 +237,8 @@ def make_state(
         if node.kind == "static"
         else params.wheeled_accel_psd
         if node.vehicle in WHEELED
+        else params.hand_accel_psd
+        if node.vehicle == "hand"
         else params.accel_psd
         for node in constellation.nodes
     ]
