@@ -7,7 +7,18 @@ import numpy as np
 from tracking.compiled import kernel, small_kernel
 from tracking.filters._shape_kernels import SURVEYED
 from tracking.filters.pair._mds_kernels import add_pair, factor, move_pair, solve, weigh
-from tracking.filters.pair._start_kernels import copy_hypothesis, hypothesis_positions
+from tracking.filters.pair._start_kernels import (
+    copy_hypothesis,
+    forget_mean,
+    hypothesis_positions,
+)
+
+FLAT = 1.0
+"""[-] A layout flatter than so many of its standard deviations may turn over unseen."""
+OPEN = 2.0
+"""[-] When it opens to so many, its mirror image becomes a hypothesis."""
+MISFIT = 3.0
+"""[-] Ranges whose running mean of NIS is above this bring it up, too."""
 
 
 @small_kernel
@@ -76,12 +87,12 @@ def watch_mirror(c, s, layout):
     if group.n_alive != 1:
         return
     ratio = flatness(c, s, layout)
-    if ratio < c.flat:
+    if ratio < FLAT:
         group.flat = True
-    elif group.flat and ratio > c.flat_open:
+    elif group.flat and ratio > OPEN:
         group.flat = False
         add_mirror_image(c, s, layout)
-    elif group.misfit > c.misfit and ratio > c.flat_open and ratio < np.inf:
+    elif group.misfit > MISFIT and ratio > OPEN and ratio < np.inf:
         group.misfit = 1.0
         add_mirror_image(c, s, layout)
 
@@ -108,9 +119,6 @@ def add_mirror_image(c, s, layout):
     for p in range(s.pairs.shape[0]):
         s.x[p, target] = M @ s.x[p, h].copy()
         s.P[p, target] = M @ s.P[p, h].copy() @ M.T.copy()
-    mean = E[0, 0] * s.mean_v[h, 0] + E[1, 0] * s.mean_v[h, 1]
-    for k in range(2):
-        s.mean_v[target, k] -= 2.0 * c.mirror_mean * mean * E[k, 0]
 
 
 @kernel
@@ -169,6 +177,7 @@ def remove_node(s, layout, i):
     """Destroy the filters of a node that left."""
     s.nodes[i].present = False
     s.nodes[i].heard = False
+    forget_mean(s)
     n_present = 0
     for k in range(s.nodes.shape[0]):
         n_present += s.nodes[k].present

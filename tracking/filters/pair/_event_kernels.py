@@ -27,7 +27,7 @@ from tracking.filters.pair._range_kernels import (
 )
 from tracking.filters.pair._sight_kernels import gap_evidence
 from tracking.filters.pair._start_kernels import try_join, try_start
-from tracking.filters.pair._wheel_kernels import add_mean_velocity, apply_wheels
+from tracking.filters.pair._wheel_kernels import add_mean_velocity, apply_wheels, note_heading
 from tracking.filters.pair.state import FilterState
 
 # Plain numbers of `Kind` and `Status`: kernels do not know enums.
@@ -92,7 +92,7 @@ def run_events(coefficients, layout, state, block, t_out, out):
             state.loglik[e],
             state.nlos[e],
             state.mean_v[e],
-            state.mean_P[e],
+            state.mean_cov[e],
         )
         o = 0
         for k in range(t.shape[1]):
@@ -138,7 +138,7 @@ def take_state(c, s, layout, i, t, values, e, k):
             if other != i and s.nodes[other].present:
                 advance_pair(c, s, layout.pair_index[i, other], t)
         add_mean_velocity(s, i, t)
-    turn(c, node, t, values, e, k)
+    note_heading(c, node, t, values[e, k])
     for column in range(7):
         s.held[i, column] = values[e, k, column]
     if node.levelled:
@@ -147,21 +147,6 @@ def take_state(c, s, layout, i, t, values, e, k):
         s.held[i, 4], s.held[i, 5] = a0, a1
     node.t_state = t
     node.has_state = True
-
-
-@small_kernel
-def turn(c, node, t, values, e, k):
-    """Yaw of a node, and its low-passed rate."""
-    w, x, y, z = values[e, k, 0], values[e, k, 1], values[e, k, 2], values[e, k, 3]
-    yaw = math.atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
-    dt = t - node.t_state
-    if not node.has_state or dt > c.unaided_after:
-        node.yaw_rate = 0.0
-    elif dt > 1e-4:
-        change = yaw - node.yaw
-        change -= 2.0 * math.pi * math.floor(change / (2.0 * math.pi) + 0.5)
-        node.yaw_rate += dt / (0.05 + dt) * (change / dt - node.yaw_rate)
-    node.yaw = yaw
 
 
 @small_kernel

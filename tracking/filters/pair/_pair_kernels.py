@@ -1,8 +1,9 @@
 """The Kalman filter of one pair: prediction and scalar corrections, in place.
 
-State ``x = (pos_ij, vel_ij, e)``, seven numbers, and covariance ``P``, of pair p in hypothesis
-h; e is the slow error of the pair's ranges, and may be left out. In two dimensions the vertical rows stay exactly zero: nothing is uncertain across the plane.
-Arrays are indexed inside the kernels, since handing on slices costs more than the algebra.
+State ``x = (pos_ij, vel_ij, e)``, seven numbers, and covariance ``P``, of pair p in hypothesis h;
+e is the slow error of the pair's ranges, which kernels also do without. In two dimensions the
+vertical rows stay exactly zero: nothing is uncertain across the plane. Arrays are indexed inside
+the kernels, since handing on slices costs more than the algebra.
 """
 
 from __future__ import annotations

@@ -14,6 +14,9 @@ from tracking.filters.pair._pair_kernels import (
 )
 from tracking.filters.pair._sight_kernels import change_sight, fade_error, judge_sight
 
+MOST_BEND = 0.1
+"""[m] No more noise than this is added for what the straight line misses."""
+
 
 @small_kernel
 def is_aided(c, node, t):
@@ -165,11 +168,11 @@ def fuse_range(c, s, layout, p, t, distance, evidence, antenna_i, antenna_j, wor
         if switched > 0.01:
             change_sight(c, s, p, h, switched)
             nu = distance - range_model(s.x, p, h, l0, l1, l2, work)
-        bent = min(c.bend_gain * bend(s, p, h, work), c.bend_most)
+        bent = min(c.bend_gain * bend(s, p, h, work), MOST_BEND)
         R = c.range_var + bent * bent + s.nlos[p, h] * c.excess_white_var
         if sane > 1e-3:
             correct(s.x, s.P, p, h, work, nu, R / sane)
-        s.loglik[h] += c.range_evidence * max(
+        s.loglik[h] += c.evidence * max(
             loglik, -0.5 * (c.max_nis + math.log(variance + c.range_var))
         )
         if h == group.best:

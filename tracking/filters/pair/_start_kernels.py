@@ -20,6 +20,9 @@ from tracking.filters._shape_kernels import (
 )
 from tracking.filters.pair._sight_kernels import E
 
+MEAN_SPEED_VAR = 4.0
+"""[m2/s2] Variance of the mean velocity of a group before its wheels tell."""
+
 
 @kernel
 def begin_pair(c, s, h, p, pos, t):
@@ -42,6 +45,15 @@ def begin_pair(c, s, h, p, pos, t):
 
 
 @kernel
+def forget_mean(s):
+    """The mean velocity of another group is not known."""
+    s.mean_v[:] = 0.0
+    s.mean_cov[:] = 0.0
+    s.mean_cov[:, 0, 0] = MEAN_SPEED_VAR
+    s.mean_cov[:, 1, 1] = MEAN_SPEED_VAR
+
+
+@kernel
 def try_start(c, s, layout, t):
     """Start the group with the nodes whose pairs are all ready."""
     members = np.empty(s.nodes.shape[0], np.int64)
@@ -54,15 +66,13 @@ def try_start(c, s, layout, t):
     for h in range(layout.rotations.shape[0]):
         s.alive[h] = True
         s.loglik[h] = 0.0
-        s.mean_v[h, :] = 0.0
-        s.mean_P[h, :, :] = 0.0
-        s.mean_P[h, 0, 0] = s.mean_P[h, 1, 1] = 4.0
         Y = X @ layout.rotations[h].T.copy()
         for a in range(m):
             for b in range(m):
                 if members[a] < members[b]:
                     p = layout.pair_index[members[a], members[b]]
                     begin_pair(c, s, h, p, Y[b] - Y[a], t)
+    forget_mean(s)
     group = s.group[0]
     group.started = True
     group.flat = False
@@ -127,6 +137,7 @@ def try_join(c, s, layout, new, t):
                     p = layout.pair_index[k, new]
                     begin_pair(c, s, target, p, sign * (sides[side] - pos[k]), t)
     s.nodes[new].present = True
+    forget_mean(s)
 
 
 @kernel
@@ -140,7 +151,7 @@ def copy_hypothesis(s, h):
             s.P[:, free] = s.P[:, h]
             s.nlos[:, free] = s.nlos[:, h]
             s.mean_v[free] = s.mean_v[h]
-            s.mean_P[free] = s.mean_P[h]
+            s.mean_cov[free] = s.mean_cov[h]
             s.group[0].n_alive += 1
             return free
     return -1

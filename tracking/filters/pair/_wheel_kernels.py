@@ -7,8 +7,8 @@ axle and w the yaw rate,
 
     n . v_i = l w,    v_i = u + mean over k of v_ki
 
-corrects u, and every pair of i by its own covariance. Both know that the other may err: of an
-innovation, the pair of i and j takes what is left after u and after the other end.
+corrects u, and every pair of i by its own covariance: the variance of the innovation is that
+of u and of the velocity in the group together, so each takes its share.
 """
 
 from __future__ import annotations
@@ -16,6 +16,22 @@ from __future__ import annotations
 import math
 
 from tracking.compiled import small_kernel
+from tracking.filters.pair._start_kernels import MEAN_SPEED_VAR
+
+
+@small_kernel
+def note_heading(c, node, t, q):
+    """Yaw of a node, and its low-passed rate."""
+    w, x, y, z = q[0], q[1], q[2], q[3]
+    yaw = math.atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
+    dt = t - node.t_state
+    if not node.has_state or dt > c.unaided_after:
+        node.yaw_rate = 0.0
+    elif dt > 1e-4:
+        change = yaw - node.yaw
+        change -= 2.0 * math.pi * math.floor(change / (2.0 * math.pi) + 0.5)
+        node.yaw_rate += dt / (0.05 + dt) * (change / dt - node.yaw_rate)
+    node.yaw = yaw
 
 
 @small_kernel
@@ -31,7 +47,7 @@ def add_mean_velocity(s, i, t):
 
 @small_kernel
 def velocity_in_group(s, layout, h, i, m):
-    """Velocity of node i relative to the mean of the group, horizontal; and its variance."""
+    """Horizontal velocity of node i relative to the mean of the m nodes present [m/s]."""
     v0, v1 = 0.0, 0.0
     for k in range(s.nodes.shape[0]):
         if k != i and s.nodes[k].present:
@@ -65,11 +81,11 @@ def apply_wheels(c, s, layout, t, work):
     for h in range(s.alive.shape[0]):
         if not s.alive[h]:
             continue
-        u, Pu = s.mean_v[h], s.mean_P[h]
+        u, Pu = s.mean_v[h], s.mean_cov[h]
         u[0] += dv0
         u[1] += dv1
-        Pu[0, 0] = min(Pu[0, 0] + q, 4.0)
-        Pu[1, 1] = min(Pu[1, 1] + q, 4.0)
+        Pu[0, 0] = min(Pu[0, 0] + q, MEAN_SPEED_VAR)
+        Pu[1, 1] = min(Pu[1, 1] + q, MEAN_SPEED_VAR)
         for i in range(s.nodes.shape[0]):
             node = s.nodes[i]
             if node.present and node.sideways_var > 0.0 and t - node.t_state < c.unaided_after:
@@ -79,7 +95,7 @@ def apply_wheels(c, s, layout, t, work):
 @small_kernel
 def hold(c, s, layout, h, i, m, work):
     """The rear axle of car i does not move sideways."""
-    node, u, Pu = s.nodes[i], s.mean_v[h], s.mean_P[h]
+    node, u, Pu = s.nodes[i], s.mean_v[h], s.mean_cov[h]
     n0, n1 = -math.sin(node.yaw), math.cos(node.yaw)
     r0, r1 = velocity_in_group(s, layout, h, i, m)
     nu = node.rear_axle * node.yaw_rate - n0 * (u[0] + r0) - n1 * (u[1] + r1)
@@ -95,7 +111,7 @@ def hold(c, s, layout, h, i, m, work):
     common = n0 * w0 + n1 * w1
     S = common + own + node.sideways_var
     nis = nu * nu / S
-    s.loglik[h] -= 0.5 * c.wheel_evidence * (min(nis, c.max_nis) + math.log(S))
+    s.loglik[h] -= 0.5 * (min(nis, c.max_nis) + math.log(S))
     if nis > 25.0:
         S *= nis / 25.0  # a jolt or a skid: it counts for less
     for k in range(s.nodes.shape[0]):

@@ -81,8 +81,7 @@ _NUMBERS = (
     "slow_length",
     "least_speed",
     "bend_gain",
-    "bend_most",
-    "range_evidence",
+    "evidence",
     "enter_rate",
     "leave_rate",
     "excess",
@@ -97,11 +96,6 @@ _NUMBERS = (
     "outlier_prob",
     "outlier_span",
     "wheel_period",
-    "wheel_evidence",
-    "flat",
-    "flat_open",
-    "misfit",
-    "mirror_mean",
     "speed_var",
     "speed_tau",
     "lost_after",
@@ -151,7 +145,7 @@ class FilterState(NamedTuple):
     """Probability that a pair is out of sight, (env, pair, hyp)."""
     mean_v: F64
     """Mean velocity of the group, horizontal, (env, hyp, 2) [m/s]."""
-    mean_P: F64
+    mean_cov: F64
     """Its covariance, (env, hyp, 2, 2)."""
 
 
@@ -176,6 +170,7 @@ def make_coefficients(
 ) -> Records:
     """Derive the constants of the kernels, (1)."""
     c = np.zeros(1, dtype=COEFFICIENTS)
+    rows = 2 * constellation.dimensions * (constellation.n_nodes - 1)
     e, v, w = params.range_error, params.nlos, params.wheels
     values = {
         "d": constellation.dimensions,
@@ -188,9 +183,8 @@ def make_coefficients(
         "slow_length": e.slow_length,
         "least_speed": e.least_speed,
         "bend_gain": e.bend_gain,
-        "bend_most": e.bend_most,
-        "range_evidence": e.evidence,
-        **{k: getattr(v, k) for k in v.__slots__ if not k.endswith("excess_std") and k != "white_std"},
+        "evidence": params.start.evidence,
+        **{k: getattr(v, k) for k in v.__slots__ if k in _NUMBERS},
         "excess_var": v.excess_std**2,
         "excess_white_var": v.white_std**2,
         "survey_var": params.survey_std**2,
@@ -199,14 +193,10 @@ def make_coefficients(
         "lost_after": params.lost_after,
         "leave_after": params.leave_after,
         **{f"gate_{k}": getattr(params.gate, k) for k in params.gate.__slots__},
-        "mds_period": params.mds.period,
+        # The cost of a refinement grows with the cube of the group: it keeps its share.
+        "mds_period": params.mds.period * max(1.0, (rows / 30.0) ** 2),
         "mds_min_spread": params.mds.min_spread,
-        "flat": params.mds.flat,
-        "flat_open": params.mds.flat_open,
-        "misfit": params.mds.misfit,
-        "mirror_mean": params.mds.mirror_mean,
         "wheel_period": w.period,
-        "wheel_evidence": w.evidence,
         "start_k": params.start.k,
         "start_max_age": params.start.max_age,
         "prune": params.start.prune,
@@ -232,19 +222,14 @@ def make_state(
     n, p = constellation.n_nodes, constellation.n_pairs
     nodes = np.zeros((n_envs, n), dtype=NODE)
     nodes["static"] = constellation.is_static
+    psd = {"hand": params.hand_accel_psd, **dict.fromkeys(WHEELED, params.wheeled_accel_psd)}
     nodes["psd"] = [
-        0.0
-        if node.kind == "static"
-        else params.wheeled_accel_psd
-        if node.vehicle in WHEELED
-        else params.hand_accel_psd
-        if node.vehicle == "hand"
-        else params.accel_psd
+        0.0 if node.kind == "static" else psd.get(node.vehicle, params.accel_psd)
         for node in constellation.nodes
     ]
     nodes["levelled"] = [node.vehicle in WHEELED for node in constellation.nodes]
-    slides = [node.vehicle != "car" for node in constellation.nodes]
-    nodes["sideways_var"] = np.where(slides, 0.0, params.wheels.std**2)
+    cars = [node.vehicle == "car" and node.kind == "moving" for node in constellation.nodes]
+    nodes["sideways_var"] = np.where(cars, params.wheels.std**2, 0.0)
     nodes["rear_axle"] = params.wheels.rear_axle
     held = np.zeros((n_envs, n, 7))
     held[..., 0] = 1.0
@@ -261,5 +246,5 @@ def make_state(
         loglik=np.zeros((n_envs, n_hyps)),
         nlos=np.zeros((n_envs, p, n_hyps)),
         mean_v=np.zeros((n_envs, n_hyps, 2)),
-        mean_P=np.zeros((n_envs, n_hyps, 2, 2)),
+        mean_cov=np.zeros((n_envs, n_hyps, 2, 2)),
     )
