@@ -1,4 +1,4 @@
-"""Classical multidimensional scaling: the shape of a group from its distances.
+"""Multidimensional scaling: the shape of a group from its distances, classical and weighted.
 
 With D the matrix of distances and J the centring matrix, the kernel
 
@@ -9,18 +9,23 @@ rank-d fit of K otherwise [1]. (The text of the paper takes the square root twic
 do not see rotations, shifts and mirror images: X is then aligned to positions known otherwise
 by the orthogonal Procrustes problem [2], mirror images included.
 
-The compiled form for one group is in `tracking.filters.pair._mds_kernels`; this is its plain twin.
+Classical MDS believes every distance alike, and one rotation stands for all it knows of the
+vectors. The weighted form [3] takes relative positions with their covariances: where those are
+certain of lengths only, it is classical MDS with Procrustes to first order. Its compiled form is in
+`tracking.filters.pair._mds_kernels`; this is the plain twin.
 
 References:
     [1] Torgerson, Psychometrika 17 (1952) 401.
     [2] Schoenemann, Psychometrika 31 (1966) 1.
+    [3] De Leeuw, Heiser, Multidimensional scaling with restrictions on the configuration, in
+        Multivariate Analysis V, 1980.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from tracking.arrays import F64
+from tracking.arrays import F64, I64
 from tracking.geometry import best_rotation
 
 
@@ -61,3 +66,28 @@ def refine_positions(pos: F64, dimensions: int) -> F64:
     R = best_rotation(X, target, planar=dimensions == 2, reflect=True)
     refined: F64 = X @ R.T
     return refined
+
+
+def weighted_mds(x: F64, cov: F64, pairs: I64) -> F64:
+    """Least squares over all pairs, by their covariances.
+
+    The stress ``sum (y_j - y_i - x_ij)^T P_ij^-1 (y_j - y_i - x_ij)`` is least at the result.
+
+    Args:
+        x: Difference of what nodes j and i have, (pair, k).
+        cov: Its covariance P, (pair, k, k).
+        pairs: Node indices, (pair, 2).
+
+    Returns:
+        What each node has relative to node 0, (node, k).
+    """
+    n, k = int(pairs.max()) + 1, x.shape[1]
+    B = np.zeros((len(pairs), n))
+    rows = np.arange(len(pairs))
+    B[rows, pairs[:, 1]], B[rows, pairs[:, 0]] = 1.0, -1.0
+    root = np.linalg.inv(np.linalg.cholesky(cov))
+    A = np.einsum("pab,pn->panb", root, B[:, 1:]).reshape(len(pairs) * k, (n - 1) * k)
+    b = np.einsum("pab,pb->pa", root, x).reshape(-1)
+    y = np.zeros((n, k))
+    y[1:] = np.linalg.lstsq(A, b)[0].reshape(n - 1, k)
+    return y

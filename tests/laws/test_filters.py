@@ -36,7 +36,8 @@ def put_on_truth(state, group):
         return
     for p, t in enumerate(state.pairs["t"][0]):
         vel = (group.pairs(t + h)[p] - group.pairs(t - h)[p]) / (2 * h)
-        state.x[0, p, :, :3], state.x[0, p, :, 3:] = group.pairs(t)[p], vel
+        state.x[0, p, :, :3], state.x[0, p, :, 3:6] = group.pairs(t)[p], vel
+        state.x[0, p, :, 6] = 0.0
 
 
 def times(group, n=60):

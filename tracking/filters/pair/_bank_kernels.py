@@ -6,93 +6,95 @@ import numpy as np
 
 from tracking.compiled import kernel, small_kernel
 from tracking.filters._shape_kernels import SURVEYED
-from tracking.filters.pair._mds_kernels import refine
-from tracking.filters.pair._start_kernels import copy_hypothesis, hypothesis_positions
+from tracking.filters.pair._mds_kernels import add_pair, factor, move_pair, solve, weigh
+from tracking.filters.pair._start_kernels import (
+    copy_hypothesis,
+    forget_mean,
+    hypothesis_positions,
+)
+
+FLAT = 1.0
+"""[-] A layout flatter than so many of its standard deviations may turn over unseen."""
+OPEN = 2.0
+"""[-] When it opens to so many, its mirror image becomes a hypothesis."""
+MISFIT = 3.0
+"""[-] Ranges whose running mean of NIS is above this bring it up, too."""
 
 
 @small_kernel
 def refine_group(c, s, layout, scratch):
-    """Move the positions of every hypothesis to their MDS refinement.
-
-    Returns:
-        True if the reported layout was too flat to tell its mirror image and now is not.
-    """
-    n = s.nodes.shape[0]
+    """Move every hypothesis to its weighted MDS: positions, velocities and range errors."""
+    n, size = s.nodes.shape[0], 2 * c.d
     m = 0
     for i in range(n):
         if s.nodes[i].present:
             scratch.members[m] = i
             m += 1
-    opened = False
     if m < 3:
-        return opened
+        return
+    rows = (m - 1) * size
+    W, A, y = scratch.W, scratch.A, scratch.y
     for h in range(s.alive.shape[0]):
         if not s.alive[h]:
             continue
-        gather(c, s, layout, scratch, m, h)
-        spread = refine(scratch.T, scratch.K, scratch.X, scratch.small, m, c.d)
-        if h == s.group[0].best:
-            if spread < c.mds_min_spread:
-                s.group[0].flat = True
-            elif s.group[0].flat and spread > 2.0 * c.mds_min_spread:
-                s.group[0].flat = False
-                opened = True
-        if spread < c.mds_min_spread:
-            continue
+        for r in range(rows):
+            y[r] = 0.0
+            for k in range(r + 1):
+                A[r, k] = 0.0
         for a in range(m):
             for b in range(a + 1, m):
                 p = layout.pair_index[scratch.members[a], scratch.members[b]]
-                move_to(c, s, p, h, scratch.T, a, b)
-    return opened
+                weigh(s.P, p, h, c.d, scratch.L, W)
+                add_pair(s.x, p, h, c.d, W, a, b, A, y)
+        factor(A, rows)
+        solve(A, y, rows)
+        for a in range(m):
+            for b in range(a + 1, m):
+                p = layout.pair_index[scratch.members[a], scratch.members[b]]
+                move_pair(s.x, s.P, p, h, c.d, W, a, b, y, scratch.nu)
 
 
-@small_kernel
-def gather(c, s, layout, scratch, m, h):
-    """Squared distances, and positions by least squares over all pairs of one hypothesis."""
-    for a in range(m):
-        scratch.K[a, a] = 0.0
-        for k in range(3):
-            scratch.T[a, k] = 0.0
-    for a in range(m):
-        for b in range(a + 1, m):
-            p = layout.pair_index[scratch.members[a], scratch.members[b]]
-            squared = 0.0
-            for k in range(c.d):
-                v = s.x[p, h, k]
-                squared += v * v
-                scratch.T[b, k] += v / m
-                scratch.T[a, k] -= v / m
-            scratch.K[a, b] = squared
-            scratch.K[b, a] = squared
+@kernel
+def flatness(c, s, layout):
+    """Extent of the reported layout across itself over its standard deviation."""
+    h, d, n = s.group[0].best, c.d, s.nodes.shape[0]
+    pos = np.zeros((n, 3))
+    hypothesis_positions(s, layout, h, pos)
+    present, n_pairs = 0, 0
+    for i in range(n):
+        present += s.nodes[i].present
+        if not s.nodes[i].present:
+            pos[i] = 0.0
+    if present <= d:
+        return np.inf
+    flat = pos[:, :d].copy()
+    eigenvalues, E = np.linalg.eigh(flat.T.copy() @ flat)
+    variance = 0.0
+    for p in range(s.pairs.shape[0]):
+        if s.nodes[s.pairs[p].i].present and s.nodes[s.pairs[p].j].present:
+            n_pairs += 1
+            for k in range(d):
+                for q in range(d):
+                    variance += E[k, 0] * E[q, 0] * s.P[p, h, k, q]
+    variance *= 0.5 * present / n_pairs
+    return np.sqrt(max(eigenvalues[0], 0.0) / max(variance, 1e-12))
 
 
-@small_kernel
-def move_to(c, s, p, h, T, a, b):
-    """Replace the position of a filter; the velocity follows by the filter's covariance.
-
-    With ``G = (P_xx + R)^-1`` the state moves by ``P_xx G nu`` and ``P_vx G nu``. The
-    covariance stays as it is: the refined position holds nothing that the filters of the
-    group did not know already.
-    """
-    x, P, d = s.x, s.P, c.d
-    y0, y1, y2 = 0.0, 0.0, 0.0
-    n0 = T[b, 0] - T[a, 0] - x[p, h, 0]
-    n1 = T[b, 1] - T[a, 1] - x[p, h, 1]
-    A00, A01, A11 = P[p, h, 0, 0] + c.mds_var, P[p, h, 0, 1], P[p, h, 1, 1] + c.mds_var
-    if d == 2:
-        inverse = 1.0 / (A00 * A11 - A01 * A01)
-        y0, y1 = (A11 * n0 - A01 * n1) * inverse, (A00 * n1 - A01 * n0) * inverse
-    else:
-        n2 = T[b, 2] - T[a, 2] - x[p, h, 2]
-        A02, A12, A22 = P[p, h, 0, 2], P[p, h, 1, 2], P[p, h, 2, 2] + c.mds_var
-        c00, c01, c02 = A11 * A22 - A12 * A12, A02 * A12 - A01 * A22, A01 * A12 - A02 * A11
-        inverse = 1.0 / (A00 * c00 + A01 * c01 + A02 * c02)
-        c11, c12, c22 = A00 * A22 - A02 * A02, A01 * A02 - A00 * A12, A00 * A11 - A01 * A01
-        y0 = (c00 * n0 + c01 * n1 + c02 * n2) * inverse
-        y1 = (c01 * n0 + c11 * n1 + c12 * n2) * inverse
-        y2 = (c02 * n0 + c12 * n1 + c22 * n2) * inverse
-    for k in range(6):
-        x[p, h, k] += P[p, h, k, 0] * y0 + P[p, h, k, 1] * y1 + P[p, h, k, 2] * y2
+@kernel
+def watch_mirror(c, s, layout):
+    """Bring the mirror image up where it can no longer be excluded."""
+    group = s.group[0]
+    if group.n_alive != 1:
+        return
+    ratio = flatness(c, s, layout)
+    if ratio < FLAT:
+        group.flat = True
+    elif group.flat and ratio > OPEN:
+        group.flat = False
+        add_mirror_image(c, s, layout)
+    elif group.misfit > MISFIT and ratio > OPEN and ratio < np.inf:
+        group.misfit = 1.0
+        add_mirror_image(c, s, layout)
 
 
 @kernel
@@ -109,9 +111,7 @@ def add_mirror_image(c, s, layout):
     hypothesis_positions(s, layout, h, pos)
     flat = pos[:, : c.d].copy()
     _, E = np.linalg.eigh(flat.T.copy() @ flat)
-    M = np.zeros((6, 6))
-    for r in range(3):
-        M[r, r] = M[3 + r, 3 + r] = 1.0
+    M = np.eye(s.x.shape[2])
     for r in range(c.d):
         for k in range(c.d):
             M[r, k] -= 2.0 * E[r, 0] * E[k, 0]
@@ -151,6 +151,8 @@ def prune_bank(c, s):
             ):
                 s.alive[b] = False
     group.n_alive = np.sum(s.alive)
+    for h in range(n_hyps):
+        s.loglik[h] -= top
 
 
 @kernel
@@ -175,6 +177,7 @@ def remove_node(s, layout, i):
     """Destroy the filters of a node that left."""
     s.nodes[i].present = False
     s.nodes[i].heard = False
+    forget_mean(s)
     n_present = 0
     for k in range(s.nodes.shape[0]):
         n_present += s.nodes[k].present

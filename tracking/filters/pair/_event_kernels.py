@@ -11,11 +11,11 @@ from tracking.compiled import kernel, small_kernel
 from tracking.filters._level_kernels import level
 from tracking.filters._shape_kernels import collect
 from tracking.filters.pair._bank_kernels import (
-    add_mirror_image,
     prune_bank,
     refine_group,
     remove_node,
     remove_silent,
+    watch_mirror,
 )
 from tracking.filters.pair._pair_kernels import predict
 from tracking.filters.pair._range_kernels import (
@@ -25,7 +25,9 @@ from tracking.filters.pair._range_kernels import (
     is_aided,
     node_variance,
 )
+from tracking.filters.pair._sight_kernels import gap_evidence
 from tracking.filters.pair._start_kernels import try_join, try_start
+from tracking.filters.pair._wheel_kernels import add_mean_velocity, apply_wheels, note_heading
 from tracking.filters.pair.state import FilterState
 
 # Plain numbers of `Kind` and `Status`: kernels do not know enums.
@@ -37,17 +39,19 @@ class Scratch(NamedTuple):
     """Room for intermediate results, so that no event allocates."""
 
     work: np.ndarray
-    """Jacobian and its product with P, (2, 6)."""
+    """Jacobian and its product with P, (2, 7)."""
     members: np.ndarray
     """Present nodes, (node)."""
-    T: np.ndarray
-    """Positions, (node, 3)."""
-    K: np.ndarray
-    """Kernel of the MDS, (node, node)."""
-    X: np.ndarray
-    """(node, 3)"""
-    small: np.ndarray
-    """(2, 3, 3)"""
+    L: np.ndarray
+    """Covariance of a pair and its Cholesky factor, (6, 6)."""
+    W: np.ndarray
+    """Weights of the MDS, (pair, 6, 6)."""
+    A: np.ndarray
+    """Its normal equations, (6 node, 6 node)."""
+    y: np.ndarray
+    """Right side, then the solution, (6 node)."""
+    nu: np.ndarray
+    """(6)"""
 
 
 @kernel
@@ -62,18 +66,19 @@ def run_events(coefficients, layout, state, block, t_out, out):
             (env, event, ...).
         t_out: Times at which estimates are due, ascending, (env, time) [s]. An estimate
             holds every event up to its time, that time included.
-        out: Arrays written: pos, vel, cov, q, has_q, age, nis, status; (env, time, ...).
+        out: Arrays written: pos, vel, cov, q, has_q, age, nis, nlos, status; (env, time, ...).
     """
     t, kind, node_i, node_j, antenna_i, antenna_j, values, has_power, valid = block
     c = coefficients[0]
     n = state.nodes.shape[1]
     scratch = Scratch(
-        np.zeros((2, 6)),
+        np.zeros((2, 7)),
         np.zeros(n, np.int64),
-        np.zeros((n, 3)),
-        np.zeros((n, n)),
-        np.zeros((n, 3)),
-        np.zeros((2, 3, 3)),
+        np.zeros((6, 6)),
+        np.zeros((state.pairs.shape[1], 6, 6)),
+        np.zeros((6 * n, 6 * n)),
+        np.zeros(6 * n),
+        np.zeros(6),
     )
     for e in range(t.shape[0]):
         s = FilterState(
@@ -85,6 +90,9 @@ def run_events(coefficients, layout, state, block, t_out, out):
             state.P[e],
             state.alive[e],
             state.loglik[e],
+            state.nlos[e],
+            state.mean_v[e],
+            state.mean_cov[e],
         )
         o = 0
         for k in range(t.shape[1]):
@@ -102,18 +110,18 @@ def run_events(coefficients, layout, state, block, t_out, out):
                     i, j, a_i, a_j = j, i, a_j, a_i
                 distance = values[e, k, 0]
                 is_survey = what == SURVEY
-                R = c.range_var
-                if has_power[e, k] and values[e, k, 1] - values[e, k, 2] > c.nlos_gap:
-                    R += c.nlos_var
+                evidence = 0.0
+                if has_power[e, k]:
+                    evidence = gap_evidence(c, values[e, k, 1] - values[e, k, 2])
                 if t[e, k] - s.group[0].t_check >= c.check_period:
                     look_at_group(c, s, layout, t[e, k])
                 p, runs = hear(s, layout, i, j, t[e, k])
                 if not runs:
                     take_first_range(c, s, layout, i, j, p, t[e, k], distance, is_survey)
-                elif take_range(
-                    c, s, layout, scratch, p, a_i, a_j, t[e, k], distance, R, is_survey
-                ):
-                    add_mirror_image(c, s, layout)
+                else:
+                    take_range(
+                        c, s, layout, scratch, p, a_i, a_j, t[e, k], distance, evidence, is_survey
+                    )
             elif what == LEAVE or (what == JOIN and s.nodes[i].present):
                 remove_node(s, layout, i)
         while o < t_out.shape[1]:
@@ -129,6 +137,8 @@ def take_state(c, s, layout, i, t, values, e, k):
         for other in range(s.nodes.shape[0]):
             if other != i and s.nodes[other].present:
                 advance_pair(c, s, layout.pair_index[i, other], t)
+        add_mean_velocity(s, i, t)
+    note_heading(c, node, t, values[e, k])
     for column in range(7):
         s.held[i, column] = values[e, k, column]
     if node.levelled:
@@ -149,21 +159,24 @@ def hear(s, layout, i, j, t):
 
 
 @small_kernel
-def take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, R, is_survey):
-    """A range or survey of a running pair; True if the layout opened after being flat."""
+def take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, evidence, is_survey):
+    """A range or survey of a running pair."""
+    group = s.group[0]
     advance_pair(c, s, p, t)
     if is_survey:
         fuse_survey(c, s, p, distance, scratch.work)
         s.pairs[p].t_range = t
     else:
-        fuse_range(c, s, layout, p, t, distance, R, a_i, a_j, scratch.work)
-    if not c.use_mds or t - s.group[0].t_mds < c.mds_period:
-        return False
+        fuse_range(c, s, layout, p, t, distance, evidence, a_i, a_j, scratch.work)
+    if not c.use_mds or t - group.t_mds < c.mds_period:
+        return
     for q in range(s.pairs.shape[0]):
         if s.nodes[s.pairs[q].i].present and s.nodes[s.pairs[q].j].present:
             advance_pair(c, s, q, t)
-    s.group[0].t_mds = t
-    return refine_group(c, s, layout, scratch)
+    group.t_mds = t
+    refine_group(c, s, layout, scratch)
+    if t - group.t_wheels >= c.wheel_period:
+        apply_wheels(c, s, layout, t, scratch.work)
 
 
 @kernel
@@ -184,13 +197,15 @@ def look_at_group(c, s, layout, t):
     """From time to time: who left, and which hypotheses are still worth their time."""
     remove_silent(c, s, layout, t)
     prune_bank(c, s)
+    if c.use_mds:
+        watch_mirror(c, s, layout)
     s.group[0].t_check = t
 
 
 @kernel
 def write_estimate(c, s, t, e, o, out):
     """The best hypothesis at time t, without touching the state."""
-    pos, vel, cov, q_wb, has_q, age, nis, status = out
+    pos, vel, cov, q_wb, has_q, age, nis, nlos, status = out
     h = s.group[0].best
     x, P = np.zeros((1, 1, 6)), np.zeros((1, 1, 6, 6))
     for n in range(s.nodes.shape[0]):
@@ -204,8 +219,9 @@ def write_estimate(c, s, t, e, o, out):
         if not (node_i.present and node_j.present):
             status[e, o, p] = STARTING if node_i.heard and node_j.heard else ABSENT
             continue
-        x[0, 0] = s.x[p, h]
-        P[0, 0] = s.P[p, h]
+        x[0, 0] = s.x[p, h, :6]
+        P[0, 0] = s.P[p, h, :6, :6]
+        nlos[e, o, p] = s.nlos[p, h]
         aided_i, aided_j = is_aided(c, node_i, t), is_aided(c, node_j, t)
         w_i, w_j = 1.0 if aided_i else 0.0, 1.0 if aided_j else 0.0
         predict(

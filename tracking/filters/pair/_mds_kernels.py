@@ -1,14 +1,19 @@
-"""The MDS step of one group, compiled: shape and alignment in one closed form.
+"""Weighted MDS of one group, aligned to the filters of its pairs in the same step.
 
-Classical MDS factors the centred kernel ``K = -1/2 J D^2 J = X X^T``, and the orthogonal
-Procrustes problem turns X towards known positions T. For a kernel of rank d both are one
-expression, with no eigenvalues of K: with ``A = X^T T`` and its polar factor Q,
+Positions and velocities y_i of the nodes minimise the stress
 
-    M = T^T K T = A^T A,     K T M^(-1/2) = X A (A^T A)^(-1/2) = X Q
+    sum over pairs (y_j - y_i - x_ij)^T W_ij (y_j - y_i - x_ij),   W_ij = P_ij^-1
 
-Noise makes K only nearly of rank d; T spans nearly its leading space, and a second pass with
-T replaced by the result brings the difference to second order. `tracking.mds` is the plain
-twin with eigenvectors and a singular value decomposition.
+with the state x_ij and covariance P_ij of the pair's filter. Along the line of sight this is
+the stress of weighted multidimensional scaling, ``w_ij (|p_j - p_i| - d_ij)^2`` to first order
+[1], with the weight that the filter's range deserves; a pair out of sight is uncertain along
+its line and follows the others. Across the line it is what Procrustes does, alignment to the
+filters' own vectors, by how sure each of them is: so a layout as flat as a line needs no
+exception. The stress is quadratic; its normal equations are solved by a Cholesky factor.
+
+References:
+    [1] De Leeuw, Heiser, Multidimensional scaling with restrictions on the configuration, in
+        Multivariate Analysis V, 1980: weighted stress.
 """
 
 from __future__ import annotations
@@ -17,118 +22,119 @@ import math
 
 from tracking.compiled import small_kernel
 
-PASSES = 2
-SWEEPS = 6
+LEAST_VAR = 1e-6
+"""[m2], [m2/s2] Added to every variance: surveyed pairs of fixed nodes are as good as exact."""
 
 
 @small_kernel
-def inverse_root(M, V, d, rank):
-    """``M^(-1/2)`` of a symmetric matrix, in place; returns its least eigenvalue in use.
-
-    Jacobi rotations, exact to rounding for d <= 3 in a few sweeps.
-
-    Args:
-        M: Symmetric, (3, 3); replaced.
-        V: Scratch, (3, 3).
-        d: 2 or 3.
-        rank: Directions that are used, the greatest.
-    """
-    for r in range(d):
-        for k in range(d):
-            V[r, k] = 1.0 if r == k else 0.0
-    for _ in range(SWEEPS):
-        off = 0.0
-        for r in range(d):
-            for k in range(r + 1, d):
-                off += M[r, k] * M[r, k]
-        if off < 1e-30 * (M[0, 0] * M[0, 0] + M[1, 1] * M[1, 1] + 1e-300):
-            break
-        for a in range(d):
-            for b in range(a + 1, d):
-                if M[a, b] == 0.0:
-                    continue
-                theta = (M[b, b] - M[a, a]) / (2.0 * M[a, b])
-                t = 1.0 / (abs(theta) + math.sqrt(theta * theta + 1.0))
-                if theta < 0.0:
-                    t = -t
-                c = 1.0 / math.sqrt(t * t + 1.0)
-                s = t * c
-                for k in range(d):
-                    m_a, m_b = M[k, a], M[k, b]
-                    M[k, a], M[k, b] = c * m_a - s * m_b, s * m_a + c * m_b
-                for k in range(d):
-                    m_a, m_b = M[a, k], M[b, k]
-                    M[a, k], M[b, k] = c * m_a - s * m_b, s * m_a + c * m_b
-                for k in range(d):
-                    v_a, v_b = V[k, a], V[k, b]
-                    V[k, a], V[k, b] = c * v_a - s * v_b, s * v_a + c * v_b
-    e0, e1, e2 = M[0, 0], M[1, 1], M[2, 2] if d == 3 else math.inf
-    least = min(e0, e1, e2)
-    if rank < d:
-        # Fewer nodes than span the space: the direction across them is left out.
-        least = e0 + e1 + (e2 if d == 3 else 0.0) - least - max(e0, e1, e2 if d == 3 else 0.0)
-        if d == 2:
-            least = max(e0, e1)
-    floor = max(0.5 * least, 1e-12)
-    w0 = 1.0 / math.sqrt(e0) if e0 >= floor else 0.0
-    w1 = 1.0 / math.sqrt(e1) if e1 >= floor else 0.0
-    w2 = 1.0 / math.sqrt(e2) if d == 3 and e2 >= floor else 0.0
-    for r in range(d):
-        for k in range(d):
-            s = V[r, 0] * w0 * V[k, 0] + V[r, 1] * w1 * V[k, 1]
-            M[r, k] = s + V[r, 2] * w2 * V[k, 2] if d == 3 else s
-    return least
+def at(k, d):
+    """Place of the k-th of 2 d coordinates in the state of a pair."""
+    return k if k < d else 3 + k - d
 
 
 @small_kernel
-def refine(T, K, X, small, m, d):
-    """Shape from squared distances, aligned to known positions.
+def invert(L, W, m):
+    """Inverse of a positive definite matrix.
 
     Args:
-        T: Centred known positions, (node, 3) [m]; replaced by the refined ones.
-        K: Squared distances of the first m nodes, (node, node) [m2]; replaced by the kernel.
-        X: Scratch, (node, 3).
-        small: Scratch, (2, 3, 3).
-        m: Nodes used.
-        d: 2 or 3 dimensions.
-
-    Returns:
-        The smallest spread of the layout, its root-mean-square extent [m] along the least of
-        its d axes; near zero the mirror image cannot be told from the distances.
+        L: The matrix, (m, m) in its corner; its lower triangle becomes the Cholesky factor.
+        W: The inverse, written, (m, m) in its corner.
+        m: Size.
     """
-    total = 0.0
-    for i in range(m):
-        s = 0.0
-        for j in range(m):
-            s += K[i, j]
-        X[i, 0] = s / m
-        total += s / (m * m)
-    for i in range(m):
-        for j in range(m):
-            K[i, j] = -0.5 * (K[i, j] - X[i, 0] - X[j, 0] + total)
-    M, V = small[0], small[1]
-    spread = 0.0
-    for _ in range(PASSES):
-        for i in range(m):
-            for k in range(d):
-                s = 0.0
-                for j in range(m):
-                    s += K[i, j] * T[j, k]
-                X[i, k] = s
-        for r in range(d):
-            for k in range(r, d):
-                s = 0.0
-                for i in range(m):
-                    s += T[i, r] * X[i, k]
-                M[r, k] = s
-                M[k, r] = s
-        # T near X makes M near (X^T X)^2, so its fourth root is an extent.
-        least = inverse_root(M, V, d, min(d, m - 1))
-        spread = math.sqrt(math.sqrt(max(least, 0.0)) / m)
-        for i in range(m):
-            for k in range(d):
-                s = 0.0
-                for r in range(d):
-                    s += X[i, r] * M[r, k]
-                T[i, k] = s
-    return spread
+    factor(L, m)
+    for k in range(m):
+        # Column k of the inverse of L, then of L^-T L^-1.
+        for r in range(m):
+            s = 1.0 if r == k else 0.0
+            for q in range(k, r):
+                s -= L[r, q] * W[q, k]
+            W[r, k] = s / L[r, r] if r >= k else 0.0
+    for k in range(m):
+        for r in range(m - 1, k - 1, -1):
+            s = W[r, k]
+            for q in range(r + 1, m):
+                s -= L[q, r] * W[q, k]
+            W[r, k] = s / L[r, r]
+    for k in range(m):
+        for r in range(k):
+            W[r, k] = W[k, r]
+
+
+@small_kernel
+def factor(L, m):
+    """Cholesky factor of a symmetric positive definite matrix, in its lower triangle."""
+    for k in range(m):
+        for r in range(k, m):
+            s = L[r, k]
+            for q in range(k):
+                s -= L[r, q] * L[k, q]
+            if r == k:
+                L[k, k] = math.sqrt(max(s, 1e-12))
+            else:
+                L[r, k] = s / L[k, k]
+
+
+@small_kernel
+def solve(L, b, m):
+    """Solve ``L L^T y = b`` in place."""
+    for r in range(m):
+        s = b[r]
+        for q in range(r):
+            s -= L[r, q] * b[q]
+        b[r] = s / L[r, r]
+    for r in range(m - 1, -1, -1):
+        s = b[r]
+        for q in range(r + 1, m):
+            s -= L[q, r] * b[q]
+        b[r] = s / L[r, r]
+
+
+@small_kernel
+def weigh(P, p, h, d, L, W):
+    """Weight of pair p in hypothesis h: the inverse of its covariance, (2 d, 2 d)."""
+    m = 2 * d
+    for r in range(m):
+        for k in range(m):
+            L[r, k] = P[p, h, at(r, d), at(k, d)]
+        L[r, r] += LEAST_VAR
+    invert(L, W[p], m)
+
+
+@small_kernel
+def add_pair(x, p, h, d, W, a, b, A, y):
+    """Add pair p between members a < b to the normal equations; member 0 is the origin."""
+    m = 2 * d
+    for r in range(m):
+        pull = 0.0
+        for k in range(m):
+            w = W[p, r, k]
+            pull += w * x[p, h, at(k, d)]
+            A[(b - 1) * m + r, (b - 1) * m + k] += w
+            if a > 0:
+                A[(a - 1) * m + r, (a - 1) * m + k] += w
+                A[(b - 1) * m + r, (a - 1) * m + k] -= w
+        y[(b - 1) * m + r] += pull
+        if a > 0:
+            y[(a - 1) * m + r] -= pull
+
+
+@small_kernel
+def move_pair(x, P, p, h, d, W, a, b, y, nu):
+    """Put the filter of pair p where the solution has it; its range error follows.
+
+    The rest of the state moves by its regression on what was moved, ``P_ey P_yy^-1 nu``. The
+    covariance stays: the solution holds little that the filters of the group did not know.
+    """
+    m = 2 * d
+    for r in range(m):
+        value = y[(b - 1) * m + r]
+        if a > 0:
+            value -= y[(a - 1) * m + r]
+        nu[r] = value - x[p, h, at(r, d)]
+        x[p, h, at(r, d)] = value
+    for e in range(6, x.shape[2]):
+        for r in range(m):
+            s = 0.0
+            for k in range(m):
+                s += W[p, r, k] * nu[k]
+            x[p, h, e] += P[p, h, e, at(r, d)] * s

@@ -1,8 +1,9 @@
 """The Kalman filter of one pair: prediction and scalar corrections, in place.
 
-State ``x = (pos_ij, vel_ij)``, six numbers, and covariance ``P``, of pair p in hypothesis h.
-In two dimensions the vertical rows stay exactly zero: nothing is uncertain across the plane.
-Arrays are indexed inside the kernels, since handing on slices costs more than the algebra.
+State ``x = (pos_ij, vel_ij, e)``, seven numbers, and covariance ``P``, of pair p in hypothesis h;
+e is the slow error of the pair's ranges, which kernels also do without. In two dimensions the
+vertical rows stay exactly zero: nothing is uncertain across the plane. Arrays are indexed inside
+the kernels, since handing on slices costs more than the algebra.
 """
 
 from __future__ import annotations
@@ -43,6 +44,11 @@ def predict(x, P, p, h, dt, a0, a1, a2, psd, d):
             p_xv = P[p, h, r, 3 + k] + dt * P[p, h, 3 + r, 3 + k]
             P[p, h, r, 3 + k] = p_xv
             P[p, h, 3 + k, r] = p_xv
+    for e in range(6, x.shape[2]):
+        for k in range(d):
+            p_xe = P[p, h, k, e] + dt * P[p, h, 3 + k, e]
+            P[p, h, k, e] = p_xe
+            P[p, h, e, k] = p_xe
     q = psd * psd * dt
     for k in range(d):
         P[p, h, k, k] += 0.25 * q * dt * dt
@@ -64,23 +70,24 @@ def correct(x, P, p, h, work, nu, R):
         P: Covariances.
         p: Pair.
         h: Hypothesis.
-        work: Row 0 holds the Jacobian H; row 1 is scratch; (2, 6).
+        work: Row 0 holds the Jacobian H; row 1 is scratch; (2, state).
         nu: Innovation.
         R: Variance of the measurement.
     """
+    m = x.shape[2]
     S = R
-    for r in range(6):
+    for r in range(m):
         s = 0.0
-        for k in range(6):
+        for k in range(m):
             s += P[p, h, r, k] * work[0, k]
         work[1, r] = s
         S += work[0, r] * s
     inv_S = 1.0 / S
-    for r in range(6):
+    for r in range(m):
         x[p, h, r] += work[1, r] * inv_S * nu
-    for r in range(6):
+    for r in range(m):
         K_r = work[1, r] * inv_S
-        for k in range(r, 6):
+        for k in range(r, m):
             v = P[p, h, r, k] - K_r * work[1, k]
             P[p, h, r, k] = v
             P[p, h, k, r] = v
@@ -89,7 +96,7 @@ def correct(x, P, p, h, work, nu, R):
 
 @small_kernel
 def range_model(x, p, h, l0, l1, l2, work):
-    """Distance between two antennas; writes its Jacobian to row 0 of work.
+    """Range between two antennas, its slow error included; its Jacobian to row 0 of work.
 
     ``l0 l1 l2`` is the antenna's offset on j minus that on i, world frame [m].
     """
@@ -98,13 +105,20 @@ def range_model(x, p, h, l0, l1, l2, work):
     inverse = 1.0 / max(distance, MIN_DISTANCE)
     work[0, 0], work[0, 1], work[0, 2] = r0 * inverse, r1 * inverse, r2 * inverse
     work[0, 3] = work[0, 4] = work[0, 5] = 0.0
+    for e in range(6, x.shape[2]):
+        work[0, e] = 1.0
+        distance += x[p, h, e]
     return distance
 
 
 @small_kernel
 def range_rate_model(x, p, h, l0, l1, l2, work):
     """Rate of the distance, ``u . vel`` with u the unit vector along it, and its Jacobian."""
-    distance = max(range_model(x, p, h, l0, l1, l2, work), MIN_DISTANCE)
+    range_model(x, p, h, l0, l1, l2, work)
+    r0, r1, r2 = x[p, h, 0] + l0, x[p, h, 1] + l1, x[p, h, 2] + l2
+    distance = max(math.sqrt(r0 * r0 + r1 * r1 + r2 * r2), MIN_DISTANCE)
+    for e in range(6, x.shape[2]):
+        work[0, e] = 0.0
     rate = 0.0
     for k in range(3):
         rate += work[0, k] * x[p, h, 3 + k]
@@ -121,6 +135,8 @@ def speed_model(x, p, h, work):
     v0, v1, v2 = x[p, h, 3], x[p, h, 4], x[p, h, 5]
     speed = math.sqrt(v0 * v0 + v1 * v1 + v2 * v2)
     inverse = 1.0 / max(speed, 1e-6)
+    for e in range(6, x.shape[2]):
+        work[0, e] = 0.0
     for k in range(3):
         work[0, k] = 0.0
         work[0, 3 + k] = x[p, h, 3 + k] * inverse

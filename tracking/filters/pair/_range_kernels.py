@@ -12,8 +12,10 @@ from tracking.filters.pair._pair_kernels import (
     range_rate_model,
     speed_model,
 )
+from tracking.filters.pair._sight_kernels import change_sight, fade_error, judge_sight
 
-LN_2PI = math.log(2.0 * math.pi)
+MOST_BEND = 0.1
+"""[m] No more noise than this is added for what the straight line misses."""
 
 
 @small_kernel
@@ -126,7 +128,23 @@ def update_rate(c, pair, t, distance):
 
 
 @small_kernel
-def fuse_range(c, s, layout, p, t, distance, R, antenna_i, antenna_j, work):
+def bend(s, p, h, work):
+    """What the straight line misses: how much longer a range is on average than predicted [m].
+
+    To second order ``tr(P_across) / (2 d)``, with P_across the covariance of the relative
+    position across the line of sight.
+    """
+    trace, along, squared = 0.0, 0.0, 0.0
+    for a in range(3):
+        squared += s.x[p, h, a] * s.x[p, h, a]
+        trace += s.P[p, h, a, a]
+        for b in range(3):
+            along += work[0, a] * s.P[p, h, a, b] * work[0, b]
+    return 0.5 * max(trace - along, 0.0) / math.sqrt(squared + 0.01)
+
+
+@small_kernel
+def fuse_range(c, s, layout, p, t, distance, evidence, antenna_i, antenna_j, work):
     """Gate a range, then correct pair p of every hypothesis with it and with its rate."""
     if not passes_gate(c, s, p, t, distance):
         return
@@ -134,6 +152,7 @@ def fuse_range(c, s, layout, p, t, distance, R, antenna_i, antenna_j, work):
     i0, i1, i2 = antenna_offset(s, layout, pair.i, antenna_i)
     j0, j1, j2 = antenna_offset(s, layout, pair.j, antenna_j)
     l0, l1, l2 = j0 - i0, j1 - i1, j2 - i2
+    dt = max(t - pair.t_range, 0.0)
     has_rate = update_rate(c, pair, t, distance)
     group = s.group[0]
     many = group.n_alive > 1
@@ -141,15 +160,26 @@ def fuse_range(c, s, layout, p, t, distance, R, antenna_i, antenna_j, work):
     for h in range(first, end):
         if not s.alive[h]:
             continue
+        fade_error(c, s, p, h, dt)
         nu = distance - range_model(s.x, p, h, l0, l1, l2, work)
-        S = correct(s.x, s.P, p, h, work, nu, R)
-        nis = nu * nu / S
-        if many:
-            s.loglik[h] -= 0.5 * (min(nis, c.max_nis) + math.log(S) + LN_2PI)
+        variance, w_e = predicted_variance(s.P, p, h, work)
+        nis = nu * nu / (variance + c.range_var)
+        switched, sane, loglik = judge_sight(c, s, p, h, dt, nu, variance, w_e, evidence)
+        if switched > 0.01:
+            change_sight(c, s, p, h, switched)
+            nu = distance - range_model(s.x, p, h, l0, l1, l2, work)
+        bent = min(c.bend_gain * bend(s, p, h, work), MOST_BEND)
+        R = c.range_var + bent * bent + s.nlos[p, h] * c.excess_white_var
+        if sane > 1e-3:
+            correct(s.x, s.P, p, h, work, nu, R / sane)
+        s.loglik[h] += c.evidence * max(
+            loglik, -0.5 * (c.max_nis + math.log(variance + c.range_var))
+        )
         if h == group.best:
             pair.nis = nis
             group.nis_sum += nis
             group.nis_n += 1
+            group.misfit += 0.01 * (sane * min(nis, 25.0) - group.misfit)
         if has_rate and c.speed_model == 1:
             nu = pair.rate - range_rate_model(s.x, p, h, l0, l1, l2, work)
             correct(s.x, s.P, p, h, work, nu, c.speed_var)
@@ -159,3 +189,16 @@ def fuse_range(c, s, layout, p, t, distance, R, antenna_i, antenna_j, work):
     pair.last_distance = distance
     pair.t_range = t
     pair.n_ranges += 1
+
+
+@small_kernel
+def predicted_variance(P, p, h, work):
+    """Variance of a predicted range, and its covariance with the range's slow error [m2]."""
+    variance, w_e = 0.0, 0.0
+    for r in range(P.shape[2]):
+        total = 0.0
+        for k in range(P.shape[2]):
+            total += P[p, h, r, k] * work[0, k]
+        variance += work[0, r] * total
+        w_e = total
+    return variance, w_e

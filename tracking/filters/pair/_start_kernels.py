@@ -18,6 +18,10 @@ from tracking.filters._shape_kernels import (
     place,
     start_distance,
 )
+from tracking.filters.pair._sight_kernels import E
+
+MEAN_SPEED_VAR = 4.0
+"""[m2/s2] Variance of the mean velocity of a group before its wheels tell."""
 
 
 @kernel
@@ -31,11 +35,22 @@ def begin_pair(c, s, h, p, pos, t):
         s.x[p, h, k] = pos[k]
         s.P[p, h, k, k] = 1.0
         s.P[p, h, 3 + k, 3 + k] = 0.0 if both_static else 1.0
+    s.P[p, h, E, E] = c.slow_var
+    s.nlos[p, h] = 0.1
     pair.t = t
     pair.t_range = t
     pair.n_ranges = 0
     pair.in_a_row = 0
     pair.rate = 0.0
+
+
+@kernel
+def forget_mean(s):
+    """The mean velocity of another group is not known."""
+    s.mean_v[:] = 0.0
+    s.mean_cov[:] = 0.0
+    s.mean_cov[:, 0, 0] = MEAN_SPEED_VAR
+    s.mean_cov[:, 1, 1] = MEAN_SPEED_VAR
 
 
 @kernel
@@ -57,6 +72,7 @@ def try_start(c, s, layout, t):
                 if members[a] < members[b]:
                     p = layout.pair_index[members[a], members[b]]
                     begin_pair(c, s, h, p, Y[b] - Y[a], t)
+    forget_mean(s)
     group = s.group[0]
     group.started = True
     group.flat = False
@@ -64,6 +80,8 @@ def try_start(c, s, layout, t):
     group.best = 0
     group.t_check = t
     group.t_mds = t
+    group.t_wheels = t
+    group.misfit = 0.0
 
 
 @kernel
@@ -119,6 +137,7 @@ def try_join(c, s, layout, new, t):
                     p = layout.pair_index[k, new]
                     begin_pair(c, s, target, p, sign * (sides[side] - pos[k]), t)
     s.nodes[new].present = True
+    forget_mean(s)
 
 
 @kernel
@@ -130,6 +149,9 @@ def copy_hypothesis(s, h):
             s.loglik[free] = s.loglik[h]
             s.x[:, free] = s.x[:, h]
             s.P[:, free] = s.P[:, h]
+            s.nlos[:, free] = s.nlos[:, h]
+            s.mean_v[free] = s.mean_v[h]
+            s.mean_cov[free] = s.mean_cov[h]
             s.group[0].n_alive += 1
             return free
     return -1

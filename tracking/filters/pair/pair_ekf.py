@@ -73,6 +73,7 @@ class PairEkf:
             estimate.has_orientation,
             estimate.age,
             estimate.nis,
+            estimate.nlos_prob,
             estimate.status,
         )
         run_events(

@@ -44,14 +44,82 @@ class MdsParams:
 
     period: float = 0.012
     """[s] Shortest time between two refinements: one ranging round of three nodes."""
-    std: float = 0.3
-    """[m] Standard deviation of a refined position as a measurement of the filters. Towards 0
-    it replaces the position outright, as the paper has it."""
     min_spread: float = 0.15
-    """[m] Layouts flatter than this are not refined: their mirror image cannot be told."""
+    """[m] A newcomer is placed on both sides of a layout that is flatter than this."""
 
     def __post_init__(self) -> None:
-        _expect_positive(self, "period std min_spread")
+        _expect_positive(self, "period min_spread")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RangeErrorParams:
+    """How a range errs in sight: white noise, and a part that lasts while nobody moves."""
+
+    white_std: float = 0.06
+    """[m] Of a single range."""
+    slow_std: float = 0.045
+    """[m] Multipath and antennas: another one metres further."""
+    slow_length: float = 1.5
+    """[m] Relative way after which it is another. Shorter than it is: what MDS moves, a filter
+    does not remember, and its range error would wander off."""
+    least_speed: float = 1.0
+    """[m/s] Relative speed counted at least. Zero keeps the error of a pair at rest for ever."""
+    bend_gain: float = 0.1
+    """[-] Trust lost where a filter is uncertain across a short line of sight, in units of the
+    second-order error there."""
+
+    def __post_init__(self) -> None:
+        _expect_positive(self, "white_std slow_std slow_length least_speed bend_gain")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NlosParams:
+    """Ranges that are not line of sight, and those that are plainly wrong."""
+
+    enter_rate: float = 0.5
+    """[1/s] How often a pair loses sight."""
+    leave_rate: float = 5.0
+    """[1/s] How often it regains it."""
+    excess: float = 0.15
+    """[m] Mean of what is added to a range behind an obstacle."""
+    excess_std: float = 0.12
+    """[m] Its standard deviation."""
+    excess_length: float = 1.5
+    """[m] Relative way after which the excess is another."""
+    white_std: float = 0.25
+    """[m] White noise that is added behind an obstacle: the excess jumps where paths change."""
+    gap_los: float = 3.0
+    """[dB] Received minus first-path power in sight."""
+    gap_los_std: float = 1.2
+    """[dB]"""
+    gap_nlos: float = 8.0
+    """[dB] The same behind an obstacle."""
+    gap_nlos_std: float = 3.0
+    """[dB]"""
+    gap_weight: float = 0.2
+    """[-] Gaps of successive ranges are alike, so that each counts for less than one."""
+    outlier_prob: float = 1e-2
+    """[-] Share of ranges that mean nothing."""
+    outlier_span: float = 20.0
+    """[m] They lie anywhere in so much."""
+
+    def __post_init__(self) -> None:
+        _expect_positive(self, " ".join(self.__slots__))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WheelParams:
+    """The rear axle of a car does not slide sideways."""
+
+    std: float = 0.15
+    """[m/s] Sideways speed of the axle, each time it is used: slip, and a heading that is wrong."""
+    rear_axle: float = 0.15
+    """[m] How far the tracker is ahead of the axle."""
+    period: float = 0.05
+    """[s] Time between two uses."""
+
+    def __post_init__(self) -> None:
+        _expect_positive(self, "std rear_axle period")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,13 +141,16 @@ class StartParams:
     of real ranges are correlated over a second, so that their evidence counts too much."""
     merge_distance: float = 0.25
     """[m] Two hypotheses as near as this in every pair are one."""
+    evidence: float = 0.3
+    """[-] So much each range counts in the likelihood: errors that last make successive ranges
+    say the same thing."""
     max_nis: float = 6.0
     """[-] A single range counts for at most this in the likelihood, outlier or not."""
     check_period: float = 0.25
     """[s] Time between two looks at the bank."""
 
     def __post_init__(self) -> None:
-        _expect_positive(self, "k max_age rotations_2d prune merge_distance max_nis check_period")
+        _expect_positive(self, " ".join(self.__slots__))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,19 +160,14 @@ class PairEkfParams:
     accel_psd: float = 0.15
     """[m/s2/sqrt(Hz)] Noise of one node's world acceleration: sensor noise, vibration and the
     slow error of a wrong tilt. Larger forgets dead reckoning sooner."""
-    wheeled_accel_psd: float = 0.035
+    wheeled_accel_psd: float = 0.07
     """[m/s2/sqrt(Hz)] The same on cars and robots, whose acceleration is free of tilt errors."""
+    hand_accel_psd: float = 0.3
+    """[m/s2/sqrt(Hz)] The same in a hand, whose heading is often off by many degrees."""
     unaided_accel_psd: float = 0.7
     """[m/s2/sqrt(Hz)] The same for a moving node whose IMU is not heard."""
     unaided_after: float = 0.3
     """[s] A node whose IMU was silent for so long is unaided."""
-    range_std: float = 0.15
-    """[m] Standard deviation of a range. 5 to 10 cm in sight; the rest is for the bias of real
-    ranges, which lasts for seconds."""
-    nlos_gap: float = 5.5
-    """[dB] A range whose first path is so much weaker than all it received is no line of sight."""
-    nlos_std: float = 0.3
-    """[m] Added standard deviation of such a range: a stretch of them counts as a single one."""
     survey_std: float = 0.02
     """[m] Standard deviation of a surveyed distance."""
     speed_model: Literal["range-rate", "speed-norm", "none"] = "range-rate"
@@ -118,13 +184,16 @@ class PairEkfParams:
     """[s] A node not heard for so long has left; its filters are destroyed."""
     gate: GateParams = field(default_factory=GateParams)
     mds: MdsParams = field(default_factory=MdsParams)
+    range_error: RangeErrorParams = field(default_factory=RangeErrorParams)
+    nlos: NlosParams = field(default_factory=NlosParams)
+    wheels: WheelParams = field(default_factory=WheelParams)
     start: StartParams = field(default_factory=StartParams)
 
     def __post_init__(self) -> None:
-        _expect_positive(self, "accel_psd wheeled_accel_psd unaided_accel_psd unaided_after")
+        _expect_positive(self, "accel_psd wheeled_accel_psd hand_accel_psd unaided_accel_psd")
         _expect_positive(
             self,
-            "range_std nlos_gap nlos_std survey_std speed_std speed_tau lost_after leave_after",
+            "unaided_after survey_std speed_std speed_tau lost_after leave_after",
         )
         if self.speed_model not in ("range-rate", "speed-norm", "none"):
             raise ConfigError(

@@ -30,7 +30,12 @@ NODE = np.dtype(
         ("present", "?"),  # in the group, with filters
         ("static", "?"),  # constant: never moves
         ("levelled", "?"),  # constant: its carrier stays level
+        ("yaw", "f8"),  # of the body [rad]
+        ("yaw_rate", "f8"),  # low-passed [rad/s]
+        ("t_sum", "f8"),  # until when its acceleration is in the mean velocity [s]
         ("psd", "f8"),  # constant: acceleration noise with an IMU [m/s2/sqrt(Hz)]
+        ("sideways_var", "f8"),  # constant: of its rear axle [m2/s2]; 0 if it may slide
+        ("rear_axle", "f8"),  # constant: how far the tracker is ahead of it [m]
     ]
 )
 PAIR = np.dtype(
@@ -58,6 +63,10 @@ GROUP = np.dtype(
         ("n_alive", "i8"),  # hypotheses still considered
         ("best", "i8"),  # the hypothesis reported
         ("t_mds", "f8"),  # time of the last refinement [s]
+        ("t_wheels", "f8"),  # time of the last use of the wheels [s]
+        ("dv0", "f8"),  # sum over nodes of what their acceleration added since then [m/s]
+        ("dv1", "f8"),
+        ("misfit", "f8"),  # running mean of NIS [-]
         ("t_check", "f8"),  # time of the last look at the bank [s]
         ("nis_sum", "f8"),  # over accepted ranges, in the best hypothesis
         ("nis_n", "i8"),
@@ -68,8 +77,25 @@ _NUMBERS = (
     "unaided_after",
     "range_var",
     "survey_var",
-    "nlos_gap",
-    "nlos_var",
+    "slow_var",
+    "slow_length",
+    "least_speed",
+    "bend_gain",
+    "evidence",
+    "enter_rate",
+    "leave_rate",
+    "excess",
+    "excess_var",
+    "excess_length",
+    "excess_white_var",
+    "gap_los",
+    "gap_los_std",
+    "gap_nlos",
+    "gap_nlos_std",
+    "gap_weight",
+    "outlier_prob",
+    "outlier_span",
+    "wheel_period",
     "speed_var",
     "speed_tau",
     "lost_after",
@@ -80,7 +106,6 @@ _NUMBERS = (
     "gate_min_speed",
     "gate_max_rejected",
     "mds_period",
-    "mds_var",
     "mds_min_spread",
     "start_k",
     "start_max_age",
@@ -109,13 +134,19 @@ class FilterState(NamedTuple):
     group: Records
     """GROUP, (env, 1)."""
     x: F64
-    """Position [m] and velocity [m/s], (env, pair, hyp, 6)."""
+    """Position [m], velocity [m/s] and range error [m], (env, pair, hyp, 7)."""
     P: F64
-    """Covariance, (env, pair, hyp, 6, 6)."""
+    """Covariance, (env, pair, hyp, 7, 7)."""
     alive: Bool
     """True for hypotheses still considered, (env, hyp)."""
     loglik: F64
-    """Log-likelihood of the ranges, (env, hyp)."""
+    """Log-likelihood of the ranges and wheels, (env, hyp)."""
+    nlos: F64
+    """Probability that a pair is out of sight, (env, pair, hyp)."""
+    mean_v: F64
+    """Mean velocity of the group, horizontal, (env, hyp, 2) [m/s]."""
+    mean_cov: F64
+    """Its covariance, (env, hyp, 2, 2)."""
 
 
 class Layout(NamedTuple):
@@ -139,24 +170,33 @@ def make_coefficients(
 ) -> Records:
     """Derive the constants of the kernels, (1)."""
     c = np.zeros(1, dtype=COEFFICIENTS)
+    rows = 2 * constellation.dimensions * (constellation.n_nodes - 1)
+    e, v, w = params.range_error, params.nlos, params.wheels
     values = {
         "d": constellation.dimensions,
         "use_mds": use_mds,
         "speed_model": SPEED_MODELS[params.speed_model],
         "unaided_psd": params.unaided_accel_psd,
         "unaided_after": params.unaided_after,
-        "range_var": params.range_std**2,
+        "range_var": e.white_std**2,
+        "slow_var": e.slow_std**2,
+        "slow_length": e.slow_length,
+        "least_speed": e.least_speed,
+        "bend_gain": e.bend_gain,
+        "evidence": params.start.evidence,
+        **{k: getattr(v, k) for k in v.__slots__ if k in _NUMBERS},
+        "excess_var": v.excess_std**2,
+        "excess_white_var": v.white_std**2,
         "survey_var": params.survey_std**2,
-        "nlos_gap": params.nlos_gap,
-        "nlos_var": params.nlos_std**2,
         "speed_var": params.speed_std**2,
         "speed_tau": params.speed_tau,
         "lost_after": params.lost_after,
         "leave_after": params.leave_after,
         **{f"gate_{k}": getattr(params.gate, k) for k in params.gate.__slots__},
-        "mds_period": params.mds.period,
-        "mds_var": params.mds.std**2,
+        # The cost of a refinement grows with the cube of the group: it keeps its share.
+        "mds_period": params.mds.period * max(1.0, (rows / 30.0) ** 2),
         "mds_min_spread": params.mds.min_spread,
+        "wheel_period": w.period,
         "start_k": params.start.k,
         "start_max_age": params.start.max_age,
         "prune": params.start.prune,
@@ -182,15 +222,15 @@ def make_state(
     n, p = constellation.n_nodes, constellation.n_pairs
     nodes = np.zeros((n_envs, n), dtype=NODE)
     nodes["static"] = constellation.is_static
+    psd = {"hand": params.hand_accel_psd, **dict.fromkeys(WHEELED, params.wheeled_accel_psd)}
     nodes["psd"] = [
-        0.0
-        if node.kind == "static"
-        else params.wheeled_accel_psd
-        if node.vehicle in WHEELED
-        else params.accel_psd
+        0.0 if node.kind == "static" else psd.get(node.vehicle, params.accel_psd)
         for node in constellation.nodes
     ]
     nodes["levelled"] = [node.vehicle in WHEELED for node in constellation.nodes]
+    cars = [node.vehicle == "car" and node.kind == "moving" for node in constellation.nodes]
+    nodes["sideways_var"] = np.where(cars, params.wheels.std**2, 0.0)
+    nodes["rear_axle"] = params.wheels.rear_axle
     held = np.zeros((n_envs, n, 7))
     held[..., 0] = 1.0
     pairs = np.zeros((n_envs, p), dtype=PAIR)
@@ -200,8 +240,11 @@ def make_state(
         held=held,
         pairs=pairs,
         group=np.zeros((n_envs, 1), dtype=GROUP),
-        x=np.zeros((n_envs, p, n_hyps, 6)),
-        P=np.zeros((n_envs, p, n_hyps, 6, 6)),
+        x=np.zeros((n_envs, p, n_hyps, 7)),
+        P=np.zeros((n_envs, p, n_hyps, 7, 7)),
         alive=np.zeros((n_envs, n_hyps), dtype=bool),
         loglik=np.zeros((n_envs, n_hyps)),
+        nlos=np.zeros((n_envs, p, n_hyps)),
+        mean_v=np.zeros((n_envs, n_hyps, 2)),
+        mean_cov=np.zeros((n_envs, n_hyps, 2, 2)),
     )
