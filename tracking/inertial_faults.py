@@ -94,7 +94,7 @@ def at_limit(health: InertialHealth, accel_b: F64) -> tuple[Bool, Bool]:
     cut = np.zeros(accel_b.shape, dtype=bool)
     health.limits = health.limits.copy()  # a saved copy of the health may share it
     find_limits(health.limits, np.ascontiguousarray(accel_b), cut)
-    n_whole = _run_lengths(~cut.any(axis=1), health.n_whole)
+    n_whole = _run_lengths(np.asarray(~cut.any(axis=1)), health.n_whole)
     health.n_whole = int(n_whole[-1])
     return cut, n_whole >= WHOLE_AFTER
 

@@ -10,7 +10,7 @@ from vqf import VQF
 
 from tracking.constellation import Constellation, NodeConfig
 from tracking.geometry import GRAVITY, rotate, yaw_of
-from tracking.inertial_faults import InertialHealth, inspect
+from tracking.inertial_faults import InertialHealth, at_limit, inspect
 from tracking.measurements import Kind, MeasurementBlock
 from tracking.orientation import Orientation, OrientationParams
 
@@ -118,6 +118,32 @@ def test_any_cut_into_blocks_judges_samples_the_same(seed, cuts):
         parts.append(inspect(health, samples[a:b]))
     for k in range(2):
         np.testing.assert_array_equal(np.concatenate([p[k] for p in parts]), whole[k])
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=st.integers(0, 2**31), cuts=st.lists(st.integers(1, 399), max_size=6))
+def test_any_cut_into_blocks_finds_the_same_limits(seed, cuts):
+    accel = 3.0 * np.random.default_rng(seed).standard_normal((400, 3)).clip(-1.0, 1.0)
+    whole = at_limit(InertialHealth(), accel)
+    health, parts = InertialHealth(), []
+    for a, b in itertools.pairwise([0, *sorted(set(cuts)), 400]):
+        parts.append(at_limit(health, accel[a:b]))
+    for k in range(2):
+        np.testing.assert_array_equal(np.concatenate([p[k] for p in parts]), whole[k])
+
+
+def test_flat_tops_are_limits_and_a_rest_is_none():
+    """Cut at 2 m/s2 nearly all such readings are found; rounded noise about gravity has none."""
+    t = np.arange(2000) / 100.0
+    noise = 0.05 * np.random.default_rng(2).standard_normal((2000, 3))
+    moving = noise + np.stack([4.0 * np.sin(3.0 * t), 0.0 * t, 0.0 * t + GRAVITY], axis=1)
+    spoilt = np.column_stack([moving[:, :2].clip(-2.0, 2.0), moving[:, 2]])
+    cut, upright = at_limit(InertialHealth(), spoilt)
+    assert cut[:, 0].sum() > 0.9 * (np.abs(moving[:, 0]) > 2.0).sum()
+    assert not cut[:, 1:].any()
+    assert not upright[cut.any(axis=1)].any()
+    at_rest = (noise + [0.0, 0.0, GRAVITY]).round(1)
+    assert not at_limit(InertialHealth(), at_rest)[0].any()
 
 
 def test_single_absurd_readings_are_replaced():

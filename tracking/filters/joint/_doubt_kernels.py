@@ -67,11 +67,10 @@ def watch_nodes(c, s, layout, t):
         if astray or offset > limit:
             if not node.doubted:
                 free_offset(s, layout, i, JUMP**2)
-                open_node(c, s, i, 0.0 if astray else 0.0, 0.0)
             else:
                 free_offset(s, layout, i, WANDER**2 * dt)
                 if astray:
-                    open_node(c, s, i, SPEED**2 * dt, SPEED**2 * dt)
+                    open_node(c, s, i, SPEED**2 * dt)
             node.doubted, node.t_doubted = True, t
         elif node.doubted and t - node.t_doubted > HELD:
             node.doubted = False
@@ -119,14 +118,14 @@ def common_error(c, s, layout, i, t):
 
 
 @kernel
-def open_node(c, s, i, position_var, velocity_var):
+def open_node(c, s, i, variance):
     """Know less about where node i is and how it moves."""
     node = s.nodes[i]
     for h in range(s.alive.shape[0]):
         if s.alive[h] and not node.static:
             for k in range(c.d):
-                s.P[h, node.at_p + k, node.at_p + k] += position_var
-                s.P[h, node.at_v + k, node.at_v + k] += velocity_var
+                s.P[h, node.at_p + k, node.at_p + k] += variance
+                s.P[h, node.at_v + k, node.at_v + k] += variance
 
 
 @kernel
