@@ -173,7 +173,7 @@ class PairEkfParams:
     speed_model: Literal["range-rate", "speed-norm", "none"] = "range-rate"
     """What the derivative of the range is compared with: its true model, the rate of the
     distance, or the norm of the velocity as the paper writes."""
-    speed_std: float = 2.0
+    speed_std: float = 4.0
     """[m/s] Standard deviation of the low-passed derivative. It is made of the same ranges,
     so that a small value counts them twice."""
     speed_tau: float = 0.15
