@@ -162,7 +162,7 @@ class PairEkfParams:
     slow error of a wrong tilt. Larger forgets dead reckoning sooner."""
     wheeled_accel_psd: float = 0.07
     """[m/s2/sqrt(Hz)] The same on cars and robots, whose acceleration is free of tilt errors."""
-    hand_accel_psd: float = 0.3
+    hand_accel_psd: float = 0.25
     """[m/s2/sqrt(Hz)] The same in a hand, whose heading is often off by many degrees."""
     unaided_accel_psd: float = 0.7
     """[m/s2/sqrt(Hz)] The same for a moving node whose IMU is not heard."""
