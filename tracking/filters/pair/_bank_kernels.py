@@ -69,14 +69,17 @@ def flatness(c, s, layout):
         return np.inf
     flat = pos[:, :d].copy()
     eigenvalues, E = np.linalg.eigh(flat.T.copy() @ flat)
-    variance = 0.0
+    # Variance across the layout: half of a pair's is each end's. Pairs that are heard decide.
+    information = 0.0
     for p in range(s.pairs.shape[0]):
         if s.nodes[s.pairs[p].i].present and s.nodes[s.pairs[p].j].present:
             n_pairs += 1
+            across = 0.0
             for k in range(d):
                 for q in range(d):
-                    variance += E[k, 0] * E[q, 0] * s.P[p, h, k, q]
-    variance *= 0.5 * present / n_pairs
+                    across += E[k, 0] * E[q, 0] * s.P[p, h, k, q]
+            information += 1.0 / max(across, 1e-9)
+    variance = 0.5 * present * n_pairs / information
     return np.sqrt(max(eigenvalues[0], 0.0) / max(variance, 1e-12))
 
 
@@ -177,6 +180,7 @@ def remove_node(s, layout, i):
     """Destroy the filters of a node that left."""
     s.nodes[i].present = False
     s.nodes[i].heard = False
+    s.group[0].flat = False
     forget_mean(s)
     n_present = 0
     for k in range(s.nodes.shape[0]):

@@ -162,7 +162,7 @@ class PairEkfParams:
     slow error of a wrong tilt. Larger forgets dead reckoning sooner."""
     wheeled_accel_psd: float = 0.07
     """[m/s2/sqrt(Hz)] The same on cars and robots, whose acceleration is free of tilt errors."""
-    hand_accel_psd: float = 0.3
+    hand_accel_psd: float = 0.25
     """[m/s2/sqrt(Hz)] The same in a hand, whose heading is often off by many degrees."""
     unaided_accel_psd: float = 0.7
     """[m/s2/sqrt(Hz)] The same for a moving node whose IMU is not heard."""
@@ -173,7 +173,7 @@ class PairEkfParams:
     speed_model: Literal["range-rate", "speed-norm", "none"] = "range-rate"
     """What the derivative of the range is compared with: its true model, the rate of the
     distance, or the norm of the velocity as the paper writes."""
-    speed_std: float = 2.0
+    speed_std: float = 4.0
     """[m/s] Standard deviation of the low-passed derivative. It is made of the same ranges,
     so that a small value counts them twice."""
     speed_tau: float = 0.15
