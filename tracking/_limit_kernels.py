@@ -5,7 +5,8 @@ equal readings is taken for that once it is longer than chance makes them, which
 the sensor rounds and is learned from the readings themselves, and if it lies away from their
 mean. The limit is then known: single readings of it count as well, until one goes beyond. An
 axis that repeats itself for long while another changes is taken for the same: it may have been
-beyond its limit from the beginning.
+beyond its limit from the beginning. Readings that are equal in all axes are none of this: they
+stand for some that were lost.
 """
 
 from __future__ import annotations
@@ -27,8 +28,8 @@ LONG, CHANGE = 20, 1.0
 SEEN, LAST, RUN, MEAN, SHARE, LOW, HIGH, START = 0, 1, 2, 3, 4, 5, 6, 7
 N_LIMIT = 8
 """Columns of the memory: any reading yet; the last; how many before it were equal; their mean;
-share that are equal; the limits found, infinite for none; what the axis read when a run of
-another axis began, the next one's."""
+share that are equal; the limits found, infinite for none; what was read when the run of
+the axis began, summed over the other two."""
 
 
 @kernel
@@ -41,6 +42,9 @@ def find_limits(memory, samples, out):
         out: Written, True at a limit, (sample, 3).
     """
     for k in range(samples.shape[0]):
+        held = True
+        for a in range(3):
+            held = held and memory[a, SEEN] != 0.0 and samples[k, a] == memory[a, LAST]
         for a in range(3):
             x, m = samples[k, a], memory[a]
             one, other = samples[k, (a + 1) % 3], samples[k, (a + 2) % 3]
@@ -48,9 +52,10 @@ def find_limits(memory, samples, out):
                 m[SEEN], m[LAST], m[MEAN], m[SHARE] = 1.0, x + 1.0, x, RARE
                 m[LOW], m[HIGH] = -math.inf, math.inf
             equal = x == m[LAST]
-            m[RUN] = m[RUN] + 1.0 if equal else 0.0
             if not equal:
-                m[START] = one + other
+                m[RUN], m[START] = 0.0, one + other
+            elif not held:
+                m[RUN] += 1.0
             m[LAST] = x
             if x > m[HIGH] or x < m[LOW]:
                 m[LOW], m[HIGH] = -math.inf, math.inf

@@ -152,4 +152,4 @@ def small_faults():
 @pytest.fixture(scope="session")
 def person():
     """The same of a person with a tracker on every limb."""
-    return Faults("human", cars=None, seeds=(1, 2))
+    return Faults("human", cars=None, seeds=range(1, 7))

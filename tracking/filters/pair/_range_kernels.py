@@ -12,7 +12,7 @@ from tracking.filters.pair._pair_kernels import (
     range_rate_model,
     speed_model,
 )
-from tracking.filters.pair._sight_kernels import change_sight, fade_error, judge_sight
+from tracking.filters.pair._sight_kernels import E, change_sight, fade_error, judge_sight
 
 MOST_BEND = 0.1
 """[m] No more noise than this is added for what the straight line misses."""
@@ -165,9 +165,9 @@ def fuse_range(c, s, layout, p, t, distance, evidence, antenna_i, antenna_j, wor
         variance, w_e = predicted_variance(s.P, p, h, work)
         nis = nu * nu / (variance + c.range_var)
         switched, sane, loglik = judge_sight(c, s, p, h, dt, nu, variance, w_e, evidence)
-        if switched > 0.01:
-            change_sight(c, s, p, h, switched)
-            nu = distance - range_model(s.x, p, h, l0, l1, l2, work)
+        nu += s.x[p, h, E]
+        change_sight(c, s, p, h, switched)
+        nu -= s.x[p, h, E]
         bent = min(c.bend_gain * bend(s, p, h, work), MOST_BEND)
         R = c.range_var + bent * bent + s.nlos[p, h] * c.excess_white_var
         if sane > 1e-3:
