@@ -7,13 +7,16 @@ mean. The limit is then known: single readings of it count as well, until one go
 axis that repeats itself for long while another changes is taken for the same: it may have been
 beyond its limit from the beginning. Readings that are equal in all axes are none of this: they
 stand for some that were lost.
+
+What is cut off is used and doubted; but it tells no tilt, nor do the readings about it: the
+largest left out, the mean acceleration of a motion is no longer zero.
 """
 
 from __future__ import annotations
 
 import math
 
-from tracking.compiled import kernel
+from tracking.compiled import kernel, small_kernel
 
 CHANCE = math.log(1e-5)
 """[-] A run of equal readings is chance as long as it is more likely than this."""
@@ -25,49 +28,114 @@ AWAY = 0.5
 """[m/s2] A limit is at least so far from the mean."""
 LONG, CHANGE = 20, 1.0
 """[-], [m/s2] An axis that repeats itself so often while another changes so much is cut off."""
-SEEN, LAST, RUN, MEAN, SHARE, LOW, HIGH, START = 0, 1, 2, 3, 4, 5, 6, 7
-N_LIMIT = 8
-"""Columns of the memory: any reading yet; the last; how many before it were equal; their mean;
-share that are equal; the limits found, infinite for none; what was read when the run of
-the axis began, summed over the other two."""
+WHOLE_AFTER = 100
+"""[-] Readings in a row within the scale before they tell the tilt again."""
+
+LAST, RUN, MEAN, SHARE, LOW, HIGH, START = 0, 1, 2, 3, 4, 5, 6
+N_AXIS = 7
+SEEN, N_WHOLE = 3 * N_AXIS, 3 * N_AXIS + 1
+N_LIMIT = 3 * N_AXIS + 2
+"""Columns of the memory. For each axis: the last reading; how many before it were equal; their
+mean; share that are equal; the limits found, infinite for none; what was read when the run of
+the axis began, summed over the other two. Then: any reading yet; readings in a row within the
+scale."""
+
+
+@small_kernel
+def start_limits(memory, e, n, x, y, z):
+    """Begin with a reading."""
+    for a in range(3):
+        at = a * N_AXIS
+        first = (x, y, z)[a]
+        memory[e, n, at + LAST] = first + 1.0  # equal to none
+        memory[e, n, at + MEAN], memory[e, n, at + SHARE] = first, RARE
+        memory[e, n, at + LOW], memory[e, n, at + HIGH] = -math.inf, math.inf
+    memory[e, n, SEEN], memory[e, n, N_WHOLE] = 1.0, WHOLE_AFTER
+
+
+@small_kernel
+def is_at_limit(memory, e, n, at, x, others, held):
+    """Whether the reading of one axis is at its limit.
+
+    Args:
+        memory: Updated, (env, node, N_LIMIT).
+        e: Environment.
+        n: Node.
+        at: First column of the axis.
+        x: Its reading [m/s2].
+        others: Sum of the readings of the other axes [m/s2].
+        held: Whether all three are as they were.
+    """
+    equal = x == memory[e, n, at + LAST]
+    run = memory[e, n, at + RUN]
+    if not equal:
+        run = 0.0
+        memory[e, n, at + START] = others
+    elif not held:
+        run += 1.0
+    memory[e, n, at + LAST], memory[e, n, at + RUN] = x, run
+    mean = memory[e, n, at + MEAN]
+    if x > memory[e, n, at + HIGH] or x < memory[e, n, at + LOW]:
+        memory[e, n, at + LOW], memory[e, n, at + HIGH] = -math.inf, math.inf
+    if run > 0.0:
+        rare = min(max(memory[e, n, at + SHARE], RARE), COMMON)
+        if abs(x - mean) > AWAY and run * math.log(rare) < CHANCE:
+            if x > mean:
+                memory[e, n, at + HIGH] = x
+            else:
+                memory[e, n, at + LOW] = x
+        if run >= LONG and abs(others - memory[e, n, at + START]) > CHANGE:
+            memory[e, n, at + LOW], memory[e, n, at + HIGH] = x, x
+    if x == memory[e, n, at + LOW] or x == memory[e, n, at + HIGH]:
+        return True
+    share = memory[e, n, at + SHARE]
+    memory[e, n, at + SHARE] = share + ((1.0 if equal else 0.0) - share) / MEMORY
+    memory[e, n, at + MEAN] = mean + (x - mean) / RECENT
+    return False
+
+
+@small_kernel
+def find_limits(memory, e, n, x, y, z):
+    """Note which axes are at their limit.
+
+    Args:
+        memory: Updated, (env, node, N_LIMIT); zeros before the first sample.
+        e: Environment.
+        n: Node.
+        x: Specific force [m/s2].
+        y: Likewise.
+        z: Likewise.
+
+    Returns:
+        True for each axis that is cut off; True if the sample tells the tilt.
+    """
+    if memory[e, n, SEEN] == 0.0:
+        start_limits(memory, e, n, x, y, z)
+    held = (
+        x == memory[e, n, LAST]
+        and y == memory[e, n, N_AXIS + LAST]
+        and z == memory[e, n, 2 * N_AXIS + LAST]
+    )
+    cut_x = is_at_limit(memory, e, n, 0, x, y + z, held)
+    cut_y = is_at_limit(memory, e, n, N_AXIS, y, z + x, held)
+    cut_z = is_at_limit(memory, e, n, 2 * N_AXIS, z, x + y, held)
+    whole = not (cut_x or cut_y or cut_z)
+    memory[e, n, N_WHOLE] = memory[e, n, N_WHOLE] + 1.0 if whole else 0.0
+    return cut_x, cut_y, cut_z, memory[e, n, N_WHOLE] >= WHOLE_AFTER
 
 
 @kernel
-def find_limits(memory, samples, out):
-    """Note which readings are at the limit of their axis.
+def at_limit(memory, accel_b, cut, upright):
+    """Note where the accelerometer is at the end of its scale, and where it tells the tilt.
 
     Args:
-        memory: Of the node, updated, (axis, N_LIMIT); zeros before the first sample.
-        samples: Specific force, (sample, 3) [m/s2].
-        out: Written, True at a limit, (sample, 3).
+        memory: Updated, (env, node, N_LIMIT); zeros before the first sample.
+        accel_b: Specific force, (env, sample, 3) [m/s2], in order, all of node 0.
+        cut: Written, True for axes that are cut off, (env, sample, 3).
+        upright: Written, True for samples that tell the tilt, (env, sample).
     """
-    for k in range(samples.shape[0]):
-        held = True
-        for a in range(3):
-            held = held and memory[a, SEEN] != 0.0 and samples[k, a] == memory[a, LAST]
-        for a in range(3):
-            x, m = samples[k, a], memory[a]
-            one, other = samples[k, (a + 1) % 3], samples[k, (a + 2) % 3]
-            if m[SEEN] == 0.0:
-                m[SEEN], m[LAST], m[MEAN], m[SHARE] = 1.0, x + 1.0, x, RARE
-                m[LOW], m[HIGH] = -math.inf, math.inf
-            equal = x == m[LAST]
-            if not equal:
-                m[RUN], m[START] = 0.0, one + other
-            elif not held:
-                m[RUN] += 1.0
-            m[LAST] = x
-            if x > m[HIGH] or x < m[LOW]:
-                m[LOW], m[HIGH] = -math.inf, math.inf
-            rare = min(max(m[SHARE], RARE), COMMON)
-            if m[RUN] * math.log(rare) < CHANCE and abs(x - m[MEAN]) > AWAY:
-                if x > m[MEAN]:
-                    m[HIGH] = x
-                else:
-                    m[LOW] = x
-            if m[RUN] >= LONG and abs(one + other - m[START]) > CHANGE:
-                m[LOW], m[HIGH] = x, x
-            out[k, a] = x == m[LOW] or x == m[HIGH]
-            if not out[k, a]:
-                m[SHARE] += ((1.0 if equal else 0.0) - m[SHARE]) / MEMORY
-                m[MEAN] += (x - m[MEAN]) / RECENT
+    for e in range(accel_b.shape[0]):
+        for k in range(accel_b.shape[1]):
+            x, y, z = accel_b[e, k, 0], accel_b[e, k, 1], accel_b[e, k, 2]
+            found = find_limits(memory, e, 0, x, y, z)
+            cut[e, k, 0], cut[e, k, 1], cut[e, k, 2], upright[e, k] = found

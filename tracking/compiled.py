@@ -9,17 +9,20 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, TypeVar
 
-from numba import config, njit
+from numba import config, njit, typeof
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def kernel(function: Function) -> Function:
-    """Compile a function with numba, without the interpreter, and keep the result on disk."""
+    """Compile a function with numba, without the interpreter, and keep the result on disk.
+
+    It holds no lock of the interpreter, so several threads can run kernels at a time.
+    """
     return _compile(function, inline=False)
 
 
@@ -28,8 +31,27 @@ def small_kernel(function: Function) -> Function:
     return _compile(function, inline=True)
 
 
+def bind(kernel: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
+    """A kernel that is called again and again with the same arguments: arrays filled anew.
+
+    Finding out the types of many arrays takes longer than most kernels do. Here that is done
+    once, and the compiled code is then called without a look at them.
+
+    Args:
+        kernel: To call.
+        arguments: Everything it takes.
+    """
+    if config.DISABLE_JIT:
+        return partial(kernel, *arguments)
+    compiled: Any = kernel
+    entry = compiled.compile(tuple(typeof(argument) for argument in arguments))
+    return partial(entry, *arguments)
+
+
 def _compile(function: Function, *, inline: bool) -> Function:
-    compiled = njit(cache=True, forceinline=inline, _nrt=not inline)(function)
+    compiled = njit(
+        cache=True, nogil=True, error_model="numpy", forceinline=inline, _nrt=not inline
+    )(function)
     if not config.DISABLE_JIT:
         package = function.__module__.partition(".")[0]
         folder = Path(inspect.getfile(function))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 
@@ -76,6 +77,27 @@ class TeamEstimate:
             nis=np.zeros((*lead, p)),
             nlos_prob=np.zeros((*lead, p)),
             status=np.zeros((*lead, p), dtype=np.int64),
+        )
+
+    @property
+    def arrays(self) -> tuple[Any, ...]:
+        """The fields but the time in their order, as kernels take them."""
+        return (
+            self.pos_ij_w,
+            self.vel_ij_w,
+            self.cov,
+            self.q_wb,
+            self.has_orientation,
+            self.age,
+            self.nis,
+            self.nlos_prob,
+            self.status,
+        )
+
+    def with_time_axis(self) -> TeamEstimate:
+        """Arrays over (env, 1, ...) that share the memory of these over (env, ...)."""
+        return TeamEstimate(
+            self.constellation, self.t[:, None], *(array[:, None] for array in self.arrays)
         )
 
     @property

@@ -7,12 +7,22 @@ in order any more: it is dropped and counted.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import copy
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from tracking._horizon_kernels import count_due, hand_on, sum_turns, take_in
 from tracking.arrays import F64, I64, Bool
-from tracking.measurements import MeasurementBlock
+from tracking.compiled import bind
+from tracking.constellation import Constellation
+from tracking.errors import ConfigError
+from tracking.measurements import N_VALUES, Kind, MeasurementBlock
+
+LONG_BLOCK = 4096
+"""[-] Longer blocks are sorted before they are put in order, event by event."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,84 +33,210 @@ class HorizonParams:
     """[s] Longer puts later measurements in order, and makes every estimate older."""
 
 
+class HorizonState(NamedTuple):
+    """What waits, and what was counted; the slots are as many as a power of two."""
+
+    t: F64
+    """Of the event in each slot, (env, slot) [s]; those that follow are `MeasurementBlock`'s."""
+    kind: I64
+    i: I64
+    j: I64
+    antenna_i: I64
+    antenna_j: I64
+    values: F64
+    has_power: Bool
+    order: I64
+    """Slots, a ring: from `head` on those that wait, in order, then the free ones, (env, slot)."""
+    head: I64
+    """Where it begins, (env)."""
+    n_waiting: I64
+    """Events that wait, (env)."""
+    released: F64
+    """Time up to which measurements were handed on, (env) [s]."""
+    n_late: I64
+    """Measurements dropped because they came too late, (env)."""
+    n_doubled: I64
+    """Measurements dropped because they had come before, (env)."""
+
+    def of(self, envs: slice) -> HorizonState:
+        """Some environments, as views."""
+        views: list[Any] = [array[envs] for array in self]
+        return HorizonState(*views)
+
+
+def make_state(n_envs: int, n_slots: int = 64) -> HorizonState:
+    """Nothing waits; `n_slots` is a power of two."""
+
+    def ints(*shape: int) -> I64:
+        return np.zeros((n_envs, *shape), dtype=np.int64)
+
+    return HorizonState(
+        t=np.zeros((n_envs, n_slots)),
+        kind=ints(n_slots),
+        i=ints(n_slots),
+        j=ints(n_slots),
+        antenna_i=ints(n_slots),
+        antenna_j=ints(n_slots),
+        values=np.zeros((n_envs, n_slots, N_VALUES)),
+        has_power=np.zeros((n_envs, n_slots), dtype=bool),
+        order=np.tile(np.arange(n_slots), (n_envs, 1)),
+        head=ints(),
+        n_waiting=ints(),
+        released=np.full(n_envs, -np.inf),
+        n_late=ints(),
+        n_doubled=ints(),
+    )
+
+
 class Horizon:
     """A buffer in front of the tracker.
 
-    Law: the stream that comes out does not depend on the order or the blocks in which
-    measurements came in, as long as none is later than the delay.
+    Laws: the stream that comes out does not depend on the order or the blocks in which
+    measurements came in, as long as none is later than the delay; environment k of a batch
+    gives what that environment alone gives.
+
+    The class is a shell around `take_in` and `hand_on`, which work on slices of environments
+    too (`HorizonState.of`), once there is room (`reserve`).
     """
 
     def __init__(self, params: HorizonParams, n_envs: int = 1) -> None:
         self._params = params
-        self._n_envs = n_envs
-        self._pending = MeasurementBlock.empty(n_envs)
-        self._released = np.full(n_envs, -np.inf)
-        self.n_late = np.zeros(n_envs, dtype=np.int64)
-        """Measurements dropped because they came too late, (env)."""
-        self.n_doubled = np.zeros(n_envs, dtype=np.int64)
-        """Measurements dropped because they had come before, (env)."""
+        self._n_envs, self._is_part = n_envs, False
+        self.state = make_state(n_envs)
+        """What waits, arrays over (env, ...)."""
 
     @property
     def waiting(self) -> MeasurementBlock:
-        """Measurements that came and were not handed on yet, in order."""
-        return self._pending
+        """Measurements that came and were not handed on yet, in order, as a copy."""
+        out = MeasurementBlock.empty(self._n_envs, int(self.state.n_waiting.max(initial=0)))
+        hand_on(self.state, np.full(self._n_envs, np.inf), False, out.arrays)
+        return out
 
     @property
     def t(self) -> F64:
         """Time up to which measurements were handed on, (env) [s]."""
-        return self._released.copy()
+        return self.state.released.copy()
 
-    def step(self, block: MeasurementBlock, now: F64 | float) -> MeasurementBlock:
+    @property
+    def n_late(self) -> I64:
+        """Measurements dropped because they came too late, (env)."""
+        return self.state.n_late
+
+    @property
+    def n_doubled(self) -> I64:
+        """Measurements dropped because they had come before, (env)."""
+        return self.state.n_doubled
+
+    def step(
+        self, block: MeasurementBlock, now: F64 | float, out: MeasurementBlock | None = None
+    ) -> MeasurementBlock:
         """Take what arrived and hand on, in order, everything older than the delay.
 
         Args:
             block: Measurements that arrived, in any order.
             now: Current time, scalar or (env) [s]; must not go back.
+            out: A block to write into, which saves making one; it may be longer than needed.
 
         Returns:
-            The measurements up to ``now - delay``, sorted.
+            The measurements up to ``now - delay``, sorted; `out` where given.
+
+        Raises:
+            ConfigError: More measurements are due than `out` has columns; they still wait. Or
+                this is a part, and they do not fit.
         """
         until = np.broadcast_to(np.asarray(now, dtype=np.float64), (self._n_envs,))
-        return self._release(block, until - self._params.delay)
+        if block.n_events > LONG_BLOCK:
+            block = block.sorted()
+        if self._room < block.n_events:
+            self.reserve(int(block.valid.sum(axis=1).max(initial=0)))
+        take_in(self.state, block.arrays)
+        return self._release(until - self._params.delay, out)
+
+    def bind(self, block: MeasurementBlock, now: F64, out: MeasurementBlock) -> Callable[[], None]:
+        """`step` for arrays that stay where they are, without its overhead.
+
+        Args:
+            block: Filled anew before every call.
+            now: Likewise, (env) [s].
+            out: Written by every call.
+
+        Returns:
+            What does a step; it raises ConfigError if there is not room enough (`reserve`).
+        """
+        state, until, delay = self.state, np.empty_like(now), self._params.delay
+        take = bind(take_in, state, block.arrays)
+        count = bind(count_due, state, until)
+        give = bind(hand_on, state, until, True, out.arrays)
+
+        def step() -> None:
+            np.subtract(now, delay, until)
+            if take() or count() > out.n_events:
+                raise ConfigError(
+                    f"horizon: {state.order.shape[1]} measurements that wait and {out.n_events} "
+                    "that are due are not room enough"
+                )
+            give()
+
+        return step
+
+    def bind_turns(self, constellation: Constellation, out: F64) -> Callable[[], None]:
+        """What sums how far nodes have turned in the samples that wait.
+
+        An estimate is as old as the delay; nodes that stay level carry its headings to the
+        present by that.
+
+        Args:
+            constellation: The nodes, with the rates of their IMUs.
+            out: About the own vertical, (env, node) [rad], written by every call.
+        """
+        dt = np.array([1.0 / node.imu_hz for node in constellation.nodes])
+        return bind(sum_turns, self.state, int(Kind.IMU), dt, out)
+
+    def part(self, envs: slice) -> Horizon:
+        """Some of the environments; shares their memory. There is as much room as there is now."""
+        part = copy.copy(self)
+        part.state = self.state.of(envs)
+        part._n_envs, part._is_part = len(part.state.head), True
+        return part
 
     def flush(self) -> MeasurementBlock:
         """Hand on all that is left, at the end of a stream."""
-        return self._release(MeasurementBlock.empty(self._n_envs), np.full(self._n_envs, np.inf))
+        return self._release(np.full(self._n_envs, np.inf), None)
 
     def reset(self, env: int) -> None:
         """Forget what one environment still held."""
-        self._pending.valid[env] = False
-        self._released[env] = -np.inf
-        self.n_late[env] = 0
+        state = self.state
+        state.n_waiting[env] = state.n_late[env] = state.n_doubled[env] = 0
+        state.released[env] = -np.inf
 
-    def _release(self, block: MeasurementBlock, until: F64) -> MeasurementBlock:
-        late = block.valid & (block.t <= self._released[:, None])
-        self.n_late += late.sum(axis=1)
-        fresh = replace(block, valid=block.valid & ~late)
-        waiting = MeasurementBlock.concatenate([self._pending, fresh]).sorted()
-        doubled = _same_as_before(waiting)
-        self.n_doubled += doubled.sum(axis=1)
-        waiting = replace(waiting, valid=waiting.valid & ~doubled)
-        due = waiting.valid & (waiting.t <= until[:, None])
-        self._released = np.maximum(self._released, until)
-        self._pending = _compact(waiting, waiting.valid & ~due)
-        return _compact(waiting, due)
+    @property
+    def _room(self) -> int:
+        """Free slots in the fullest environment."""
+        return int(self.state.order.shape[1] - self.state.n_waiting.max(initial=0))
 
+    def reserve(self, n_events: int) -> None:
+        """Make room for so many more events in every environment."""
+        old = self.state.order.shape[1]
+        needed = int(self.state.n_waiting.max(initial=0)) + n_events
+        if needed <= old:
+            return
+        if self._is_part:
+            raise ConfigError(f"horizon: a part has room for {old} measurements, needs {needed}")
+        n_slots = 1 << (needed - 1).bit_length()
+        grown = make_state(self._n_envs, n_slots)
+        for name in HorizonState._fields:
+            array, before = getattr(grown, name), getattr(self.state, name)
+            array[(slice(None), slice(old), ...)[: array.ndim]] = before
+        ring = (self.state.head[:, None] + np.arange(old)) % old
+        grown.order[:, :old] = np.take_along_axis(self.state.order, ring, axis=1)
+        grown.head[:] = 0
+        self.state = grown
 
-def _same_as_before(block: MeasurementBlock) -> Bool:
-    """True for events that equal the one before them in everything, (env, event)."""
-    same = np.zeros(block.t.shape, dtype=bool)
-    if block.n_events < 2:
-        return same
-    same[:, 1:] = block.valid[:, 1:] & block.valid[:, :-1]
-    for field in (block.t, block.kind, block.i, block.j, block.antenna_i, block.antenna_j):
-        same[:, 1:] &= field[:, 1:] == field[:, :-1]
-    same[:, 1:] &= (block.values[:, 1:] == block.values[:, :-1]).all(axis=-1)
-    return same
-
-
-def _compact(block: MeasurementBlock, keep: Bool) -> MeasurementBlock:
-    """The kept events moved to the front, with no more padding than needed."""
-    n: I64 = keep.sum(axis=1)
-    kept = replace(block, valid=keep).sorted()
-    return kept.take(slice(0, int(n.max(initial=0))))
+    def _release(self, until: F64, out: MeasurementBlock | None) -> MeasurementBlock:
+        n = int(count_due(self.state, until))
+        if out is None:
+            out = MeasurementBlock.empty(self._n_envs, n)
+        elif out.n_events < n:
+            raise ConfigError(f"out: expected at least {n} event columns, got {out.n_events}")
+        hand_on(self.state, until, True, out.arrays)
+        return out

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 
@@ -78,6 +79,22 @@ class MeasurementBlock:
     def n_events(self) -> int:
         """Number of event columns, padding included."""
         return int(self.t.shape[1])
+
+    @property
+    def arrays(self) -> tuple[Any, ...]:
+        """The fields in their order, contiguous, as kernels take them."""
+        fields = (
+            self.t,
+            self.kind,
+            self.i,
+            self.j,
+            self.antenna_i,
+            self.antenna_j,
+            self.values,
+            self.has_power,
+            self.valid,
+        )
+        return tuple(np.ascontiguousarray(array) for array in fields)
 
     @classmethod
     def empty(cls, n_envs: int = 1, n_events: int = 0) -> MeasurementBlock:

@@ -7,6 +7,8 @@ Late data are the business of `Horizon`, which stands in front of it.
 
 from __future__ import annotations
 
+import copy
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -84,6 +86,21 @@ class Tracker:
         t_out = np.broadcast_to(t_out, (self.n_envs, t_out.shape[1]))
         return self._filter.run(self._orientation.step(block), t_out)
 
+    def bind(
+        self, block: MeasurementBlock, estimate: TeamEstimate
+    ) -> tuple[Callable[[], None], Callable[[], None]]:
+        """`step` for arrays that stay where they are, without its overhead.
+
+        Args:
+            block: Filled anew before every step, which leaves states in place of samples.
+            estimate: Arrays over (env, ...), written by every step for its times `t`.
+
+        Returns:
+            Two functions to be called one after the other: orientations, then positions.
+        """
+        follow = self._filter.bind(block, estimate.with_time_axis())
+        return self._orientation.bind(block), follow
+
     def smooth(self, later: MeasurementBlock, t: F64 | float) -> TeamEstimate:
         """Report at one time with the help of later measurements, and stay where it is.
 
@@ -112,6 +129,14 @@ class Tracker:
         """Forget everything of one environment."""
         self._orientation.reset(env)
         self._filter.reset(env)
+
+    def part(self, envs: slice) -> Tracker:
+        """Some of the environments, without a step between them; shares their memory."""
+        part = copy.copy(self)
+        part.n_envs = len(range(*envs.indices(self.n_envs)))
+        part._orientation = self._orientation.part(envs)
+        part._filter = self._filter.part(envs)
+        return part
 
     def save(self) -> dict[str, Any]:
         """A copy of everything that evolves."""

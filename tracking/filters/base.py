@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Protocol
 
 from tracking.arrays import F64
@@ -29,8 +30,19 @@ class Filter(Protocol):
             Estimates, arrays over (env, time, ...).
         """
 
+    def bind(self, block: MeasurementBlock, estimate: TeamEstimate) -> Callable[[], None]:
+        """`run` for arrays that stay where they are, without its overhead.
+
+        Args:
+            block: Filled anew before every call, contiguous.
+            estimate: Written by every call for its times `t`, (env, time), filled before.
+        """
+
     def reset(self, env: int) -> None:
         """Forget everything of one environment."""
+
+    def part(self, envs: slice) -> Filter:
+        """Some of the environments, without a step between them; shares their memory."""
 
     def save(self) -> Any:
         """A copy of everything that evolves."""

@@ -11,8 +11,8 @@ import numpy as np
 
 from tracking.compiled import kernel
 from tracking.filters._shape_kernels import SURVEYED
+from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_hypothesis
 from tracking.filters.joint._linear_kernels import decouple
-from tracking.filters.joint._start_kernels import copy_hypothesis
 
 FLAT, OPEN = 2.5, 4.0
 """Extent of a layout across itself, in standard deviations: less is flat, more is open again."""
@@ -89,27 +89,18 @@ def add_mirror_image(c, s):
     out, _ = centred(c, s, h)
     pos = out[0].copy()
     _, E = np.linalg.eigh(pos.T.copy() @ pos)
-    M = np.eye(c.n)
-    for i in range(s.nodes.shape[0]):
-        node = s.nodes[i]
-        if not node.present:
-            continue
-        for r in range(d):
-            for k in range(d):
-                M[node.at_p + r, node.at_p + k] -= 2.0 * E[r, 0] * E[k, 0]
-                s.x[target, node.at_p + r] -= 2.0 * E[r, 0] * E[k, 0] * out[0, i, k]
-                if not node.static:
-                    M[node.at_v + r, node.at_v + k] -= 2.0 * E[r, 0] * E[k, 0]
-                    s.x[target, node.at_v + r] -= 2.0 * E[r, 0] * E[k, 0] * out[1, i, k]
-    s.moved[target, :] = 0.0
-    s.P[target] = M @ s.P[h].copy() @ M.T.copy()
+    M = np.eye(d)
+    for r in range(d):
+        for k in range(d):
+            M[r, k] -= 2.0 * E[r, 0] * E[k, 0]
+    turn_hypothesis(c, s, target, M)
 
 
 @kernel
 def watch_mirror(c, s):
     """Bring the mirror image up where it can no longer be excluded."""
     group = s.group[0]
-    if group.n_alive != 1:
+    if group.n_alive != 1 or group.asleep:
         return
     ratio = flatness(c, s, group.best)
     if ratio < FLAT:

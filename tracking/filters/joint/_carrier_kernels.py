@@ -11,6 +11,7 @@ import math
 
 from tracking.compiled import small_kernel
 from tracking.filters.joint._linear_kernels import absorb, project, symmetrise
+from tracking.filters.joint._sleep_kernels import rests
 
 CENTRE_VAR = 1.0
 """[m2] Variance of the centre after it was moved back."""
@@ -32,7 +33,7 @@ def apply_carriers(c, s, h, t, dt, scratch):
         node = s.nodes[i]
         if not node.present or node.static or t - node.t_state > c.unaided_after:
             continue
-        if node.rests and t - node.t_moved > c.rest_after:
+        if rests(c, node, t):
             for k in range(c.d):
                 scratch.idx[0], scratch.val[0] = node.at_v + k, 1.0
                 judge(c, s, h, -s.x[h, node.at_v + k], 1, c.rest_var, scratch)
@@ -53,16 +54,21 @@ def judge(c, s, h, nu, m, variance, scratch):
 
 @small_kernel
 def hold_on_wheels(c, s, h, i, scratch):
-    """The rear axle does not move sideways; in space, a wheeled node does not rise."""
+    """The rear axle moves sideways by the slip of its tyres only; wheeled nodes do not rise."""
     node = s.nodes[i]
     angle = node.yaw + s.x[h, node.at_h]
     cos_y, sin_y = math.cos(angle), math.sin(angle)
     v0, v1 = s.x[h, node.at_v], s.x[h, node.at_v + 1]
-    sideways = -sin_y * v0 + cos_y * v1
+    sideways, forward = -sin_y * v0 + cos_y * v1, cos_y * v0 + sin_y * v1
+    # Its tyres need a slip angle for the force that a curve takes, v yaw_rate; so it drifts out.
+    outwards = node.slip * node.yaw_rate * forward
+    gain = 2.0 * outwards
     idx, val = scratch.idx, scratch.val
     idx[0], idx[1], idx[2] = node.at_v, node.at_v + 1, node.at_h
-    val[0], val[1], val[2] = -sin_y, cos_y, -(cos_y * v0 + sin_y * v1)
-    judge(c, s, h, node.rear_axle * node.yaw_rate - sideways, 3, node.sideways_var, scratch)
+    val[0], val[1] = -sin_y + gain * cos_y, cos_y + gain * sin_y
+    val[2] = -forward + gain * sideways
+    nu = node.rear_axle * node.yaw_rate - outwards * forward - sideways
+    judge(c, s, h, nu, 3, node.sideways_var, scratch)
     if c.d == 3:
         idx[0], val[0] = node.at_v + 2, 1.0
         judge(c, s, h, -s.x[h, node.at_v + 2], 1, node.sideways_var, scratch)

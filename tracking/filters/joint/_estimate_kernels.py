@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from tracking.compiled import kernel
+from tracking.filters._clear_kernels import clear_estimate
 from tracking.filters.joint._motion_kernels import predict, sum_inertial
 from tracking.filters.joint.state import JointState
 
@@ -13,6 +14,7 @@ ABSENT, STARTING, AMBIGUOUS, OK, LOST, DOUBTFUL = 0, 1, 2, 3, 4, 5
 @kernel
 def write_estimate(c, s, scratch, t, e, o, out):
     """The best hypothesis at time t, without touching the state."""
+    clear_estimate(e, o, out)
     pos, vel, cov, q_wb, has_q, age, nis, nlos, status = out
     group = s.group[0]
     h, d, n = group.best, c.d, s.nodes.shape[0]
@@ -47,7 +49,7 @@ def write_estimate(c, s, scratch, t, e, o, out):
                 cov[e, o, p, q, r] = v
             if a < d:
                 worst = max(worst, cov[e, o, p, a, a])
-        if group.n_alive > 1:
+        if group.n_alive > 1 or group.asleep:
             status[e, o, p] = AMBIGUOUS
         elif node_i.static and node_j.static:
             status[e, o, p] = OK

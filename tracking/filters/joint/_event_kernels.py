@@ -23,6 +23,7 @@ from tracking.filters.joint._range_kernels import (
     gap_evidence,
 )
 from tracking.filters.joint._rotation_kernels import follow_rotation
+from tracking.filters.joint._sleep_kernels import none_moved, wake_up
 from tracking.filters.joint._start_kernels import try_join, try_start
 from tracking.filters.joint._stuck_kernels import is_stuck
 from tracking.filters.joint.state import N_PRE, JointState
@@ -112,12 +113,12 @@ def one_env(state, e):
 
 
 @kernel
-def advance_all(coefficients, state, scratch, t):
+def advance_all(coefficients, layout, state, scratch, t):
     """Carry every environment to its time t, (env) [s]."""
     for e in range(t.shape[0]):
         s = one_env(state, e)
         if s.group[0].started:
-            advance(coefficients[0], s, scratch, t[e])
+            advance(coefficients[0], s, layout, scratch, t[e])
 
 
 @small_kernel
@@ -130,7 +131,7 @@ def hear(c, s, layout, scratch, i, j, a_i, a_j, t, distance, evidence, is_survey
     node_i.heard, node_j.heard = True, True
     node_i.t_heard, node_j.t_heard = t, t
     if s.group[0].started:
-        advance(c, s, scratch, t)
+        advance(c, s, layout, scratch, t)
         if t - s.group[0].t_check >= c.check_period:
             look_at_group(c, s, layout, t)
     if node_i.present and node_j.present:
@@ -140,9 +141,11 @@ def hear(c, s, layout, scratch, i, j, a_i, a_j, t, distance, evidence, is_survey
 
 
 @small_kernel
-def advance(c, s, scratch, t):
+def advance(c, s, layout, scratch, t):
     """Carry every hypothesis to time t, and use what is known about the carriers."""
     group = s.group[0]
+    if group.asleep and not none_moved(c, s, t):
+        wake_up(c, s, layout)
     if t - group.t > SAME:
         for i in range(s.nodes.shape[0]):
             if s.nodes[i].present and not s.nodes[i].static:
@@ -219,6 +222,8 @@ def take_first_range(c, s, layout, i, j, p, t, distance, is_survey):
     if not s.group[0].started:
         try_start(c, s, layout, t)
         return
+    if s.group[0].asleep:
+        wake_up(c, s, layout)
     if not s.nodes[i].present:
         try_join(c, s, layout, i, t)
     if not s.nodes[j].present:

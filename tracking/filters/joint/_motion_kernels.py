@@ -107,7 +107,7 @@ def watch_rest(c, node, t, dt, accel, fresh):
         node.accel_var = c.rest_accel * c.rest_accel
         node.turning = c.rest_rate
         node.yaw_rate = 0.0
-        node.t_moved = t
+        node.t_first = node.t_moved = t
         return
     keep = decay(dt / 0.1)
     off = accel - node.accel_mean

@@ -1,9 +1,10 @@
 """Starting a group and joining it: from the first k ranges of each pair to running states.
 
 A group starts with MDS on the mean of the first k ranges, once for every rotation and mirror
-image of the bank; the covariance holds the gap between two rotations. A node that joins is
-placed by least squares on its distances to the others, in every hypothesis; where those are
-too few or too flat to tell on which side it is, both sides become hypotheses.
+image of the bank; the covariance holds the gap between two rotations. While all nodes rest, one
+of them stands for all (`_sleep_kernels`). A node that joins is placed by least squares on its
+distances to the others, in every hypothesis; where those are too few or too flat to tell on
+which side it is, both sides become hypotheses.
 """
 
 from __future__ import annotations
@@ -19,7 +20,9 @@ from tracking.filters._shape_kernels import (
     start_distance,
 )
 from tracking.filters.joint._carrier_kernels import CENTRE_VAR
+from tracking.filters.joint._copy_kernels import copy_hypothesis
 from tracking.filters.joint._linear_kernels import decouple
+from tracking.filters.joint._sleep_kernels import none_moved, rests
 
 JOIN_SPREAD = 0.75
 """[m] Others that extend less than this along an axis leave the side of a newcomer open: along
@@ -38,7 +41,9 @@ def try_start(c, s, layout, t):
     for a in range(m):
         s.nodes[members[a]].present = True
         forget_sums(s, members[a], t)
-    for h in range(layout.rotations.shape[0]):
+    asleep = none_moved(c, s, t)
+    n_first = 1 if asleep else layout.rotations.shape[0]
+    for h in range(n_first):
         s.alive[h] = True
         s.loglik[h] = 0.0
         s.nlos[h, :] = c.enter_rate / (c.enter_rate + c.leave_rate)
@@ -64,7 +69,8 @@ def try_start(c, s, layout, t):
     group = s.group[0]
     group.started = True
     group.flat = False
-    group.n_alive = layout.rotations.shape[0]
+    group.asleep = asleep
+    group.n_alive = n_first
     group.best = 0
     group.t, group.t_check, group.t_carrier, group.t_gauge = t, t, t, t
     group.misfit, group.fit = 1.0, 1.0
@@ -105,7 +111,7 @@ def begin_node(c, s, h, i, t):
     node = s.nodes[i]
     if node.static:
         return
-    still = node.rests and node.has_state and t - node.t_moved > c.rest_after
+    still = rests(c, node, t)
     for k in range(c.d):
         speed_var = c.rest_var if still else c.start_speed_var
         decouple(s.x, s.P, h, c.n, node.at_v + k, speed_var)
@@ -186,19 +192,3 @@ def add_node(c, s, layout, h, new, pos, t):
             s.pairs[p].t_range = t
             s.pairs[p].n_ranges = 0
             s.pairs[p].misfit = 1.0
-
-
-@kernel
-def copy_hypothesis(s, h):
-    """A copy of a hypothesis in a free place of the bank; -1 if there is none."""
-    for free in range(s.alive.shape[0]):
-        if not s.alive[free]:
-            s.alive[free] = True
-            s.loglik[free] = s.loglik[h]
-            s.x[free] = s.x[h]
-            s.P[free] = s.P[h]
-            s.moved[free] = s.moved[h]
-            s.nlos[free] = s.nlos[h]
-            s.group[0].n_alive += 1
-            return free
-    return -1

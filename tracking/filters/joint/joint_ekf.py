@@ -13,9 +13,14 @@ covariance is that of the group:
 
 from __future__ import annotations
 
+import copy
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from tracking.arrays import F64
+from tracking.compiled import bind
 from tracking.constellation import Constellation
 from tracking.estimate import TeamEstimate
 from tracking.filters.joint._event_kernels import advance_all, run_events
@@ -48,6 +53,11 @@ class JointEkf:
         self._pass(self._state, self._coefficients, self._scratch, block, estimate)
         return estimate
 
+    def bind(self, block: MeasurementBlock, estimate: TeamEstimate) -> Callable[[], None]:
+        """`run` for arrays that stay where they are; see `Filter.bind`."""
+        arguments = self._arguments(self._state, self._coefficients, self._scratch, block, estimate)
+        return bind(run_events, *arguments)
+
     def smooth(self, later: MeasurementBlock, t: F64) -> TeamEstimate:
         """Report at one time with the help of later measurements, and stay where it is.
 
@@ -62,7 +72,9 @@ class JointEkf:
         now = self.run(MeasurementBlock.empty(self._n_envs), t[:, None])
         names = TeamEstimate.__slots__[1:]
         estimate = TeamEstimate(now.constellation, *(getattr(now, name)[:, 0] for name in names))
-        advance_all(as_records(self._coefficients), _records(self._state), self._scratch, t)
+        advance_all(
+            as_records(self._coefficients), self._layout, _records(self._state), self._scratch, t
+        )
         clones, coefficients, source = with_clones(
             self._state, self._coefficients, self._constellation
         )
@@ -78,6 +90,16 @@ class JointEkf:
         """Forget everything of one environment."""
         for array, fresh in zip(self._state, self._fresh(1), strict=True):
             array[env] = fresh[0]
+
+    def part(self, envs: slice) -> JointEkf:
+        """Some of the environments; shares their memory."""
+        part = copy.copy(self)
+        part._state = JointState._make(array[envs] for array in self._state)
+        part._n_envs = len(part._state.x)
+        part._scratch = make_scratch(
+            self._constellation.n_nodes, self._constellation.n_pairs, self._state.x.shape[2]
+        )
+        return part
 
     def save(self) -> JointState:
         """A copy of everything that evolves."""
@@ -108,36 +130,25 @@ class JointEkf:
         estimate: TeamEstimate,
     ) -> None:
         """Handle events and fill the estimate for its times."""
-        events = (
-            block.t,
-            block.kind,
-            block.i,
-            block.j,
-            block.antenna_i,
-            block.antenna_j,
-            block.values,
-            block.has_power,
-            block.valid,
-        )
-        out = (
-            estimate.pos_ij_w,
-            estimate.vel_ij_w,
-            estimate.cov,
-            estimate.q_wb,
-            estimate.has_orientation,
-            estimate.age,
-            estimate.nis,
-            estimate.nlos_prob,
-            estimate.status,
-        )
-        run_events(
+        run_events(*self._arguments(state, coefficients, scratch, block, estimate))
+
+    def _arguments(
+        self,
+        state: JointState,
+        coefficients: Records,
+        scratch: Scratch,
+        block: MeasurementBlock,
+        estimate: TeamEstimate,
+    ) -> tuple[Any, ...]:
+        """What the kernel takes."""
+        return (
             as_records(coefficients),
             self._layout,
             _records(state),
             scratch,
-            tuple(np.ascontiguousarray(a) for a in events),
+            block.arrays,
             estimate.t,
-            out,
+            estimate.arrays,
         )
 
     def _fresh(self, n_envs: int) -> JointState:

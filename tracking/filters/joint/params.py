@@ -41,11 +41,14 @@ class CarrierParams:
     """[m/s] Sideways speed of the rear axle, 20 times a second; None for what may move sideways."""
     rear_axle: float = 0.0
     """[m] How far the tracker is ahead of the axle that cannot move sideways."""
+    slip: float = 0.0
+    """[s2/m] How fast that axle drifts outwards in a curve, per squared speed and yaw rate: the
+    inverse of its cornering stiffness per load [1/rad] times gravity."""
     rests: bool = True
     """It stands still now and then, and its IMU tells."""
 
     def __post_init__(self) -> None:
-        _expect_positive(self, "rear_axle")
+        _expect_positive(self, "rear_axle", "slip")
 
 
 BODY = CarrierParams()
@@ -60,6 +63,7 @@ CARRIERS = {
         heading_tau=5.0,
         sideways_std=0.08,
         rear_axle=0.15,
+        slip=0.018,
     ),
     "robot": CarrierParams(accel_psd=0.07, bias_std=0.1, bias_tau=30.0, levelled=True),
     # Limbs: larger slow errors are measured, but a filter that may move them also makes them up.

@@ -20,6 +20,7 @@ NODE = np.dtype(
         ("accel_mean", "f8"),  # running mean of |accel| [m/s2]
         ("accel_var", "f8"),  # running mean square of accel about its mean [m2/s4]
         ("turning", "f8"),  # running mean of the angular rate [rad/s]
+        ("t_first", "f8"),  # its first sample, or the first after a long silence [s]
         ("t_moved", "f8"),  # last time it was not at rest [s]
         ("cut_off", "?"),  # its last acceleration was at the end of the sensor's scale
         ("astray", "f8"),  # running share of its ranges that do not fit [-]
@@ -40,6 +41,7 @@ NODE = np.dtype(
         ("speed_var", "f8"),
         ("sideways_var", "f8"),  # 0 for what may move sideways
         ("rear_axle", "f8"),
+        ("slip", "f8"),
         ("at_p", "i8"),  # first state of its position
         ("at_v", "i8"),  # of its velocity; -1 for static nodes, like the next two
         ("at_b", "i8"),
@@ -69,6 +71,7 @@ PAIR = np.dtype(
 GROUP = np.dtype(
     [
         ("started", "?"),
+        ("asleep", "?"),  # nothing has moved yet, and one rotation stands for all
         ("flat", "?"),  # the layout was too flat to tell its mirror image
         ("n_alive", "i8"),
         ("best", "i8"),

@@ -102,6 +102,7 @@ def make_state(
             "speed_var": carrier.speed_std**2,
             "sideways_var": (carrier.sideways_std or 0.0) ** 2,
             "rear_axle": carrier.rear_axle,
+            "slip": carrier.slip,
             "at_p": at,
             "at_v": -1 if static else at + d,
             "at_b": -1 if static else at + 2 * d,

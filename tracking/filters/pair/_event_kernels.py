@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracking.compiled import kernel, small_kernel
+from tracking.filters._clear_kernels import clear_estimate
 from tracking.filters._level_kernels import level
 from tracking.filters._shape_kernels import collect
 from tracking.filters.pair._bank_kernels import (
@@ -205,6 +206,7 @@ def look_at_group(c, s, layout, t):
 @kernel
 def write_estimate(c, s, t, e, o, out):
     """The best hypothesis at time t, without touching the state."""
+    clear_estimate(e, o, out)
     pos, vel, cov, q_wb, has_q, age, nis, nlos, status = out
     h = s.group[0].best
     x, P = np.zeros((1, 1, 6)), np.zeros((1, 1, 6, 6))

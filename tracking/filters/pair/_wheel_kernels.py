@@ -1,14 +1,15 @@
-"""What is known of cars: their rear axle does not slide sideways.
+"""What is known of cars: their rear axle moves sideways by the slip of its tyres only.
 
 The pair filters hold differences of velocities, a wheel speaks of the velocity itself. So each
 hypothesis also holds the mean velocity of the group, u, dead reckoned with the mean of all
 accelerations. With n the direction to the left of car i, l how far the tracker is ahead of the
-axle and w the yaw rate,
+axle, k the slip, v the speed forward and w the yaw rate,
 
-    n . v_i = l w,    v_i = u + mean over k of v_ki
+    n . v_i = (l - k v^2) w,    v_i = u + mean over k of v_ki
 
 corrects u, and every pair of i by its own covariance: the variance of the innovation is that
-of u and of the velocity in the group together, so each takes its share.
+of u and of the velocity in the group together, so each takes its share. Of a pair, i has a
+half, or what its own variance allows where the other end is known far less, as after a join.
 """
 
 from __future__ import annotations
@@ -94,18 +95,19 @@ def apply_wheels(c, s, layout, t, work):
 
 @small_kernel
 def hold(c, s, layout, h, i, m, work):
-    """The rear axle of car i does not move sideways."""
+    """The rear axle of car i moves sideways by the slip of its tyres only."""
     node, u, Pu = s.nodes[i], s.mean_v[h], s.mean_cov[h]
     n0, n1 = -math.sin(node.yaw), math.cos(node.yaw)
     r0, r1 = velocity_in_group(s, layout, h, i, m)
-    nu = node.rear_axle * node.yaw_rate - n0 * (u[0] + r0) - n1 * (u[1] + r1)
+    forward = n1 * (u[0] + r0) - n0 * (u[1] + r1)
+    # Its tyres need a slip angle for the force that a curve takes; so the axle drifts out.
+    sideways = (node.rear_axle - node.slip * forward * forward) * node.yaw_rate
+    nu = sideways - n0 * (u[0] + r0) - n1 * (u[1] + r1)
     # Variance of the velocity in the group: half of that of a pair is each end's.
     own = 0.0
     for k in range(s.nodes.shape[0]):
         if k != i and s.nodes[k].present:
-            p = layout.pair_index[i, k]
-            own += n0 * n0 * s.P[p, h, 3, 3] + n1 * n1 * s.P[p, h, 4, 4]
-            own += 2.0 * n0 * n1 * s.P[p, h, 3, 4]
+            own += velocity_variance(s.P, layout.pair_index[i, k], h, n0, n1)
     own *= 0.5 / m
     w0, w1 = Pu[0, 0] * n0 + Pu[0, 1] * n1, Pu[1, 0] * n0 + Pu[1, 1] * n1
     common = n0 * w0 + n1 * w1
@@ -122,7 +124,8 @@ def hold(c, s, layout, h, i, m, work):
         for r in range(work.shape[1]):
             work[0, r] = 0.0
         work[0, 3], work[0, 4] = sign * n0, sign * n1
-        half_correct(s.x, s.P, p, h, work, nu, S)
+        share = own_share(velocity_variance(s.P, p, h, n0, n1), own)
+        correct_share(s.x, s.P, p, h, work, nu, S, share)
     g0, g1 = w0 / S, w1 / S
     u[0] += g0 * nu
     u[1] += g1 * nu
@@ -133,18 +136,37 @@ def hold(c, s, layout, h, i, m, work):
 
 
 @small_kernel
-def half_correct(x, P, p, h, work, nu, S):
+def velocity_variance(P, p, h, n0, n1):
+    """Variance of the relative velocity of pair p along the unit vector n0 n1 [m2/s2]."""
+    return n0 * n0 * P[p, h, 3, 3] + n1 * n1 * P[p, h, 4, 4] + 2.0 * n0 * n1 * P[p, h, 3, 4]
+
+
+@small_kernel
+def own_share(pair, own):
+    """Share of a pair's covariance that is the node's own: a half, or less [-].
+
+    No covariance of two quantities is above the root of the product of their variances. So a
+    node whose velocity in the group has variance `own` has a share of at most
+    ``sqrt(own / pair)`` in a pair of variance `pair`: what a node that has just joined does not
+    know about itself is not the uncertainty of those that were there.
+    """
+    return 0.5 if pair <= 4.0 * own else math.sqrt(own / pair)
+
+
+@small_kernel
+def correct_share(x, P, p, h, work, nu, S, share):
     """Correct a pair with an innovation of variance S of which one end's share is its own.
 
-    One end has half of the pair's covariance, so the gain is ``P H / (2 S)``; the covariance
-    falls by ``P H H^T P / (4 S)``, the other end's half stays.
+    One end has the share a of the pair's covariance, so the gain is ``a P H / S``; the
+    covariance falls by ``a^2 P H H^T P / S``, the rest, the other end's, stays. It stays
+    positive definite as long as ``a^2 H^T P H < S``.
     """
     m = x.shape[2]
     for r in range(m):
         total = 0.0
         for k in range(3, 5):
             total += P[p, h, r, k] * work[0, k]
-        work[1, r] = 0.5 * total
+        work[1, r] = share * total
     for r in range(m):
         x[p, h, r] += work[1, r] * nu / S
         for k in range(r, m):

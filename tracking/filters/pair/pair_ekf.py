@@ -16,9 +16,13 @@ References:
 
 from __future__ import annotations
 
+import copy
+from collections.abc import Callable
+
 import numpy as np
 
 from tracking.arrays import F64
+from tracking.compiled import bind
 from tracking.constellation import Constellation
 from tracking.estimate import TeamEstimate
 from tracking.filters.pair._event_kernels import run_events
@@ -51,40 +55,35 @@ class PairEkf:
 
     def run(self, block: MeasurementBlock, t_out: F64) -> TeamEstimate:
         """Handle the events and report at the given times; see `Filter.run`."""
-        events = (
-            block.t,
-            block.kind,
-            block.i,
-            block.j,
-            block.antenna_i,
-            block.antenna_j,
-            block.values,
-            block.has_power,
-            block.valid,
+        estimate = TeamEstimate.empty(
+            self._constellation, np.ascontiguousarray(t_out, dtype=np.float64)
         )
-        contiguous = tuple(np.ascontiguousarray(a) for a in events)
-        t_out = np.ascontiguousarray(t_out, dtype=np.float64)
-        estimate = TeamEstimate.empty(self._constellation, t_out)
-        out = (
-            estimate.pos_ij_w,
-            estimate.vel_ij_w,
-            estimate.cov,
-            estimate.q_wb,
-            estimate.has_orientation,
-            estimate.age,
-            estimate.nis,
-            estimate.nlos_prob,
-            estimate.status,
-        )
-        run_events(
-            as_records(self._coefficients), self._layout, self._records(), contiguous, t_out, out
-        )
+        self.bind(block, estimate)()
         return estimate
+
+    def bind(self, block: MeasurementBlock, estimate: TeamEstimate) -> Callable[[], None]:
+        """`run` for arrays that stay where they are; see `Filter.bind`."""
+        arguments = (
+            as_records(self._coefficients),
+            self._layout,
+            self._records(),
+            block.arrays,
+            estimate.t,
+            estimate.arrays,
+        )
+        return bind(run_events, *arguments)
 
     def reset(self, env: int) -> None:
         """Forget everything of one environment."""
         for array, fresh in zip(self._state, self._fresh(1), strict=True):
             array[env] = fresh[0]
+
+    def part(self, envs: slice) -> PairEkf:
+        """Some of the environments; shares their memory."""
+        part = copy.copy(self)
+        part._state = FilterState._make(array[envs] for array in self._state)
+        part._n_envs = len(part._state.x)
+        return part
 
     def save(self) -> FilterState:
         """A copy of everything that evolves."""

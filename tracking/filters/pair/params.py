@@ -115,6 +115,8 @@ class WheelParams:
     """[m/s] Sideways speed of the axle, each time it is used: slip, and a heading that is wrong."""
     rear_axle: float = 0.15
     """[m] How far the tracker is ahead of the axle."""
+    slip: float = 0.018
+    """[s2/m] How fast that axle drifts outwards in a curve, per squared speed and yaw rate."""
     period: float = 0.05
     """[s] Time between two uses."""
 

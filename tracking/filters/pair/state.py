@@ -35,6 +35,7 @@ NODE = np.dtype(
         ("t_sum", "f8"),  # until when its acceleration is in the mean velocity [s]
         ("psd", "f8"),  # constant: acceleration noise with an IMU [m/s2/sqrt(Hz)]
         ("sideways_var", "f8"),  # constant: of its rear axle [m2/s2]; 0 if it may slide
+        ("slip", "f8"),  # constant: how fast that axle drifts out in a curve [s2/m]
         ("rear_axle", "f8"),  # constant: how far the tracker is ahead of it [m]
     ]
 )
@@ -231,6 +232,7 @@ def make_state(
     cars = [node.vehicle == "car" and node.kind == "moving" for node in constellation.nodes]
     nodes["sideways_var"] = np.where(cars, params.wheels.std**2, 0.0)
     nodes["rear_axle"] = params.wheels.rear_axle
+    nodes["slip"] = params.wheels.slip
     held = np.zeros((n_envs, n, 7))
     held[..., 0] = 1.0
     pairs = np.zeros((n_envs, p), dtype=PAIR)

@@ -1,0 +1,172 @@
+"""The queue of measurements that wait, one an environment, kept in handling order.
+
+Events lie in slots that never move; `order` lists the slots, as a ring: from `head` on those that
+wait, in order, then the free ones. An event that comes is put at the end and moved forward past
+those that come after it, which is one comparison for one that arrives in order.
+"""
+
+from __future__ import annotations
+
+from tracking.compiled import kernel, small_kernel
+
+
+@small_kernel
+def is_before(s, e, a, b):
+    """Whether the event in slot a is handled before that in slot b: time, kind, nodes."""
+    if s.t[e, a] != s.t[e, b]:
+        return s.t[e, a] < s.t[e, b]
+    if s.kind[e, a] != s.kind[e, b]:
+        return s.kind[e, a] < s.kind[e, b]
+    if s.i[e, a] != s.i[e, b]:
+        return s.i[e, a] < s.i[e, b]
+    return s.j[e, a] < s.j[e, b]
+
+
+@small_kernel
+def is_same(s, e, a, b):
+    """Whether two events that neither comes before the other are one measurement."""
+    same = s.antenna_i[e, a] == s.antenna_i[e, b] and s.antenna_j[e, a] == s.antenna_j[e, b]
+    for v in range(s.values.shape[2]):
+        same = same and s.values[e, a, v] == s.values[e, b, v]
+    return same
+
+
+@small_kernel
+def put_in_slot(s, e, slot, block, k):
+    """Copy the event in column k of a block into a slot."""
+    t, kind, i, j, antenna_i, antenna_j, values, has_power, _ = block
+    s.t[e, slot], s.kind[e, slot] = t[e, k], kind[e, k]
+    s.i[e, slot], s.j[e, slot] = i[e, k], j[e, k]
+    s.antenna_i[e, slot], s.antenna_j[e, slot] = antenna_i[e, k], antenna_j[e, k]
+    for v in range(s.values.shape[2]):
+        s.values[e, slot, v] = values[e, k, v]
+    s.has_power[e, slot] = has_power[e, k]
+
+
+@small_kernel
+def enqueue(s, e, slot):
+    """Move the event in the first free slot to its place; False if it is there already."""
+    mask = s.order.shape[1] - 1
+    end = s.head[e] + s.n_waiting[e]
+    place = end
+    while place > s.head[e] and is_before(s, e, slot, s.order[e, (place - 1) & mask]):
+        place -= 1
+    other = place - 1
+    while other >= s.head[e] and not is_before(s, e, s.order[e, other & mask], slot):
+        if is_same(s, e, slot, s.order[e, other & mask]):
+            return False
+        other -= 1
+    for at in range(end, place, -1):
+        s.order[e, at & mask] = s.order[e, (at - 1) & mask]
+    s.order[e, place & mask] = slot
+    s.n_waiting[e] += 1
+    return True
+
+
+@kernel
+def take_in(s, block):
+    """Put the events of a block in order behind those that wait.
+
+    Late ones are dropped and counted, and so are those that wait already.
+
+    Args:
+        s: HorizonState, updated.
+        block: Events, (env, event, ...), the arrays of a `MeasurementBlock` in their order.
+
+    Returns:
+        How many events were left out for want of slots.
+    """
+    t, valid = block[0], block[8]
+    mask = s.order.shape[1] - 1
+    n_refused = 0
+    for e in range(t.shape[0]):
+        for k in range(t.shape[1]):
+            if not valid[e, k]:
+                continue
+            if not t[e, k] > s.released[e]:
+                s.n_late[e] += 1
+                continue
+            if s.n_waiting[e] > mask:
+                n_refused += 1
+                continue
+            slot = s.order[e, (s.head[e] + s.n_waiting[e]) & mask]
+            put_in_slot(s, e, slot, block, k)
+            if not enqueue(s, e, slot):
+                s.n_doubled[e] += 1
+    return n_refused
+
+
+@kernel
+def count_due(s, until):
+    """Most events that any environment has up to a time, (env) [s]."""
+    mask = s.order.shape[1] - 1
+    most = 0
+    for e in range(until.shape[0]):
+        low, high = 0, s.n_waiting[e]
+        while low < high:
+            middle = (low + high) // 2
+            if s.t[e, s.order[e, (s.head[e] + middle) & mask]] <= until[e]:
+                low = middle + 1
+            else:
+                high = middle
+        most = max(most, low)
+    return most
+
+
+@kernel
+def hand_on(s, until, remove, out):
+    """Write what waited up to a time.
+
+    Args:
+        s: HorizonState, updated.
+        until: (env) [s].
+        remove: Whether it waits no longer.
+        out: Events, written, (env, event, ...), at least `count_due` columns; what they do not
+            need is padding.
+    """
+    t, kind, i, j, antenna_i, antenna_j, values, has_power, valid = out
+    mask = s.order.shape[1] - 1
+    for e in range(t.shape[0]):
+        n = 0
+        while n < s.n_waiting[e]:
+            slot = s.order[e, (s.head[e] + n) & mask]
+            if s.t[e, slot] > until[e]:
+                break
+            t[e, n], kind[e, n], i[e, n], j[e, n] = (
+                s.t[e, slot],
+                s.kind[e, slot],
+                s.i[e, slot],
+                s.j[e, slot],
+            )
+            antenna_i[e, n], antenna_j[e, n] = s.antenna_i[e, slot], s.antenna_j[e, slot]
+            for v in range(s.values.shape[2]):
+                values[e, n, v] = s.values[e, slot, v]
+            has_power[e, n], valid[e, n] = s.has_power[e, slot], True
+            n += 1
+        for k in range(n, t.shape[1]):
+            valid[e, k] = False
+        if remove:
+            s.head[e] = (s.head[e] + n) & mask
+            s.n_waiting[e] -= n
+            s.released[e] = max(s.released[e], until[e])
+
+
+@kernel
+def sum_turns(s, kind, dt, out):
+    """How far every node has turned about its own vertical in the samples that wait.
+
+    Args:
+        s: HorizonState.
+        kind: That of inertial samples.
+        dt: Time between two of them, (node) [s].
+        out: (env, node) [rad], written.
+    """
+    mask = s.order.shape[1] - 1
+    for e in range(out.shape[0]):
+        for n in range(out.shape[1]):
+            out[e, n] = 0.0
+        for k in range(s.n_waiting[e]):
+            slot = s.order[e, (s.head[e] + k) & mask]
+            if s.kind[e, slot] == kind:
+                i = s.i[e, slot]
+                out[e, i] += s.values[e, slot, 2] * dt[i]

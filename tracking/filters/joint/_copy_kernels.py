@@ -1,0 +1,70 @@
+"""Copies of hypotheses, turned or mirrored."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tracking.compiled import kernel
+
+
+@kernel
+def copy_hypothesis(s, h):
+    """A copy of a hypothesis in a free place of the bank; -1 if there is none."""
+    for free in range(s.alive.shape[0]):
+        if not s.alive[free]:
+            s.alive[free] = True
+            s.loglik[free] = s.loglik[h]
+            s.x[free] = s.x[h]
+            s.P[free] = s.P[h]
+            s.moved[free] = s.moved[h]
+            s.nlos[free] = s.nlos[h]
+            s.group[0].n_alive += 1
+            return free
+    return -1
+
+
+@kernel
+def turn_hypothesis(c, s, h, M):
+    """Turn or mirror the layout of a hypothesis about its centre, velocities as well.
+
+    Args:
+        c: Coefficients.
+        s: JointState of one environment.
+        h: Hypothesis, updated.
+        M: Orthogonal, (d, d).
+    """
+    d = c.d
+    T = np.eye(c.n)
+    mean, mean_v, present, moving = np.zeros(d), np.zeros(d), 0, 0
+    for i in range(s.nodes.shape[0]):
+        node = s.nodes[i]
+        if node.present:
+            present += 1
+            mean += s.x[h, node.at_p : node.at_p + d]
+            if not node.static:
+                moving += 1
+                mean_v += s.x[h, node.at_v : node.at_v + d]
+    mean /= max(present, 1)
+    # Beside static nodes velocities are not free to shift.
+    mean_v *= 1.0 / max(moving, 1) if moving == present else 0.0
+    for i in range(s.nodes.shape[0]):
+        node = s.nodes[i]
+        if node.present:
+            turn_part(s.x, T, h, node.at_p, mean, M)
+            if not node.static:
+                turn_part(s.x, T, h, node.at_v, mean_v, M)
+    s.moved[h, :] = 0.0
+    s.P[h] = T @ s.P[h].copy() @ T.T.copy()
+
+
+@kernel
+def turn_part(x, T, h, at, mean, M):
+    """Turn one vector of the state about a mean, and note it in the matrix of the whole."""
+    d = M.shape[0]
+    out = x[h, at : at + d] - mean
+    for r in range(d):
+        total = mean[r]
+        for k in range(d):
+            total += M[r, k] * out[k]
+            T[at + r, at + k] = M[r, k]
+        x[h, at + r] = total

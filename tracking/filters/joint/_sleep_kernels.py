@@ -1,0 +1,52 @@
+"""Groups in which nothing has moved yet: one rotation stands for all.
+
+Ranges say nothing about the rotation of a layout, nor about its mirror image, and the
+accelerations of nodes at rest neither: until something moves, all hypotheses of the bank are
+one, turned. So only one is followed; the others are made of it when the first node moves.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tracking.compiled import kernel, small_kernel
+from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_hypothesis
+
+SETTLE = 0.5
+"""[s] The first samples of a node look like motion: its orientation is still being found."""
+
+
+@small_kernel
+def rests(c, node, t):
+    """True for a node whose IMU has read the same for a while, up to now."""
+    if not node.has_state or t - node.t_state > c.unaided_after:
+        return False
+    return node.rests and t - node.t_moved > c.rest_after
+
+
+@small_kernel
+def none_moved(c, s, t):
+    """True if no present node has been seen to move since it was first heard."""
+    for i in range(s.nodes.shape[0]):
+        node = s.nodes[i]
+        if not node.present or node.static:
+            continue
+        if not node.has_state or t - node.t_state > c.unaided_after:
+            return False
+        if node.t_moved - node.t_first > SETTLE:
+            return False
+    return True
+
+
+@kernel
+def wake_up(c, s, layout):
+    """Follow all rotations and mirror images from now on."""
+    group = s.group[0]
+    group.asleep = False
+    d = c.d
+    first = layout.rotations[0, :d, :d].copy()
+    for r in range(1, layout.rotations.shape[0]):
+        h = copy_hypothesis(s, group.best)
+        if h >= 0:
+            turn = layout.rotations[r, :d, :d].copy() @ first.T.copy()
+            turn_hypothesis(c, s, h, np.ascontiguousarray(turn))
