@@ -1,21 +1,30 @@
-"""Scenarios: rooms, obstacles, who moves, and the sensors. Adding one: a file and a line here."""
+"""Scenarios: rooms, obstacles, who moves, the sensors, and what changes from episode to episode.
+
+Those with cars are the files in `files/`; adding one: a file there. `docs/scenarios.md`.
+"""
 
 from __future__ import annotations
 
-from relpos_env.errors import EnvError
-from relpos_env.registry import look_up
-from relpos_env.scenarios.base import Scenario
-from relpos_env.scenarios.cars import CARS_LOS, CARS_NLOS
-from relpos_env.scenarios.people import HUMAN, HUMAN_MOCAP, HumanScenario
-from relpos_env.scenarios.ring import RING_LOS, RING_NLOS
+from collections import ChainMap
+from collections.abc import Mapping, MutableMapping
+from pathlib import Path
+from typing import TypeVar, cast
 
-SCENARIOS: dict[str, Scenario] = {
-    "cars-los": CARS_LOS,
-    "cars-nlos": CARS_NLOS,
-    "ring-los": RING_LOS,
-    "ring-nlos": RING_NLOS,
-}
-"""With cars: for environments and recordings."""
+from relpos_env.errors import EnvError
+from relpos_env.scenarios.base import Scenario
+from relpos_env.scenarios.catalogue import SHIPPED, is_path, load_scenario
+from relpos_env.scenarios.episode import Episode, draw_episode
+from relpos_env.scenarios.gap import Gap
+from relpos_env.scenarios.levels import LEVELS
+from relpos_env.scenarios.life import LifeEvent
+from relpos_env.scenarios.obstacle import Obstacle
+from relpos_env.scenarios.people import HUMAN, HUMAN_MOCAP, HumanScenario
+from relpos_env.scenarios.randomisation import Randomisation
+
+Entry = TypeVar("Entry")
+
+SCENARIOS: Mapping[str, Scenario] = SHIPPED
+"""With cars: for environments and recordings; read from their files when first used."""
 
 PEOPLE: dict[str, HumanScenario] = {
     "human": HUMAN,
@@ -23,38 +32,68 @@ PEOPLE: dict[str, HumanScenario] = {
 }
 """With a person: for recordings only."""
 
-RECORDABLE: dict[str, Scenario | HumanScenario] = {**SCENARIOS, **PEOPLE}
+RECORDABLE: Mapping[str, Scenario | HumanScenario] = ChainMap(
+    # Looked up in this order, listed in the other one; nothing is written to it.
+    cast(MutableMapping[str, Scenario | HumanScenario], PEOPLE),
+    cast(MutableMapping[str, Scenario | HumanScenario], SCENARIOS),
+)
 
 
-def scenario(name: str) -> Scenario:
-    """Look a scenario with cars up.
+def scenario(name: str | Path | Scenario) -> Scenario:
+    """Look a scenario with cars up, or read it from a file.
+
+    Args:
+        name: One of `SCENARIOS`, the path of a file that ends in `.toml`, or a scenario itself.
 
     Raises:
-        EnvError: No scenario of that name, or one with a person, whom nobody can drive.
+        EnvError: No scenario of that name, or one with a person, whom nobody can drive; or
+            something is wrong with the file.
     """
+    if isinstance(name, Scenario):
+        return name
+    if isinstance(name, Path) or is_path(name):
+        return load_scenario(name)
     if name in PEOPLE:
         raise EnvError(
             f"scenario: {name!r} has a person and no cars to command, and can only be recorded; "
             f"expected one of {', '.join(SCENARIOS)}"
         )
-    return look_up(SCENARIOS, name, "scenario")
+    return _known(SCENARIOS, name)
 
 
 def recordable(name: str) -> Scenario | HumanScenario:
-    """Look any scenario up.
+    """Look any scenario up, or read one with cars from a file.
+
+    Args:
+        name: One of `RECORDABLE`, or the path of a file that ends in `.toml`.
 
     Raises:
-        EnvError: No scenario of that name.
+        EnvError: No scenario of that name, or something is wrong with the file.
     """
-    return look_up(RECORDABLE, name, "scenario")
+    return load_scenario(name) if is_path(name) else _known(RECORDABLE, name)
+
+
+def _known(registry: Mapping[str, Entry], name: str) -> Entry:
+    if name in registry:
+        return registry[name]
+    names = ", ".join(registry)
+    raise EnvError(f"scenario: expected one of {names} or a file *.toml, got {name!r}")
 
 
 __all__ = [
+    "LEVELS",
     "PEOPLE",
     "RECORDABLE",
     "SCENARIOS",
+    "Episode",
+    "Gap",
     "HumanScenario",
+    "LifeEvent",
+    "Obstacle",
+    "Randomisation",
     "Scenario",
+    "draw_episode",
+    "load_scenario",
     "recordable",
     "scenario",
 ]

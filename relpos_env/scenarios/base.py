@@ -2,63 +2,146 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from relpos_env.errors import EnvError
+from relpos_env.scenarios.checks import check_scenario, most_that_start
+from relpos_env.scenarios.floor import Area, Floor
+from relpos_env.scenarios.gap import Gap
+from relpos_env.scenarios.layout import Layout, line_poses, ring_poses
+from relpos_env.scenarios.levels import level
+from relpos_env.scenarios.obstacle import Obstacle, boxes_of
+from relpos_env.scenarios.randomisation import Randomisation
 from relpos_env.sensors.imu import ImuSimParams
 from relpos_env.sensors.magnetometer import MagSimParams
 from relpos_env.sensors.odometer import OdometerSimParams
 from relpos_env.sensors.radio.params import RadioSimParams
 from relpos_env.vehicle import CarParams
-from relpos_env.world import Obstacle
 from tracking.arrays import F64
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scenario:
-    """A room with obstacles, cars and sensors."""
+    """A room with obstacles, cars and sensors, and what of it changes from episode to episode."""
 
     name: str
     room: tuple[float, float]
     """[m] Along x and along y; the origin is the centre."""
     obstacles: tuple[Obstacle, ...] = ()
+    """What stands in it in every episode."""
+    gap: Gap | None = None
+    """Where a wall leaves a gap to drive through; its wall is among the obstacles.
+    `with_gap` puts both in."""
     n_cars: int = 3
+    n_cars_range: tuple[int, int] = (2, 20)
+    """[-] Fewest and most cars that the room is made for, whoever asks for them."""
     ring: tuple[float, float]
     """[m] Half axes of the loop on which the cars start and drive round the centre."""
-    in_line: bool = False
-    """The cars start on one straight line beside the centre, in place of on the loop."""
+    layout: Layout = "ring"
+    """Where the cars start: `ring`, evenly on the loop; `line`, on a straight line beside the
+    centre, at x = ring[0]; `scattered`, anywhere, facing anywhere."""
+    start_area: Area | None = None
+    """[m] x from, y from, x to, y to: where scattered and joining cars start; None is
+    everywhere."""
+    in_line: bool = field(default=False, repr=False, metadata={"in_file": False})
+    """To be passed only, and the same as `layout="line"`; always False when read."""
     car: CarParams = field(default_factory=CarParams)
     imu: ImuSimParams = field(default_factory=ImuSimParams)
     mag: MagSimParams = field(default_factory=MagSimParams)
     odometer: OdometerSimParams = field(default_factory=OdometerSimParams)
     radio: RadioSimParams = field(default_factory=RadioSimParams)
+    randomisation: Randomisation = field(default_factory=Randomisation)
+    """What is drawn anew for every episode; nothing by default."""
 
     def __post_init__(self) -> None:
-        if self.n_cars < 2:
-            raise EnvError(f"cars: expected at least 2, got {self.n_cars}")
-        room_for = int(np.pi * sum(self.ring) / (1.5 * self.car.length))
-        if self.n_cars > room_for:
-            raise EnvError(
-                f"cars: {self.n_cars} do not fit on the loop of scenario {self.name!r}, "
-                f"expected at most {room_for}"
-            )
-
-    def start(self, rng: np.random.Generator) -> F64:
-        """Starting poses, evenly on the loop with some disorder, (car, 3) [m, m, rad].
-
-        On a line (`in_line`) the spacing is even and only the headings are in disorder.
-        """
-        n = self.n_cars
         if self.in_line:
-            a, b = self.ring
-            y = (np.arange(n) - 0.5 * (n - 1)) * 2.0 * b / n
-            heading = 0.5 * np.pi + rng.uniform(-0.1, 0.1, n)
-            return np.stack([np.full(n, a), y, heading], axis=1)
-        spacing = 2.0 * np.pi / n
-        phase = rng.uniform(0.0, 2.0 * np.pi) + spacing * np.arange(n)
-        phase += rng.uniform(-0.1, 0.1, n) * spacing
-        a, b = self.ring
-        heading = np.arctan2(b * np.cos(phase), -a * np.sin(phase)) + rng.uniform(-0.1, 0.1, n)
-        return np.stack([a * np.cos(phase), b * np.sin(phase), heading], axis=1)
+            object.__setattr__(self, "layout", "line")
+            object.__setattr__(self, "in_line", False)
+        check_scenario(self)
+
+    @property
+    def max_boxes(self) -> int:
+        """So many obstacles an episode can have."""
+        return len(self.obstacles) + self.randomisation.obstacles[1]
+
+    def with_cars(self, n_cars: int) -> Scenario:
+        """The same with slots for so many cars: all are there, or fewer where it is drawn.
+
+        Raises:
+            EnvError: They do not fit.
+        """
+        drawn = self.randomisation.n_cars
+        if drawn is None:
+            return replace(self, n_cars=n_cars)
+        if n_cars < drawn[0]:
+            raise EnvError(
+                f"n_cars: expected at least {drawn[0]}, the fewest that are drawn, got {n_cars}"
+            )
+        drawn = (drawn[0], min(drawn[1], n_cars))
+        return replace(
+            self,
+            n_cars=min(self.n_cars, n_cars),
+            randomisation=replace(self.randomisation, n_cars=drawn),
+        )
+
+    def start(self, rng: np.random.Generator, n_cars: int | None = None) -> F64:
+        """Starting poses among the obstacles of the scenario, (car, 3) [m, m, rad].
+
+        Args:
+            rng: For the disorder.
+            n_cars: By default that of the scenario.
+
+        Raises:
+            EnvError: Fewer than so many scattered cars found a place.
+        """
+        n = self.n_cars if n_cars is None else n_cars
+        if self.layout == "ring":
+            return ring_poses(n, self.ring, self.car, rng)
+        if self.layout == "line":
+            return line_poses(n, self.ring, rng)
+        return self.scattered(Floor(self.room, self.car, boxes_of(self.obstacles)), n, rng)
+
+    def scattered(self, floor: Floor, n: int, rng: np.random.Generator) -> F64:
+        """Random poses on a floor, (car, 3) [m, m, rad].
+
+        Raises:
+            EnvError: Fewer than so many found a place.
+        """
+        for _ in range(20):
+            poses = floor.scatter(n, self.start_area, np.zeros((0, 2)), rng)
+            if len(poses) == n:
+                return poses
+        raise EnvError(
+            f"n_cars: {n} do not fit into scenario {self.name!r}, the last try placed {len(poses)}"
+        )
+
+    def with_gap(self, gap: Gap | None) -> Scenario:
+        """The same with another gap and its wall in place of the present ones, or with none.
+
+        Raises:
+            EnvError: The gap is wider than the wall, too narrow for a car, or blocked.
+        """
+        old = () if self.gap is None else self.gap.wall(self.room)
+        rest = tuple(o for o in self.obstacles if o not in old)
+        new = () if gap is None else gap.wall(self.room)
+        return replace(self, gap=gap, obstacles=rest + new)
+
+    def at_level(self, number: int) -> Scenario:
+        """The same with the randomisation of a level of the curriculum.
+
+        The number of cars is drawn from what both the level and the room allow.
+
+        Args:
+            number: 0, nothing, to 4, see `relpos_env.scenarios.levels.LEVELS`.
+
+        Raises:
+            EnvError: No level of that number.
+        """
+        wanted = level(number)
+        if wanted.n_cars is not None:
+            low = max(wanted.n_cars[0], self.n_cars_range[0])
+            high = min(wanted.n_cars[1], self.n_cars_range[1], most_that_start(self))
+            wanted = replace(wanted, n_cars=(low, high) if low <= high else None)
+        return replace(self, randomisation=wanted)

@@ -1,0 +1,127 @@
+"""Scenario files: those that come with the package, by name, and those of users, by path."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from relpos_env.errors import EnvError
+from relpos_env.registry import look_up
+from relpos_env.scenarios.base import Scenario
+from relpos_env.scenarios.gap import Gap
+from relpos_env.scenarios.levels import level
+from relpos_env.scenarios.randomisation import Randomisation
+from relpos_env.scenarios.toml import Preset, TableReader, Where
+from relpos_env.sensors.radio.channel import CHANNELS, ChannelParams
+from tracking.ranging.airtime import PHYS, Phy
+
+FILES = Path(__file__).parent / "files"
+SUFFIX = ".toml"
+DEEPEST = 8
+"""[-] Files that may extend each other in a row."""
+
+
+class Catalogue(Mapping[str, Scenario]):
+    """The scenarios that come with the package; a file is read when it is first asked for."""
+
+    def __init__(self) -> None:
+        self._names = sorted(path.stem for path in FILES.glob(f"*{SUFFIX}"))
+
+    def __getitem__(self, name: str) -> Scenario:
+        if name not in self._names:
+            raise KeyError(name)
+        return shipped(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._names
+
+
+def is_path(name_or_path: str | Path) -> bool:
+    """Whether it is a file rather than a name."""
+    return isinstance(name_or_path, Path) or name_or_path.endswith(SUFFIX)
+
+
+def load_scenario(path: str | Path) -> Scenario:
+    """Read a scenario from a TOML file, see `docs/scenarios.md`.
+
+    Raises:
+        EnvError: No such file, no TOML, or something in it that is unknown or cannot be; names
+            the file and the key.
+    """
+    return _load(Path(path), 0)
+
+
+@cache
+def shipped(name: str) -> Scenario:
+    """A scenario of the package."""
+    return load_scenario(FILES / f"{name}{SUFFIX}")
+
+
+def scenario_from(
+    table: Mapping[str, Any], *, file: str, name: str, beside: Path | None = None, depth: int = 0
+) -> Scenario:
+    """A scenario from the content of a file.
+
+    Args:
+        table: What TOML gave.
+        file: For messages.
+        name: Of the scenario, unless the file says one.
+        beside: The folder in which `extends = "other.toml"` is looked for; None is here.
+        depth: How many files extend this one.
+
+    Raises:
+        EnvError: Names the file and the key.
+    """
+    where, rest = Where(file), dict(table)
+    inherited: list[Gap | None] = []
+
+    def parent(wanted: str) -> Scenario:
+        if not is_path(wanted):
+            base = look_up(SHIPPED, wanted, "extends")
+        elif depth < DEEPEST:
+            base = _load((beside or Path()) / wanted, depth + 1)
+        else:
+            raise EnvError(f"expected files that extend each other at most {DEEPEST} deep")
+        inherited.append(base.gap)
+        return base.with_gap(None)  # its wall would stand in the way of another room
+
+    rest.setdefault("name", name)
+    reader = TableReader(presets={**_PRESETS, Scenario: Preset("extends", str, parent)})
+    gap_table = rest.pop("gap", None)
+    read = reader.read(Scenario, rest, where)
+    gap = next(iter(inherited), None)
+    if gap_table is not None:
+        gap = reader.read(Gap, gap_table, where.key("gap"), gap)
+    try:
+        return read if gap is None else read.with_gap(gap)
+    except EnvError as error:
+        raise where.error(str(error)) from error
+
+
+def _load(path: Path, depth: int) -> Scenario:
+    try:
+        with path.open("rb") as stream:
+            table = tomllib.load(stream)
+    except OSError as error:
+        reason = error.strerror or type(error).__name__
+        raise EnvError(f"scenario: cannot read {str(path)!r}: {reason}") from error
+    except (ValueError, RecursionError) as error:  # of TOML, of UTF-8, and of endless brackets
+        raise EnvError(f"{path.name}: expected TOML: {error}") from error
+    return scenario_from(table, file=path.name, name=path.stem, beside=path.parent, depth=depth)
+
+
+SHIPPED = Catalogue()
+_PRESETS: dict[type, Preset] = {
+    ChannelParams: Preset("place", str, lambda name: look_up(CHANNELS, name, "place")),
+    Phy: Preset("setting", str, lambda name: look_up(PHYS, name, "setting")),
+    Randomisation: Preset("level", int, level),
+}

@@ -1,0 +1,150 @@
+"""Scenarios that cannot be: every one is an error that names the argument and what is allowed."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import TYPE_CHECKING
+
+from relpos_env.errors import EnvError
+from relpos_env.scenarios.floor import Area, Floor
+from relpos_env.scenarios.gap import Gap
+from relpos_env.scenarios.layout import LAYOUTS, first_in_the_way, most_cars, track
+from relpos_env.scenarios.limits import check_params
+from relpos_env.scenarios.obstacle import Obstacle, boxes_of
+from relpos_env.scenarios.overlap import overlap
+from tracking.arrays import F64
+
+if TYPE_CHECKING:
+    from relpos_env.scenarios.base import Scenario
+
+MOST_CARS = 20
+"""[-] The tables of the radio's messages and the trackers' groups are tried up to so many."""
+LARGEST_ROOM = 100.0
+"""[m] Along a side; the radio reaches no farther."""
+MOST_OBSTACLES = 200
+
+
+def check_scenario(s: Scenario) -> None:
+    """Refuse a scenario that cannot be.
+
+    Raises:
+        EnvError: Names the argument and what is allowed.
+    """
+    for name, params in (
+        ("car", s.car), ("imu", s.imu), ("mag", s.mag), ("odometer", s.odometer),
+        ("radio", s.radio),
+    ):  # fmt: skip
+        check_params(name, params)
+    _check_room(s)
+    _check_numbers(s)
+    if s.gap is not None:
+        _check_gap(s.gap, s)
+    _check_start(s)
+
+
+def _check_room(s: Scenario) -> None:
+    if not re.fullmatch(r"[\w .+-]{1,80}", s.name):
+        raise EnvError(f"name: expected 1 to 80 letters, digits, spaces or .+-_, got {s.name!r}")
+    least = 2.0 * math.hypot(s.car.length, s.car.width)
+    for side in s.room:
+        if not least <= side <= LARGEST_ROOM:
+            raise EnvError(f"room: expected {least:.2f} to {LARGEST_ROOM:g} m a side, got {side}")
+    for axis, side in zip(s.ring, s.room, strict=True):
+        if not 0.0 < axis < 0.5 * side:
+            raise EnvError(f"ring: expected above 0 and below {0.5 * side:g} m, got {axis}")
+    if len(s.obstacles) > MOST_OBSTACLES:
+        raise EnvError(f"obstacles: expected at most {MOST_OBSTACLES}, got {len(s.obstacles)}")
+    for k, o in enumerate(s.obstacles):
+        if abs(o.x) > 0.5 * s.room[0] or abs(o.y) > 0.5 * s.room[1]:
+            raise EnvError(
+                f"obstacles[{k}]: expected its centre in the room of {s.room[0]:g} m x "
+                f"{s.room[1]:g} m, got x = {o.x:g}, y = {o.y:g}"
+            )
+    if s.layout not in LAYOUTS:
+        raise EnvError(f"layout: expected one of {', '.join(LAYOUTS)}, got {s.layout!r}")
+    if s.start_area is not None:
+        _check_area(s.start_area)
+
+
+def _check_area(area: Area) -> None:
+    if not (all(map(math.isfinite, area)) and area[0] < area[2] and area[1] < area[3]):
+        raise EnvError(f"start_area: expected x from, y from, x to, y to, got {area}")
+
+
+def _check_numbers(s: Scenario) -> None:
+    low, high = s.n_cars_range
+    if not 2 <= low <= high <= MOST_CARS:
+        raise EnvError(f"n_cars_range: expected 2 <= low <= high <= {MOST_CARS}, got {low}, {high}")
+    if s.n_cars < 2:
+        raise EnvError(f"n_cars: expected at least 2, got {s.n_cars}")
+    most = most_that_start(s)
+    for name, n in _wanted(s):
+        if n > most:
+            where = "into" if s.layout == "scattered" else "on the loop of"
+            if s.layout == "line":
+                where = "on the line of"
+            raise EnvError(
+                f"{name}: {n} do not fit {where} scenario {s.name!r}, expected at most {most}"
+            )
+    for name, n in _wanted(s):
+        if not low <= n <= high:
+            raise EnvError(f"{name}: expected {low} to {high} in scenario {s.name!r}, got {n}")
+
+
+def _wanted(s: Scenario) -> list[tuple[str, int]]:
+    """All numbers of cars that may start, by their arguments."""
+    drawn = s.randomisation.n_cars or ()
+    return [("n_cars", s.n_cars), *(("randomisation.n_cars", n) for n in drawn)]
+
+
+def most_that_start(s: Scenario) -> int:
+    """How many cars find a place at the start."""
+    if s.layout != "scattered":
+        return most_cars(s.layout, s.ring, s.car)
+    floor = Floor(s.room, s.car, boxes_of(s.obstacles))
+    return floor.room_for(floor.patches(floor.clearance, s.start_area)[2])
+
+
+def _check_start(s: Scenario) -> None:
+    poses = track(s.layout, s.ring)
+    hit = first_in_the_way(poses, s.car, s.room, boxes_of(s.obstacles))
+    if hit == -2:
+        return
+    what = "a wall" if hit == -1 else f"obstacles[{hit}]"
+    raise EnvError(
+        f"ring: cars would start in {what}; expected a loop (or line) clear of walls and "
+        f'obstacles, or layout = "scattered"'
+    )
+
+
+def _check_gap(gap: Gap, s: Scenario) -> None:
+    least = s.car.width + 0.1
+    if gap.width < least:
+        raise EnvError(f"gap.width: expected at least {least:g} m for a car, got {gap.width:g}")
+    gap.wall(s.room)
+    boxes = boxes_of(s.obstacles)
+    for k in (1.0, -1.0):
+        # A finger's breadth of wall just beside the opening.
+        beside = _slice(gap, k * (0.5 * gap.width + 0.005), 0.002)
+        if not overlap(beside, boxes).any():
+            raise EnvError("gap: expected walls at both its sides, see Scenario.with_gap")
+    blocked = overlap(_slice(gap, 0.0, gap.width - 0.002), boxes)[0]
+    if blocked.any():
+        raise EnvError(f"gap: obstacles[{int(blocked.argmax())}] stands in it")
+
+
+def _slice(gap: Gap, aside: float, width: float) -> F64:
+    """A part of the wall's line, as a box (1, 6)."""
+    along = gap.direction + 0.5 * math.pi
+    return boxes_of(
+        (
+            Obstacle(
+                x=gap.x + aside * math.cos(along),
+                y=gap.y + aside * math.sin(along),
+                width=max(width, 0.01),
+                height=gap.thickness,
+                angle=along,
+            ),
+        )
+    )

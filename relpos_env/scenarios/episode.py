@@ -1,0 +1,117 @@
+"""One episode: a scenario with everything that is drawn for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from relpos_env.errors import EnvError
+from relpos_env.scenarios.base import Scenario
+from relpos_env.scenarios.checks import MOST_CARS
+from relpos_env.scenarios.clutter import draw_clutter
+from relpos_env.scenarios.draws import draw_car, draw_imu, draw_mag, draw_odometer, draw_radio
+from relpos_env.scenarios.floor import Floor
+from relpos_env.scenarios.life import LifeEvent, Pose, draw_life
+from relpos_env.scenarios.obstacle import Obstacle, boxes_of
+from relpos_env.sensors.imu import ImuSimParams
+from relpos_env.sensors.magnetometer import MagSimParams
+from relpos_env.sensors.odometer import OdometerSimParams
+from relpos_env.sensors.radio.params import RadioSimParams
+from relpos_env.vehicle import CarParams
+from tracking.arrays import F64, Bool
+
+KINDS = ("number", "clutter", "car", "imu", "mag", "odometer", "radio", "leaving", "power", "joins")
+"""What has a generator of its own. New kinds go to the end, so that the others stay."""
+DOORS = 8
+"""[-] Places that cars join at, one after the other."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Episode:
+    """What one episode of one environment is made of."""
+
+    obstacles: tuple[Obstacle, ...]
+    """Those of the scenario, then the drawn ones."""
+    start: F64
+    """x, y, heading, (car, 3) [m, m, rad]; 0 for cars that are absent at the start."""
+    present: Bool
+    """Who is in the room at the start, (car): the first ones."""
+    events: tuple[LifeEvent, ...]
+    """By rising time."""
+    car: CarParams
+    imu: ImuSimParams
+    mag: MagSimParams
+    odometer: OdometerSimParams
+    radio: RadioSimParams
+
+
+def draw_episode(
+    scenario: Scenario, n_slots: int, seconds: float, rng: np.random.Generator
+) -> Episode:
+    """Draw an episode.
+
+    Laws: same scenario and generator, same episode; without randomisation it is the scenario,
+    with the poses of `Scenario.start(rng)`; switching one kind of randomisation on changes the
+    draws of no other kind.
+
+    Args:
+        scenario: What to draw from.
+        n_slots: Cars that there may be. Those that are absent at the start can join later; the
+            number of cars is drawn up to it.
+        seconds: Length of the episode, the time at rest included.
+        rng: Starting poses are drawn from it, everything else from children of it.
+
+    Raises:
+        EnvError: Fewer slots than cars or more than 20, or a room too full.
+    """
+    if not 2 <= n_slots <= MOST_CARS:
+        raise EnvError(f"n_slots: expected 2 to {MOST_CARS}, got {n_slots}")
+    if not 0.0 < seconds <= 86400.0:
+        raise EnvError(f"seconds: expected above 0 and at most 86400, got {seconds}")
+    s, what = scenario, scenario.randomisation
+    rngs = dict(zip(KINDS, rng.spawn(len(KINDS)), strict=True))
+    n = _number(s, n_slots, rngs["number"])
+    obstacles, poses, joins = s.obstacles, None, None
+    if what.obstacles[1] > 0 or what.has_life:
+        floor = Floor(s.room, s.car, boxes_of(obstacles))
+        obstacles += draw_clutter(s, floor, n_slots, rngs["clutter"])
+        poses = s.scattered(floor, n, rng) if s.layout == "scattered" else None
+        joins = floor
+    if poses is None:
+        poses = s.start(rng, n)
+    start = np.zeros((n_slots, 3))
+    start[:n] = poses
+    present = np.arange(n_slots) < n
+    for array in (start, present):
+        array.setflags(write=False)
+    places = _places_to_join(s, joins, poses, rngs["joins"]) if what.has_life and joins else []
+    return Episode(
+        obstacles=obstacles,
+        start=start,
+        present=present,
+        events=draw_life(what, present, seconds, places, rngs["leaving"], rngs["power"]),
+        car=draw_car(s.car, what, rngs["car"]),
+        imu=draw_imu(s.imu, what, rngs["imu"]),
+        mag=draw_mag(s.mag, what, rngs["mag"]),
+        odometer=draw_odometer(s.odometer, what, rngs["odometer"]),
+        radio=draw_radio(s.radio, what, rngs["radio"]),
+    )
+
+
+def _number(s: Scenario, n_slots: int, rng: np.random.Generator) -> int:
+    """Cars at the start."""
+    low, high = s.randomisation.n_cars or (s.n_cars, s.n_cars)
+    if low > n_slots:
+        raise EnvError(
+            f"n_slots: expected at least {low}, the cars of scenario {s.name!r}, got {n_slots}"
+        )
+    return int(rng.integers(low, min(high, n_slots), endpoint=True))
+
+
+def _places_to_join(s: Scenario, floor: Floor, taken: F64, rng: np.random.Generator) -> list[Pose]:
+    """Free poses, away from those at the start as long as there are such."""
+    poses = floor.scatter(DOORS, s.start_area, taken[:, :2], rng)
+    if not len(poses):
+        poses = floor.scatter(DOORS, s.start_area, np.zeros((0, 2)), rng)
+    return [(float(x), float(y), float(heading)) for x, y, heading in poses]

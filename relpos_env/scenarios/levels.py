@@ -1,0 +1,78 @@
+"""A curriculum: the same scenario with more and more drawn anew for every episode.
+
+The noise of a level spans that of real devices of one type at level 1 and of cheap, badly
+calibrated ones at level 4. Later levels have all of the earlier ones.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from relpos_env.errors import EnvError
+from relpos_env.scenarios.randomisation import Randomisation
+
+_EXACT = Randomisation()
+_NOISE = Randomisation(
+    imu_noise=(0.7, 1.5),
+    imu_bias=(0.5, 1.5),
+    imu_vibration=(0.7, 1.5),
+    mag_disturbance=(0.5, 1.5),
+    mag_hard_iron=(0.5, 1.5),
+    odometer_scale=(0.5, 1.5),
+    range_noise=(0.8, 1.3),
+    clock_offset=(0.5, 1.5),
+)
+_ROOMS = replace(
+    _NOISE,
+    obstacles=(0, 3),
+    movable_share=0.25,
+    range_excess=(0.7, 1.5),
+    radio_loss_nlos=(0.5, 2.0),
+    friction=(0.8, 1.1),
+    mass=(0.85, 1.2),
+)
+_LIFE = replace(
+    _ROOMS,
+    n_cars=(3, 6),
+    radio_loss=(0.5, 5.0),
+    leave_rate=(0.0, 2.0),
+    power_off_rate=(0.0, 2.0),
+)
+_HARD = replace(
+    _LIFE,
+    n_cars=(2, 8),
+    obstacles=(1, 6),
+    obstacle_size=(0.2, 0.8),
+    movable_share=0.4,
+    imu_noise=(0.5, 3.0),
+    imu_bias=(0.5, 3.0),
+    imu_vibration=(0.5, 2.0),
+    mag_disturbance=(0.5, 3.0),
+    mag_hard_iron=(0.5, 3.0),
+    odometer_scale=(0.5, 3.0),
+    radio_loss=(0.5, 20.0),
+    radio_loss_nlos=(0.5, 4.0),
+    range_noise=(0.7, 2.0),
+    range_excess=(0.5, 2.5),
+    clock_offset=(0.5, 2.0),
+    antenna_delay=(0.0, 0.15),
+    friction=(0.5, 1.2),
+    mass=(0.7, 1.5),
+    leave_rate=(0.0, 5.0),
+    power_off_rate=(0.0, 5.0),
+)
+
+LEVELS: tuple[Randomisation, ...] = (_EXACT, _NOISE, _ROOMS, _LIFE, _HARD)
+"""Nothing; noise; obstacles, tyres and loads; cars that come and go; all that and calibration
+errors, far stronger."""
+
+
+def level(number: int) -> Randomisation:
+    """Look a level up.
+
+    Raises:
+        EnvError: No level of that number.
+    """
+    if not 0 <= number < len(LEVELS):
+        raise EnvError(f"level: expected 0 to {len(LEVELS) - 1}, got {number}")
+    return LEVELS[number]

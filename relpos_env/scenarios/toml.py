@@ -1,0 +1,184 @@
+"""Reading frozen dataclasses from TOML tables by their fields and type hints.
+
+Numbers, words, tuples, tables in tables and lists of tables. What a table does not say stays as
+in a base: another instance, or what a `Preset` key of the table names. Whatever does not fit is
+an error that names the file, the key and what is allowed.
+"""
+
+from __future__ import annotations
+
+import math
+import types
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING as REQUIRED
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from functools import lru_cache
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+
+from relpos_env.errors import EnvError
+from tracking.errors import ConfigError
+
+T = TypeVar("T")
+LARGEST = 1e12
+"""Numbers beyond are refused: no quantity here is so large."""
+
+
+@dataclass(frozen=True, slots=True)
+class Where:
+    """A place in a file."""
+
+    file: str
+    path: str = ""
+
+    def key(self, name: str) -> Where:
+        """A key of the table here."""
+        return Where(self.file, f"{self.path}.{name}" if self.path else name)
+
+    def item(self, k: int) -> Where:
+        """An entry of the list here."""
+        return Where(self.file, f"{self.path}[{k}]")
+
+    def error(self, message: str) -> EnvError:
+        """An error about this place."""
+        return EnvError(": ".join(part for part in (self.file, self.path, message) if part))
+
+
+@dataclass(frozen=True, slots=True)
+class Preset:
+    """A key of a table that names the base of the rest, such as `place = "indoor"`."""
+
+    key: str
+    kind: type
+    """What the value must be: `str` or `int`."""
+    find: Callable[[Any], Any]
+    """Value to base; raises `EnvError`."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TableReader:
+    """Reads tables; the presets are by the class of the table that they are for."""
+
+    presets: Mapping[type, Preset] = field(default_factory=dict)
+
+    def read(self, kind: type[T], table: object, where: Where, base: T | None = None) -> T:
+        """Make an instance of a dataclass from a table.
+
+        Args:
+            kind: A frozen dataclass.
+            table: Of a TOML file.
+            where: The table is, for messages.
+            base: What the table does not say; None are the defaults of the class.
+
+        Raises:
+            EnvError: Names the file and the key.
+        """
+        if not isinstance(table, dict):
+            raise where.error(f"expected a table, got {_described(table)}")
+        hints = readable(kind)  # type: ignore[arg-type]
+        preset = self.presets.get(kind)
+        expected = [preset.key, *hints] if preset else list(hints)
+        for name in table:
+            if name not in expected:
+                shown = where.key(name if name.isprintable() and name else repr(name))
+                raise shown.error(f"unknown, expected one of {', '.join(expected)}")
+        if preset and preset.key in table:
+            base = self._preset(preset, table[preset.key], where.key(preset.key))
+        values = {
+            name: self._value(hint, table[name], where.key(name), getattr(base, name, None))
+            for name, hint in hints.items()
+            if name in table
+        }
+        if base is None:
+            for f in fields(kind):  # type: ignore[arg-type]
+                needed = f.default is REQUIRED and f.default_factory is REQUIRED
+                if needed and f.name not in values:
+                    raise where.key(f.name).error("missing")
+        try:
+            return kind(**values) if base is None else replace(base, **values)  # type: ignore
+        except (EnvError, ConfigError) as error:
+            raise _placed(error, where, [f.name for f in fields(kind)]) from error  # type: ignore
+
+    def _preset(self, preset: Preset, value: object, where: Where) -> Any:
+        wanted = self._value(preset.kind, value, where, None)
+        try:
+            return preset.find(wanted)
+        except EnvError as error:
+            raise where.error(str(error).removeprefix(f"{preset.key}: ")) from error
+
+    def _value(self, hint: Any, value: object, where: Where, base: Any) -> Any:
+        """One value of a type."""
+        origin = get_origin(hint)
+        if origin in (Union, types.UnionType):
+            (hint,) = (a for a in get_args(hint) if a is not type(None))
+            return self._value(hint, value, where, base)
+        if origin is Literal:
+            if value not in get_args(hint) or not isinstance(value, str):
+                names = ", ".join(map(repr, get_args(hint)))
+                raise where.error(f"expected one of {names}, got {_described(value)}")
+            return value
+        if origin is tuple:
+            return self._tuple(get_args(hint), value, where)
+        if is_dataclass(hint):
+            return self.read(hint, value, where, base)  # type: ignore[arg-type]
+        return _scalar(hint, value, where)
+
+    def _tuple(self, items: tuple[Any, ...], value: object, where: Where) -> tuple[Any, ...]:
+        """A list of a fixed length, or of any if the type ends in dots."""
+        if not isinstance(value, list):
+            raise where.error(f"expected a list, got {_described(value)}")
+        if items[-1] is Ellipsis:
+            items = (items[0],) * len(value)
+        if len(items) != len(value):
+            raise where.error(f"expected {len(items)} values, got {len(value)}")
+        return tuple(
+            self._value(hint, v, where.item(k), None)
+            for k, (hint, v) in enumerate(zip(items, value, strict=True))
+        )
+
+
+@lru_cache(maxsize=256)
+def readable(kind: type) -> dict[str, Any]:
+    """Fields of a dataclass that a file may set, and their types."""
+    hints = get_type_hints(kind)
+    return {f.name: hints[f.name] for f in fields(kind) if f.metadata.get("in_file", True)}
+
+
+def _scalar(hint: Any, value: object, where: Where) -> Any:
+    """A number or a word; true and false are no numbers, and neither is nan."""
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if hint is float and number:
+        finite = isinstance(value, int) or math.isfinite(value)  # type: ignore[arg-type]
+        if finite and abs(value) <= LARGEST:  # type: ignore[arg-type]
+            return float(value)  # type: ignore[arg-type]
+        raise where.error(f"expected a finite number, got {_described(value)}")
+    if hint is int and number and isinstance(value, int):
+        if abs(value) <= LARGEST:
+            return value
+        raise where.error(f"expected a number within {LARGEST:g}, got {_described(value)}")
+    if (hint is bool and isinstance(value, bool)) or (hint is str and isinstance(value, str)):
+        return value
+    expected = {float: "a number", int: "a whole number", bool: "true or false", str: "a string"}
+    raise where.error(f"expected {expected[hint]}, got {_described(value)}")
+
+
+def _described(value: object) -> str:
+    """A value as its author knows it, short."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, dict):
+        return "a table"
+    if isinstance(value, list):
+        return "a list"
+    if isinstance(value, int) and abs(value) > LARGEST:
+        return "a number too large"
+    text = repr(value) if isinstance(value, (str, int, float)) else str(value)
+    return text if len(text) <= 40 else f"{text[:37]}..."
+
+
+def _placed(error: Exception, where: Where, names: list[str]) -> EnvError:
+    """An error of a class, whose message begins with a field or not, at its place."""
+    message = str(error)
+    head = message.split(":", 1)[0]
+    if where.path and head.split(".")[0].split("[")[0] in names:
+        return EnvError(f"{where.file}: {where.path}.{message}")
+    return where.error(message)
