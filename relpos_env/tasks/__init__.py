@@ -2,24 +2,63 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
+from typing import Any
 
+from relpos_env.errors import EnvError
 from relpos_env.registry import look_up
-from relpos_env.scenarios import Scenario
-from relpos_env.tasks.base import Task
-from relpos_env.tasks.ring import RingFormation
+from relpos_env.tasks.base import Task, Truth
+from relpos_env.tasks.follow import follow
+from relpos_env.tasks.gap import Gap
+from relpos_env.tasks.hold import hold
+from relpos_env.tasks.rendezvous import Rendezvous
+from relpos_env.tasks.ring import turning_ring
+from relpos_env.tasks.travel import travel
+from relpos_env.tasks.weights import DEFAULT_WEIGHTS, reward_weights
 
-TASKS: dict[str, Callable[[Scenario], Task]] = {"ring": RingFormation}
-"""Name to builder ``(scenario) -> Task``. Adding one: a file and a line here."""
+TASKS: dict[str, Callable[..., Task]] = {
+    "ring": turning_ring,
+    "hold": hold,
+    "travel": travel,
+    "gap": Gap,
+    "rendezvous": Rendezvous,
+    "follow": follow,
+}
+"""Name to builder ``(n_cars, n_envs, room, **options) -> Task``. Adding one: a file, a line
+here, and its weights in `DEFAULT_WEIGHTS`."""
 
 
-def make_task(name: str, scenario: Scenario) -> Task:
+def make_task(
+    name: str, n_cars: int, n_envs: int, room: tuple[float, float], **options: Any
+) -> Task:
     """Look a task up and build it.
 
+    Args:
+        name: One of `TASKS`.
+        n_cars: Slots for cars, 2 to 20.
+        n_envs: Environments.
+        room: Width along x and depth along y [m]; the origin is the middle.
+        options: The task's own, by name.
+
     Raises:
-        EnvError: No task of that name.
+        EnvError: No task of that name, no option of that name, or an option out of range.
     """
-    return look_up(TASKS, name, "task")(scenario)
+    build = look_up(TASKS, name, "task")
+    known = [p for p in inspect.signature(build).parameters if p not in _ALWAYS]
+    for option in options:
+        if option not in known:
+            raise EnvError(f"{option}: task {name!r} expected options among {', '.join(known)}")
+    return build(n_cars, n_envs, room, **options)
 
 
-__all__ = ["TASKS", "Task", "make_task"]
+_ALWAYS = ("n_cars", "n_envs", "room")
+
+__all__ = [
+    "DEFAULT_WEIGHTS",
+    "TASKS",
+    "Task",
+    "Truth",
+    "make_task",
+    "reward_weights",
+]

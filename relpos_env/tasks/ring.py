@@ -1,73 +1,70 @@
 """A ring that turns: cars keep even places on a circle and circle together.
 
-All accelerate differently, so the group's rotation stays observable. The cars see each other
-through their trackers only. An operator with a remote control sees the room: he asks for the
-circling speed and trims the centre of the group back to the centre of the room.
+All accelerate differently, so the group's rotation stays observable to their trackers.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from relpos_env.scenarios import Scenario
-from relpos_env.world import WorldState
+from relpos_env.errors import EnvError
+from relpos_env.tasks.curves import Curve
+from relpos_env.tasks.moving import Motion, MovingFormation
+from relpos_env.tasks.options import half_room, not_negative, positive
+from relpos_env.tasks.shapes import MIN_SPACING, Formation
 from tracking.arrays import F64
 
-LOOKAHEAD = 0.3
-"""[s] The operator asks for the velocity of so much later, which covers the cars' lag."""
-TRIM_GAIN = 0.4
-"""[1/s] How firmly the operator brings the group back to the centre."""
-COLLISION_COST = 1.0
-"""[-] Reward lost with every contact."""
+SHARE = 0.28
+"""[-] Radius of the ring over the smaller side of the room."""
 
 
-class RingFormation:
-    """Even places on a circle, turning counter-clockwise at a constant rate."""
+def turning_ring(
+    n_cars: int,
+    n_envs: int,
+    room: tuple[float, float],
+    *,
+    radius: float | None = None,
+    speed: float = 1.0,
+    lookahead: float = 0.3,
+) -> MovingFormation:
+    """Even places on a circle round the room's middle, turning counter-clockwise.
 
-    def __init__(self, scenario: Scenario, speed: float = 1.0) -> None:
-        self._n = scenario.n_cars
-        self._radius = float(np.min(scenario.ring))
-        self._rate = speed / self._radius
-        self._phase = np.zeros(self._n)
+    Args:
+        n_cars: Slots for cars, 2 to 20.
+        n_envs: Environments.
+        room: Width along x and depth along y [m].
+        radius: Of the circle [m]; by default `SHARE` of the smaller side of the room.
+        speed: Of each car [m/s].
+        lookahead: The plan is the velocity of so much later [s].
 
-    def reset(self, state: WorldState) -> None:
-        """Begin where the cars stand: places go in the order in which the cars stand."""
-        angle = np.arctan2(state.pos_w[:, 1], state.pos_w[:, 0])
-        spacing = 2.0 * np.pi / self._n
-        slots = spacing * np.argsort(np.argsort(np.mod(angle, 2.0 * np.pi)))
-        # The common phase that puts the places nearest to the cars.
-        start = np.angle(np.mean(np.exp(1j * (angle - slots))))
-        self._phase = start + slots
+    Raises:
+        EnvError: An option is out of range, or the cars have no room on the ring.
+    """
+    half = float(half_room(room, 0.0).min())
+    r = 2.0 * SHARE * half if radius is None else positive("radius", radius)
+    if r > half:
+        raise EnvError(f"radius: expected at most {half:.2f} m, got {r:g}")
+    if 2.0 * np.pi * r < MIN_SPACING * n_cars:
+        raise EnvError(
+            f"radius: {n_cars} cars need {MIN_SPACING * n_cars / (2.0 * np.pi):.2f} m, got {r:.2f}"
+        )
+    motion = Motion(
+        curve=Curve.point(),
+        rate=positive("speed", speed) / r,
+        lookahead=not_negative("lookahead", lookahead),
+    )
+    return MovingFormation(n_cars, n_envs, Circle(n_cars, r), motion, round_places=True)
 
-    def offsets(self, t: float) -> F64:
-        """Wanted positions relative to the centre, (car, 2) [m]."""
-        angle = self._phase + self._rate * t
-        offsets: F64 = self._radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-        return offsets
 
-    def target(self, t: float) -> F64:
-        """Wanted relative positions, (car, other, 2) [m]."""
-        offsets = self.offsets(t)
-        return offsets[None, :] - offsets[:, None]
+class Circle(Formation):
+    """Places on a circle of one size, however many cars are present."""
 
-    def command(self, state: WorldState, t: float) -> F64:
-        """Circling velocity a little ahead of now, plus the operator's trim, (car, 2) [m/s]."""
-        ahead = self.offsets(t + LOOKAHEAD)
-        circling = self._rate * np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
-        trim = -TRIM_GAIN * state.pos_w.mean(axis=0)
-        velocity: F64 = circling + trim
-        return velocity
+    def __init__(self, n_cars: int, radius: float) -> None:
+        super().__init__("ring", n_cars, None)
+        self._radius = radius
 
-    def error(self, state: WorldState, t: float) -> F64:
-        """Mean distance of the others from where they should be, (car) [m]."""
-        actual = state.pos_w[None, :] - state.pos_w[:, None]
-        distance = np.linalg.norm(actual - self.target(t), axis=-1)
-        error: F64 = distance.sum(axis=1) / (self._n - 1)
-        return error
-
-    def rewards(self, state: WorldState, t: float, collided: F64) -> dict[str, F64]:
-        """Nearness to the formation, and contacts."""
-        return {
-            "formation": np.exp(-self.error(state, t) / 0.5),
-            "collision": -COLLISION_COST * collided,
-        }
+    def places(self, n: int) -> F64:
+        """Places for so many cars, (place, 2) [m]."""
+        angle = 2.0 * np.pi * np.arange(n) / n
+        places: F64 = self._radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        return places

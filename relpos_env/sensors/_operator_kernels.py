@@ -1,0 +1,68 @@
+"""What an operator sees and asks for, compiled."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from relpos_env.sensors.radio._random_kernels import draw_key, normal_pair
+from tracking.compiled import kernel
+
+
+@kernel
+def operate(
+    start, stop, pos, present, plan, goal, seeds, counts, offset, seen, limits, command
+):  # fmt: skip
+    """Velocities asked of the cars of the environments from start to stop.
+
+    Args:
+        start: First environment.
+        stop: One behind the last.
+        pos: (env, car, 2) [m].
+        present: (env, car).
+        plan: (env, car, 2) [m/s].
+        goal: (env, car, 2) [m].
+        seeds: (env) uint64.
+        counts: Samples since the start of the episode, (env), updated.
+        offset: Error of the operator's eye, (env, 2) [m], updated.
+        seen: How far off the group was at the last samples, (env, slot, 2) [m], updated.
+        limits: Gain [1/s], largest trim [m/s], largest speed [m/s], standard deviation of the
+            eye's error [m], and its correlation from sample to sample [-].
+        command: (env, car, 2) [m/s], written; 0 of absent cars.
+    """
+    gain, max_trim, max_speed, std, keep = limits
+    depth = seen.shape[1]
+    for env in range(start, stop):
+        count = counts[env]
+        x, y, n = 0.0, 0.0, 0
+        for k in range(present.shape[1]):
+            if present[env, k]:
+                x += pos[env, k, 0] - goal[env, k, 0]
+                y += pos[env, k, 1] - goal[env, k, 1]
+                n += 1
+        if std > 0.0:
+            a, b = normal_pair(draw_key(seeds[env], np.uint64(count)), 0)
+            # The first draw has the full deviation, so the error is stationary.
+            kept = keep if count > 0 else 0.0
+            fresh = std * math.sqrt(1.0 - kept * kept)
+            offset[env, 0] = kept * offset[env, 0] + fresh * a
+            offset[env, 1] = kept * offset[env, 1] + fresh * b
+        slot = count % depth
+        seen[env, slot, 0] = x / max(n, 1) + offset[env, 0]
+        seen[env, slot, 1] = y / max(n, 1) + offset[env, 1]
+        # The oldest there is: the slot that is written next or, before all are, the first.
+        late = (count + 1) % depth if count + 1 >= depth else 0
+        trim_x, trim_y = -gain * seen[env, late, 0], -gain * seen[env, late, 1]
+        length = math.hypot(trim_x, trim_y)
+        if length > max_trim:
+            trim_x, trim_y = trim_x * max_trim / length, trim_y * max_trim / length
+        for k in range(present.shape[1]):
+            v_x, v_y = 0.0, 0.0
+            if present[env, k]:
+                v_x, v_y = plan[env, k, 0] + trim_x, plan[env, k, 1] + trim_y
+                speed = math.hypot(v_x, v_y)
+                if speed > max_speed:
+                    v_x, v_y = v_x * max_speed / speed, v_y * max_speed / speed
+            command[env, k, 0], command[env, k, 1] = v_x, v_y
+        counts[env] = count + 1

@@ -1,0 +1,105 @@
+"""What all tasks have in common, compiled: targets from goals, formation error, reward terms."""
+
+from __future__ import annotations
+
+import math
+
+from tracking.compiled import small_kernel
+
+HARD_ACCEL = 5.0
+"""[m/s2] Acceleration whose effort is 1; harder counts no more."""
+
+
+@small_kernel
+def changed(env, present, seated):
+    """True if other cars are in the room than the places were given to."""
+    n_other = 0
+    for k in range(present.shape[1]):
+        n_other += present[env, k] != seated[env, k]
+    return n_other > 0
+
+
+@small_kernel
+def targets_from_goals(env, present, goal, target):
+    """Wanted relative positions of one environment, antisymmetric to the last bit.
+
+    Args:
+        env: Environment.
+        present: (env, car).
+        goal: Place of each car in the room, (env, car, 2) [m].
+        target: (env, car, other, 2) [m], written; 0 where either is absent.
+    """
+    n = present.shape[1]
+    for i in range(n):
+        for j in range(n):
+            if present[env, i] and present[env, j]:
+                target[env, i, j, 0] = goal[env, j, 0] - goal[env, i, 0]
+                target[env, i, j, 1] = goal[env, j, 1] - goal[env, i, 1]
+            else:
+                target[env, i, j, 0] = 0.0
+                target[env, i, j, 1] = 0.0
+
+
+@small_kernel
+def formation_error(env, pos, present, target, error):
+    """Distance of the present others from where they should be, mean, into error (env, car) [m]."""
+    n = present.shape[1]
+    others = -1
+    for i in range(n):
+        error[env, i] = 0.0
+        if present[env, i]:
+            others += 1
+    if others < 1:
+        return
+    for i in range(n):
+        if not present[env, i]:
+            continue
+        for j in range(i + 1, n):
+            if present[env, j]:
+                x = pos[env, j, 0] - pos[env, i, 0] - target[env, i, j, 0]
+                y = pos[env, j, 1] - pos[env, i, 1] - target[env, i, j, 1]
+                distance = math.sqrt(x * x + y * y) / others
+                error[env, i] += distance
+                error[env, j] += distance
+
+
+@small_kernel
+def all_within(env, pos, present, goal, tolerance):
+    """True if somebody is present, and all who are stand within a distance [m] of their goals."""
+    anybody = False
+    for k in range(present.shape[1]):
+        if present[env, k]:
+            anybody = True
+            x, y = pos[env, k, 0] - goal[env, k, 0], pos[env, k, 1] - goal[env, k, 1]
+            if x * x + y * y > tolerance * tolerance:
+                return False
+    return anybody
+
+
+@small_kernel
+def common_terms(env, accel, present, collided, error, error_scale, done, rewards):
+    """The reward terms that all tasks have; the second, the task's own, must be there before.
+
+    Args:
+        env: Environment.
+        accel: (env, car, 2) [m/s2].
+        present: (env, car).
+        collided: Contacts begun, (env, car).
+        error: (env, car) [m].
+        error_scale: Error at which the formation term is exp(-1) [m].
+        done: Whether this environment is through.
+        rewards: (env, car, term), written: formation, (own), collision, effort, and time if
+            the task has that term; all 0 of an absent car.
+    """
+    n_terms = rewards.shape[2]
+    for k in range(present.shape[1]):
+        if not present[env, k]:
+            for term in range(n_terms):
+                rewards[env, k, term] = 0.0
+            continue
+        square = accel[env, k, 0] ** 2 + accel[env, k, 1] ** 2
+        rewards[env, k, 0] = math.exp(-error[env, k] / error_scale)
+        rewards[env, k, 2] = -collided[env, k]
+        rewards[env, k, 3] = -min(1.0, square / (HARD_ACCEL * HARD_ACCEL))
+        if n_terms > 4:
+            rewards[env, k, 4] = 0.0 if done else -1.0

@@ -1,0 +1,181 @@
+"""Go through a gap in a wall, one after the other, and take places behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from relpos_env.errors import EnvError
+from relpos_env.scenarios.gap import Gap as Opening
+from relpos_env.tasks._gap_kernels import update_gap
+from relpos_env.tasks.assignment import assign
+from relpos_env.tasks.base import COMMON_TERMS, Task, Truth
+from relpos_env.tasks.moving import ERROR_SCALE, MARGIN, TOLERANCE
+from relpos_env.tasks.options import half_room, points, positive
+from relpos_env.tasks.shapes import Formation
+from tracking.arrays import F64, I64, Bool
+
+APPROACH = 0.6
+"""[m] From the wall to the waypoints before and behind the gap: straight through with a car."""
+
+
+class Gap(Task):
+    """Cars go along the waypoints one behind the other, from where they stand to a formation.
+
+    The nearest to the first waypoint leaves first and gets the place furthest from where the
+    cars arrive. Cars that stand behind the wall already go to their places at once.
+    """
+
+    def __init__(
+        self,
+        n_cars: int,
+        n_envs: int,
+        room: tuple[float, float],
+        *,
+        gap: Opening | None = None,
+        waypoints: Sequence[Sequence[float]] | F64 | None = None,
+        shape: str | Sequence[Sequence[float]] | F64 = "triangle",
+        spacing: float | None = None,
+        speed: float = 0.6,
+        headway: float = 1.0,
+    ) -> None:
+        """Plan the way.
+
+        Args:
+            n_cars: Slots for cars, 2 to 20.
+            n_envs: Environments.
+            room: Width along x and depth along y [m].
+            gap: To be passed along x; environments take that of their scenario. By default 1 m
+                wide, in the middle.
+            waypoints: From before the wall, x below the wall's, through the gap and round what
+                obstacles there are, to the middle of the formation at the end [m]; by default
+                straight through the gap to the middle of the room behind.
+            shape: At the end, one of `SHAPES`, or places (x ahead, y left) [m], one a car.
+            spacing: Of neighbours at the end [m]; by default 1 m, or less where the room asks
+                for it.
+            speed: Along the way [m/s].
+            headway: Distance along the way from car to car [m].
+
+        Raises:
+            EnvError: An option is out of range, or there is no room.
+        """
+        super().__init__(n_cars, n_envs, ("formation", "progress", *COMMON_TERMS, "time"))
+        gap = Opening(width=1.0) if gap is None else gap
+        if abs(gap.direction) > 1e-6:
+            raise EnvError(f"gap: expected one that is passed along x, got {gap.direction:g} rad")
+        self._wall_x = gap.x
+        half = half_room(room, 0.0)
+        behind = gap.x + 0.5 * gap.thickness
+        if waypoints is None:
+            x, y = gap.x, gap.y
+            middle = (0.5 * (behind + half[0]), 0.0)
+            self._way: F64 = np.array([(x - APPROACH, y), (x + APPROACH, y), middle])
+        else:
+            self._way = points("waypoints", waypoints, 2)
+            if np.any(np.abs(self._way) > half - MARGIN) or self._way[-1, 0] < behind + MARGIN:
+                raise EnvError(
+                    "waypoints: expected points in the room, the last one behind the wall, "
+                    f"at least {MARGIN} m from walls"
+                )
+        end = self._way[-1]
+        free = np.array([min(half[0] - end[0], end[0] - behind), half[1] - abs(end[1])]) - MARGIN
+        self._formation = Formation(shape, n_cars, spacing)
+        self._formation.fit(free, 0.0)
+        self._headway = positive("headway", headway)
+        self._limits = (positive("speed", speed), TOLERANCE, ERROR_SCALE)
+        self._route = np.zeros((n_envs, n_cars, len(self._way) + 1, 3))
+        self._lag = np.zeros((n_envs, n_cars))
+
+    def begin(self, env: int, pos: F64, cars: I64) -> None:
+        """The nearest to the gap leave first, one a headway; those behind the wall at once."""
+        queue = self._queue(pos, cars)
+        self._lag[env] = 0.0
+        self._lag[env, queue] = self._headway * np.arange(len(queue))
+        places = self._way[-1] + self._formation.places(len(cars))
+        across = cars[~np.isin(cars, queue)]
+        for_across, for_queue = self._share(pos[across], places)
+        self._lay(env, pos, across, for_across, self._way[:0])
+        far_first = np.argsort(-np.linalg.norm(for_queue - self._way[-2], axis=1), kind="stable")
+        self._lay(env, pos, queue, for_queue[far_first], self._way[:-1])
+
+    def change(self, env: int, pos: F64, cars: I64, before: Bool, t: float) -> None:
+        """Newcomers queue behind the last; the others keep their way but for the last leg."""
+        travelled = self._limits[0] * t
+        stay, new = cars[before[cars]], cars[~before[cars]]
+        # Newcomers count as if they stood where the cars arrive, so others keep their places.
+        ends = np.concatenate(
+            [self._route[env, stay, -1, :2], np.tile(self._way[-2], (len(new), 1))]
+        )
+        places = self._way[-1] + self._formation.places(len(cars))
+        places = places[assign(ends, places)]
+        queue = self._queue(pos, new)
+        across = new[~np.isin(new, queue)]
+        last = max(self._lag[env, stay].max(initial=-np.inf) + self._headway, travelled)
+        self._lag[env, queue] = last + self._headway * np.arange(len(queue))
+        self._lag[env, across] = travelled
+        order = np.concatenate([stay, new])
+        place_of = {int(car): places[k] for k, car in enumerate(order)}
+        for car in stay:
+            self._end_at(env, car, place_of[int(car)])
+        for group, way in ((queue, self._way[:-1]), (across, self._way[:0])):
+            given = np.array([place_of[int(car)] for car in group]).reshape(-1, 2)
+            self._lay(env, pos, group, given, way)
+
+    def compute(self, state: Truth, t: F64, collided: F64, start: int, stop: int) -> int:
+        """One compiled call."""
+        n_changed: int = update_gap(
+            start,
+            stop,
+            state.pos_w,
+            state.accel_w,
+            state.present,
+            t,
+            collided,
+            self._seated,
+            self._route,
+            self._lag,
+            self._limits,
+            self.target,
+            self.plan,
+            self.goal_w,
+            self.error,
+            self.rewards,
+            self.done,
+        )
+        return n_changed
+
+    def _queue(self, pos: F64, cars: I64) -> I64:
+        """Those before the wall, the nearest to the first waypoint first."""
+        queue = cars[pos[cars, 0] < self._wall_x]
+        away = np.linalg.norm(pos[queue] - self._way[0], axis=1)
+        found: I64 = queue[np.argsort(away, kind="stable")]
+        return found
+
+    def _share(self, pos: F64, places: F64) -> tuple[F64, F64]:
+        """Places for cars that are behind the wall, nearest in sum of squares, and the rest."""
+        taken: list[int] = []
+        if len(pos):
+            cost = np.sum((pos[:, None] - places[None, :]) ** 2, axis=-1)
+            taken = list(linear_sum_assignment(cost)[1])
+        rest = [k for k in range(len(places)) if k not in taken]
+        return places[taken], places[rest]
+
+    def _lay(self, env: int, pos: F64, cars: I64, places: F64, way: F64) -> None:
+        """Routes from where cars stand along a way to their places."""
+        n = self._route.shape[2]
+        for car, place in zip(cars, places, strict=True):
+            route = np.concatenate([pos[car][None], way, np.tile(place, (n - 1 - len(way), 1))])
+            legs = np.linalg.norm(np.diff(route, axis=0), axis=1)
+            self._route[env, car, :, :2] = route
+            self._route[env, car, 1:, 2] = np.cumsum(legs)
+
+    def _end_at(self, env: int, car: int, place: F64) -> None:
+        """Give a car on its way another place at the end."""
+        route = self._route[env, car]
+        # The route of a car that joined behind the wall is one leg and repetitions of its end.
+        last = np.flatnonzero(route[1:, 2] > route[:-1, 2])
+        leg = int(last[-1]) if len(last) else 0
+        route[leg + 1 :, :2] = place
+        route[leg + 1 :, 2] = route[leg, 2] + np.linalg.norm(place - route[leg, :2])

@@ -1,0 +1,41 @@
+"""Keep a formation, standing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from relpos_env.tasks.curves import Curve
+from relpos_env.tasks.moving import MARGIN, Motion, MovingFormation
+from relpos_env.tasks.options import finite, half_room
+from relpos_env.tasks.shapes import Formation
+from tracking.arrays import F64
+
+
+def hold(
+    n_cars: int,
+    n_envs: int,
+    room: tuple[float, float],
+    *,
+    shape: str | Sequence[Sequence[float]] | F64 = "triangle",
+    spacing: float | None = None,
+    heading: float = 0.0,
+) -> MovingFormation:
+    """A formation that stands where the group stood at the start, or as near as the room allows.
+
+    Args:
+        n_cars: Slots for cars, 2 to 20.
+        n_envs: Environments.
+        room: Width along x and depth along y [m].
+        shape: One of `SHAPES`, or places (x ahead, y left) [m], one a car.
+        spacing: Of neighbours [m]; by default 1 m, or less where the room asks for it.
+        heading: Of the formation [rad].
+
+    Raises:
+        EnvError: An option is out of range, or the formation does not fit in the room.
+    """
+    heading = finite("heading", heading)
+    formation = Formation(shape, n_cars, spacing)
+    half = half_room(room, MARGIN)
+    free = half - formation.fit(half, heading)
+    motion = Motion(curve=Curve.point(), heading=heading, half=(float(free[0]), float(free[1])))
+    return MovingFormation(n_cars, n_envs, formation, motion)

@@ -1,0 +1,150 @@
+"""A formation in a frame that may stay, move along a curve and turn: what four tasks share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from relpos_env.tasks._frame_kernels import frame_now, update_frame
+from relpos_env.tasks.assignment import assign, assign_round
+from relpos_env.tasks.base import COMMON_TERMS, Task, Truth
+from relpos_env.tasks.curves import Curve
+from relpos_env.tasks.shapes import Formation
+from tracking.arrays import F64, I64, Bool
+
+ERROR_SCALE = 0.5
+"""[m] Formation error at which the formation term is exp(-1)."""
+TOLERANCE = 0.4
+"""[m] As near to its place at the end a car has arrived: about its length."""
+MARGIN = 0.3
+"""[m] From the walls of the room to the places nearest to them."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Motion:
+    """How the frame of a formation moves."""
+
+    curve: Curve
+    """What its origin follows."""
+    speed: float = 0.0
+    """[m/s] Along the curve."""
+    rate: float = 0.0
+    """[rad/s] Of turning, besides what the curve asks for."""
+    turning: bool = False
+    """The frame's x axis points along the curve."""
+    heading: float = 0.0
+    """[rad] Of the frame at the start, if it does not turn with the curve."""
+    lookahead: float = 0.0
+    """[s] The plan is the velocity of the goal so much later, which covers the cars' lag."""
+    half: tuple[float, float] | None = None
+    """[m] The frame is put where the group stands, so far from the room's middle at most; None
+    for a frame that is put by its curve alone."""
+
+
+class MovingFormation(Task):
+    """Cars with places in a moving frame."""
+
+    def __init__(
+        self,
+        n_cars: int,
+        n_envs: int,
+        formation: Formation,
+        motion: Motion,
+        *,
+        round_places: bool = False,
+        led: bool = False,
+        all_told: bool = True,
+    ) -> None:
+        """Put the parts together.
+
+        Args:
+            n_cars: Slots for cars.
+            n_envs: Environments.
+            formation: Places in the frame.
+            motion: Of the frame.
+            round_places: Places go in the order in which the cars stand round the frame's
+                origin, and the frame starts as it fits them best; else see `assign`.
+            led: The first present car has the first place.
+            all_told: The plan is for all; else for the first present car alone.
+        """
+        ends = motion.curve.length > 0.0 and not motion.curve.closed
+        time = ("time",) if ends else ()
+        super().__init__(n_cars, n_envs, ("formation", "velocity", *COMMON_TERMS, *time))
+        self._formation, self._motion = formation, motion
+        self._round, self._led, self._all_told = round_places, led, all_told
+        self._frame, self._places = np.zeros((n_envs, 4)), np.zeros((n_envs, n_cars, 3))
+        curve = motion.curve
+        self._constants = (
+            float(motion.speed),
+            float(motion.rate),
+            curve.length,
+            float(curve.closed),
+            float(motion.turning),
+        )
+        self._limits = (float(motion.lookahead), TOLERANCE, ERROR_SCALE)
+        self._now = np.zeros(7)
+
+    def begin(self, env: int, pos: F64, cars: I64) -> None:
+        """Put the frame where the group stands, and give out places."""
+        motion = self._motion
+        middle = pos[cars].mean(axis=0)
+        anchor, arc = np.zeros(2), 0.0
+        if motion.half is not None:
+            anchor = np.clip(middle, -np.array(motion.half), motion.half)
+        elif motion.curve.length > 0.0 and motion.curve.closed:
+            arc = motion.curve.nearest(pos[cars[0]] if self._led else middle)
+        heading = 0.0 if motion.turning else motion.heading
+        self._frame[env] = (*anchor, arc, heading)
+        self._give(env, pos, cars, 0.0)
+
+    def change(self, env: int, pos: F64, cars: I64, before: Bool, t: float) -> None:
+        """Give out places for those who are present now; the frame goes on as it did."""
+        self._give(env, pos, cars, t)
+
+    def compute(self, state: Truth, t: F64, collided: F64, start: int, stop: int) -> int:
+        """One compiled call."""
+        n_changed: int = update_frame(
+            start,
+            stop,
+            state.pos_w,
+            state.vel_w,
+            state.accel_w,
+            state.present,
+            t,
+            collided,
+            self._seated,
+            self._frame,
+            self._places,
+            self._motion.curve.pieces,
+            self._constants,
+            self._limits,
+            self.target,
+            self.plan,
+            self.goal_w,
+            self.error,
+            self.rewards,
+            self.done,
+        )
+        return n_changed
+
+    def _give(self, env: int, pos: F64, cars: I64, t: float) -> None:
+        frame_now(env, t, self._frame, self._motion.curve.pieces, self._constants, self._now)
+        x, y, c, s = self._now[:4]
+        # Where the cars stand, in the frame.
+        own = (pos[cars] - [x, y]) @ np.array([[c, -s], [s, c]])
+        places = self._formation.places(len(cars))
+        if self._round:
+            slots, phase = assign_round(own)
+            self._frame[env, 3] += phase
+            radius = np.linalg.norm(places[0])
+            places = radius * np.stack([np.cos(slots), np.sin(slots)], axis=1)
+        elif self._led:
+            if len(cars) > 1:
+                rest = assign(own[1:], places[1:])
+                places = np.concatenate([places[:1], places[1:][rest]])
+        else:
+            places = places[assign(own, places)]
+        self._places[env] = 0.0
+        self._places[env, cars, :2] = places
+        self._places[env, cars if self._all_told else cars[:1], 2] = 1.0

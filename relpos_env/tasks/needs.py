@@ -1,0 +1,37 @@
+"""What tasks need of the scenarios that they are done in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from relpos_env.errors import EnvError
+from relpos_env.scenarios import Scenario
+
+DEFAULT_SCENARIO: Mapping[str, str] = {
+    "ring": "ring-nlos",
+    "hold": "ring-nlos",
+    "travel": "hall",
+    "gap": "gap",
+    "rendezvous": "hall",
+    "follow": "hall",
+}
+"""Task to the scenario it is done in unless another is asked for."""
+
+
+def needs_of(task: str, scenario: Scenario) -> dict[str, Any]:
+    """Options of a task that follow from the scenario.
+
+    Raises:
+        EnvError: The scenario lacks what the task needs.
+    """
+    if task == "ring":
+        return {"radius": min(scenario.ring)}
+    if task == "gap":
+        if scenario.gap is None:
+            raise EnvError(
+                f"scenario: task 'gap' expected one with a gap, such as 'gap', "
+                f"got {scenario.name!r}"
+            )
+        return {"gap": scenario.gap}
+    return {}

@@ -1,0 +1,98 @@
+"""Meet, without given places."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from relpos_env.errors import EnvError
+from relpos_env.tasks._meeting_kernels import update_meeting
+from relpos_env.tasks.base import COMMON_TERMS, Task, Truth
+from relpos_env.tasks.moving import ERROR_SCALE, MARGIN
+from relpos_env.tasks.options import half_room, not_negative, points, positive
+from tracking.arrays import F64, I64, Bool
+
+ROOM_OF_CAR = 0.35
+"""[m] A disc of this radius times the root of the number of cars has room for all."""
+
+
+class Rendezvous(Task):
+    """All cars come within a radius round the middle of the group, and stay.
+
+    There are no targets and no planned velocities: the cars find each other by their own
+    estimates. An operator can only bring the group as a whole to the place.
+    """
+
+    def __init__(
+        self,
+        n_cars: int,
+        n_envs: int,
+        room: tuple[float, float],
+        *,
+        radius: float | None = None,
+        stay: float = 2.0,
+        place: Sequence[float] | None = None,
+    ) -> None:
+        """Say where.
+
+        Args:
+            n_cars: Slots for cars, 2 to 20.
+            n_envs: Environments.
+            room: Width along x and depth along y [m].
+            radius: Within which all must be [m]; by default `ROOM_OF_CAR` times the root of
+                the number of cars.
+            stay: How long all must be within it [s].
+            place: Where in the room [m]; by default the middle of the group at the start, or
+                as near as the radius allows.
+
+        Raises:
+            EnvError: An option is out of range, or there is no room.
+        """
+        super().__init__(n_cars, n_envs, ("formation", "progress", *COMMON_TERMS, "time"))
+        r = ROOM_OF_CAR * np.sqrt(n_cars) if radius is None else positive("radius", radius)
+        self._half = half_room(room, MARGIN)
+        if r > self._half.min():
+            raise EnvError(f"radius: expected at most {self._half.min():.2f} m, got {r:.2f}")
+        self._fixed = None if place is None else points("place", [place], 1)[0]
+        if self._fixed is not None and np.any(np.abs(self._fixed) > self._half):
+            raise EnvError(f"place: expected a point in the room, got {place!r}")
+        self._limits = (float(r), not_negative("stay", stay), ERROR_SCALE)
+        self._room = self._half - r
+        self._place, self._since = np.zeros((n_envs, 2)), np.full(n_envs, np.inf)
+
+    def begin(self, env: int, pos: F64, cars: I64) -> None:
+        """Choose the place."""
+        middle = np.clip(pos[cars].mean(axis=0), -self._room, self._room)
+        self._place[env] = middle if self._fixed is None else self._fixed
+        self._since[env] = np.inf
+
+    def change(self, env: int, pos: F64, cars: I64, before: Bool, t: float) -> None:
+        """A newcomer has to come too; the place stays."""
+        self._since[env] = np.inf
+
+    def compute(self, state: Truth, t: F64, collided: F64, start: int, stop: int) -> int:
+        """One compiled call."""
+        n_changed: int = update_meeting(
+            start,
+            stop,
+            state.pos_w,
+            state.vel_w,
+            state.accel_w,
+            state.present,
+            t,
+            collided,
+            self._seated,
+            self._place,
+            self._since,
+            self._limits,
+            self.goal_w,
+            self.error,
+            self.rewards,
+            self.done,
+        )
+        return n_changed
+
+    def _seat(self, env: int, present: Bool) -> None:
+        super()._seat(env, present)
+        self.has_target[env] = False
