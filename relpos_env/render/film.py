@@ -1,0 +1,117 @@
+"""What an environment shows while it runs: snapshots of it, and the errors of the last while."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any
+
+import numpy as np
+
+from relpos_env.errors import EnvError
+from relpos_env.formation import Formation
+from relpos_env.render.renderer import RENDER_MODES, Renderer
+from relpos_env.render.snapshot import LINE_OF_SIGHT, NO_LINE_OF_SIGHT, NO_RANGE, Snapshot
+from relpos_env.timing import DECISION
+
+HISTORY = 20.0
+"""[s] Errors are shown so far back."""
+SILENT = 0.5
+"""[s] A pair without a range for so long counts as not connected."""
+
+
+def check_render_mode(mode: str | None) -> None:
+    """Refuse modes that there are not.
+
+    Raises:
+        EnvError: Neither None nor one of `RENDER_MODES`.
+    """
+    if mode is not None and mode not in RENDER_MODES:
+        raise EnvError(f"render_mode: expected None, {' or '.join(RENDER_MODES)}, got {mode!r}")
+
+
+class Film:
+    """Pictures of one environment of a batch, as its first car sees it."""
+
+    def __init__(self, mode: str | None, fps: float, *, env: int = 0) -> None:
+        self._mode, self._fps, self._env = mode, fps, env
+        self._renderer: Renderer | None = None
+        self._errors: deque[tuple[float, float, float]] = deque(maxlen=round(HISTORY / DECISION))
+
+    def forget(self) -> None:
+        """Begin a new episode."""
+        self._errors.clear()
+
+    def add(self, formation: Formation) -> None:
+        """Note the errors of now and, if there is a window, show it."""
+        env = self._env
+        present = formation.state.present[env]
+        formed = float(np.mean(formation.task.error[env], where=present)) if present.any() else 0.0
+        tracking = formation.tracking_error()[env]
+        known = np.isfinite(tracking)
+        tracked = float(tracking[known].mean()) if known.any() else np.nan
+        self._errors.append((float(formation.t[env]), formed, tracked))
+        if self._mode == "human":
+            self._draw(formation)
+
+    def picture(self, formation: Formation) -> Any:
+        """A picture of now, uint8 (height, width, 3); None for a window or no mode."""
+        return self._draw(formation) if self._mode == "rgb_array" else None
+
+    def close(self) -> None:
+        """Release the window; it opens again when there is something to show."""
+        if self._renderer is not None:
+            self._renderer.close()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but the drawing surfaces, which are made anew."""
+        return {**self.__dict__, "_renderer": None}
+
+    def _draw(self, formation: Formation) -> Any:
+        if self._renderer is None:
+            self._renderer = Renderer(mode=self._mode or "rgb_array", fps=self._fps)
+        return self._renderer.draw(self.snapshot(formation))
+
+    def snapshot(self, formation: Formation) -> Snapshot:
+        """Everything that a picture of now shows."""
+        env, swarm, view = self._env, formation.loop.swarm, formation.loop.view
+        state, task = swarm.state.take(env), formation.task
+        present = state.present
+        viewer = int(np.argmax(present))
+        cov = view.cov[env, viewer]
+        history = np.array(self._errors).reshape(-1, 3)
+        boxes = swarm.boxes[env]
+        scenario = formation.parts.scenario
+        return Snapshot(
+            t=max(float(formation.t[env]), 0.0),
+            room=scenario.room,
+            boxes=boxes,
+            movable=swarm.movable(env),
+            pose=np.column_stack([state.pos_w, state.heading]),
+            steering=state.steering,
+            present=present,
+            powered=swarm.powered[env],
+            car_size=(scenario.car.length, scenario.car.width),
+            viewer=viewer,
+            belief=view.pos[env, viewer],
+            belief_cov=cov[:, [[0, 2], [2, 1]]],
+            belief_ok=view.ok[env, viewer],
+            belief_status=view.status[env, viewer],
+            belief_heading=view.heading[env],
+            links=self._links(formation),
+            target=task.target[env, viewer],
+            has_target=task.has_target[env, viewer],
+            goal=task.goal_w[env],
+            history_t=history[:, 0],
+            formation_error=history[:, 1],
+            tracking_error=history[:, 2],
+            title=f"{formation.parts.config.task}, {scenario.name}",
+        )
+
+    def _links(self, formation: Formation) -> np.ndarray:
+        """Pairs of cars and whether they see and hear each other, (pair, 3)."""
+        env, swarm, view = self._env, formation.loop.swarm, formation.loop.view
+        i, j = swarm.constellation.pairs.T
+        sight = swarm.line_of_sight(env)[i, j]
+        kind = np.where(sight, LINE_OF_SIGHT, NO_LINE_OF_SIGHT)
+        kind[view.now[env] - view.heard[env, i, j] > SILENT] = NO_RANGE
+        return np.column_stack([i, j, kind])

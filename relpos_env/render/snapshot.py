@@ -1,0 +1,126 @@
+"""What one picture shows: plain arrays, whoever fills them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from relpos_env.errors import EnvError
+from tracking.arrays import F64, I64, Bool
+
+LINE_OF_SIGHT, NO_LINE_OF_SIGHT, NO_RANGE = 0, 1, 2
+"""Kinds of links: the third column of `Snapshot.links`."""
+
+_SHAPES: dict[str, tuple[int | str, ...]] = {
+    "boxes": ("box", 6),
+    "movable": ("box",),
+    "pose": ("car", 3),
+    "steering": ("car",),
+    "present": ("car",),
+    "powered": ("car",),
+    "belief": ("car", 2),
+    "belief_cov": ("car", 2, 2),
+    "belief_ok": ("car",),
+    "belief_status": ("car",),
+    "belief_heading": ("car",),
+    "links": ("pair", 3),
+    "target": ("car", 2),
+    "has_target": ("car",),
+    "goal": ("car", 2),
+    "path": ("point", 2),
+    "history_t": ("time",),
+    "formation_error": ("time",),
+    "tracking_error": ("time",),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Snapshot:
+    """One instant of a room with cars, and what the tracker of one car believes.
+
+    World frame: origin in the centre of the room, x to the right, y up. Cars are slots
+    0 .. n - 1; those that are not ``present`` are not drawn, nor anything about them.
+
+    Raises:
+        EnvError: A field has the wrong shape or points to a car that is none; it is named.
+    """
+
+    t: float
+    """[s]"""
+    room: tuple[float, float]
+    """[m] Width along x, depth along y."""
+    boxes: F64
+    """Obstacles: centre x y, half width, half depth [m], cosine, sine, (box, 6). Rows with a
+    half size of 0 are not drawn."""
+    movable: Bool
+    """True for boxes that cars can push, (box)."""
+    pose: F64
+    """The truth: x, y, heading, (car, 3) [m, m, rad]."""
+    steering: F64
+    """Angle of the front wheels, (car) [rad]."""
+    present: Bool
+    """The car is in the room, (car)."""
+    powered: Bool
+    """Its tracker has power, (car)."""
+    car_size: tuple[float, float]
+    """[m] Length, width."""
+    viewer: int
+    """The car whose belief is drawn."""
+    belief: F64
+    """Where the viewer believes the others to be, relative to itself, on the axes that it takes
+    for the world's, (car, 2) [m]. The viewer's own row is not used."""
+    belief_cov: F64
+    """Covariance of that, (car, 2, 2) [m2]."""
+    belief_ok: Bool
+    """The viewer may use it, (car)."""
+    belief_status: I64
+    """A `tracking.estimate.Status`, (car). Nothing is drawn of ABSENT and STARTING."""
+    belief_heading: F64 | None = None
+    """Headings as the viewer believes, (car) [rad]. With them, ghosts are turned like cars, and
+    the belief is turned by the error of the viewer's own heading."""
+    links: I64
+    """Cars i and j and the kind of their link, (pair, 3): 0 line of sight, 1 none, 2 no range
+    lately."""
+    target: F64
+    """Wanted positions relative to the viewer, world frame, (car, 2) [m]."""
+    has_target: Bool
+    """A position is wanted, (car)."""
+    goal: F64 | None = None
+    """Places in the room that a plan gives the cars, (car, 2) [m]."""
+    path: F64 | None = None
+    """A way through the room that a plan follows, (point, 2) [m]."""
+    history_t: F64
+    """Times of the errors of the recent past, ascending, (time) [s]."""
+    formation_error: F64
+    """Distance from the wanted formation, (time) [m]; gaps where it is not finite."""
+    tracking_error: F64
+    """Distance of the belief from the truth, (time) [m]; gaps where it is not finite."""
+    title: str = ""
+
+    def __post_init__(self) -> None:
+        sizes: dict[str, int] = {}
+        for field in fields(self):
+            value, shape = getattr(self, field.name), _SHAPES.get(field.name)
+            if shape is None or value is None:
+                continue
+            got = np.shape(value)
+            expected = tuple(
+                axis if isinstance(axis, int) else sizes.get(axis, got[k] if k < len(got) else axis)
+                for k, axis in enumerate(shape)
+            )
+            if got != expected:
+                raise EnvError(f"snapshot: {field.name}: expected shape {expected}, got {got}")
+            sizes.update({axis: got[k] for k, axis in enumerate(shape) if isinstance(axis, str)})
+        n = len(self.pose)
+        if not 0 <= self.viewer < n:
+            raise EnvError(f"snapshot: viewer: expected 0 to {n - 1}, got {self.viewer}")
+        if np.any((self.links[:, :2] < 0) | (self.links[:, :2] >= n)):
+            raise EnvError(f"snapshot: links: expected cars 0 to {n - 1}")
+        if min(*self.room, *self.car_size) <= 0.0:
+            raise EnvError("snapshot: room and car_size: expected lengths above 0")
+
+    @property
+    def n_cars(self) -> int:
+        """Number of slots, of cars present or not."""
+        return len(self.pose)
