@@ -1,14 +1,22 @@
-"""What a policy tells a car to do."""
+"""What a policy tells a car to do. Adding a kind: a class here and a line in `ACTIONS`."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 from gymnasium import spaces
 
 from relpos_env.errors import EnvError
+from relpos_env.registry import look_up
 from tracking.arrays import F64
+
+MAX_SPEED = 2.0
+"""[m/s] Asked of a car at most."""
+MAX_STEERING = 0.42
+"""[rad]"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,31 +31,90 @@ class DriveCommand:
     """Steering angle wanted [rad]; positive turns left."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ContinuousActions:
-    """Two numbers in [-1, 1] a car: speed and steering as shares of their largest values."""
+class ActionMode(Protocol):
+    """Actions of cars to commands."""
 
-    max_speed: float = 2.0
-    """[m/s]"""
-    max_steering: float = 0.42
-    """[rad]"""
+    def space(self) -> spaces.Space[Any]:
+        """The action space of one car."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the action of one car."""
+
+    def decode(self, actions: Any, where: str) -> tuple[F64, F64]:
+        """Speed [m/s] and steering [rad] that actions ask for.
+
+        Args:
+            actions: (..., *shape)
+            where: What they are called in errors.
+
+        Raises:
+            EnvError: Not finite, or not in the space and not of those that are clipped.
+        """
+
+
+class ContinuousActions:
+    """Two numbers in [-1, 1]: speed and steering as shares of their largest values.
+
+    Left is positive. Numbers beyond are clipped.
+    """
+
+    shape = (2,)
 
     def space(self) -> spaces.Box:
         """The action space of one car."""
-        return spaces.Box(-1.0, 1.0, shape=(2,), dtype=np.float32)
+        return spaces.Box(-1.0, 1.0, shape=self.shape, dtype=np.float32)
 
-    def decode(self, t: float, actions: F64, agents: tuple[str, ...] = ()) -> DriveCommand:
-        """Actions of every car, (car, 2), as commands. Values beyond the space are clipped.
+    def decode(self, actions: Any, where: str) -> tuple[F64, F64]:
+        """Speed and steering; see `ActionMode`."""
+        try:
+            actions = np.asarray(actions, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise EnvError(f"{where}: expected numbers, got {actions!r}") from error
+        # The sum is finite unless some number is not, or is beyond all reason.
+        if not np.isfinite(actions.sum()):
+            bad = np.argwhere(~np.isfinite(actions))[0]
+            raise EnvError(f"{where}: expected finite numbers, got {actions[tuple(bad)]}")
+        clipped = np.minimum(np.maximum(actions, -1.0), 1.0)
+        return clipped[..., 0] * MAX_SPEED, clipped[..., 1] * MAX_STEERING
 
-        Raises:
-            EnvError: Wrong shape, or not finite.
-        """
-        actions = np.asarray(actions, dtype=np.float64)
-        if actions.ndim != 2 or actions.shape[1] != 2:
-            raise EnvError(f"actions: expected shape (cars, 2), got {actions.shape}")
-        bad = np.nonzero(~np.isfinite(actions).all(axis=1))[0]
-        if len(bad):
-            who = agents[bad[0]] if agents else f"car {bad[0]}"
-            raise EnvError(f"action of {who}: expected finite numbers, got {actions[bad[0]]}")
-        clipped = np.clip(actions, -1.0, 1.0)
-        return DriveCommand(t, clipped[:, 0] * self.max_speed, clipped[:, 1] * self.max_steering)
+
+class DiscreteActions:
+    """Fifteen choices: backwards, stop or forwards, and five steering angles from right to left.
+
+    Number ``5 g + s``: speed -0.5, 0 or 1 m/s for g = 0, 1, 2; steering -0.42 rad to 0.42 rad for
+    s = 0 to 4.
+    """
+
+    shape = ()
+    speeds = np.array([-0.5, 0.0, 1.0])
+    angles = MAX_STEERING * np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
+
+    def space(self) -> spaces.Discrete:
+        """The action space of one car."""
+        return spaces.Discrete(len(self.speeds) * len(self.angles))
+
+    def decode(self, actions: Any, where: str) -> tuple[F64, F64]:
+        """Speed and steering; see `ActionMode`."""
+        actions = np.asarray(actions)
+        n = len(self.speeds) * len(self.angles)
+        if not np.issubdtype(actions.dtype, np.integer) or actions.min() < 0 or actions.max() >= n:
+            raise EnvError(f"{where}: expected whole numbers from 0 to {n - 1}, got {actions}")
+        gear, side = np.divmod(actions, len(self.angles))
+        return self.speeds[gear], self.angles[side]
+
+
+ACTIONS: dict[str, Callable[[], ActionMode]] = {
+    "continuous": ContinuousActions,
+    "discrete": DiscreteActions,
+}
+"""Name to builder."""
+
+
+def action_mode(name: str) -> ActionMode:
+    """Look a kind of actions up.
+
+    Raises:
+        EnvError: None of that name.
+    """
+    return look_up(ACTIONS, name, "actions")()

@@ -1,112 +1,118 @@
-"""What each car may know at one instant, whoever provides it: simulation or hardware."""
+"""What cars may know at one instant, whoever provides it: simulation or hardware."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
-from tracking.arrays import F64, Bool
+from relpos_env.interface._view_kernels import see_estimate, see_truth
+from tracking.arrays import F64, I64, Bool
+from tracking.compiled import bind
 from tracking.estimate import TeamEstimate
-from tracking.geometry import yaw_of
 
 
-@dataclass(frozen=True, slots=True)
-class TeamBelief:
-    """Relative positions of all cars in the plane of the world, (car, other, ...).
+class View(NamedTuple):
+    """Arrays over (env, car, ...) and, of the others, over (env, car, other, ...).
 
-    Made from the tracker's estimate, or from the truth for a mode that needs it.
+    Relative quantities are in the plane of the world frame; the observation modes turn them into
+    the frame of each car. A car is no other of its own: its entries are zero, its masks False.
     """
 
-    pos_w: F64
-    """Position of the other relative to the car, (car, other, 2) [m]."""
-    vel_w: F64
-    """Its velocity relative to the car, (car, other, 2) [m/s]."""
-    pos_std: F64
-    """Standard deviation of one position axis, (car, other) [m]; 0 for the truth."""
+    pos: F64
+    """Position of the other relative to the car, (env, car, other, 2) [m]."""
+    vel: F64
+    """Its velocity relative to the car, (env, car, other, 2) [m/s]."""
+    cov: F64
+    """Covariance of that position: xx, yy, xy, (env, car, other, 3) [m2]; 0 for the truth."""
     ok: Bool
-    """True where position and velocity can be used, (car, other)."""
+    """True where position and velocity can be used."""
+    status: I64
+    """A `tracking.Status`; what a car without power knows of anyone is absent."""
+    age: F64
+    """Time since the last range of the pair [s]."""
+    nlos: F64
+    """Probability that the last range was not line of sight [-]."""
     heading: F64
-    """Heading of each car, (car) [rad]."""
-
-    @classmethod
-    def from_estimate(cls, estimate: TeamEstimate) -> TeamBelief:
-        """The belief in an estimate of one group at one instant."""
-        n = estimate.constellation.n_nodes
-        pos, vel = np.zeros((n, n, 2)), np.zeros((n, n, 2))
-        std, ok = np.zeros((n, n)), np.zeros((n, n), dtype=bool)
-        i, j = estimate.constellation.pairs.T
-        for a, b, sign in ((i, j, 1.0), (j, i, -1.0)):
-            pos[a, b] = sign * estimate.pos_ij_w[:, :2]
-            vel[a, b] = sign * estimate.vel_ij_w[:, :2]
-            std[a, b] = np.sqrt(0.5 * np.sum(estimate.pos_std[:, :2] ** 2, axis=-1))
-            ok[a, b] = estimate.ok
-        return cls(pos, vel, std, ok, yaw_of(estimate.q_wb))
-
-    @classmethod
-    def from_truth(cls, pos_w: F64, vel_w: F64, heading: F64) -> TeamBelief:
-        """The belief of an oracle, from true positions and velocities, (car, 2)."""
-        n = len(pos_w)
-        return cls(
-            pos_w[None, :] - pos_w[:, None],
-            vel_w[None, :] - vel_w[:, None],
-            np.zeros((n, n)),
-            ~np.eye(n, dtype=bool),
-            heading.copy(),
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class AgentView:
-    """What every car may know, each in its own frame: x forward, y left; (car, ...)."""
-
-    pos_b: F64
-    """Position of each other car, (car, other, 2) [m]."""
-    vel_b: F64
-    """Velocity of each other car relative to this one, (car, other, 2) [m/s]."""
-    pos_std: F64
-    """(car, other) [m]"""
-    ok: Bool
-    """(car, other)"""
-    target_b: F64
-    """Where each other car should be, (car, other, 2) [m]."""
-    command_b: F64
-    """Velocity that the operator asks of this car, (car, 2) [m/s]."""
-    heading: F64
-    """(car) [rad]"""
+    """Heading by the car's own tracker, (env, car) [rad]."""
+    oriented: Bool
+    """True where the heading is known, (env, car)."""
+    distance: F64
+    """Last range of the pair as it came [m]; 0 before the first."""
+    heard: F64
+    """When that was, (env, car, other) [s]; -inf before the first."""
+    gap: F64
+    """Received less first-path power of that range [dB]."""
+    target: F64
+    """Where the other should be relative to the car, (env, car, other, 2) [m]."""
+    wanted: Bool
+    """False where the task gives it no place."""
+    command: F64
+    """Velocity that the operator asks for, (env, car, 2) [m/s]."""
     speed: F64
-    """Forward speed by the car's own odometer, (car) [m/s]."""
+    """Forward speed by the car's own odometer, (env, car) [m/s]."""
     steering: F64
-    """Steering angle, (car) [rad]."""
+    """Steering angle by its own servo, (env, car) [rad]."""
+    present: Bool
+    """True while the car is in the room, (env, car)."""
+    now: F64
+    """(env) [s]"""
 
-    @classmethod
-    def build(
-        cls, belief: TeamBelief, target_w: F64, command_w: F64, speed: F64, steering: F64
-    ) -> AgentView:
-        """Put a belief and the task's wishes into the frame of every car.
+    def part(self, envs: slice) -> View:
+        """Some of the environments; shares their memory."""
+        return View._make(array[envs] for array in self)
 
-        Args:
-            belief: Relative positions in the world frame.
-            target_w: Wanted relative positions, (car, other, 2) [m].
-            command_w: Wanted velocities, (car, 2) [m/s].
-            speed: Odometer, (car) [m/s].
-            steering: Steering angle, (car) [rad].
-        """
-        c, s = np.cos(belief.heading), np.sin(belief.heading)
-        R_bw = np.stack([np.stack([c, s], -1), np.stack([-s, c], -1)], axis=-2)  # noqa: N806
 
-        def to_body(v: F64) -> F64:
-            turned: F64 = np.einsum("...ab,...ob->...oa", R_bw, v)
-            return turned
+def make_view(n_envs: int, n_cars: int) -> View:
+    """A view in which nobody knows anything."""
+    own, other = (n_envs, n_cars), (n_envs, n_cars, n_cars)
+    return View(
+        pos=np.zeros((*other, 2)),
+        vel=np.zeros((*other, 2)),
+        cov=np.zeros((*other, 3)),
+        ok=np.zeros(other, dtype=bool),
+        status=np.zeros(other, dtype=np.int64),
+        age=np.zeros(other),
+        nlos=np.zeros(other),
+        heading=np.zeros(own),
+        oriented=np.zeros(own, dtype=bool),
+        distance=np.zeros(other),
+        heard=np.full(other, -np.inf),
+        gap=np.zeros(other),
+        target=np.zeros((*other, 2)),
+        wanted=np.zeros(other, dtype=bool),
+        command=np.zeros((*own, 2)),
+        speed=np.zeros(own),
+        steering=np.zeros(own),
+        present=np.zeros(own, dtype=bool),
+        now=np.zeros(n_envs),
+    )
 
-        return cls(
-            pos_b=to_body(belief.pos_w),
-            vel_b=to_body(belief.vel_w),
-            pos_std=belief.pos_std,
-            ok=belief.ok,
-            target_b=to_body(target_w),
-            command_b=to_body(command_w[:, None])[:, 0],
-            heading=belief.heading,
-            speed=speed,
-            steering=steering,
-        )
+
+def bind_view(view: View, estimate: TeamEstimate, powered: Bool, turns: F64) -> Callable[[], None]:
+    """What writes into a view what trackers tell, carried to `view.now` at constant velocity.
+
+    Args:
+        view: Written at every call: everything of the others but ranges and targets, and headings.
+        estimate: Of the same environments, at one time each; filled before every call.
+        powered: Which cars' trackers run, (env, car).
+        turns: How far every car has turned since then, by its own gyroscope, (env, car) [rad].
+    """
+    i, j = (np.ascontiguousarray(column) for column in estimate.constellation.pairs.T)
+    e = estimate
+    motion = (e.pos_ij_w, e.vel_ij_w, e.cov, e.q_wb)
+    rest = (e.has_orientation, e.age, e.nlos_prob, e.status, e.t)
+    return bind(see_estimate, motion, rest, i, j, powered, turns, view)
+
+
+def reveal(view: View, pos_w: F64, vel_w: F64, heading: F64) -> None:
+    """Write the truth in place of what trackers tell, for modes that need it.
+
+    Args:
+        view: Written, as by `update_view`.
+        pos_w: (env, car, 2) [m]
+        vel_w: (env, car, 2) [m/s]
+        heading: (env, car) [rad]
+    """
+    see_truth(pos_w, vel_w, heading, view)

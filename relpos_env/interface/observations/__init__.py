@@ -5,13 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from relpos_env.interface.observations.base import Field, ObservationMode
+from relpos_env.interface.observations.base import (
+    Field,
+    ObservationMode,
+    index_table,
+    space_of,
+    total_size,
+)
+from relpos_env.interface.observations.ranges import Ranges
 from relpos_env.interface.observations.relative import RelativePositions
 from relpos_env.registry import look_up
 
 OBSERVATIONS: dict[str, Callable[[int], ObservationMode]] = {
-    "estimate": partial(RelativePositions, needs_truth=False),
-    "truth": partial(RelativePositions, needs_truth=True),
+    "estimate": partial(RelativePositions, needs_truth=False, with_cov=False),
+    "estimate_cov": partial(RelativePositions, needs_truth=False, with_cov=True),
+    "ranges": Ranges,
+    "truth": partial(RelativePositions, needs_truth=True, with_cov=False),
 }
 """Name to builder ``(n_cars) -> ObservationMode``."""
 
@@ -25,4 +34,12 @@ def observation_mode(name: str, n_cars: int) -> ObservationMode:
     return look_up(OBSERVATIONS, name, "observation")(n_cars)
 
 
-__all__ = ["OBSERVATIONS", "Field", "ObservationMode", "observation_mode"]
+__all__ = [
+    "OBSERVATIONS",
+    "Field",
+    "ObservationMode",
+    "index_table",
+    "observation_mode",
+    "space_of",
+    "total_size",
+]

@@ -1,14 +1,18 @@
-"""What an observation mode is: a view to a vector, with names and units for each number."""
+"""What an observation mode is: a view to vectors, with names and units for each number."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
+import numpy as np
 from gymnasium import spaces
+from numpy.typing import NDArray
 
-from relpos_env.interface.views import AgentView
-from tracking.arrays import F64
+from relpos_env.interface.views import View
+
+F32 = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,25 +24,62 @@ class Field:
     unit: str
     meaning: str
     limit: float
-    """Values are clipped to +- this, so that an observation is always inside its space."""
+    """Values are cut at +- this, so that an observation is always inside its space."""
+    signed: bool = True
+    """False if they are never below 0."""
 
 
 class ObservationMode(Protocol):
-    """A view of every car to one vector a car.
+    """Views to one vector a car. The others come in the order of their numbers, oneself left out.
 
-    Law: the vector is inside `space`, and its layout is `fields` in order.
+    Law: a vector is inside `space_of(fields)`, and its layout is `fields` in order.
     """
 
-    @property
-    def needs_truth(self) -> bool:
-        """True if the view must be made from the true positions."""
+    needs_truth: bool
+    """True if the view must be made from the true positions."""
+    fields: tuple[Field, ...]
+    """The stretches of the vector, in order."""
 
-    @property
-    def fields(self) -> tuple[Field, ...]:
-        """The stretches of the vector, in order."""
+    def bind(self, view: View, out: F32) -> Callable[[], None]:
+        """What writes observations from a view that is filled anew before every call.
 
-    def space(self) -> spaces.Box:
-        """The observation space of one car."""
+        Args:
+            view: Of all cars.
+            out: (env, car, size), written; zeros for absent cars.
+        """
 
-    def observe(self, view: AgentView) -> F64:
-        """Observations of every car, (car, size)."""
+
+def space_of(fields: tuple[Field, ...], history: int = 1) -> spaces.Box:
+    """The observation space of one car.
+
+    Args:
+        fields: Its stretches.
+        history: So many vectors, the newest first.
+    """
+    high = np.concatenate([np.full(f.size, f.limit) for f in fields]).astype(np.float32)
+    low = np.concatenate([np.full(f.size, -f.limit * f.signed) for f in fields]).astype(np.float32)
+    return spaces.Box(np.tile(low, history), np.tile(high, history), dtype=np.float32)
+
+
+def index_table(fields: tuple[Field, ...]) -> list[dict[str, Any]]:
+    """Where every stretch stands, for documents and cards: first, last, name, unit, meaning."""
+    rows, first = [], 0
+    for f in fields:
+        rows.append(
+            {
+                "first": first,
+                "last": first + f.size - 1,
+                "name": f.name,
+                "unit": f.unit,
+                "low": -f.limit if f.signed else 0.0,
+                "high": f.limit,
+                "meaning": f.meaning,
+            }
+        )
+        first += f.size
+    return rows
+
+
+def total_size(fields: tuple[Field, ...]) -> int:
+    """Length of the vector."""
+    return sum(f.size for f in fields)

@@ -1,0 +1,105 @@
+"""From estimates, or from the truth, to what every car sees of every other."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tracking.compiled import kernel, small_kernel
+
+ABSENT, OK = 0, 3
+RANGE = 5
+
+
+@kernel
+def see_estimate(motion, rest, pair_i, pair_j, powered, turns, view):
+    """Write what the trackers tell, carried to now at constant velocity.
+
+    Args:
+        motion: Position, velocity, covariance of every pair, (env, pair, ...), and orientation of
+            every node, (env, node, 4).
+        rest: Whether that is known, (env, node); age, NLOS probability and status, (env, pair);
+            and the time of all that, (env) [s].
+        pair_i: (pair)
+        pair_j: (pair)
+        powered: (env, car)
+        turns: How far every car has turned since, (env, car) [rad].
+        view: View, written.
+    """
+    pos, vel, cov, q = motion
+    has_q, age, nlos, status, t = rest
+    for e in range(t.shape[0]):
+        dt = view.now[e] - t[e]
+        for n in range(powered.shape[1]):
+            w, x, y, z = q[e, n, 0], q[e, n, 1], q[e, n, 2], q[e, n, 3]
+            known = has_q[e, n] and powered[e, n]
+            view.oriented[e, n] = known
+            yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+            view.heading[e, n] = yaw + turns[e, n] if known else 0.0
+        for p in range(pair_i.shape[0]):
+            i, j = pair_i[p], pair_j[p]
+            for a, b, sign in ((i, j, 1.0), (j, i, -1.0)):
+                on = powered[e, a]
+                view.ok[e, a, b] = on and status[e, p] == OK
+                view.status[e, a, b] = status[e, p] if on else ABSENT
+                view.age[e, a, b] = age[e, p] + dt if on else 0.0
+                view.nlos[e, a, b] = nlos[e, p] if on else 0.0
+                for k in range(2):
+                    v = sign * vel[e, p, k] if on else 0.0
+                    view.vel[e, a, b, k] = v
+                    view.pos[e, a, b, k] = sign * pos[e, p, k] + dt * v if on else 0.0
+                    view.cov[e, a, b, k] = carried(cov, e, p, k, k, dt) if on else 0.0
+                view.cov[e, a, b, 2] = carried(cov, e, p, 0, 1, dt) if on else 0.0
+
+
+@small_kernel
+def carried(cov, e, p, r, k, dt):
+    """An entry of the position's covariance after dt at constant velocity [m2]."""
+    mixed = cov[e, p, r, 3 + k] + cov[e, p, 3 + r, k]
+    return cov[e, p, r, k] + dt * (mixed + dt * cov[e, p, 3 + r, 3 + k])
+
+
+@kernel
+def see_truth(pos, vel, heading, view):
+    """Write the truth; arguments as for `views.reveal`."""
+    for e in range(pos.shape[0]):
+        for a in range(pos.shape[1]):
+            here = view.present[e, a]
+            view.heading[e, a] = heading[e, a] if here else 0.0
+            view.oriented[e, a] = here
+            for b in range(pos.shape[1]):
+                seen = here and a != b and view.present[e, b]
+                view.ok[e, a, b] = seen
+                view.status[e, a, b] = OK if seen else ABSENT
+                view.age[e, a, b] = view.nlos[e, a, b] = 0.0
+                for k in range(2):
+                    view.pos[e, a, b, k] = pos[e, b, k] - pos[e, a, k] if seen else 0.0
+                    view.vel[e, a, b, k] = vel[e, b, k] - vel[e, a, k] if seen else 0.0
+                for k in range(3):
+                    view.cov[e, a, b, k] = 0.0
+
+
+@kernel
+def note_ranges(t, kind, i, j, values, has_power, valid, view):
+    """Keep the last range of every pair; arguments as in `MeasurementBlock`."""
+    for e in range(t.shape[0]):
+        for k in range(t.shape[1]):
+            if not valid[e, k] or kind[e, k] != RANGE:
+                continue
+            for a, b in ((i[e, k], j[e, k]), (j[e, k], i[e, k])):
+                if t[e, k] >= view.heard[e, a, b]:
+                    view.heard[e, a, b] = t[e, k]
+                    view.distance[e, a, b] = values[e, k, 0]
+                    power = values[e, k, 1] - values[e, k, 2] if has_power[e, k] else 0.0
+                    view.gap[e, a, b] = power
+
+
+@kernel
+def forget_all(view, e):
+    """Begin an environment anew: nobody has heard anything."""
+    for a in range(view.heard.shape[1]):
+        for b in range(view.heard.shape[1]):
+            view.heard[e, a, b] = -np.inf
+            view.distance[e, a, b] = 0.0
+            view.gap[e, a, b] = 0.0

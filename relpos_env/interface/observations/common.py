@@ -1,0 +1,25 @@
+"""The stretches that every mode has: what is wanted, and the car's own motion."""
+
+from __future__ import annotations
+
+from relpos_env.interface._observation_kernels import FAR, FAST
+from relpos_env.interface.observations.base import Field
+
+
+def wish_fields(n_others: int) -> tuple[Field, ...]:
+    """Where the others should be."""
+    return (
+        Field(
+            "wanted", n_others, "-", "1 where the task gives that car a place", 1.0, signed=False
+        ),
+        Field("target", 2 * n_others, "m", "where that car should be: forward, left", FAR),
+    )
+
+
+def own_fields() -> tuple[Field, ...]:
+    """What the operator asks, and what the car knows of itself."""
+    return (
+        Field("command", 2, "m/s", "velocity asked by the operator: forward, left", FAST),
+        Field("heading", 2, "-", "cosine and sine of the own heading; zeros if unknown", 1.0),
+        Field("motion", 2, "m/s, rad", "own speed and steering angle", FAST),
+    )

@@ -1,0 +1,32 @@
+"""The raw ranges, for policies that do without a tracker."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from relpos_env.interface._observation_kernels import FAR, LOUD, OLD, observe_ranges
+from relpos_env.interface.observations.base import F32, Field
+from relpos_env.interface.observations.common import own_fields, wish_fields
+from relpos_env.interface.views import View
+from tracking.compiled import bind
+
+
+class Ranges:
+    """The last range of every pair; zeros where there was none for ten seconds."""
+
+    needs_truth = False
+
+    def __init__(self, n_cars: int) -> None:
+        n = n_cars - 1
+        self.fields = (
+            Field("mask", n, "-", "1 where there was a range of late", 1.0, signed=False),
+            Field("range", n, "m", "last range to that car, as it came", FAR),
+            Field("age", n, "s", "since then", OLD, signed=False),
+            Field("gap", n, "dB", "received less first-path power of that range", LOUD),
+            *wish_fields(n),
+            *own_fields(),
+        )
+
+    def bind(self, view: View, out: F32) -> Callable[[], None]:
+        """What writes observations of every car, (env, car, size)."""
+        return bind(observe_ranges, view, out)
