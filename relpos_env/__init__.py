@@ -1,5 +1,10 @@
 """A simulated world of RC cars with real estimators in the loop, as standard environments.
 
-``relpos_env.formation_v0.parallel_env()`` is the PettingZoo environment; `relpos_env.sim` is
-the simulation without any environment interface around it.
+Importing this package registers ``relpos_env/Formation-v0`` with Gymnasium and
+``relpos_env/formation-v0`` with PettingZoo. `relpos_env.formation_v0.parallel_env` is the
+environment of the latter; `relpos_env.sim` is the simulation without any interface around it.
 """
+
+from relpos_env.registration import register_environments
+
+register_environments()

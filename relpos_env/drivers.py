@@ -6,7 +6,7 @@ import numpy as np
 
 from relpos_env.interface.actions import DriveCommand
 from relpos_env.scenarios import Scenario
-from relpos_env.world import WorldState
+from relpos_env.world_state import WorldState
 from tracking.arrays import F64
 
 
@@ -17,8 +17,10 @@ class LoopDrivers:
     when they are stuck.
     """
 
-    def __init__(self, scenario: Scenario, rng: np.random.Generator) -> None:
-        n = scenario.n_cars
+    def __init__(
+        self, scenario: Scenario, rng: np.random.Generator, n_cars: int | None = None
+    ) -> None:
+        n = scenario.n_cars if n_cars is None else n_cars
         self._scenario = scenario
         self._ring = np.array(scenario.ring)
         self._frequency = rng.uniform(0.03, 0.12, (3, n))
@@ -45,7 +47,7 @@ class LoopDrivers:
                 self._stuck_since[k] = np.inf
             if state.t < self._back_until[k]:
                 speed[k], steering[k] = -0.7, -steering[k]
-        return DriveCommand(state.t, speed, steering)
+        return DriveCommand(float(state.t), speed, steering)
 
     def _loop_direction(self, pos: F64, lane: F64) -> F64:
         """Along the ellipse, and towards the lane, (car, 2)."""

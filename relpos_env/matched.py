@@ -17,6 +17,7 @@ from relpos_env.scenarios import HumanScenario, Scenario
 from relpos_env.sensors.radio.channel import ChannelParams
 from relpos_env.timing import DT
 from tracking.filters.joint.params import CARRIERS, JointParams, NlosParams, RangeErrorParams
+from tracking.geometry import GRAVITY
 from tracking.ranging.timestamps import SPEED_OF_LIGHT
 
 STAMPS = 0.61
@@ -49,6 +50,7 @@ def matched_params(scenario: Scenario | HumanScenario) -> JointParams:
             # World yaw of VQF against the truth: 0.6 to 1.4 degrees round offsets of a degree.
             heading_std=0.022,
             heading_tau=8.0,
+            slip=1.0 / (scenario.car.rear_cornering * GRAVITY),
         )
     return JointParams(
         carriers=carriers,

@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from relpos_env.sensors.radio.radio import Ranges
+from relpos_env.swarm import Swarm
+from relpos_env.timing import DT
 from tracking.arrays import F64, Bool
 from tracking.constellation import Constellation
+from tracking.geometry import quat_from_yaw, quat_multiply
 from tracking.log import Log, Truth
 from tracking.measurements import Kind, MeasurementBlock
 
@@ -17,17 +20,19 @@ class Recording:
     def __init__(self) -> None:
         self._blocks: list[MeasurementBlock] = []
         self._nlos: list[Bool] = []
-        self._truth: list[tuple[float, F64, F64]] = []
+        self._truth: list[tuple[float, F64, F64, Bool]] = []
 
-    def add_truth(self, t: float, pos_w: F64, q_wb: F64) -> None:
+    def add_truth(self, t: float, pos_w: F64, q_wb: F64, present: Bool | None = None) -> None:
         """Keep where the nodes are.
 
         Args:
             t: Time, later than the last [s].
             pos_w: (node, 3) [m].
             q_wb: (node, 4).
+            present: Which of them are there at all, (node).
         """
-        self._truth.append((t, pos_w, q_wb))
+        there = np.ones(len(pos_w), dtype=bool) if present is None else present.copy()
+        self._truth.append((t, pos_w, q_wb, there))
 
     def add_block(self, block: MeasurementBlock, nlos: Bool) -> None:
         """Keep what was measured in a step.
@@ -38,6 +43,21 @@ class Recording:
         """
         self._blocks.append(block)
         self._nlos.append(nlos)
+
+    def add_swarm(self, swarm: Swarm) -> None:
+        """Keep what the last step of a swarm's first group brought."""
+        n, events = int(swarm.events.used[0]), swarm.events
+        steps = swarm.events.pose[0]
+        yaw, roll, pitch = (np.moveaxis(steps, -1, 0)[k] for k in (2, 3, 4))
+        q = quat_multiply(quat_from_yaw(yaw), quat_from_tilt(roll, pitch))
+        last = round(float(swarm.t[0]) / DT)
+        for k, pose in enumerate(steps):
+            pos = np.column_stack([pose[:, :2], np.zeros(len(pose))])
+            t = (last - len(steps) + 1 + k) * DT
+            self.add_truth(t, pos, q[k], swarm.state.present[0])
+        block = swarm.block.take(slice(0, n))
+        ranges = block.kind[0] == Kind.RANGE
+        self.add_block(block.take(np.arange(n)), events.nlos[0, :n][ranges])
 
     def to_log(
         self, name: str, scenario: str, constellation: Constellation, *, truth_every: int
@@ -51,7 +71,8 @@ class Recording:
             truth_every: Truth of every so-manieth step.
         """
         kept = self._truth[truth_every - 1 :: truth_every]
-        n, rows = constellation.n_nodes, len(kept) * constellation.n_nodes
+        n = constellation.n_nodes
+        there = np.concatenate([present for *_, present in kept])
         block = MeasurementBlock.concatenate(self._blocks)
         nlos = np.zeros(block.n_events, dtype=bool)
         nlos[block.kind[0] == Kind.RANGE] = np.concatenate(self._nlos)
@@ -65,12 +86,12 @@ class Recording:
             block=block,
             nlos=nlos[order][block.kind[0] == Kind.RANGE],
             truth=Truth(
-                np.repeat([t for t, _, _ in kept], n),
+                np.repeat([t for t, *_ in kept], n),
                 np.tile(np.arange(n, dtype=np.int64), len(kept)),
-                np.concatenate([pos for _, pos, _ in kept]),
-                np.concatenate([q for _, _, q in kept]),
-                np.ones(rows, dtype=bool),
-                np.ones(rows, dtype=bool),
+                np.concatenate([pos for _, pos, *_ in kept]),
+                np.concatenate([q for _, _, q, _ in kept]),
+                there,
+                there,
             ),
         )
 
@@ -104,3 +125,11 @@ def inertial_blocks(t: float, imu: F64, mag: F64) -> list[MeasurementBlock]:
         MeasurementBlock.of_kind(Kind.MAG, times, nodes, mag),
         MeasurementBlock.of_kind(Kind.IMU, times, nodes, imu),
     ]
+
+
+def quat_from_tilt(roll: F64, pitch: F64) -> F64:
+    """Orientation of a body that is turned by pitch about y and then by roll about its own x."""
+    cr, sr = np.cos(0.5 * roll), np.sin(0.5 * roll)
+    cp, sp = np.cos(0.5 * pitch), np.sin(0.5 * pitch)
+    q: F64 = np.stack([cp * cr, cp * sr, sp * cr, -sp * sr], axis=-1)
+    return q

@@ -2,5 +2,7 @@
 
 DT = 0.01
 """[s] One step of the physics, of the IMUs, and of the air."""
+DECISION = 0.1
+"""[s] From one action of a policy to the next."""
 STAND_STILL = 2.0
 """[s] Cars and people stand while their trackers are switched on, as real ones do."""

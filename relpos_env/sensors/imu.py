@@ -13,9 +13,12 @@ References:
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from relpos_env.records import fill_numbers, numbers_dtype
+from relpos_env.sensors._imu_kernels import DRIFT_EVERY
 from tracking.arrays import F64
 from tracking.geometry import GRAVITY, quat_conjugate, rotate
 
@@ -55,6 +58,30 @@ class ImuSimParams:
 HUMAN_IMU = ImuSimParams(vibration=0.5, gyr_vibration=0.05, vibration_speed=2.0)
 """On a person: skin and straps shake behind heel strikes and swings. The size is assumed: soft
 tissue moves by millimetres at 10 Hz to 20 Hz, of which 0.5 m/s2 is a modest share."""
+
+
+IMU = numbers_dtype(
+    ImuSimParams, ("keep", "gyr_step", "acc_step", "gyr_resolution", "acc_resolution")
+)
+"""`ImuSimParams` as the kernels take it."""
+
+
+def fill_imu(record: Any, params: ImuSimParams, dt: float) -> None:
+    """Write the numbers of the kernels.
+
+    Args:
+        record: IMU, of one environment.
+        params: What its IMUs do.
+        dt: Time between two samples [s].
+    """
+    fill_numbers(record, params)
+    keep = float(np.exp(-dt * DRIFT_EVERY / params.drift_tau))
+    record["keep"] = keep
+    record["gyr_step"] = np.sqrt(1.0 - keep**2) * params.gyr_drift
+    record["acc_step"] = np.sqrt(1.0 - keep**2) * params.acc_drift
+    steps = 2.0 ** (params.bits - 1)
+    record["gyr_resolution"] = params.gyr_range / steps if params.bits else 0.0
+    record["acc_resolution"] = params.acc_range / steps if params.bits else 0.0
 
 
 class Imu:

@@ -12,9 +12,11 @@ References:
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from relpos_env.records import fill_numbers, numbers_dtype
 from relpos_env.sensors.imu import quantise
 from tracking.arrays import F64
 from tracking.geometry import quat_conjugate, rotate
@@ -40,6 +42,18 @@ class MagSimParams:
     """[uT] 8 gauss."""
     bits: int = 16
     """[-] Resolution over the range; 0 for none."""
+
+
+MAG = numbers_dtype(MagSimParams, ("field_x", "field_y", "field_z", "resolution"))
+"""`MagSimParams` as the kernels take it."""
+
+
+def fill_mag(record: Any, params: MagSimParams) -> None:
+    """Write the numbers of the kernels into MAG, of one environment."""
+    fill_numbers(record, params)
+    for name, value in zip("xyz", params.field_w, strict=True):
+        record[f"field_{name}"] = value
+    record["resolution"] = params.full_scale / 2.0 ** (params.bits - 1) if params.bits else 0.0
 
 
 class Magnetometer:

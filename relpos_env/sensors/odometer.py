@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from relpos_env.records import numbers_dtype
 from tracking.arrays import F64
 
 
@@ -17,6 +18,10 @@ class OdometerSimParams:
     """[-] Error of the wheel radius, constant for a car."""
     noise: float = 0.02
     """[m/s]"""
+
+
+ODOMETER = numbers_dtype(OdometerSimParams)
+"""`OdometerSimParams` as the kernels take it."""
 
 
 class Odometer:

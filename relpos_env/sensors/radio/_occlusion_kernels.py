@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from tracking.compiled import small_kernel
+from tracking.compiled import kernel, small_kernel
 
 
 @small_kernel
@@ -71,3 +71,20 @@ def crosses_capsule(ax, ay, az, bx, by, bz, capsule, skin):
         s = min(max((b * t - d) / a, 0.0), 1.0) if a > 0.0 else 0.0
     x, y, z = wx + s * ux - t * vx, wy + s * uy - t * vy, wz + s * uz - t * vz
     return math.sqrt(x * x + y * y + z * z) < skin * capsule[6]
+
+
+@kernel
+def pairs_cross_boxes(pos, boxes, sight):
+    """Note which points have no box between them.
+
+    Args:
+        pos: (point, 2) [m]
+        boxes: (box, 6)
+        sight: (point, point), written.
+    """
+    for a in range(pos.shape[0]):
+        for b in range(pos.shape[0]):
+            sight[a, b] = True
+            for k in range(boxes.shape[0]):
+                if crosses_box(pos[a, 0], pos[a, 1], pos[b, 0], pos[b, 1], boxes[k]):
+                    sight[a, b] = False

@@ -28,7 +28,36 @@ NOTHING, END, DETECT, DEADLINE = -1, 0, 1, 2
 
 
 class Air(NamedTuple):
-    """One environment; in the batch every array has a leading axis `env`."""
+    """All that evolves between the nodes of a batch, arrays over (env, ...)."""
+
+    nodes: np.ndarray
+    """NODE, (env, node)."""
+    latents: np.ndarray
+    """LATENT, (env, node, node)."""
+    sessions: np.ndarray
+    """SESSION, (env, node)."""
+    peers: np.ndarray
+    """PEER, (env, node, node)."""
+    messages: np.ndarray
+    """MESSAGE, (env, node)."""
+    rows: np.ndarray
+    """Stamps of the tables, (env, node, node) [ticks]."""
+    receptions: np.ndarray
+    """RECEPTION, (env, node + 1); the last one is scratch."""
+    flights: np.ndarray
+    """FLIGHT, (env, node)."""
+    due: np.ndarray
+    """Deadlines, s since the start of the window, (env, node)."""
+    channel: np.ndarray
+    """CHANNEL, (env)."""
+    seeds: np.ndarray
+    """uint64, (env)."""
+    window: np.ndarray
+    """Windows gone by, (env)."""
+
+
+class OneAir(NamedTuple):
+    """What a kernel of one environment works on."""
 
     nodes: np.ndarray
     """NODE, (node)."""
@@ -64,53 +93,57 @@ class Scene(NamedTuple):
 
 
 @kernel
-def run_window(p, radio, channel, seeds, window, dt, batch, scenes, out):
+def run_window(p, radio, batch, scenes, dt, out):
     """Let all environments send and hear for one window.
 
     Args:
         p: SessionNumbers.
         radio: RadioNumbers.
-        channel: CHANNEL, (1).
-        seeds: Of each environment, uint64, (env).
-        window: Number of the window.
-        dt: Its length [s].
         batch: Air of all environments, updated.
         scenes: Scene of all environments.
+        dt: Length of the window [s].
         out: RangeBuffer, written; it must have room for what a window can bring.
     """
-    c = channel[0]
-    for e in range(seeds.shape[0]):
-        air = Air(
-            batch.nodes[e],
-            batch.latents[e],
-            batch.sessions[e],
-            batch.peers[e],
-            batch.messages[e],
-            batch.rows[e],
-            batch.receptions[e],
-            batch.flights[e],
-            batch.due[e],
-        )
-        scene = Scene(scenes.pos0[e], scenes.pos1[e], scenes.boxes[e], scenes.capsules[e])
-        n = air.nodes.shape[0]
-        out.used[e] = 0
-        for k in range(n):
-            air.nodes[k].step = distance_moved(scene, k)
-            plan(air, k)
-        while True:
-            what, k, t = next_event(air, dt)
-            if what == NOTHING:
-                break
-            if what == DETECT:
-                air.flights[k].detect = np.inf
-                for r in range(n):
-                    detect(p, radio, c, seeds[e], air, scene, k, r, t, dt)
-            elif what == DEADLINE:
-                take_timeout(p, air.sessions[k], air.peers, k, air.messages[k], air.rows)
-                launch(radio, air, k)
-            else:
-                end_message(p, radio, c, seeds[e], air, scene, k, t, dt, out, e)
-        close_window(radio, air, seeds[e], window, dt)
+    for e in range(batch.seeds.shape[0]):
+        run_env_window(p, radio, batch, scenes, dt, out, e)
+
+
+@kernel
+def run_env_window(p, radio, batch, scenes, dt, out, e):
+    """Let one environment send and hear for one window; arguments as for `run_window`."""
+    air = OneAir(
+        batch.nodes[e],
+        batch.latents[e],
+        batch.sessions[e],
+        batch.peers[e],
+        batch.messages[e],
+        batch.rows[e],
+        batch.receptions[e],
+        batch.flights[e],
+        batch.due[e],
+    )
+    scene = Scene(scenes.pos0[e], scenes.pos1[e], scenes.boxes[e], scenes.capsules[e])
+    seed, c = batch.seeds[e], batch.channel[e]
+    n = air.nodes.shape[0]
+    out.used[e] = 0
+    for k in range(n):
+        air.nodes[k].step = distance_moved(scene, k)
+        plan(air, k)
+    while True:
+        what, k, t = next_event(air, dt)
+        if what == NOTHING:
+            break
+        if what == DETECT:
+            air.flights[k].detect = np.inf
+            for r in range(n):
+                detect(p, radio, c, seed, air, scene, k, r, t, dt)
+        elif what == DEADLINE:
+            take_timeout(p, air.sessions[k], air.peers, k, air.messages[k], air.rows)
+            launch(radio, air, k)
+        else:
+            end_message(p, radio, c, seed, air, scene, k, t, dt, out, e)
+    close_window(radio, air, seed, batch.window[e], dt)
+    batch.window[e] += 1
 
 
 @kernel

@@ -7,6 +7,7 @@ moment at which that node spoke, and is known a good part of a round later.
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,7 @@ import numpy as np
 from relpos_env.errors import EnvError
 from relpos_env.sensors.radio._air_kernels import make_nodes
 from relpos_env.sensors.radio._air_state import (
+    CHANNEL,
     FLIGHT,
     LATENT,
     NODE,
@@ -26,7 +28,12 @@ from relpos_env.sensors.radio._channel_kernels import KNOT
 from relpos_env.sensors.radio._radio_kernels import Air, Scene, power_nodes, run_window
 from relpos_env.sensors.radio.params import RadioSimParams
 from tracking.arrays import F64, I64, Bool
-from tracking.ranging._session_state import MESSAGE, make_sessions, session_numbers
+from tracking.ranging._session_state import (
+    MESSAGE,
+    SessionNumbers,
+    make_sessions,
+    session_numbers,
+)
 from tracking.ranging.airtime import airtime, round_rate
 from tracking.ranging.members import MAX_MEMBERS
 from tracking.ranging.timestamps import TICK_HZ
@@ -85,10 +92,8 @@ class Radio:
                 f"radio: expected at most {most} nodes with frames of {phy.max_frame} bytes, "
                 f"got {n_nodes}"
             )
-        self._dt, self._window = dt, 0
-        self._seeds = np.array(seeds, dtype=np.uint64)
+        self._dt, self._params = dt, params
         self._numbers = session_numbers(params.session, n_nodes)
-        self._channel = make_channel(params.channel, KNOT)
         rows = np.arange(len(self._numbers.frame))
         self._radio = RadioNumbers(
             phy.header_time,
@@ -109,18 +114,17 @@ class Radio:
             np.zeros((e, n + 1), dtype=RECEPTION),
             np.zeros((e, n), dtype=FLIGHT),
             np.full((e, n), np.inf),
+            np.zeros(e, dtype=CHANNEL),
+            np.zeros(e, dtype=np.uint64),
+            np.zeros(e, dtype=np.int64),
         )
-        self._air.latents["knot"] = -1
-        self._air.receptions["src"] = -1
-        self._air.flights["detect"] = self._air.flights["end"] = np.inf
-        for k in range(e):
-            make_nodes(
-                self._air.nodes[k], self._seeds[k], params.clock_offset, params.antenna_delay_std
-            )
+        for k, seed in enumerate(seeds):
+            self.reset(k, seed)
         if clocks is not None:
             self._air.nodes["rate"] = TICK_HZ * (1.0 + clocks)
         pairs = n * (n - 1) // 2
-        room = pairs * (2 + int(np.ceil(dt * round_rate(phy, max(n, 2)))))
+        self.room = room = pairs * (2 + int(np.ceil(dt * round_rate(phy, max(n, 2)))))
+        """Ranges that a window can bring at most."""
         self._out = RangeBuffer(
             np.zeros((e, room)),
             np.zeros((e, room), dtype=np.int64),
@@ -129,6 +133,40 @@ class Radio:
             np.zeros((e, room), dtype=bool),
             np.zeros(e, dtype=np.int64),
         )
+
+    def reset(self, env: int, seed: int, params: RadioSimParams | None = None) -> None:
+        """Begin anew in one environment, with every node switched off.
+
+        Args:
+            env: Which.
+            seed: 0 to 2^63.
+            params: Channel, clock offsets and antenna delays of this environment from now on;
+                by default as when it was made. The protocol stays.
+        """
+        params, air = params or self._params, self._air
+        sessions, peers = make_sessions(1, air.nodes.shape[1])
+        for name in ("nodes", "messages", "rows", "latents", "receptions", "flights"):
+            getattr(air, name)[env] = 0
+        air.sessions[env], air.peers[env] = sessions[0], peers[0]
+        air.latents["knot"][env] = -1
+        air.receptions["src"][env] = -1
+        air.flights["detect"][env] = air.flights["end"][env] = np.inf
+        air.due[env] = np.inf
+        air.channel[env] = make_channel(params.channel, KNOT)[0]
+        air.seeds[env], air.window[env] = seed, 0
+        make_nodes(air.nodes[env], air.seeds[env], params.clock_offset, params.antenna_delay_std)
+
+    def part(self, envs: slice) -> Radio:
+        """Some of the environments; shares their memory."""
+        part = copy.copy(self)
+        part._air = Air._make(array[envs] for array in self._air)
+        part._out = RangeBuffer._make(array[envs] for array in self._out)
+        return part
+
+    @property
+    def kernel_arguments(self) -> tuple[SessionNumbers, RadioNumbers, Air, RangeBuffer]:
+        """What `run_env_window` needs besides the scene."""
+        return self._numbers, self._radio, self._air, self._out
 
     def switch_on(self, env: int, node: int, *, boot: int, after: float = 0.0) -> None:
         """Give a node power, so many seconds after the start of the next window."""
@@ -150,26 +188,15 @@ class Radio:
                 sine of the angle, (env, box, 6).
             capsules: What stands in space: two ends and the radius [m], (env, capsule, 7).
         """
-        e = len(self._seeds)
+        e = len(self._air.seeds)
         scene = Scene(
             pos0,
             pos1,
             np.zeros((e, 0, 6)) if boxes is None else boxes,
             np.zeros((e, 0, 7)) if capsules is None else capsules,
         )
-        run_window(
-            self._numbers,
-            self._radio,
-            self._channel,
-            self._seeds,
-            self._window,
-            self._dt,
-            self._air,
-            scene,
-            self._out,
-        )
-        start = self._window * self._dt
-        self._window += 1
+        start = self._air.window[:, None] * self._dt
+        run_window(self._numbers, self._radio, self._air, scene, self._dt, self._out)
         out, used = self._out, int(self._out.used.max())
         return Ranges(
             start + out.t[:, :used],

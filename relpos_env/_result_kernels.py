@@ -1,0 +1,69 @@
+"""What came of a step: rewards, who takes part, what is over, and how far beliefs are off."""
+
+from __future__ import annotations
+
+import math
+
+from tracking.compiled import kernel
+
+
+@kernel
+def judge(
+    first, end, present, to_come, contacts, terms, weights, done, cycles, max_cycles,
+    collision_ends, rewards, active, left, terminated, truncated,
+):  # fmt: skip
+    """Sum rewards up, and note who left and which episodes are over.
+
+    Args:
+        first: First environment.
+        end: The one after the last.
+        present: Cars in the room, (env, car).
+        to_come: Cars that will come in, (env, car).
+        contacts: Begun in the step, (env, car).
+        terms: Reward terms, (env, car, term).
+        weights: (term)
+        done: The task is accomplished, (env).
+        cycles: Steps of the episode, (env).
+        max_cycles: After so many it is over.
+        collision_ends: Whether a contact ends it.
+        rewards: (env, car), written.
+        active: Cars that take part, (env, car), updated.
+        left: Cars that left for good, (env, car), written.
+        terminated: (env), written.
+        truncated: (env), written.
+    """
+    for e in range(first, end):
+        terminated[e] = done[e]
+        truncated[e] = cycles[e] >= max_cycles
+        for n in range(present.shape[1]):
+            total = 0.0
+            for k in range(weights.shape[0]):
+                total += weights[k] * terms[e, n, k]
+            rewards[e, n] = total
+            stays = present[e, n] or (active[e, n] and to_come[e, n])
+            left[e, n] = active[e, n] and not stays
+            active[e, n] = stays
+            if collision_ends and contacts[e, n] > 0.0:
+                terminated[e] = True
+
+
+@kernel
+def tracking_errors(body, believed, ok, out):
+    """Distance of believed from true relative positions, mean over the others that can be used.
+
+    Args:
+        body: The truth: x and y first, (env, car, 6) [m].
+        believed: (env, car, other, 2) [m]
+        ok: Where a belief can be used, (env, car, other).
+        out: (env, car) [m], written; NaN where none can.
+    """
+    for e in range(out.shape[0]):
+        for a in range(out.shape[1]):
+            total, n = 0.0, 0
+            for b in range(out.shape[1]):
+                if ok[e, a, b]:
+                    x = believed[e, a, b, 0] - (body[e, b, 0] - body[e, a, 0])
+                    y = believed[e, a, b, 1] - (body[e, b, 1] - body[e, a, 1])
+                    total += math.sqrt(x * x + y * y)
+                    n += 1
+            out[e, a] = total / n if n > 0 else math.nan

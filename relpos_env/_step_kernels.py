@@ -1,0 +1,180 @@
+"""One decision of every environment: cars drive, sensors read, radios talk, step by step.
+
+An environment runs through its steps by itself until something is about to touch; it then
+waits for the rigid-body solver to make that one move, and goes on.
+"""
+
+from __future__ import annotations
+
+import math
+
+from relpos_env._nearness_kernels import touches_soon
+from relpos_env._vehicle_kernels import (
+    PITCH,
+    PITCH_RATE,
+    ROLL,
+    ROLL_RATE,
+    drive_car,
+    integrate_car,
+)
+from relpos_env.sensors._imu_kernels import felt_on_car, read_imu
+from relpos_env.sensors._magnetometer_kernels import read_magnetometer
+from relpos_env.sensors.radio._radio_kernels import run_env_window
+from tracking.compiled import kernel, small_kernel
+
+MAG, IMU, RANGE = 1, 2, 5
+CALM = 5
+"""[-] Steps that the solver keeps a room in which nothing touches any more: it remembers contacts
+for three."""
+
+
+@kernel
+def begin_decision(bodies, events):
+    """Forget what the last decision brought."""
+    for e in range(bodies.done.shape[0]):
+        bodies.done[e] = 0
+        events.used[e] = 0
+        for k in range(events.valid.shape[1]):
+            events.valid[e, k] = False
+        for n in range(bodies.contacts.shape[1]):
+            bodies.contacts[e, n] = 0.0
+
+
+@kernel
+def run_steps(bodies, sensors, radio, scenes, n_steps, dt, events, speed, steering, waiting):
+    """Go on with the decision of every environment until it is over or must wait.
+
+    Args:
+        bodies: Bodies, updated.
+        sensors: Sensors, updated.
+        radio: SessionNumbers, RadioNumbers, Air and RangeBuffer; updated.
+        scenes: Scene of all environments.
+        n_steps: Steps of a decision.
+        dt: [s]
+        events: Events, appended.
+        speed: Commands, (env, car) [m/s].
+        steering: Commands, (env, car) [rad].
+        waiting: Numbers of the environments that wait for the solver, written.
+
+    Returns:
+        How many wait.
+    """
+    n_waiting = 0
+    for e in range(bodies.done.shape[0]):
+        while bodies.done[e] < n_steps:
+            if not bodies.moved[e]:
+                push_cars(bodies, speed, steering, dt, e)
+                near = touches_soon(
+                    bodies.body, bodies.present, bodies.box_body, bodies.boxes, bodies.room,
+                    bodies.size, e,
+                )  # fmt: skip
+                bodies.calm[e] = CALM if near else max(bodies.calm[e] - 1, 0)
+                if bodies.calm[e] > 0:
+                    waiting[n_waiting] = e
+                    n_waiting += 1
+                    break
+                for n in range(bodies.body.shape[1]):
+                    if bodies.present[e, n]:
+                        integrate_car(bodies.cars[e], bodies.body, bodies.wrench, e, n, dt)
+            bodies.moved[e] = False
+            bodies.tick[e] += 1
+            sense(bodies, sensors, radio, scenes, dt, events, e)
+            bodies.done[e] += 1
+    return n_waiting
+
+
+@small_kernel
+def push_cars(bodies, speed, steering, dt, e):
+    """Forces on the cars; their velocities are kept where accelerations will be."""
+    for n in range(bodies.body.shape[1]):
+        if bodies.present[e, n]:
+            drive_car(
+                bodies.cars[e], bodies.body, bodies.drive, e, n, speed[e, n], steering[e, n], dt,
+                bodies.wrench,
+            )  # fmt: skip
+        bodies.accel[e, n, 0] = bodies.body[e, n, 3]
+        bodies.accel[e, n, 1] = bodies.body[e, n, 4]
+
+
+@small_kernel
+def sense(bodies, sensors, radio, scenes, dt, events, e):
+    """All that the nodes of an environment measure in a step, after it."""
+    body, drive, accel = bodies.body, bodies.drive, bodies.accel
+    tick, step = bodies.tick[e], bodies.done[e]
+    t = tick * dt
+    k = events.used[e]
+    for n in range(body.shape[1]):
+        accel[e, n, 0] = (body[e, n, 3] - accel[e, n, 0]) / dt
+        accel[e, n, 1] = (body[e, n, 4] - accel[e, n, 1]) / dt
+        heading, roll, pitch = body[e, n, 2], drive[e, n, ROLL], drive[e, n, PITCH]
+        events.pose[e, step, n, 0] = body[e, n, 0]
+        events.pose[e, step, n, 1] = body[e, n, 1]
+        events.pose[e, step, n, 2] = heading
+        events.pose[e, step, n, 3] = roll
+        events.pose[e, step, n, 4] = pitch
+        place_antenna(sensors, scenes, body, heading, roll, pitch, e, n)
+        if not bodies.powered[e, n] or k + 2 > events.t.shape[1]:
+            continue
+        c, s = math.cos(heading), math.sin(heading)
+        forward = c * accel[e, n, 0] + s * accel[e, n, 1]
+        left = c * accel[e, n, 1] - s * accel[e, n, 0]
+        truth = felt_on_car(
+            body[e, n, 5], forward, left, roll, pitch, drive[e, n, ROLL_RATE],
+            drive[e, n, PITCH_RATE],
+        )  # fmt: skip
+        velocity = c * body[e, n, 3] + s * body[e, n, 4]
+        at = (body[e, n, 0], body[e, n, 1])
+        read_magnetometer(
+            sensors.mag[e], sensors.mag_seed[e], tick, sensors.waves, sensors.hard_iron, e, n, at,
+            heading, roll, pitch, events.values, k,
+        )  # fmt: skip
+        write_own(events, e, k, t, MAG, n)
+        read_imu(
+            sensors.imu[e], sensors.imu_seed[e], tick, sensors.bias, sensors.drift, e, n, truth,
+            velocity, events.values, k + 1,
+        )  # fmt: skip
+        write_own(events, e, k + 1, t, IMU, n)
+        k += 2
+    numbers, radio_numbers, air, ranges = radio
+    run_env_window(numbers, radio_numbers, air, scenes, dt, ranges, e)
+    for r in range(ranges.used[e]):
+        if k >= events.t.shape[1]:
+            break
+        events.t[e, k] = t - dt + ranges.t[e, r]
+        events.kind[e, k] = RANGE
+        i, j = ranges.i[e, r], ranges.j[e, r]
+        events.i[e, k], events.j[e, k] = i, j
+        events.antenna_i[e, k], events.antenna_j[e, k] = i, j
+        events.values[e, k, 0] = ranges.values[e, r, 0]
+        events.values[e, k, 1] = ranges.values[e, r, 1]
+        events.values[e, k, 2] = ranges.values[e, r, 2]
+        for column in range(3, events.values.shape[2]):
+            events.values[e, k, column] = 0.0
+        events.has_power[e, k], events.valid[e, k] = True, True
+        events.nlos[e, k] = ranges.nlos[e, r]
+        k += 1
+    events.used[e] = k
+
+
+@small_kernel
+def write_own(events, e, k, t, kind, n):
+    """Everything of an event of one node but its values."""
+    events.t[e, k], events.kind[e, k] = t, kind
+    events.i[e, k], events.j[e, k] = n, n
+    events.antenna_i[e, k], events.antenna_j[e, k] = 0, 0
+    for column in range(3 if kind == MAG else 6, events.values.shape[2]):
+        events.values[e, k, column] = 0.0
+    events.has_power[e, k], events.nlos[e, k], events.valid[e, k] = False, False, True
+
+
+@small_kernel
+def place_antenna(sensors, scenes, body, heading, roll, pitch, e, n):
+    """Move the antenna of a car on: where it was, and where it is on its mast."""
+    before, now, h = scenes.pos0, scenes.pos1, sensors.mast[e]
+    for a in range(3):
+        before[e, n, a] = now[e, n, a]
+    c, s = math.cos(heading), math.sin(heading)
+    ahead, left = h * math.sin(pitch) * math.cos(roll), -h * math.sin(roll)
+    now[e, n, 0] = body[e, n, 0] + c * ahead - s * left
+    now[e, n, 1] = body[e, n, 1] + s * ahead + c * left
+    now[e, n, 2] = h * math.cos(pitch) * math.cos(roll)

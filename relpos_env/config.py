@@ -1,0 +1,146 @@
+"""What an environment is made of: the arguments that all its forms share."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from relpos_env.errors import EnvError
+from relpos_env.interface.actions import ActionMode, action_mode
+from relpos_env.interface.observations import ObservationMode, observation_mode
+from relpos_env.loop import default_params
+from relpos_env.scenarios import Scenario
+from relpos_env.scenarios import scenario as find_scenario
+from relpos_env.sensors.operator import OperatorSimParams
+from relpos_env.tasks import Task, make_task, reward_weights
+from relpos_env.tasks.needs import DEFAULT_SCENARIO, needs_of
+from tracking.errors import ConfigError
+from tracking.filters import DEFAULT_FILTER, filter_builder
+from tracking.tracker import TrackerParams
+
+MOST_CARS = 20
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FormationConfig:
+    """One environment, whichever interface it has."""
+
+    scenario: str | Path | Scenario | None = None
+    """Room, obstacles, sensors and randomisation: a name in `relpos_env.scenarios.SCENARIOS`, a
+    TOML file, or a scenario; by default that of the task in
+    `relpos_env.tasks.needs.DEFAULT_SCENARIO`."""
+    task: str = "ring"
+    """What is asked of the cars, one of `relpos_env.tasks.TASKS`."""
+    task_options: Mapping[str, Any] = field(default_factory=dict)
+    """The task's own options, by name."""
+    n_cars: int | None = None
+    """Slots for cars, 2 to 20; by default as many as the scenario can have at a time."""
+    level: int | None = None
+    """Randomisation of a level of the curriculum, 0 to 4, in place of the scenario's own."""
+    observation: str = "estimate"
+    """One of `relpos_env.interface.observations.OBSERVATIONS`."""
+    history: int = 1
+    """So many observations in one, the newest first."""
+    actions: str = "continuous"
+    """One of `relpos_env.interface.actions.ACTIONS`."""
+    filter: str = DEFAULT_FILTER
+    """Position filter of the trackers, one of `tracking.filters.FILTERS`."""
+    params: TrackerParams | None = None
+    """What the trackers believe; by default `relpos_env.loop.default_params`."""
+    operator: OperatorSimParams = field(default_factory=OperatorSimParams)
+    """The operator who tells the group where to go."""
+    weights: Mapping[str, float] | None = None
+    """Weights of reward terms that differ from `relpos_env.tasks.DEFAULT_WEIGHTS`."""
+    max_cycles: int = 600
+    """Steps of 0.1 s until truncation."""
+    end_on_collision: bool = False
+    """A contact terminates the episode."""
+
+    def resolve(self) -> Parts:
+        """Look everything up.
+
+        Raises:
+            EnvError: An unknown name or a number out of range; the argument is named.
+        """
+        config = replace(
+            self,
+            max_cycles=whole_number("max_cycles", self.max_cycles, 1, 800_000),
+            history=whole_number("history", self.history, 1, 64),
+        )
+        try:
+            filter_builder(self.filter)
+        except ConfigError as error:
+            raise EnvError(str(error)) from error
+        name = DEFAULT_SCENARIO.get(self.task, "ring-nlos")
+        wanted = name if self.scenario is None else self.scenario
+        if not isinstance(wanted, str | Path | Scenario):
+            raise EnvError(f"scenario: expected a name, a path or a scenario, got {wanted!r}")
+        scenario = find_scenario(wanted)
+        if self.level is not None:
+            scenario = scenario.at_level(whole_number("level", self.level, 0, 4))
+        n_cars = self.n_cars
+        if n_cars is None:
+            n_cars = max(scenario.n_cars, *(scenario.randomisation.n_cars or (0,)))
+        else:
+            n_cars = whole_number("n_cars", n_cars, 2, MOST_CARS)
+            scenario = scenario.with_cars(n_cars)
+        options = {**needs_of(self.task, scenario), **self.task_options}
+        task = make_task(self.task, n_cars, 1, scenario.room, **options)
+        reward_weights(self.task, task.terms, self.weights)
+        return Parts(
+            config=config,
+            scenario=scenario,
+            n_cars=n_cars,
+            task_options=options,
+            mode=observation_mode(self.observation, n_cars),
+            actions=action_mode(self.actions),
+            params=self.params or default_params(scenario, n_cars),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parts:
+    """A configuration with its names looked up."""
+
+    config: FormationConfig
+    scenario: Scenario
+    n_cars: int
+    task_options: Mapping[str, Any]
+    mode: ObservationMode
+    actions: ActionMode
+    params: TrackerParams
+
+    def make_task(self, n_envs: int) -> Task:
+        """The task of a batch."""
+        return make_task(
+            self.config.task, self.n_cars, n_envs, self.scenario.room, **self.task_options
+        )
+
+
+def configure(arguments: Mapping[str, Any]) -> Parts:
+    """The parts that keyword arguments ask for.
+
+    Raises:
+        EnvError: An argument of no such name, an unknown name or a number out of range.
+    """
+    known = [f.name for f in fields(FormationConfig)]
+    for name in arguments:
+        if name not in known:
+            raise EnvError(f"{name}: unknown argument, expected one of {', '.join(known)}")
+    return FormationConfig(**arguments).resolve()
+
+
+def whole_number(name: str, value: Any, least: int, most: int) -> int:
+    """The value, if it is a whole number in a range.
+
+    Raises:
+        EnvError: It is not; the argument is named.
+    """
+    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not (whole and least <= value <= most):
+        raise EnvError(f"{name}: expected a whole number from {least} to {most}, got {value!r}")
+    return int(value)

@@ -1,0 +1,220 @@
+"""A batch of environments without an interface: rooms, trackers, operator, task, observations.
+
+The PettingZoo, Gymnasium and Stable-Baselines3 environments are thin forms of this one, so they
+cannot differ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+from relpos_env._result_kernels import judge, tracking_errors
+from relpos_env.config import Parts, whole_number
+from relpos_env.interface.observations import total_size
+from relpos_env.interface.observations.base import F32
+from relpos_env.interface.views import reveal
+from relpos_env.loop import TrackedSwarm
+from relpos_env.scenarios.episode import draw_episode
+from relpos_env.sensors.operator import Operator
+from relpos_env.swarm import Swarm
+from relpos_env.tasks import reward_weights
+from relpos_env.timing import DECISION, DT, STAND_STILL
+from relpos_env.world_state import WorldState
+from tracking.arrays import F64, I64, Bool
+
+MOST_ENVS = 1 << 20
+
+
+class Formation:
+    """Environments of one configuration, their results in arrays.
+
+    Laws: same configuration, seeds and actions, same everything, bit for bit; environment k of
+    a batch is that environment alone.
+    """
+
+    def __init__(self, parts: Parts, n_envs: int = 1, threads: int = 1) -> None:
+        """Make room for the batch; `begin` puts episodes into it.
+
+        Args:
+            parts: What the environments are made of.
+            n_envs: How many.
+            threads: The batch is stepped in so many parts at a time.
+        """
+        n_envs = whole_number("n_envs", n_envs, 1, MOST_ENVS)
+        threads = whole_number("threads", threads, 1, n_envs)
+        self.parts, self.n_envs = parts, n_envs
+        config, n = parts.config, parts.n_cars
+        self.loop = TrackedSwarm(
+            parts.scenario,
+            n,
+            n_envs,
+            filter=config.filter,
+            params=parts.params,
+            n_steps=round(DECISION / DT),
+        )
+        self.task = parts.make_task(n_envs)
+        self.operator = Operator(config.operator, n, n_envs)
+        self.weights = reward_weights(config.task, self.task.terms, config.weights)
+        self._size = total_size(parts.mode.fields)
+        self.observations: F32 = np.zeros((n_envs, n, config.history * self._size), np.float32)
+        """(env, car, size); zeros for absent cars."""
+        self.rewards: F64 = np.zeros((n_envs, n))
+        """(env, car); 0 for absent cars."""
+        self.active: Bool = np.zeros((n_envs, n), dtype=bool)
+        """Cars that take part, (env, car): in the room, or away and to return."""
+        self.left: Bool = np.zeros((n_envs, n), dtype=bool)
+        """Cars that left for good in the last step, (env, car)."""
+        self.terminated: Bool = np.zeros(n_envs, dtype=bool)
+        self.truncated: Bool = np.zeros(n_envs, dtype=bool)
+        self.cycles: I64 = np.zeros(n_envs, dtype=np.int64)
+        self._rngs = [np.random.default_rng(k) for k in range(n_envs)]
+        self._newest: F32 = self.observations
+        if config.history > 1:
+            self._newest = np.zeros((n_envs, n, self._size), np.float32)
+        self.loop.share(self.task.target, self.task.has_target, self.operator.command)
+        self._threads = threads
+        self._pool: ThreadPoolExecutor | None = None
+        self._share_out()
+
+    def seed(self, env: int, rng: np.random.Generator) -> None:
+        """Let the episodes of an environment come from a generator, from the next one on."""
+        self._rngs[env] = rng
+
+    def begin(self, env: int, watch: Callable[[Swarm], None] | None = None) -> None:
+        """Begin a new episode in one environment and observe it.
+
+        Args:
+            env: Which.
+            watch: Called with its group after each step in which it stands at first.
+        """
+        rng = self._rngs[env].spawn(1)[0]
+        seconds = STAND_STILL + DECISION * self.parts.config.max_cycles
+        episode = draw_episode(self.parts.scenario, self.parts.n_cars, seconds, rng)
+        self.loop.begin(env, episode, rng.spawn(1)[0], watch)
+        here = slice(env, env + 1)
+        seed = np.array([rng.integers(1 << 62)], dtype=np.uint64)
+        self.task.reset(self.state, here)
+        self.operator.reset(seed, here)
+        self.cycles[env] = 0
+        self.active[env] = False
+        self.terminated[env] = self.truncated[env] = False
+        self._judge(here)
+        self.left[env] = False
+        self.observations[env] = 0.0
+        self._observe(here)
+
+    def step(self, speed: F64, steering: F64) -> None:
+        """Drive all environments for one decision; the results are in the arrays.
+
+        Args:
+            speed: (env, car) [m/s]; without effect where the car is not in the room yet.
+            steering: (env, car) [rad]; likewise.
+        """
+        if self._pool is None:
+            self.loop.step(speed, steering)
+        else:
+            jobs = [
+                self._pool.submit(part.step, speed[envs], steering[envs])
+                for envs, part in self._lanes
+            ]
+            for job in jobs:
+                job.result()
+        everything = slice(0, self.n_envs)
+        self.cycles += 1
+        self._judge(everything)
+        self._observe(everything)
+
+    @property
+    def state(self) -> WorldState:
+        """The truth now."""
+        return self.loop.swarm.state
+
+    @property
+    def t(self) -> F64:
+        """Time since the cars were let go, (env) [s]."""
+        return self.loop.swarm.t - STAND_STILL
+
+    def truth(self) -> F64:
+        """The truth for critics, (env, 8 car); zeros for absent cars.
+
+        Of each car: 1, x, y, cosine and sine of the heading, velocity x, y, yaw rate.
+        """
+        s = self.state
+        columns = [
+            np.ones_like(s.heading),
+            s.pos_w[..., 0],
+            s.pos_w[..., 1],
+            np.cos(s.heading),
+            np.sin(s.heading),
+            s.vel_w[..., 0],
+            s.vel_w[..., 1],
+            s.yaw_rate,
+        ]
+        rows = np.stack(columns, axis=-1) * s.present[..., None]
+        truth: F64 = rows.reshape(self.n_envs, -1)
+        return truth
+
+    def tracking_error(self) -> F64:
+        """Distance of believed from true relative positions, (env, car) [m].
+
+        Mean over the others that a car can use; NaN where it can use none.
+        """
+        error = np.empty(self.rewards.shape)
+        view = self.loop.view
+        tracking_errors(self.loop.swarm.body, view.pos, view.ok, error)
+        return error
+
+    def close(self) -> None:
+        """Release the threads."""
+        if self._pool is not None:
+            self._pool.shutdown()
+            self._pool = None
+
+    def _judge(self, envs: slice) -> None:
+        """What the task, the operator and the clock say of now."""
+        swarm, config = self.loop.swarm, self.parts.config
+        self.task.update(self.state, self.t, swarm.contacts, envs)
+        self.operator.sample(self.state, self.task, envs)
+        judge(
+            envs.start, envs.stop, self.state.present, swarm.to_come, swarm.contacts,
+            self.task.rewards, self.weights, self.task.done, self.cycles, config.max_cycles,
+            config.end_on_collision, self.rewards, self.active, self.left, self.terminated,
+            self.truncated,
+        )  # fmt: skip
+
+    def _observe(self, envs: slice) -> None:
+        """Write the observations of some environments."""
+        everything = envs.stop - envs.start == self.n_envs
+        here = self.loop.view if everything else self.loop.view.part(envs)
+        if self.parts.mode.needs_truth:
+            s = self.state
+            reveal(here, s.pos_w[envs], s.vel_w[envs], s.heading[envs])
+        if everything:
+            self._write()
+        else:
+            self.parts.mode.bind(here, self._newest[envs])()
+        if self.parts.config.history == 1:
+            return
+        observations, size = self.observations[envs], self._size
+        observations[..., size:] = observations[..., :-size].copy()
+        observations[..., :size] = self._newest[envs]
+        observations[~self.loop.view.present[envs]] = 0.0
+
+    def _share_out(self) -> None:
+        """Cut the batch into parts for the threads."""
+        edges = np.linspace(0, self.n_envs, self._threads + 1).astype(int)
+        slices = [slice(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        self._lanes = [(envs, self.loop.part(envs)) for envs in slices] if len(slices) > 1 else []
+        self._write = self.parts.mode.bind(self.loop.view, self._newest)
+        self._pool = ThreadPoolExecutor(self._threads) if self._threads > 1 else None
+
+    def __getstate__(self) -> dict[str, object]:
+        """Threads and views stay behind."""
+        return {k: v for k, v in self.__dict__.items() if k not in ("_lanes", "_pool", "_write")}
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        self.__dict__.update(state)
+        self._share_out()

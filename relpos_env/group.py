@@ -1,0 +1,126 @@
+"""What a group of cars has besides numbers: its boxes, its room in the solver, its life."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+import numpy as np
+
+from relpos_env.bodies import Bodies, box_row
+from relpos_env.room import Room
+from relpos_env.scenarios.life import LifeEvent
+from relpos_env.scenarios.obstacle import Obstacle
+from relpos_env.sensors.radio.radio import Radio
+from relpos_env.timing import DT
+from relpos_env.vehicle import CarParams
+from tracking.arrays import F64, Bool
+
+SOON = 1e-9
+"""[s] Events are due that much earlier, for the roundings of times."""
+WAIT = 0.5
+"""[s] A car that cannot come in, because another stands there, tries again after so long."""
+
+
+@dataclass(slots=True)
+class Group:
+    """One environment; the whole of a batch and its parts have the same object."""
+
+    life: tuple[LifeEvent, ...] = ()
+    """What is still to happen, by rising time."""
+    boots: np.random.Generator = field(default_factory=np.random.default_rng)
+    """For what the radios draw when they are switched on."""
+    obstacles: tuple[Obstacle, ...] = ()
+    car: CarParams = field(default_factory=CarParams)
+    size: tuple[float, float] = (0.0, 0.0)
+    """[m] Width and depth of the room."""
+    room: Room | None = None
+    """Made when something is about to touch, and kept until nothing does."""
+    solved: int = -1
+    """The last step that it made."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but the room: what is touching then is solved anew."""
+        return {f.name: getattr(self, f.name) for f in fields(self) if f.name != "room"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.room = None
+        for name, value in state.items():
+            setattr(self, name, value)
+
+    @property
+    def next_event(self) -> float:
+        """When something happens to a car or a tracker next [s]; inf for never."""
+        return self.life[0].t if self.life else np.inf
+
+    def to_come(self) -> list[int]:
+        """Cars that will come in, for the first time or again."""
+        return [event.car for event in self.life if event.what == "join"]
+
+    def movable(self, n_boxes: int) -> Bool:
+        """Which of so many boxes can be pushed, (box)."""
+        movable = np.zeros(n_boxes, dtype=bool)
+        movable[: len(self.obstacles)] = [box.movable for box in self.obstacles]
+        return movable
+
+    def solve(self, b: Bodies, env: int) -> None:
+        """Make one move of the environment with the rigid-body solver."""
+        tick = int(b.tick[env])
+        # The order in which a space takes its contacts is a matter of what it had before, so that
+        # each time something touches begins with a new one.
+        if self.room is None or tick != self.solved + 1:
+            cars = np.nonzero(b.present[env])[0]
+            self.room = Room(self.size, self.obstacles, self.car, cars)
+        self.solved = tick
+        self.room.step(b.body[env], b.wrench[env], b.box_body[env], b.contacts[env], DT)
+        for k, box in enumerate(self.obstacles):
+            if box.movable:
+                x, y, angle = b.box_body[env, k, :3]
+                b.boxes[env, k] = box_row(x, y, box.width, box.height, angle)
+        b.moved[env] = True
+
+    def live(self, b: Bodies, radio: Radio, antennas: F64, env: int, t: float) -> None:
+        """Let happen what is due.
+
+        Args:
+            b: Cars, updated.
+            radio: Their radios, updated.
+            antennas: Where these are, (env, car, 3) [m], updated.
+            env: Number of the environment in these.
+            t: Now [s].
+        """
+        events = self.life
+        while events and events[0].t <= t + SOON:
+            event, events = events[0], events[1:]
+            n = event.car
+            if event.what == "join" and self._is_taken(b, env, event):
+                later = replace(event, t=event.t + WAIT)
+                events = tuple(sorted((*events, later), key=lambda each: each.t))
+                continue
+            if event.what == "join":
+                b.body[env, n], b.drive[env, n] = 0.0, 0.0
+                b.body[env, n, :3] = event.pose
+                antennas[env, n, :2] = b.body[env, n, :2]
+                b.present[env, n] = True
+            elif event.what == "leave":
+                b.body[env, n, 3:] = 0.0
+                b.present[env, n] = False
+            if event.what in ("join", "leave"):
+                self.room = None
+            on = event.what in ("join", "power-on")
+            if on and not b.powered[env, n]:
+                radio.switch_on(env, n, boot=int(self.boots.integers(256)))
+            elif not on and b.powered[env, n]:
+                radio.switch_off(env, n)
+            b.powered[env, n] = on
+        self.life = events
+
+    def _is_taken(self, b: Bodies, env: int, event: LifeEvent) -> bool:
+        """True while a car or a box that was pushed stands where one is to come in."""
+        assert event.pose is not None
+        boxes, half = b.boxes[env], b.size[env].sum()
+        away = np.abs(b.body[env, b.present[env], :2] - event.pose[:2]).max(axis=-1)
+        reach = half + np.hypot(boxes[:, 2], boxes[:, 3])
+        beside = np.hypot(boxes[:, 0] - event.pose[0], boxes[:, 1] - event.pose[1])
+        pushed = self.movable(len(boxes)) & (beside < reach)
+        return bool((away < 2.0 * half).any() or pushed.any())

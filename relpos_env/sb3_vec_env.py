@@ -1,0 +1,173 @@
+"""Stable-Baselines3: a seat for every car of every environment, all with one shared policy."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium.utils import seeding
+from stable_baselines3.common.vec_env import VecEnv
+
+from relpos_env.config import configure
+from relpos_env.errors import EnvError
+from relpos_env.formation import Formation
+from relpos_env.interface.observations import space_of
+from relpos_env.interface.observations.base import F32
+from relpos_env.render.film import Film, check_render_mode
+from tracking.arrays import F64, Bool
+
+_NOTHING: dict[str, Any] = {}
+_IDLE: dict[str, Any] = {"active": False}
+
+
+class FormationVecEnv(VecEnv):  # type: ignore[misc]
+    """``n_envs`` environments; seat ``e * n_cars + k`` is car k of environment e.
+
+    Seeds count on from environment to environment. A seat is done when the episode of its
+    environment is over or its car leaves for good; what it saw last is then in
+    ``infos[seat]["terminal_observation"]``, and ``TimeLimit.truncated`` says whether it only
+    ended. The seat of a car that is not there sees zeros and gets no reward, and its info has
+    ``active`` False.
+    """
+
+    def __init__(
+        self, n_envs: int = 1, *, threads: int = 1, render_mode: str | None = None, **arguments: Any
+    ) -> None:
+        """Build the environments.
+
+        Args:
+            n_envs: How many.
+            threads: The batch is stepped in so many parts at a time.
+            render_mode: None, ``human`` or ``rgb_array``: pictures of the first environment.
+            arguments: Fields of `relpos_env.config.FormationConfig`.
+
+        Raises:
+            EnvError: An unknown name or a number out of range; the argument is named.
+        """
+        check_render_mode(render_mode)
+        self.render_mode = render_mode
+        self._parts = configure(arguments)
+        self.formation = Formation(self._parts, n_envs, threads)
+        self.n_cars = self._parts.n_cars
+        self._film = Film(render_mode, 10)
+        self._commands: tuple[F64, F64] | None = None
+        self._next_seeds: list[int | None] = [None] * n_envs
+        self._begun = False
+        super().__init__(
+            n_envs * self.n_cars,
+            space_of(self._parts.mode.fields, self._parts.config.history),
+            self._parts.actions.space(),
+        )
+
+    @property
+    def active(self) -> Bool:
+        """Which seats have a car that takes part, (seat)."""
+        return self.formation.active.ravel()
+
+    def seed(self, seed: int | None = None) -> Sequence[int | None]:
+        """Seed all environments, from the next reset on; None lets chance decide."""
+        if seed is not None:
+            n = self.formation.n_envs
+            self._next_seeds = [int(seed) + k for k in range(n)]
+        return [s for s in self._next_seeds for _ in range(self.n_cars)]
+
+    def reset(self) -> F32:
+        """Begin an episode in every environment; observations, (seat, size)."""
+        for env, seed in enumerate(self._next_seeds):
+            if seed is not None or not self._begun:
+                self.formation.seed(env, seeding.np_random(seed)[0])
+            self.formation.begin(env)
+        self._next_seeds = [None] * self.formation.n_envs
+        self._begun = True
+        self.reset_infos = [_NOTHING] * self.num_envs
+        self._film.forget()
+        self._show()
+        return self._observations()
+
+    def step_async(self, actions: Any) -> None:
+        """Take the actions of all seats, (seat, ...).
+
+        Raises:
+            EnvError: The actions have a wrong shape, are not finite or not in the space; or
+                there was no reset.
+        """
+        if not self._begun:
+            raise EnvError("the environment must be reset first")
+        shape = (self.num_envs, *self._parts.actions.shape)
+        if np.shape(actions) != shape:
+            raise EnvError(f"actions: expected shape {shape}, got {np.shape(actions)}")
+        rows = np.reshape(actions, (-1, self.n_cars, *self._parts.actions.shape))
+        self._commands = self._parts.actions.decode(rows, "actions")
+
+    def step_wait(self) -> tuple[F32, F32, Bool, list[dict[str, Any]]]:
+        """Drive for 0.1 s: observations, rewards, dones and infos of all seats."""
+        assert self._commands is not None
+        f = self.formation
+        was_active = f.active.copy()
+        f.step(*self._commands)
+        rewards = f.rewards.ravel().astype(np.float32)
+        over = f.terminated | f.truncated
+        dones = (was_active & over[:, None] | f.left).ravel()
+        infos = [_NOTHING] * self.num_envs
+        if not f.active.all():
+            for seat in np.nonzero(~f.active.ravel())[0]:
+                infos[seat] = _IDLE
+        if dones.any():
+            last, ended = self._observations(), np.repeat(f.terminated, self.n_cars)
+            for seat in np.nonzero(dones)[0]:
+                infos[seat] = {
+                    "terminal_observation": last[seat],
+                    "TimeLimit.truncated": not ended[seat],
+                }
+            for env in np.nonzero(over)[0]:
+                f.begin(int(env))
+                if env == 0:
+                    self._film.forget()
+        self._show()
+        return self._observations(), rewards, dones, infos
+
+    def close(self) -> None:
+        """Release threads and window."""
+        self.formation.close()
+        self._film.close()
+
+    def get_images(self) -> list[Any]:
+        """A picture of the first environment."""
+        return [self._film.picture(self.formation)]
+
+    def render(self, mode: str | None = None) -> Any:
+        """A picture of the first environment; None without a render mode or with a window."""
+        return self._film.picture(self.formation)
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """An attribute of this environment, once for every seat asked for."""
+        return [getattr(self, attr_name)] * len(self._seats(indices))
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """Set an attribute; the seats share it."""
+        setattr(self, attr_name, value)
+
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any
+    ) -> list[Any]:
+        """Call a method once; its result for every seat asked for."""
+        result = getattr(self, method_name)(*method_args, **method_kwargs)
+        return [result] * len(self._seats(indices))
+
+    def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
+        """False for every seat: nothing is wrapped."""
+        return [False] * len(self._seats(indices))
+
+    def _seats(self, indices: Any) -> list[int]:
+        return list(self._get_indices(indices))
+
+    def _observations(self) -> F32:
+        observations: F32 = self.formation.observations.reshape(self.num_envs, -1).copy()
+        return observations
+
+    def _show(self) -> None:
+        if self.render_mode is not None:
+            self._film.add(self.formation)
+
+    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 10}  # noqa: RUF012

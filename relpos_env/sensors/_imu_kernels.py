@@ -1,0 +1,109 @@
+"""What the IMU of a car reads: the formulas of `relpos_env.sensors.imu`, one sample at a time."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from relpos_env.sensors.radio._random_kernels import draw_key, normal_pair
+from tracking.compiled import kernel, small_kernel
+
+GRAVITY = 9.81
+DRIFT_EVERY = 10
+"""[-] Samples between two steps of the slow part, whose time constant is a thousand times that."""
+STARTS = 1 << 50
+"""Counter of the draws at the start of an episode."""
+
+
+@kernel
+def start_imus(p, seed, bias, drift, e):
+    """Draw what calibration left on every IMU of an environment.
+
+    Args:
+        p: IMU of the environment.
+        seed: Of its IMUs, uint64.
+        bias: Constant part, (env, node, 6) [rad/s, m/s2], written.
+        drift: Slow part, likewise.
+        e: Which environment.
+    """
+    for n in range(bias.shape[1]):
+        key = draw_key(seed, np.uint64(STARTS + n))
+        for half in range(2):
+            constant = p.gyr_bias if half == 0 else p.acc_bias
+            slow = p.gyr_drift if half == 0 else p.acc_drift
+            for a in range(3):
+                one, two = normal_pair(key, 3 * half + a)
+                bias[e, n, 3 * half + a] = constant * one
+                drift[e, n, 3 * half + a] = slow * two
+
+
+@small_kernel
+def read_imu(p, seed, count, bias, drift, e, n, truth, speed, out, row):
+    """One sample of one IMU.
+
+    Args:
+        p: IMU of the environment.
+        seed: Of its IMUs, uint64.
+        count: Number of the sample.
+        bias: (env, node, 6).
+        drift: (env, node, 6), updated.
+        e: Environment.
+        n: Node.
+        truth: Six numbers: angular rate [rad/s] and specific force [m/s2] in the body frame.
+        speed: Of the carrier [m/s].
+        out: Values of events, (env, event, ...); columns 0 to 5 of the row are written.
+        row: Which.
+    """
+    key = draw_key(seed, np.uint64(count * 64 + n))
+    if count % DRIFT_EVERY == 0:
+        for k in range(3):
+            one, two = normal_pair(key, 3 + k)
+            drift[e, n, k] = p.keep * drift[e, n, k] + p.gyr_step * one
+            drift[e, n, 3 + k] = p.keep * drift[e, n, 3 + k] + p.acc_step * two
+    share = min(abs(speed) / p.vibration_speed, 1.0)
+    gyr_var = p.gyr_noise**2 + (share * p.gyr_vibration) ** 2
+    acc_var = p.acc_noise**2 + (share * p.vibration) ** 2
+    gyr_std, acc_std = math.sqrt(gyr_var), math.sqrt(acc_var)
+    for k in range(3):
+        one, two = normal_pair(key, k)
+        gyr = truth[k] + bias[e, n, k] + drift[e, n, k] + gyr_std * one
+        acc = truth[3 + k] + bias[e, n, 3 + k] + drift[e, n, 3 + k] + acc_std * two
+        out[e, row, k] = quantise(gyr, p.gyr_range, p.gyr_resolution)
+        out[e, row, 3 + k] = quantise(acc, p.acc_range, p.acc_resolution)
+
+
+@small_kernel
+def quantise(reading, full_scale, resolution):
+    """A reading cut at +- full scale and rounded to the converter's resolution, 0 for none."""
+    cut = min(max(reading, -full_scale), full_scale)
+    if resolution == 0.0:
+        return cut
+    return math.floor(cut / resolution + 0.5) * resolution
+
+
+@small_kernel
+def felt_on_car(yaw_rate, forward, left, roll, pitch, roll_rate, pitch_rate):
+    """Angular rate and specific force in the frame of a body that rolls and pitches.
+
+    Args:
+        yaw_rate: [rad/s]
+        forward: Acceleration along the heading, level [m/s2].
+        left: Acceleration across it [m/s2].
+        roll: About the forward axis, left side up is positive [rad].
+        pitch: About the left axis, nose down is positive [rad].
+        roll_rate: [rad/s]
+        pitch_rate: [rad/s]
+    """
+    sr, cr = math.sin(roll), math.cos(roll)
+    sp, cp = math.sin(pitch), math.cos(pitch)
+    x = cp * forward - sp * GRAVITY
+    z = sp * forward + cp * GRAVITY
+    return (
+        roll_rate - sp * yaw_rate,
+        cr * pitch_rate + sr * cp * yaw_rate,
+        -sr * pitch_rate + cr * cp * yaw_rate,
+        x,
+        cr * left + sr * z,
+        -sr * left + cr * z,
+    )

@@ -1,0 +1,86 @@
+"""What the magnetometer of a car reads: the formulas of `relpos_env.sensors.magnetometer`."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from relpos_env.sensors._imu_kernels import STARTS, quantise
+from relpos_env.sensors.radio._random_kernels import draw_key, normal_pair, uniform
+from tracking.compiled import kernel, small_kernel
+
+N_WAVE = 6
+"""Columns of a wave: wave vector x, y [rad/m], phase [rad], amplitude x, y, z [uT]."""
+
+
+@kernel
+def start_magnetometers(p, seed, waves, hard_iron, e):
+    """Draw the field of a building and what calibration left on every magnetometer.
+
+    Args:
+        p: MAG of the environment.
+        seed: Of its magnetometers, uint64.
+        waves: (env, wave, N_WAVE), written.
+        hard_iron: (env, node, 3) [uT], written.
+        e: Which environment.
+    """
+    n_waves = int(p.n_waves)
+    scale = p.disturbance * math.sqrt(2.0 / max(n_waves, 1))
+    for k in range(waves.shape[1]):
+        key = draw_key(seed, np.uint64(STARTS + 64 + k))
+        angle = 2.0 * math.pi * uniform(key, 0)
+        length = p.wavelength * (0.6 + uniform(key, 1))
+        waves[e, k, 0] = 2.0 * math.pi / length * math.cos(angle)
+        waves[e, k, 1] = 2.0 * math.pi / length * math.sin(angle)
+        waves[e, k, 2] = 2.0 * math.pi * uniform(key, 2)
+        x, y = normal_pair(key, 1)
+        z, _ = normal_pair(key, 2)
+        here = scale if k < n_waves else 0.0
+        waves[e, k, 3], waves[e, k, 4], waves[e, k, 5] = here * x, here * y, here * z
+    for n in range(hard_iron.shape[1]):
+        key = draw_key(seed, np.uint64(STARTS + n))
+        x, y = normal_pair(key, 0)
+        z, _ = normal_pair(key, 1)
+        hard_iron[e, n, 0] = p.hard_iron * x
+        hard_iron[e, n, 1] = p.hard_iron * y
+        hard_iron[e, n, 2] = p.hard_iron * z
+
+
+@small_kernel
+def read_magnetometer(p, seed, count, waves, hard_iron, e, n, at, heading, roll, pitch, out, row):
+    """One reading of one magnetometer.
+
+    Args:
+        p: MAG of the environment.
+        seed: Of its magnetometers, uint64.
+        count: Number of the sample.
+        waves: (env, wave, N_WAVE).
+        hard_iron: (env, node, 3).
+        e: Environment.
+        n: Node.
+        at: x, y of the node [m].
+        heading: [rad]
+        roll: [rad]
+        pitch: [rad]
+        out: Values of events, (env, event, ...); columns 0 to 2 of the row are written.
+        row: Which.
+    """
+    x, y, z = p.field_x, p.field_y, p.field_z
+    for k in range(waves.shape[1]):
+        wave = math.cos(waves[e, k, 0] * at[0] + waves[e, k, 1] * at[1] + waves[e, k, 2])
+        x += wave * waves[e, k, 3]
+        y += wave * waves[e, k, 4]
+        z += wave * waves[e, k, 5]
+    c, s = math.cos(heading), math.sin(heading)
+    x, y = c * x + s * y, c * y - s * x
+    sr, cr = math.sin(roll), math.cos(roll)
+    sp, cp = math.sin(pitch), math.cos(pitch)
+    x, z = cp * x - sp * z, sp * x + cp * z
+    y, z = cr * y + sr * z, cr * z - sr * y
+    key = draw_key(seed, np.uint64(count * 64 + n))
+    one, two = normal_pair(key, 0)
+    three, _ = normal_pair(key, 1)
+    out[e, row, 0] = quantise(x + hard_iron[e, n, 0] + p.noise * one, p.full_scale, p.resolution)
+    out[e, row, 1] = quantise(y + hard_iron[e, n, 1] + p.noise * two, p.full_scale, p.resolution)
+    out[e, row, 2] = quantise(z + hard_iron[e, n, 2] + p.noise * three, p.full_scale, p.resolution)

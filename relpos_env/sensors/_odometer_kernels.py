@@ -1,0 +1,35 @@
+"""What the odometers of all cars read: the formulas of `relpos_env.sensors.odometer`."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from relpos_env.sensors._imu_kernels import STARTS
+from relpos_env.sensors.radio._random_kernels import draw_key, normal_pair
+from tracking.compiled import kernel
+
+
+@kernel
+def read_odometers(p, seeds, tick, body, present, out):
+    """One reading of every car.
+
+    Args:
+        p: ODOMETER, (env).
+        seeds: uint64, (env).
+        tick: Counts the readings, (env).
+        body: (env, car, 6).
+        present: (env, car)
+        out: Forward speed, (env, car) [m/s], written; 0 for absent cars.
+    """
+    for e in range(body.shape[0]):
+        for n in range(body.shape[1]):
+            out[e, n] = 0.0
+            if present[e, n]:
+                c, s = math.cos(body[e, n, 2]), math.sin(body[e, n, 2])
+                # The wheel radius is wrong by the same share all through an episode.
+                scale, _ = normal_pair(draw_key(seeds[e], np.uint64(STARTS + n)), 0)
+                noise, _ = normal_pair(draw_key(seeds[e], np.uint64(tick[e] * 64 + n)), 0)
+                speed = c * body[e, n, 3] + s * body[e, n, 4]
+                out[e, n] = (1.0 + p[e].scale_std * scale) * speed + p[e].noise * noise

@@ -1,0 +1,135 @@
+"""The arrays of everything that measures on cars, over environments, and what they measured."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relpos_env.records import fill_numbers
+from relpos_env.scenarios.episode import Episode
+from relpos_env.sensors._imu_kernels import start_imus
+from relpos_env.sensors._magnetometer_kernels import N_WAVE, start_magnetometers
+from relpos_env.sensors.imu import IMU, fill_imu
+from relpos_env.sensors.magnetometer import MAG, fill_mag
+from relpos_env.sensors.odometer import ODOMETER
+from relpos_env.timing import DT
+from tracking.arrays import I64, Bool
+from tracking.filters.joint.records import as_records
+from tracking.measurements import N_VALUES
+
+Array = NDArray[Any]
+
+
+class Sensors(NamedTuple):
+    """Everything that measures, arrays over (env, ...)."""
+
+    imu: Array
+    """IMU, (env)."""
+    imu_seed: Array
+    bias: Array
+    """(env, car, 6)"""
+    drift: Array
+    """(env, car, 6)"""
+    mag: Array
+    """MAG, (env)."""
+    mag_seed: Array
+    waves: Array
+    """(env, wave, N_WAVE)"""
+    hard_iron: Array
+    """(env, car, 3)"""
+    mast: Array
+    """Height of the antenna over the tracker [m], (env)."""
+    odometer: Array
+    """ODOMETER, (env)."""
+    odometer_seed: Array
+
+
+class Events(NamedTuple):
+    """What was measured, arrays over (env, event), as in `MeasurementBlock`."""
+
+    t: Array
+    kind: Array
+    i: Array
+    j: Array
+    antenna_i: Array
+    antenna_j: Array
+    values: Array
+    has_power: Array
+    valid: Array
+    nlos: Array
+    """Ranges that an obstacle was in the way of."""
+    used: Array
+    """Events written, (env)."""
+    pose: Array
+    """The truth after every step: x, y, heading, roll, pitch; (env, step, car, 5)."""
+
+
+def make_sensors(n_envs: int, n_cars: int, n_waves: int) -> Sensors:
+    """Nothing yet."""
+    e, n = n_envs, n_cars
+    return Sensors(
+        imu=np.zeros(e, dtype=IMU),
+        imu_seed=np.zeros(e, dtype=np.uint64),
+        bias=np.zeros((e, n, 6)),
+        drift=np.zeros((e, n, 6)),
+        mag=np.zeros(e, dtype=MAG),
+        mag_seed=np.zeros(e, dtype=np.uint64),
+        waves=np.zeros((e, n_waves, N_WAVE)),
+        hard_iron=np.zeros((e, n, 3)),
+        mast=np.zeros(e),
+        odometer=np.zeros(e, dtype=ODOMETER),
+        odometer_seed=np.zeros(e, dtype=np.uint64),
+    )
+
+
+def start_sensors(s: Sensors, env: int, episode: Episode, rng: np.random.Generator) -> None:
+    """Draw what calibration left on the sensors of an environment, and the field of its building.
+
+    Args:
+        s: Written.
+        env: Which.
+        episode: What it is made of.
+        rng: Gives a seed to each kind of sensor.
+    """
+    s.imu_seed[env], s.mag_seed[env], s.odometer_seed[env] = rng.integers(1 << 62, size=3)
+    fill_imu(s.imu[env], episode.imu, DT)
+    fill_mag(s.mag[env], episode.mag)
+    fill_numbers(s.odometer[env], episode.odometer)
+    start_imus(as_records(s.imu)[env], s.imu_seed[env], s.bias, s.drift, env)
+    start_magnetometers(as_records(s.mag)[env], s.mag_seed[env], s.waves, s.hard_iron, env)
+    s.mast[env] = episode.radio.antenna_height
+
+
+def make_events(n_envs: int, n_cars: int, n_steps: int, n_ranges: int) -> Events:
+    """Room for what so many steps can bring.
+
+    Args:
+        n_envs: Environments.
+        n_cars: Cars.
+        n_steps: Steps.
+        n_ranges: In one of them, at most.
+    """
+    shape = (n_envs, n_steps * (2 * n_cars + n_ranges))
+
+    def ints() -> I64:
+        return np.zeros(shape, dtype=np.int64)
+
+    def flags() -> Bool:
+        return np.zeros(shape, dtype=bool)
+
+    return Events(
+        t=np.zeros(shape),
+        kind=ints(),
+        i=ints(),
+        j=ints(),
+        antenna_i=ints(),
+        antenna_j=ints(),
+        values=np.zeros((*shape, N_VALUES)),
+        has_power=flags(),
+        valid=flags(),
+        nlos=flags(),
+        used=np.zeros(n_envs, dtype=np.int64),
+        pose=np.zeros((n_envs, n_steps, n_cars, 5)),
+    )

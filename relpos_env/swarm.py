@@ -1,0 +1,236 @@
+"""A batch of simulated rooms: cars, their sensors and radios, stepped by commands.
+
+It has no notion of agents, rewards or episodes that end. The blocks it gives are all that a
+tracker ever gets; recorded to a log and tracked from there they give the same estimates.
+"""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import numpy as np
+
+from relpos_env._step_kernels import begin_decision, run_steps
+from relpos_env._vehicle_kernels import STEERING
+from relpos_env.bodies import Bodies, make_bodies, place_bodies
+from relpos_env.group import SOON, Group
+from relpos_env.scenarios import Scenario
+from relpos_env.scenarios.episode import Episode
+from relpos_env.sensors._odometer_kernels import read_odometers
+from relpos_env.sensors.batch import Events, Sensors, make_events, make_sensors, start_sensors
+from relpos_env.sensors.radio._radio_kernels import Scene
+from relpos_env.sensors.radio.radio import Radio
+from relpos_env.sight import pairs_in_sight
+from relpos_env.timing import DT
+from relpos_env.world_state import WorldState
+from tracking.arrays import F64, Bool
+from tracking.compiled import bind
+from tracking.constellation import Antenna, Constellation, NodeConfig
+from tracking.filters.joint.records import as_records
+from tracking.measurements import MeasurementBlock
+
+
+def car_constellation(scenario: Scenario, n_cars: int) -> Constellation:
+    """The nodes that the cars carry: ids from 1, antenna on a mast over the tracker."""
+    ids = range(1, n_cars + 1)
+    height = scenario.radio.antenna_height
+    return Constellation(
+        nodes=tuple(NodeConfig(id=k, vehicle="car", imu_hz=1.0 / DT) for k in ids),
+        dimensions=2,
+        heading="magnetic",
+        antennas=tuple(Antenna(id=k, node=k, offset_b=(0.0, 0.0, height)) for k in ids),
+    )
+
+
+class Swarm:
+    """Groups of cars.
+
+    Laws: same episode, seed and commands, same everything, bit for bit; environment k of a
+    batch is that environment alone.
+    """
+
+    def __init__(self, scenario: Scenario, n_cars: int, n_envs: int = 1, n_steps: int = 10) -> None:
+        """Make room for the batch; `begin` puts something into it.
+
+        Args:
+            scenario: Its room, protocol and largest number of boxes hold for all episodes.
+            n_cars: Largest number of cars in a group.
+            n_envs: Number of groups.
+            n_steps: Steps of `DT` in one `step`.
+        """
+        self.scenario, self.n_steps = scenario, n_steps
+        self.constellation = car_constellation(scenario, n_cars)
+        e, n = n_envs, n_cars
+        self._bodies = make_bodies(e, n, max(scenario.max_boxes, 1))
+        self._sensors = make_sensors(e, n, scenario.mag.n_waves)
+        self.odometer: F64 = np.zeros((e, n))
+        """Last readings, (env, car) [m/s]."""
+        self._radio = Radio(scenario.radio.for_nodes(n), n, [0] * e, DT)
+        self._scene = Scene(
+            np.zeros((e, n, 3)), np.zeros((e, n, 3)), self._bodies.boxes, np.zeros((e, 0, 7))
+        )
+        self.events = make_events(e, n, n_steps, self._radio.room)
+        self._groups = [Group() for _ in range(e)]
+        self._next_life = np.full(e, np.inf)
+        self.to_come: Bool = np.zeros((e, n), dtype=bool)
+        """Cars that will come in, for the first time or again, (env, car)."""
+        self.t: F64 = np.zeros(e)
+        """Time since each group began, (env) [s]."""
+        self._bind()
+
+    @property
+    def n_envs(self) -> int:
+        """Number of groups."""
+        return len(self._bodies.tick)
+
+    @property
+    def body(self) -> F64:
+        """x, y [m], heading [rad], velocity x, y [m/s] and yaw rate [rad/s], (env, car, 6)."""
+        return self._bodies.body
+
+    @property
+    def powered(self) -> Bool:
+        """Which trackers have power, (env, car)."""
+        return self._bodies.powered
+
+    @property
+    def contacts(self) -> F64:
+        """Contacts that each car began in the last step, (env, car)."""
+        return self._bodies.contacts
+
+    @property
+    def boxes(self) -> F64:
+        """What stands in the rooms, (env, box, 6); half sizes are zero for nothing.
+
+        Of each box: centre x, y, half width and depth [m], cosine and sine of its angle.
+        """
+        return self._bodies.boxes
+
+    @property
+    def nlos_share(self) -> F64:
+        """Share of the ranges of the last step that an obstacle was in the way of, (env)."""
+        ranges = self.events.valid & self.events.has_power
+        share: F64 = (self.events.nlos & ranges).sum(axis=1) / np.maximum(ranges.sum(axis=1), 1)
+        return share
+
+    def part(self, envs: slice) -> Swarm:
+        """Some of the groups; shares their memory."""
+        part = copy.copy(self)
+        part._bodies = Bodies._make(a[envs] for a in self._bodies)
+        part._sensors = Sensors._make(a[envs] for a in self._sensors)
+        part.odometer = self.odometer[envs]
+        part._radio = self._radio.part(envs)
+        part._scene = Scene._make(a[envs] for a in self._scene)
+        part._groups = self._groups[envs]
+        part._next_life, part.to_come = self._next_life[envs], self.to_come[envs]
+        part.events, part.t = Events._make(a[envs] for a in self.events), self.t[envs]
+        part._bind()
+        return part
+
+    def begin(self, env: int, episode: Episode, rng: np.random.Generator) -> None:
+        """Begin a group anew.
+
+        Args:
+            env: Which.
+            episode: What it is made of.
+            rng: Its own; no part's draws depend on another's.
+        """
+        b, group = self._bodies, self._groups[env]
+        place_bodies(b, env, episode, self.scenario.room)
+        start_sensors(self._sensors, env, episode, rng)
+        self.t[env] = 0.0
+        self._scene.pos1[env, :, :2] = b.body[env, :, :2]
+        self._scene.pos1[env, :, 2] = self._sensors.mast[env]
+        group.life, group.room, group.solved = episode.events, None, -1
+        group.obstacles, group.car, group.size = episode.obstacles, episode.car, self.scenario.room
+        self._radio.reset(env, int(rng.integers(1 << 62)), episode.radio)
+        group.boots = rng.spawn(1)[0]
+        for n in np.nonzero(episode.present)[0].tolist():
+            self._radio.switch_on(env, n, boot=int(group.boots.integers(256)))
+        self._look_ahead(env)
+
+    def step(self, speed: F64, steering: F64) -> MeasurementBlock:
+        """Drive for `n_steps` steps and return all that was measured.
+
+        Args:
+            speed: Forward speed wanted, (env, car) [m/s]; 0 for cars that come in just now.
+            steering: Steering angle wanted, (env, car) [rad]; likewise.
+
+        Returns:
+            Measurements, roughly in order; valid until the next step.
+        """
+        present = self._bodies.present
+        np.multiply(speed, present, out=self._speed)
+        np.multiply(steering, present, out=self._steering)
+        if self._next_life.min() <= self.t.max() + SOON:
+            for env in np.nonzero(self._next_life <= self.t + SOON)[0].tolist():
+                t = float(self.t[env])
+                self._groups[env].live(self._bodies, self._radio, self._scene.pos1, env, t)
+                self._look_ahead(env)
+        self._begin_decision()
+        while n_waiting := self._run_steps():
+            for env in self._waiting[:n_waiting].tolist():
+                self._groups[env].solve(self._bodies, env)
+        np.multiply(self._bodies.tick, DT, out=self.t)
+        self._read_odometers()
+        return self.block
+
+    def movable(self, env: int) -> Bool:
+        """Which boxes of a room can be pushed, (box)."""
+        return self._groups[env].movable(self.boxes.shape[1])
+
+    def line_of_sight(self, env: int) -> Bool:
+        """Which cars see each other, (car, car)."""
+        return pairs_in_sight(self._bodies.body[env, :, :2], self._bodies.boxes[env])
+
+    def _look_ahead(self, env: int) -> None:
+        """When something happens next, and who will come."""
+        group = self._groups[env]
+        self._next_life[env] = group.next_event
+        self.to_come[env] = False
+        self.to_come[env, group.to_come()] = True
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What is put together by `_bind` stays behind."""
+        bound = ("_begin_decision", "_run_steps", "_read_odometers", "block", "state")
+        return {k: v for k, v in self.__dict__.items() if k not in bound}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._bind()
+
+    def _bind(self) -> None:
+        """Put together what the kernels take: arrays that stay where they are."""
+        sensors = self._sensors
+        bodies = self._bodies._replace(cars=as_records(self._bodies.cars))
+        sensors = sensors._replace(
+            imu=as_records(sensors.imu),
+            mag=as_records(sensors.mag),
+            odometer=as_records(sensors.odometer),
+        )
+        self._speed, self._steering = np.zeros_like(self.odometer), np.zeros_like(self.odometer)
+        self._waiting = np.zeros(self.n_envs, dtype=np.int64)
+        self._begin_decision = bind(begin_decision, bodies, self.events)
+        self._run_steps = bind(
+            run_steps, bodies, sensors, self._radio.kernel_arguments, self._scene, self.n_steps,
+            DT, self.events, self._speed, self._steering, self._waiting,
+        )  # fmt: skip
+        self._read_odometers = bind(
+            read_odometers, sensors.odometer, sensors.odometer_seed, bodies.tick, bodies.body,
+            bodies.present, self.odometer,
+        )  # fmt: skip
+        self.block = MeasurementBlock(*self.events[:9])
+        """What the last step measured; shares memory."""
+        b = self._bodies
+        self.state = WorldState(
+            t=self.t,
+            pos_w=b.body[..., 0:2],
+            vel_w=b.body[..., 3:5],
+            accel_w=b.accel,
+            heading=b.body[..., 2],
+            yaw_rate=b.body[..., 5],
+            steering=b.drive[..., STEERING],
+            present=b.present,
+        )
+        """The truth now; shares memory."""
