@@ -1,22 +1,26 @@
-"""Three cars keep a formation on estimates: what `relpos demo` does, as a function."""
+"""Cars keep a formation on estimates: what `relpos demo` does, as a function."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from agents.controllers import CONTROLLERS
-from agents.controllers.base import split_fields
+from agents.controllers.base import Controller, split_fields
+from agents.frames import FrameRecorder, errors
 from agents.track import TrackResult, track_log
 from relpos_env import formation_v0
 from relpos_env.parallel_env import FormationEnv
 from relpos_env.registry import look_up
+from relpos_env.timing import DECISION
 from tracking.filters import FILTERS
-from tracking.log import Log
 
+TOLD = ("estimate", "truth", "nothing")
+"""What the cars are told in the drives of a demonstration."""
 SETTLE = 10.0
 """[s] Errors are averaged from here on."""
 
@@ -26,10 +30,15 @@ class DemoResult:
     """One demonstration."""
 
     scenario: str
+    task: str
     seed: int
     seconds: float
+    """[s] Length of the drive on estimates."""
+    done: bool
+    """Whether it ended because the task was accomplished."""
     formation_error: float
-    """[m] Mean distance of the others from where they should be, tracker in the loop."""
+    """[m] Mean distance of the others from where they should be, tracker in the loop; as the
+    task says, see `relpos_env.tasks`."""
     formation_error_truth: float
     """[m] The same when the cars are told the truth."""
     formation_error_blind: float
@@ -37,7 +46,7 @@ class DemoResult:
     nlos_share: float
     """[-] Share of the ranges that an obstacle was in the way of."""
     collisions: int
-    """[-] Contacts of any car."""
+    """[-] Contacts that cars began, with each other, obstacles and walls."""
     tracks: tuple[TrackResult, ...]
     """The same drive tracked by every filter."""
     frames: dict[str, Any]
@@ -52,8 +61,10 @@ class DemoResult:
             {
                 "result": "formation",
                 "scenario": self.scenario,
+                "task": self.task,
                 "seed": self.seed,
                 "seconds": self.seconds,
+                "done": self.done,
                 "formation_error": self.formation_error,
                 "formation_error_truth": self.formation_error_truth,
                 "formation_error_blind": self.formation_error_blind,
@@ -65,122 +76,117 @@ class DemoResult:
 
 def demo(
     *,
-    scenario: str = "ring-nlos",
+    scenario: str | Path | None = None,
+    task: str = "ring",
     seconds: float = 60.0,
     seed: int = 0,
-    cars: int = 3,
+    cars: int | None = None,
     controller: str = "consensus",
     progress: Callable[[float], None] | None = None,
 ) -> DemoResult:
-    """Drive a formation on estimates and, for comparison, on the truth.
+    """Drive a formation on estimates and, for comparison, on the truth and on nothing.
+
+    Args:
+        scenario: One of `relpos_env.scenarios.SCENARIOS` or a TOML file; by default that of
+            the task.
+        task: One of `relpos_env.tasks.TASKS`.
+        seconds: Length, less where the task is done before.
+        seed: Same seed, same run.
+        cars: Number of cars; by default that of the scenario.
+        controller: One of `agents.controllers.CONTROLLERS`.
+        progress: Called with the share done, 0 to 1.
 
     Raises:
         EnvError: An unknown name or a number out of range.
     """
-    cycles = round(seconds * 10)
-    drive = {}
-    log: Log | None = None
-    frames: dict[str, Any] = {}
-    told = ("estimate", "truth", "nothing")
-    for n, observation in enumerate(told):
+    drives: dict[str, Drive] = {}
+    for n, told in enumerate(TOLD):
+
+        def tell(share: float, n: int = n) -> None:
+            if progress is not None:
+                progress((n + share) / len(TOLD))
+
         env = formation_v0.parallel_env(
             scenario=scenario,
+            task=task,
             n_cars=cars,
-            observation="truth" if observation == "truth" else "estimate",
-            max_cycles=cycles,
-            record=observation == "estimate",
+            observation="truth" if told == "truth" else "estimate",
+            max_cycles=round(seconds / DECISION),
+            record=told == "estimate",
         )
-        recorder = FrameRecorder(env) if observation == "estimate" else None
-        observations, _ = env.reset(seed=seed)
         policy = look_up(CONTROLLERS, controller, "controller")(env.fields)
-        errors, nlos = [], []
-        for k in range(cycles):
-            if observation == "nothing":
-                observations = {a: _blinded(env, o) for a, o in observations.items()}
-            actions = {a: policy.act(o) for a, o in observations.items()}
-            observations, _, _, _, infos = env.step(actions)
-            errors.append(np.mean([info["formation_error"] for info in infos.values()]))
-            nlos.append(env.loop.sim.nlos_share)
-            if recorder is not None:
-                recorder.add(infos)
-            if progress is not None:
-                progress((n + (k + 1) / cycles) / len(told))
-        from_here = min(int(SETTLE * 10), cycles - 1)
-        drive[observation] = float(np.mean(errors[from_here:]))
-        if recorder is not None:
-            log = env.recorded_log(f"{scenario}-{seed}")
-            frames = recorder.frames
-            share = float(np.mean(nlos))
-            collisions = int(env.loop.sim.world.n_collisions.sum())
+        drives[told] = drive(env, policy, seed, blind=told == "nothing", progress=tell)
+        if told == "estimate":
+            name = env.scenario.name
+            log = env.recorded_log(f"{name}-{seed}")
         env.close()
-    assert log is not None
+    ours = drives["estimate"]
+    assert log.nlos is not None
     return DemoResult(
-        scenario=scenario,
+        scenario=name,
+        task=task,
         seed=seed,
-        seconds=seconds,
-        formation_error=drive["estimate"],
-        formation_error_truth=drive["truth"],
-        formation_error_blind=drive["nothing"],
-        nlos_share=share,
-        collisions=collisions,
+        seconds=ours.seconds,
+        done=ours.done,
+        formation_error=ours.formation_error,
+        formation_error_truth=drives["truth"].formation_error,
+        formation_error_blind=drives["nothing"].formation_error,
+        nlos_share=float(log.nlos.mean()) if len(log.nlos) else 0.0,
+        collisions=ours.collisions,
         tracks=tuple(track_log(log, filter=name) for name in FILTERS),
-        frames=frames,
+        frames=ours.frames,
     )
 
 
-def _blinded(env: FormationEnv, observation: np.ndarray) -> np.ndarray:
-    """An observation in which no other car is known."""
-    blinded = observation.copy()
-    blinded[split_fields(env.fields)["mask"]] = 0.0
-    return blinded
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """One episode."""
+
+    seconds: float
+    done: bool
+    """Whether the task was accomplished and ended it."""
+    formation_error: float
+    """[m] Mean from `SETTLE` on, or that of the end if it came before."""
+    collisions: int
+    frames: dict[str, Any]
 
 
-class FrameRecorder:
-    """Collects what the animation shows, rounded to a millimetre."""
+def drive(
+    env: FormationEnv,
+    policy: Controller,
+    seed: int,
+    *,
+    blind: bool,
+    progress: Callable[[float], None],
+) -> Drive:
+    """Drive one episode.
 
-    def __init__(self, env: FormationEnv) -> None:
-        self._env = env
-        scenario = env.scenario
-        self.frames: dict[str, Any] = {
-            "room": list(scenario.room),
-            "car": [scenario.car.length, scenario.car.width],
-            "obstacles": [np.round(o.corners(), 3).tolist() for o in scenario.obstacles],
-            "dt": 0.1,
-        }
-        names = ("t", "pos", "heading", "sight", "target", "estimate", "tracking", "formation")
-        self.frames |= {name: [] for name in names}
-
-    def add(self, infos: dict[str, Any]) -> None:
-        """One frame from the environment as it stands."""
-        env, f = self._env, self.frames
-        loop = env.loop
-        state, belief = loop.state, loop.belief()
-        i, j = loop.sim.constellation.pairs.T
-        sight = loop.sim.world.pairs_in_sight(state.pos_w)[i, j]
-        estimate = loop.estimate.at(loop.sim.t).take(0)
-        n = len(state.heading)
-        others = []
-        for b in range(1, n):
-            pair = loop.sim.constellation.pair_index[0, b]
-            others.append(
-                [*belief.pos_w[0, b], *_ellipse(estimate.cov[pair, :2, :2])]
-                if belief.ok[0, b]
-                else None
-            )
-        tracking = [v["tracking_error"] for v in infos.values() if v["tracked"]]
-        f["t"].append(round(state.t, 2))
-        f["pos"].append(np.round(state.pos_w, 3).tolist())
-        f["heading"].append(np.round(state.heading, 3).tolist())
-        f["sight"].append(sight.astype(int).tolist())
-        f["target"].append(np.round(env.target()[0, 1:], 3).tolist())
-        f["estimate"].append([None if o is None else np.round(o, 3).tolist() for o in others])
-        f["tracking"].append(round(float(np.mean(tracking)), 3) if tracking else None)
-        mean = float(np.mean([v["formation_error"] for v in infos.values()]))
-        f["formation"].append(round(mean, 3))
-
-
-def _ellipse(cov: np.ndarray) -> tuple[float, float, float]:
-    """Standard deviations along the axes of a covariance, and the angle of the first [rad]."""
-    values, vectors = np.linalg.eigh(cov)
-    a, b = np.sqrt(np.maximum(values[::-1], 0.0))
-    return float(a), float(b), float(np.arctan2(vectors[1, 1], vectors[0, 1]))
+    Args:
+        env: Is reset first.
+        policy: Drives all cars.
+        seed: Of the episode.
+        blind: Whether the observations are changed so that no other car is known.
+        progress: Called with the share done, 0 to 1.
+    """
+    observations, _ = env.reset(seed=seed)
+    formation, mask = env.formation, split_fields(env.fields)["mask"]
+    recorder = FrameRecorder(formation)
+    formed: list[float] = []
+    collisions = 0.0
+    while env.agents:
+        if blind:
+            for observation in observations.values():
+                observation[mask] = 0.0
+        observations, *_ = env.step({a: policy.act(o) for a, o in observations.items()})
+        formed.append(errors(formation)[1])
+        collisions += formation.loop.swarm.contacts[0].sum()
+        recorder.add()
+        progress(len(formed) / formation.parts.config.max_cycles)
+    settled = formed[round(SETTLE / DECISION) :] or formed[-1:]
+    return Drive(
+        seconds=len(formed) * DECISION,
+        done=bool(formation.task.done[0]),
+        formation_error=float(np.mean(settled)),
+        collisions=int(collisions),
+        frames=recorder.frames,
+    )

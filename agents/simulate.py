@@ -11,6 +11,7 @@ import numpy as np
 from relpos_env.errors import EnvError
 from relpos_env.registry import look_up
 from relpos_env.scenarios import HumanScenario, Scenario, recordable
+from relpos_env.scenarios.checks import MOST_CARS
 from relpos_env.sensors.radio.channel import CHANNELS
 from relpos_env.sensors.radio.params import RadioSimParams
 from relpos_env.timing import DT, STAND_STILL
@@ -36,7 +37,7 @@ def simulate(
     """Let people drive cars about, or exercise, and record what their trackers measure.
 
     Args:
-        scenario: One of `relpos_env.scenarios.RECORDABLE`.
+        scenario: One of `relpos_env.scenarios.RECORDABLE`, or a TOML file.
         seconds: Length of the recording; nobody moves in the first two.
         seed: Same seed, same recording, bit for bit.
         cars: Number of cars; by default that of the scenario. People have none.
@@ -64,7 +65,9 @@ def simulate(
         if cars is not None:
             raise EnvError(f"cars: scenario {scenario!r} has a person and no cars, got {cars}")
     elif cars is not None:
-        chosen = replace(chosen, n_cars=cars)
+        if not 2 <= cars <= MOST_CARS:
+            raise EnvError(f"cars: expected 2 to {MOST_CARS}, got {cars}")
+        chosen = chosen.with_cars(cars)
     log = record(chosen, seconds=seconds, seed=seed, progress=progress)
     if channel is not None or antenna_delay is not None:
         place = f"channel {channel or 'of the scenario'}, antenna delays {antenna_delay or 0:g} m"
@@ -119,13 +122,14 @@ def _drive(
     from relpos_env.interface.actions import DriveCommand
     from relpos_env.sim import Simulation
 
-    sim = Simulation(scenario, rng, record=True)
-    drivers = LoopDrivers(scenario, sim.driver_rng)
-    still = DriveCommand(0.0, np.zeros(scenario.n_cars), np.zeros(scenario.n_cars))
+    sim = Simulation(scenario, rng, seconds=seconds)
+    n = sim.constellation.n_nodes
+    drivers = LoopDrivers(scenario, sim.driver_rng, n)
+    still = DriveCommand(0.0, np.zeros(n), np.zeros(n))
     n_decisions = round(seconds / (DECISION * DT))
     for k in range(n_decisions):
         parked = sim.t < STAND_STILL
-        sim.step(still if parked else drivers.command(sim.state), DECISION)
+        sim.step(still if parked else drivers.command(sim.state))
         if tell is not None:
             tell((k + 1) / n_decisions)
     return sim.to_log(name)

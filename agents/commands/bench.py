@@ -61,6 +61,65 @@ def bench_radio(as_json: bool) -> None:
     _show_bench("Time of one message-level round", rows, as_json)
 
 
+@bench.command("env")
+@click.option("--quick", is_flag=True, help="Fewer and shorter figures.")
+@click.option("--out", type=Path, help="Folder for a picture of the curves and the parts.")
+@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+def bench_env(quick: bool, out: Path | None, as_json: bool) -> None:
+    """Environment steps per second, beside mpe2 and bare pymunk, and where the time goes."""
+    from agents.bench.env import bench_env as run
+    from agents.bench.env.effort import FULL, QUICK
+    from agents.output import check_folder, write_results
+    from agents.report.bench_env_figures import ENV_PICTURE, env_figure
+    from agents.report.page import png
+
+    if out is not None:
+        check_folder(out, [ENV_PICTURE])
+    with progress_bar("environments") as report:
+        rows = run(
+            QUICK if quick else FULL,
+            progress=report,
+            tell=lambda note: click.echo(note, err=True),
+        )
+    if out is not None:
+        write_results(out, {ENV_PICTURE: png(env_figure(rows))})
+    if as_json:
+        emit_json(rows)
+    else:
+        _show_env(rows)
+    if out is not None and not as_json:
+        click.echo(f"written: {out / ENV_PICTURE}")
+
+
+def _show_env(rows: list[dict[str, Any]]) -> None:
+    header = ["figure", "envs", "cars", "cores", "env-steps/s", "us", "peer", "ratio"]
+    cells = []
+    for r in rows:
+        rate, ratio = r["env_steps_per_s"], r["ratio"]
+        cells.append(
+            [
+                r["what"],
+                str(r["envs"]),
+                str(r["cars"]),
+                str(r["threads"] * r["processes"]),
+                "" if rate is None or ":" in r["what"] else f"{rate:.0f}",
+                f"{r['us_per_env_step']:.1f}",
+                r["peer"] or "",
+                "" if ratio is None else f"{ratio:.2f}",
+            ]
+        )
+    print_table("Time of environment steps", header, cells)
+    shares = [r for r in rows if "solver_share" in r]
+    for r in shares:
+        click.echo(f"{r['what']}: the solver makes {100.0 * r['solver_share']:.1f} % of sub-steps")
+    held = max(rows, key=lambda r: r["envs"] if "array_bytes_per_env" in r else 0)
+    text = f"memory of an environment of {held['cars']} cars: arrays "
+    text += f"{held['array_bytes_per_env'] / 1024.0:.0f} KiB"
+    if held["resident_bytes_per_env"] is not None:
+        text += f", process {held['resident_bytes_per_env'] / 1024.0:.0f} KiB"
+    click.echo(f"{text} ({held['envs']} environments)")
+
+
 def _show_bench(title: str, rows: list[dict[str, Any]], as_json: bool) -> None:
     if as_json:
         emit_json(rows)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -14,16 +15,25 @@ from agents.errors import UsageError
 @click.command()
 @click.option(
     "--scenario",
-    default="ring-nlos",
+    help="cars-los, cars-nlos, gap, hall, open, random, ring-los, ring-nlos, warehouse, or a file "
+    "*.toml; by default that of the task.",
+)
+@click.option(
+    "--task",
+    default="ring",
     show_default=True,
-    help="cars-los, cars-nlos, ring-los or ring-nlos.",
+    help="ring, hold, travel, gap, rendezvous or follow.",
 )
 @click.option("--seconds", default=60.0, show_default=True, help="Length, 15 to 3600.")
 @click.option("--seed", default=0, show_default=True, help="Same seed, same run.")
-@click.option("--cars", default=3, show_default=True, help="Number of cars, 2 or more.")
+@click.option(
+    "--cars", type=int, help="Number of cars, 2 to 20; by default as many as the scenario has."
+)
 @click.option("--out", type=Path, default=Path("demo"), show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
-def demo(scenario: str, seconds: float, seed: int, cars: int, out: Path, as_json: bool) -> None:
+def demo(
+    seconds: float, seed: int, cars: int | None, out: Path, as_json: bool, **names: Any
+) -> None:
     """Cars keep a formation on estimated relative positions; writes report.html."""
     from agents.demo import SETTLE
     from agents.demo import demo as run
@@ -34,8 +44,10 @@ def demo(scenario: str, seconds: float, seed: int, cars: int, out: Path, as_json
         raise UsageError(f"--seconds: expected 15 to 3600, got {seconds:g}")
     if seed < 0:
         raise UsageError(f"--seed: expected 0 or more, got {seed}")
-    with progress_bar(f"{scenario}, seed {seed}") as report:
-        result = run(scenario=scenario, seconds=seconds, seed=seed, cars=cars, progress=report)
+    if cars is not None and not 2 <= cars <= 20:
+        raise UsageError(f"--cars: expected 2 to 20, got {cars}")
+    with progress_bar(f"{names['task']}, seed {seed}") as report:
+        result = run(seconds=seconds, seed=seed, cars=cars, progress=report, **names)
     write_results(out, {"report.html": demo_report(result)})
     if as_json:
         emit_json(result.summary)
@@ -50,7 +62,8 @@ def demo(scenario: str, seconds: float, seed: int, cars: int, out: Path, as_json
             ["nothing, only the command", f"{result.formation_error_blind:.3f}"],
         ],
     )
+    done = f", done after {result.seconds:.1f} s" if result.done else ""
     click.echo(
-        f"{100 * result.nlos_share:.0f} % of the ranges behind the wall, "
-        f"{result.collisions} contacts\nopen {out / 'report.html'} to see the drive"
+        f"{100 * result.nlos_share:.0f} % of the ranges behind an obstacle, "
+        f"{result.collisions} contacts{done}\nopen {out / 'report.html'} to see the drive"
     )

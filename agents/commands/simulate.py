@@ -16,13 +16,18 @@ from agents.console import emit_json, progress_bar
     "--scenario",
     default="cars-nlos",
     show_default=True,
-    help="cars-los, cars-nlos, ring-los, ring-nlos; human or human-mocap.",
+    help="cars-los, cars-nlos, gap, hall, open, random, ring-los, ring-nlos, warehouse, or a file "
+    "*.toml; human or human-mocap.",
 )
 @click.option(
     "--seconds", default=120.0, show_default=True, help="Length, 3 to 86400; people to 1800."
 )
 @click.option("--seed", default=0, show_default=True, help="Same seed, same run.")
-@click.option("--cars", type=int, help="Number of cars, 2 or more (default 3); not for people.")
+@click.option(
+    "--cars",
+    type=int,
+    help="Number of cars, 2 to 20; by default as many as the scenario has. Not for people.",
+)
 @click.option(
     "--channel",
     help="Radio: calibrated (default of cars), indoor, hall, outdoor, body (of people) or exact.",

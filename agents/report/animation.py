@@ -9,9 +9,9 @@ _SCRIPT = """
 <canvas id="stage" width="1000" height="720"></canvas>
 <div class="bar"><button id="play">pause</button><input id="at" type="range" min="0" value="0">
 <span id="clock"></span></div>
-<p class="key">Filled cars are true. Outlines are where the tracker of the blue car believes the
-others to be, with ellipses of two standard deviations. Lines between cars: green in sight, orange
-behind the wall. Crosses mark the wanted formation around the blue car.</p>
+<p class="key">Filled cars are true. Dashed outlines are where the tracker of the first car believes
+the others to be, with ellipses of two standard deviations. Lines between cars: green in sight,
+orange behind an obstacle. Crosses mark the wanted formation around the first car.</p>
 <script>
 (() => {
 const D = __DATA__;
@@ -36,30 +36,34 @@ function draw(k) {
   const w = D.room[0] * scale, d = D.room[1] * scale;
   g.beginPath(); g.rect(360 - w / 2, 360 - d / 2, w, d); g.fill(); g.stroke();
   g.fillStyle = "#475467";
-  for (const box of D.obstacles) { g.beginPath();
+  let b0 = k; while (!D.boxes[b0]) b0--;
+  for (const box of D.boxes[b0]) { g.beginPath();
     box.forEach((p, n) => n ? g.lineTo(X(p[0]), Y(p[1])) : g.moveTo(X(p[0]), Y(p[1])));
     g.closePath(); g.fill(); }
-  const P = D.pos[k], n = P.length;
+  const P = D.pos[k], n = P.length, here = D.present[k], v = D.viewer[k];
   let pair = 0;
   for (let a = 0; a < n; a++) for (let b = a + 1; b < n; b++, pair++) {
+    if (!here[a] || !here[b]) continue;
     g.beginPath(); g.moveTo(X(P[a][0]), Y(P[a][1])); g.lineTo(X(P[b][0]), Y(P[b][1]));
     g.strokeStyle = D.sight[k][pair] ? "#34d39988" : "#f59e0bcc"; g.lineWidth = 2; g.stroke(); }
   for (let a = 0; a < n; a++) {
-    g.beginPath(); g.strokeStyle = colours[a % 6] + "55"; g.lineWidth = 2;
-    for (let m = Math.max(0, k - 40); m <= k; m++)
-      m === Math.max(0, k - 40) ? g.moveTo(X(D.pos[m][a][0]), Y(D.pos[m][a][1]))
-                                : g.lineTo(X(D.pos[m][a][0]), Y(D.pos[m][a][1]));
+    g.beginPath(); g.strokeStyle = colours[a % 6] + "55"; g.lineWidth = 2; let pen = false;
+    for (let m = Math.max(0, k - 40); m <= k; m++) {
+      if (!D.present[m][a]) { pen = false; continue; }
+      const x = X(D.pos[m][a][0]), y = Y(D.pos[m][a][1]);
+      pen ? g.lineTo(x, y) : g.moveTo(x, y); pen = true; }
     g.stroke(); }
-  for (let a = 0; a < n; a++) car(P[a][0], P[a][1], D.heading[k][a], colours[a % 6], "#1c2430");
-  for (let b = 1; b < n; b++) {
-    const T = D.target[k][b - 1], c = colours[b % 6];
-    const tx = X(P[0][0] + T[0]), ty = Y(P[0][1] + T[1]);
-    g.strokeStyle = c; g.lineWidth = 2; g.beginPath();
-    g.moveTo(tx - 6, ty - 6); g.lineTo(tx + 6, ty + 6); g.moveTo(tx - 6, ty + 6);
-    g.lineTo(tx + 6, ty - 6); g.stroke();
-    const E = D.estimate[k][b - 1]; if (!E) continue;
-    const ex = P[0][0] + E[0], ey = P[0][1] + E[1];
-    g.setLineDash([5, 4]); car(ex, ey, D.heading[k][b], null, c); g.setLineDash([]);
+  for (let a = 0; a < n; a++) if (here[a])
+    car(P[a][0], P[a][1], D.heading[k][a], colours[a % 6], "#1c2430");
+  for (let b = 0; b < n; b++) {
+    const T = D.target[k][b], E = D.estimate[k][b], c = colours[b % 6];
+    if (T) { const tx = X(P[v][0] + T[0]), ty = Y(P[v][1] + T[1]);
+      g.strokeStyle = c; g.lineWidth = 2; g.beginPath();
+      g.moveTo(tx - 6, ty - 6); g.lineTo(tx + 6, ty + 6); g.moveTo(tx - 6, ty + 6);
+      g.lineTo(tx + 6, ty - 6); g.stroke(); }
+    if (!E) continue;
+    const ex = P[v][0] + E[0], ey = P[v][1] + E[1];
+    g.setLineDash([5, 4]); car(ex, ey, E[5], null, c); g.setLineDash([]);
     g.beginPath(); g.ellipse(X(ex), Y(ey), 2 * E[2] * scale, 2 * E[3] * scale, -E[4], 0, 7);
     g.strokeStyle = c + "88"; g.stroke(); }
   plot(k, D.tracking, "tracking error [m]", 40, "#2563eb");
@@ -103,7 +107,6 @@ def animation_markup(frames: dict[str, Any]) -> str:
     """The player with its data.
 
     Args:
-        frames: room, car size, obstacles, dt, and per frame t, pos, heading, sight, target,
-            estimate, tracking and formation error; see `agents.demo.FrameRecorder`.
+        frames: room, car size, dt, and lists over frames; see `agents.frames.FrameRecorder`.
     """
     return _SCRIPT.replace("__DATA__", json.dumps(frames, separators=(",", ":")))

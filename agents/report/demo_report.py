@@ -20,7 +20,8 @@ def demo_report(result: DemoResult) -> str:
         "Three cars, one formation, no anchors"
         if len(result.frames["pos"][0]) == 3
         else "One formation, no anchors",
-        f"Scenario {result.scenario}, seed {result.seed}, {result.seconds:.0f} s: the cars know "
+        f"Task {result.task}, scenario {result.scenario}, seed {result.seed}, "
+        f"{result.seconds:.0f} s{' until it was done' if result.done else ''}: the cars know "
         "each other only through simulated UWB ranges, inertial sensors and the tracker.",
     )
     page.raw(animation_markup(result.frames))
@@ -40,8 +41,8 @@ def demo_report(result: DemoResult) -> str:
         ],
     )
     page.text(
-        f"{100 * result.nlos_share:.0f} % of the ranges had the wall in their way; the cars "
-        f"touched something {result.collisions} times."
+        f"{100 * result.nlos_share:.0f} % of the ranges had an obstacle in their way; the "
+        f"cars touched something {result.collisions} times."
     )
     page.figure(_over_time(result), "Errors over time, the tracker in the loop.")
     return page.render()

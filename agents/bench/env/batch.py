@@ -1,0 +1,63 @@
+"""Our batch of environments in one process, timed over turns of whole episodes."""
+
+from __future__ import annotations
+
+import time
+from math import ceil
+
+import numpy as np
+
+from agents.bench.env.drives import Drive
+from agents.bench.env.effort import EPISODE
+from relpos_env.vector_env import FormationVectorEnv
+
+SCENARIO, TASK = "ring-los", "ring"
+
+
+class Batch:
+    """Environments that are at evenly spread places of their episodes.
+
+    So a turn has the resets that its steps should have, `resets` in all, and no step has many.
+    """
+
+    def __init__(
+        self,
+        n_envs: int,
+        drive: Drive,
+        *,
+        resets: int,
+        scenario: str = SCENARIO,
+        n_cars: int = 3,
+        threads: int = 1,
+    ) -> None:
+        self.env = FormationVectorEnv(
+            n_envs, scenario=scenario, task=TASK, n_cars=n_cars, threads=threads, max_cycles=EPISODE
+        )
+        self.n_envs, self._drive = n_envs, drive
+        self.steps = ceil(EPISODE * resets / n_envs)
+        """Of a turn."""
+        self.env.reset(seed=0)
+        self.env.formation.cycles[:] = EPISODE * np.arange(n_envs) // n_envs
+
+    def warm_up(self, steps: int, patience: float = np.inf) -> None:
+        """Drive so many steps, or for so long [s]."""
+        until = time.perf_counter() + patience
+        for _ in range(steps):
+            self._step()
+            if time.perf_counter() > until:
+                return
+
+    def turn(self) -> float:
+        """Time of a turn [us per env-step]."""
+        spent = sum(self._step() for _ in range(self.steps))
+        return 1e6 * spent / (self.steps * self.n_envs)
+
+    def close(self) -> None:
+        """Release the threads."""
+        self.env.close()
+
+    def _step(self) -> float:
+        actions = self._drive(self.env.formation).reshape(self.n_envs, -1)
+        began = time.perf_counter()
+        self.env.step(actions)
+        return time.perf_counter() - began

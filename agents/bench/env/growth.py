@@ -1,0 +1,77 @@
+"""How time and memory grow with the number of environments and of cars."""
+
+from __future__ import annotations
+
+import gc
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from agents.bench.env.batch import SCENARIO, Batch
+from agents.bench.env.drives import followed
+from agents.bench.env.effort import EPISODE, Effort
+from agents.bench.env.memory import array_bytes, resident_bytes
+
+WIDE = "open"
+"""The scenario of the curve over cars: twenty have room on its ring."""
+RESETS = 2
+"""Episodes that begin in a turn; a turn of large batches must have more than a step or two."""
+LEAST_STEPS = 5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Point:
+    """One point of a curve."""
+
+    scenario: str
+    n_envs: int
+    n_cars: int
+    cost: float
+    """[us per env-step], one thread."""
+    array_bytes: float
+    """[byte] Of the arrays, per environment."""
+    resident_bytes: float | None
+    """[byte] That the process grew by, per environment; None where the system does not tell.
+    Small batches fit into what it had."""
+
+
+def growth(effort: Effort, *, progress: Callable[[float], None] | None = None) -> list[Point]:
+    """The curve over environments with three cars, then the one over cars.
+
+    Args:
+        effort: Sizes, turns and patience.
+        progress: Called with the share done, 0 to 1.
+    """
+    cases = [(SCENARIO, e, 3) for e in effort.growth_envs]
+    cases += [(WIDE, effort.envs, n) for n in effort.growth_cars]
+    points = []
+    for k, (scenario, n_envs, n_cars) in enumerate(cases):
+        points.append(_point(scenario, n_envs, n_cars, effort))
+        if progress is not None:
+            progress((k + 1) / len(cases))
+    return points
+
+
+def _point(scenario: str, n_envs: int, n_cars: int, effort: Effort) -> Point:
+    gc.collect()
+    before = resident_bytes()
+    resets = max(RESETS, LEAST_STEPS * n_envs // EPISODE)
+    batch = Batch(n_envs, followed, resets=resets, scenario=scenario, n_cars=n_cars)
+    batch.warm_up(effort.warm_up, effort.patience)
+    cost, until = batch.turn(), time.perf_counter() + effort.patience
+    for _ in range(effort.turns - 1):
+        if time.perf_counter() > until:
+            break
+        cost = min(cost, batch.turn())
+    after = resident_bytes()
+    grown = None if before is None or after is None else max(after - before, 0) / n_envs
+    held = array_bytes(batch.env.formation) / n_envs
+    batch.close()
+    return Point(
+        scenario=scenario,
+        n_envs=n_envs,
+        n_cars=n_cars,
+        cost=cost,
+        array_bytes=held,
+        resident_bytes=grown,
+    )

@@ -1,0 +1,134 @@
+"""Where the time of a step goes: methods of the environment with a stopwatch round each."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+from unittest.mock import patch
+
+from agents.bench.env.batch import Batch
+from relpos_env.formation import Formation
+from relpos_env.group import Group
+from relpos_env.sensors.operator import Operator
+from relpos_env.swarm import Swarm
+from relpos_env.tasks.base import Task
+from relpos_env.timing import DECISION, DT
+
+METHODS: tuple[tuple[str, type, str], ...] = (
+    ("cars, sensors, radio", Swarm, "step"),
+    ("task, operator", Task, "update"),
+    ("task, operator", Operator, "sample"),
+    ("observations", Formation, "_observe"),
+    ("resets", Formation, "begin"),
+)
+"""Part, and the class with the method that is timed for it."""
+BOUND: tuple[tuple[str, str], ...] = (
+    ("horizon", "_wait"),
+    ("orientation", "_orient"),
+    ("filter", "_follow"),
+    ("view", "_turn"),
+    ("view", "_see"),
+)
+"""Part, and the function that a `TrackedSwarm` has for it."""
+REST = "rest"
+"""Checks, copies, infos, and Python between the parts."""
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Of one batch, in its best turn."""
+
+    total: float
+    """[us per env-step]"""
+    cost: dict[str, float]
+    """[us per env-step] of each part."""
+    solver_share: float
+    """[-] Sub-steps that the rigid-body solver makes, since something is about to touch."""
+    solver_cost: float
+    """[us per env-step] Of the solver, within that of the cars."""
+
+
+@dataclass
+class _Stopwatch:
+    """Time by name. What is called inside of something timed counts for the outer one."""
+
+    spent: dict[str, float] = field(default_factory=dict)
+    solver_calls: int = 0
+    solver_spent: float = 0.0
+    _running: str = ""
+
+    @contextmanager
+    def running(self, name: str) -> Iterator[None]:
+        if self._running:
+            yield
+            return
+        self._running = name
+        began = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.spent[name] = self.spent.get(name, 0.0) + time.perf_counter() - began
+            self._running = ""
+
+    def round(self, function: Callable[..., Any], name: str) -> Callable[..., Any]:
+        """The function with its time counted."""
+
+        def timed(*args: Any, **kwargs: Any) -> Any:
+            with self.running(name):
+                return function(*args, **kwargs)
+
+        return timed
+
+    def solver(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        """The solver with its moves counted, except while an episode begins."""
+
+        def counted(*args: Any, **kwargs: Any) -> Any:
+            began = time.perf_counter()
+            result = function(*args, **kwargs)
+            if self._running != "resets":
+                self.solver_spent += time.perf_counter() - began
+                self.solver_calls += 1
+            return result
+
+        return counted
+
+
+def parts_of(batch: Batch, turns: int = 1) -> Parts:
+    """Time of the parts over the best turn of a batch with one thread.
+
+    The stopwatches themselves add under a microsecond a call, once a step of the whole batch.
+
+    Args:
+        batch: Warmed up.
+        turns: How many.
+    """
+    return min((_turn(batch) for _ in range(turns)), key=lambda parts: parts.total)
+
+
+def _turn(batch: Batch) -> Parts:
+    watch = _Stopwatch()
+    with ExitStack() as patches:
+        for name, owner, method in METHODS:
+            timed = watch.round(getattr(owner, method), name)
+            patches.enter_context(patch.object(owner, method, timed))
+        loop = batch.env.formation.loop
+        for name, function in BOUND:
+            timed = watch.round(getattr(loop, function), name)
+            patches.enter_context(patch.object(loop, function, timed))
+        solver = watch.solver(Group.solve)
+        patches.enter_context(patch.object(Group, "solve", solver))
+        total = batch.turn()
+    env_steps = batch.steps * batch.n_envs
+    cost = dict.fromkeys([name for name, *_ in METHODS] + [name for name, _ in BOUND], 0.0)
+    cost |= {name: 1e6 * spent / env_steps for name, spent in watch.spent.items()}
+    cost[REST] = total - sum(cost.values())
+    sub_steps = env_steps * round(DECISION / DT)
+    return Parts(
+        total=total,
+        cost=cost,
+        solver_share=watch.solver_calls / sub_steps,
+        solver_cost=1e6 * watch.solver_spent / env_steps,
+    )

@@ -1,0 +1,55 @@
+"""The picture of `relpos bench env`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+ENV_PICTURE = "env_cost.png"
+
+
+def env_figure(rows: Sequence[dict[str, Any]]) -> Figure:
+    """Time of an env-step over environments, over cars, and of its parts.
+
+    Args:
+        rows: Of `agents.bench.env.bench_env`.
+    """
+    from matplotlib.figure import Figure
+
+    curves = [r for r in rows if r["what"].startswith("growth")]
+    first = curves[0]["what"]
+    figure = Figure(figsize=(12, 3.6), layout="constrained")
+    envs, cars, parts = figure.subplots(1, 3, width_ratios=(1, 1, 1.2))
+    _curve(envs, [r for r in curves if r["what"] == first], "envs", "environments, 3 cars")
+    over_cars = [r for r in curves if r["what"] != first]
+    _curve(cars, over_cars, "cars", f"cars, {over_cars[0]['envs']} environments")
+    _bars(parts, rows)
+    return figure
+
+
+def _curve(axes: Axes, rows: Sequence[dict[str, Any]], key: str, label: str) -> None:
+    from matplotlib.ticker import FuncFormatter, LogLocator
+
+    x = [r[key] for r in rows]
+    axes.plot(x, [r["us_per_env_step"] for r in rows], "o-", color="tab:blue")
+    axes.set(xscale="log", yscale="log", xlabel=label, ylabel="us per env-step, one core")
+    axes.set_xticks(x, [str(n) for n in x], fontsize=7)
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
+    axes.minorticks_off()
+    axes.grid(alpha=0.3)
+
+
+def _bars(axes: Axes, rows: Sequence[dict[str, Any]]) -> None:
+    """Parts of the first batch."""
+    what = next(r["what"] for r in rows if "solver_share" in r)
+    parts = [r for r in rows if r["what"].startswith(f"{what}: ")]
+    names = [r["what"].removeprefix(f"{what}: ") for r in parts]
+    axes.barh(names, [r["us_per_env_step"] for r in parts], color="tab:blue")
+    axes.invert_yaxis()
+    axes.set(title=what, xlabel="us per env-step, one core")
+    axes.grid(axis="x", alpha=0.3)
