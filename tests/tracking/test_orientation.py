@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from vqf import VQF
 
+from tracking import _inertial_kernels, _limit_kernels
 from tracking.constellation import Constellation, NodeConfig
 from tracking.geometry import GRAVITY, rotate, yaw_of
-from tracking.inertial_faults import InertialHealth, at_limit, inspect
 from tracking.measurements import Kind, MeasurementBlock
 from tracking.orientation import Orientation, OrientationParams
 
@@ -30,6 +30,26 @@ def recording(n=400, mag=True, seed=0):
     if mag:
         parts.append(MeasurementBlock.of_kind(Kind.MAG, t, node, field))
     return MeasurementBlock.concatenate(parts).sorted(), imu, field
+
+
+def new_health():
+    return np.zeros((1, 1, _inertial_kernels.N_HEALTH))
+
+
+def inspect(health, samples):
+    judged, usable = samples[None].copy(), np.zeros((1, len(samples)), dtype=bool)
+    _inertial_kernels.inspect(health, judged, usable)
+    return judged[0], usable[0]
+
+
+def new_limits():
+    return np.zeros((1, 1, _limit_kernels.N_LIMIT))
+
+
+def at_limit(limits, accel_b):
+    cut, upright = np.zeros((1, *accel_b.shape), dtype=bool), np.zeros((1, len(accel_b)), bool)
+    _limit_kernels.at_limit(limits, accel_b[None].copy(), cut, upright)
+    return cut[0], upright[0]
 
 
 def states(block):
@@ -111,8 +131,8 @@ def test_any_cut_into_blocks_judges_samples_the_same(seed, cuts):
     samples[rng.random(400) < 0.05] *= 100.0
     for a in rng.integers(0, 380, 3):
         samples[a : a + rng.integers(5, 60)] = samples[a]
-    whole = inspect(InertialHealth(), samples)
-    health, parts = InertialHealth(), []
+    whole = inspect(new_health(), samples)
+    health, parts = new_health(), []
     edges = [0, *sorted(set(cuts)), 400]
     for a, b in itertools.pairwise(edges):
         parts.append(inspect(health, samples[a:b]))
@@ -124,10 +144,10 @@ def test_any_cut_into_blocks_judges_samples_the_same(seed, cuts):
 @given(seed=st.integers(0, 2**31), cuts=st.lists(st.integers(1, 399), max_size=6))
 def test_any_cut_into_blocks_finds_the_same_limits(seed, cuts):
     accel = 3.0 * np.random.default_rng(seed).standard_normal((400, 3)).clip(-1.0, 1.0)
-    whole = at_limit(InertialHealth(), accel)
-    health, parts = InertialHealth(), []
+    whole = at_limit(new_limits(), accel)
+    limits, parts = new_limits(), []
     for a, b in itertools.pairwise([0, *sorted(set(cuts)), 400]):
-        parts.append(at_limit(health, accel[a:b]))
+        parts.append(at_limit(limits, accel[a:b]))
     for k in range(2):
         np.testing.assert_array_equal(np.concatenate([p[k] for p in parts]), whole[k])
 
@@ -138,19 +158,19 @@ def test_flat_tops_are_limits_and_a_rest_is_none():
     noise = 0.05 * np.random.default_rng(2).standard_normal((2000, 3))
     moving = noise + np.stack([4.0 * np.sin(3.0 * t), 0.0 * t, 0.0 * t + GRAVITY], axis=1)
     spoilt = np.column_stack([moving[:, :2].clip(-2.0, 2.0), moving[:, 2]])
-    cut, upright = at_limit(InertialHealth(), spoilt)
+    cut, upright = at_limit(new_limits(), spoilt)
     assert cut[:, 0].sum() > 0.9 * (np.abs(moving[:, 0]) > 2.0).sum()
     assert not cut[:, 1:].any()
     assert not upright[cut.any(axis=1)].any()
     at_rest = (noise + [0.0, 0.0, GRAVITY]).round(1)
-    assert not at_limit(InertialHealth(), at_rest)[0].any()
+    assert not at_limit(new_limits(), at_rest)[0].any()
 
 
 def test_single_absurd_readings_are_replaced():
     samples = np.zeros((50, 6)) + 1e-3 * np.random.default_rng(1).standard_normal((50, 6))
     spoilt = samples.copy()
     spoilt[20] *= 1e5
-    judged, usable = inspect(InertialHealth(), spoilt)
+    judged, usable = inspect(new_health(), spoilt)
     assert usable.all()
     np.testing.assert_array_equal(judged[20], samples[19])
     np.testing.assert_array_equal(np.delete(judged, 20, 0), np.delete(samples, 20, 0))

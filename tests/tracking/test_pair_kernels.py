@@ -154,12 +154,13 @@ def test_a_right_range_with_a_strong_first_path_is_in_sight():
     assert x[0] == pytest.approx(2.0, abs=0.01)
 
 
-def roll(s, speeds, yaws, axle=0.15, rates=(0.3, -0.2, 0.5)):
+def roll(s, speeds, yaws, axle=0.15, slip=0.018, rates=(0.3, -0.2, 0.5)):
     """Let cars roll as their wheels allow; returns their velocities, (3, 2)."""
     s.nodes["yaw"], s.nodes["yaw_rate"] = yaws, rates
     f = np.stack([np.cos(yaws), np.sin(yaws)], axis=-1)
     left = np.stack([-f[:, 1], f[:, 0]], axis=-1)
-    return np.asarray(speeds)[:, None] * f + axle * np.asarray(rates)[:, None] * left
+    forward = np.asarray(speeds)[:, None]
+    return forward * f + (axle - slip * forward**2) * np.asarray(rates)[:, None] * left
 
 
 def test_wheels_leave_what_rolls():
@@ -209,3 +210,37 @@ def test_large_groups_are_refined_less_often():
     large = replace(small, nodes=tuple(NodeConfig(id=k) for k in range(40)))
     assert make_coefficients(small, params, use_mds=True)["mds_period"] == params.mds.period
     assert make_coefficients(large, params, use_mds=True)["mds_period"] > params.mds.period
+
+
+@pytest.mark.parametrize("n", [3, 6, 10])
+def test_wheels_leave_a_covariance_beside_a_node_that_just_joined(n):
+    """Its pairs know nothing of its velocity, those of the others nearly all of theirs."""
+    c, layout, s, pairs = team(n=n)
+    is_new = (pairs == n - 1).any(axis=-1)
+    cols = [*Y[2], 6]
+    s.P[:] = 0.0
+    for k in cols:
+        s.P[:, 0, k, k] = np.where(is_new, 1.0, 1e-3)
+    s.mean_cov[0] = 1e-3 * np.eye(2)
+    s.nodes["yaw"] = np.linspace(0.0, 3.0, n)
+    for _ in range(20):
+        before = s.P[:, 0].copy()
+        _wheel_kernels.apply_wheels(c, s, layout, 0.0, np.zeros((2, 7)))
+        after = s.P[:, 0]
+        np.testing.assert_array_equal(after, np.swapaxes(after, 1, 2))
+        assert np.linalg.eigvalsh(after[:, cols][:, :, cols]).min() > 0.0
+        assert np.linalg.eigvalsh(before - after).min() > -1e-12
+
+
+def test_a_share_is_a_half_where_all_pairs_are_alike():
+    for m in (3, 6, 10):
+        own = 0.5 / m * (m - 1) * 0.2
+        assert _wheel_kernels.own_share(0.2, own) == 0.5
+
+
+def test_a_share_correlates_no_more_than_fully():
+    for pair in (1e-6, 0.1, 1.0, 50.0):
+        for own in (1e-9, 1e-3, 0.1, 10.0):
+            share = _wheel_kernels.own_share(pair, own)
+            assert 0.0 < share <= 0.5
+            assert (share * pair) ** 2 <= pair * own * (1.0 + 1e-12)

@@ -1,0 +1,120 @@
+"""Same seed, same everything, bit for bit, in every form; a batch is its environments alone."""
+
+import numpy as np
+import pytest
+from runs import bits, busy, gym_run, parallel_run, vector_run
+
+from relpos_env.formation_v0 import parallel_env
+from relpos_env.gym_env import FormationGymEnv
+from relpos_env.vector_env import FormationVectorEnv
+
+HARD = {"scenario": "random", "level": 4, "n_cars": 5, "max_cycles": 30}
+BUSY = {"scenario": busy(), "max_cycles": 30, "observation": "estimate_cov"}
+"""With joins, leaves, losses of power and randomisation of everything."""
+
+
+@pytest.mark.parametrize("kwargs", [HARD, BUSY, {"max_cycles": 20, "actions": "discrete"}])
+def test_same_seed_same_run_over_several_episodes(kwargs):
+    one, two, other = (parallel_run(parallel_env(**kwargs), seed) for seed in (4, 4, 5))
+    assert one == two
+    assert one != other
+
+
+def test_a_used_environment_is_as_good_as_a_new_one():
+    env = parallel_env(**BUSY)
+    first = parallel_run(env, 4)
+    parallel_run(env, 11)
+    assert parallel_run(env, 4) == first
+
+
+def test_episodes_differ_from_each_other():
+    env = FormationGymEnv(max_cycles=20)
+    first, _ = env.reset(seed=1)
+    second, _ = env.reset()
+    assert bits(first) != bits(second)
+
+
+@pytest.mark.parametrize("kwargs", [HARD, BUSY])
+def test_same_seed_same_run_of_the_gymnasium_form(kwargs):
+    one, two, other = (gym_run(FormationGymEnv(**kwargs), seed) for seed in (4, 4, 5))
+    assert one == two
+    assert one != other
+
+
+def test_the_busy_scenario_has_joins_leaves_and_losses_of_power():
+    env = parallel_env(**BUSY)
+    seen = set()
+    for k in range(4):
+        env.reset(seed=4 if k == 0 else None)
+        before = env.formation.state.present.copy(), env.loop.swarm.powered.copy()
+        while env.agents:
+            env.step({a: np.zeros(2) for a in env.agents})
+            now = env.formation.state.present.copy(), env.loop.swarm.powered.copy()
+            for name, was, is_now in zip(("present", "power"), before, now, strict=True):
+                seen |= {(name, "on")} if (is_now & ~was).any() else set()
+                seen |= {(name, "off")} if (was & ~is_now).any() else set()
+            before = now
+    assert len(seen) == 4
+
+
+@pytest.mark.parametrize(
+    ("n_envs", "kwargs"),
+    [
+        (1, BUSY),
+        (3, BUSY),
+        (5, {**HARD, "max_cycles": 20}),
+        (3, {**BUSY, "history": 3, "observation": "ranges", "actions": "discrete"}),
+        (3, {**BUSY, "end_on_collision": True, "max_cycles": 60}),
+    ],
+)
+def test_environment_k_of_a_vector_is_the_single_one_with_the_next_seeds(n_envs, kwargs):
+    steps = 70
+    vector = FormationVectorEnv(n_envs, **kwargs)
+    trace, taken = vector_run(vector, 20, steps)
+    for k in range(n_envs):
+        single = FormationGymEnv(**kwargs)
+        observation, _ = single.reset(seed=20 + k)
+        assert bits(trace[0][0][k]) == bits(observation)
+        episodes = 1
+        for step, actions in zip(trace[1:], taken, strict=True):
+            observation, reward, terminated, truncated, info = single.step(actions[k])
+            infos = step[4]
+            assert bits(step[1][k]) == bits(reward)
+            assert (step[2][k], step[3][k]) == (terminated, truncated)
+            if terminated or truncated:
+                assert bits(infos["final_obs"][k]) == bits(observation)
+                observation, _ = single.reset()
+                episodes += 1
+            assert bits(step[0][k]) == bits(observation)
+            for name in ("formation_error", "collisions", "active"):
+                assert np.array_equal(infos[name][k], info[name])
+        assert episodes > 1
+
+
+@pytest.mark.parametrize("kwargs", [HARD, BUSY])
+def test_threads_change_nothing(kwargs):
+    runs = []
+    for threads in (1, 2, 3):
+        env = FormationVectorEnv(5, threads=threads, **kwargs)
+        runs.append(bits(vector_run(env, 3, 65)[0]))
+        env.close()
+    assert runs[0] == runs[1] == runs[2]
+
+
+def test_seeds_of_a_vector_can_be_given_one_by_one():
+    env = FormationVectorEnv(3, max_cycles=10)
+    first, _ = env.reset(seed=[7, 5, 7])
+    assert bits(first[0]) == bits(first[2]) != bits(first[1])
+    again, _ = env.reset(seed=7)
+    assert bits(again[0]) == bits(first[0])
+
+
+def test_a_vector_begins_those_anew_that_are_asked_for():
+    env = FormationVectorEnv(3, **BUSY)
+    vector_run(env, 3, 5)
+    before = env.formation.observations.copy()
+    after, _ = env.reset(options={"reset_mask": np.array([False, True, False])})
+    after = after.reshape(before.shape)
+    assert np.array_equal(after[[0, 2]], before[[0, 2]])
+    assert not np.array_equal(after[1], before[1])
+    assert env.formation.cycles.tolist() == [5, 0, 5]

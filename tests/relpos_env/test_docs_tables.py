@@ -1,0 +1,100 @@
+"""The documents against the code: tables, snippets, quoted code and paths."""
+
+import inspect
+import re
+import runpy
+from pathlib import Path
+
+import gymnasium
+import pytest
+
+from relpos_env import formation_v0
+from relpos_env.config import FormationConfig
+from relpos_env.gym_env import FormationGymEnv
+from relpos_env.interface.observations import OBSERVATIONS
+from relpos_env.parallel_env import FormationEnv
+from relpos_env.tasks import TASKS
+from relpos_env.vector_env import FormationVectorEnv
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+MAKE = runpy.run_path(str(DOCS / "make_tables.py"))
+CODE = re.compile(r"^```(?:python|toml)\n(.*?)^```", re.DOTALL | re.MULTILINE)
+TOP = ("tracking/", "relpos_env/", "agents/", "hardware_bridge/", "tests/", "docs/", "examples/")
+
+
+def snippets(page):
+    return CODE.findall((DOCS / page).read_text())
+
+
+@pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda p: p.name)
+def test_tables_are_those_of_the_code(page):
+    text = page.read_text()
+    assert MAKE["rewrite"](text) == text, "run python docs/make_tables.py"
+
+
+def test_every_table_is_somewhere():
+    pages = "".join(page.read_text() for page in DOCS.glob("*.md"))
+    assert all(f"<!-- table: {name} -->" in pages for name in MAKE["TABLES"])
+
+
+def test_tables_are_complete():
+    tables = MAKE["TABLES"]
+    assert {f"observation-{mode}" for mode in OBSERVATIONS} <= set(tables)
+    for field in FormationConfig.__dataclass_fields__:
+        assert f"| `{field}` |" in tables["arguments"]()
+    for task in TASKS:
+        assert f"| `{task}` |" in tables["weights"]()
+
+
+@pytest.mark.parametrize(("at_two", "at_three", "size"), [
+    (2, 2, "2"), (1, 2, "n - 1"), (2, 4, "2 (n - 1)"), (14, 22, "8 (n - 1) + 6"),
+])  # fmt: skip
+def test_sizes_in_cars(at_two, at_three, size):
+    assert MAKE["in_others"](at_two, at_three) == size
+    for n, value in ((2, at_two), (3, at_three)):
+        assert eval(size.replace(" (", " * ("), {"n": n}) == value
+
+
+def test_infos_are_told():
+    text = (DOCS / "environment.md").read_text()
+    told = set(re.findall(r"`(\w+)`", text[text.index("## Infos") : text.index("## Seeds")]))
+    options = {"observation": "truth", "max_cycles": 4}
+    cars = formation_v0.parallel_env(**options)
+    one = gymnasium.make("relpos_env/Formation-v0", **options)
+    batch = gymnasium.make_vec("relpos_env/Formation-v0", num_envs=2, **options)
+    infos = [cars.reset(seed=0)[1]["car_0"], one.reset(seed=0)[1], batch.reset(seed=0)[1]]
+    keys = {key for info in infos for key in info if not key.startswith("_")}
+    assert keys == told - {"truth", "_formation_error"}
+
+
+@pytest.mark.parametrize("form", [FormationEnv, FormationGymEnv, FormationVectorEnv])
+def test_arguments_of_the_forms_are_told(form):
+    text = (DOCS / "environment.md").read_text()
+    for name in list(inspect.signature(form).parameters)[:-1]:
+        assert f"| `{name}` |" in text
+
+
+@pytest.mark.parametrize("code", snippets("environment.md"), ids=lambda c: c.splitlines()[0])
+def test_snippets_run(code, tmp_path, monkeypatch):
+    if "sb3" in code:
+        pytest.importorskip("stable_baselines3")
+    monkeypatch.chdir(tmp_path)
+    exec(compile(code, "environment.md", "exec"), {})
+
+
+@pytest.mark.parametrize("code", snippets("adding.md"), ids=lambda c: c.splitlines()[0])
+def test_quoted_code_is_that_of_the_file(code):
+    """The first line names the file; where something is left out stands a line of three dots."""
+    name, _, quoted = code.partition("\n")
+    text = (ROOT / name.removeprefix("# ")).read_text()
+    for part in re.split(r"^\s*\.\.\.$\n", quoted, flags=re.MULTILINE):
+        assert part.strip("\n") in text, part
+
+
+@pytest.mark.parametrize("page", [ROOT / "README.md", *sorted(DOCS.glob("*.md"))],
+                         ids=lambda p: p.name)  # fmt: skip
+def test_named_paths_exist(page):
+    for name in re.findall(r"`([\w./*-]+/[\w./*-]*)`", page.read_text()):
+        if name.startswith(TOP) and (name.endswith("/") or "." in name):
+            assert list(ROOT.glob(name.rstrip("/"))), name
