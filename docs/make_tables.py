@@ -1,0 +1,227 @@
+"""Tables of the documents that follow from the code.
+
+python docs/make_tables.py            writes them anew
+python docs/make_tables.py --check    fails if one differs
+
+A table stands between ``<!-- table: NAME -->`` and ``<!-- end of table -->``.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import re
+import sys
+from collections.abc import Callable, Iterable
+from dataclasses import MISSING, Field, fields
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from relpos_env import config
+from relpos_env.interface.actions import ACTIONS, MAX_SPEED, MAX_STEERING, DiscreteActions
+from relpos_env.interface.observations import (
+    OBSERVATIONS,
+    index_table,
+    observation_mode,
+    total_size,
+)
+from relpos_env.scenarios import LEVELS, SCENARIOS, Scenario
+from relpos_env.sensors.radio.channel import CHANNELS
+from relpos_env.tasks import DEFAULT_WEIGHTS, TASKS
+from relpos_env.tasks.needs import DEFAULT_SCENARIO
+
+DOCS = Path(__file__).resolve().parent
+CARS = 3
+"""So many cars have the observations whose indices are shown."""
+BLOCK = re.compile(r"(<!-- table: ([\w-]+) -->\n).*?(<!-- end of table -->)", re.DOTALL)
+
+
+def markdown(head: Iterable[str], rows: Iterable[Iterable[str]], right: str = "") -> str:
+    """A table; `right` names the columns that are set to the right."""
+    head = list(head)
+    rule = ["--:" if name in right.split(", ") else "---" for name in head]
+    lines = ["| " + " | ".join(cells) + " |" for cells in (head, *rows)]
+    lines.insert(1, "|" + "|".join(rule) + "|")
+    return "\n".join(lines) + "\n"
+
+
+def in_others(at_two: int, at_three: int) -> str:
+    """A size that is linear in the number of cars n, from those for two and three."""
+    slope = at_three - at_two
+    rest = at_two - slope
+    if slope == 0:
+        return str(rest)
+    share = "n - 1" if slope == 1 else f"{slope} (n - 1)"
+    return f"{share} + {rest}" if rest else share
+
+
+def sizes() -> str:
+    """How long the observations of every mode are."""
+    rows = []
+    for name in OBSERVATIONS:
+        two, three = observation_mode(name, 2), observation_mode(name, CARS)
+        n = total_size(three.fields)
+        size = in_others(total_size(two.fields), n)
+        rows.append([f"`{name}`", size, str(n), "the truth" if two.needs_truth else "the tracker"])
+    rows[[r[0] for r in rows].index("`ranges`")][3] = "the radio; the heading is the tracker's"
+    return markdown(("mode", "size", "three cars", "from"), rows, right="three cars")
+
+
+def observations(mode: str) -> str:
+    """The vector of one mode: for three cars, and how it grows."""
+    small = observation_mode(mode, 2).fields
+    large = observation_mode(mode, CARS).fields
+    rows = []
+    for few, many, row in zip(small, large, index_table(large), strict=True):
+        last = f" to {row['last']}" if row["last"] > row["first"] else ""
+        size = in_others(few.size, many.size)
+        limits = f"{row['low']:g} to {row['high']:g}"
+        name = f"`{row['name']}`"
+        rows.append([f"{row['first']}{last}", name, size, row["unit"], limits, row["meaning"]])
+    return markdown(("index", "field", "size", "unit", "limits", "meaning"), rows)
+
+
+def continuous() -> str:
+    """What the two numbers of a continuous action mean."""
+    return markdown(
+        ("index", "values", "meaning"),
+        [
+            ["0", "-1 to 1", f"forward speed wanted, share of {MAX_SPEED:g} m/s"],
+            ["1", "-1 to 1", f"steering angle wanted, share of {MAX_STEERING:g} rad; left is +"],
+        ],
+    )
+
+
+def discrete() -> str:
+    """What every number of a discrete action means."""
+    mode = DiscreteActions()
+    assert isinstance(ACTIONS["discrete"](), DiscreteActions)
+    head = ["speed \\ steering [rad]", *(f"{angle:+.2f}" for angle in mode.angles)]
+    rows, number = [], 0
+    for speed in mode.speeds:
+        cells = []
+        for angle in mode.angles:
+            assert mode.decode(number, "") == (speed, angle)
+            cells.append(str(number))
+            number += 1
+        rows.append([f"{speed:g} m/s", *cells])
+    return markdown(head, rows, right=", ".join(head[1:]))
+
+
+def weights() -> str:
+    """Reward terms of every task and how much they count."""
+    terms: list[str] = []
+    for task in TASKS:
+        terms += [t for t in DEFAULT_WEIGHTS[task] if t not in terms]
+    rows = []
+    for task in TASKS:
+        default = config.configure({"task": task})
+        has = default.make_task(1).terms
+        cells = []
+        for term in terms:
+            weight = DEFAULT_WEIGHTS[task].get(term)
+            unused = "" if term in has else "*"
+            cells.append("" if weight is None else f"{weight:g}{unused}")
+        rows.append([f"`{task}`", f"`{DEFAULT_SCENARIO[task]}`", *cells])
+    return markdown(("task", "scenario", *terms), rows, right=", ".join(terms))
+
+
+def arguments() -> str:
+    """The fields of a configuration."""
+    told = docstrings(config.FormationConfig)
+    rows = []
+    for f in fields(config.FormationConfig):
+        rows.append([f"`{f.name}`", f"`{default_of(f)}`", told[f.name]])
+    return markdown(("argument", "default", "meaning"), rows)
+
+
+def default_of(f: Field[Any]) -> str:
+    """A default as one would write it."""
+    if f.default is not MISSING:
+        return repr(f.default)
+    assert f.default_factory is not MISSING
+    value = f.default_factory()
+    return repr(value) if isinstance(value, dict) else f"{type(value).__name__}()"
+
+
+def docstrings(cls: type) -> dict[str, str]:
+    """The strings under the fields of a dataclass, each in one line."""
+    (body,) = ast.parse(inspect.getsource(cls)).body
+    assert isinstance(body, ast.ClassDef)
+    told = {}
+    for line, below in zip(body.body, body.body[1:], strict=False):
+        if not isinstance(line, ast.AnnAssign) or not isinstance(below, ast.Expr):
+            continue
+        if isinstance(line.target, ast.Name) and isinstance(below.value, ast.Constant):
+            told[line.target.id] = " ".join(str(below.value.value).split())
+    return told
+
+
+def scenarios() -> str:
+    """The scenarios that come with the package."""
+    rows = []
+    for name in SCENARIOS:
+        s = SCENARIOS[name]
+        room = f"{s.room[0]:g} m x {s.room[1]:g} m"
+        boxes = str(len(s.obstacles)) if s.gap is None else f"a wall with a gap of {s.gap.width} m"
+        channel = next((k for k, c in CHANNELS.items() if c == s.radio.channel), "its own")
+        rows.append([f"`{name}`", room, str(s.n_cars), s.layout, boxes, channel, drawn(s)])
+    head = ("scenario", "room", "cars", "start", "obstacles", "radio", "drawn anew")
+    return markdown(head, rows, right="cars")
+
+
+def drawn(s: Scenario) -> str:
+    """What a scenario draws for every episode besides the poses."""
+    for k, level in enumerate(LEVELS):
+        if s.randomisation == level:
+            return f"level {k}" if k else ""
+    own = [f.name for f in fields(s.randomisation)]
+    least = [
+        (sum(getattr(s.randomisation, n) != getattr(level, n) for n in own), k)
+        for k, level in enumerate(LEVELS)
+    ]
+    _, nearest = min(least)
+    differ = [n for n in own if getattr(s.randomisation, n) != getattr(LEVELS[nearest], n)]
+    told = ", ".join(f"{n} {getattr(s.randomisation, n)}" for n in differ)
+    return f"level {nearest}, {told}"
+
+
+TABLES: dict[str, Callable[[], str]] = {
+    "sizes": sizes,
+    **{f"observation-{mode}": partial(observations, mode) for mode in OBSERVATIONS},
+    "actions-continuous": continuous,
+    "actions-discrete": discrete,
+    "weights": weights,
+    "arguments": arguments,
+    "scenarios": scenarios,
+}
+"""Name to what makes it."""
+
+
+def rewrite(text: str) -> str:
+    """A page with its tables made anew.
+
+    Raises:
+        KeyError: It has a table of which nothing is known.
+    """
+    return BLOCK.sub(lambda match: f"{match[1]}{TABLES[match[2]]()}{match[3]}", text)
+
+
+def main(check: bool) -> list[str]:
+    """Rewrite all pages, or only say which differ; returns their names."""
+    differ = []
+    for page in sorted(DOCS.glob("*.md")):
+        old = page.read_text()
+        new = rewrite(old)
+        if new != old:
+            differ.append(page.name)
+            if not check:
+                page.write_text(new)
+    return differ
+
+
+if __name__ == "__main__":
+    changed = main("--check" in sys.argv[1:])
+    print(", ".join(changed) if changed else "nothing to change")
+    sys.exit(1 if changed and "--check" in sys.argv[1:] else 0)
