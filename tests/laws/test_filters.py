@@ -240,7 +240,10 @@ def test_turning_the_world_turns_the_estimate(name, group):
 
     Put on the truth at half time: a wrong hypothesis that falls in with its ranges after all
     does so from an unstable balance, which makes any rounding larger by a factor of a million.
+    In `joint` one rotation stands for all in the first half second; what its covariance has of
+    that is not forgotten to the last digit.
     """
+    atol = 1e-4 if name == "joint" else 1e-6
     b = group.block
     values = b.values.copy()
     state = b.kind[0] == Kind.STATE
@@ -250,11 +253,11 @@ def test_turning_the_world_turns_the_estimate(name, group):
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     one = half_on_truth(name, group, b)
     other = half_on_truth(name, group, replace(b, values=values), turn)
-    np.testing.assert_allclose(other.pos_ij_w, one.pos_ij_w @ turn.T, atol=1e-6)
-    np.testing.assert_allclose(other.vel_ij_w, one.vel_ij_w @ turn.T, atol=1e-6)
+    np.testing.assert_allclose(other.pos_ij_w, one.pos_ij_w @ turn.T, atol=atol)
+    np.testing.assert_allclose(other.vel_ij_w, one.vel_ij_w @ turn.T, atol=atol)
     for i, j in group.constellation.pairs:
         for a, c in zip(one.between_b(i, j), other.between_b(i, j), strict=True):
-            np.testing.assert_allclose(a, c, atol=1e-6)
+            np.testing.assert_allclose(a, c, atol=atol)
     np.testing.assert_allclose(
         one.relative_orientation(0, 1), other.relative_orientation(0, 1), atol=1e-9
     )

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from runs import busy, commands
 
+from relpos_env.config import configure
+from relpos_env.formation import Formation
 from relpos_env.formation_v0 import parallel_env
 from relpos_env.interface.actions import MAX_SPEED, MAX_STEERING
 from relpos_env.interface.observations import OBSERVATIONS, index_table
@@ -77,3 +79,21 @@ def test_the_formation_is_kept_on_estimates():
     assert truth < 0.2
     assert estimate < 0.35
     assert blind > 2.0 * estimate
+
+
+@pytest.mark.parametrize("n_cars", [4, 6])
+def test_a_group_that_stands_at_first_is_found_right(n_cars):
+    """All rotations are open until somebody drives: nobody is ok and a metre wrong."""
+    formation = Formation(configure({"scenario": "ring-nlos", "n_cars": n_cars}), 8)
+    for env in range(8):
+        formation.seed(env, np.random.default_rng(env))
+        formation.begin(env)
+    for _ in range(40):
+        command, heading = formation.operator.command, formation.state.heading
+        ahead = np.cos(heading) * command[..., 0] + np.sin(heading) * command[..., 1]
+        left = np.cos(heading) * command[..., 1] - np.sin(heading) * command[..., 0]
+        turn = np.arctan(np.clip(np.arctan2(left, ahead), -1.0, 1.0))
+        formation.step(np.hypot(ahead, left), np.clip(turn, -0.4, 0.4))
+        wrong = formation.tracking_error() > 1.0
+        assert not wrong.any()
+    assert formation.loop.view.ok.any(axis=(1, 2)).all()

@@ -23,7 +23,7 @@ from tracking.filters.joint._range_kernels import (
     gap_evidence,
 )
 from tracking.filters.joint._rotation_kernels import follow_rotation
-from tracking.filters.joint._sleep_kernels import none_moved, wake_up
+from tracking.filters.joint._sleep_kernels import may_move, none_moved, wake_up
 from tracking.filters.joint._start_kernels import try_join, try_start
 from tracking.filters.joint._stuck_kernels import is_stuck
 from tracking.filters.joint.state import N_PRE, JointState
@@ -222,8 +222,8 @@ def take_first_range(c, s, layout, i, j, p, t, distance, is_survey):
     if not s.group[0].started:
         try_start(c, s, layout, t)
         return
-    if s.group[0].asleep:
-        wake_up(c, s, layout)
+    if s.group[0].asleep and may_move(s, t):
+        return
     if not s.nodes[i].present:
         try_join(c, s, layout, i, t)
     if not s.nodes[j].present:

@@ -38,15 +38,39 @@ def none_moved(c, s, t):
     return True
 
 
+@small_kernel
+def may_move(s, t):
+    """True while it is too early to know whether the present nodes move."""
+    for i in range(s.nodes.shape[0]):
+        node = s.nodes[i]
+        if node.present and not node.static and t - node.t_first <= SETTLE:
+            return True
+    return False
+
+
 @kernel
 def wake_up(c, s, layout):
-    """Follow all rotations and mirror images from now on."""
+    """Follow all rotations and mirror images from now on.
+
+    Where a node that joined may be on two sides there are two layouts; the bank has room for a
+    few rotations of the second.
+    """
     group = s.group[0]
     group.asleep = False
-    d = c.d
+    d, n_hyps = c.d, s.alive.shape[0]
     first = layout.rotations[0, :d, :d].copy()
-    for r in range(1, layout.rotations.shape[0]):
-        h = copy_hypothesis(s, group.best)
-        if h >= 0:
-            turn = layout.rotations[r, :d, :d].copy() @ first.T.copy()
-            turn_hypothesis(c, s, h, np.ascontiguousarray(turn))
+    was_alive = s.alive.copy()
+    for _ in range(n_hyps):
+        # The likelier layout first.
+        original = -1
+        for h in range(n_hyps):
+            if was_alive[h] and (original < 0 or s.loglik[h] > s.loglik[original]):
+                original = h
+        if original < 0:
+            return
+        was_alive[original] = False
+        for r in range(1, layout.rotations.shape[0]):
+            h = copy_hypothesis(s, original)
+            if h >= 0:
+                turn = layout.rotations[r, :d, :d].copy() @ first.T.copy()
+                turn_hypothesis(c, s, h, np.ascontiguousarray(turn))
