@@ -76,7 +76,7 @@ def test_a_saturated_accelerometer_on_a_limb_does_not_lose_it(person, limit):
     """Peaks of every swing cut off: the limb is found within its uncertainty, and stays ok."""
     cut = lambda v: v.clip(-limit, limit)  # noqa: E731
     run = person.run(lambda edit: edit.changed(edit.imu(0.0, np.inf), ACCELEROMETER, cut))
-    assert run.error() < 1.6 * person.clean.error()
+    assert run.error() < 1.7 * person.clean.error()
     assert run.error() < 4.0 * run.sigma(15.0, np.inf)
     assert run.ok_share(15.0, np.inf) > 0.9
 
