@@ -9,6 +9,7 @@ import numpy as np
 
 from relpos_env.errors import EnvError
 from relpos_env.formation import Formation
+from relpos_env.render.backend import load_pygame
 from relpos_env.render.renderer import RENDER_MODES, Renderer
 from relpos_env.render.snapshot import LINE_OF_SIGHT, NO_LINE_OF_SIGHT, NO_RANGE, Snapshot
 from relpos_env.timing import DECISION
@@ -20,13 +21,15 @@ SILENT = 0.5
 
 
 def check_render_mode(mode: str | None) -> None:
-    """Refuse modes that there are not.
+    """Refuse modes that there are not, and those that cannot draw.
 
     Raises:
-        EnvError: Neither None nor one of `RENDER_MODES`.
+        EnvError: Neither None nor one of `RENDER_MODES`; or pygame is not installed.
     """
     if mode is not None and mode not in RENDER_MODES:
         raise EnvError(f"render_mode: expected None, {' or '.join(RENDER_MODES)}, got {mode!r}")
+    if mode is not None:
+        load_pygame()
 
 
 class Film:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from relpos_env.interface._observation_kernels import FAR, FAST, N_STATUS, OLD, observe_relative
 from relpos_env.interface.observations.base import F32, Field
-from relpos_env.interface.observations.common import own_fields, wish_fields
+from relpos_env.interface.observations.standard_fields import own_fields, wish_fields
 from relpos_env.interface.views import View
 from tracking.compiled import bind
 
