@@ -2,7 +2,7 @@
 
 from relpos_env.sensors.imu import HUMAN_IMU, Imu, ImuSimParams
 from relpos_env.sensors.magnetometer import Magnetometer, MagSimParams
-from relpos_env.sensors.odometer import Odometer, OdometerSimParams
+from relpos_env.sensors.odometer import OdometerSimParams
 from relpos_env.sensors.radio.params import RadioSimParams
 from relpos_env.sensors.radio.radio import Radio
 
@@ -12,7 +12,6 @@ __all__ = [
     "ImuSimParams",
     "MagSimParams",
     "Magnetometer",
-    "Odometer",
     "OdometerSimParams",
     "Radio",
     "RadioSimParams",

@@ -101,27 +101,6 @@ class Imu:
         self._drift = self._drift_std * rng.standard_normal((n_nodes, 6))
         self._keep = float(np.exp(-dt / p.drift_tau))
 
-    def sample(self, heading: F64, yaw_rate: F64, accel_w: F64, speed: F64) -> F64:
-        """One sample of every car, which moves in the plane.
-
-        Args:
-            heading: (car) [rad].
-            yaw_rate: (car) [rad/s].
-            accel_w: World acceleration in the plane, (car, 2) [m/s2].
-            speed: (car) [m/s].
-
-        Returns:
-            Gyroscope [rad/s] and specific force [m/s2] in the body frame, (car, 6).
-        """
-        n = len(heading)
-        truth = np.zeros((n, 6))
-        truth[:, 2] = yaw_rate
-        c, s = np.cos(heading), np.sin(heading)
-        truth[:, 3] = c * accel_w[:, 0] + s * accel_w[:, 1]
-        truth[:, 4] = -s * accel_w[:, 0] + c * accel_w[:, 1]
-        truth[:, 5] = GRAVITY
-        return self._read(truth, speed)
-
     def sample_3d(self, q_wb: F64, rate_b: F64, accel_w: F64, speed: F64) -> F64:
         """One sample of every node, which moves in space.
 

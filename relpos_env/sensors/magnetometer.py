@@ -76,16 +76,6 @@ class Magnetometer:
         field: F64 = np.array(self._params.field_w) + waves @ self._amplitude
         return field
 
-    def sample(self, pos_w: F64, heading: F64) -> F64:
-        """One reading of every car in its body frame, (car, 3) [uT]."""
-        field = self.field(pos_w)
-        c, s = np.cos(heading), np.sin(heading)
-        body = np.stack(
-            [c * field[:, 0] + s * field[:, 1], -s * field[:, 0] + c * field[:, 1], field[:, 2]],
-            axis=1,
-        )
-        return self._read(body)
-
     def sample_3d(self, pos_w: F64, q_wb: F64) -> F64:
         """One reading of every node in space, in its body frame.
 
