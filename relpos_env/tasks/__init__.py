@@ -13,12 +13,12 @@ from relpos_env.tasks.follow import follow
 from relpos_env.tasks.gap import Gap
 from relpos_env.tasks.hold import hold
 from relpos_env.tasks.rendezvous import Rendezvous
-from relpos_env.tasks.ring import turning_ring
+from relpos_env.tasks.ring import Ring
 from relpos_env.tasks.travel import travel
 from relpos_env.tasks.weights import DEFAULT_WEIGHTS, reward_weights
 
 TASKS: dict[str, Callable[..., Task]] = {
-    "ring": turning_ring,
+    "ring": Ring,
     "hold": hold,
     "travel": travel,
     "gap": Gap,

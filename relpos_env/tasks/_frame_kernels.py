@@ -12,17 +12,16 @@ from __future__ import annotations
 
 import math
 
+from relpos_env.tasks._curve_kernels import curve_point
 from relpos_env.tasks._score_kernels import (
     all_within,
     changed,
     common_terms,
     formation_error,
     targets_from_goals,
+    velocity_term,
 )
 from tracking.compiled import kernel, small_kernel
-
-VELOCITY_SCALE = 0.5
-"""[m/s] Difference from the planned velocity at which the velocity term is exp(-1)."""
 
 
 @small_kernel
@@ -47,19 +46,9 @@ def frame_state(env, t, frame, curve, motion):
         elif s < 0.0 or s >= length:
             speed = 0.0
             s = min(max(s, 0.0), length)
-        knot = length / curve.shape[0]
-        segment = min(int(s / knot), curve.shape[0] - 1)
-        u = s - segment * knot
-        a, b = curve[segment, 0, 0], curve[segment, 0, 1]
-        c, d = curve[segment, 0, 2], curve[segment, 0, 3]
-        x += ((a * u + b) * u + c) * u + d
-        d_x = (3.0 * a * u + 2.0 * b) * u + c
-        dd_x = 6.0 * a * u + 2.0 * b
-        a, b = curve[segment, 1, 0], curve[segment, 1, 1]
-        c, d = curve[segment, 1, 2], curve[segment, 1, 3]
-        y += ((a * u + b) * u + c) * u + d
-        d_y = (3.0 * a * u + 2.0 * b) * u + c
-        dd_y = 6.0 * a * u + 2.0 * b
+        c_x, c_y, d_x, d_y, dd_x, dd_y = curve_point(curve, length, s)
+        x += c_x
+        y += c_y
         v_x, v_y = speed * d_x, speed * d_y
         if turning > 0.0:
             psi += math.atan2(d_y, d_x)
@@ -130,8 +119,7 @@ def update_frame(
             plan_x = told * (v_x - turn * (s_a * o_x + c_a * o_y))
             plan_y = told * (v_y + turn * (c_a * o_x - s_a * o_y))
             plan[env, k, 0], plan[env, k, 1] = plan_x, plan_y
-            off = math.hypot(vel[env, k, 0] - plan_x, vel[env, k, 1] - plan_y)
-            rewards[env, k, 1] = math.exp(-off / VELOCITY_SCALE)
+            velocity_term(env, k, vel, plan, rewards)
         targets_from_goals(env, present, goal, target)
         formation_error(env, pos, present, target, error)
         arrived = ends and frame[env, 2] + motion[0] * t[env] >= motion[2]

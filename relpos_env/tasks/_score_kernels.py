@@ -8,6 +8,8 @@ from tracking.compiled import small_kernel
 
 HARD_ACCEL = 5.0
 """[m/s2] Acceleration whose effort is 1; harder counts no more."""
+VELOCITY_SCALE = 0.5
+"""[m/s] Difference from the planned velocity at which the velocity term is exp(-1)."""
 
 
 @small_kernel
@@ -74,6 +76,13 @@ def all_within(env, pos, present, goal, tolerance):
             if x * x + y * y > tolerance * tolerance:
                 return False
     return anybody
+
+
+@small_kernel
+def velocity_term(env, k, vel, plan, rewards):
+    """The second reward term of cars that follow a plan, of one car."""
+    off = math.hypot(vel[env, k, 0] - plan[env, k, 0], vel[env, k, 1] - plan[env, k, 1])
+    rewards[env, k, 1] = math.exp(-off / VELOCITY_SCALE)
 
 
 @small_kernel

@@ -33,17 +33,19 @@ def assign(pos: F64, places: F64) -> I64:
     return chosen
 
 
-def assign_round(pos: F64) -> tuple[F64, float]:
-    """Even places on a circle, in the order in which the cars stand round its middle.
+def assign_round(arc: F64, length: float) -> F64:
+    """Even places on a closed curve, in the order in which the cars stand along it.
 
     Args:
-        pos: Relative to the middle of the circle, (car, 2) [m].
+        arc: Where the cars stand, (car) [m].
+        length: Of the curve [m].
 
     Returns:
-        Angle of each car's place from the common phase, (car) [rad], and the phase that puts
-        the places nearest to the cars [rad].
+        Arc of each car's place, (car) [m], put so that the places are nearest to the cars.
     """
-    angle = np.arctan2(pos[:, 1], pos[:, 0])
-    order = np.argsort(np.argsort(np.mod(angle, 2.0 * np.pi), kind="stable"), kind="stable")
-    slots: F64 = (2.0 * np.pi / len(pos) * order).astype(np.float64)
-    return slots, float(np.angle(np.mean(np.exp(1j * (angle - slots)))))
+    order = np.argsort(np.argsort(np.mod(arc, length), kind="stable"), kind="stable")
+    slots = length / len(arc) * order
+    turn = 2.0 * np.pi / length
+    phase = np.angle(np.mean(np.exp(1j * turn * (arc - slots)))) / turn
+    places: F64 = (slots + phase).astype(np.float64)
+    return places

@@ -42,15 +42,18 @@ class Curve:
         return cls(np.zeros((1, 2, 4)), 0.0, True)
 
     @classmethod
-    def through(cls, trace: F64, closed: bool) -> Curve:
+    def through(cls, trace: F64, closed: bool, *, eased: bool = True) -> Curve:
         """The curve along a dense trace.
 
         Args:
             trace: Points some centimetres apart, (point, 2) [m]; of a closed one, the last is
                 the first.
             closed: Whether it goes round.
+            eased: Whether corners are made to begin and end over `EASE`; what is round already
+                would only become smaller.
         """
-        trace = _eased(trace, closed)
+        if eased:
+            trace = _eased(trace, closed)
         arc = _arc(trace)
         n = max(8, int(np.ceil(arc[-1] / KNOT)))
         knots = np.linspace(0.0, arc[-1], n + 1)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from relpos_env.tasks._frame_kernels import frame_now, update_frame
-from relpos_env.tasks.assignment import assign, assign_round
+from relpos_env.tasks.assignment import assign
 from relpos_env.tasks.base import COMMON_TERMS, Task, Truth
 from relpos_env.tasks.curves import Curve
 from relpos_env.tasks.shapes import Formation
@@ -52,7 +52,6 @@ class MovingFormation(Task):
         formation: Formation,
         motion: Motion,
         *,
-        round_places: bool = False,
         led: bool = False,
         all_told: bool = True,
     ) -> None:
@@ -63,8 +62,6 @@ class MovingFormation(Task):
             n_envs: Environments.
             formation: Places in the frame.
             motion: Of the frame.
-            round_places: Places go in the order in which the cars stand round the frame's
-                origin, and the frame starts as it fits them best; else see `assign`.
             led: The first present car has the first place.
             all_told: The plan is for all; else for the first present car alone.
         """
@@ -72,7 +69,7 @@ class MovingFormation(Task):
         time = ("time",) if ends else ()
         super().__init__(n_cars, n_envs, ("formation", "velocity", *COMMON_TERMS, *time))
         self._formation, self._motion = formation, motion
-        self._round, self._led, self._all_told = round_places, led, all_told
+        self._led, self._all_told = led, all_told
         self._frame, self._places = np.zeros((n_envs, 4)), np.zeros((n_envs, n_cars, 3))
         curve = motion.curve
         self._constants = (
@@ -134,12 +131,7 @@ class MovingFormation(Task):
         # Where the cars stand, in the frame.
         own = (pos[cars] - [x, y]) @ np.array([[c, -s], [s, c]])
         places = self._formation.places(len(cars))
-        if self._round:
-            slots, phase = assign_round(own)
-            self._frame[env, 3] += phase
-            radius = np.linalg.norm(places[0])
-            places = radius * np.stack([np.cos(slots), np.sin(slots)], axis=1)
-        elif self._led:
+        if self._led:
             if len(cars) > 1:
                 rest = assign(own[1:], places[1:])
                 places = np.concatenate([places[:1], places[1:][rest]])

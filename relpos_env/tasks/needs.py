@@ -26,7 +26,7 @@ def needs_of(task: str, scenario: Scenario) -> dict[str, Any]:
         EnvError: The scenario lacks what the task needs.
     """
     if task == "ring":
-        return {"radius": min(scenario.ring)}
+        return {"half_axes": scenario.ring}
     if task == "gap":
         if scenario.gap is None:
             raise EnvError(

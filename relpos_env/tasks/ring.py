@@ -1,70 +1,121 @@
-"""A ring that turns: cars keep even places on a circle and circle together.
+"""A ring that turns: cars keep even places on a loop and go round together.
 
-All accelerate differently, so the group's rotation stays observable to their trackers.
+The loop is a circle, or two half circles and straight sides between them. All accelerate
+differently, so the group's rotation stays observable to their trackers.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from relpos_env.errors import EnvError
-from relpos_env.tasks.curves import Curve
-from relpos_env.tasks.moving import Motion, MovingFormation
+from relpos_env.tasks._ring_kernels import update_ring
+from relpos_env.tasks.assignment import assign_round
+from relpos_env.tasks.base import COMMON_TERMS, Task, Truth
+from relpos_env.tasks.curves import Curve, rounded
+from relpos_env.tasks.moving import ERROR_SCALE
 from relpos_env.tasks.options import half_room, not_negative, positive
-from relpos_env.tasks.shapes import MIN_SPACING, Formation
-from tracking.arrays import F64
+from relpos_env.tasks.shapes import MIN_SPACING
+from tracking.arrays import F64, I64, Bool
 
 SHARE = 0.28
 """[-] Radius of the ring over the smaller side of the room."""
 
 
-def turning_ring(
-    n_cars: int,
-    n_envs: int,
-    room: tuple[float, float],
-    *,
-    radius: float | None = None,
-    speed: float = 1.0,
-    lookahead: float = 0.3,
-) -> MovingFormation:
-    """Even places on a circle round the room's middle, turning counter-clockwise.
+class Ring(Task):
+    """Even places on a loop round the room's middle, going counter-clockwise; never ends."""
 
-    Args:
-        n_cars: Slots for cars, 2 to 20.
-        n_envs: Environments.
-        room: Width along x and depth along y [m].
-        radius: Of the circle [m]; by default `SHARE` of the smaller side of the room.
-        speed: Of each car [m/s].
-        lookahead: The plan is the velocity of so much later [s].
+    def __init__(
+        self,
+        n_cars: int,
+        n_envs: int,
+        room: tuple[float, float],
+        *,
+        half_axes: Sequence[float] | None = None,
+        speed: float = 1.0,
+        lookahead: float = 0.3,
+    ) -> None:
+        """Lay the loop.
+
+        Args:
+            n_cars: Slots for cars, 2 to 20.
+            n_envs: Environments.
+            room: Width along x and depth along y [m].
+            half_axes: Half width and half depth of the loop [m]; its ends are half circles of
+                the smaller. By default a circle, `SHARE` of the smaller side of the room.
+            speed: Of each car [m/s].
+            lookahead: The plan is the velocity of so much later [s].
+
+        Raises:
+            EnvError: An option is out of range, or the cars have no room on the ring.
+        """
+        super().__init__(n_cars, n_envs, ("formation", "velocity", *COMMON_TERMS))
+        half = half_room(room, 0.0)
+        axes = _half_axes(half_axes, half)
+        self._curve = loop(*axes)
+        self._motion = (
+            self._curve.length,
+            positive("speed", speed),
+            not_negative("lookahead", lookahead),
+            ERROR_SCALE,
+        )
+        if self._curve.length < MIN_SPACING * n_cars:
+            raise EnvError(
+                f"half_axes: {n_cars} cars need a loop of {MIN_SPACING * n_cars:.1f} m, "
+                f"got one of {self._curve.length:.1f} m"
+            )
+        self._arc = np.zeros((n_envs, n_cars))
+
+    def begin(self, env: int, pos: F64, cars: I64) -> None:
+        """Put the places where the cars stand."""
+        self._give(env, pos, cars, 0.0)
+
+    def change(self, env: int, pos: F64, cars: I64, before: Bool, t: float) -> None:
+        """Even places for those who are present now, nearest to where they are."""
+        self._give(env, pos, cars, t)
+
+    def compute(self, state: Truth, t: F64, collided: F64, start: int, stop: int) -> int:
+        """One compiled call."""
+        n_changed: int = update_ring(
+            start, stop, state.pos_w, state.vel_w, state.accel_w, state.present, t, collided,
+            self._seated, self._arc, self._curve.pieces, self._motion, self.target, self.plan,
+            self.goal_w, self.error, self.rewards,
+        )  # fmt: skip
+        return n_changed
+
+    def _give(self, env: int, pos: F64, cars: I64, t: float) -> None:
+        arc = np.array([self._curve.nearest(p) for p in pos[cars]])
+        self._arc[env] = 0.0
+        self._arc[env, cars] = assign_round(arc, self._curve.length) - self._motion[1] * t
+
+
+def loop(a: float, b: float) -> Curve:
+    """A closed curve of these half axes [m], counter-clockwise."""
+    radius = min(a, b)
+    if a == b:
+        angle = np.linspace(0.0, 2.0 * np.pi, 1 + int(np.ceil(200.0 * np.pi * radius)))
+        trace = radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        return Curve.through(trace, True, eased=False)
+    corners = np.array([[a, -b], [a, b], [-a, b], [-a, -b]])
+    return Curve.through(rounded(corners, True, radius), True)
+
+
+def _half_axes(value: Sequence[float] | None, half: F64) -> tuple[float, float]:
+    """The half axes asked for, if they fit into the room.
 
     Raises:
-        EnvError: An option is out of range, or the cars have no room on the ring.
+        EnvError: They do not, or are not two lengths.
     """
-    half = float(half_room(room, 0.0).min())
-    r = 2.0 * SHARE * half if radius is None else positive("radius", radius)
-    if r > half:
-        raise EnvError(f"radius: expected at most {half:.2f} m, got {r:g}")
-    if 2.0 * np.pi * r < MIN_SPACING * n_cars:
+    if value is None:
+        radius = 2.0 * SHARE * float(half.min())
+        return radius, radius
+    if isinstance(value, str) or np.shape(value) != (2,):
+        raise EnvError(f"half_axes: expected two lengths, got {value!r}")
+    a, b = (positive("half_axes", length) for length in value)
+    if a > half[0] or b > half[1]:
         raise EnvError(
-            f"radius: {n_cars} cars need {MIN_SPACING * n_cars / (2.0 * np.pi):.2f} m, got {r:.2f}"
+            f"half_axes: expected at most {half[0]:.2f} and {half[1]:.2f} m, got {a:g} and {b:g} m"
         )
-    motion = Motion(
-        curve=Curve.point(),
-        rate=positive("speed", speed) / r,
-        lookahead=not_negative("lookahead", lookahead),
-    )
-    return MovingFormation(n_cars, n_envs, Circle(n_cars, r), motion, round_places=True)
-
-
-class Circle(Formation):
-    """Places on a circle of one size, however many cars are present."""
-
-    def __init__(self, n_cars: int, radius: float) -> None:
-        super().__init__("ring", n_cars, None)
-        self._radius = radius
-
-    def places(self, n: int) -> F64:
-        """Places for so many cars, (place, 2) [m]."""
-        angle = 2.0 * np.pi * np.arange(n) / n
-        places: F64 = self._radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-        return places
+    return a, b

@@ -21,7 +21,7 @@ BAD_ARGUMENTS = [
     ({"filter": "magic"}, "filter: expected one of"),
     ({"task": "none"}, "task: expected one of ring, .* got 'none'"),
     ({"task": "ring", "task_options": {"colour": 1}}, "colour: task 'ring' expected options among"),
-    ({"task": "ring", "task_options": {"radius": -1.0}}, "radius: expected"),
+    ({"task": "ring", "task_options": {"half_axes": (1.0, -1.0)}}, "half_axes: expected"),
     ({"weights": {"beauty": 1.0}}, "weights: expected terms among"),
     ({"weights": {"formation": np.nan}}, "weights: formation"),
     ({"n_cars": 1}, "n_cars: expected a whole number from 2 to 20, got 1"),
@@ -52,11 +52,11 @@ def test_whole_numbers_of_numpy_are_whole_numbers():
 
 
 def test_an_environment_does_not_change_its_arguments():
-    options = {"radius": 1.0}
+    options = {"half_axes": (1.0, 1.0)}
     config = FormationConfig(task_options=options)
     config.resolve()
-    assert options == {"radius": 1.0}
-    assert config == FormationConfig(task_options={"radius": 1.0})
+    assert options == {"half_axes": (1.0, 1.0)}
+    assert config == FormationConfig(task_options={"half_axes": (1.0, 1.0)})
 
 
 @pytest.mark.parametrize("n", [0, -1, 1.5, "2"])
