@@ -26,6 +26,8 @@ from relpos_env.world_state import WorldState
 from tracking.arrays import F64, I64, Bool
 
 MOST_ENVS = 1 << 20
+N_TRUTH = 8
+"""[-] Numbers of the truth about each car, see `Formation.truth`."""
 
 
 class Formation:
@@ -155,6 +157,26 @@ class Formation:
         ]
         rows = np.stack(columns, axis=-1) * s.present[..., None]
         truth: F64 = rows.reshape(self.n_envs, -1)
+        return truth
+
+    def own_truth(self) -> F64:
+        """The truth as each car would put it, for critics of one car, (env, car, 8 car).
+
+        The car itself comes first, at its place in the room, then the others relative to it;
+        directions are in its frame; of each the numbers of `truth`. Zeros for absent cars.
+        """
+        n = self.parts.n_cars
+        s = self.truth().reshape(self.n_envs, n, N_TRUTH)
+        seen = s[:, (np.arange(n)[:, None] + np.arange(n)) % n]
+        own = s[:, :, None]
+        c, sn = own[..., 3], own[..., 4]
+        told = seen.copy()
+        offset = seen[..., 1:3] - own[..., 1:3]
+        for k, vector in ((1, offset), (3, seen[..., 3:5]), (5, seen[..., 5:7])):
+            x, y = vector[..., 0], vector[..., 1]
+            told[..., k], told[..., k + 1] = c * x + sn * y, c * y - sn * x
+        told[:, :, 0, 1:3] = s[..., 1:3]
+        truth: F64 = (told * seen[..., :1] * own[..., :1]).reshape(self.n_envs, n, -1)
         return truth
 
     def tracking_error(self) -> F64:

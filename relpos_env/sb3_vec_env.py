@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from gymnasium.spaces import Box
 from gymnasium.utils import seeding
 from stable_baselines3.common.vec_env import VecEnv
 
 from relpos_env.config import configure
 from relpos_env.errors import EnvError
-from relpos_env.formation import Formation
+from relpos_env.formation import N_TRUTH, Formation
 from relpos_env.interface.observations import space_of
 from relpos_env.interface.observations.base import F32
 from relpos_env.render.film import Film, check_render_mode
@@ -32,7 +33,13 @@ class FormationVecEnv(VecEnv):  # type: ignore[misc]
     """
 
     def __init__(
-        self, n_envs: int = 1, *, threads: int = 1, render_mode: str | None = None, **arguments: Any
+        self,
+        n_envs: int = 1,
+        *,
+        threads: int = 1,
+        render_mode: str | None = None,
+        with_truth: bool = False,
+        **arguments: Any,
     ) -> None:
         """Build the environments.
 
@@ -40,6 +47,7 @@ class FormationVecEnv(VecEnv):  # type: ignore[misc]
             n_envs: How many.
             threads: The batch is stepped in so many parts at a time.
             render_mode: None, ``human`` or ``rgb_array``: pictures of the first environment.
+            with_truth: Every observation is followed by `Formation.own_truth`, for critics.
             arguments: Fields of `relpos_env.config.FormationConfig`.
 
         Raises:
@@ -54,11 +62,12 @@ class FormationVecEnv(VecEnv):  # type: ignore[misc]
         self._commands: tuple[F64, F64] | None = None
         self._next_seeds: list[int | None] = [None] * n_envs
         self._begun = False
-        super().__init__(
-            n_envs * self.n_cars,
-            space_of(self._parts.mode.fields, self._parts.config.history),
-            self._parts.actions.space(),
-        )
+        self.with_truth = with_truth
+        space = space_of(self._parts.mode.fields, self._parts.config.history)
+        if with_truth:
+            more = np.full(N_TRUTH * self.n_cars, np.inf, np.float32)
+            space = Box(np.append(space.low, -more), np.append(space.high, more))
+        super().__init__(n_envs * self.n_cars, space, self._parts.actions.space())
 
     @property
     def active(self) -> Bool:
@@ -71,6 +80,15 @@ class FormationVecEnv(VecEnv):  # type: ignore[misc]
             n = self.formation.n_envs
             self._next_seeds = [int(seed) + k for k in range(n)]
         return [s for s in self._next_seeds for _ in range(self.n_cars)]
+
+    def stagger(self, rng: np.random.Generator) -> None:
+        """Let episodes that begin now end at random times, no two together but by chance.
+
+        Args:
+            rng: Draws how much of `max_cycles` has passed already.
+        """
+        cycles = self.formation.cycles
+        cycles[:] = rng.integers(0, self._parts.config.max_cycles, len(cycles))
 
     def reset(self) -> F32:
         """Begin an episode in every environment; observations, (seat, size)."""
@@ -163,8 +181,11 @@ class FormationVecEnv(VecEnv):  # type: ignore[misc]
         return list(self._get_indices(indices))
 
     def _observations(self) -> F32:
-        observations: F32 = self.formation.observations.reshape(self.num_envs, -1).copy()
-        return observations
+        observations: F32 = self.formation.observations.reshape(self.num_envs, -1)
+        if self.with_truth:
+            truth = self.formation.own_truth().reshape(self.num_envs, -1).astype(np.float32)
+            return np.concatenate([observations, truth], axis=1)
+        return observations.copy()
 
     def _show(self) -> None:
         if self.render_mode is not None:

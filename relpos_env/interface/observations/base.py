@@ -27,6 +27,8 @@ class Field:
     """Values are cut at +- this, so that an observation is always inside its space."""
     signed: bool = True
     """False if they are never below 0."""
+    per_other: bool = False
+    """Whether it is cut into equal pieces, one for each of the others in order."""
 
 
 class ObservationMode(Protocol):

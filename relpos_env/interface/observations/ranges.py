@@ -19,10 +19,20 @@ class Ranges:
     def __init__(self, n_cars: int) -> None:
         n = n_cars - 1
         self.fields = (
-            Field("mask", n, "-", "1 where there was a range of late", 1.0, signed=False),
-            Field("range", n, "m", "last range to that car, as it came", FAR),
-            Field("age", n, "s", "since then", OLD, signed=False),
-            Field("gap", n, "dB", "received less first-path power of that range", LOUD),
+            Field(
+                "mask",
+                n,
+                "-",
+                "1 where there was a range of late",
+                1.0,
+                signed=False,
+                per_other=True,
+            ),
+            Field("range", n, "m", "last range to that car, as it came", FAR, per_other=True),
+            Field("age", n, "s", "since then", OLD, signed=False, per_other=True),
+            Field(
+                "gap", n, "dB", "received less first-path power of that range", LOUD, per_other=True
+            ),
             *wish_fields(n),
             *own_fields(),
         )

@@ -24,9 +24,20 @@ class RelativePositions:
                 "m, m, -",
                 "of that position: standard deviations ahead and to the left, their correlation",
                 FAR,
+                per_other=True,
             ),
-            Field("age", n, "s", "since the last range of the pair", OLD, signed=False),
-            Field("nlos", n, "-", "probability that it was not line of sight", 1.0, signed=False),
+            Field(
+                "age", n, "s", "since the last range of the pair", OLD, signed=False, per_other=True
+            ),
+            Field(
+                "nlos",
+                n,
+                "-",
+                "probability that it was not line of sight",
+                1.0,
+                signed=False,
+                per_other=True,
+            ),
             Field(
                 "status",
                 N_STATUS * n,
@@ -34,12 +45,23 @@ class RelativePositions:
                 "one 1 among: absent, starting, ambiguous, ok, lost, doubtful",
                 1.0,
                 signed=False,
+                per_other=True,
             ),
         )
         self.fields = (
-            Field("mask", n, "-", "1 where that car's position can be used", 1.0, signed=False),
-            Field("pos", 2 * n, "m", "position of each other car: forward, left", FAR),
-            Field("vel", 2 * n, "m/s", "its velocity relative to this car", FAST),
+            Field(
+                "mask",
+                n,
+                "-",
+                "1 where that car's position can be used",
+                1.0,
+                signed=False,
+                per_other=True,
+            ),
+            Field(
+                "pos", 2 * n, "m", "position of each other car: forward, left", FAR, per_other=True
+            ),
+            Field("vel", 2 * n, "m/s", "its velocity relative to this car", FAST, per_other=True),
             *(certainty if with_cov else ()),
             *wish_fields(n),
             *own_fields(),

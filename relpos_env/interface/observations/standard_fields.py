@@ -10,9 +10,22 @@ def wish_fields(n_others: int) -> tuple[Field, ...]:
     """Where the others should be."""
     return (
         Field(
-            "wanted", n_others, "-", "1 where the task gives that car a place", 1.0, signed=False
+            "wanted",
+            n_others,
+            "-",
+            "1 where the task gives that car a place",
+            1.0,
+            signed=False,
+            per_other=True,
         ),
-        Field("target", 2 * n_others, "m", "where that car should be: forward, left", FAR),
+        Field(
+            "target",
+            2 * n_others,
+            "m",
+            "where that car should be: forward, left",
+            FAR,
+            per_other=True,
+        ),
     )
 
 
