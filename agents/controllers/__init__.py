@@ -4,11 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from agents.controllers.base import Controller
-from agents.controllers.consensus import Consensus
+from agents.controllers.consensus import Consensus, ConsensusParams
+from agents.controllers.leader_follower import LeaderFollower, LeaderFollowerParams
+from agents.controllers.range_only import RangeOnly, RangeOnlyParams
+from agents.driver import Driver
 from relpos_env.interface.observations import Field
 
-CONTROLLERS: dict[str, Callable[[tuple[Field, ...]], Controller]] = {"consensus": Consensus}
-"""Name to builder ``(observation fields) -> Controller``."""
+CONTROLLERS: dict[str, Callable[[tuple[Field, ...]], Driver]] = {
+    "consensus": Consensus,
+    "leader-follower": LeaderFollower,
+    "range-only": RangeOnly,
+}
+"""Name to builder ``(observation fields) -> Driver``."""
 
-__all__ = ["CONTROLLERS", "Consensus", "Controller"]
+__all__ = [
+    "CONTROLLERS",
+    "Consensus",
+    "ConsensusParams",
+    "LeaderFollower",
+    "LeaderFollowerParams",
+    "RangeOnly",
+    "RangeOnlyParams",
+]

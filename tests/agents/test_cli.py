@@ -105,6 +105,13 @@ FAULTS = [
     (["demo", "--cars", "40"], "--cars: expected 2 to 20"),
     (["demo", "--cars", "19"], "n_cars: 19 do not fit"),
     (["demo", "--seed", "-1"], "--seed: expected 0 or more"),
+    (["demo", "--policy", "nowhere"], "nowhere: no such file or folder, and no policy"),
+    (["demo", "--policy", "best_model.zip"], "may execute code when it is loaded"),
+    (["demo", "--policy", "a", "--controller", "b"], "--policy: expected either a policy or a"),
+    (["demo", "--controller", "magic"], "controller: expected one of consensus"),
+    (["policy", "show", "vec_normalize.pkl"], "may execute code when it is loaded"),
+    (["policy", "show"], "Missing argument"),
+    (["bench", "policy", "--steps", "0"], "--steps: expected 1 to"),
     (["bench", "tracker", "--rounds", "3"], "--rounds"),
     (["nonsense"], "No such command"),
 ]

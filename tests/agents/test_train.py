@@ -1,0 +1,267 @@
+"""Training: runs that stop and go on, folders, networks, files."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from agents.errors import UsageError
+from agents.policy import load_policy
+from agents.policy.layout import Layout
+from agents.settings import from_options
+from agents.train.config import TrainConfig
+from agents.train.environments import make_rooms
+from agents.train.export import export_policy, read_results
+from agents.train.learner import level_of, make_model, make_policy
+from agents.train.network import Actor
+from agents.train.run import train_policy
+from agents.train.run_folder import BEST, CONFIG, LAST, RunFolder
+from agents.train.train import train
+
+SMALL = {
+    "frames": "1400", "leg": "2", "envs": "3", "steps": "16", "batch": "64", "epochs": "2",
+    "eval_episodes": "2", "seconds": "12", "width": "8", "threads": "1", "cars": "6",
+}  # fmt: skip
+
+
+def small(**changes):
+    return from_options(TrainConfig, {**SMALL, **changes})
+
+
+def weights(folder, name=LAST):
+    return RunFolder(folder).load(name)[0]
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """An uninterrupted run."""
+    folder = tmp_path_factory.mktemp("runs") / "whole"
+    return train(small(), folder)
+
+
+@pytest.fixture(scope="module")
+def policy(run, tmp_path_factory):
+    return export_policy(run.folder, tmp_path_factory.mktemp("policies"), name="small")
+
+
+def same(a, b):
+    assert a.keys() == b.keys()
+    return all(torch.equal(a[k], b[k]) for k in a)
+
+
+def test_same_seed_same_weights(run, tmp_path):
+    train(small(), tmp_path / "again")
+    assert same(weights(run.folder), weights(tmp_path / "again"))
+    train(small(seed="1"), tmp_path / "other")
+    assert not same(weights(run.folder), weights(tmp_path / "other"))
+
+
+def test_a_run_that_was_stopped_goes_on_as_if_it_had_not_been(run, tmp_path):
+    class Stop(Exception):
+        pass
+
+    def stop(share, row):
+        if row["leg"] == 1:
+            raise Stop
+
+    with pytest.raises(Stop):
+        train(small(), tmp_path / "run", progress=stop)
+    assert not same(weights(run.folder), weights(tmp_path / "run"))
+    resumed = train(None, tmp_path / "run")
+    assert same(weights(run.folder), weights(tmp_path / "run"))
+    assert same(weights(run.folder, BEST), weights(tmp_path / "run", BEST))
+    strip = [{k: v for k, v in r.items() if k != "seconds"} for r in run.records]
+    assert strip == [{k: v for k, v in r.items() if k != "seconds"} for r in resumed.records]
+    assert len(strip) == 3
+
+
+@pytest.mark.slow
+def test_a_run_that_was_killed_goes_on_as_if_it_had_not_been(run, tmp_path):
+    folder = tmp_path / "run"
+    options = [f"--{k.replace('_', '-')}={v}" for k, v in SMALL.items()]
+    code = "from agents.cli import main; main()"
+    command = [sys.executable, "-c", code, "train", "--out", str(folder), *options]
+    process = subprocess.Popen(command, stderr=subprocess.DEVNULL, env=dict(os.environ))
+    until = time.monotonic() + 120.0
+    while not (folder / LAST).exists() and process.poll() is None and time.monotonic() < until:
+        time.sleep(0.01)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    assert (folder / LAST).exists()
+    train(None, folder)
+    assert same(weights(run.folder), weights(folder))
+
+
+def test_the_curriculum_goes_through_its_levels(tmp_path):
+    config = small(levels="0,2,3", frames="1000", scenarios="cars-nlos")
+    assert [level_of(config, f) for f in (0, 333, 334, 700, 5000)] == [0, 0, 1 + 1, 3, 3]
+    result = train(config, tmp_path / "run")
+    assert [r["level"] for r in result.records] == sorted(r["level"] for r in result.records)
+    assert {0, 3} <= {r["level"] for r in result.records}
+
+
+def test_a_central_critic_sees_the_truth_and_the_actor_does_not(tmp_path):
+    config = small(critic="central", frames="1000")
+    train(config, tmp_path / "run")
+    rooms = make_rooms(config, None)
+    size = Layout("estimate", 6).size
+    assert rooms.observation_space.shape == (size + 48,)
+    model = make_model(config, rooms)
+    seen = torch.from_numpy(rooms.reset())
+    with torch.no_grad():
+        blind = seen.clone()
+        blind[:, size:] = 0.0
+        policy = model.policy
+        assert torch.equal(Actor(policy)(seen), Actor(policy)(blind))
+        assert not torch.allclose(policy.predict_values(seen), policy.predict_values(blind))
+    assert export_policy(tmp_path / "run", tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("observation", ["estimate", "estimate_cov", "ranges", "truth"])
+@pytest.mark.parametrize("history", [1, 3])
+def test_the_order_of_the_others_does_not_matter(observation, history):
+    layout = Layout(observation, 5, history)
+    config = small(observation=observation, history=str(history), cars="5", scenarios="cars-nlos")
+    actor = Actor(make_policy(config))
+    with torch.no_grad():
+        for weight in actor.parameters():
+            weight.normal_(generator=torch.Generator().manual_seed(1))
+    rng = np.random.default_rng(0)
+    seen = rng.uniform(-2.0, 2.0, (7, layout.size)).astype(np.float32)
+    order = rng.permutation(4)
+    turned = seen.copy()
+    first = 0
+    for _ in range(history):
+        for f in layout.fields:
+            if f.name in ("mask", "wanted"):
+                seen[:, first : first + f.size] = rng.integers(0, 2, (7, f.size))
+            if f.per_other:
+                pieces = seen[:, first : first + f.size].reshape(7, 4, -1)
+                turned[:, first : first + f.size] = pieces[:, order].reshape(7, -1)
+            else:
+                turned[:, first : first + f.size] = seen[:, first : first + f.size]
+            first += f.size
+    with torch.no_grad():
+        a, b = actor(torch.from_numpy(seen)), actor(torch.from_numpy(turned))
+    assert torch.allclose(a, b, atol=1e-5)
+
+
+def test_rooms_of_several_scenarios_share_the_seats():
+    config = small(scenarios="cars-nlos,hall", cars="6")
+    rooms = make_rooms(config, None)
+    rooms.seed(3)
+    seen = rooms.reset()
+    assert seen.shape == (1 * 3 + 2 * 5, Layout("estimate", 6).size)
+    rooms.step_async(np.zeros((13, 2), np.float32))
+    seen, rewards, dones, infos = rooms.step_wait()
+    assert len(seen) == len(rewards) == len(dones) == len(infos) == 13
+    again = make_rooms(config, None)
+    again.seed(3)
+    again.reset()
+    again.step_async(np.zeros((13, 2), np.float32))
+    assert np.array_equal(again.step_wait()[0], seen)
+
+
+def test_the_exported_policy_does_what_the_trained_one_does(run, policy):
+    loaded = load_policy(policy)
+    actor = make_policy(run.config)
+    actor.load_state_dict(
+        {k[7:]: v for k, v in weights(run.folder, BEST).items() if k.startswith("policy.")}
+    )
+    rng = np.random.default_rng(0)
+    seen = rng.uniform(-3.0, 3.0, (50, loaded.card.layout.size)).astype(np.float32)
+    with torch.no_grad():
+        expected = Actor(actor)(torch.from_numpy(seen)).numpy()
+    assert np.allclose(loaded.act(seen), expected, atol=1e-5)
+    assert loaded.card.training["observation"] == "estimate"
+    assert loaded.card.training["config"]["frames"] == 1400
+
+
+def test_a_whole_run_ends_with_a_policy_and_a_report(tmp_path):
+    result = train_policy(small(frames="1000"), tmp_path / "mine")
+    assert result.policy == tmp_path / "mine" / "mine.onnx"
+    assert load_policy(result.policy).card.name == "mine"
+    assert "Learning curves" in (tmp_path / "mine" / "report.html").read_text()
+    assert list((tmp_path / "mine" / "tensorboard").iterdir())
+
+
+def test_a_full_disk_leaves_the_last_good_checkpoint(run, tmp_path, monkeypatch):
+    folder = tmp_path / "run"
+    before = {}
+
+    def full(path, target):
+        raise OSError(28, "No space left on device")
+
+    def fill(share, row):
+        if row["leg"] == 0:
+            before.update({p.name: p.read_bytes() for p in folder.iterdir() if p.is_file()})
+            monkeypatch.setattr(Path, "replace", full)
+
+    with pytest.raises(UsageError, match="No space left on device.*--resume"):
+        train(small(), folder, progress=fill)
+    monkeypatch.undo()
+    assert before == {p.name: p.read_bytes() for p in folder.iterdir() if p.is_file()}
+    train(None, folder)
+    assert same(weights(run.folder), weights(folder))
+
+
+BAD_CONFIG = [
+    ("not json", "damaged"),
+    ("[]", "format None"),
+    ('{"format": 0, "config": {}}', "format 0, expected 1"),
+    ('{"format": 1, "config": {}}', "missing field"),
+    ('{"format": 1, "config": {"speed": 1}}', "unknown field 'speed'"),
+]
+
+
+@pytest.mark.parametrize(("text", "said"), BAD_CONFIG)
+def test_runs_that_are_none_are_refused(tmp_path, text, said):
+    with pytest.raises(UsageError, match="no training run"):
+        train(None, tmp_path / "none")
+    (tmp_path / CONFIG).write_text(text)
+    with pytest.raises(UsageError, match=said):
+        train(None, tmp_path)
+
+
+def test_damaged_checkpoints_are_refused(run, tmp_path):
+    whole = (run.folder / LAST).read_bytes()
+    text = (run.folder / CONFIG).read_text()
+    (tmp_path / CONFIG).write_text(text)
+    for damaged in (whole[:-1], whole[: len(whole) // 2], b"", b"\x80\x04N.", os.urandom(200)):
+        (tmp_path / LAST).write_bytes(damaged)
+        with pytest.raises(UsageError, match="damaged checkpoint"):
+            train(None, tmp_path)
+    other = json.loads(text)
+    other["config"]["net"]["width"] = 16
+    other["config"]["frames"] = 5000
+    (tmp_path / CONFIG).write_text(json.dumps(other))
+    (tmp_path / LAST).write_bytes(whole)
+    with pytest.raises(UsageError, match="other networks"):
+        train(None, tmp_path)
+
+
+def test_what_cannot_be_trained_is_refused(tmp_path):
+    for changes, said in (
+        ({"scenarios": ""}, "--scenarios: expected at least one"),
+        ({"envs": "1"}, "--envs: expected at least 2"),
+        ({"cars": "3"}, "--cars: expected at least 6"),
+    ):
+        with pytest.raises(UsageError, match=said):
+            train(small(**changes), tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+    (tmp_path / "taken").mkdir()
+    (tmp_path / "taken" / "x").write_text("")
+    with pytest.raises(UsageError, match="new or empty"):
+        train(small(), tmp_path / "taken")
+    with pytest.raises(UsageError, match="no training run"):
+        export_policy(tmp_path / "taken", tmp_path / "out")
+    (tmp_path / "lines").write_text('{"a": 1}\n[]\n')
+    with pytest.raises(UsageError, match="line 2"):
+        read_results(tmp_path / "lines")
