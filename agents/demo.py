@@ -9,9 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from agents.blindfold import Blindfold
 from agents.controllers import CONTROLLERS
-from agents.controllers.base import Controller, split_fields
+from agents.driver import Driver
+from agents.errors import UsageError
 from agents.frames import FrameRecorder, errors
+from agents.policy import Layout, TrainedPolicy, load_policy
 from agents.track import TrackResult, track_log
 from relpos_env import formation_v0
 from relpos_env.parallel_env import FormationEnv
@@ -21,6 +24,8 @@ from tracking.filters import FILTERS
 
 TOLD = ("estimate", "truth", "nothing")
 """What the cars are told in the drives of a demonstration."""
+CONTROLLER = "consensus"
+"""Drives the cars if nothing else is said."""
 SETTLE = 10.0
 """[s] Errors are averaged from here on."""
 
@@ -31,6 +36,8 @@ class DemoResult:
 
     scenario: str
     task: str
+    driver: str
+    """The controller or policy."""
     seed: int
     seconds: float
     """[s] Length of the drive on estimates."""
@@ -39,8 +46,9 @@ class DemoResult:
     formation_error: float
     """[m] Mean distance of the others from where they should be, tracker in the loop; as the
     task says, see `relpos_env.tasks`."""
-    formation_error_truth: float
-    """[m] The same when the cars are told the truth."""
+    formation_error_truth: float | None
+    """[m] The same when the cars are told the truth; None where their observations have no place
+    for it."""
     formation_error_blind: float
     """[m] The same when they are told nothing and follow the operator's command alone."""
     nlos_share: float
@@ -62,6 +70,7 @@ class DemoResult:
                 "result": "formation",
                 "scenario": self.scenario,
                 "task": self.task,
+                "driver": self.driver,
                 "seed": self.seed,
                 "seconds": self.seconds,
                 "done": self.done,
@@ -81,7 +90,8 @@ def demo(
     seconds: float = 60.0,
     seed: int = 0,
     cars: int | None = None,
-    controller: str = "consensus",
+    controller: str | None = None,
+    policy: str | Path | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> DemoResult:
     """Drive a formation on estimates and, for comparison, on the truth and on nothing.
@@ -93,29 +103,43 @@ def demo(
         seconds: Length, less where the task is done before.
         seed: Same seed, same run.
         cars: Number of cars; by default that of the scenario.
-        controller: One of `agents.controllers.CONTROLLERS`.
+        controller: One of `agents.controllers.CONTROLLERS`, by default `CONTROLLER`.
+        policy: A trained policy in its place, as for `load_policy`; the cars observe what it
+            was trained on.
         progress: Called with the share done, 0 to 1.
 
     Raises:
         EnvError: An unknown name or a number out of range.
+        UsageError: A controller and a policy, or a policy that cannot be loaded or is not for
+            these cars.
     """
+    if policy is not None and controller is not None:
+        raise UsageError("policy: expected either a policy or a controller, got both")
+    trained = None if policy is None else load_policy(policy)
+    controller = controller or CONTROLLER
     drives: dict[str, Drive] = {}
-    for n, told in enumerate(TOLD):
+    modes, history = _modes(trained), 1 if trained is None else trained.layout.history
+    for n, (told, mode) in enumerate(modes.items()):
 
         def tell(share: float, n: int = n) -> None:
             if progress is not None:
-                progress((n + share) / len(TOLD))
+                progress((n + share) / len(modes))
 
         env = formation_v0.parallel_env(
             scenario=scenario,
             task=task,
             n_cars=cars,
-            observation="truth" if told == "truth" else "estimate",
+            observation=mode,
+            history=history,
             max_cycles=round(seconds / DECISION),
             record=told == "estimate",
         )
-        policy = look_up(CONTROLLERS, controller, "controller")(env.fields)
-        drives[told] = drive(env, policy, seed, blind=told == "nothing", progress=tell)
+        driver: Driver
+        if trained is None:
+            driver = look_up(CONTROLLERS, controller, "controller")(env.fields)
+        else:
+            driver = trained.driver(Layout(mode, len(env.possible_agents), history))
+        drives[told] = drive(env, driver, seed, blind=told == "nothing", progress=tell)
         if told == "estimate":
             name = env.scenario.name
             log = env.recorded_log(f"{name}-{seed}")
@@ -125,17 +149,28 @@ def demo(
     return DemoResult(
         scenario=name,
         task=task,
+        driver=controller if trained is None else trained.card.name,
         seed=seed,
         seconds=ours.seconds,
         done=ours.done,
         formation_error=ours.formation_error,
-        formation_error_truth=drives["truth"].formation_error,
+        formation_error_truth=drives["truth"].formation_error if "truth" in drives else None,
         formation_error_blind=drives["nothing"].formation_error,
         nlos_share=float(log.nlos.mean()) if len(log.nlos) else 0.0,
         collisions=ours.collisions,
         tracks=tuple(track_log(log, filter=name) for name in FILTERS),
         frames=ours.frames,
     )
+
+
+def _modes(policy: TrainedPolicy | None) -> dict[str, str]:
+    """The observation mode of each drive, by what the cars are told."""
+    modes = {told: "truth" if told == "truth" else "estimate" for told in TOLD}
+    if policy is not None and policy.layout.observation not in modes.values():
+        # What this policy sees is measured, and has no true counterpart.
+        del modes["truth"]
+        return dict.fromkeys(modes, policy.layout.observation)
+    return modes
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +188,7 @@ class Drive:
 
 def drive(
     env: FormationEnv,
-    policy: Controller,
+    driver: Driver,
     seed: int,
     *,
     blind: bool,
@@ -163,21 +198,20 @@ def drive(
 
     Args:
         env: Is reset first.
-        policy: Drives all cars.
+        driver: Drives all cars.
         seed: Of the episode.
         blind: Whether the observations are changed so that no other car is known.
         progress: Called with the share done, 0 to 1.
     """
     observations, _ = env.reset(seed=seed)
-    formation, mask = env.formation, split_fields(env.fields)["mask"]
+    formation, blindfold = env.formation, Blindfold(Layout.of(env.formation.parts))
     recorder = FrameRecorder(formation)
     formed: list[float] = []
     collisions = 0.0
     while env.agents:
         if blind:
-            for observation in observations.values():
-                observation[mask] = 0.0
-        observations, *_ = env.step({a: policy.act(o) for a, o in observations.items()})
+            observations = {a: blindfold(o) for a, o in observations.items()}
+        observations, *_ = env.step({a: driver.act(o) for a, o in observations.items()})
         formed.append(errors(formation)[1])
         collisions += formation.loop.swarm.contacts[0].sum()
         recorder.add()

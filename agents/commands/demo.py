@@ -15,8 +15,8 @@ from agents.errors import UsageError
 @click.command()
 @click.option(
     "--scenario",
-    help="cars-los, cars-nlos, gap, hall, open, random, ring-los, ring-nlos, warehouse, or a file "
-    "*.toml; by default that of the task.",
+    help="cars-los, cars-nlos, gap, hall, open, random, ring-los, ring-nlos, swarm-nlos, "
+    "warehouse, or a file *.toml; by default that of the task.",
 )
 @click.option(
     "--task",
@@ -29,6 +29,16 @@ from agents.errors import UsageError
 @click.option(
     "--cars", type=int, help="Number of cars, 2 to 20; by default as many as the scenario has."
 )
+@click.option(
+    "--controller",
+    metavar="NAME",
+    help="Who drives: consensus, leader-follower or range-only.  [default: consensus]",
+)
+@click.option(
+    "--policy",
+    metavar="NAME_OR_PATH",
+    help="A trained policy drives: its name, its file or its folder; see `relpos policy list`.",
+)
 @click.option("--out", type=Path, default=Path("demo"), show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
 def demo(
@@ -39,6 +49,7 @@ def demo(
     from agents.demo import demo as run
     from agents.output import write_results
     from agents.report.demo_report import demo_report
+    from agents.report.page import metres
 
     if not 15.0 <= seconds <= 3600.0:
         raise UsageError(f"--seconds: expected 15 to 3600, got {seconds:g}")
@@ -46,6 +57,8 @@ def demo(
         raise UsageError(f"--seed: expected 0 or more, got {seed}")
     if cars is not None and not 2 <= cars <= 20:
         raise UsageError(f"--cars: expected 2 to 20, got {cars}")
+    if names["policy"] is not None and names["controller"] is not None:
+        raise UsageError("--policy: expected either a policy or a --controller, got both")
     with progress_bar(f"{names['task']}, seed {seed}") as report:
         result = run(seconds=seconds, seed=seed, cars=cars, progress=report, **names)
     write_results(out, {"report.html": demo_report(result)})
@@ -54,12 +67,12 @@ def demo(
         return
     print_tracks(result.tracks)
     print_table(
-        "Formation error",
+        f"Formation error, {result.driver} drives",
         ["the cars are told", f"mean after {SETTLE:.0f} s [m]"],
         [
-            ["what the tracker estimates", f"{result.formation_error:.3f}"],
-            ["the truth", f"{result.formation_error_truth:.3f}"],
-            ["nothing, only the command", f"{result.formation_error_blind:.3f}"],
+            ["what the tracker estimates", metres(result.formation_error)],
+            ["the truth", metres(result.formation_error_truth)],
+            ["nothing, only the command", metres(result.formation_error_blind)],
         ],
     )
     done = f", done after {result.seconds:.1f} s" if result.done else ""
