@@ -28,6 +28,7 @@ from agents.console import emit_json, print_table, progress_bar
     show_default=True,
     help="Processes at a time; no figure but the time of a round depends on it.",
 )
+@click.option("--engine", default="local", show_default=True, help="Where the jobs run.")
 @click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
 @click.option("--out", type=Path, help="New folder for report.html, its pictures, results.jsonl.")
 def evaluate(
@@ -36,6 +37,7 @@ def evaluate(
     seeds: int | None,
     seconds: float | None,
     jobs: int,
+    engine: str,
     as_json: bool,
     out: Path | None,
 ) -> None:
@@ -54,6 +56,7 @@ def evaluate(
             seeds=seeds,
             seconds=seconds,
             jobs=jobs,
+            engine=engine,
             progress=tell,
         )
     if out is not None:

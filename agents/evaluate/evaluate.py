@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import signal
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from agents.engines import check_jobs, find_engine
 from agents.errors import UsageError
 from agents.evaluate.run import RunResult, run_seed
 from agents.evaluate.suites import SUITES, Case, Suite
@@ -112,6 +109,7 @@ def evaluate(
     seeds: int | None = None,
     seconds: float | None = None,
     jobs: int = 1,
+    engine: str = "local",
     progress: Callable[[float], None] | None = None,
 ) -> EvaluateResult:
     """Track simulated runs of every case and seed with every filter, and score them.
@@ -125,6 +123,7 @@ def evaluate(
         seeds: So many runs of each case, seeds 0, 1, ...; by default those of the suite.
         seconds: Length of a run [s]; by default that of the suite.
         jobs: Processes at a time. Nothing but the time of a round depends on it.
+        engine: One of `agents.engines.ENGINES`.
         progress: Called with the share done, 0 to 1.
 
     Raises:
@@ -139,12 +138,13 @@ def evaluate(
         raise UsageError(f"--seeds: expected 1 to 100000, got {seeds}")
     if not SHORTEST <= seconds <= LONGEST:
         raise UsageError(f"--seconds: expected {SHORTEST:g} to {LONGEST:g}, got {seconds:g}")
-    if not 1 <= jobs <= 1024:
-        raise UsageError(f"--jobs: expected 1 to 1024, got {jobs}")
+    check_jobs(jobs)
+    work = find_engine(engine)
     tasks = [(case, seed, names, seconds) for seed in range(seeds) for case in chosen.cases]
     done: dict[tuple[str, int], list[RunResult]] = {}
-    for case, seed, runs in _run_all(tasks, jobs):
-        done[case, seed] = runs
+    for n, runs in work(run_seed, tasks, jobs):
+        case, seed, _, _ = tasks[n]
+        done[case.name, seed] = runs
         if progress is not None:
             progress(len(done) / len(tasks))
     cases = tuple(
@@ -189,38 +189,6 @@ def check_filters(names: Iterable[str]) -> tuple[str, ...]:
         got = repr(wrong[0]) if wrong else "none"
         raise UsageError(f"--filters: expected names of {', '.join(FILTERS)}, got {got}")
     return chosen
-
-
-Task = tuple[Case, int, tuple[str, ...], float]
-
-
-def _run_all(tasks: Sequence[Task], jobs: int) -> Iterator[tuple[str, int, list[RunResult]]]:
-    """Results by case and seed, in any order."""
-    jobs = min(jobs, len(tasks))
-    if jobs == 1:
-        for task in tasks:
-            yield task[0].name, task[1], run_seed(*task)
-        return
-    # New processes, since a forked one would share the threads of compiled libraries.
-    spawn = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(jobs, mp_context=spawn, initializer=_leave_interrupts)
-    try:
-        waiting = {pool.submit(run_seed, *task): task for task in tasks}
-        for future in as_completed(waiting):
-            case, seed, _, _ = waiting.pop(future)
-            yield case.name, seed, future.result()
-    except BrokenProcessPool as error:
-        raise UsageError(
-            "--jobs: a process was ended from outside, perhaps for want of memory; "
-            f"expected fewer than {jobs}"
-        ) from error
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
-def _leave_interrupts() -> None:
-    """An interrupt from the keyboard is the business of the first process."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _mean(values: Iterable[float | None]) -> float | None:

@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from typing import Any
 
 _SCRIPT = """
-<canvas id="stage" width="1000" height="720"></canvas>
-<div class="bar"><button id="play">pause</button><input id="at" type="range" min="0" value="0">
-<span id="clock"></span></div>
+<canvas width="1000" height="720"></canvas>
+<div class="bar"><button>pause</button><select></select><input type="range" min="0" value="0">
+<span></span></div>
 <p class="key">Filled cars are true. Dashed outlines are where the tracker of the first car believes
 the others to be, with ellipses of two standard deviations. Lines between cars: green in sight,
 orange behind an obstacle. Crosses mark the wanted formation around the first car.</p>
 <script>
 (() => {
-const D = __DATA__;
-const cv = document.getElementById("stage"), g = cv.getContext("2d");
-const at = document.getElementById("at"), play = document.getElementById("play");
-const clock = document.getElementById("clock");
+const drives = __DATA__, me = document.currentScript.parentElement;
+const cv = me.querySelector("canvas"), g = cv.getContext("2d");
+const at = me.querySelector("input"), play = me.querySelector("button");
+const clock = me.querySelector("span"), choice = me.querySelector("select");
 const colours = ["#2563eb", "#dc2626", "#059669", "#d97706", "#7c3aed", "#0891b2"];
-at.max = D.t.length - 1;
-const scale = Math.min(680 / D.room[1], 680 / D.room[0]);
+drives.forEach((d, n) => choice.add(new Option(d[0], n)));
+choice.hidden = drives.length < 2;
+let D, scale;
 const X = x => 360 + x * scale, Y = y => 360 - y * scale;
 function car(x, y, h, fill, stroke) {
   g.save(); g.translate(X(x), Y(y)); g.rotate(-h);
@@ -87,16 +89,22 @@ function plot(k, values, title, top, colour) {
   if (now !== null) { g.fillStyle = colour; g.font = "bold 16px system-ui";
     g.fillText(now.toFixed(2) + " m", left + width - 66, top + 20); }
 }
-let k = 0, running = true, last = 0;
+let k = 0, running = __RUNNING__, last = 0;
+function show(n) {
+  D = drives[n][1]; at.max = D.t.length - 1;
+  scale = Math.min(680 / D.room[1], 680 / D.room[0]);
+  k = Math.min(k, D.t.length - 1); at.value = k; draw(k); }
+function run(on) { running = on; play.textContent = on ? "pause" : "play"; }
 function tick(stamp) {
   if (running && stamp - last > 1000 * D.dt) { last = stamp; k = (k + 1) % D.t.length;
     at.value = k; draw(k); }
   requestAnimationFrame(tick);
 }
 at.oninput = () => { k = +at.value; draw(k); };
-play.onclick = () => { running = !running; play.textContent = running ? "pause" : "play"; };
-draw(Number(location.hash.slice(1)) || 0); k = Number(location.hash.slice(1)) || 0;
-if (location.hash) { running = false; play.textContent = "play"; at.value = k; }
+play.onclick = () => run(!running);
+choice.onchange = () => show(+choice.value);
+if (location.hash) k = Number(location.hash.slice(1)) || 0;
+show(0); run(running && !location.hash);
 requestAnimationFrame(tick);
 })();
 </script>
@@ -109,4 +117,16 @@ def animation_markup(frames: dict[str, Any]) -> str:
     Args:
         frames: room, car size, dt, and lists over frames; see `agents.frames.FrameRecorder`.
     """
-    return _SCRIPT.replace("__DATA__", json.dumps(frames, separators=(",", ":")))
+    return player_markup({"": frames})
+
+
+def player_markup(drives: Mapping[str, dict[str, Any]], *, running: bool = True) -> str:
+    """A player of one drive at a time, with a choice between them if there are several.
+
+    Args:
+        drives: Frames by what they are called; see `animation_markup`.
+        running: Whether it plays at once.
+    """
+    # "</" would end the script in which the names stand.
+    data = json.dumps(list(drives.items()), separators=(",", ":")).replace("</", "<\\/")
+    return _SCRIPT.replace("__RUNNING__", json.dumps(running)).replace("__DATA__", data)

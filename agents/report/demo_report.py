@@ -20,7 +20,8 @@ def demo_report(result: DemoResult) -> str:
         "Three cars, one formation, no anchors"
         if len(result.frames["pos"][0]) == 3
         else "One formation, no anchors",
-        f"Task {result.task}, scenario {result.scenario}, seed {result.seed}, "
+        f"Task {result.task}, scenario {result.scenario}, driven by {result.driver}, "
+        f"seed {result.seed}, "
         f"{result.seconds:.0f} s{' until it was done' if result.done else ''}: the cars know "
         "each other only through simulated UWB ranges, inertial sensors and the tracker.",
     )

@@ -1,0 +1,189 @@
+"""Drivers on observations in scenarios: what `relpos compare` does, as a function."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+from agents.compare.contender import Contender, find_entry, line_up
+from agents.compare.episode import EpisodeResult, run_episodes
+from agents.compare.result import CompareResult, Row
+from agents.compare.setting import Setting
+from agents.demo import SETTLE
+from agents.engines import check_jobs, find_engine
+from agents.errors import UsageError
+from relpos_env.interface.observations import OBSERVATIONS
+
+FIRST_SEED = 1000
+"""Training never uses the seeds from here on."""
+BATCH = 10
+"""[-] Episodes that a process runs side by side."""
+SHORTEST, LONGEST = 0.1, 3600.0
+"""[s]"""
+MOST_EPISODES = 10_000
+
+Name = TypeVar("Name")
+
+
+def compare(
+    *,
+    drivers: Sequence[str],
+    observations: Sequence[str] = ("estimate",),
+    scenarios: Sequence[str | Path | None] = (None,),
+    task: str = "ring",
+    task_options: Mapping[str, Any] | None = None,
+    cars: int | None = None,
+    level: int | None = None,
+    episodes: int = 100,
+    first_seed: int = FIRST_SEED,
+    seconds: float = 60.0,
+    settle: float = SETTLE,
+    jobs: int = 1,
+    engine: str = "local",
+    progress: Callable[[float], None] | None = None,
+) -> CompareResult:
+    """Let every driver drive on every mode of observations in every scenario, on the same seeds.
+
+    What a driver cannot see is left out and noted. With more than one job the calling script
+    must be importable: its work belongs below `if __name__ == "__main__"`.
+
+    Args:
+        drivers: Controllers of `agents.controllers.CONTROLLERS`, and policies as for
+            `agents.policy.load_policy`.
+        observations: Of `relpos_env.interface.observations.OBSERVATIONS`.
+        scenarios: Of `relpos_env.scenarios.SCENARIOS`, or TOML files; None is that of the task.
+        task: One of `relpos_env.tasks.TASKS`.
+        task_options: The task's own options, by name.
+        cars: Slots for cars; by default as many as the scenario can have.
+        level: Randomisation of a level of the curriculum, 0 to 4.
+        episodes: Of each driver, mode and scenario, seeds from `first_seed` on.
+        first_seed: Seed of the first episode.
+        seconds: Length of an episode [s], less where the task is done before.
+        settle: Errors are scored from here on [s].
+        jobs: Processes at a time. No figure depends on it.
+        engine: One of `agents.engines.ENGINES`.
+        progress: Called with the share done, 0 to 1.
+
+    Raises:
+        UsageError: A name that is not known, a number out of range, nothing left to compare;
+            the option is named.
+        EnvError: A scenario, task or number of cars that does not exist or fit.
+    """
+    _check_numbers(episodes, first_seed, seconds, settle)
+    check_jobs(jobs)
+    work = find_engine(engine)
+    settings = [
+        Setting(
+            scenario=scenario,
+            task=task,
+            task_options=dict(task_options or {}),
+            cars=cars,
+            level=level,
+            seconds=seconds,
+            settle=settle,
+        )
+        for scenario in _each_once("--scenario", scenarios)
+    ]
+    chosen = line_up(_each_once("NAME", drivers), _modes(observations))
+    empty, notes = _who_can(chosen, settings)
+    seeds = range(first_seed, first_seed + episodes)
+    tasks = [
+        (row.contender, row.setting, seeds[k : k + BATCH])
+        for k in range(0, episodes, BATCH)
+        for row in empty
+    ]
+    done: dict[int, list[EpisodeResult]] = {}
+    for n, found in work(run_episodes, tasks, jobs):
+        done[n] = found
+        if progress is not None:
+            progress(len(done) / len(tasks))
+    rows = [
+        Row(
+            contender=row.contender,
+            trained_on=row.trained_on,
+            setting=row.setting,
+            scenario=row.scenario,
+            cars=row.cars,
+            episodes=tuple(e for n in range(k, len(tasks), len(empty)) for e in done[n]),
+        )
+        for k, row in enumerate(empty)
+    ]
+    return CompareResult(
+        rows=tuple(rows), notes=tuple(notes), first_seed=first_seed, seeds=episodes
+    )
+
+
+def _who_can(
+    contenders: Sequence[Contender], settings: Sequence[Setting]
+) -> tuple[list[Row], list[str]]:
+    """Rows without episodes of all who can drive, and why the others cannot."""
+    rows: list[Row] = []
+    refused: dict[tuple[str, str], list[str]] = {}
+    for setting in settings:
+        for contender in contenders:
+            entry = find_entry(contender.name)
+            parts = setting.parts(contender.observation, entry.history)
+            why = entry.refusal(contender.observation, parts.n_cars)
+            if why is not None:
+                refused.setdefault((contender.label, why), []).append(parts.scenario.name)
+                continue
+            rows.append(
+                Row(
+                    contender=contender,
+                    trained_on=entry.trained_on,
+                    setting=setting,
+                    scenario=parts.scenario.name,
+                    cars=parts.n_cars,
+                    episodes=(),
+                )
+            )
+    notes = [f"{who} in {', '.join(names)}: {why}" for (who, why), names in refused.items()]
+    if not rows:
+        raise UsageError("NAME: nothing to compare: " + "; ".join(notes))
+    found = {setting.parts(rows[0].contender.observation, 1).scenario.name for setting in settings}
+    if len(found) < len(settings):
+        raise UsageError("--scenario: expected scenarios of different names")
+    return rows, notes
+
+
+def _modes(names: Sequence[str]) -> list[str]:
+    """Modes of observations as they were named, each once.
+
+    Raises:
+        UsageError: No such mode, or none at all.
+    """
+    chosen = _each_once("--observation", names)
+    for name in chosen:
+        if name not in OBSERVATIONS:
+            modes = ", ".join(OBSERVATIONS)
+            raise UsageError(f"--observation: expected names of {modes}, got {name!r}")
+    return chosen
+
+
+def _each_once(option: str, names: Sequence[Name]) -> list[Name]:
+    """Names in order.
+
+    Raises:
+        UsageError: None at all.
+    """
+    chosen = list(dict.fromkeys(names))
+    if not chosen:
+        raise UsageError(f"{option}: expected at least one, got none")
+    return chosen
+
+
+def _check_numbers(episodes: int, first_seed: int, seconds: float, settle: float) -> None:
+    """See that numbers are in range.
+
+    Raises:
+        UsageError: One is not; the option is named.
+    """
+    if not 1 <= episodes <= MOST_EPISODES:
+        raise UsageError(f"--episodes: expected 1 to {MOST_EPISODES}, got {episodes}")
+    if first_seed < 0:
+        raise UsageError(f"--first-seed: expected 0 or more, got {first_seed}")
+    if not SHORTEST <= seconds <= LONGEST:
+        raise UsageError(f"--seconds: expected {SHORTEST:g} to {LONGEST:g}, got {seconds:g}")
+    if not 0.0 <= settle < seconds:
+        raise UsageError(f"--settle: expected 0 to less than --seconds, got {settle:g}")

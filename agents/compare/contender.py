@@ -1,0 +1,126 @@
+"""Who is compared: a driver by its name, and what it is shown."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from agents.compare.trained import find_trained
+from agents.controllers import CONTROLLERS
+from agents.driver import Driver
+from agents.errors import UsageError
+from agents.policy import shipped_names
+from relpos_env.interface.observations import observation_mode
+
+
+class Entry(Protocol):
+    """What the name of a driver stands for."""
+
+    @property
+    def title(self) -> str:
+        """For tables and records."""
+
+    @property
+    def trained_on(self) -> str | None:
+        """Observation mode that it was trained on, None if it was not trained."""
+
+    @property
+    def history(self) -> int:
+        """So many observations it sees in one."""
+
+    def refusal(self, observation: str, n_cars: int) -> str | None:
+        """Why it cannot drive so many cars on a mode of observations; None if it can."""
+
+    def driver(self, observation: str, n_cars: int) -> Driver:
+        """The driver of so many cars on a mode of observations."""
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerEntry:
+    """A controller: it takes the stretches that an observation has, whatever they are."""
+
+    title: str
+    trained_on: None = None
+    history: int = 1
+
+    def refusal(self, observation: str, n_cars: int) -> str | None:
+        """A mode in which it cannot read what it needs."""
+        try:
+            self.driver(observation, n_cars)
+        except UsageError as error:
+            return str(error)
+        return None
+
+    def driver(self, observation: str, n_cars: int) -> Driver:
+        """The controller of one mode."""
+        return CONTROLLERS[self.title](observation_mode(observation, n_cars).fields)
+
+
+def find_controller(name: str) -> Entry | None:
+    """A controller of that name, if there is one."""
+    return ControllerEntry(name) if name in CONTROLLERS else None
+
+
+SOURCES: tuple[Callable[[str], Entry | None], ...] = (find_controller, find_trained)
+"""Where drivers come from, asked one after the other; each gives None for names it does not
+know."""
+
+
+def find_entry(name: str) -> Entry:
+    """What a name stands for.
+
+    Args:
+        name: One of `agents.controllers.CONTROLLERS`, or a policy as for
+            `agents.policy.load_policy`.
+
+    Raises:
+        UsageError: Nothing, or a policy that cannot be used.
+    """
+    for find in SOURCES:
+        entry = find(name)
+        if entry is not None:
+            return entry
+    known = ", ".join((*CONTROLLERS, *shipped_names()))
+    raise UsageError(f"NAME: expected one of {known} or the file of a policy, got {name!r}")
+
+
+@dataclass(frozen=True, slots=True)
+class Contender:
+    """A driver and what it is shown."""
+
+    name: str
+    """What `find_entry` knows it by."""
+    observation: str
+    """One of `relpos_env.interface.observations.OBSERVATIONS`."""
+    title: str = ""
+    """What tables call the driver; by default its name."""
+
+    @property
+    def called(self) -> str:
+        """The driver, for tables and records."""
+        return self.title or self.name
+
+    @property
+    def label(self) -> str:
+        """Driver and observations, for tables and pictures."""
+        return f"{self.called} on {self.observation}"
+
+
+def line_up(names: Sequence[str], observations: Sequence[str]) -> list[Contender]:
+    """Every driver on every mode of observations.
+
+    Args:
+        names: See `find_entry`.
+        observations: Of `relpos_env.interface.observations.OBSERVATIONS`.
+
+    Raises:
+        UsageError: A name stands for nothing.
+    """
+    titles = [find_entry(name).title for name in names]
+    return [
+        # Drivers of the same title are told apart by what they were asked for as.
+        Contender(name, observation, title if titles.count(title) == 1 else name)
+        for name, title in zip(names, titles, strict=True)
+        for observation in observations
+    ]

@@ -1,0 +1,34 @@
+"""The median episode of every row, driven once more and filmed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from agents.compare.episode import film_episode
+from agents.compare.result import CompareResult
+from agents.engines import find_engine
+
+
+def median_films(
+    result: CompareResult,
+    *,
+    jobs: int = 1,
+    engine: str = "local",
+    progress: Callable[[float], None] | None = None,
+) -> list[dict[str, Any]]:
+    """Frames for the animation, by row; the same drives as those that were measured.
+
+    Args:
+        result: Whose rows.
+        jobs: Processes at a time.
+        engine: One of `agents.engines.ENGINES`.
+        progress: Called with the share done, 0 to 1.
+    """
+    tasks = [(r.contender, r.setting, r.median_episode.seed) for r in result.rows]
+    films: dict[int, dict[str, Any]] = {}
+    for n, frames in find_engine(engine)(film_episode, tasks, jobs):
+        films[n] = frames
+        if progress is not None:
+            progress(len(films) / len(tasks))
+    return [films[n] for n in range(len(tasks))]

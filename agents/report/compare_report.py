@@ -1,0 +1,128 @@
+"""The report of a comparison: table, pictures, and the median episode of every contender."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import Any
+
+from agents.compare.episode import IN_FORMATION
+from agents.compare.result import CompareResult, Row
+from agents.report import compare_figures as figures
+from agents.report.animation import player_markup
+from agents.report.page import Page, metres, png
+
+_TO = "\N{NO-BREAK SPACE}to\N{NO-BREAK SPACE}"
+HEADER = (
+    "driver", "trained on", "sees", "error [m]", "95 %", "tracking", "hits/min", "formed %",
+    "J/min", "ratio", "95 %",
+)  # fmt: skip
+"""Names of the columns."""
+
+
+def rows(result: CompareResult, scenario: str) -> list[list[str]]:
+    """Cells of the table of one scenario, one line for each driver and mode of observations."""
+    return [_cells(r) for r in result.records if r["scenario"] == scenario]
+
+
+def _cells(record: dict[str, Any]) -> list[str]:
+    share = record["time_in_formation"]
+    return [
+        record["policy"],
+        record["trained_on"] or "-",
+        record["observation"],
+        metres(record["formation_error"]),
+        _ends(record["ci95"]),
+        metres(record["tracking_error"]),
+        _number(record["collisions_per_min"], 2),
+        _number(None if share is None else 100.0 * share, 1),
+        _number(record["energy"], 1),
+        _number(record["ratio"], 3),
+        _ends(record["ratio_ci95"]),
+    ]
+
+
+SHORT_HEADER = ("driver", "error", "95 %", "track", "hits", "formed", "ratio", "95 %")
+"""Names of the columns of `short_rows`."""
+_LONGEST = 36
+"""[-] Letters of a driver in a terminal, so that no figure is cut."""
+
+
+def short_rows(result: CompareResult, scenario: str) -> list[list[str]]:
+    """Cells of the table of one scenario, for a terminal: without the energy."""
+    lines = []
+    for row, cells in zip(result.of(scenario), rows(result, scenario), strict=True):
+        sees = f" on {row.contender.observation}"
+        name, room = row.contender.called, _LONGEST - len(sees)
+        if len(name) > room:
+            name = f"{name[: room - 3]}..."
+        numbers = [cell.replace(_TO, "-") for cell in (*cells[3:8], *cells[9:])]
+        lines.append([name + sees, *numbers])
+    return lines
+
+
+def notes(result: CompareResult) -> list[str]:
+    """What a reader of the table must know, a line each."""
+    setting = result.rows[0].setting
+    by: dict[str, list[str]] = {}
+    for scenario in result.scenarios:
+        by.setdefault(result.reference(scenario).contender.label, []).append(scenario)
+    references = "; ".join(f"{label} in {', '.join(names)}" for label, names in by.items())
+    last = result.first_seed + result.seeds - 1
+    return [
+        f"Task {setting.task}, {result.seeds} episodes of {setting.seconds:g} s each, seeds "
+        f"{result.first_seed} to {last}, the same for all; means with 95 % intervals.",
+        f"Errors [m] and the time formed (every car's error below {IN_FORMATION:g} m) count from "
+        f"{setting.settle:g} s on; hits (contacts of all cars) and the energy of a car from the "
+        "start.",
+        f"ratio: formation error over that of {references}, on the same seeds.",
+        *(f"Left out: {note}." for note in result.notes),
+    ]
+
+
+def compare_files(result: CompareResult, films: Sequence[dict[str, Any]]) -> dict[str, str | bytes]:
+    """Everything that goes into the folder, by name.
+
+    Args:
+        result: What was found.
+        films: Frames of the median episode of every row.
+    """
+    drawn = figures.figures(result)
+    names = ", ".join(dict.fromkeys(c.called for c in result.contenders))
+    page = Page(f"Comparison on task {result.rows[0].setting.task}", names)
+    for scenario in result.scenarios:
+        page.heading(scenario)
+        page.table(HEADER, rows(result, scenario))
+    for line in notes(result):
+        page.text(line)
+    for name, (title, figure, caption) in drawn.items():
+        page.heading(title)
+        page.figure(figure, f"{caption} ({name})")
+    filmed = list(zip(result.rows, films, strict=True))
+    for n, scenario in enumerate(result.scenarios):
+        page.heading(f"Median episodes in {scenario}")
+        drives = {_title(r): frames for r, frames in filmed if r.scenario == scenario}
+        page.raw(player_markup(drives, running=n == 0))
+    lines = [*result.records, *result.episode_records]
+    return {
+        "report.html": page.render(),
+        "results.jsonl": "".join(json.dumps(r, allow_nan=False) + "\n" for r in lines),
+        **{name: png(figure) for name, (_, figure, _) in drawn.items()},
+    }
+
+
+def _title(row: Row) -> str:
+    """What an episode is called in the player."""
+    episode = row.median_episode
+    error = metres(episode.formation_error)
+    return f"{row.contender.label}: seed {episode.seed}, formation error {error} m"
+
+
+def _number(value: float | None, digits: int) -> str:
+    """A number for a table, or a dash."""
+    return "-" if value is None else f"{value:.{digits}f}"
+
+
+def _ends(ends: Sequence[float] | None) -> str:
+    """An interval for a table, or a dash."""
+    return "-" if ends is None else f"{ends[0]:.3f}{_TO}{ends[1]:.3f}"
