@@ -8,11 +8,15 @@ import click
 
 from agents.commands.bench import bench
 from agents.commands.calibrate import calibrate
+from agents.commands.compare import compare
 from agents.commands.demo import demo
 from agents.commands.evaluate import evaluate
+from agents.commands.export import export
+from agents.commands.policy import policy
 from agents.commands.protocol import protocol
 from agents.commands.simulate import simulate
 from agents.commands.track import track
+from agents.commands.train import train
 from agents.errors import UsageError
 
 
@@ -22,7 +26,19 @@ def cli() -> None:
     """Relative positions without anchors: track, simulate, drive in formation, measure."""
 
 
-for command in (track, calibrate, simulate, demo, evaluate, protocol, bench):
+for command in (
+    track,
+    calibrate,
+    simulate,
+    demo,
+    evaluate,
+    compare,
+    train,
+    export,
+    policy,
+    protocol,
+    bench,
+):
     cli.add_command(command)
 
 

@@ -18,6 +18,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from agents.settings import leaves
+from agents.train.config import TrainConfig
 from relpos_env import config
 from relpos_env.interface.actions import ACTIONS, MAX_SPEED, MAX_STEERING, DiscreteActions
 from relpos_env.interface.observations import (
@@ -187,6 +189,16 @@ def drawn(s: Scenario) -> str:
     return f"level {nearest}, {told}"
 
 
+def training() -> str:
+    """Everything a training run depends on."""
+    rows = []
+    for leaf in leaves(TrainConfig):
+        default = ",".join(map(str, leaf.default)) if leaf.many else leaf.default
+        shown = f"`{default}`" if default != "" else "none"
+        rows.append([f"`--{leaf.name.replace('_', '-')}`", shown, leaf.help])
+    return markdown(("option", "default", "meaning"), rows)
+
+
 TABLES: dict[str, Callable[[], str]] = {
     "sizes": sizes,
     **{f"observation-{mode}": partial(observations, mode) for mode in OBSERVATIONS},
@@ -195,6 +207,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "weights": weights,
     "arguments": arguments,
     "scenarios": scenarios,
+    "training": training,
 }
 """Name to what makes it."""
 

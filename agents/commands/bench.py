@@ -61,6 +61,39 @@ def bench_radio(as_json: bool) -> None:
     _show_bench("Time of one message-level round", rows, as_json)
 
 
+@bench.command("policy")
+@click.option("--steps", default=2000, show_default=True, help="Calls per turn.")
+@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+def bench_policy(steps: int, as_json: bool) -> None:
+    """Time of one step of a policy, alone and with the observation, beside plain numpy."""
+    from agents.bench.policy import bench_policy as run
+
+    if not 1 <= steps <= 1_000_000:
+        raise UsageError(f"--steps: expected 1 to 1000000, got {steps}")
+    with progress_bar("policy") as report:
+        rows = run(steps=steps, progress=report)
+    _show_bench("Time of one step of a policy", rows, as_json)
+
+
+@bench.command("train")
+@click.option("--updates", default=6, show_default=True, help="Updates per turn.")
+@click.option("--threads", default=2, show_default=True, help="Of simulation and learning.")
+@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+def bench_train(updates: int, threads: int, as_json: bool) -> None:
+    """Frames per second of training, beside an environment that costs nothing."""
+    if not 1 <= updates <= 10_000:
+        raise UsageError(f"--updates: expected 1 to 10000, got {updates}")
+    if not 1 <= threads <= 64:
+        raise UsageError(f"--threads: expected 1 to 64, got {threads}")
+    try:
+        from agents.bench.train import bench_train as run
+    except ImportError as error:
+        raise UsageError(f"training needs {error.name}: pip install 'relpos-env[train]'") from error
+    with progress_bar("training") as report:
+        rows = run(updates=updates, threads=threads, progress=report)
+    _show_bench("Frames per second of training", rows, as_json)
+
+
 @bench.command("env")
 @click.option("--quick", is_flag=True, help="Fewer and shorter figures.")
 @click.option("--out", type=Path, help="Folder for a picture of the curves and the parts.")
@@ -125,9 +158,13 @@ def _show_bench(title: str, rows: list[dict[str, Any]], as_json: bool) -> None:
         emit_json(rows)
         return
     header = ["case", "value", "unit", "peer", "peer value", "ratio"]
-    figures = [(f"{r['value']:.2f}", f"{r['peer_value']:.1f}", f"{r['ratio']:.0f}") for r in rows]
+    figures = [(f"{r['value']:.2f}", f"{r['peer_value']:.1f}", _ratio(r["ratio"])) for r in rows]
     cells = [
         [r["case"], value, r["unit"], r["peer"], peer, ratio]
         for r, (value, peer, ratio) in zip(rows, figures, strict=True)
     ]
     print_table(title, header, cells)
+
+
+def _ratio(value: float) -> str:
+    return f"{value:.0f}" if value >= 10.0 else f"{value:.2f}"

@@ -1,0 +1,7 @@
+"""`relpos bench train`: frames per second of training, beside an environment that costs nothing."""
+
+from __future__ import annotations
+
+from agents.bench.train.rows import bench_train
+
+__all__ = ["bench_train"]

@@ -1,0 +1,89 @@
+"""The figures of `relpos bench train`."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import torch
+from stable_baselines3 import PPO
+from stable_baselines3.common.logger import Logger
+from stable_baselines3.common.vec_env import VecEnv
+
+from agents.bench.env.turns import best_of_turns
+from agents.bench.train.nothing import Nothing
+from agents.train.config import TrainConfig
+from agents.train.environments import make_rooms
+from agents.train.learner import make_model, run_leg
+
+Row = dict[str, Any]
+TURNS = 3
+CASES: dict[str, tuple[str, ...]] = {
+    "cars-nlos, 3 cars": ("cars-nlos",),
+    "cars-nlos, swarm-nlos": ("cars-nlos", "swarm-nlos"),
+}
+"""What is trained in."""
+
+
+def bench_train(
+    *, updates: int = 6, threads: int = 2, progress: Callable[[float], None] | None = None
+) -> list[Row]:
+    """Frames per second of whole training, simulation and learning together.
+
+    The peer is the same learner with the same networks, seats and batches, in an environment that
+    costs nothing: the most that Stable-Baselines3 can reach. Both learn from the observations of
+    cars that are driven, so that equally many absent cars are left out.
+
+    Args:
+        updates: Of a turn.
+        threads: Of simulation and learning.
+        progress: Called with the share done, 0 to 1.
+    """
+    torch.set_num_threads(threads)
+    rows: list[Row] = []
+    for case, scenarios in CASES.items():
+        config = TrainConfig(frames=10**9, threads=threads, leg=updates)
+        config = replace(config, env=replace(config.env, scenarios=scenarios))
+        rooms = make_rooms(config, None)
+        ours = _quiet(make_model(config, rooms))
+        # Compiles what is not, and puts the cars somewhere.
+        run_leg(ours, replace(config, leg=2), 0)
+        peer = _quiet(make_model(config, Nothing(rooms, rooms.reset())))
+        run_leg(peer, replace(config, leg=1), 0)
+        us, peer_us = best_of_turns([_turn(ours, config), _turn(peer, config)], TURNS)
+        rooms.close()
+        rows.append(
+            {
+                "case": case,
+                "value": 1e6 / us,
+                "unit": "frames/s",
+                "peer": "an environment that costs nothing",
+                "peer_value": 1e6 / peer_us,
+                "ratio": peer_us / us,
+                "threads": threads,
+                "us_per_frame": us,
+            }
+        )
+        if progress is not None:
+            progress(len(rows) / len(CASES))
+    return rows
+
+
+def _quiet(model: PPO) -> PPO:
+    model.set_logger(Logger(None, []))
+    return model
+
+
+def _turn(model: PPO, config: TrainConfig) -> Callable[[], float]:
+    """A leg; its time for a frame [us]."""
+    env: VecEnv = model.env
+
+    def turn() -> float:
+        start = time.perf_counter()
+        run_leg(model, config, 1)
+        frames = config.leg * config.ppo.steps * env.num_envs
+        return 1e6 * (time.perf_counter() - start) / float(frames)
+
+    return turn

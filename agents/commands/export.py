@@ -1,0 +1,37 @@
+"""`relpos export`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+from agents.console import emit_json
+from agents.errors import UsageError
+
+
+@click.command()
+@click.argument("run", type=Path)
+@click.option("--out", type=Path, required=True, help="Folder for NAME.onnx and NAME.json.")
+@click.option("--name", help="Of the policy; by default that of the run's folder.")
+@click.option(
+    "--results", type=Path, help="results.jsonl of `relpos compare`, for the policy's card."
+)
+@click.option("--json", "as_json", is_flag=True, help="The card as JSON on stdout, nothing else.")
+def export(run: Path, out: Path, name: str | None, results: Path | None, as_json: bool) -> None:
+    """Write the best policy of a training run as files that run without torch."""
+    try:
+        from agents.train.export import export_policy, read_results
+    except ImportError as error:
+        raise UsageError(
+            f"exporting needs {error.name}: pip install 'relpos-env[train]'"
+        ) from error
+    told = read_results(results) if results is not None else []
+    path = export_policy(run, out, name=name, results=told)
+    if as_json:
+        from agents.policy import load_policy
+
+        emit_json([json.loads(load_policy(path).card.to_json())])
+    else:
+        click.echo(f"written: {path} and {path.with_suffix('.json').name}")

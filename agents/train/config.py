@@ -1,0 +1,94 @@
+"""Everything that a training run depends on; saved with it, and the source of the options."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from agents.settings import number
+
+FORMAT = 1
+"""Version of the run folder; another one is refused."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EnvSetup:
+    """What the policy is trained in, and what it sees."""
+
+    scenarios: tuple[str, ...] = ("cars-nlos", "swarm-nlos")
+    """Names or TOML files; the environments are shared out among them."""
+    task: str = "ring"
+    """One of `relpos_env.tasks.TASKS`."""
+    observation: str = "estimate"
+    """One of `relpos_env.interface.observations.OBSERVATIONS`."""
+    history: int = number(1, 1, 64)
+    """Observations in one, the newest first."""
+    cars: int = number(6, 2, 20)
+    """Slots for cars, 2 to 20: the policy drives groups of up to so many, at least those of the
+    scenarios."""
+    levels: tuple[int, ...] = field(default=(), metadata={"low": 0, "high": 4})
+    """Levels of randomisation, 0 to 4, gone through one after the other in equal shares of the
+    training; none keeps what the scenarios say."""
+    seconds: float = number(30.0, 12, 3600)
+    """[s] Length of an episode."""
+    weights: tuple[str, ...] = ("collision=5",)
+    """Weights of reward terms that differ from the task's own, TERM=WEIGHT."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Networks:
+    """Shapes of actor and critic."""
+
+    width: int = number(64, 4, 1024)
+    """Units of each layer."""
+    depth: int = number(2, 1, 6)
+    """Layers for each of the others, before the mean."""
+    layers: int = number(2, 1, 6)
+    """Layers behind it."""
+    critic: Literal["own", "central"] = "own"
+    """What the critic sees: what the car sees, or the truth of all cars as well."""
+    log_std: float = number(-1.0, -5, 1)
+    """[-] Logarithm of the standard deviation of actions at first."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ppo:
+    """Proximal policy optimisation (Schulman et al., arXiv 1707.06347)."""
+
+    envs: int = number(64, 1, 4096)
+    """Environments side by side."""
+    steps: int = number(64, 8, 4096)
+    """Decisions of each between two updates."""
+    batch: int = number(2048, 16, 1048576)
+    """Transitions of a gradient step."""
+    epochs: int = number(5, 1, 100)
+    """Times that every transition is learned from."""
+    learning_rate: float = number(1e-3, 1e-07, 1)
+    """[-] At first; falls to a hundredth along half a cosine."""
+    gamma: float = number(0.95, 0, 1)
+    """[-] Discount of a decision of 0.1 s: 2 s are foreseen."""
+    gae_lambda: float = number(0.9, 0, 1)
+    """[-] Of the generalised advantage estimate."""
+    clip: float = number(0.2, 0.01, 1)
+    """[-] Largest relative change of a probability by an update."""
+    entropy: float = number(0.0, 0, 1)
+    """[-] Weight of the entropy bonus."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrainConfig:
+    """A training run."""
+
+    frames: int = number(6_000_000, 1000, 1000000000000)
+    """Decisions of cars until the end, those of absent ones counted; the last leg is whole."""
+    seed: int = number(0, 0, 2147483647)
+    """Same seed, same weights, bit for bit on one machine with equal versions and threads."""
+    leg: int = number(40, 1, 10000)
+    """Updates from checkpoint to checkpoint; each leg begins with new episodes."""
+    threads: int = number(2, 1, 256)
+    """Threads of simulation and of learning."""
+    eval_episodes: int = number(24, 1, 10000)
+    """Episodes after each leg that tell the best policy, the same every time."""
+    env: EnvSetup = field(default_factory=EnvSetup)
+    net: Networks = field(default_factory=Networks)
+    ppo: Ppo = field(default_factory=Ppo)

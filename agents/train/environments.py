@@ -1,0 +1,94 @@
+"""The environments of a run: those it learns in and those that tell how good it is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from agents.errors import UsageError
+from agents.policy.layout import Layout
+from agents.train.config import TrainConfig
+from agents.train.rooms import Rooms
+from relpos_env.config import FormationConfig, Parts
+from relpos_env.sb3_vec_env import FormationVecEnv
+from relpos_env.timing import DECISION
+
+
+def layout_of(config: TrainConfig) -> Layout:
+    """What the policy sees."""
+    return Layout(config.env.observation, config.env.cars, config.env.history)
+
+
+def env_arguments(config: TrainConfig, scenario: str, level: int | None) -> dict[str, Any]:
+    """Arguments of the environments of one scenario, with as many slots as it has cars."""
+    env = config.env
+    return {
+        "scenario": Path(scenario) if scenario.endswith(".toml") else scenario,
+        "task": env.task,
+        "level": level,
+        "observation": env.observation,
+        "history": env.history,
+        "weights": _weights(env.weights),
+        "max_cycles": round(env.seconds / DECISION),
+    }
+
+
+def _weights(given: tuple[str, ...]) -> dict[str, float]:
+    """Weights by term.
+
+    Raises:
+        UsageError: One is not TERM=WEIGHT.
+    """
+    weights = {}
+    for text in given:
+        term, _, weight = text.partition("=")
+        try:
+            weights[term] = float(weight)
+        except ValueError as error:
+            raise UsageError(f"--weights: expected TERM=WEIGHT,..., got {text!r}") from error
+    return weights
+
+
+def check_environments(config: TrainConfig) -> Parts:
+    """See that all environments of a run can be, at every level; the parts of the first.
+
+    Raises:
+        UsageError: More cars than the policy has slots for, or no scenario at all.
+        EnvError: An environment that cannot be.
+    """
+    names, levels = config.env.scenarios, config.env.levels or (None,)
+    if not names:
+        raise UsageError("--scenarios: expected at least one")
+    if config.ppo.envs < len(names):
+        raise UsageError(
+            f"--envs: expected at least {len(names)}, one for each scenario, got {config.ppo.envs}"
+        )
+    every = [
+        FormationConfig(**env_arguments(config, name, level)).resolve()
+        for name in names
+        for level in levels
+    ]
+    most = max(parts.n_cars for parts in every)
+    if most > config.env.cars:
+        raise UsageError(
+            f"--cars: expected at least {most}, the cars of the scenarios, got {config.env.cars}"
+        )
+    return FormationConfig(**env_arguments(config, names[0], None)).resolve()
+
+
+def make_rooms(config: TrainConfig, level: int | None) -> Rooms:
+    """The environments to learn in at a level of the curriculum."""
+    scenarios = config.env.scenarios
+    shares = np.diff(np.linspace(0, config.ppo.envs, len(scenarios) + 1).astype(int))
+    parts = [
+        FormationVecEnv(
+            int(n),
+            threads=min(config.threads, int(n)),
+            with_truth=config.net.critic == "central",
+            **env_arguments(config, scenario, level),
+        )
+        for scenario, n in zip(scenarios, shares, strict=True)
+    ]
+    return Rooms(parts, layout_of(config))

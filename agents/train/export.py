@@ -1,0 +1,114 @@
+"""A trained policy as files that run without torch: what `relpos export` does."""
+
+from __future__ import annotations
+
+import json
+import platform
+import warnings
+from collections.abc import Iterable
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from agents.errors import UsageError
+from agents.policy.card import Card
+from agents.policy.write import write_policy
+from agents.settings import to_json
+from agents.train.environments import layout_of
+from agents.train.learner import make_policy
+from agents.train.network import Actor
+from agents.train.run_folder import BEST, RunFolder, restore_weights
+
+PACKAGES = ("relpos-env", "torch", "stable-baselines3", "numpy", "numba")
+"""Whose versions a card tells."""
+
+
+def export_policy(
+    run: Path, out: Path, *, name: str | None = None, results: Iterable[dict[str, Any]] = ()
+) -> Path:
+    """Write the best policy of a run as a network and a card.
+
+    Args:
+        run: Folder of the run.
+        out: Folder to write to.
+        name: Of the policy; by default that of the run's folder.
+        results: What it reached, for the card, as of `relpos compare`.
+
+    Returns:
+        The file with the network.
+
+    Raises:
+        UsageError: No run, nothing trained yet, or the folder cannot be written to.
+    """
+    folder = RunFolder(run)
+    config = folder.config()
+    found = folder.load(BEST)
+    if found is None:
+        raise UsageError(f"{run}: nothing trained yet, expected {BEST}")
+    tensors, progress = found
+    policy = make_policy(config)
+    restore_weights(policy, tensors)
+    layout = layout_of(config)
+    training = {
+        "observation": config.env.observation,
+        "seed": config.seed,
+        "frames": progress.log[progress.best_leg]["frames"],
+        "leg": progress.best_leg,
+        "config": to_json(config),
+        "measured": progress.log[progress.best_leg],
+        "versions": {p: version(p) for p in PACKAGES} | {"python": platform.python_version()},
+    }
+    card = Card(
+        name=name or run.resolve().name, layout=layout, training=training, results=tuple(results)
+    )
+    write_policy(out, card.name, to_onnx(Actor(policy), layout.size), card)
+    return out / f"{card.name}.onnx"
+
+
+def read_results(path: Path) -> list[dict[str, Any]]:
+    """Records from a file of JSON lines.
+
+    Raises:
+        UsageError: It cannot be read, or a line is no JSON object.
+    """
+    try:
+        lines = path.read_text().splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise UsageError(f"--results {path}: cannot be read ({error})") from error
+    found = []
+    for k, line in enumerate(lines):
+        try:
+            record = json.loads(line)
+        except ValueError as error:
+            raise UsageError(f"--results {path}: line {k + 1} is no JSON ({error})") from error
+        if not isinstance(record, dict):
+            raise UsageError(f"--results {path}: line {k + 1}: expected an object")
+        found.append(record)
+    return found
+
+
+def to_onnx(actor: Actor, size: int) -> bytes:
+    """The network as ONNX: `observations` (batch, size) to `actions` (batch, 2).
+
+    Args:
+        actor: To be written.
+        size: Numbers in an observation.
+    """
+    with warnings.catch_warnings():
+        # The exporter warns of its own future.
+        warnings.simplefilter("ignore")
+        program = torch.onnx.export(
+            actor.eval(),
+            (torch.zeros(2, size),),
+            input_names=["observations"],
+            output_names=["actions"],
+            dynamic_shapes=({0: torch.export.Dim("batch", min=1, max=1 << 16)},),
+            dynamo=True,
+            verbose=False,
+            external_data=False,
+        )
+    assert program is not None
+    data: bytes = program.model_proto.SerializeToString()
+    return data

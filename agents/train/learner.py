@@ -1,0 +1,92 @@
+"""Proximal policy optimisation of Stable-Baselines3, set up for a swarm."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from typing import Any
+
+import numpy as np
+from stable_baselines3 import PPO
+from stable_baselines3.common.utils import set_random_seed
+
+from agents.train.buffer import SwarmRolloutBuffer
+from agents.train.config import TrainConfig
+from agents.train.environments import layout_of
+from agents.train.network import SwarmPolicy
+from agents.train.rooms import Rooms, observation_space
+from relpos_env.formation import N_TRUTH
+from relpos_env.interface.actions import ContinuousActions
+
+
+def level_of(config: TrainConfig, frames: int) -> int | None:
+    """Level of the curriculum after so many frames; None for what the scenarios say."""
+    levels = config.env.levels
+    return levels[min(frames * len(levels) // config.frames, len(levels) - 1)] if levels else None
+
+
+def make_model(config: TrainConfig, rooms: Rooms) -> PPO:
+    """The learner with fresh weights that follow from the seed."""
+    ppo = config.ppo
+    models: list[PPO] = []
+
+    def learning_rate(_: float) -> float:
+        # Stable-Baselines3 counts progress within a leg; this is that of the run.
+        share = min(models[0].num_timesteps / config.frames, 1.0) if models else 0.0
+        return ppo.learning_rate * (0.01 + 0.495 * (1.0 + math.cos(math.pi * share)))
+
+    with warnings.catch_warnings():
+        # Of batches that do not divide the experience: ours leaves the rest out.
+        warnings.filterwarnings("ignore", message="You have specified a mini-batch size")
+        model = PPO(
+            SwarmPolicy,
+            rooms,
+            n_steps=ppo.steps,
+            batch_size=min(ppo.batch, ppo.steps * rooms.num_envs),
+            n_epochs=ppo.epochs,
+            learning_rate=learning_rate,
+            gamma=ppo.gamma,
+            gae_lambda=ppo.gae_lambda,
+            clip_range=ppo.clip,
+            ent_coef=ppo.entropy,
+            rollout_buffer_class=SwarmRolloutBuffer,
+            policy_kwargs=network_arguments(config),
+            seed=config.seed,
+            device="cpu",
+        )
+    models.append(model)
+    return model
+
+
+def network_arguments(config: TrainConfig) -> dict[str, Any]:
+    """Arguments of `SwarmPolicy` besides its spaces."""
+    net = config.net
+    return {
+        "features": {
+            "fields": layout_of(config).fields,
+            "history": config.env.history,
+            "width": net.width,
+            "depth": net.depth,
+        },
+        "n_state": N_TRUTH * config.env.cars if net.critic == "central" else 0,
+        "net_arch": [net.width] * net.layers,
+        "log_std_init": net.log_std,
+    }
+
+
+def make_policy(config: TrainConfig) -> SwarmPolicy:
+    """The networks alone, to put trained weights into."""
+    arguments = network_arguments(config)
+    space = observation_space(layout_of(config), with_truth=config.net.critic == "central")
+    return SwarmPolicy(space, ContinuousActions().space(), lambda _: 0.0, **arguments)
+
+
+def run_leg(model: PPO, config: TrainConfig, leg: int) -> None:
+    """Learn for one leg, from new episodes on."""
+    seeds = np.random.SeedSequence([config.seed, leg]).generate_state(2)
+    set_random_seed(int(seeds[0] >> 1))
+    model.env.seed(int(seeds[1] >> 1))
+    # Nothing observed yet: learning begins with a reset.
+    model._last_obs = None
+    frames = config.leg * config.ppo.steps * model.n_envs
+    model.learn(frames, reset_num_timesteps=False, log_interval=config.leg)

@@ -1,0 +1,130 @@
+"""The environments that a policy is trained in: several scenarios side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium.spaces import Box
+from stable_baselines3.common.vec_env import VecEnv
+
+from agents.policy.layout import Layout
+from agents.policy.padding import Padding
+from relpos_env.formation import N_TRUTH
+from relpos_env.interface.observations import space_of
+from relpos_env.interface.observations.base import F32
+from relpos_env.sb3_vec_env import FormationVecEnv
+from tracking.arrays import Bool
+
+
+class Rooms(VecEnv):  # type: ignore[misc]
+    """The seats of several `FormationVecEnv`, one after the other, as of one.
+
+    Environments may have fewer cars than the policy has slots for: what their cars see is padded
+    as if the others were absent, and they take no more seats than they need.
+    """
+
+    def __init__(self, parts: Sequence[FormationVecEnv], layout: Layout) -> None:
+        """Join them.
+
+        Args:
+            parts: Of one observation mode and action space; all with the truth or none.
+            layout: What the policy sees.
+        """
+        self.parts = tuple(parts)
+        self._views = [_SeatView(layout, part) for part in self.parts]
+        self._rng = np.random.default_rng(0)
+        ends = np.cumsum([p.num_envs for p in parts])
+        self._seats = [slice(int(e) - p.num_envs, int(e)) for e, p in zip(ends, parts, strict=True)]
+        self.render_mode = None
+        space = observation_space(layout, with_truth=parts[0].with_truth)
+        super().__init__(int(ends[-1]), space, parts[0].action_space)
+
+    def seed(self, seed: int | None = None) -> Sequence[int | None]:
+        """Let the next reset begin the episodes of a seed, each with another time left to go.
+
+        Environments so do not end together, wherever training is taken up.
+        """
+        if seed is not None:
+            self._rng = np.random.default_rng(seed)
+            for part in self.parts:
+                part.seed(int(self._rng.integers(1 << 30)))
+        return [seed] * self.num_envs
+
+    def reset(self) -> F32:
+        """Begin episodes everywhere; observations, (seat, size)."""
+        seen = [view(part.reset()) for view, part in zip(self._views, self.parts, strict=True)]
+        for part in self.parts:
+            part.stagger(self._rng)
+        observations: F32 = np.concatenate(seen)
+        return observations
+
+    def step_async(self, actions: F32) -> None:
+        """Take the actions of all seats."""
+        for part, seats in zip(self.parts, self._seats, strict=True):
+            part.step_async(actions[seats])
+
+    def step_wait(self) -> tuple[F32, F32, Bool, list[dict[str, Any]]]:
+        """Drive for one decision."""
+        seen, rewards, dones, infos = [], [], [], []
+        for view, part in zip(self._views, self.parts, strict=True):
+            observations, reward, done, told = part.step_wait()
+            for info in told:
+                if "terminal_observation" in info:
+                    info["terminal_observation"] = view(info["terminal_observation"])
+            seen.append(view(observations))
+            rewards.append(reward)
+            dones.append(done)
+            infos += told
+        return np.concatenate(seen), np.concatenate(rewards), np.concatenate(dones), infos
+
+    def close(self) -> None:
+        """Release the threads."""
+        for part in self.parts:
+            part.close()
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """An attribute, once for every seat asked for."""
+        return [getattr(self, attr_name)] * len(list(self._get_indices(indices)))
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """Set an attribute; the seats share it."""
+        setattr(self, attr_name, value)
+
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any
+    ) -> list[Any]:
+        """Call a method once; its result for every seat asked for."""
+        result = getattr(self, method_name)(*method_args, **method_kwargs)
+        return [result] * len(list(self._get_indices(indices)))
+
+    def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
+        """False for every seat."""
+        return [False] * len(list(self._get_indices(indices)))
+
+
+def observation_space(layout: Layout, *, with_truth: bool) -> Box:
+    """What a seat sees: an observation, and the truth of as many cars behind it if asked for."""
+    space = space_of(layout.fields, layout.history)
+    more = np.full(N_TRUTH * layout.n_cars * with_truth, np.inf, np.float32)
+    return Box(np.append(space.low, -more), np.append(space.high, more))
+
+
+class _SeatView:
+    """Observations of one part as the policy wants them."""
+
+    def __init__(self, layout: Layout, part: FormationVecEnv) -> None:
+        given = Layout(layout.observation, part.n_cars, layout.history)
+        self._pad, self._size = Padding(layout, given), given.size
+        self._n_truth = N_TRUTH * layout.n_cars * part.with_truth
+
+    def __call__(self, observations: F32) -> F32:
+        """Padded, (..., size)."""
+        seen = self._pad(observations[..., : self._size])
+        if not self._n_truth:
+            return seen
+        truth = np.zeros((*seen.shape[:-1], self._n_truth), np.float32)
+        told = observations[..., self._size :]
+        truth[..., : told.shape[-1]] = told
+        return np.concatenate([seen, truth], axis=-1)

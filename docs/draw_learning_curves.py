@@ -1,0 +1,45 @@
+"""Learning curves of training runs: their rows into one file, and the picture of that file.
+
+python docs/draw_learning_curves.py RUN ...    collects legs.jsonl of the runs, then draws
+python docs/draw_learning_curves.py            draws docs/learning-curves.jsonl again
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from agents.report.page import png
+from agents.report.train_report import curves
+from agents.train.run_folder import LOG, RunFolder
+
+DOCS = Path(__file__).resolve().parent
+ROWS, PICTURE = DOCS / "learning-curves.jsonl", DOCS / "images" / "learning-curves.png"
+
+
+def collect(folders: list[Path]) -> list[dict[str, Any]]:
+    """Rows of all runs, each with what it was trained on and its seed."""
+    rows = []
+    for folder in folders:
+        config = RunFolder(folder).config()
+        which = {"trained_on": config.env.observation, "seed": config.seed}
+        lines = (folder / LOG).read_text().splitlines()
+        rows += [{**which, **json.loads(line)} for line in lines]
+    return rows
+
+
+def draw(rows: list[dict[str, Any]]) -> bytes:
+    """The picture, one line a run, one colour for each mode of observations."""
+    runs: dict[tuple[str, int], list[dict[str, Any]]] = {}
+    for row in rows:
+        runs.setdefault((row["trained_on"], row["seed"]), []).append(row)
+    return png(curves([(f"on {name}", run) for (name, _), run in runs.items()]))
+
+
+if __name__ == "__main__":
+    if sys.argv[1:]:
+        found = collect([Path(name) for name in sys.argv[1:]])
+        ROWS.write_text("".join(json.dumps(row) + "\n" for row in found))
+    PICTURE.write_bytes(draw([json.loads(line) for line in ROWS.read_text().splitlines()]))
