@@ -8,7 +8,17 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-HEAVY = ("torch", "pygame", "matplotlib", "stable_baselines3", "serial", "rich", "filterpy")
+HEAVY = (
+    "torch",
+    "pygame",
+    "matplotlib",
+    "stable_baselines3",
+    "serial",
+    "rich",
+    "filterpy",
+    "onnx",
+    "onnxruntime",
+)
 
 
 @pytest.mark.parametrize(
