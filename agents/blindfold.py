@@ -8,7 +8,7 @@ from agents.policy.layout import Layout
 from relpos_env.interface.observations.base import F32
 from relpos_env.interface.observations.standard_fields import own_fields, wish_fields
 
-KEPT = {f.name for f in (*wish_fields(1), *own_fields())}
+KEPT = {f.name for f in (*wish_fields(1), *own_fields(1))}
 """What is asked of a car and what it knows of itself."""
 
 

@@ -90,6 +90,7 @@ def demo(
     seconds: float = 60.0,
     seed: int = 0,
     cars: int | None = None,
+    proximity: int | None = None,
     controller: str | None = None,
     policy: str | Path | None = None,
     progress: Callable[[float], None] | None = None,
@@ -103,6 +104,8 @@ def demo(
         seconds: Length, less where the task is done before.
         seed: Same seed, same run.
         cars: Number of cars; by default that of the scenario.
+        proximity: Beams that measure distances round each car; by default those of the policy, or
+            none.
         controller: One of `agents.controllers.CONTROLLERS`, by default `CONTROLLER`.
         policy: A trained policy in its place, as for `load_policy`; the cars observe what it
             was trained on.
@@ -119,6 +122,13 @@ def demo(
     controller = controller or CONTROLLER
     drives: dict[str, Drive] = {}
     modes, history = _modes(trained), 1 if trained is None else trained.layout.history
+    if trained is not None:
+        if proximity not in (None, trained.layout.proximity):
+            raise UsageError(
+                f"proximity: expected {trained.layout.proximity}, the beams of the policy, "
+                f"got {proximity}"
+            )
+        proximity = trained.layout.proximity
     for n, (told, mode) in enumerate(modes.items()):
 
         def tell(share: float, n: int = n) -> None:
@@ -131,6 +141,7 @@ def demo(
             n_cars=cars,
             observation=mode,
             history=history,
+            proximity=proximity or 0,
             max_cycles=round(seconds / DECISION),
             record=told == "estimate",
         )
@@ -138,7 +149,7 @@ def demo(
         if trained is None:
             driver = look_up(CONTROLLERS, controller, "controller")(env.fields)
         else:
-            driver = trained.driver(Layout(mode, len(env.possible_agents), history))
+            driver = trained.driver(Layout(mode, len(env.possible_agents), history, proximity or 0))
         drives[told] = drive(env, driver, seed, blind=told == "nothing", progress=tell)
         if told == "estimate":
             name = env.scenario.name

@@ -11,6 +11,7 @@ import numpy as np
 
 from relpos_env.errors import EnvError
 from relpos_env.interface.actions import ActionMode, action_mode
+from relpos_env.interface.beams import MOST_BEAMS
 from relpos_env.interface.observations import ObservationMode, observation_mode
 from relpos_env.loop import default_params
 from relpos_env.scenarios import Scenario
@@ -45,6 +46,8 @@ class FormationConfig:
     """One of `relpos_env.interface.observations.OBSERVATIONS`."""
     history: int = 1
     """So many observations in one, the newest first."""
+    proximity: int = 0
+    """Beams that measure distances round each car, 0 to 32; they end observations."""
     actions: str = "continuous"
     """One of `relpos_env.interface.actions.ACTIONS`."""
     filter: str = DEFAULT_FILTER
@@ -70,6 +73,7 @@ class FormationConfig:
             self,
             max_cycles=whole_number("max_cycles", self.max_cycles, 1, 800_000),
             history=whole_number("history", self.history, 1, 64),
+            proximity=whole_number("proximity", self.proximity, 0, MOST_BEAMS),
         )
         try:
             filter_builder(self.filter)
@@ -96,7 +100,7 @@ class FormationConfig:
             scenario=scenario,
             n_cars=n_cars,
             task_options=options,
-            mode=observation_mode(self.observation, n_cars),
+            mode=observation_mode(self.observation, n_cars, config.proximity),
             actions=action_mode(self.actions),
             params=self.params or default_params(scenario, n_cars),
         )

@@ -56,6 +56,7 @@ class Formation:
             filter=config.filter,
             params=parts.params,
             n_steps=round(DECISION / DT),
+            proximity=config.proximity,
         )
         self.task = parts.make_task(n_envs)
         self.operator = Operator(config.operator, n, n_envs)

@@ -55,13 +55,14 @@ class TrackedSwarm:
         filter: str,
         params: TrackerParams,
         n_steps: int = 10,
+        proximity: int = 0,
     ) -> None:
-        self.swarm = Swarm(scenario, n_cars, n_envs, n_steps)
+        self.swarm = Swarm(scenario, n_cars, n_envs, n_steps, proximity)
         self.tracker = Tracker(self.swarm.constellation, params, filter=filter, n_envs=n_envs)
         self.horizon = Horizon(params.horizon, n_envs)
         self._room = waiting_at_most(scenario, n_cars, params, n_steps)
         self.horizon.reserve(self._room)
-        self.view: View = make_view(n_envs, n_cars)
+        self.view: View = make_view(n_envs, n_cars, proximity)
         self.estimate = TeamEstimate.empty(self.swarm.constellation, np.zeros(n_envs))
         """The tracker's last estimate, as old as the horizon, overwritten by the next."""
         self._bind()
@@ -131,6 +132,7 @@ class TrackedSwarm:
         view.present[:] = state.present
         view.speed[:] = swarm.odometer
         view.steering[:] = state.steering
+        view.near[:] = swarm.proximity
         self._wait()
         self.estimate.t[:] = self.horizon.state.released
         self._orient()

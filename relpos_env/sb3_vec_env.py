@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from gymnasium.spaces import Box
 from gymnasium.utils import seeding
-from stable_baselines3.common.vec_env import VecEnv
 
 from relpos_env.config import configure
 from relpos_env.errors import EnvError
@@ -16,13 +15,14 @@ from relpos_env.formation import N_TRUTH, Formation
 from relpos_env.interface.observations import space_of
 from relpos_env.interface.observations.base import F32
 from relpos_env.render.film import Film, check_render_mode
+from relpos_env.sb3_seats import SharedSeats
 from tracking.arrays import F64, Bool
 
 _NOTHING: dict[str, Any] = {}
 _IDLE: dict[str, Any] = {"active": False}
 
 
-class FormationVecEnv(VecEnv):  # type: ignore[misc]
+class FormationVecEnv(SharedSeats):
     """``n_envs`` environments; seat ``e * n_cars + k`` is car k of environment e.
 
     Seeds count on from environment to environment. A seat is done when the episode of its
@@ -157,28 +157,6 @@ class FormationVecEnv(VecEnv):  # type: ignore[misc]
     def render(self, mode: str | None = None) -> Any:
         """A picture of the first environment; None without a render mode or with a window."""
         return self._film.picture(self.formation)
-
-    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """An attribute of this environment, once for every seat asked for."""
-        return [getattr(self, attr_name)] * len(self._seats(indices))
-
-    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Set an attribute; the seats share it."""
-        setattr(self, attr_name, value)
-
-    def env_method(
-        self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any
-    ) -> list[Any]:
-        """Call a method once; its result for every seat asked for."""
-        result = getattr(self, method_name)(*method_args, **method_kwargs)
-        return [result] * len(self._seats(indices))
-
-    def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
-        """False for every seat: nothing is wrapped."""
-        return [False] * len(self._seats(indices))
-
-    def _seats(self, indices: Any) -> list[int]:
-        return list(self._get_indices(indices))
 
     def _observations(self) -> F32:
         observations: F32 = self.formation.observations.reshape(self.num_envs, -1)

@@ -15,9 +15,11 @@ from relpos_env._step_kernels import begin_decision, run_steps
 from relpos_env._vehicle_kernels import STEERING
 from relpos_env.bodies import Bodies, make_bodies, place_bodies
 from relpos_env.group import SOON, Group
+from relpos_env.interface.beams import beam_directions
 from relpos_env.scenarios import Scenario
 from relpos_env.scenarios.episode import Episode
 from relpos_env.sensors._odometer_kernels import read_odometers
+from relpos_env.sensors._proximity_kernels import read_proximity
 from relpos_env.sensors.batch import Events, Sensors, make_events, make_sensors, start_sensors
 from relpos_env.sensors.radio._radio_kernels import Scene
 from relpos_env.sensors.radio.radio import Radio
@@ -50,7 +52,14 @@ class Swarm:
     batch is that environment alone.
     """
 
-    def __init__(self, scenario: Scenario, n_cars: int, n_envs: int = 1, n_steps: int = 10) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        n_cars: int,
+        n_envs: int = 1,
+        n_steps: int = 10,
+        proximity: int = 0,
+    ) -> None:
         """Make room for the batch; `begin` puts something into it.
 
         Args:
@@ -58,6 +67,7 @@ class Swarm:
             n_cars: Largest number of cars in a group.
             n_envs: Number of groups.
             n_steps: Steps of `DT` in one `step`.
+            proximity: Beams that measure distances round each car.
         """
         self.scenario, self.n_steps = scenario, n_steps
         self.constellation = car_constellation(scenario, n_cars)
@@ -66,6 +76,8 @@ class Swarm:
         self._sensors = make_sensors(e, n, scenario.mag.n_waves)
         self.odometer: F64 = np.zeros((e, n))
         """Last readings, (env, car) [m/s]."""
+        self.proximity: F64 = np.zeros((e, n, proximity))
+        """Last readings of the distance sensors, (env, car, beam) [m]; 0 of absent cars."""
         self._radio = Radio(scenario.radio.for_nodes(n), n, [0] * e, DT)
         self._scene = Scene(
             np.zeros((e, n, 3)), np.zeros((e, n, 3)), self._bodies.boxes, np.zeros((e, 0, 7))
@@ -119,7 +131,7 @@ class Swarm:
         part = copy.copy(self)
         part._bodies = Bodies._make(a[envs] for a in self._bodies)
         part._sensors = Sensors._make(a[envs] for a in self._sensors)
-        part.odometer = self.odometer[envs]
+        part.odometer, part.proximity = self.odometer[envs], self.proximity[envs]
         part._radio = self._radio.part(envs)
         part._scene = Scene._make(a[envs] for a in self._scene)
         part._groups = self._groups[envs]
@@ -148,6 +160,8 @@ class Swarm:
         group.boots = rng.spawn(1)[0]
         for n in np.nonzero(episode.present)[0].tolist():
             self._radio.switch_on(env, n, boot=int(group.boots.integers(256)))
+        # Last, so that all other draws are what they are without beams.
+        self._sensors.proximity_seed[env] = rng.integers(1 << 62)
         self._look_ahead(env)
 
     def step(self, speed: F64, steering: F64) -> MeasurementBlock:
@@ -174,6 +188,8 @@ class Swarm:
                 self._groups[env].solve(self._bodies, env)
         np.multiply(self._bodies.tick, DT, out=self.t)
         self._read_odometers()
+        if self.proximity.shape[-1]:
+            self._read_proximity()
         return self.block
 
     def movable(self, env: int) -> Bool:
@@ -193,7 +209,8 @@ class Swarm:
 
     def __getstate__(self) -> dict[str, Any]:
         """What is put together by `_bind` stays behind."""
-        bound = ("_begin_decision", "_run_steps", "_read_odometers", "block", "state")
+        bound = {"_begin_decision", "_run_steps", "_read_odometers", "_read_proximity"}
+        bound |= {"block", "state"}
         return {k: v for k, v in self.__dict__.items() if k not in bound}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -208,6 +225,7 @@ class Swarm:
             imu=as_records(sensors.imu),
             mag=as_records(sensors.mag),
             odometer=as_records(sensors.odometer),
+            proximity=as_records(sensors.proximity),
         )
         self._speed, self._steering = np.zeros_like(self.odometer), np.zeros_like(self.odometer)
         self._waiting = np.zeros(self.n_envs, dtype=np.int64)
@@ -219,6 +237,11 @@ class Swarm:
         self._read_odometers = bind(
             read_odometers, sensors.odometer, sensors.odometer_seed, bodies.tick, bodies.body,
             bodies.present, self.odometer,
+        )  # fmt: skip
+        self._read_proximity = bind(
+            read_proximity, sensors.proximity, sensors.proximity_seed, bodies.tick,
+            beam_directions(self.proximity.shape[-1]), bodies.body, bodies.present, bodies.size,
+            bodies.room, bodies.boxes, self.proximity,
         )  # fmt: skip
         self.block = MeasurementBlock(*self.events[:9])
         """What the last step measured; shares memory."""

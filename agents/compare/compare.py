@@ -13,6 +13,7 @@ from agents.compare.setting import Setting
 from agents.demo import SETTLE
 from agents.engines import check_jobs, find_engine
 from agents.errors import UsageError
+from relpos_env.interface.beams import MOST_BEAMS
 from relpos_env.interface.observations import OBSERVATIONS
 
 FIRST_SEED = 1000
@@ -35,12 +36,14 @@ def compare(
     task_options: Mapping[str, Any] | None = None,
     cars: int | None = None,
     level: int | None = None,
+    proximity: int | None = None,
     episodes: int = 100,
     first_seed: int = FIRST_SEED,
     seconds: float = 60.0,
     settle: float = SETTLE,
     jobs: int = 1,
     engine: str = "local",
+    address: str | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> CompareResult:
     """Let every driver drive on every mode of observations in every scenario, on the same seeds.
@@ -57,12 +60,15 @@ def compare(
         task_options: The task's own options, by name.
         cars: Slots for cars; by default as many as the scenario can have.
         level: Randomisation of a level of the curriculum, 0 to 4.
+        proximity: Beams that measure distances round each car; by default those that each policy
+            was trained with, and of controllers as many as any policy has, or none.
         episodes: Of each driver, mode and scenario, seeds from `first_seed` on.
         first_seed: Seed of the first episode.
         seconds: Length of an episode [s], less where the task is done before.
         settle: Errors are scored from here on [s].
         jobs: Processes at a time. No figure depends on it.
         engine: One of `agents.engines.ENGINES`.
+        address: Of a cluster that runs, see `agents.engines.find_engine`.
         progress: Called with the share done, 0 to 1.
 
     Raises:
@@ -72,7 +78,7 @@ def compare(
     """
     _check_numbers(episodes, first_seed, seconds, settle)
     check_jobs(jobs)
-    work = find_engine(engine)
+    work = find_engine(engine, address)
     settings = [
         Setting(
             scenario=scenario,
@@ -85,7 +91,9 @@ def compare(
         )
         for scenario in _each_once("--scenario", scenarios)
     ]
-    chosen = line_up(_each_once("NAME", drivers), _modes(observations))
+    if proximity is not None and not 0 <= proximity <= MOST_BEAMS:
+        raise UsageError(f"--proximity: expected 0 to {MOST_BEAMS}, got {proximity}")
+    chosen = line_up(_each_once("NAME", drivers), _modes(observations), proximity)
     empty, notes = _who_can(chosen, settings)
     seeds = range(first_seed, first_seed + episodes)
     tasks = [
@@ -123,8 +131,8 @@ def _who_can(
     for setting in settings:
         for contender in contenders:
             entry = find_entry(contender.name)
-            parts = setting.parts(contender.observation, entry.history)
-            why = entry.refusal(contender.observation, parts.n_cars)
+            parts = setting.parts(contender.observation, entry.history, contender.proximity)
+            why = entry.refusal(contender.observation, parts.n_cars, contender.proximity)
             if why is not None:
                 refused.setdefault((contender.label, why), []).append(parts.scenario.name)
                 continue

@@ -29,10 +29,14 @@ class Entry(Protocol):
     def history(self) -> int:
         """So many observations it sees in one."""
 
-    def refusal(self, observation: str, n_cars: int) -> str | None:
+    @property
+    def proximity(self) -> int | None:
+        """Beams that it was trained with, None if it was not trained."""
+
+    def refusal(self, observation: str, n_cars: int, proximity: int) -> str | None:
         """Why it cannot drive so many cars on a mode of observations; None if it can."""
 
-    def driver(self, observation: str, n_cars: int) -> Driver:
+    def driver(self, observation: str, n_cars: int, proximity: int) -> Driver:
         """The driver of so many cars on a mode of observations."""
 
 
@@ -43,18 +47,19 @@ class ControllerEntry:
     title: str
     trained_on: None = None
     history: int = 1
+    proximity: None = None
 
-    def refusal(self, observation: str, n_cars: int) -> str | None:
+    def refusal(self, observation: str, n_cars: int, proximity: int) -> str | None:
         """A mode in which it cannot read what it needs."""
         try:
-            self.driver(observation, n_cars)
+            self.driver(observation, n_cars, proximity)
         except UsageError as error:
             return str(error)
         return None
 
-    def driver(self, observation: str, n_cars: int) -> Driver:
+    def driver(self, observation: str, n_cars: int, proximity: int) -> Driver:
         """The controller of one mode."""
-        return CONTROLLERS[self.title](observation_mode(observation, n_cars).fields)
+        return CONTROLLERS[self.title](observation_mode(observation, n_cars, proximity).fields)
 
 
 def find_controller(name: str) -> Entry | None:
@@ -95,6 +100,8 @@ class Contender:
     """One of `relpos_env.interface.observations.OBSERVATIONS`."""
     title: str = ""
     """What tables call the driver; by default its name."""
+    proximity: int = 0
+    """Beams that measure distances round each car."""
 
     @property
     def called(self) -> str:
@@ -102,25 +109,45 @@ class Contender:
         return self.title or self.name
 
     @property
+    def sees(self) -> str:
+        """What it is shown, for tables."""
+        return sees(self.observation, self.proximity)
+
+    @property
     def label(self) -> str:
         """Driver and observations, for tables and pictures."""
-        return f"{self.called} on {self.observation}"
+        return f"{self.called} on {self.sees}"
 
 
-def line_up(names: Sequence[str], observations: Sequence[str]) -> list[Contender]:
+def sees(observation: str, proximity: int) -> str:
+    """A mode and its beams, for tables."""
+    return f"{observation}, {proximity} beams" if proximity else observation
+
+
+def line_up(
+    names: Sequence[str], observations: Sequence[str], proximity: int | None = None
+) -> list[Contender]:
     """Every driver on every mode of observations.
 
     Args:
         names: See `find_entry`.
         observations: Of `relpos_env.interface.observations.OBSERVATIONS`.
+        proximity: Beams of all of them; by default each policy has its own, and controllers as
+            many as any policy.
 
     Raises:
         UsageError: A name stands for nothing.
     """
-    titles = [find_entry(name).title for name in names]
+    entries = [find_entry(name) for name in names]
+    titles = [entry.title for entry in entries]
+    most = max((entry.proximity or 0 for entry in entries), default=0)
+    beams = [
+        proximity if proximity is not None else most if entry.proximity is None else entry.proximity
+        for entry in entries
+    ]
     return [
         # Drivers of the same title are told apart by what they were asked for as.
-        Contender(name, observation, title if titles.count(title) == 1 else name)
-        for name, title in zip(names, titles, strict=True)
+        Contender(name, observation, title if titles.count(title) == 1 else name, n)
+        for name, title, n in zip(names, titles, beams, strict=True)
         for observation in observations
     ]

@@ -98,12 +98,12 @@ def _begin(
 ) -> tuple[Formation, Driver]:
     """Environments with an episode each, and who drives in them."""
     entry = find_entry(contender.name)
-    parts = setting.parts(contender.observation, entry.history)
+    parts = setting.parts(contender.observation, entry.history, contender.proximity)
     formation = Formation(parts, len(seeds))
     for env, seed in enumerate(seeds):
         formation.seed(env, seeding.np_random(seed)[0])
         formation.begin(env)
-    return formation, entry.driver(contender.observation, parts.n_cars)
+    return formation, entry.driver(contender.observation, parts.n_cars, contender.proximity)
 
 
 def _decide(formation: Formation, driver: Driver) -> None:

@@ -15,6 +15,7 @@ def median_films(
     *,
     jobs: int = 1,
     engine: str = "local",
+    address: str | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> list[dict[str, Any]]:
     """Frames for the animation, by row; the same drives as those that were measured.
@@ -23,11 +24,12 @@ def median_films(
         result: Whose rows.
         jobs: Processes at a time.
         engine: One of `agents.engines.ENGINES`.
+        address: Of a cluster that runs, see `agents.engines.find_engine`.
         progress: Called with the share done, 0 to 1.
     """
     tasks = [(r.contender, r.setting, r.median_episode.seed) for r in result.rows]
     films: dict[int, dict[str, Any]] = {}
-    for n, frames in find_engine(engine)(film_episode, tasks, jobs):
+    for n, frames in find_engine(engine, address)(film_episode, tasks, jobs):
         films[n] = frames
         if progress is not None:
             progress(len(films) / len(tasks))

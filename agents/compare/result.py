@@ -112,6 +112,7 @@ class CompareResult:
             {
                 "policy": row.contender.called,
                 "observation": row.contender.observation,
+                "proximity": row.contender.proximity,
                 "scenario": row.scenario,
                 "seed": e.seed,
                 **{name: _number(getattr(e, name)) for name in FIGURES},
@@ -130,6 +131,7 @@ class CompareResult:
             "policy": row.contender.called,
             "trained_on": row.trained_on,
             "observation": row.contender.observation,
+            "proximity": row.contender.proximity,
             "scenario": row.scenario,
             "task": row.setting.task,
             "level": row.setting.level,

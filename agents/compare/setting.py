@@ -41,12 +41,13 @@ class Setting:
         """Number of the first decision whose errors count."""
         return round(self.settle / DECISION)
 
-    def parts(self, observation: str, history: int) -> Parts:
+    def parts(self, observation: str, history: int, proximity: int = 0) -> Parts:
         """What the environments are made of.
 
         Args:
             observation: One of `relpos_env.interface.observations.OBSERVATIONS`.
             history: So many observations in one.
+            proximity: Beams that measure distances round each car.
 
         Raises:
             EnvError: An unknown name or a number out of range.
@@ -60,6 +61,7 @@ class Setting:
                 "level": self.level,
                 "observation": observation,
                 "history": history,
+                "proximity": proximity,
                 "max_cycles": self.cycles,
             }
         )

@@ -30,13 +30,19 @@ class TrainedEntry:
         """So many observations it sees in one."""
         return self.policy.layout.history
 
-    def refusal(self, observation: str, n_cars: int) -> str | None:
-        """Why it cannot drive so many cars on a mode of observations; None if it can."""
-        return self.policy.layout.refusal(Layout(observation, n_cars, self.history))
+    @property
+    def proximity(self) -> int:
+        """Beams that it was trained with."""
+        return self.policy.layout.proximity
 
-    def driver(self, observation: str, n_cars: int) -> Driver:
+    def refusal(self, observation: str, n_cars: int, proximity: int) -> str | None:
+        """Why it cannot drive so many cars on a mode of observations; None if it can."""
+        seen = Layout(observation, n_cars, self.history, proximity)
+        return self.policy.layout.refusal(seen)
+
+    def driver(self, observation: str, n_cars: int, proximity: int) -> Driver:
         """The policy, fitted to so many cars."""
-        return self.policy.driver(Layout(observation, n_cars, self.history))
+        return self.policy.driver(Layout(observation, n_cars, self.history, proximity))
 
 
 def find_trained(name: str) -> TrainedEntry | None:

@@ -22,12 +22,14 @@ References:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from agents.controllers.base import TINY, Plane, Sight, length
+from agents.controllers.bounds import Bounds
 from agents.controllers.caution import spread
+from agents.controllers.clearance import ClearanceParams
 from tracking.arrays import F64
 
 ABEAM = 0.1
@@ -50,16 +52,8 @@ class AvoidanceParams:
     """[m/s] A car too near backs off at most so fast."""
     sweeps: int = 2
     """[-] The bounds of all others are applied so often, each time those still broken."""
-
-
-@dataclass(frozen=True, slots=True)
-class Bounds:
-    """Largest velocity towards each of the others, each (..., other)."""
-
-    toward: Plane
-    """Direction of the other, of length 1."""
-    closing: F64
-    """[m/s] Own velocity in that direction at most; infinite where nobody is known."""
+    clearance: ClearanceParams = field(default_factory=ClearanceParams)
+    """How near to what stands, where there are sensors for it."""
 
 
 def closing_bounds(sight: Sight, params: AvoidanceParams) -> Bounds:

@@ -62,6 +62,8 @@ class Sight:
     """Since the range of each pair, (..., other) [s]; of ranges only."""
     gap: F64 | None
     """Received less first-path power of that range, (..., other) [dB]; of ranges only."""
+    near: F64 | None = None
+    """What the distance sensors read, (..., beam) [m]; None without them."""
 
     @property
     def used(self) -> Bool:
@@ -142,6 +144,7 @@ class Reader:
             steering=o[..., own + 1],
             age=age,
             gap=gap,
+            near=o[..., where["near"]] if "near" in where else None,
         )
 
 
@@ -158,8 +161,9 @@ def mode_of(fields: tuple[Field, ...]) -> str:
     """
     names = [f.name for f in fields]
     others = next((f.size for f in fields if f.name == "mask"), 0)
+    beams = next((f.size for f in fields if f.name == "near"), 0)
     for name in OBSERVATIONS:
-        if others and observation_mode(name, others + 1).fields == fields:
+        if others and observation_mode(name, others + 1, beams).fields == fields:
             return name
     return f"fields {', '.join(names)}"
 

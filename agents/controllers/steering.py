@@ -21,8 +21,9 @@ from math import cos, radians
 
 import numpy as np
 
-from agents.controllers.avoidance import AvoidanceParams, Bounds, bounded_speed
+from agents.controllers.avoidance import AvoidanceParams, bounded_speed
 from agents.controllers.base import TINY, Plane, Sight, length
+from agents.controllers.bounds import Bounds
 from agents.controllers.freeing import FreeingParams, back_out
 from agents.controllers.shunting import ShuntingParams, shunt
 from relpos_env.interface.actions import MAX_SPEED, MAX_STEERING

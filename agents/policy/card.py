@@ -27,7 +27,7 @@ HASH = re.compile(r"[0-9a-f]{64}")
 KEYS = (
     "format", "name", "layout", "actions", "decision_s", "onnx_sha256", "training", "results",
 )  # fmt: skip
-LAYOUT_KEYS = ("observation", "n_cars", "history", "digest", "index")
+LAYOUT_KEYS = ("observation", "n_cars", "history", "proximity", "digest", "index")
 ACTION_KEYS = ("kind", "max_speed_m_s", "max_steering_rad")
 INDEX_KEYS: dict[str, type] = {
     "first": int, "last": int, "name": str, "unit": str, "low": float, "high": float,
@@ -71,6 +71,7 @@ class Card:
                 "observation": self.layout.observation,
                 "n_cars": self.layout.n_cars,
                 "history": self.layout.history,
+                "proximity": self.layout.proximity,
                 "digest": self.layout.digest,
                 "index": self.layout.index,
             },
@@ -114,7 +115,7 @@ class Card:
             actions.refuse("kind", f"expected 'continuous', got {actions.text('kind')!a}")
         return cls(
             name=card.matching("name", NAME, "a name of letters, digits, '.', '-' and '_'"),
-            layout=_layout(card.part("layout", LAYOUT_KEYS)),
+            layout=_layout(card.part("layout", LAYOUT_KEYS, {"proximity": 0})),
             onnx_sha256=card.matching("onnx_sha256", HASH, "64 hexadecimal digits"),
             max_speed=actions.positive("max_speed_m_s"),
             max_steering=actions.positive("max_steering_rad"),
@@ -134,7 +135,12 @@ def _layout(part: Reader) -> Layout:
             {int: reader.whole, str: reader.text, float: reader.number}[kind](name)
     digest = part.matching("digest", HASH, "64 hexadecimal digits")
     try:
-        layout = Layout(part.text("observation"), part.whole("n_cars"), part.whole("history"))
+        layout = Layout(
+            part.text("observation"),
+            part.whole("n_cars"),
+            part.whole("history"),
+            part.whole("proximity"),
+        )
     except EnvError as error:
         raise part.error("", str(error)) from error
     differences = layout.differences(index)

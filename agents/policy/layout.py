@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from relpos_env.config import MOST_CARS, Parts, whole_number
+from relpos_env.interface.beams import MOST_BEAMS
 from relpos_env.interface.observations import Field, index_table, observation_mode, total_size
 from relpos_env.interface.observations.base import F32
 from relpos_env.interface.views import make_view
@@ -41,21 +42,25 @@ class Layout:
     """[-] Slots for cars, the own one included."""
     history: int = 1
     """[-] So many observations in one, the newest first."""
+    proximity: int = 0
+    """[-] Beams that measure distances round the car."""
 
     def __post_init__(self) -> None:
         whole_number("n_cars", self.n_cars, 2, MOST_CARS)
         whole_number("history", self.history, 1, MOST_HISTORY)
+        whole_number("proximity", self.proximity, 0, MOST_BEAMS)
         observation_mode(self.observation, self.n_cars)
 
     @classmethod
     def of(cls, parts: Parts) -> Layout:
         """What the cars of an environment see."""
-        return cls(parts.config.observation, parts.n_cars, parts.config.history)
+        config = parts.config
+        return cls(config.observation, parts.n_cars, config.history, config.proximity)
 
     @cached_property
     def fields(self) -> tuple[Field, ...]:
         """The stretches of one of the observations."""
-        return observation_mode(self.observation, self.n_cars).fields
+        return observation_mode(self.observation, self.n_cars, self.proximity).fields
 
     @property
     def one(self) -> int:
@@ -85,7 +90,8 @@ class Layout:
     def describe(self) -> str:
         """In words, for messages."""
         times = "" if self.history == 1 else f", {self.history} in one"
-        return f"observation {self.observation!r} of {self.n_cars} cars{times}"
+        beams = "" if self.proximity == 0 else f" with {self.proximity} beams"
+        return f"observation {self.observation!r} of {self.n_cars} cars{beams}{times}"
 
     def differences(self, index: list[dict[str, Any]]) -> list[str]:
         """How a table of stretches differs from this layout's, one sentence each.
@@ -114,7 +120,10 @@ class Layout:
             return f"{expected}: there are more cars than the policy has slots for"
         if other.history != self.history:
             return f"{expected}: the history differs"
-        if Layout(other.observation, self.n_cars, self.history).digest != self.digest:
+        if other.proximity != self.proximity:
+            return f"{expected}: the beams differ"
+        same = replace(other, n_cars=self.n_cars)
+        if same.digest != self.digest:
             return f"{expected}: the numbers differ"
         return None
 
@@ -146,10 +155,10 @@ class Layout:
 
     def alone(self) -> F32:
         """What a car sees that is the only one, and of which nothing else is known, (size)."""
-        view = make_view(1, self.n_cars)
+        view = make_view(1, self.n_cars, self.proximity)
         view.present[0, 0] = True
         out = np.zeros((1, self.n_cars, self.one), dtype=np.float32)
-        observation_mode(self.observation, self.n_cars).bind(view, out)()
+        observation_mode(self.observation, self.n_cars, self.proximity).bind(view, out)()
         return np.tile(out[0, 0], self.history)
 
 

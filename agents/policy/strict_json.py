@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections.abc import Mapping
 from typing import Any, NoReturn
 
 from agents.policy.errors import PolicyError
@@ -110,9 +111,17 @@ class Reader:
                 self.refuse(f"{key}[{k}]", f"expected an object, got {_kind(value)}")
         return values  # type: ignore[no-any-return]
 
-    def part(self, key: str, keys: tuple[str, ...]) -> Reader:
-        """An object with exactly these keys."""
-        reader = Reader(self.mapping(key), self.path(key), inside=True)
+    def part(
+        self, key: str, keys: tuple[str, ...], default: Mapping[str, Any] | None = None
+    ) -> Reader:
+        """An object with exactly these keys.
+
+        Args:
+            key: Of the object.
+            keys: In it.
+            default: Values of those that older files do not have.
+        """
+        reader = Reader({**(default or {}), **self.mapping(key)}, self.path(key), inside=True)
         reader.keys(keys)
         return reader
 

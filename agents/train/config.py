@@ -23,6 +23,8 @@ class EnvSetup:
     """One of `relpos_env.interface.observations.OBSERVATIONS`."""
     history: int = number(1, 1, 64)
     """Observations in one, the newest first."""
+    proximity: int = number(0, 0, 32)
+    """Beams that measure distances to walls, boxes and cars round each car."""
     cars: int = number(6, 2, 20)
     """Slots for cars, 2 to 20: the policy drives groups of up to so many, at least those of the
     scenarios."""

@@ -18,7 +18,8 @@ from relpos_env.timing import DECISION
 
 def layout_of(config: TrainConfig) -> Layout:
     """What the policy sees."""
-    return Layout(config.env.observation, config.env.cars, config.env.history)
+    env = config.env
+    return Layout(env.observation, env.cars, env.history, env.proximity)
 
 
 def env_arguments(config: TrainConfig, scenario: str, level: int | None) -> dict[str, Any]:
@@ -31,6 +32,7 @@ def env_arguments(config: TrainConfig, scenario: str, level: int | None) -> dict
         "observation": env.observation,
         "history": env.history,
         "weights": _weights(env.weights),
+        "proximity": env.proximity,
         "max_cycles": round(env.seconds / DECISION),
     }
 

@@ -27,9 +27,11 @@ from tracking.arrays import I64
 
 SCALES = {
     "pos": 2.0, "vel": 1.0, "std": 0.3, "age": 1.0, "target": 2.0, "range": 2.0, "gap": 10.0,
-    "command": 1.0, "motion": 1.0,
+    "command": 1.0, "motion": 1.0, "near": 1.0,
 }  # fmt: skip
 """Field to the value that becomes 1, in the field's unit; 1 for those not named."""
+CLOSE = 0.5
+"""[m] What a beam sees nearer than this has a feature of its own, which is 1 at a touch."""
 ERROR_SCALE = 0.2
 """[m] Distance from a place that becomes 1."""
 LIMIT = 5.0
@@ -69,7 +71,9 @@ class SwarmFeatures(BaseFeaturesExtractor):  # type: ignore[misc]
         self._keep("own", own)
         self._keep("mask", where.newest["mask"])
         self._keep("wanted", where.newest["wanted"])
-        self._has_places = where.places is not None
+        self._has_places, self._has_beams = where.places is not None, where.near is not None
+        if where.near is not None:
+            self._keep("near", where.near)
         width_in = where.others.shape[1]
         if where.places is not None:
             for name, index in where.places.items():
@@ -79,7 +83,8 @@ class SwarmFeatures(BaseFeaturesExtractor):  # type: ignore[misc]
         for k in range(depth):
             layers += [nn.Linear(width if k else width_in, width), nn.Tanh()]
         self.of_other = nn.Sequential(*layers)
-        self.of_own = nn.Sequential(nn.Linear(len(own), width), nn.Tanh())
+        n_own = len(own) + (0 if where.near is None else len(where.near))
+        self.of_own = nn.Sequential(nn.Linear(n_own, width), nn.Tanh())
 
     def forward(self, observations: Tensor) -> Tensor:
         """Features, (batch, feature)."""
@@ -96,8 +101,11 @@ class SwarmFeatures(BaseFeaturesExtractor):  # type: ignore[misc]
         weight = (known + wanted).clamp(max=1.0)
         count = weight.sum(dim=1, keepdim=True)
         mean = (self.of_other(others) * weight[:, :, None]).sum(dim=1) / count.clamp(min=1.0)
-        own = self.of_own(scaled.index_select(1, self._own))
-        return torch.cat([mean, own, 0.2 * count], dim=-1)
+        own = scaled.index_select(1, self._own)
+        if self._has_beams:
+            near = seen.index_select(1, self._near)
+            own = torch.cat([own, (1.0 - near / CLOSE).clamp(0.0, 1.0)], dim=-1)
+        return torch.cat([mean, self.of_own(own), 0.2 * count], dim=-1)
 
     def _by_other(self, flat: Tensor) -> Tensor:
         return flat.reshape(-1, self._n_others, flat.shape[1] // self._n_others)
@@ -167,6 +175,7 @@ class _Where:
         self.size = one * history
         self.others = _join([stands[f.name] for f in fields if f.per_other])
         self.own = _join([stands[f.name] for f in fields if not f.per_other])[0]
+        self.near = stands["near"].ravel() if "near" in stands else None
         # Somebody counts whose position is known, or who has a place; the newest says.
         self.newest = {n: np.ascontiguousarray(stands[n][0, :, 0]) for n in ("mask", "wanted")}
         self.gain = np.ones(self.size, np.float32)

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from gymnasium.spaces import Box
-from stable_baselines3.common.vec_env import VecEnv
 
 from agents.policy.layout import Layout
 from agents.policy.padding import Padding
 from relpos_env.formation import N_TRUTH
 from relpos_env.interface.observations import space_of
 from relpos_env.interface.observations.base import F32
+from relpos_env.sb3_seats import SharedSeats
 from relpos_env.sb3_vec_env import FormationVecEnv
 from tracking.arrays import Bool
 
 
-class Rooms(VecEnv):  # type: ignore[misc]
+class Rooms(SharedSeats):
     """The seats of several `FormationVecEnv`, one after the other, as of one.
 
     Environments may have fewer cars than the policy has slots for: what their cars see is padded
@@ -84,25 +85,6 @@ class Rooms(VecEnv):  # type: ignore[misc]
         for part in self.parts:
             part.close()
 
-    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """An attribute, once for every seat asked for."""
-        return [getattr(self, attr_name)] * len(list(self._get_indices(indices)))
-
-    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Set an attribute; the seats share it."""
-        setattr(self, attr_name, value)
-
-    def env_method(
-        self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any
-    ) -> list[Any]:
-        """Call a method once; its result for every seat asked for."""
-        result = getattr(self, method_name)(*method_args, **method_kwargs)
-        return [result] * len(list(self._get_indices(indices)))
-
-    def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
-        """False for every seat."""
-        return [False] * len(list(self._get_indices(indices)))
-
 
 def observation_space(layout: Layout, *, with_truth: bool) -> Box:
     """What a seat sees: an observation, and the truth of as many cars behind it if asked for."""
@@ -115,7 +97,7 @@ class _SeatView:
     """Observations of one part as the policy wants them."""
 
     def __init__(self, layout: Layout, part: FormationVecEnv) -> None:
-        given = Layout(layout.observation, part.n_cars, layout.history)
+        given = replace(layout, n_cars=part.n_cars)
         self._pad, self._size = Padding(layout, given), given.size
         self._n_truth = N_TRUTH * layout.n_cars * part.with_truth
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from relpos_env.interface.beams import FARTHEST
 from tracking.compiled import kernel, small_kernel
 
 FAR, FAST = 20.0, 10.0
@@ -30,13 +31,15 @@ def put_turned(out, e, a, k, x, y, c, s, limit):
 
 @small_kernel
 def put_own(view, out, e, a, k, c, s):
-    """What every mode ends with: command, heading, own motion (6 numbers)."""
+    """What every mode ends with: command, heading, own motion (6 numbers), and every beam."""
     put_turned(out, e, a, k, view.command[e, a, 0], view.command[e, a, 1], c, s, FAST)
     known = 1.0 if view.oriented[e, a] else 0.0
     put(out, e, a, k + 2, known * c, 1.0)
     put(out, e, a, k + 3, known * s, 1.0)
     put(out, e, a, k + 4, view.speed[e, a], FAST)
     put(out, e, a, k + 5, view.steering[e, a], FAST)
+    for b in range(view.near.shape[2]):
+        put(out, e, a, k + 6 + b, view.near[e, a, b], FARTHEST)
 
 
 @small_kernel

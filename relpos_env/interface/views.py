@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from relpos_env.interface._view_kernels import see_estimate, see_truth
+from relpos_env.interface.beams import FARTHEST
 from tracking.arrays import F64, I64, Bool
 from tracking.compiled import bind
 from tracking.estimate import TeamEstimate
@@ -54,6 +55,9 @@ class View(NamedTuple):
     """Forward speed by the car's own odometer, (env, car) [m/s]."""
     steering: F64
     """Steering angle by its own servo, (env, car) [rad]."""
+    near: F64
+    """Distance by the car's own sensors to what is nearest, straight ahead, then counter-clockwise,
+    (env, car, beam) [m]; of walls, boxes and cars alike."""
     present: Bool
     """True while the car is in the room, (env, car)."""
     now: F64
@@ -64,8 +68,8 @@ class View(NamedTuple):
         return View._make(array[envs] for array in self)
 
 
-def make_view(n_envs: int, n_cars: int) -> View:
-    """A view in which nobody knows anything."""
+def make_view(n_envs: int, n_cars: int, n_beams: int = 0) -> View:
+    """A view in which nobody knows anything, and no beam meets anything."""
     own, other = (n_envs, n_cars), (n_envs, n_cars, n_cars)
     return View(
         pos=np.zeros((*other, 2)),
@@ -85,6 +89,7 @@ def make_view(n_envs: int, n_cars: int) -> View:
         command=np.zeros((*own, 2)),
         speed=np.zeros(own),
         steering=np.zeros(own),
+        near=np.full((*own, n_beams), FARTHEST),
         present=np.zeros(own, dtype=bool),
         now=np.zeros(n_envs),
     )

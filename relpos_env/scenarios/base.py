@@ -17,6 +17,7 @@ from relpos_env.scenarios.randomisation import Randomisation
 from relpos_env.sensors.imu import ImuSimParams
 from relpos_env.sensors.magnetometer import MagSimParams
 from relpos_env.sensors.odometer import OdometerSimParams
+from relpos_env.sensors.proximity import ProximitySimParams
 from relpos_env.sensors.radio.params import RadioSimParams
 from relpos_env.vehicle import CarParams
 from tracking.arrays import F64
@@ -51,6 +52,8 @@ class Scenario:
     imu: ImuSimParams = field(default_factory=ImuSimParams)
     mag: MagSimParams = field(default_factory=MagSimParams)
     odometer: OdometerSimParams = field(default_factory=OdometerSimParams)
+    proximity: ProximitySimParams = field(default_factory=ProximitySimParams)
+    """Distance sensors, of environments that ask for beams."""
     radio: RadioSimParams = field(default_factory=RadioSimParams)
     randomisation: Randomisation = field(default_factory=Randomisation)
     """What is drawn anew for every episode; nothing by default."""

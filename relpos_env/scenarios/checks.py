@@ -33,7 +33,7 @@ def check_scenario(s: Scenario) -> None:
     """
     for name, params in (
         ("car", s.car), ("imu", s.imu), ("mag", s.mag), ("odometer", s.odometer),
-        ("radio", s.radio),
+        ("proximity", s.proximity), ("radio", s.radio),
     ):  # fmt: skip
         check_params(name, params)
     _check_room(s)

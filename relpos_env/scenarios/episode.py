@@ -17,6 +17,7 @@ from relpos_env.scenarios.obstacle import Obstacle, boxes_of
 from relpos_env.sensors.imu import ImuSimParams
 from relpos_env.sensors.magnetometer import MagSimParams
 from relpos_env.sensors.odometer import OdometerSimParams
+from relpos_env.sensors.proximity import ProximitySimParams
 from relpos_env.sensors.radio.params import RadioSimParams
 from relpos_env.vehicle import CarParams
 from tracking.arrays import F64, Bool
@@ -43,6 +44,7 @@ class Episode:
     imu: ImuSimParams
     mag: MagSimParams
     odometer: OdometerSimParams
+    proximity: ProximitySimParams
     radio: RadioSimParams
 
 
@@ -95,6 +97,7 @@ def draw_episode(
         imu=draw_imu(s.imu, what, rngs["imu"]),
         mag=draw_mag(s.mag, what, rngs["mag"]),
         odometer=draw_odometer(s.odometer, what, rngs["odometer"]),
+        proximity=s.proximity,
         radio=draw_radio(s.radio, what, rngs["radio"]),
     )
 

@@ -10,9 +10,11 @@ from dataclasses import fields, is_dataclass
 from typing import Any
 
 from relpos_env.errors import EnvError
+from relpos_env.interface.beams import FARTHEST
 from relpos_env.sensors.imu import ImuSimParams
 from relpos_env.sensors.magnetometer import MagSimParams
 from relpos_env.sensors.odometer import OdometerSimParams
+from relpos_env.sensors.proximity import ProximitySimParams
 from relpos_env.sensors.radio.channel import ChannelParams
 from relpos_env.sensors.radio.params import RadioSimParams
 from relpos_env.vehicle import CarParams
@@ -52,6 +54,12 @@ LIMITS: dict[type, dict[str, Range]] = {
         "bits": (0, 32),
     },
     OdometerSimParams: {"scale_std": _SHARE},
+    ProximitySimParams: {
+        "max_range": (0.1, FARTHEST),
+        "cone": (0.0, 1.5),
+        "noise_std": (0.0, FARTHEST),
+        "noise_share": _SHARE,
+    },
     RadioSimParams: {
         "clock_offset": (0.0, 1e-4),
         "clock_wander": (0.0, 1e-6),

@@ -3,6 +3,7 @@
 from relpos_env.sensors.imu import HUMAN_IMU, Imu, ImuSimParams
 from relpos_env.sensors.magnetometer import Magnetometer, MagSimParams
 from relpos_env.sensors.odometer import OdometerSimParams
+from relpos_env.sensors.proximity import ProximitySimParams
 from relpos_env.sensors.radio.params import RadioSimParams
 from relpos_env.sensors.radio.radio import Radio
 
@@ -13,6 +14,7 @@ __all__ = [
     "MagSimParams",
     "Magnetometer",
     "OdometerSimParams",
+    "ProximitySimParams",
     "Radio",
     "RadioSimParams",
 ]

@@ -14,6 +14,7 @@ from relpos_env.sensors._magnetometer_kernels import N_WAVE, start_magnetometers
 from relpos_env.sensors.imu import IMU, fill_imu
 from relpos_env.sensors.magnetometer import MAG, fill_mag
 from relpos_env.sensors.odometer import ODOMETER
+from relpos_env.sensors.proximity import PROXIMITY, fill_proximity
 from relpos_env.timing import DT
 from tracking.arrays import I64, Bool
 from tracking.filters.joint.records import as_records
@@ -44,6 +45,9 @@ class Sensors(NamedTuple):
     odometer: Array
     """ODOMETER, (env)."""
     odometer_seed: Array
+    proximity: Array
+    """PROXIMITY, (env)."""
+    proximity_seed: Array
 
 
 class Events(NamedTuple):
@@ -81,6 +85,8 @@ def make_sensors(n_envs: int, n_cars: int, n_waves: int) -> Sensors:
         mast=np.zeros(e),
         odometer=np.zeros(e, dtype=ODOMETER),
         odometer_seed=np.zeros(e, dtype=np.uint64),
+        proximity=np.zeros(e, dtype=PROXIMITY),
+        proximity_seed=np.zeros(e, dtype=np.uint64),
     )
 
 
@@ -91,12 +97,13 @@ def start_sensors(s: Sensors, env: int, episode: Episode, rng: np.random.Generat
         s: Written.
         env: Which.
         episode: What it is made of.
-        rng: Gives a seed to each kind of sensor.
+        rng: Gives a seed to each kind of sensor but those of distance.
     """
     s.imu_seed[env], s.mag_seed[env], s.odometer_seed[env] = rng.integers(1 << 62, size=3)
     fill_imu(s.imu[env], episode.imu, DT)
     fill_mag(s.mag[env], episode.mag)
     fill_numbers(s.odometer[env], episode.odometer)
+    fill_proximity(s.proximity[env], episode.proximity)
     start_imus(as_records(s.imu)[env], s.imu_seed[env], s.bias, s.drift, env)
     start_magnetometers(as_records(s.mag)[env], s.mag_seed[env], s.waves, s.hard_iron, env)
     s.mast[env] = episode.radio.antenna_height

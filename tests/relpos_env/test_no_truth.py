@@ -19,7 +19,10 @@ def move_everything(formation):
     formation.loop.swarm.contacts[:] += 1.0
 
 
-@pytest.mark.parametrize("kwargs", [{}, {"scenario": busy(), "task": "hold"}, {"task": "follow"}])
+@pytest.mark.parametrize(
+    "kwargs",
+    [{}, {"scenario": busy(), "task": "hold"}, {"task": "follow"}, {"proximity": 8}],
+)
 @pytest.mark.parametrize("name", OBSERVATIONS)
 def test_a_policy_sees_no_truth(name, kwargs):
     env = parallel_env(observation=name, max_cycles=80, **kwargs)

@@ -16,22 +16,27 @@ from relpos_env.interface.observations.ranges import Ranges
 from relpos_env.interface.observations.relative import RelativePositions
 from relpos_env.registry import look_up
 
-OBSERVATIONS: dict[str, Callable[[int], ObservationMode]] = {
+OBSERVATIONS: dict[str, Callable[[int, int], ObservationMode]] = {
     "estimate": partial(RelativePositions, needs_truth=False, with_cov=False),
     "estimate_cov": partial(RelativePositions, needs_truth=False, with_cov=True),
     "ranges": Ranges,
     "truth": partial(RelativePositions, needs_truth=True, with_cov=False),
 }
-"""Name to builder ``(n_cars) -> ObservationMode``."""
+"""Name to builder ``(n_cars, beams of each car) -> ObservationMode``."""
 
 
-def observation_mode(name: str, n_cars: int) -> ObservationMode:
+def observation_mode(name: str, n_cars: int, proximity: int = 0) -> ObservationMode:
     """Look a mode up.
+
+    Args:
+        name: One of `OBSERVATIONS`.
+        n_cars: Slots for cars.
+        proximity: Beams that measure distances round each car.
 
     Raises:
         EnvError: No mode of that name.
     """
-    return look_up(OBSERVATIONS, name, "observation")(n_cars)
+    return look_up(OBSERVATIONS, name, "observation")(n_cars, proximity)
 
 
 __all__ = [

@@ -14,7 +14,7 @@ from tracking.compiled import bind
 class RelativePositions:
     """Zeros where the mask is 0."""
 
-    def __init__(self, n_cars: int, *, needs_truth: bool, with_cov: bool) -> None:
+    def __init__(self, n_cars: int, n_beams: int = 0, *, needs_truth: bool, with_cov: bool) -> None:
         self.needs_truth, self._with_cov = needs_truth, with_cov
         n = n_cars - 1
         certainty = (
@@ -64,7 +64,7 @@ class RelativePositions:
             Field("vel", 2 * n, "m/s", "its velocity relative to this car", FAST, per_other=True),
             *(certainty if with_cov else ()),
             *wish_fields(n),
-            *own_fields(),
+            *own_fields(n_beams),
         )
 
     def bind(self, view: View, out: F32) -> Callable[[], None]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from relpos_env.interface._observation_kernels import FAR, FAST
+from relpos_env.interface.beams import FARTHEST
 from relpos_env.interface.observations.base import Field
 
 
@@ -29,10 +30,19 @@ def wish_fields(n_others: int) -> tuple[Field, ...]:
     )
 
 
-def own_fields() -> tuple[Field, ...]:
-    """What the operator asks, and what the car knows of itself."""
+def own_fields(n_beams: int) -> tuple[Field, ...]:
+    """What the operator asks, and what the car knows of itself and what stands round it."""
+    near = Field(
+        "near",
+        n_beams,
+        "m",
+        "distance to what is nearest: straight ahead, then counter-clockwise",
+        FARTHEST,
+        signed=False,
+    )
     return (
         Field("command", 2, "m/s", "velocity asked by the operator: forward, left", FAST),
         Field("heading", 2, "-", "cosine and sine of the own heading; zeros if unknown", 1.0),
         Field("motion", 2, "m/s, rad", "own speed and steering angle", FAST),
+        *((near,) if n_beams else ()),
     )
