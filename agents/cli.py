@@ -14,6 +14,7 @@ from agents.commands.evaluate import evaluate
 from agents.commands.export import export
 from agents.commands.policy import policy
 from agents.commands.protocol import protocol
+from agents.commands.rllib import rllib
 from agents.commands.simulate import simulate
 from agents.commands.track import track
 from agents.commands.train import train
@@ -36,6 +37,7 @@ for command in (
     train,
     export,
     policy,
+    rllib,
     protocol,
     bench,
 ):

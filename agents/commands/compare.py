@@ -36,6 +36,11 @@ from agents.console import emit_json, print_table, progress_bar
 @click.option(
     "--cars", type=int, help="Number of cars, 2 to 20; by default as many as the scenario has."
 )
+@click.option(
+    "--proximity",
+    type=int,
+    help="Beams that measure distances round each car, 0 to 32; default: as the policies.",
+)
 @click.option("--level", type=int, help="Randomisation of a level, 0 to 4, in every scenario.")
 @click.option("--episodes", default=100, show_default=True, help="Of each of them.")
 @click.option("--first-seed", default=1000, show_default=True, help="Of the first episode.")
@@ -44,7 +49,8 @@ from agents.console import emit_json, print_table, progress_bar
 @click.option(
     "--jobs", default=1, show_default=True, help="Processes at a time; no figure depends on it."
 )
-@click.option("--engine", default="local", show_default=True, help="Where the jobs run.")
+@click.option("--engine", default="local", show_default=True, help="Where jobs run: local or ray.")
+@click.option("--address", help="Of a Ray cluster that runs, for --engine ray: auto or host:port.")
 @click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
 @click.option("--out", type=Path, help="New folder for report.html, its pictures, results.jsonl.")
 def compare(
@@ -53,6 +59,7 @@ def compare(
     scenarios: tuple[str, ...],
     jobs: int,
     engine: str,
+    address: str | None,
     as_json: bool,
     out: Path | None,
     **numbers: Any,
@@ -77,12 +84,13 @@ def compare(
             scenarios=scenarios or (None,),
             jobs=jobs,
             engine=engine,
+            address=address,
             progress=tell,
             **numbers,
         )
     if out is not None:
         with progress_bar("film") as tell:
-            films = median_films(result, jobs=jobs, engine=engine, progress=tell)
+            films = median_films(result, jobs=jobs, engine=engine, address=address, progress=tell)
         write_results(out, report.compare_files(result, films))
     if as_json:
         emit_json(result.records)

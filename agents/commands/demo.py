@@ -30,6 +30,11 @@ from agents.errors import UsageError
     "--cars", type=int, help="Number of cars, 2 to 20; by default as many as the scenario has."
 )
 @click.option(
+    "--proximity",
+    type=int,
+    help="Beams that measure distances round each car, 0 to 32; default: as the policy.",
+)
+@click.option(
     "--controller",
     metavar="NAME",
     help="Who drives: consensus, leader-follower or range-only.  [default: consensus]",
@@ -57,6 +62,8 @@ def demo(
         raise UsageError(f"--seed: expected 0 or more, got {seed}")
     if cars is not None and not 2 <= cars <= 20:
         raise UsageError(f"--cars: expected 2 to 20, got {cars}")
+    if names["proximity"] is not None and not 0 <= names["proximity"] <= 32:
+        raise UsageError(f"--proximity: expected 0 to 32, got {names['proximity']}")
     if names["policy"] is not None and names["controller"] is not None:
         raise UsageError("--policy: expected either a policy or a --controller, got both")
     with progress_bar(f"{names['task']}, seed {seed}") as report:

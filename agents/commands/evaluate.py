@@ -28,7 +28,8 @@ from agents.console import emit_json, print_table, progress_bar
     show_default=True,
     help="Processes at a time; no figure but the time of a round depends on it.",
 )
-@click.option("--engine", default="local", show_default=True, help="Where the jobs run.")
+@click.option("--engine", default="local", show_default=True, help="Where jobs run: local or ray.")
+@click.option("--address", help="Of a Ray cluster that runs, for --engine ray: auto or host:port.")
 @click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
 @click.option("--out", type=Path, help="New folder for report.html, its pictures, results.jsonl.")
 def evaluate(
@@ -38,6 +39,7 @@ def evaluate(
     seconds: float | None,
     jobs: int,
     engine: str,
+    address: str | None,
     as_json: bool,
     out: Path | None,
 ) -> None:
@@ -57,6 +59,7 @@ def evaluate(
             seconds=seconds,
             jobs=jobs,
             engine=engine,
+            address=address,
             progress=tell,
         )
     if out is not None:

@@ -62,6 +62,7 @@ def _short(card: Card) -> dict[str, Any]:
         "observation": layout.observation,
         "n_cars": layout.n_cars,
         "history": layout.history,
+        "proximity": layout.proximity,
     }
 
 

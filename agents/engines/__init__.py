@@ -2,25 +2,39 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from agents.engines.base import Engine
 from agents.engines.local import local
+from agents.engines.ray_engine import ray_engine
 from agents.errors import UsageError
 
-ENGINES: dict[str, Engine] = {"local": local}
+ENGINES: dict[str, Engine] = {"local": local, "ray": ray_engine}
 """Name to engine."""
+JOINING = ("ray",)
+"""Engines that take the address of a cluster."""
 
 MOST_JOBS = 1024
 
 
-def find_engine(name: str) -> Engine:
+def find_engine(name: str, address: str | None = None) -> Engine:
     """Look an engine up.
 
+    Args:
+        name: One of `ENGINES`.
+        address: Of a cluster that runs, for the engines of `JOINING`.
+
     Raises:
-        UsageError: None of that name.
+        UsageError: None of that name, or an address that it has no use for.
     """
     if name not in ENGINES:
         raise UsageError(f"--engine: expected one of {', '.join(ENGINES)}, got {name!r}")
-    return ENGINES[name]
+    if address is None:
+        return ENGINES[name]
+    if name not in JOINING:
+        raise UsageError(f"--address: expected --engine {' or '.join(JOINING)} with it")
+    joined: Engine = partial(ENGINES[name], address=address)  # type: ignore[call-arg]
+    return joined
 
 
 def check_jobs(jobs: int) -> int:
@@ -34,4 +48,4 @@ def check_jobs(jobs: int) -> int:
     return jobs
 
 
-__all__ = ["ENGINES", "Engine", "check_jobs", "find_engine"]
+__all__ = ["ENGINES", "JOINING", "Engine", "check_jobs", "find_engine"]

@@ -110,6 +110,7 @@ def evaluate(
     seconds: float | None = None,
     jobs: int = 1,
     engine: str = "local",
+    address: str | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> EvaluateResult:
     """Track simulated runs of every case and seed with every filter, and score them.
@@ -124,6 +125,7 @@ def evaluate(
         seconds: Length of a run [s]; by default that of the suite.
         jobs: Processes at a time. Nothing but the time of a round depends on it.
         engine: One of `agents.engines.ENGINES`.
+        address: Of a cluster that runs, see `agents.engines.find_engine`.
         progress: Called with the share done, 0 to 1.
 
     Raises:
@@ -139,7 +141,7 @@ def evaluate(
     if not SHORTEST <= seconds <= LONGEST:
         raise UsageError(f"--seconds: expected {SHORTEST:g} to {LONGEST:g}, got {seconds:g}")
     check_jobs(jobs)
-    work = find_engine(engine)
+    work = find_engine(engine, address)
     tasks = [(case, seed, names, seconds) for seed in range(seeds) for case in chosen.cases]
     done: dict[tuple[str, int], list[RunResult]] = {}
     for n, runs in work(run_seed, tasks, jobs):

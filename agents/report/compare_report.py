@@ -6,6 +6,7 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
+from agents.compare.contender import sees
 from agents.compare.episode import IN_FORMATION
 from agents.compare.result import CompareResult, Row
 from agents.report import compare_figures as figures
@@ -30,7 +31,7 @@ def _cells(record: dict[str, Any]) -> list[str]:
     return [
         record["policy"],
         record["trained_on"] or "-",
-        record["observation"],
+        sees(record["observation"], record["proximity"]),
         metres(record["formation_error"]),
         _ends(record["ci95"]),
         metres(record["tracking_error"]),
@@ -52,12 +53,12 @@ def short_rows(result: CompareResult, scenario: str) -> list[list[str]]:
     """Cells of the table of one scenario, for a terminal: without the energy."""
     lines = []
     for row, cells in zip(result.of(scenario), rows(result, scenario), strict=True):
-        sees = f" on {row.contender.observation}"
-        name, room = row.contender.called, _LONGEST - len(sees)
+        shown = f" on {row.contender.sees}"
+        name, room = row.contender.called, _LONGEST - len(shown)
         if len(name) > room:
             name = f"{name[: room - 3]}..."
         numbers = [cell.replace(_TO, "-") for cell in (*cells[3:8], *cells[9:])]
-        lines.append([name + sees, *numbers])
+        lines.append([name + shown, *numbers])
     return lines
 
 

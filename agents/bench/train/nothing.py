@@ -6,16 +6,16 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from stable_baselines3.common.vec_env import VecEnv
 
 from relpos_env.interface.observations.base import F32
+from relpos_env.sb3_seats import SharedSeats
 from tracking.arrays import Bool
 
 
-class Nothing(VecEnv):  # type: ignore[misc]
+class Nothing(SharedSeats):
     """Shows the same observations at every step; nothing ends."""
 
-    def __init__(self, like: VecEnv, observations: F32) -> None:
+    def __init__(self, like: SharedSeats, observations: F32) -> None:
         """Take the spaces and seats of an environment.
 
         Args:
@@ -46,22 +46,3 @@ class Nothing(VecEnv):  # type: ignore[misc]
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Nothing to seed."""
         return [seed] * self.num_envs
-
-    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """An attribute, once for every seat asked for."""
-        return [getattr(self, attr_name)] * len(list(self._get_indices(indices)))
-
-    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Set an attribute; the seats share it."""
-        setattr(self, attr_name, value)
-
-    def env_method(
-        self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any
-    ) -> list[Any]:
-        """Call a method once; its result for every seat asked for."""
-        result = getattr(self, method_name)(*method_args, **method_kwargs)
-        return [result] * len(list(self._get_indices(indices)))
-
-    def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
-        """False for every seat."""
-        return [False] * len(list(self._get_indices(indices)))

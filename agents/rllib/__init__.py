@@ -1,0 +1,1 @@
+"""Training with RLlib on the same environment, for clusters; needs `relpos-env[rllib]`."""

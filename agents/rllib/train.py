@@ -1,0 +1,223 @@
+"""Training with RLlib: what `relpos rllib` does, as a function."""
+
+from __future__ import annotations
+
+import json
+import logging
+import platform
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from ray.rllib.algorithms.ppo import PPOConfig
+from ray.rllib.callbacks.callbacks import RLlibCallback
+from ray.rllib.core.rl_module.multi_rl_module import MultiRLModuleSpec
+from ray.rllib.core.rl_module.rl_module import RLModuleSpec
+
+from agents.engines.ray_engine import import_ray, start_ray
+from agents.output import check_folder, check_new, write_results
+from agents.policy.layout import Layout
+from agents.rllib.config import RllibConfig
+from agents.rllib.env import SeededEnv
+from agents.rllib.export import export_module
+from agents.rllib.module import CarModule, gain_of
+
+MODULE = "car"
+"""What RLlib calls the network that all cars share."""
+POLICY, CHECKPOINT, LOG = "policy", "checkpoint", "training.jsonl"
+"""In the folder of a run: name of the policy, RLlib's own checkpoint, a record an iteration."""
+SAVE_EVERY = 20
+"""[-] Iterations after which files are written, and at the end."""
+EPISODES = 100
+"""[-] Figures of episodes are means over so many of the last."""
+PACKAGES = ("relpos-env", "ray", "torch", "gymnasium", "numpy", "numba")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RllibResult:
+    """A training."""
+
+    policy: Path
+    """The file with the network; the card is beside it."""
+    checkpoint: Path
+    """RLlib's own, a folder."""
+    records: list[dict[str, Any]]
+    """By iteration."""
+
+
+class FormationCallback(RLlibCallback):  # type: ignore[misc]
+    """Tells what the return does not: how well the cars kept formation."""
+
+    def on_episode_end(self, *, env: Any, env_index: int, metrics_logger: Any, **_: Any) -> None:
+        """Log the error of the episode [m]."""
+        error = env.envs[env_index].unwrapped.formation_error
+        if np.isfinite(error):
+            metrics_logger.log_value("formation_error", error, window=EPISODES)
+
+
+def rllib_train(
+    config: RllibConfig,
+    folder: Path,
+    *,
+    address: str | None = None,
+    progress: Callable[[dict[str, Any]], None] | None = None,
+) -> RllibResult:
+    """Train, then write policy, checkpoint and log.
+
+    Args:
+        config: Of the run.
+        folder: New or empty.
+        address: Of a running cluster; None starts one with a core for each worker on this machine
+            and ends it afterwards.
+        progress: Called with the record of every iteration.
+
+    Raises:
+        UsageError: No ray, no cluster, or a folder that cannot be written to.
+        EnvError: An environment that cannot be.
+    """
+    check_new(folder)
+    check_folder(folder, [LOG])
+    # It warns of its own former ways.
+    logging.getLogger("ray.rllib").setLevel(logging.ERROR)
+    layout = config.layout
+    records: list[dict[str, Any]] = []
+    with _cluster(max(1, config.workers), address), _algorithm(config) as algorithm:
+        for k in range(1, config.iterations + 1):
+            begun = time.perf_counter()
+            found = algorithm.train()
+            records.append(_record(found, time.perf_counter() - begun))
+            if progress is not None:
+                progress(records[-1])
+            if k % SAVE_EVERY == 0 or k == config.iterations:
+                policy = _save(algorithm, config, layout, folder, records)
+    return RllibResult(policy=policy, checkpoint=folder / CHECKPOINT, records=records)
+
+
+def _save(
+    algorithm: Any,
+    config: RllibConfig,
+    layout: Layout,
+    folder: Path,
+    records: list[dict[str, Any]],
+) -> Path:
+    """Write what there is so far over what there was; gives the file of the policy."""
+    lines = "".join(json.dumps(r, allow_nan=False) + "\n" for r in records)
+    write_results(folder, {LOG: lines})
+    algorithm.save_to_path((folder / CHECKPOINT).resolve())
+    training = {
+        "command": "rllib",
+        "config": config.record,
+        "seed": config.seed,
+        "frames": records[-1]["env_steps"],
+        "measured": records[-1],
+        "versions": {p: _version(p) for p in PACKAGES} | {"python": platform.python_version()},
+    }
+    return export_module(algorithm.get_module(MODULE), layout, folder, POLICY, training)
+
+
+def ppo_config(config: RllibConfig) -> PPOConfig:
+    """The same in RLlib's words, for those who want to go on from there.
+
+    Raises:
+        EnvError: An environment that cannot be.
+    """
+    model = {"gain": gain_of(config.layout).tolist(), "width": config.width}
+    spec = RLModuleSpec(module_class=CarModule, model_config=model)
+    return (
+        PPOConfig()
+        .api_stack(enable_rl_module_and_learner=True, enable_env_runner_and_connector_v2=True)
+        .environment(
+            SeededEnv,
+            env_config={"arguments": dict(config.arguments), "seed": config.seed},
+            disable_env_checking=True,
+            normalize_actions=False,
+            clip_actions=True,
+        )
+        .env_runners(
+            num_env_runners=config.workers,
+            num_envs_per_env_runner=config.envs,
+            num_cpus_per_env_runner=1,
+            rollout_fragment_length="auto",
+        )
+        .multi_agent(policies={MODULE}, policy_mapping_fn=_one_for_all)
+        .rl_module(rl_module_spec=MultiRLModuleSpec(rl_module_specs={MODULE: spec}))
+        .training(
+            lr=config.learning_rate,
+            gamma=config.gamma,
+            lambda_=config.trace,
+            clip_param=config.clip,
+            # Returns are not scaled, so neither is how far a value may go.
+            vf_clip_param=float("inf"),
+            vf_loss_coeff=0.5,
+            use_kl_loss=False,
+            grad_clip=0.5,
+            grad_clip_by="global_norm",
+            num_epochs=config.epochs,
+            minibatch_size=min(config.minibatch, config.steps),
+            train_batch_size_per_learner=config.steps,
+        )
+        .learners(num_learners=0)
+        .callbacks(FormationCallback)
+        .fault_tolerance(restart_failed_env_runners=True)
+        .reporting(metrics_num_episodes_for_smoothing=EPISODES)
+        .debugging(seed=config.seed, log_level="ERROR")
+    )
+
+
+def _one_for_all(agent: str, episode: Any, **_: Any) -> str:
+    """Every car is driven by the same network."""
+    return MODULE
+
+
+@contextmanager
+def _cluster(cores: int, address: str | None) -> Iterator[None]:
+    ray = import_ray()
+    if ray.is_initialized():
+        yield
+        return
+    start_ray(cores, address)
+    try:
+        yield
+    finally:
+        ray.shutdown()
+
+
+@contextmanager
+def _algorithm(config: RllibConfig) -> Iterator[Any]:
+    algorithm = ppo_config(config).build_algo()
+    try:
+        yield algorithm
+    finally:
+        algorithm.stop()
+
+
+def _record(found: dict[str, Any], seconds: float) -> dict[str, Any]:
+    """One iteration, ready for JSON; None for what no episode has shown yet."""
+    runners = found["env_runners"]
+    steps = float(runners["num_env_steps_sampled"])
+    return {
+        "iteration": int(found["training_iteration"]),
+        "env_steps": int(runners["num_env_steps_sampled_lifetime"]),
+        "episodes": int(runners.get("num_episodes_lifetime", 0)),
+        "return": _number(runners.get("episode_return_mean")),
+        "formation_error": _number(runners.get("formation_error")),
+        "env_steps_per_s": steps / seconds,
+    }
+
+
+def _number(value: Any) -> float | None:
+    """A finite number, or None."""
+    return None if value is None or not np.isfinite(value) else float(value)
+
+
+def _version(package: str) -> str | None:
+    """Of an installed package."""
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
