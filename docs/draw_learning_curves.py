@@ -20,22 +20,24 @@ ROWS, PICTURE = DOCS / "learning-curves.jsonl", DOCS / "images" / "learning-curv
 
 
 def collect(folders: list[Path]) -> list[dict[str, Any]]:
-    """Rows of all runs, each with what it was trained on and its seed."""
+    """Rows of all runs, each with its task, what it was trained on and its seed."""
     rows = []
     for folder in folders:
         config = RunFolder(folder).config()
-        which = {"trained_on": config.env.observation, "seed": config.seed}
+        env = config.env
+        which = {"task": env.task, "trained_on": env.observation, "seed": config.seed}
         lines = (folder / LOG).read_text().splitlines()
         rows += [{**which, **json.loads(line)} for line in lines]
     return rows
 
 
 def draw(rows: list[dict[str, Any]]) -> bytes:
-    """The picture, one line a run, one colour for each mode of observations."""
+    """The picture, one line a run, one colour for each task and mode of observations."""
     runs: dict[tuple[str, int], list[dict[str, Any]]] = {}
     for row in rows:
-        runs.setdefault((row["trained_on"], row["seed"]), []).append(row)
-    return png(curves([(f"on {name}", run) for (name, _), run in runs.items()]))
+        label = f"{row['task']}, on {row['trained_on']}"
+        runs.setdefault((label, row["seed"]), []).append(row)
+    return png(curves([(label, run) for (label, _), run in runs.items()]))
 
 
 if __name__ == "__main__":

@@ -5,6 +5,8 @@ Run `python docs/measure_controllers.py`; a minute or two. Seeds 0 to 15, 60 s e
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from gymnasium.utils import seeding
 
@@ -21,17 +23,30 @@ NEAR = 0.5
 """[m] A contact while another car's middle is nearer than this is one of cars."""
 
 
-def measure(controller: str | None, task: str, scenario: str, observation: str) -> list[float]:
+def measure(
+    controller: str | None,
+    task: str,
+    scenario: str,
+    observation: str,
+    proximity: int = 0,
+    seeds: Sequence[int] = SEEDS,
+) -> list[float]:
     """Mean formation error [m], contacts of cars, and with what stands there [1/min of a car].
 
     Without a controller, consensus drives cars that are told nothing of each other.
     """
     steps = round(SECONDS / DECISION)
     parts = configure(
-        {"task": task, "scenario": scenario, "observation": observation, "max_cycles": steps + 1}
+        {
+            "task": task,
+            "scenario": scenario,
+            "observation": observation,
+            "proximity": proximity,
+            "max_cycles": steps + 1,
+        }
     )
-    formation = Formation(parts, len(SEEDS))
-    for e, seed in enumerate(SEEDS):
+    formation = Formation(parts, len(seeds))
+    for e, seed in enumerate(seeds):
         formation.seed(e, seeding.np_random(seed)[0])
         formation.begin(e)
     driver = CONTROLLERS[controller or "consensus"](parts.mode.fields)
@@ -47,7 +62,7 @@ def measure(controller: str | None, task: str, scenario: str, observation: str) 
         apart[:, range(parts.n_cars), range(parts.n_cars)] = np.inf
         near, contacts = apart.min(axis=-1) < NEAR, formation.loop.swarm.contacts
         cars, others = cars + contacts[near].sum(), others + contacts[~near].sum()
-    minutes = len(SEEDS) * parts.n_cars * SECONDS / 60.0
+    minutes = len(seeds) * parts.n_cars * SECONDS / 60.0
     settled = np.nanmean(np.array(errors)[round(SETTLE / DECISION) :])
     return [float(settled), cars / minutes, others / minutes]
 

@@ -75,6 +75,17 @@ def test_single_bad_measurements_are_shown(recording, tmp_path):
 
 
 FAULTS = [
+    (["train"], "--out, --resume: expected one of them"),
+    (["train", "--resume", "nowhere"], "nowhere: no training run"),
+    (["train", "--resume", "nowhere", "--seed", "1"], "--seed: a run goes on with its own"),
+    (["train", "--out", "run", "--gamma", "2"], "--gamma: expected 0 to 1, got 2"),
+    (["train", "--out", "run", "--critic", "all"], "--critic: expected one of own, central"),
+    (["train", "--out", "run", "--scenarios", "moon"], "scenario: expected one of"),
+    (["train", "--out", "run", "--cars", "3"], "--cars: expected at least 6"),
+    (["train", "--out", "run", "--weights", "collision"], "--weights: expected TERM=WEIGHT"),
+    (["train", "--out", "run", "--weights", "luck=1"], "weights: expected terms among"),
+    (["export", "nowhere", "--out", "out"], "nowhere: no training run"),
+    (["bench", "train", "--updates", "0"], "--updates: expected 1 to"),
     (["track", "nowhere"], "no such folder"),
     (["track"], "Missing argument"),
     (["track", ".", "--filter", "magic"], "filter: expected one of joint, ekf-mds, ekf"),

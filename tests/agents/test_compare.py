@@ -123,10 +123,10 @@ def constant(monkeypatch):
     """Drivers called by their speed share, which see at most three cars and only estimates."""
 
     class Entry(ControllerEntry):
-        def refusal(self, observation, n_cars):
+        def refusal(self, observation, n_cars, proximity):
             return None if observation == "estimate" else "expected observation 'estimate'"
 
-        def driver(self, observation, n_cars):
+        def driver(self, observation, n_cars, proximity):
             return Constant([float(self.title), 0.0])
 
     def find(name):

@@ -54,6 +54,19 @@ def test_a_history_is_the_policys_own(tmp_path):
     assert [r["policy"] for r in result.records] == ["consensus", "past"]
 
 
+def test_beams_are_those_of_the_policies_unless_said(tmp_path):
+    who = make(tmp_path, Layout("estimate", 3, 1, 4), "feeler")
+    same = dict(scenarios=["cars-nlos"], episodes=1, seconds=1.0, settle=0.0)
+    result = compare(drivers=["consensus", who], **same)
+    assert [r["proximity"] for r in result.records] == [4, 4]
+    assert result.rows[0].contender.label == "consensus on estimate, 4 beams"
+    result = compare(drivers=["consensus", who], proximity=0, **same)
+    assert [(r["policy"], r["proximity"]) for r in result.records] == [("consensus", 0)]
+    assert "the beams differ" in result.notes[0]
+    with pytest.raises(UsageError, match="--proximity: expected 0 to 32, got 40"):
+        compare(drivers=["consensus"], proximity=40, **same)
+
+
 def test_a_file_that_is_not_there_is_named(tmp_path):
     with pytest.raises(UsageError, match=r"gone\.onnx: no such file"):
         find_entry(str(tmp_path / "gone.onnx"))

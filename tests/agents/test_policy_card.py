@@ -46,6 +46,7 @@ def places(value, path=()):
 
 PLACES = [path for path in places(RECORD) if path]
 NEEDED = [p for p in PLACES if isinstance(p[-1], str) and p[:2] != ("results", 0)]
+NEEDED.remove(("layout", "proximity"))  # older cards do not have it
 
 
 def changed(path, change):
@@ -99,6 +100,17 @@ def test_a_missing_value_is_named(path):
     with pytest.raises(PolicyError, match=f"{path[-1]}: is missing") as caught:
         Card.from_json(json.dumps(record))
     assert caught.value.where == "card"
+
+
+def test_a_card_that_says_nothing_of_beams_has_none():
+    older = changed(("layout", "proximity"), lambda inner, key: inner.pop(key))
+    assert Card.from_json(json.dumps(older)).layout.proximity == 0
+
+
+def test_a_card_has_beams():
+    found = Card.from_json(card(layout=Layout("estimate", 3, 2, 8)).to_json())
+    assert found.layout == Layout("estimate", 3, 2, 8)
+    assert found.layout.index[-1]["name"] == "near"
 
 
 @pytest.mark.parametrize("path", [(), ("layout",), ("actions",), ("layout", "index", 3)], ids=str)

@@ -44,7 +44,13 @@ def test_shipped_ones_are_listed(tmp_path, monkeypatch):
     small(tmp_path, name="one")
     small(tmp_path, Layout("ranges", 6, 2), name="two")
     rows = [json.loads(line) for line in run("policy", "list", "--json").output.splitlines()]
-    assert rows[1] == {"name": "two", "observation": "ranges", "n_cars": 6, "history": 2}
+    assert rows[1] == {
+        "name": "two",
+        "observation": "ranges",
+        "n_cars": 6,
+        "history": 2,
+        "proximity": 0,
+    }
     assert "two" in run("policy", "list").output
     assert run("policy", "show", "two").exit_code == 0
 
@@ -75,6 +81,15 @@ def test_a_policy_drives_the_demonstration(tmp_path, layout, has_truth):
     assert (result.formation_error_truth is not None) == has_truth
     assert result.seconds == pytest.approx(1.0)
     assert result.summary[-1]["driver"] == "small"
+
+
+def test_beams_of_a_demonstration_are_those_of_the_policy(tmp_path):
+    small(tmp_path, Layout("estimate", 3, 1, 4), name="small")
+    policy = tmp_path / "small.onnx"
+    assert demo(policy=policy, scenario="cars-nlos", seconds=0.5).driver == "small"
+    with pytest.raises(UsageError, match="proximity: expected 4, the beams of the policy, got 8"):
+        demo(policy=policy, proximity=8)
+    assert isinstance(run("demo", "--proximity", "33").exception, UsageError)
 
 
 def test_a_policy_for_fewer_cars_is_refused(tmp_path):

@@ -98,6 +98,30 @@ def test_padded_is_what_the_mode_writes_of_absent_cars(mode, few, more, history,
     assert np.array_equal(pad(frames[0]), frames[1][:, :few])
 
 
+@pytest.mark.parametrize("mode", MODES)
+def test_beams_end_the_observation_and_are_padded_as_they_are(mode):
+    wanted, given_ = Layout(mode, 6, 2, 8), Layout(mode, 3, 2, 8)
+    assert wanted.index[-1]["name"] == "near"
+    assert wanted.one == Layout(mode, 6, 2).one + 8
+    seen = np.random.default_rng(0).uniform(0.1, 1.0, given_.size).astype(np.float32)
+    padded = Padding(wanted, given_)(seen).reshape(2, -1)
+    assert np.array_equal(padded[:, -8:], seen.reshape(2, -1)[:, -8:])
+    assert (wanted.alone().reshape(2, -1)[:, -8:] == 3.0).all()
+    parts = configure({"observation": mode, "history": 2, "n_cars": 3, "proximity": 8})
+    assert Layout.of(parts) == given_
+
+
+def test_other_beams_are_another_layout():
+    without, some, more = (Layout("estimate", 3, 1, n) for n in (0, 8, 16))
+    assert len({without.digest, some.digest, more.digest}) == 3
+    reason = some.refusal(more)
+    assert reason is not None
+    assert reason.endswith("of 3 cars with 16 beams: the beams differ")
+    assert some.refusal(without).endswith("the beams differ")
+    with pytest.raises(EnvError, match="^proximity: expected a whole number from 0 to 32"):
+        Layout("estimate", 3, 1, 33)
+
+
 def test_the_index_map_counts_every_number_once():
     wanted, given_ = Layout("estimate_cov", 6, 4), Layout("estimate_cov", 3, 4)
     where = wanted.padding_from(given_)

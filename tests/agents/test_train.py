@@ -11,7 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from click.testing import CliRunner
 
+from agents.cli import cli
 from agents.errors import UsageError
 from agents.policy import load_policy
 from agents.policy.layout import Layout
@@ -124,6 +126,22 @@ def test_a_central_critic_sees_the_truth_and_the_actor_does_not(tmp_path):
     assert export_policy(tmp_path / "run", tmp_path / "out").exists()
 
 
+def test_a_policy_with_beams_sees_them_and_is_exported(tmp_path):
+    config = small(proximity="8", frames="1000")
+    train(config, tmp_path / "run")
+    rooms = make_rooms(config, None)
+    size = Layout("estimate", 6, 1, 8).size
+    assert rooms.observation_space.shape == (size,)
+    seen = torch.from_numpy(rooms.reset())
+    closer = seen.clone()
+    closer[:, -8:] *= 0.1
+    actor = Actor(make_model(config, rooms).policy)
+    with torch.no_grad():
+        assert not torch.allclose(actor(seen), actor(closer))
+    path = export_policy(tmp_path / "run", tmp_path / "out")
+    assert load_policy(path).layout == Layout("estimate", 6, 1, 8)
+
+
 @pytest.mark.parametrize("observation", ["estimate", "estimate_cov", "ranges", "truth"])
 @pytest.mark.parametrize("history", [1, 3])
 def test_the_order_of_the_others_does_not_matter(observation, history):
@@ -190,6 +208,22 @@ def test_a_whole_run_ends_with_a_policy_and_a_report(tmp_path):
     assert load_policy(result.policy).card.name == "mine"
     assert "Learning curves" in (tmp_path / "mine" / "report.html").read_text()
     assert list((tmp_path / "mine" / "tensorboard").iterdir())
+
+
+def test_the_command_tells_every_leg_and_the_policy(tmp_path):
+    options = [f"--{k.replace('_', '-')}={v}" for k, v in SMALL.items() if k != "frames"]
+    command = ["train", "--out", str(tmp_path / "run"), "--frames", "1000", "--json", *options]
+    done = CliRunner().invoke(cli, command)
+    assert done.exit_code == 0, done.output
+    rows = [json.loads(line) for line in done.stdout.splitlines()]
+    assert [r["leg"] for r in rows[:-1]] == [0, 1, 2]
+    assert rows[-1]["result"] == "policy"
+    out = tmp_path / "policies"
+    done = CliRunner().invoke(
+        cli, ["export", str(tmp_path / "run"), "--out", str(out), "--name", "p", "--json"]
+    )
+    assert json.loads(done.stdout)["name"] == "p"
+    assert {p.name for p in out.iterdir()} == {"p.onnx", "p.json"}
 
 
 def test_a_full_disk_leaves_the_last_good_checkpoint(run, tmp_path, monkeypatch):

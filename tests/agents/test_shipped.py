@@ -1,0 +1,52 @@
+"""The policies that come with the package."""
+
+import numpy as np
+import pytest
+
+from agents.compare.contender import Contender
+from agents.compare.episode import IN_FORMATION, run_episodes
+from agents.compare.setting import Setting
+from agents.policy import load_policy, shipped_names
+from agents.settings import from_json
+from agents.train.config import TrainConfig
+
+EPISODES = range(2000, 2004)
+
+
+def mean_error(name, **setting):
+    card = load_policy(name).card
+    episodes = run_episodes(Contender(name, card.layout.observation), Setting(**setting), EPISODES)
+    return float(np.mean([e.formation_error for e in episodes]))
+
+
+def test_there_are_some():
+    assert {"ring", "hold"} <= set(shipped_names())
+
+
+@pytest.mark.parametrize("name", shipped_names())
+def test_cards_tell_how_a_policy_was_made_and_what_it_reached(name):
+    card = load_policy(name).card
+    assert card.name == name
+    config = from_json(TrainConfig, card.training["config"])
+    assert config.env.observation == card.training["observation"] == card.layout.observation
+    assert config.env.cars == card.layout.n_cars
+    assert card.training["frames"] <= config.frames * 1.2
+    assert all({"scenario", "formation_error", "ci95"} <= set(r) for r in card.results)
+    assert card.results
+
+
+@pytest.mark.parametrize("name", shipped_names())
+def test_they_keep_their_formation(name):
+    config = from_json(TrainConfig, load_policy(name).card.training["config"])
+    error = mean_error(
+        name, task=config.env.task, scenario=config.env.scenarios[0], seconds=25.0, settle=15.0
+    )
+    assert error < IN_FORMATION
+
+
+@pytest.mark.parametrize("cars", [3, 4, 5, 6])
+def test_one_policy_drives_groups_of_several_sizes_in_a_room_it_has_not_seen(cars):
+    error = mean_error(
+        "ring", task="ring", scenario="ring-nlos", cars=cars, seconds=25.0, settle=15.0
+    )
+    assert error < IN_FORMATION
