@@ -15,6 +15,7 @@ HEAVY = (
     "stable_baselines3",
     "serial",
     "rich",
+    "ray",
     "filterpy",
     "onnx",
     "onnxruntime",
