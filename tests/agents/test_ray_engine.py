@@ -145,16 +145,20 @@ print("workers in session", *{{r[2] for r in found.values()}})
 """
 
 
-def elsewhere(address, path=True):
+HERE_ALONE = """
+import sys, types
+module = types.ModuleType("here_alone")
+exec("def divided(a, b): return a / b, 0, 0", module.__dict__)
+sys.modules["here_alone"] = module
+"""
+"""A module that no other process can import."""
+
+
+def elsewhere(address, code=SCRIPT):
     """A program of its own that uses the engine; its process and what it says."""
     here = Path(__file__).parent
-    if path:
-        before = os.environ.get("PYTHONPATH", "")
-        search = {"PYTHONPATH": os.pathsep.join([str(here), str(here.parents[1]), before])}
-        code = SCRIPT
-    else:
-        search = {}
-        code = f"import sys; sys.path.insert(0, {str(here)!r})" + SCRIPT
+    before = os.environ.get("PYTHONPATH", "")
+    search = {"PYTHONPATH": os.pathsep.join([str(here), str(here.parents[1]), before])}
     with subprocess.Popen(
         [sys.executable, "-c", code.format(address=address)],
         stdout=subprocess.PIPE,
@@ -198,10 +202,11 @@ def test_a_cluster_that_runs_is_joined_and_left(cluster):
 
 
 def test_machines_without_the_packages_are_told(cluster):
-    child, _, err = elsewhere(cluster.get_runtime_context().gcs_address, path=False)
+    code = HERE_ALONE + SCRIPT.replace("from test_ray_engine", "from here_alone")
+    child, _, err = elsewhere(cluster.get_runtime_context().gcs_address, code)
     assert child.returncode == 1
     assert "expected the same packages on every machine" in err
-    assert "No module named 'test_ray_engine'" in err
+    assert "No module named 'here_alone'" in err
 
 
 def test_an_address_where_nobody_answers_is_refused():
