@@ -13,7 +13,7 @@ from agents.blindfold import Blindfold
 from agents.cli import cli
 from agents.demo import demo
 from agents.errors import UsageError
-from agents.policy import Layout, PolicyError, find, write_policy
+from agents.policy import Layout, PolicyError, find, shipped_names, write_policy
 from relpos_env.errors import EnvError
 
 
@@ -135,7 +135,7 @@ def test_bench_lines_have_a_peer():
     done = run("bench", "policy", "--steps", 20, "--json")
     assert done.exit_code == 0, done.output
     rows = [json.loads(line) for line in done.output.splitlines()]
-    assert len(rows) == 4
+    assert len(rows) == 4 + len(shipped_names())
     for row in rows:
         assert row["ratio"] == pytest.approx(row["peer_value"] / row["value"])
         assert 0.0 < row["value"] < 1e6

@@ -12,6 +12,7 @@ import numpy as np
 from agents.bench.env.turns import best_of_turns
 from agents.bench.policy.perceptron import HIDDEN, Perceptron
 from agents.driver import Driver
+from agents.policy import load_policy, shipped_names
 from agents.policy.layout import Layout
 from agents.policy.padding import PaddedDriver
 from relpos_env.config import configure
@@ -63,6 +64,11 @@ def bench_policy(
     ours, theirs, _, n = drivers[f"one car of {SLOTS} slots, three cars"]
     jobs = [_turn(_decision(formation, driver), n) for driver in (ours, theirs)]
     rows.append(_row("observation and act, the same", *best_of_turns(jobs, TURNS)))
+    for name in shipped_names():
+        policy = load_policy(name)
+        if policy.layout.refusal(seen) is None:
+            jobs = [_turn(_decision(formation, d), n) for d in (policy.driver(seen), theirs)]
+            rows.append(_row(f"observation and act, policy {name}", *best_of_turns(jobs, TURNS)))
     if progress is not None:
         progress(1.0)
     return rows
