@@ -14,63 +14,37 @@ References:
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from agents.controllers.avoidance import AvoidanceParams
-from agents.controllers.base import TINY, Plane, Reader, Sight
+from agents.controllers.base import TINY, Plane, Sight
 from agents.controllers.caution import shrunk
-from agents.controllers.correcting import corrected
-from agents.controllers.steering import SteeringParams
+from agents.controllers.correcting import Correcting, CorrectingParams
 from relpos_env.interface.observations import Field
-from relpos_env.interface.observations.base import F32
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ConsensusParams:
+class ConsensusParams(CorrectingParams):
     """How hard cars pull."""
 
-    gain_ahead: float = 1.5
-    """[1/s] Velocity per displacement error along the car."""
-    gain_left: float = 1.2
-    """[1/s] Velocity per displacement error across it."""
-    max_correction: float = 0.9
-    """[m/s] Largest correction of the commanded velocity."""
-    trusted_std: float = 0.3
-    """[m] s: an estimate counts half in a direction in which it is as unsure as this."""
     room_of_car: float = 0.25
     """[m] Cars without places come as near to the middle as this times the root of their number."""
-    steering: SteeringParams = field(default_factory=SteeringParams)
-    """The car, and how it pursues."""
-    avoidance: AvoidanceParams = field(default_factory=AvoidanceParams)
-    """How near cars may come."""
 
 
-class Consensus:
+class Consensus(Correcting[ConsensusParams]):
     """Formation by relative displacements; follows the command alone while nothing is known."""
 
+    name = "consensus"
     observations = ("estimate", "estimate_cov", "truth")
-    """Modes that it can read."""
 
     def __init__(self, fields: tuple[Field, ...], params: ConsensusParams | None = None) -> None:
-        """Say what is read.
+        """See `Correcting`; by default the parameters are those of their class."""
+        super().__init__(fields, params or ConsensusParams())
 
-        Args:
-            fields: Stretches of an observation.
-            params: How hard cars pull.
-
-        Raises:
-            UsageError: The observation has no positions.
-        """
-        self._reader = Reader(fields, "consensus", self.observations)
-        self.params = params or ConsensusParams()
-
-    def act(self, observations: F32) -> F32:
-        """Actions, (..., 2), see `agents.driver.Driver`."""
-        p, sight = self.params, self._reader.read(observations)
-        velocity = correction(sight, p)
-        return corrected(sight, velocity, p.max_correction, p.steering, p.avoidance)
+    def correction(self, sight: Sight) -> Plane:
+        """See the head of this file."""
+        return correction(sight, self.params)
 
 
 def correction(sight: Sight, params: ConsensusParams) -> Plane:

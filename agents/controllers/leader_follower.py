@@ -17,68 +17,41 @@ References:
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from math import cos, radians, sin
 
 import numpy as np
 
-from agents.controllers.avoidance import AvoidanceParams
-from agents.controllers.base import Plane, Reader, Sight
+from agents.controllers.base import Plane, Sight
 from agents.controllers.caution import shrunk
-from agents.controllers.correcting import corrected
-from agents.controllers.steering import SteeringParams
+from agents.controllers.correcting import Correcting, CorrectingParams
 from relpos_env.interface.observations import Field
-from relpos_env.interface.observations.base import F32
 from tracking.arrays import Bool
 
 FOREMOST = radians(20.0)
 """[rad] Direction in the room, from x to y, in which the leader's place is the farthest."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LeaderFollowerParams:
+class LeaderFollowerParams(CorrectingParams):
     """How hard followers pull."""
 
-    gain_ahead: float = 1.5
-    """[1/s] Velocity per displacement error along the car."""
-    gain_left: float = 1.2
-    """[1/s] Velocity per displacement error across it."""
-    max_correction: float = 0.9
-    """[m/s] Largest correction of the commanded velocity."""
-    trusted_std: float = 0.3
-    """[m] s: an estimate counts half in a direction in which it is as unsure as this."""
-    steering: SteeringParams = field(default_factory=SteeringParams)
-    """The car, and how it pursues."""
-    avoidance: AvoidanceParams = field(default_factory=AvoidanceParams)
-    """How near cars may come."""
+    __slots__ = ()
 
 
-class LeaderFollower:
+class LeaderFollower(Correcting[LeaderFollowerParams]):
     """Places relative to one car that leads."""
 
+    name = "leader-follower"
     observations = ("estimate", "estimate_cov", "truth")
-    """Modes that it can read."""
 
     def __init__(
         self, fields: tuple[Field, ...], params: LeaderFollowerParams | None = None
     ) -> None:
-        """Say what is read.
+        """See `Correcting`; by default the parameters are those of their class."""
+        super().__init__(fields, params or LeaderFollowerParams())
 
-        Args:
-            fields: Stretches of an observation.
-            params: How hard followers pull.
-
-        Raises:
-            UsageError: The observation has no positions.
-        """
-        self._reader = Reader(fields, "leader-follower", self.observations)
-        self.params = params or LeaderFollowerParams()
-
-    def act(self, observations: F32) -> F32:
-        """Actions, (..., 2), see `agents.driver.Driver`."""
-        p, sight = self.params, self._reader.read(observations)
-        velocity = correction(sight, p)
-        return corrected(sight, velocity, p.max_correction, p.steering, p.avoidance)
+    def correction(self, sight: Sight) -> Plane:
+        """See the head of this file."""
+        return correction(sight, self.params)
 
 
 def leader(sight: Sight) -> Bool:

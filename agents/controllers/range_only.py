@@ -24,32 +24,21 @@ References:
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from agents.controllers.avoidance import AvoidanceParams
-from agents.controllers.base import TINY, Plane, Reader, Sight, length
+from agents.controllers.base import TINY, Plane, Sight, length
 from agents.controllers.caution import spread
-from agents.controllers.correcting import corrected
-from agents.controllers.steering import SteeringParams
+from agents.controllers.correcting import Correcting, CorrectingParams
 from relpos_env.interface.observations import Field
-from relpos_env.interface.observations.base import F32
 from tracking.arrays import F64
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RangeOnlyParams:
+class RangeOnlyParams(CorrectingParams):
     """How hard cars pull."""
 
-    gain_ahead: float = 1.5
-    """[1/s] Velocity per distance error along the car."""
-    gain_left: float = 1.2
-    """[1/s] Velocity per distance error across it."""
-    max_correction: float = 0.9
-    """[m/s] Largest correction of the commanded velocity."""
-    trusted_std: float = 0.3
-    """[m] s: a distance as unsure as this counts half."""
     range_std: float = 0.1
     """[m] Of a range in sight, new."""
     nlos_gap: float = 6.0
@@ -61,36 +50,21 @@ class RangeOnlyParams:
     doubt: float = 1.0
     """[-] Of ranges: a distance is also as unsure as this times its error, since then the other is
     not in the direction of its place. Without it cars drive each other away."""
-    steering: SteeringParams = field(default_factory=SteeringParams)
-    """The car, and how it pursues."""
-    avoidance: AvoidanceParams = field(default_factory=AvoidanceParams)
-    """How near cars may come."""
 
 
-class RangeOnly:
+class RangeOnly(Correcting[RangeOnlyParams]):
     """Formation by distances."""
 
+    name = "range-only"
     observations = ("estimate", "estimate_cov", "ranges", "truth")
-    """Modes that it can read."""
 
     def __init__(self, fields: tuple[Field, ...], params: RangeOnlyParams | None = None) -> None:
-        """Say what is read.
+        """See `Correcting`; by default the parameters are those of their class."""
+        super().__init__(fields, params or RangeOnlyParams())
 
-        Args:
-            fields: Stretches of an observation.
-            params: How hard cars pull.
-
-        Raises:
-            UsageError: The observation has neither positions nor ranges.
-        """
-        self._reader = Reader(fields, "range-only", self.observations)
-        self.params = params or RangeOnlyParams()
-
-    def act(self, observations: F32) -> F32:
-        """Actions, (..., 2), see `agents.driver.Driver`."""
-        p, sight = self.params, self._reader.read(observations)
-        velocity = correction(sight, p)
-        return corrected(sight, velocity, p.max_correction, p.steering, p.avoidance)
+    def correction(self, sight: Sight) -> Plane:
+        """See the head of this file."""
+        return correction(sight, self.params)
 
 
 def correction(sight: Sight, params: RangeOnlyParams) -> Plane:
