@@ -31,17 +31,32 @@ CONFIG, LAST, BEST, LOG = "config.json", "last.safetensors", "best.safetensors",
 class Progress:
     """Where a run stands after a leg."""
 
-    legs: int = 0
-    """Finished."""
-    frames: int = 0
-    best_leg: int = -1
-    """The leg after which the best weights were there; -1 for none yet."""
-    best_return: float = -1e300
-    """Their mean return."""
-    seconds: float = 0.0
-    """[s] Spent on training so far."""
     log: list[dict[str, Any]] = field(default_factory=list)
     """What was measured after every leg."""
+
+    @property
+    def legs(self) -> int:
+        """Finished."""
+        return len(self.log)
+
+    @property
+    def frames(self) -> int:
+        """Decisions of cars so far."""
+        return int(self.log[-1]["frames"]) if self.log else 0
+
+    @property
+    def seconds(self) -> float:
+        """Spent on training so far [s]."""
+        return float(self.log[-1]["seconds"]) if self.log else 0.0
+
+    @property
+    def best_leg(self) -> int:
+        """The leg after which the weights with the highest return were there, the first of equals.
+
+        Raises:
+            ValueError: No leg is finished.
+        """
+        return max(range(self.legs), key=lambda k: float(self.log[k]["return"]))
 
     def after_leg(
         self, frames: int, seconds: float, level: int | None, measured: Mapping[str, Any]
@@ -54,17 +69,9 @@ class Progress:
             level: Of the curriculum in it.
             measured: Of the policy after it, see `agents.train.evaluation`.
         """
-        spent = self.seconds + seconds
-        best = measured["return"] > self.best_return
-        row = {"leg": self.legs, "frames": frames, "seconds": round(spent, 2), "level": level}
-        return Progress(
-            legs=self.legs + 1,
-            frames=frames,
-            best_leg=self.legs if best else self.best_leg,
-            best_return=measured["return"] if best else self.best_return,
-            seconds=spent,
-            log=[*self.log, {**row, **measured}],
-        )
+        spent = round(self.seconds + seconds, 2)
+        row = {"leg": self.legs, "frames": frames, "seconds": spent, "level": level}
+        return Progress(log=[*self.log, {**row, **measured}])
 
 
 class RunFolder:
