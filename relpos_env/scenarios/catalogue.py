@@ -14,9 +14,9 @@ from relpos_env.scenarios.base import Scenario
 from relpos_env.scenarios.gap import Gap
 from relpos_env.scenarios.levels import level
 from relpos_env.scenarios.randomisation import Randomisation
-from relpos_env.scenarios.toml import Preset, TableReader, Where
 from relpos_env.sensors.radio.channel import CHANNELS, ChannelParams
 from tracking.ranging.airtime import PHYS, Phy
+from tracking.tables import Preset, TableReader, Where
 
 FILES = Path(__file__).parent / "files"
 SUFFIX = ".toml"
@@ -81,7 +81,7 @@ def scenario_from(
     Raises:
         EnvError: Names the file and the key.
     """
-    where, rest = Where(file), dict(table)
+    where, rest = Where(file, raises=EnvError), dict(table)
     inherited: list[Gap | None] = []
 
     def parent(wanted: str) -> Scenario:

@@ -15,7 +15,6 @@ from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import lru_cache
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
-from relpos_env.errors import EnvError
 from tracking.errors import ConfigError
 
 T = TypeVar("T")
@@ -29,18 +28,20 @@ class Where:
 
     file: str
     path: str = ""
+    raises: type[Exception] = ConfigError
+    """What errors about the file are."""
 
     def key(self, name: str) -> Where:
         """A key of the table here."""
-        return Where(self.file, f"{self.path}.{name}" if self.path else name)
+        return replace(self, path=f"{self.path}.{name}" if self.path else name)
 
     def item(self, k: int) -> Where:
         """An entry of the list here."""
-        return Where(self.file, f"{self.path}[{k}]")
+        return replace(self, path=f"{self.path}[{k}]")
 
-    def error(self, message: str) -> EnvError:
+    def error(self, message: str) -> Exception:
         """An error about this place."""
-        return EnvError(": ".join(part for part in (self.file, self.path, message) if part))
+        return self.raises(": ".join(part for part in (self.file, self.path, message) if part))
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +52,7 @@ class Preset:
     kind: type
     """What the value must be: `str` or `int`."""
     find: Callable[[Any], Any]
-    """Value to base; raises `EnvError`."""
+    """Value to base; raises what `Where` says."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,7 +71,7 @@ class TableReader:
             base: What the table does not say; None are the defaults of the class.
 
         Raises:
-            EnvError: Names the file and the key.
+            ConfigError: Names the file and the key; or what `where` says.
         """
         if not isinstance(table, dict):
             raise where.error(f"expected a table, got {_described(table)}")
@@ -95,14 +96,14 @@ class TableReader:
                     raise where.key(f.name).error("missing")
         try:
             return kind(**values) if base is None else replace(base, **values)  # type: ignore
-        except (EnvError, ConfigError) as error:
+        except (where.raises, ConfigError) as error:
             raise _placed(error, where, [f.name for f in fields(kind)]) from error  # type: ignore
 
     def _preset(self, preset: Preset, value: object, where: Where) -> Any:
         wanted = self._value(preset.kind, value, where, None)
         try:
             return preset.find(wanted)
-        except EnvError as error:
+        except where.raises as error:
             raise where.error(str(error).removeprefix(f"{preset.key}: ")) from error
 
     def _value(self, hint: Any, value: object, where: Where, base: Any) -> Any:
@@ -175,10 +176,10 @@ def _described(value: object) -> str:
     return text if len(text) <= 40 else f"{text[:37]}..."
 
 
-def _placed(error: Exception, where: Where, names: list[str]) -> EnvError:
+def _placed(error: Exception, where: Where, names: list[str]) -> Exception:
     """An error of a class, whose message begins with a field or not, at its place."""
     message = str(error)
     head = message.split(":", 1)[0]
     if where.path and head.split(".")[0].split("[")[0] in names:
-        return EnvError(f"{where.file}: {where.path}.{message}")
+        return where.raises(f"{where.file}: {where.path}.{message}")
     return where.error(message)
