@@ -1,9 +1,8 @@
 """The tracker in the loop: rooms, their measurements, and what the cars believe.
 
-    command -> Swarm -> measurements -> Horizon -> Tracker -> view of every car
+    command -> Swarm -> measurements -> Perception -> view of every car
 
-The tracker gets nothing but measurements. Its estimate is as old as the horizon's delay and
-is carried to the present: positions at constant velocity, headings by the gyroscopes.
+The tracker gets nothing but measurements.
 """
 
 from __future__ import annotations
@@ -13,19 +12,17 @@ from collections.abc import Callable
 
 import numpy as np
 
-from relpos_env.interface._view_kernels import forget_all, note_ranges
-from relpos_env.interface.views import View, bind_view, make_view
+from relpos_env.interface.perception import Perception
+from relpos_env.interface.views import View
 from relpos_env.scenarios import Scenario
 from relpos_env.scenarios.episode import Episode
 from relpos_env.swarm import Swarm
 from relpos_env.timing import DT, STAND_STILL
 from tracking.arrays import F64, Bool
-from tracking.compiled import bind
 from tracking.estimate import TeamEstimate
-from tracking.horizon import Horizon, HorizonParams
-from tracking.measurements import MeasurementBlock
+from tracking.horizon import HorizonParams
 from tracking.ranging.airtime import round_rate
-from tracking.tracker import Tracker, TrackerParams
+from tracking.tracker import TrackerParams
 
 
 def default_params(scenario: Scenario, n_cars: int) -> TrackerParams:
@@ -57,27 +54,34 @@ class TrackedSwarm:
         n_steps: int = 10,
         proximity: int = 0,
     ) -> None:
-        self.swarm = Swarm(scenario, n_cars, n_envs, n_steps, proximity)
-        self.tracker = Tracker(self.swarm.constellation, params, filter=filter, n_envs=n_envs)
-        self.horizon = Horizon(params.horizon, n_envs)
-        self._room = waiting_at_most(scenario, n_cars, params, n_steps)
-        self.horizon.reserve(self._room)
-        self.view: View = make_view(n_envs, n_cars, proximity)
-        self.estimate = TeamEstimate.empty(self.swarm.constellation, np.zeros(n_envs))
+        self.swarm = swarm = Swarm(scenario, n_cars, n_envs, n_steps, proximity)
+        self._perception = Perception(
+            swarm.constellation,
+            params,
+            swarm.block,
+            swarm.powered,
+            filter=filter,
+            room=waiting_at_most(scenario, n_cars, params, n_steps),
+            n_beams=proximity,
+        )
+        self._singles: dict[int, TrackedSwarm] = {}
+
+    @property
+    def view(self) -> View:
+        """What every car sees now."""
+        return self._perception.view
+
+    @property
+    def estimate(self) -> TeamEstimate:
         """The tracker's last estimate, as old as the horizon, overwritten by the next."""
-        self._bind()
+        return self._perception.estimate
 
     def part(self, envs: slice) -> TrackedSwarm:
         """Some of the groups; shares their memory."""
         part = copy.copy(self)
         part.swarm = self.swarm.part(envs)
-        part.tracker, part.horizon = self.tracker.part(envs), self.horizon.part(envs)
-        part.view = self.view.part(envs)
-        whole = self.estimate
-        part.estimate = TeamEstimate(
-            whole.constellation, whole.t[envs], *(array[envs] for array in whole.arrays)
-        )
-        part._bind()
+        part._perception = self._perception.part(envs, part.swarm.block, part.swarm.powered)
+        part._singles = {}
         return part
 
     def share(self, target: F64, wanted: Bool, command: F64) -> None:
@@ -88,8 +92,8 @@ class TrackedSwarm:
             wanted: As in `View`.
             command: As in `View`.
         """
-        self.view = self.view._replace(target=target, wanted=wanted, command=command)
-        self._bind()
+        self._perception.share(target, wanted, command)
+        self._singles = {}
 
     def begin(
         self,
@@ -107,9 +111,7 @@ class TrackedSwarm:
             watch: Called with the group after each of its steps.
         """
         self.swarm.begin(env, episode, rng)
-        self.tracker.reset(env)
-        self.horizon.reset(env)
-        forget_all(self.view, env)
+        self._perception.reset(env)
         if env not in self._singles:
             self._singles[env] = self.part(slice(env, env + 1))
         still = np.zeros((1, self.view.speed.shape[1]))
@@ -133,34 +135,12 @@ class TrackedSwarm:
         view.speed[:] = swarm.odometer
         view.steering[:] = state.steering
         view.near[:] = swarm.proximity
-        self._wait()
-        self.estimate.t[:] = self.horizon.state.released
-        self._orient()
-        self._follow()
-        self._turn()
-        self._see()
-        self._note()
-
-    def _bind(self) -> None:
-        """Put together what the kernels take: arrays that stay where they are."""
-        view, block = self.view, self.swarm.block
-        due = MeasurementBlock.empty(self.swarm.n_envs, self._room)
-        self._wait = self.horizon.bind(block, view.now, due)
-        self._orient, self._follow = self.tracker.bind(due, self.estimate)
-        turns = np.zeros_like(view.heading)
-        self._turn = self.horizon.bind_turns(self.swarm.constellation, turns)
-        self._see = bind_view(view, self.estimate, self.swarm.powered, turns)
-        self._note = bind(
-            note_ranges, block.t, block.kind, block.i, block.j, block.values, block.has_power,
-            block.valid, view,
-        )  # fmt: skip
-        self._singles: dict[int, TrackedSwarm] = {}
+        self._perception.step()
 
     def __getstate__(self) -> dict[str, object]:
-        """What is put together by `_bind` stays behind."""
-        bound = ("_wait", "_orient", "_follow", "_turn", "_see", "_note", "_singles")
-        return {k: v for k, v in self.__dict__.items() if k not in bound}
+        """Parts stay behind."""
+        return {**self.__dict__, "_singles": {}}
 
     def __setstate__(self, state: dict[str, object]) -> None:
         self.__dict__.update(state)
-        self._bind()
+        self._perception.rebind(self.swarm.block, self.swarm.powered)

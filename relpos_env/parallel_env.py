@@ -11,13 +11,11 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
-from gymnasium.utils import seeding
-from pettingzoo import ParallelEnv
 
 from relpos_env.config import configure
 from relpos_env.errors import EnvError
 from relpos_env.formation import Formation
-from relpos_env.interface.observations import Field, space_of
+from relpos_env.interface.cars_env import CarsEnv
 from relpos_env.loop import TrackedSwarm
 from relpos_env.recording import Recording
 from relpos_env.render.film import Film, check_render_mode
@@ -29,22 +27,13 @@ TRUTH_FIELDS = 8
 """Numbers of a car in `state()`."""
 
 
-class FormationEnv(ParallelEnv):  # type: ignore[misc]
+class FormationEnv(CarsEnv):
     """Cars in a room keep a formation, each on its own tracker's estimates.
 
-    An agent is a car. One that joins in mid-episode becomes an agent in that step; one that
-    leaves for good is truncated; one that is away and will return stays an agent, sees zeros,
-    gets no reward, and what it does has no effect (``info["present"]`` is False).
+    Agents come and go as `CarsEnv` says.
 
     Law: same arguments, seed and actions, same everything, bit for bit.
     """
-
-    metadata = {  # noqa: RUF012
-        "name": "formation_v0",
-        "render_modes": ["human", "rgb_array"],
-        "render_fps": 10,
-        "is_parallelizable": True,
-    }
 
     def __init__(
         self, *, render_mode: str | None = None, record: bool = False, **arguments: Any
@@ -64,26 +53,15 @@ class FormationEnv(ParallelEnv):  # type: ignore[misc]
         self._parts = parts = configure(arguments)
         self._record = record
         self._formation = Formation(parts)
-        self.possible_agents = [f"car_{k}" for k in range(parts.n_cars)]
-        self.agents: list[str] = []
-        self._numbers = {agent: k for k, agent in enumerate(self.possible_agents)}
         history = parts.config.history
-        self.observation_spaces = {
-            a: space_of(parts.mode.fields, history) for a in self.possible_agents
-        }
-        self.action_spaces = {a: parts.actions.space() for a in self.possible_agents}
+        super().__init__(
+            self._formation, parts.mode.fields, parts.actions, n_cars=parts.n_cars, history=history
+        )
         self.state_space = spaces.Box(
             -np.inf, np.inf, shape=(TRUTH_FIELDS * parts.n_cars,), dtype=np.float64
         )
-        self._rng: np.random.Generator | None = None
-        self._begun = False
         self._film = Film(render_mode, 10.0)
         self._recording: Recording | None = None
-
-    @property
-    def fields(self) -> tuple[Field, ...]:
-        """Names, sizes and units of the stretches of an observation."""
-        return self._parts.mode.fields
 
     @property
     def scenario(self) -> Scenario:
@@ -106,72 +84,13 @@ class FormationEnv(ParallelEnv):  # type: ignore[misc]
         """The running simulation with its trackers; a batch of one."""
         return self.formation.loop
 
-    def observation_space(self, agent: str) -> spaces.Box:
-        """Observation space of one car, the same object at each call."""
-        return self.observation_spaces[agent]
-
-    def action_space(self, agent: str) -> spaces.Space[Any]:
-        """Action space of one car, the same object at each call."""
-        return self.action_spaces[agent]
-
-    def reset(
-        self, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Begin an episode; a seed makes this and all that follow it repeatable.
-
-        Args:
-            seed: None goes on with the generator of the episode before.
-            options: Not used.
-        """
-        if seed is not None or self._rng is None:
-            self._rng, _ = seeding.np_random(seed)
-            self._formation.seed(0, self._rng)
-        self._recording = recording = Recording() if self._record else None
-        self._formation.begin(0, None if recording is None else recording.add_swarm)
-        self._begun = True
-        self._film.forget()
-        self.agents = [a for a, n in self._numbers.items() if self._formation.active[0, n]]
-        observations = self._formation.observations[0].copy()
-        self._show()
-        return (
-            {a: observations[self._numbers[a]] for a in self.agents},
-            self._infos(self.agents),
-        )
-
     def step(self, actions: dict[str, Any]) -> tuple[dict[str, Any], ...]:
-        """Drive for 0.1 s.
-
-        Args:
-            actions: Of every agent.
-
-        Raises:
-            EnvError: An action is missing, has a wrong shape, is not finite or not in its space;
-                or there was no reset.
-        """
-        formation = self.formation
-        if not self.agents:
-            return {}, {}, {}, {}, {}
-        speed, steering = self._decode(actions)
-        formation.step(speed, steering)
-        if self._recording is not None:
-            self._recording.add_swarm(formation.loop.swarm)
-        active, left = formation.active[0].tolist(), formation.left[0].tolist()
-        concerned = [a for a, n in self._numbers.items() if active[n] or left[n]]
-        observations = formation.observations[0].copy()
-        rewards = formation.rewards[0].tolist()
-        terminated, truncated = bool(formation.terminated[0]), bool(formation.truncated[0])
-        numbers = self._numbers
-        self.agents = (
-            [] if terminated or truncated else [a for a in concerned if active[numbers[a]]]
-        )
-        self._show()
-        return (
-            {a: observations[numbers[a]] for a in concerned},
-            {a: rewards[numbers[a]] for a in concerned},
-            dict.fromkeys(concerned, terminated),
-            {a: truncated or left[numbers[a]] for a in concerned},
-            self._infos(concerned),
-        )
+        """Drive for 0.1 s; see `CarsEnv`."""
+        recorded = self._recording if self.agents else None
+        results = super().step(actions)
+        if recorded is not None:
+            recorded.add_swarm(self.loop.swarm)
+        return results
 
     def state(self) -> F64:
         """The truth, for critics, (8 car); zeros for absent cars.
@@ -208,31 +127,6 @@ class FormationEnv(ParallelEnv):  # type: ignore[misc]
         self.agents = []
         self._begun = False
 
-    def _decode(self, actions: dict[str, Any]) -> tuple[F64, F64]:
-        """Commands of all cars; those of nobody are zero."""
-        n, mode = self._parts.n_cars, self._parts.actions
-        speed, steering = np.zeros((1, n)), np.zeros((1, n))
-        for agent in self.agents:
-            if agent not in actions:
-                raise EnvError(f"actions: none for {agent}")
-        try:
-            rows = np.array([actions[agent] for agent in self.agents])
-            if rows.shape == (len(self.agents), *mode.shape):
-                cars = [self._numbers[agent] for agent in self.agents]
-                speed[0, cars], steering[0, cars] = mode.decode(rows, "actions")
-                return speed, steering
-        except (ValueError, EnvError):
-            pass
-        # Something is wrong with one of them: say with which.
-        for agent in self.agents:
-            action = actions[agent]
-            if np.shape(action) != mode.shape:
-                shape = np.shape(action)
-                raise EnvError(f"action of {agent}: expected shape {mode.shape}, got {shape}")
-            k = self._numbers[agent]
-            speed[0, k], steering[0, k] = mode.decode(action, f"action of {agent}")
-        return speed, steering
-
     def _infos(self, agents: list[str]) -> dict[str, Any]:
         """Errors, reward terms and whereabouts of cars."""
         formation = self._formation
@@ -256,6 +150,11 @@ class FormationEnv(ParallelEnv):  # type: ignore[misc]
             if tracked[k]:
                 info["tracking_error"] = tracking[k]
         return infos
+
+    def _begin(self) -> None:
+        self._recording = recording = Recording() if self._record else None
+        self._formation.begin(0, None if recording is None else recording.add_swarm)
+        self._film.forget()
 
     def _show(self) -> None:
         if self.render_mode is not None:

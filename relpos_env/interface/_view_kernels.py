@@ -22,7 +22,7 @@ def see_estimate(motion, rest, pair_i, pair_j, powered, turns, view):
         rest: Whether that is known, (env, node); age, NLOS probability and status, (env, pair);
             and the time of all that, (env) [s].
         pair_i: (pair)
-        pair_j: (pair)
+        pair_j: (pair), larger; nodes behind the cars ride on none and are left out.
         powered: (env, car)
         turns: How far every car has turned since, (env, car) [rad].
         view: View, written.
@@ -39,6 +39,8 @@ def see_estimate(motion, rest, pair_i, pair_j, powered, turns, view):
             view.heading[e, n] = yaw + turns[e, n] if known else 0.0
         for p in range(pair_i.shape[0]):
             i, j = pair_i[p], pair_j[p]
+            if j >= powered.shape[1]:
+                continue
             for a, b, sign in ((i, j, 1.0), (j, i, -1.0)):
                 on = powered[e, a]
                 view.ok[e, a, b] = on and status[e, p] == OK
@@ -82,10 +84,11 @@ def see_truth(pos, vel, heading, view):
 
 @kernel
 def note_ranges(t, kind, i, j, values, has_power, valid, view):
-    """Keep the last range of every pair; arguments as in `MeasurementBlock`."""
+    """Keep the last range of every pair of cars; arguments as in `MeasurementBlock`."""
+    n_cars = view.heard.shape[1]
     for e in range(t.shape[0]):
         for k in range(t.shape[1]):
-            if not valid[e, k] or kind[e, k] != RANGE:
+            if not valid[e, k] or kind[e, k] != RANGE or max(i[e, k], j[e, k]) >= n_cars:
                 continue
             for a, b in ((i[e, k], j[e, k]), (j[e, k], i[e, k])):
                 if t[e, k] >= view.heard[e, a, b]:

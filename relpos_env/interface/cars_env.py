@@ -1,0 +1,199 @@
+"""A group of cars as a PettingZoo environment, whoever moves them: a simulation or motors.
+
+What PettingZoo promises, agents that come and go, spaces and dicts, is here; what happens in a
+step is the business of a `Group`.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+from gymnasium import spaces
+from gymnasium.utils import seeding
+from pettingzoo import ParallelEnv
+
+from relpos_env.errors import EnvError
+from relpos_env.interface.actions import ActionMode
+from relpos_env.interface.observations import Field, space_of
+from relpos_env.interface.observations.base import F32
+from tracking.arrays import F64, Bool
+
+
+class Group(Protocol):
+    """Cars in arrays over (env, car, ...), of which there is one environment here."""
+
+    @property
+    def observations(self) -> F32:
+        """(env, car, size); zeros for absent cars."""
+
+    @property
+    def rewards(self) -> F64:
+        """(env, car); 0 for absent cars."""
+
+    @property
+    def active(self) -> Bool:
+        """Cars that take part, (env, car): present, or away and to return."""
+
+    @property
+    def left(self) -> Bool:
+        """Cars that left for good in the last step, (env, car)."""
+
+    @property
+    def terminated(self) -> Bool:
+        """Whether the episode came to its end, (env)."""
+
+    @property
+    def truncated(self) -> Bool:
+        """Whether its time is up, (env)."""
+
+    def seed(self, env: int, rng: np.random.Generator) -> None:
+        """Let the episodes of an environment come from a generator, from the next one on."""
+
+    def step(self, speed: F64, steering: F64) -> None:
+        """Drive for one decision; speed [m/s] and steering [rad], each (env, car)."""
+
+
+class CarsEnv(ParallelEnv):  # type: ignore[misc]
+    """An agent is a car.
+
+    One that joins in mid-episode becomes an agent in that step; one that leaves for good is
+    truncated; one that is away and will return stays an agent, sees zeros, gets no reward, and
+    what it does has no effect (``info["present"]`` is False).
+    """
+
+    metadata = {  # noqa: RUF012
+        "name": "formation_v0",
+        "render_modes": ["human", "rgb_array"],
+        "render_fps": 10,
+        "is_parallelizable": True,
+    }
+
+    def __init__(
+        self,
+        group: Group,
+        fields: tuple[Field, ...],
+        actions: ActionMode,
+        *,
+        n_cars: int,
+        history: int = 1,
+    ) -> None:
+        """Give a group its face.
+
+        Args:
+            group: One environment of cars.
+            fields: Stretches of one observation.
+            actions: What an action says.
+            n_cars: Slots for cars.
+            history: So many observations in one.
+        """
+        self._group, self._actions = group, actions
+        self.fields = fields
+        """Names, sizes and units of the stretches of an observation."""
+        self.possible_agents = [f"car_{k}" for k in range(n_cars)]
+        self.agents: list[str] = []
+        self._numbers = {agent: k for k, agent in enumerate(self.possible_agents)}
+        self.observation_spaces = {a: space_of(fields, history) for a in self.possible_agents}
+        self.action_spaces = {a: actions.space() for a in self.possible_agents}
+        self._rng: np.random.Generator | None = None
+        self._begun = False
+
+    def observation_space(self, agent: str) -> spaces.Box:
+        """Observation space of one car, the same object at each call."""
+        return self.observation_spaces[agent]
+
+    def action_space(self, agent: str) -> spaces.Space[Any]:
+        """Action space of one car, the same object at each call."""
+        return self.action_spaces[agent]
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Begin an episode; in a simulation, a seed makes this and all after it repeatable.
+
+        Args:
+            seed: None goes on with the generator of the episode before.
+            options: Not used.
+        """
+        if seed is not None or self._rng is None:
+            self._rng, _ = seeding.np_random(seed)
+            self._group.seed(0, self._rng)
+        self._begin()
+        self._begun = True
+        self.agents = [a for a, n in self._numbers.items() if self._group.active[0, n]]
+        observations = self._group.observations[0].copy()
+        self._show()
+        return (
+            {a: observations[self._numbers[a]] for a in self.agents},
+            self._infos(self.agents),
+        )
+
+    def step(self, actions: dict[str, Any]) -> tuple[dict[str, Any], ...]:
+        """Drive for 0.1 s.
+
+        Args:
+            actions: Of every agent.
+
+        Raises:
+            EnvError: An action is missing, has a wrong shape, is not finite or not in its space;
+                or there was no reset.
+        """
+        if not self._begun:
+            raise EnvError("the environment must be reset first")
+        if not self.agents:
+            return {}, {}, {}, {}, {}
+        group = self._group
+        group.step(*self._decode(actions))
+        active, left = group.active[0].tolist(), group.left[0].tolist()
+        concerned = [a for a, n in self._numbers.items() if active[n] or left[n]]
+        observations = group.observations[0].copy()
+        rewards = group.rewards[0].tolist()
+        terminated, truncated = bool(group.terminated[0]), bool(group.truncated[0])
+        numbers = self._numbers
+        self.agents = (
+            [] if terminated or truncated else [a for a in concerned if active[numbers[a]]]
+        )
+        self._show()
+        return (
+            {a: observations[numbers[a]] for a in concerned},
+            {a: rewards[numbers[a]] for a in concerned},
+            dict.fromkeys(concerned, terminated),
+            {a: truncated or left[numbers[a]] for a in concerned},
+            self._infos(concerned),
+        )
+
+    def _begin(self) -> None:
+        """Begin an episode of the group."""
+        raise NotImplementedError
+
+    def _infos(self, agents: list[str]) -> dict[str, Any]:
+        """What agents are told beside their observations."""
+        raise NotImplementedError
+
+    def _show(self) -> None:
+        """After every reset and step."""
+
+    def _decode(self, actions: dict[str, Any]) -> tuple[F64, F64]:
+        """Commands of all cars; those of nobody are zero."""
+        n, mode = len(self.possible_agents), self._actions
+        speed, steering = np.zeros((1, n)), np.zeros((1, n))
+        for agent in self.agents:
+            if agent not in actions:
+                raise EnvError(f"actions: none for {agent}")
+        try:
+            rows = np.array([actions[agent] for agent in self.agents])
+            if rows.shape == (len(self.agents), *mode.shape):
+                cars = [self._numbers[agent] for agent in self.agents]
+                speed[0, cars], steering[0, cars] = mode.decode(rows, "actions")
+                return speed, steering
+        except (ValueError, EnvError):
+            pass
+        # Something is wrong with one of them: say with which.
+        for agent in self.agents:
+            action = actions[agent]
+            if np.shape(action) != mode.shape:
+                shape = np.shape(action)
+                raise EnvError(f"action of {agent}: expected shape {mode.shape}, got {shape}")
+            k = self._numbers[agent]
+            speed[0, k], steering[0, k] = mode.decode(action, f"action of {agent}")
+        return speed, steering
