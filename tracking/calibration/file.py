@@ -72,15 +72,32 @@ def read_calibration(path: Path | str) -> Calibration:
     """
     path = Path(path)
     try:
-        raw = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read ({error.strerror})") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
         raise ConfigError(f"{path}: not TOML ({error})") from error
+    return parse_calibration(text, str(path))
+
+
+def parse_calibration(text: str, file: str) -> Calibration:
+    """The calibration that a text is.
+
+    Args:
+        text: As `calibration_toml` gives it.
+        file: Its name, for messages.
+
+    Raises:
+        ConfigError: As for `read_calibration`.
+    """
+    try:
+        raw = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"{file}: not TOML ({error})") from error
     try:
         return _calibration(raw)
     except ConfigError as error:
-        raise ConfigError(f"{path}, {error}") from error
+        raise ConfigError(f"{file}, {error}") from error
 
 
 def _calibration(raw: dict[str, Any]) -> Calibration:

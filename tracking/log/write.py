@@ -123,7 +123,11 @@ def _tables(log: Log) -> Iterable[tuple[str, Sequence[str], list[list[object]]]]
         yield "mag", ["t_s", "node", *MAG], _rows(mag, ids, mag.values[0, :, :3])
     state = _of_kind(block, Kind.STATE)
     if state.n_events:
-        yield "state", ["t_s", "node", *QUAT, "ax", "ay", "az"], _rows(state, ids, state.values[0])
+        yield (
+            "state",
+            ["t_s", "node", *QUAT, "ax", "ay", "az"],
+            _rows(state, ids, state.values[0, :, :7]),
+        )
     truth = log.truth
     if len(truth.t):
         rows: list[list[object]] = []
