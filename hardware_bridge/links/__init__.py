@@ -1,0 +1,1 @@
+"""Ports: serial and TCP, opened, read, lost and found again."""

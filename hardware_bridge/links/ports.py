@@ -1,0 +1,29 @@
+"""Where a stream of bytes comes from: what a configuration says of a port."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PortSpec:
+    """One port; nothing about it is guessed."""
+
+    name: str
+    """What it is called in messages and recordings, ``links.left`` or ``cars.1``."""
+    port: str
+    """A device path such as ``/dev/serial/by-id/...``, ``serial:NUMBER`` for the USB serial
+    number of an adapter, or ``tcp:host:port``."""
+    baud: int = 115200
+    """[1/s] Without meaning for TCP."""
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """Bytes that were read from a port at once."""
+
+    link: str
+    """`PortSpec.name`."""
+    t_ns: int
+    """When they were read, by the host's monotonic clock [ns]."""
+    data: bytes

@@ -1,0 +1,168 @@
+"""What devices say, in SI units, before anything is known of who they are in the group.
+
+Decoders make readings of bytes, the emulator makes bytes of readings. A reading holds what the
+device itself said: its own name for itself and others, its own clock. Names become nodes and
+clocks become the host's in `hardware_bridge.intake`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+Vector: TypeAlias = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceClock:
+    """A counter of a device."""
+
+    hz: float
+    """Ticks per second, nominal."""
+    modulus: int
+    """The counter goes back to 0 here."""
+
+
+MICROSECONDS_32 = DeviceClock(1e6, 1 << 32)
+"""Wraps after 71.6 min."""
+MILLISECONDS_32 = DeviceClock(1e3, 1 << 32)
+MICROSECONDS_64 = DeviceClock(1e6, 1 << 64)
+"""Never wraps."""
+RADIO_40 = DeviceClock(128 * 499.2e6, 1 << 40)
+"""Time stamps of DW1000 and DW3000; wraps every 17.2 s."""
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """Who said it, and when by its own clock; None is what the format does not tell."""
+
+    device: str | None = None
+    """Its own id, as its format writes ids: decimal digits, or capital hex digits."""
+    boot: int | None = None
+    """A number that differs from one start of the device to the next."""
+    sequence: int | None = None
+    """Counts the messages of a boot, without gaps, modulo 2^32."""
+    ticks: int | None = None
+    """When it was measured, by `clock`."""
+    clock: DeviceClock | None = None
+
+
+NOBODY = Source()
+"""Of formats that tell nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class ImuReading:
+    """A sample of an inertial sensor, and of the magnetometer where it has one."""
+
+    source: Source
+    gyr: Vector
+    """[rad/s] Body frame: x forward, y left, z up."""
+    acc: Vector
+    """[m/s2] Specific force, +9.8 on z at rest."""
+    mag: Vector | None = None
+    """[uT]"""
+
+
+@dataclass(frozen=True, slots=True)
+class StateReading:
+    """What a node sends that filters its orientation itself."""
+
+    source: Source
+    q_wb: tuple[float, float, float, float]
+    """w x y z, body to world."""
+    accel_w: Vector
+    """[m/s2] Without gravity."""
+
+
+@dataclass(frozen=True, slots=True)
+class RangeReading:
+    """A distance between two devices."""
+
+    source: Source
+    to: str
+    """The other device, written like `Source.device`."""
+    distance: float
+    """[m]"""
+    rx_power: float | None = None
+    """[dBm]"""
+    fp_power: float | None = None
+    """[dBm] Of the first path."""
+    nearer: str | None = None
+    """The end that is not `to`, where it is not the one that says it."""
+
+
+@dataclass(frozen=True, slots=True)
+class MotionReading:
+    """What a car says of its own motion."""
+
+    source: Source
+    speed: float
+    """[m/s] Forward, by its wheels or its motor."""
+    steering: float | None = None
+    """[rad] Of the front wheels, left is positive."""
+
+
+@dataclass(frozen=True, slots=True)
+class StatusReading:
+    """How a device does."""
+
+    source: Source
+    voltage: float | None = None
+    """[V]"""
+    fault: int = 0
+    """0 is none; else what its maker says."""
+
+
+@dataclass(frozen=True, slots=True)
+class AckReading:
+    """A device took a command."""
+
+    source: Source
+    command: int
+    """Sequence number of that command."""
+
+
+@dataclass(frozen=True, slots=True)
+class HeartbeatReading:
+    """A device is alive."""
+
+    source: Source
+
+
+@dataclass(frozen=True, slots=True)
+class OperatorReading:
+    """Somebody with a remote control trims a car: a velocity on top of what the plan asks for."""
+
+    source: Source
+    to: str
+    """The car's node."""
+    velocity: tuple[float, float]
+    """[m/s] World frame, x and y."""
+
+
+@dataclass(frozen=True, slots=True)
+class DriveReading:
+    """A command to a car, as the car reads it."""
+
+    source: Source
+    to: str
+    speed: float
+    """[m/s] Forward."""
+    steering: float
+    """[rad] Left is positive."""
+    brake: bool
+    """Stand still, whatever speed and steering say."""
+
+
+Reading: TypeAlias = (
+    ImuReading
+    | StateReading
+    | RangeReading
+    | MotionReading
+    | StatusReading
+    | AckReading
+    | HeartbeatReading
+    | OperatorReading
+    | DriveReading
+)
