@@ -75,6 +75,20 @@ def bench_policy(steps: int, as_json: bool) -> None:
     _show_bench("Time of one step of a policy", rows, as_json)
 
 
+@bench.command("codec")
+@click.option("--frames", default=5000, show_default=True, help="Frames per turn.")
+@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+def bench_codec(frames: int, as_json: bool) -> None:
+    """Frames per second of the nodes' wire format, beside pymavlink; ratio: times as many."""
+    from agents.bench.codec import bench_codec as run
+
+    if not 1 <= frames <= 100_000:
+        raise UsageError(f"--frames: expected 1 to 100000, got {frames}")
+    with progress_bar("codec") as report:
+        rows = run(frames=frames, progress=report)
+    _show_bench("Frames per second of the wire format", rows, as_json)
+
+
 @bench.command("train")
 @click.option("--updates", default=6, show_default=True, help="Updates per turn.")
 @click.option("--threads", default=2, show_default=True, help="Of simulation and learning.")
