@@ -1,0 +1,82 @@
+"""WitMotion inertial sensors, the standard protocol: ``55 TT d0..d7 SUM`` [1].
+
+One burst holds a frame per quantity, in the order of their types. Accelerometer and gyroscope of a
+burst become one reading, with the magnetometer where the sensor is set to send it. Time, angle and
+quaternion are skipped: the tracker filters orientation itself.
+
+The magnetometer comes after the gyroscope, and whether it will come is known from the burst
+before: while it does, a reading waits for it; while it does not, the gyroscope completes the
+reading. Of the first burst nothing is known, it waits for the next frame of either kind.
+
+References:
+    [1] WitMotion, WT901 datasheet v20-0702, section 5.1; the unit of the magnetometer from the
+        WT901BLECL datasheet v20-0707, section 6.1.2.
+"""
+
+from __future__ import annotations
+
+import struct
+from math import pi
+
+from hardware_bridge.decoders.checked_frames import CheckedFrames
+from hardware_bridge.readings import NOBODY, ImuReading, Reading, Vector
+
+START = 0x55
+TIME, ACC, GYR, MAG, QUATERNION = 0x50, 0x51, 0x52, 0x54, 0x59
+TYPES = range(0x50, 0x60)
+FRAME = struct.Struct("<2B4hB")
+
+ACC_UNIT = 16.0 * 9.80665 / 32768.0
+"""[m/s2]"""
+GYR_UNIT = 2000.0 * pi / 180.0 / 32768.0
+"""[rad/s]"""
+MAG_UNIT = 0.1
+"""[uT] A milligauss. Models differ; a calibration takes up the scale."""
+
+
+def frame_length(head: bytes) -> int:
+    """All frames are as long."""
+    return FRAME.size if head[1] in TYPES else 0
+
+
+class Bursts:
+    """Joins the frames of a burst."""
+
+    def __init__(self) -> None:
+        self._acc: Vector | None = None
+        self._imu: ImuReading | None = None
+        """A reading that waits for its magnetometer."""
+        self._mag_comes: bool | None = None
+
+    def read_frame(self, frame: bytes) -> list[Reading]:
+        """A frame with the right sum to the readings that it completes."""
+        kind, x, y, z = FRAME.unpack(frame)[1:5]
+        if kind in (TIME, ACC):
+            readings = self._finish(None)
+            self._acc = (x * ACC_UNIT, y * ACC_UNIT, z * ACC_UNIT) if kind == ACC else None
+            return readings
+        if kind == GYR and self._acc is not None:
+            gyr = (x * GYR_UNIT, y * GYR_UNIT, z * GYR_UNIT)
+            self._imu = ImuReading(NOBODY, gyr=gyr, acc=self._acc)
+            self._acc = None
+            if self._mag_comes is False:
+                return self._finish(None)
+            return []
+        # A gyroscope that follows later belongs to another burst.
+        self._acc = None
+        if kind != MAG:
+            return []
+        self._mag_comes = True
+        return self._finish((x * MAG_UNIT, y * MAG_UNIT, z * MAG_UNIT))
+
+    def _finish(self, mag: Vector | None) -> list[Reading]:
+        imu, self._imu = self._imu, None
+        if imu is None:
+            return []
+        self._mag_comes = mag is not None
+        return [ImuReading(NOBODY, gyr=imu.gyr, acc=imu.acc, mag=mag)]
+
+
+def witmotion_decoder() -> CheckedFrames:
+    """The decoder of one port."""
+    return CheckedFrames(START, 2, frame_length, Bursts().read_frame)

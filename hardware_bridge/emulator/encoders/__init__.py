@@ -1,0 +1,40 @@
+"""Encoders: the devices' end of the formats, for nodes that are not there.
+
+`decode(encode(readings))` gives the readings back, within the resolution of the format.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from hardware_bridge.decoders.base import Encoder
+from hardware_bridge.emulator.encoders.dw1000 import Dw1000Encoder
+from hardware_bridge.emulator.encoders.dwm1001 import Dwm1001Encoder
+from hardware_bridge.emulator.encoders.linktrack import LinkTrackEncoder
+from hardware_bridge.emulator.encoders.uwb_core import UwbCoreEncoder
+from hardware_bridge.emulator.encoders.witmotion import WitMotionEncoder
+from hardware_bridge.errors import BridgeError
+
+ENCODERS: dict[str, Callable[[str], Encoder]] = {
+    "linktrack": LinkTrackEncoder,
+    "uwb-core": UwbCoreEncoder,
+    "dw1000": Dw1000Encoder,
+    "dwm1001": Dwm1001Encoder,
+    "witmotion": WitMotionEncoder,
+}
+"""Name of the format to what builds the encoder of the device of that name."""
+
+
+def make_encoder(name: str, device: str) -> Encoder:
+    """The encoder of one device.
+
+    Args:
+        name: A key of `ENCODERS`.
+        device: Its own id, as its format writes ids.
+
+    Raises:
+        BridgeError: No such format, or no such id in it.
+    """
+    if name not in ENCODERS:
+        raise BridgeError(f"format {name!r} is not known; choose one of {', '.join(ENCODERS)}")
+    return ENCODERS[name](device)

@@ -1,0 +1,25 @@
+"""The end of a DW1000 board with the Arduino library: one line a range."""
+
+from __future__ import annotations
+
+from hardware_bridge.decoders.dw1000 import ID
+from hardware_bridge.readings import RangeReading, Reading
+
+
+class Dw1000Encoder:
+    """A board that ranges with others; its own name goes nowhere."""
+
+    def __init__(self, device: str) -> None:
+        self._device = device
+
+    def encode(self, readings: list[Reading]) -> bytes:
+        """A line for each range to a board with an id of this format."""
+        return "".join(
+            range_line(r) for r in readings if isinstance(r, RangeReading) and ID.fullmatch(r.to)
+        ).encode()
+
+
+def range_line(reading: RangeReading) -> str:
+    """What the library's example prints."""
+    power = "nan" if reading.rx_power is None else f"{reading.rx_power:.2f}"
+    return f"from: {reading.to}\t Range: {reading.distance:.2f} m\t RX power: {power} dBm\r\n"
