@@ -1,0 +1,7 @@
+"""Clocks of devices to the one clock of the host."""
+
+from hardware_bridge.clocks.device_time import DeviceTime
+from hardware_bridge.clocks.params import ClockParams
+from hardware_bridge.clocks.stream_time import HostTime, StreamTime
+
+__all__ = ["ClockParams", "DeviceTime", "HostTime", "StreamTime"]

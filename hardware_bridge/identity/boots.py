@@ -1,0 +1,138 @@
+"""Starts of one node: which one runs, and what is a message of another."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+from hardware_bridge.identity.verdict import NS, IdentityParams, Mark, Verdict
+from hardware_bridge.identity.window import Place, SequenceWindow
+
+MOST_BOOTS = 64
+"""That are remembered of one node. One that was forgotten would be taken for a new one."""
+
+OF_PLACE = {
+    Place.AHEAD: Verdict.FRESH,
+    Place.NEW: Verdict.LATE,
+    Place.SEEN: Verdict.DUPLICATE,
+    Place.OLD: Verdict.DUPLICATE,
+}
+
+
+class RisingBoots:
+    """Boots that are authenticated and rise: what is lower was recorded."""
+
+    mark: Mark | None
+
+    def __init__(self, mark: Mark | None = None) -> None:
+        """Begin.
+
+        Args:
+            mark: What was accepted last before the host was restarted; nothing up to it is
+                accepted again.
+        """
+        self.mark = mark
+        self._window = SequenceWindow(0 if mark is None else mark[1], endless=False, before=False)
+
+    def check(self, boot: int | None, sequence: int | None) -> Verdict:
+        """Find out what a message is, and remember it; never TWIN."""
+        if boot is None or sequence is None:
+            return Verdict.REPLAY
+        if self.mark is None or boot > self.mark[0]:
+            verdict = Verdict.FRESH if self.mark is None else Verdict.REBOOT
+            self._window = SequenceWindow(sequence, endless=False)
+        elif boot < self.mark[0]:
+            return Verdict.REPLAY
+        else:
+            place = self._window.place(sequence)
+            if place is Place.OLD:
+                return Verdict.REPLAY
+            verdict = OF_PLACE[place]
+            self._window.take(sequence)
+        self.mark = boot, self._window.highest
+        return verdict
+
+
+@dataclass(slots=True)
+class _Boot:
+    """A start of a device, as far as it was heard."""
+
+    window: SequenceWindow | None
+    link: str
+    over_ns: int = 0
+    """When the next one began."""
+    stragglers: int = 0
+
+    def place(self, sequence: int | None) -> Place:
+        """Where a message is, which is then taken."""
+        if sequence is None or self.window is None:
+            return Place.AHEAD
+        place = self.window.place(sequence)
+        self.window.take(sequence)
+        return place
+
+
+class ClaimedBoots:
+    """Boots that anybody could claim: another one is a restart while the old one is silent."""
+
+    twins: str = ""
+    """Why the last message was found to be a TWIN."""
+
+    def __init__(self, params: IdentityParams) -> None:
+        self._params = params
+        self._boot: int | None = None
+        self._heard: dict[int, _Boot] = {}
+        """The current boot and the ones before, oldest first."""
+        self._restarts: deque[int] = deque()
+
+    def check(self, link: str, boot: int, sequence: int | None, t_ns: int) -> Verdict:
+        """Find out what a message is, and remember it."""
+        if boot not in self._heard:
+            return self._begin(link, boot, sequence, t_ns)
+        heard = self._heard[boot]
+        if boot == self._boot:
+            heard.link = link
+        place = heard.place(sequence)
+        if boot == self._boot:
+            return Verdict.UNNUMBERED if sequence is None else OF_PLACE[place]
+        if place in (Place.SEEN, Place.OLD):
+            return Verdict.DUPLICATE
+        if place is Place.AHEAD:
+            heard.stragglers += 1
+            late = t_ns - heard.over_ns > self._params.straggle * NS
+            if late or heard.stragglers > self._params.stragglers:
+                self.twins = self._where(link)
+                return Verdict.TWIN
+        return Verdict.STALE
+
+    def _begin(self, link: str, boot: int, sequence: int | None, t_ns: int) -> Verdict:
+        """The first message of a boot."""
+        first = self._boot is None
+        if self._boot is not None:
+            self._heard[self._boot].over_ns = t_ns
+            self._restarts.append(t_ns)
+            while self._restarts[0] < t_ns - self._params.restart * NS:
+                self._restarts.popleft()
+            if len(self._restarts) > self._params.restarts:
+                self.twins = (
+                    f"started {len(self._restarts)} times within {self._params.restart:g} s, "
+                    f"last on link {link}"
+                )
+                return Verdict.TWIN
+        if len(self._heard) >= MOST_BOOTS:
+            del self._heard[next(iter(self._heard))]
+        window = None if sequence is None else SequenceWindow(sequence, endless=True)
+        self._boot, self._heard[boot] = boot, _Boot(window, link)
+        return Verdict.FRESH if first else Verdict.REBOOT
+
+    def _where(self, link: str) -> str:
+        """What an operator has to know of two devices, one of them heard on this link."""
+        assert self._boot is not None
+        return two_devices(self._heard[self._boot].link, link)
+
+
+def two_devices(link: str, other: str) -> str:
+    """In words: where the two devices are."""
+    if link == other:
+        return f"is two devices, both on link {link}"
+    return "is two devices, on links " + " and ".join(sorted((link, other)))

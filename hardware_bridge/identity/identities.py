@@ -1,0 +1,149 @@
+"""The nodes of a swarm, and whose messages are taken."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from hardware_bridge.identity.boots import ClaimedBoots, RisingBoots
+from hardware_bridge.identity.unbooted import Unbooted
+from hardware_bridge.identity.verdict import NS, IdentityParams, Mark, Verdict
+from hardware_bridge.identity.window import MODULUS
+from hardware_bridge.readings import Source
+
+MOST_NOTICES = 256
+"""That wait for the operator; what is more is dropped."""
+MANY_OLD = 200
+"""Messages refused in a row of which the operator is told."""
+
+
+@dataclass(slots=True)
+class _Node:
+    """One node, as far as it was heard."""
+
+    boots: ClaimedBoots
+    unbooted: Unbooted
+    quarantined: bool = False
+    refused: int = 0
+    """Messages in a row."""
+
+
+class Identities:
+    """Every message once, and of one device only.
+
+    Laws: a message (node, boot, sequence) of the last `boots.MOST_BOOTS` boots is accepted once at
+    most; a new one of the current boot that is less than `window.WIDTH` numbers late is
+    accepted; a restart is seen with its first message, and restarts alone never quarantine unless
+    there are more than eight in ten seconds; two devices with one id that both go on speaking are
+    found out, and both refused until `release`. Authenticated: no message is ever accepted again,
+    whatever is sent how often in which order, and nothing is quarantined. Memory is bounded,
+    whatever comes.
+    """
+
+    notices: list[tuple[int, str]]
+    """Time [ns] and what an operator should read; whoever takes them clears the list."""
+
+    def __init__(self, authenticated: bool = False, params: IdentityParams | None = None) -> None:
+        """Begin with nobody known.
+
+        Args:
+            authenticated: Every message that comes here passed the check of its MAC, and boots
+                rise. Messages without boot or number are then refused as replays: streams of
+                other formats go to an object of their own.
+            params: What is believed of links and devices.
+        """
+        self._authenticated = authenticated
+        self._params = IdentityParams() if params is None else params
+        self._nodes: dict[int, _Node] = {}
+        self._rising: dict[int, RisingBoots] = {}
+        self._noticed: dict[tuple[int, str], int] = {}
+        self.notices = []
+
+    @property
+    def quarantined(self) -> tuple[int, ...]:
+        """Nodes that are refused until they are released."""
+        return tuple(sorted(k for k, node in self._nodes.items() if node.quarantined))
+
+    def check(self, link: str, source: Source, t_ns: int, node: int) -> Verdict:
+        """Find out what a message is, once for all readings that it holds, and remember it.
+
+        Args:
+            link: Where it came from, `PortSpec.name`.
+            source: What it says of itself.
+            t_ns: When it came, by the host's monotonic clock [ns].
+            node: The node that `source.device` is, one of the configuration.
+        """
+        if self._authenticated:
+            return self._check_rising(link, source, t_ns, node)
+        state = self._nodes.get(node)
+        if state is None:
+            boots, unbooted = ClaimedBoots(self._params), Unbooted(self._params)
+            state = self._nodes[node] = _Node(boots, unbooted)
+        if state.quarantined:
+            return Verdict.TWIN
+        judge: ClaimedBoots | Unbooted
+        if source.boot is None:
+            judge = state.unbooted
+            verdict = judge.check(link, source.device, source.sequence, t_ns)
+        else:
+            judge = state.boots
+            verdict = judge.check(link, source.boot, source.sequence, t_ns)
+        state.refused = 0 if verdict.accepted else state.refused + 1
+        if verdict is Verdict.TWIN:
+            state.quarantined = True
+            self._note(t_ns, node, "twin", f"{judge.twins}: refused until it is released")
+        elif verdict is Verdict.REBOOT:
+            self._note(t_ns, node, "reboot", f"started anew, on link {link}")
+        elif state.refused == MANY_OLD:
+            text = f"sends only old messages, on link {link}: refused; release it if it is well"
+            self._note(t_ns, node, "old", text)
+        return verdict
+
+    def release(self, node: int, t_ns: int) -> None:
+        """Believe a node again, as if it had never been heard; authenticated: changes nothing."""
+        if self._nodes.pop(node, None) is not None:
+            self._noticed = {key: t for key, t in self._noticed.items() if key[0] != node}
+            self._note(t_ns, node, "release", "is released")
+
+    def high_water(self, ahead: int = 0) -> dict[int, Mark]:
+        """What to keep across a restart of the host, by node; authenticated only.
+
+        Args:
+            ahead: So many more messages count as seen, of each node. Marks that are saved every
+                minute, with more messages ahead than come in a minute, leave no gap for a replay
+                after a crash; a node whose boot goes on is then refused until it is past it.
+        """
+        marks = {node: boots.mark for node, boots in self._rising.items()}
+        return {k: (m[0], min(m[1] + ahead, MODULUS - 1)) for k, m in marks.items() if m}
+
+    def restore(self, marks: Mapping[int, Mark]) -> None:
+        """Accept nothing up to these marks of `high_water`; lower ones change nothing."""
+        for node, mark in marks.items():
+            known = self._rising.get(node)
+            if known is None or known.mark is None or known.mark < mark:
+                self._rising[node] = RisingBoots(mark)
+
+    def _check_rising(self, link: str, source: Source, t_ns: int, node: int) -> Verdict:
+        if node not in self._rising:
+            self._rising[node] = RisingBoots()
+        verdict = self._rising[node].check(source.boot, source.sequence)
+        if verdict is Verdict.REBOOT:
+            self._note(t_ns, node, "reboot", f"started anew, on link {link}")
+        elif verdict is Verdict.REPLAY:
+            self._note(
+                t_ns,
+                node,
+                "replay",
+                f"is sent old messages on link {link}: recorded ones, or a second device with its "
+                "key; refused",
+            )
+        return verdict
+
+    def _note(self, t_ns: int, node: int, kind: str, text: str) -> None:
+        """Tell the operator, of each kind not too often."""
+        before = self._noticed.get((node, kind))
+        if before is not None and t_ns - before < self._params.again * NS:
+            return
+        self._noticed[node, kind] = t_ns
+        if len(self.notices) < MOST_NOTICES:
+            self.notices.append((t_ns, f"node {node} {text}"))

@@ -1,0 +1,109 @@
+"""Formats that do not tell one start of a device from the next."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeVar
+
+from hardware_bridge.identity.boots import OF_PLACE, two_devices
+from hardware_bridge.identity.verdict import NS, IdentityParams, Verdict
+from hardware_bridge.identity.window import MODULUS, SequenceWindow
+
+_Key = TypeVar("_Key")
+_Value = TypeVar("_Value")
+
+MOST_DEVICES = 16
+"""Names and links that are remembered of one node."""
+
+
+@dataclass(slots=True)
+class _Heard:
+    """Where a device that names itself was heard."""
+
+    link: str
+    t_ns: int
+    changes: int = 0
+
+
+@dataclass(slots=True)
+class _Numbers:
+    """The numbers of one stream."""
+
+    window: SequenceWindow
+    accepted_ns: int
+    refused: int = 0
+    """Rising numbers in a row."""
+    last: int = 0
+    """Of the refused ones."""
+
+
+class Unbooted:
+    """The messages of one node that carry no boot.
+
+    A device that names itself is in one place; where no device is named the port's configuration
+    says whose the messages are, and a node may have several such ports. Two devices on one link
+    cannot be told apart here.
+    """
+
+    twins: str = ""
+    """Why the last message was found to be a TWIN."""
+
+    def __init__(self, params: IdentityParams) -> None:
+        self._params = params
+        self._heard: dict[str, _Heard] = {}
+        self._numbers: dict[tuple[str | None, str], _Numbers] = {}
+
+    def check(self, link: str, device: str | None, sequence: int | None, t_ns: int) -> Verdict:
+        """Find out what a message is, and remember it."""
+        if device is not None and self._is_elsewhere(link, device, t_ns):
+            return Verdict.TWIN
+        if sequence is None:
+            return Verdict.UNNUMBERED
+        numbers = self._numbers.get((device, link))
+        if numbers is None:
+            _make_room(self._numbers)
+            window = SequenceWindow(sequence, endless=True)
+            self._numbers[device, link] = _Numbers(window, t_ns)
+            return Verdict.FRESH
+        verdict = OF_PLACE[numbers.window.place(sequence)]
+        if not verdict.accepted:
+            if not self._began_anew(numbers, sequence, t_ns):
+                return verdict
+            numbers.window = SequenceWindow(sequence, endless=True)
+            verdict = Verdict.REBOOT
+        numbers.window.take(sequence)
+        numbers.accepted_ns, numbers.refused = t_ns, 0
+        return verdict
+
+    def _is_elsewhere(self, link: str, device: str, t_ns: int) -> bool:
+        """Whether a device is heard here and there by turns."""
+        heard = self._heard.get(device)
+        if heard is None:
+            _make_room(self._heard)
+            self._heard[device] = _Heard(link, t_ns)
+            return False
+        if link != heard.link:
+            soon = t_ns - heard.t_ns < self._params.change * NS
+            heard.changes = heard.changes + 1 if soon else 0
+            if heard.changes >= self._params.changes:
+                self.twins = two_devices(heard.link, link)
+                return True
+            heard.link = link
+        elif t_ns - heard.t_ns >= self._params.change * NS:
+            heard.changes = 0
+        heard.t_ns = t_ns
+        return False
+
+    def _began_anew(self, numbers: _Numbers, sequence: int, t_ns: int) -> bool:
+        """Whether a refused number is one of a row that only a new start explains."""
+        rising = 0 < (sequence - numbers.last) % MODULUS < self._params.refused
+        numbers.refused = numbers.refused + 1 if rising else 1
+        numbers.last = sequence
+        quiet = t_ns - numbers.accepted_ns >= self._params.quiet * NS
+        return quiet and numbers.refused >= self._params.refused
+
+
+def _make_room(remembered: dict[_Key, _Value]) -> None:
+    """Forget the oldest where there are too many."""
+    if len(remembered) >= MOST_DEVICES:
+        del remembered[next(iter(remembered))]
