@@ -1,0 +1,176 @@
+"""What a recording looks like as bytes: a head of 16 bytes, a header record, records.
+
+Every record starts with the file's own random marker and ends with a check sum over all before
+it, marker included. So a reader finds the next whole record behind a damaged place, and takes
+nothing for a record that stood in a payload or in another recording (`docs/recording.md`).
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+import zlib
+from dataclasses import asdict, dataclass
+from enum import IntEnum
+from typing import Any
+
+MAGIC = b"\x89RELPOS\n"
+"""A byte above 127 and a line end show a file that was sent as text."""
+VERSION = 1
+HEAD = struct.Struct("<8sHH4s")
+"""Magic, version, 0, marker."""
+PREFIX = struct.Struct("<4sBHQqI")
+"""Marker, kind, link, sequence number, time [ns], length of the payload [bytes]."""
+CHECK = struct.Struct("<I")
+"""CRC-32 of prefix and payload, as zlib computes it."""
+OVERHEAD = PREFIX.size + CHECK.size
+"""[bytes] What a record costs beyond its payload."""
+MOST_PAYLOAD = 1 << 16
+"""[bytes] In one record; far more than a port gives at once."""
+MOST_HEADER = 1 << 20
+"""[bytes] In the header record, which holds a configuration."""
+
+
+class Kind(IntEnum):
+    """What a record holds. None is 0, so that zeros on a disk are no record."""
+
+    HEADER = 1
+    """`Header` as JSON; the first record and no other."""
+    BYTES_IN = 2
+    """What was read from a link at once."""
+    BYTES_OUT = 3
+    """What was sent to a link at once."""
+    TICK = 4
+    """A decision: the tracker was asked for an estimate at this time. No payload."""
+    EVENT = 5
+    """A JSON object with the field ``event``: a link came or went, a gate opened, records were
+    lost."""
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """One thing that happened."""
+
+    kind: Kind
+    link: int
+    """Index into `Header.links`; 0 where the kind belongs to no link."""
+    t_ns: int
+    """By the host's monotonic clock [ns]."""
+    payload: bytes
+    sequence: int = 0
+    """Counts the records of a file from 1, the header being 0, without gaps."""
+
+    def event(self) -> dict[str, Any]:
+        """The payload of an EVENT.
+
+        Raises:
+            ValueError: It is no JSON, so this is no EVENT.
+        """
+        value = json.loads(self.payload)
+        return value if isinstance(value, dict) else {}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Header:
+    """What was recorded, and with what."""
+
+    software: str
+    """Name and version of the software that recorded."""
+    config: str
+    """The text of swarm.toml."""
+    links: tuple[str, ...]
+    """Names of all links and cars, ``links.left`` or ``cars.1``; records hold their indices."""
+    monotonic_ns: int
+    """[ns] The host's monotonic clock at the start."""
+    wall_ns: int
+    """[ns] UTC since 1970 at the same moment: for people and exports, never for tracking."""
+
+    @property
+    def utc_offset_ns(self) -> int:
+        """[ns] What makes UTC of a time of this recording, as exports take it."""
+        return self.wall_ns - self.monotonic_ns
+
+    def encode(self) -> bytes:
+        """The payload of the header record."""
+        return json.dumps(asdict(self)).encode()
+
+    @classmethod
+    def decode(cls, payload: bytes) -> Header:
+        """The header of a payload.
+
+        Raises:
+            ValueError: It is not one.
+        """
+        raw = json.loads(payload)
+        if not isinstance(raw, dict):
+            raise ValueError("not a table")
+        links = raw.get("links")
+        if not isinstance(links, list) or not all(isinstance(name, str) for name in links):
+            raise ValueError("links: expected names")
+        text, numbers = ("software", "config"), ("monotonic_ns", "wall_ns")
+        for names, kind in ((text, str), (numbers, int)):
+            for name in names:
+                if type(raw.get(name)) is not kind:
+                    raise ValueError(f"{name}: expected {kind.__name__}")
+        fields = {name: raw[name] for name in (*text, *numbers)}
+        return cls(links=tuple(links), **fields)
+
+
+def check_record(record: Record) -> None:
+    """See that a record can be written.
+
+    Raises:
+        ValueError: A number does not fit its field, or the payload is too long.
+    """
+    _prefix(b"", record)
+
+
+def encode_record(marker: bytes, record: Record) -> bytes:
+    """A record as it stands in the file of that marker.
+
+    Raises:
+        ValueError: As `check_record`.
+    """
+    body = _prefix(marker, record) + record.payload
+    return body + CHECK.pack(zlib.crc32(body))
+
+
+def _prefix(marker: bytes, record: Record) -> bytes:
+    kind, n = Kind(record.kind), len(record.payload)
+    if n > most_payload(kind):
+        raise ValueError(f"payload: expected at most {most_payload(kind)} bytes, got {n}")
+    try:
+        return PREFIX.pack(marker, kind, record.link, record.sequence, record.t_ns, n)
+    except struct.error as error:
+        raise ValueError(f"link, sequence or t_ns: {error}") from error
+
+
+def decode_record(data: bytes | bytearray, at: int, marker: bytes) -> Record | None:
+    """The record that starts there, or None where there is no whole and right one."""
+    size = record_size(data, at, marker)
+    if size is None or at + size > len(data):
+        return None
+    end = at + size - CHECK.size
+    if CHECK.unpack_from(data, end)[0] != zlib.crc32(memoryview(data)[at:end]):
+        return None
+    _, kind, link, sequence, t_ns, _ = PREFIX.unpack_from(data, at)
+    payload = bytes(memoryview(data)[at + PREFIX.size : end])
+    return Record(Kind(kind), link, t_ns, payload, sequence)
+
+
+def record_size(data: bytes | bytearray, at: int, marker: bytes) -> int | None:
+    """[bytes] Size of the record that starts there by its prefix, None where none does."""
+    if at + PREFIX.size > len(data):
+        return None
+    found, kind, _, _, _, length = PREFIX.unpack_from(data, at)
+    if found != marker or kind not in _KINDS or length > most_payload(kind):
+        return None
+    return OVERHEAD + int(length)
+
+
+def most_payload(kind: int) -> int:
+    """[bytes] The longest payload of a kind."""
+    return MOST_HEADER if kind == Kind.HEADER else MOST_PAYLOAD
+
+
+_KINDS = frozenset(int(kind) for kind in Kind)
