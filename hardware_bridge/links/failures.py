@@ -1,0 +1,64 @@
+"""The many ways in which a port is lost, as one exception.
+
+An adapter that is pulled out shows itself as a hang-up of poll, as OSError (EIO, ENXIO, ENODEV), as
+a read that returns nothing although the port was readable, as pyserial's SerialException with or
+without a number, as its PortNotOpenError, as termios.error, which is no OSError, and as TypeError
+or ValueError where something else closed the descriptor. None of them tells more than that the
+port is gone.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+
+_WORDS = {
+    errno.EIO: "unplugged, or its other end closed",
+    errno.ENXIO: "unplugged",
+    errno.ENODEV: "unplugged",
+    errno.ENOENT: "not there",
+    errno.EBADF: "closed",
+    errno.EPIPE: "closed by the other end",
+    errno.ECONNRESET: "closed by the other end",
+    errno.ECONNREFUSED: "nobody listens there",
+    errno.ETIMEDOUT: "no answer",
+    errno.EHOSTUNREACH: "no way to that host",
+    errno.ENETUNREACH: "no way to that host",
+}
+
+
+class LinkLost(Exception):
+    """A port that was open is gone, or cannot be opened again yet."""
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(reason)
+        self.reason = reason
+        """Why, in words."""
+
+
+def lost_by(error: BaseException) -> LinkLost:
+    """Whatever a port raised, as the one exception."""
+    return error if isinstance(error, LinkLost) else LinkLost(reason_of(error))
+
+
+def reason_of(error: BaseException) -> str:
+    """What an exception of a port means, in a few words."""
+    number = number_of(error)
+    if number in _WORDS:
+        return f"{_WORDS[number]} ({errno.errorcode[number]})"
+    if number is not None and number in errno.errorcode:
+        return f"{os.strerror(number)} ({errno.errorcode[number]})"
+    if isinstance(error, TimeoutError):
+        return _WORDS[errno.ETIMEDOUT]
+    if isinstance(error, TypeError | ValueError):
+        return f"closed ({type(error).__name__})"
+    text = " ".join(str(error).split())
+    return text or type(error).__name__
+
+
+def number_of(error: BaseException) -> int | None:
+    """The errno of an OSError, of a SerialException that has one, or of termios.error."""
+    number = getattr(error, "errno", None)
+    if number is None and error.args and type(error).__module__ == "termios":
+        number = error.args[0]
+    return number if isinstance(number, int) else None

@@ -1,0 +1,246 @@
+"""Several ports at once: bytes as they come, losses noticed, lost ports opened again."""
+
+from __future__ import annotations
+
+import contextlib
+import selectors
+from collections.abc import Callable, Sequence
+
+from hardware_bridge.errors import BridgeError
+from hardware_bridge.links.failures import lost_by, reason_of
+from hardware_bridge.links.link_state import LinkNotice, LinkState, check_distinct
+from hardware_bridge.links.opener import Opener, OpenPort, open_port
+from hardware_bridge.links.ports import Chunk, PortSpec
+from hardware_bridge.links.stream import Port
+
+LINGER = 0.1
+"""[s] What was sent has this time to leave when all is closed."""
+
+
+class Links:
+    """The ports of one process, used by one thread.
+
+    Laws: no byte is lost or doubled while a port is up; whatever one port does, the others go on;
+    nothing is ever sent that was not asked for by `send` since the port came up.
+    """
+
+    def __init__(
+        self,
+        specs: Sequence[PortSpec],
+        now_ns: Callable[[], int],
+        *,
+        wait_for_ports: bool = False,
+        open_port: OpenPort = open_port,
+    ) -> None:
+        """Open all ports.
+
+        Args:
+            specs: The ports, each with a name of its own.
+            now_ns: The host's monotonic clock [ns].
+            wait_for_ports: Ports that cannot be opened are down and tried again, instead of being
+                an error.
+            open_port: How a port is opened.
+
+        Raises:
+            BridgeError: A port cannot be opened, or two links have the same name or device.
+        """
+        check_distinct(specs)
+        self._now_ns = now_ns
+        self._opener = Opener(open_port)
+        self._selector = selectors.DefaultSelector()
+        self._selector.register(self._opener.fileno(), selectors.EVENT_READ)
+        self._links = {spec.name: LinkState(spec, now_ns()) for spec in specs}
+        self._by_fd: dict[int, LinkState] = {}
+        self._notices: list[LinkNotice] = []
+        for link in self._links.values():
+            try:
+                self._take(link, open_port(link.spec))
+            except Exception as error:
+                if not wait_for_ports:
+                    self.close()
+                    raise (
+                        error
+                        if isinstance(error, BridgeError)
+                        else BridgeError(f"{link.spec.name}: {reason_of(error)}")
+                    ) from error
+                self._failed(link, error)
+
+    def wait(self, timeout: float) -> list[Chunk]:
+        """Wait for a byte, a loss or a return, then take what is there.
+
+        Args:
+            timeout: At most so long [s]; it may come back earlier with nothing.
+
+        Returns:
+            At most one chunk a link, stamped right after it was read.
+        """
+        self._retry()
+        chunks, opened = [], False
+        for key, events in self._selector.select(self._patience(timeout)):
+            link = self._by_fd.get(key.fd)
+            if link is None:
+                opened |= key.fd == self._opener.fileno()
+                continue
+            if events & selectors.EVENT_READ:
+                chunk = self._read(link)
+                if chunk is not None:
+                    chunks.append(chunk)
+            if events & selectors.EVENT_WRITE:
+                self._guarded(link, self._flush)
+        if opened:
+            self._take_opened()
+        return chunks
+
+    def send(self, name: str, data: bytes) -> bool:
+        """Send a message now or not at all.
+
+        Returns:
+            False if the link is down or earlier bytes still wait to leave; `data` is forgotten.
+        """
+        link = self._links[name]
+        if link.port is None:
+            return False
+        port = link.port
+        try:
+            taken = port.write(data)
+        except Exception as error:
+            self._lose(link, error)
+            return False
+        self._guarded(link, self._flush)
+        return taken
+
+    def watch(self, fd: int) -> None:
+        """Let `wait` come back when `fd`, the caller's own, is readable."""
+        self._selector.register(fd, selectors.EVENT_READ)
+
+    def unwatch(self, fd: int) -> None:
+        """No longer; before it is closed."""
+        self._selector.unregister(fd)
+
+    def is_up(self, name: str) -> bool:
+        """Whether the port is open."""
+        return self._links[name].port is not None
+
+    def since_ns(self, name: str) -> int:
+        """When the link came up or went down [ns]."""
+        return self._links[name].since_ns
+
+    def reason(self, name: str) -> str:
+        """Why the link is down; empty while it is up."""
+        return self._links[name].reason
+
+    def drain_notices(self) -> list[LinkNotice]:
+        """Who came up and went down since the last call, in order."""
+        notices, self._notices = self._notices, []
+        return notices
+
+    def close(self) -> None:
+        """Close all; what was sent has `LINGER` to leave. May be called again."""
+        self._opener.close()
+        for link in self._links.values():
+            if link.port is not None:
+                self._release(link, LINGER)
+                link.reason = "closed"
+            link.retry_ns = None
+        self._selector.close()
+
+    def __enter__(self) -> Links:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _patience(self, timeout: float) -> float:
+        due = [link.retry_ns for link in self._links.values() if link.retry_ns is not None]
+        if due:
+            timeout = min(timeout, (min(due) - self._now_ns()) / 1e9)
+        return max(0.0, timeout)
+
+    def _read(self, link: LinkState) -> Chunk | None:
+        assert link.port is not None
+        try:
+            data = link.port.read()
+            t_ns = self._now_ns()
+        except Exception as error:
+            self._lose(link, error)
+            return None
+        return Chunk(link.spec.name, t_ns, data) if data else None
+
+    def _flush(self, link: LinkState) -> None:
+        """Go on with a cut message, and wait for room as long as there is one."""
+        assert link.port is not None
+        waits = not link.port.flush()
+        if waits != link.waits_to_write:
+            events = selectors.EVENT_READ | (selectors.EVENT_WRITE if waits else 0)
+            self._selector.modify(link.fd, events)
+            link.waits_to_write = waits
+
+    def _guarded(self, link: LinkState, act: Callable[[LinkState], None]) -> None:
+        if link.port is None:
+            return
+        try:
+            act(link)
+        except Exception as error:
+            self._lose(link, error)
+
+    def _retry(self) -> None:
+        now = self._now_ns()
+        for link in self._links.values():
+            if link.retry_ns is not None and now >= link.retry_ns:
+                link.retry_ns = None
+                try:
+                    self._opener.ask(link.spec)
+                except RuntimeError as error:  # no more threads
+                    self._failed(link, error)
+
+    def _take_opened(self) -> None:
+        for name, result in self._opener.done():
+            link = self._links[name]
+            if isinstance(result, Exception):
+                self._failed(link, result)
+                continue
+            try:
+                self._take(link, result)
+            except Exception as error:
+                self._failed(link, error)
+
+    def _take(self, link: LinkState, port: Port) -> None:
+        """A port was opened."""
+        try:
+            fd = port.fileno()
+            self._selector.register(fd, selectors.EVENT_READ)
+        except Exception as error:
+            with contextlib.suppress(Exception):
+                port.close()
+            raise lost_by(error) from error
+        link.port, link.fd, link.waits_to_write = port, fd, False
+        link.reason, link.since_ns, link.retry_ns = "", self._now_ns(), None
+        self._by_fd[fd] = link
+        self._notices.append(LinkNotice(link.spec.name, link.since_ns, up=True))
+
+    def _lose(self, link: LinkState, error: Exception) -> None:
+        """A port that was open failed."""
+        now = self._now_ns()
+        link.forgive(now)
+        self._release(link, 0.0)
+        link.reason, link.since_ns = reason_of(error), now
+        self._notices.append(LinkNotice(link.spec.name, now, up=False, reason=link.reason))
+        link.back_off(now)
+
+    def _failed(self, link: LinkState, error: Exception) -> None:
+        """A port could not be opened; said once, not at every attempt."""
+        now = self._now_ns()
+        reason = reason_of(error).removeprefix(f"{link.spec.name}: ")
+        if reason != link.reason:
+            self._notices.append(LinkNotice(link.spec.name, now, up=False, reason=reason))
+            link.reason = reason
+        link.back_off(now)
+
+    def _release(self, link: LinkState, linger: float) -> None:
+        assert link.port is not None
+        with contextlib.suppress(Exception):
+            self._selector.unregister(link.fd)
+        self._by_fd.pop(link.fd, None)
+        with contextlib.suppress(Exception):
+            link.port.close(linger)
+        link.port, link.fd = None, -1

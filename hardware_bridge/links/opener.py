@@ -1,0 +1,90 @@
+"""Opening ports aside, so that one that takes its time holds up nobody.
+
+A name that must be resolved, a host that does not answer, an adapter that is just being plugged in:
+each may take seconds to open or to fail.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import threading
+from collections.abc import Callable
+from typing import TypeAlias
+
+from hardware_bridge.links.ports import PortSpec
+from hardware_bridge.links.stream import Port
+
+OpenPort: TypeAlias = Callable[[PortSpec], Port]
+
+
+def open_port(spec: PortSpec) -> Port:
+    """Open a port of any kind.
+
+    Raises:
+        BridgeError: It cannot be opened; says what to do.
+    """
+    if spec.port.startswith("tcp:"):
+        from hardware_bridge.links.tcp_port import TcpPort
+
+        return TcpPort(spec)
+    from hardware_bridge.links.serial_port import SerialPort
+
+    return SerialPort(spec)
+
+
+class Opener:
+    """Opens each port that it is asked for in a thread of its own."""
+
+    def __init__(self, open_port: OpenPort = open_port) -> None:
+        self._open_port = open_port
+        self._lock = threading.Lock()
+        self._closed = False
+        self._done: list[tuple[str, Port | Exception]] = []
+        self._wake, self._waker = os.pipe()
+        os.set_blocking(self._wake, False)
+        os.set_blocking(self._waker, False)
+
+    def fileno(self) -> int:
+        """Readable when something is done."""
+        return self._wake
+
+    def ask(self, spec: PortSpec) -> None:
+        """Begin to open a port; do not ask for the same again before it is done."""
+        threading.Thread(target=self._open, args=(spec,), name=spec.name, daemon=True).start()
+
+    def done(self) -> list[tuple[str, Port | Exception]]:
+        """What was opened, or could not be, since the last call: names, and ports or reasons."""
+        with self._lock, contextlib.suppress(BlockingIOError):
+            while len(os.read(self._wake, 4096)) == 4096:
+                pass
+        with self._lock:
+            done, self._done = self._done, []
+        return done
+
+    def close(self) -> None:
+        """Wait for nothing; a port that opens later is closed at once."""
+        with self._lock:
+            if self._closed:
+                return
+            self._closed = True
+            for _, port in self._done:
+                if not isinstance(port, Exception):
+                    port.close()
+            self._done.clear()
+            os.close(self._wake)
+            os.close(self._waker)
+
+    def _open(self, spec: PortSpec) -> None:
+        result: Port | Exception
+        try:
+            result = self._open_port(spec)
+        except Exception as error:
+            result = error
+        with self._lock:
+            if not self._closed:
+                self._done.append((spec.name, result))
+                with contextlib.suppress(BlockingIOError):
+                    os.write(self._waker, b".")
+            elif not isinstance(result, Exception):
+                result.close()

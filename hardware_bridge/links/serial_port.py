@@ -1,0 +1,145 @@
+"""A serial port, opened with pyserial, never blocking.
+
+Modem lines. Linux raises DTR and RTS together when a port is opened. They are left at that: to
+clear one of them, or one after the other, is what resets boards (on an ESP32, RTS without DTR pulls
+the reset line). HUPCL is cleared, so that closing leaves both lines up as well and a board with a
+capacitor from DTR to reset (Arduino) starts anew only when it is plugged in.
+
+VMIN is 1: a read without data then says so (EAGAIN), and an empty read is a hang-up.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import time
+from typing import TYPE_CHECKING, Any
+
+from hardware_bridge.errors import BridgeError
+from hardware_bridge.links.failures import number_of, reason_of
+from hardware_bridge.links.port_list import (
+    Listing,
+    device_path,
+    list_serial_ports,
+    permission_remedy,
+)
+from hardware_bridge.links.port_users import port_users
+from hardware_bridge.links.ports import PortSpec
+from hardware_bridge.links.stream import Stream
+
+if TYPE_CHECKING:
+    import serial
+
+OLDEST_QUEUED = 0.02
+"""[s] Bytes that wait longer than this to leave are commands that come too late."""
+LEAST_QUEUED = 64
+"""[bytes] A command always fits."""
+
+
+class SerialPort:
+    """An open serial port, 8N1, for this process alone. It implements `Port`."""
+
+    def __init__(self, spec: PortSpec, listing: Listing = list_serial_ports) -> None:
+        """Open the port.
+
+        Args:
+            spec: A path, or ``serial:NUMBER``.
+            listing: The ports there are.
+
+        Raises:
+            BridgeError: It is not there, may not be opened, is in use, is no serial port or has no
+                such rate; says what to do.
+        """
+        self.path = device_path(spec, listing)
+        self._serial: Any = _opened(spec, self.path)
+        try:
+            _set_line(self._serial)
+            queued = max(LEAST_QUEUED, round(OLDEST_QUEUED * spec.baud / 10))
+            self._stream = Stream(self._serial.fileno(), queued)
+        except Exception as error:
+            self._serial.close()
+            raise BridgeError(f"{spec.name}: {self.path}: {reason_of(error)}") from error
+
+    def fileno(self) -> int:
+        """To wait for bytes with."""
+        return self._stream.fd
+
+    def read(self) -> bytes:
+        """Everything that is there."""
+        return self._stream.read()
+
+    def write(self, data: bytes) -> bool:
+        """Take all of `data`, or none of it."""
+        return self._stream.write(data)
+
+    def flush(self) -> bool:
+        """Go on with a message that was cut."""
+        return self._stream.flush()
+
+    def close(self, linger: float = 0.0) -> None:
+        """Close. What has not left after `linger` seconds is thrown away.
+
+        The kernel would wait for it, up to 30 s at a device that no longer takes bytes.
+        """
+        import termios
+
+        if not self._serial.is_open:
+            return
+        with contextlib.suppress(Exception):
+            for _ in range(round(linger / 0.001)):
+                if self._stream.flush() and not self._stream.queued():
+                    break
+                time.sleep(0.001)
+        with contextlib.suppress(Exception):
+            if self._stream.queued():
+                termios.tcflush(self._stream.fd, termios.TCOFLUSH)
+        with contextlib.suppress(Exception):
+            self._serial.close()
+
+
+def _opened(spec: PortSpec, path: str) -> serial.Serial:
+    try:
+        import serial
+    except ImportError as error:
+        raise BridgeError(
+            f"{spec.name}: serial ports need pyserial: pip install 'relpos-env[hardware]'"
+        ) from error
+    if spec.baud < 50:
+        # A rate of 0 would hang up the line.
+        raise BridgeError(f"{spec.name}: baud: expected at least 50, got {spec.baud}")
+    try:
+        # Opened in the constructor, DTR and RTS asserted as the system has them: no edge.
+        return serial.Serial(path, spec.baud, timeout=0, write_timeout=0, exclusive=True)
+    except Exception as error:
+        raise BridgeError(f"{spec.name}: {_why_not(error, path, spec.baud)}") from error
+
+
+def _set_line(port: serial.Serial) -> None:
+    import termios
+
+    fd = port.fileno()
+    settings = termios.tcgetattr(fd)
+    settings[2] &= ~termios.HUPCL
+    settings[6][termios.VMIN], settings[6][termios.VTIME] = 1, 0
+    termios.tcsetattr(fd, termios.TCSANOW, settings)
+    # FTDI adapters hold bytes back for 16 ms otherwise; many ports know nothing of it.
+    with contextlib.suppress(OSError, ValueError, AttributeError, NotImplementedError):
+        port.set_low_latency_mode(True)
+
+
+def _why_not(error: Exception, path: str, baud: int) -> str:
+    """Why a port does not open, and what to do."""
+    number = number_of(error)
+    text = str(error)
+    if number in (errno.ENOENT, errno.ENXIO, errno.ENODEV):
+        return f"no port {path}: plug it in; `relpos doctor` lists the ports there are"
+    if number in (errno.EACCES, errno.EPERM):
+        return f"no permission to open {path}: {permission_remedy(path)}"
+    if number in (errno.EBUSY, errno.EAGAIN):
+        users = ", ".join(port_users(path)) or "another program"
+        return f"{path} is in use by {users}: end it first"
+    if "not configure" in text or number in (errno.ENOTTY, errno.EISDIR):
+        return f"{path} is not a serial port; `relpos doctor` lists those there are"
+    if "baud" in text:
+        return f"{path} cannot do {baud} baud: set a rate that the adapter knows"
+    return f"cannot open {path}: {reason_of(error)}"
