@@ -1,0 +1,68 @@
+"""``[nodes.ID]`` and ``[antennas.ID]``: who is in the group."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from hardware_bridge.config.keys import node_id, tables_of
+from tracking.constellation import Antenna, Constellation, NodeConfig
+from tracking.errors import ConfigError
+from tracking.tables import TableReader, Where
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Node:
+    kind: Literal["moving", "static"] = "moving"
+    vehicle: str = "car"
+    initial_heading_rad: float | None = None
+    imu_hz: float = 100.0
+    mag_hz: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Antenna:
+    node: int
+    offset_m: tuple[float, float, float]
+
+
+def read_constellation(
+    raw: Mapping[str, Any], dimensions: int, heading: Literal["magnetic", "initial"], where: Where
+) -> Constellation:
+    """The nodes, those that move first.
+
+    Args:
+        raw: The whole file.
+        dimensions: 2 or 3.
+        heading: As in `Constellation`.
+        where: The file, for messages.
+    """
+    nodes, antennas = [], []
+    for key, table in tables_of(raw, "nodes", where):
+        at = where.key("nodes").key(key)
+        node = TableReader().read(_Node, table, at)
+        nodes.append(
+            NodeConfig(
+                id=node_id(key, at),
+                kind=node.kind,
+                vehicle=node.vehicle,
+                initial_heading=node.initial_heading_rad,
+                imu_hz=node.imu_hz,
+                mag_hz=node.mag_hz,
+            )
+        )
+    for key, table in tables_of(raw, "antennas", where):
+        at = where.key("antennas").key(key)
+        antenna = TableReader().read(_Antenna, table, at)
+        antennas.append(Antenna(id=node_id(key, at), node=antenna.node, offset_b=antenna.offset_m))
+    nodes.sort(key=lambda node: node.kind == "static")
+    try:
+        return Constellation(
+            nodes=tuple(nodes),
+            dimensions=3 if dimensions == 3 else 2,
+            heading=heading,
+            antennas=tuple(antennas),
+        )
+    except ConfigError as error:
+        raise where.error(str(error)) from error

@@ -1,0 +1,157 @@
+"""Reading swarm.toml: what cannot be is an error that names the file and the key."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from hardware_bridge.config.keys import check_node, without
+from hardware_bridge.config.nodes import read_constellation
+from hardware_bridge.config.streams import read_cars, read_links
+from hardware_bridge.config.swarm import SwarmConfig, TaskConfig, TrackerConfig
+from hardware_bridge.errors import BridgeError
+from hardware_bridge.safety.params import SafetyParams
+from relpos_env.errors import EnvError
+from relpos_env.tasks import make_task
+from tracking.constellation import Constellation
+from tracking.errors import ConfigError
+from tracking.filters import filter_builder
+from tracking.tables import TableReader, Where
+
+SECTIONS = (
+    "name", "dimensions", "heading", "nodes", "antennas", "links", "cars", "calibration", "task",
+    "tracker", "safety",
+)  # fmt: skip
+MOST_SLOTS = 20
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Head:
+    name: str = ""
+    dimensions: int = 2
+    heading: Literal["magnetic", "initial"] = "magnetic"
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Calibration:
+    files: tuple[str, ...] = ()
+    uncalibrated: bool = False
+
+
+def read_config(path: Path | str) -> SwarmConfig:
+    """Read a swarm.toml.
+
+    Raises:
+        BridgeError: It cannot be read, or a key is unknown, missing or makes no sense; the file
+            and the key are named.
+    """
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise BridgeError(f"{path}: cannot be read ({error.strerror})") from error
+    except UnicodeDecodeError as error:
+        raise BridgeError(f"{path.name}: expected TOML, found bytes that are no text") from error
+    return parse_config(text, file=path.name, beside=path.parent)
+
+
+def parse_config(text: str, *, file: str, beside: Path, with_files: bool = True) -> SwarmConfig:
+    """The configuration that a text is.
+
+    Args:
+        text: Of a swarm.toml.
+        file: Its name, for messages.
+        beside: The folder that relative paths in it start from.
+        with_files: Whether the files that it names must be there.
+
+    Raises:
+        BridgeError: As for `read_config`.
+    """
+    try:
+        raw = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise BridgeError(f"{file}: expected TOML: {error}") from error
+    where = Where(file, raises=BridgeError)
+    for key in raw:
+        if key not in SECTIONS:
+            raise where.key(key).error(f"unknown, expected one of {', '.join(SECTIONS)}")
+    reader = TableReader()
+    head = reader.read(
+        _Head, {k: raw[k] for k in ("name", "dimensions", "heading") if k in raw}, where
+    )
+    constellation = read_constellation(raw, head.dimensions, head.heading, where)
+    config = SwarmConfig(
+        name=head.name or Path(file).stem,
+        constellation=constellation,
+        links=tuple(read_links(raw, constellation, where)),
+        cars=tuple(read_cars(raw, constellation, where)),
+        calibration=_calibration(raw, where, beside, with_files),
+        task=_task(raw, constellation, where),
+        tracker=reader.read(TrackerConfig, raw.get("tracker", {}), where.key("tracker")),
+        safety=reader.read(SafetyParams, raw.get("safety", {}), where.key("safety")),
+        text=text,
+    )
+    _check(config, where)
+    return config
+
+
+def _calibration(
+    raw: Mapping[str, Any], where: Where, beside: Path, with_files: bool
+) -> tuple[Path, ...] | None:
+    if "calibration" not in raw:
+        return None
+    at = where.key("calibration")
+    table = TableReader().read(_Calibration, raw["calibration"], at)
+    files = tuple(beside / name for name in table.files)
+    for path in files:
+        if with_files and not path.is_file():
+            raise at.key("files").error(f"no file {path}: make one with `relpos calibrate`")
+    if bool(files) == table.uncalibrated:
+        raise at.error("expected either files, or uncalibrated = true")
+    return files
+
+
+def _task(raw: Mapping[str, Any], group: Constellation, where: Where) -> TaskConfig:
+    at = where.key("task")
+    rest, options = without(raw.get("task", {}), "options", at)
+    config = replace(TableReader().read(TaskConfig, rest, at), options=options)
+    n = int((~group.is_static).sum())
+    if 2 <= n <= MOST_SLOTS:
+        try:
+            make_task(config.name, n, 1, config.room, **config.options)
+        except EnvError as error:
+            raise at.error(str(error)) from error
+    return config
+
+
+def _check(config: SwarmConfig, where: Where) -> None:
+    """What no section can see alone."""
+    n = config.n_slots
+    if not 2 <= n <= MOST_SLOTS:
+        raise where.key("nodes").error(f"expected 2 to {MOST_SLOTS} that move, got {n}")
+    if not config.links:
+        raise where.key("links").error("missing, expected at least one [links.NAME]")
+    ports: dict[str, str] = {}
+    for spec in (*(link.port for link in config.links), *(car.port for car in config.cars)):
+        if spec.port in ports:
+            raise (
+                where.key(spec.name)
+                .key("port")
+                .error(f"{spec.port} is that of {ports[spec.port]} already")
+            )
+        ports[spec.port] = spec.name
+    try:
+        filter_builder(config.tracker.filter)
+    except ConfigError as error:
+        raise where.key("tracker").error(str(error)) from error
+    if not 0.0 <= config.tracker.delay <= 1.0:
+        raise where.key("tracker").key("delay").error("expected 0 to 1 s")
+    fence, group = config.safety.fence, config.constellation
+    if fence is not None:
+        at = where.key("safety").key("fence").key("node")
+        check_node(fence.node, group, at)
+        if not group.is_static[group.index_of[fence.node]]:
+            raise at.error(f"node {fence.node} moves, expected a static one")

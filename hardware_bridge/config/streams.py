@@ -1,0 +1,100 @@
+"""``[links.NAME]`` and ``[cars.ID]``: where bytes come from and go to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from hardware_bridge.config.keys import check_node, node_id, tables_of, without
+from hardware_bridge.config.swarm import CarConfig, LinkConfig
+from hardware_bridge.errors import BridgeError
+from hardware_bridge.links.ports import PortSpec
+from tracking.constellation import Constellation
+from tracking.tables import TableReader, Where
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Link:
+    port: str
+    format: str
+    baud: int | None = None
+    node: int | None = None
+    key: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Car:
+    port: str
+    driver: str
+    baud: int | None = None
+    key: str | None = None
+
+
+def read_links(raw: Mapping[str, Any], group: Constellation, where: Where) -> Iterator[LinkConfig]:
+    """The streams that measure."""
+    from hardware_bridge.decoders import DECODERS
+
+    for key, table in tables_of(raw, "links", where):
+        at = where.key("links").key(key)
+        rest, ids = without(table, "ids", at)
+        link = TableReader().read(_Link, rest, at)
+        if link.format not in DECODERS:
+            known = ", ".join(DECODERS)
+            raise at.key("format").error(f"expected one of {known}, got {link.format!r}")
+        entry = DECODERS[link.format]
+        named = {str(device).upper(): node for device, node in ids.items()}
+        for device, node in named.items():
+            check_node(node, group, at.key("ids").key(device))
+        if len(set(named.values())) < len(named):
+            raise at.key("ids").error("two devices are the same node")
+        if link.node is not None:
+            check_node(link.node, group, at.key("node"))
+        elif not entry.names_itself:
+            raise at.key("node").error(f"missing: {link.format} does not say who speaks")
+        yield LinkConfig(
+            name=key,
+            port=PortSpec(name=f"links.{key}", port=link.port, baud=link.baud or entry.baud),
+            format=link.format,
+            node=link.node,
+            ids=named,
+            key=_key(link.key, at),
+        )
+
+
+def read_cars(raw: Mapping[str, Any], group: Constellation, where: Where) -> list[CarConfig]:
+    """The cars, in the order of their nodes."""
+    from hardware_bridge.drivers import driver_entry, driver_options
+
+    cars = []
+    for key, table in tables_of(raw, "cars", where):
+        at = where.key("cars").key(key)
+        rest, options = without(table, "options", at)
+        car, node = TableReader().read(_Car, rest, at), node_id(key, at)
+        check_node(node, group, at)
+        if group.is_static[group.index_of[node]]:
+            raise at.error(f"node {node} is static, expected one that moves")
+        key_bytes = _key(car.key, at)
+        try:
+            entry = driver_entry(car.driver, node)
+            driver_options(car.driver, node, options, key_bytes)
+        except BridgeError as error:
+            raise Where(where.file, raises=BridgeError).error(str(error)) from error
+        spec = PortSpec(name=f"cars.{node}", port=car.port, baud=car.baud or entry.baud)
+        cars.append(
+            CarConfig(node=node, port=spec, driver=car.driver, options=options, key=key_bytes)
+        )
+    return sorted(cars, key=lambda each: group.index_of[each.node])
+
+
+def _key(text: str | None, where: Where) -> bytes | None:
+    if text is None:
+        return None
+    try:
+        key = bytes.fromhex(text)
+    except ValueError:
+        key = b""
+    if len(key) != 16:
+        # Never show what may be a secret with a slip in it.
+        raise where.key("key").error("expected 16 bytes as 32 hex digits")
+    return key

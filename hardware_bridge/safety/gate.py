@@ -1,0 +1,157 @@
+"""The gate that every command passes: rules cap it, and cars are armed or they stand.
+
+Pure: a state, a moment, and what the cars may do then. Laws: from any state, silence longer than
+the limit leads to a stop; the output is within the limits whatever comes in; a car that was
+stopped for good moves again only after `arm`, and that only after `SafetyParams.health` seconds
+in which all was well.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hardware_bridge.safety.params import SafetyParams
+from hardware_bridge.safety.picture import Picture
+from hardware_bridge.safety.rules import RULES, Moment
+from tracking.arrays import F64, I64, Bool
+
+NO_REASON = -1
+NOT_ARMED = -2
+EMERGENCY = -3
+REASONS = {NO_REASON: "", NOT_ARMED: "not armed", EMERGENCY: "emergency stop"}
+
+
+def reason_text(code: int) -> str:
+    """What a code of `GateOutput.reason` says."""
+    return REASONS[code] if code < 0 else RULES[code].meaning
+
+
+@dataclass(frozen=True, slots=True)
+class GateOutput:
+    """What the cars are told now, arrays over (env, car)."""
+
+    speed: F64
+    """[m/s]"""
+    steering: F64
+    """[rad]"""
+    moving: Bool
+    """False: neutral, brakes on."""
+    armed: Bool
+    cap: F64
+    """[m/s] What the rules allow in the direction that was wanted."""
+    reason: I64
+    """Why it is slower than wanted, see `reason_text`."""
+
+
+class Gate:
+    """Gates of a batch of groups."""
+
+    def __init__(self, params: SafetyParams, n_envs: int, n_cars: int) -> None:
+        self.params = params
+        shape = (n_envs, n_cars)
+        self.armed: Bool = np.zeros(shape, dtype=bool)
+        self.emergency: Bool = np.zeros(n_envs, dtype=bool)
+        """Latched until `clear`."""
+        self._well_since: F64 = np.full(shape, np.inf)
+        self._held: I64 = np.full(shape, NOT_ARMED)
+        self._slow: Bool = np.zeros((len(RULES), *shape), dtype=bool)
+        self._speed: F64 = np.zeros(shape)
+        self._steering: F64 = np.zeros(shape)
+        self._last: F64 = np.full(n_envs, -np.inf)
+
+    def stop(self, envs: slice = slice(None)) -> None:
+        """Emergency stop of whole groups."""
+        self.emergency[envs] = True
+        self.armed[envs] = False
+
+    def clear(self, envs: slice = slice(None)) -> None:
+        """End an emergency stop; every car must be armed again."""
+        self.emergency[envs] = False
+
+    def disarm(self) -> None:
+        """Let all cars stand."""
+        self.armed[:] = False
+        self._held[:] = NOT_ARMED
+
+    def arm(self, now: F64, cars: Bool) -> Bool:
+        """Arm those cars of which all was well for long enough.
+
+        Args:
+            now: (env) [s]
+            cars: Which are asked for, (env, car).
+
+        Returns:
+            Which are armed now, (env, car).
+        """
+        well = now[:, None] - self._well_since >= self.params.health
+        fit = cars & well & ~self.emergency[:, None]
+        self.armed |= fit
+        self._held[fit] = NO_REASON
+        return self.armed.copy()
+
+    def well_for(self, now: F64) -> F64:
+        """How long all has been well with each car, (env, car) [s]."""
+        return np.maximum(now[:, None] - self._well_since, 0.0)
+
+    def step(self, picture: Picture, now: F64, word: F64, heard: F64, linked: Bool) -> GateOutput:
+        """What the cars may do now.
+
+        Args:
+            picture: The latest.
+            now: Rises from call to call, (env) [s].
+            word: When the deciding process last gave a sign of life, (env) [s].
+            heard: When each car's node was last heard, (env, car) [s].
+            linked: Whether the car's port is open, (env, car).
+        """
+        p = self.params
+        forward, backward = np.full((2, *heard.shape), p.max_speed)
+        wanted = np.nan_to_num(
+            picture.speed_wanted, nan=0.0, posinf=p.max_speed, neginf=-p.max_speed
+        )
+        limiting = np.full(heard.shape, NO_REASON)
+        hold = np.zeros(heard.shape, dtype=bool)
+        for k, rule in enumerate(RULES):
+            moment = Moment(picture, now, word, heard, linked, self._slow[k])
+            verdict = rule.check(moment, p)
+            self._slow[k] = (verdict.forward < p.max_speed) | (verdict.backward < p.max_speed)
+            cap = np.where(wanted >= 0.0, verdict.forward, verdict.backward)
+            tighter = cap < np.where(wanted >= 0.0, forward, backward)
+            limiting[tighter & (cap < np.abs(wanted))] = k
+            newly = verdict.hold & self.armed & ~hold
+            self._held[newly] = k
+            hold |= verdict.hold
+            # NaN is no number to drive by.
+            forward = np.fmin(forward, np.where(np.isnan(verdict.forward), 0.0, verdict.forward))
+            backward = np.fmin(
+                backward, np.where(np.isnan(verdict.backward), 0.0, verdict.backward)
+            )
+        self.armed &= ~hold & ~self.emergency[:, None]
+        self._well_since = np.where(hold, np.inf, np.minimum(self._well_since, now[:, None]))
+        speed = np.clip(wanted, -backward, forward)
+        elapsed = np.clip(np.where(np.isfinite(self._last), now - self._last, 0.0), 0.0, 0.1)
+        self._last = now.copy()
+        speed = self._ramp(speed, elapsed[:, None])
+        steering = np.clip(np.nan_to_num(picture.steering_wanted), -p.max_steering, p.max_steering)
+        turn = p.max_steering_rate * elapsed[:, None]
+        steering = np.clip(steering, self._steering - turn, self._steering + turn)
+        self._speed = np.where(self.armed, speed, 0.0)
+        self._steering = np.where(self.armed, steering, 0.0)
+        held = np.where(self.emergency[:, None], EMERGENCY, self._held)
+        return GateOutput(
+            speed=self._speed.copy(),
+            steering=self._steering.copy(),
+            moving=self.armed.copy(),
+            armed=self.armed.copy(),
+            cap=np.where(wanted >= 0.0, forward, backward),
+            reason=np.where(self.armed, limiting, held),
+        )
+
+    def _ramp(self, speed: F64, elapsed: F64) -> F64:
+        """Speeds that rise no faster than allowed; they may fall, and reverse through zero."""
+        before, most = self._speed, self.params.max_accel * elapsed
+        same = np.sign(speed) * np.sign(before) >= 0.0
+        start = np.where(same, np.abs(before), 0.0)
+        ramped: F64 = np.sign(speed) * np.minimum(np.abs(speed), start + most)
+        return ramped

@@ -1,0 +1,93 @@
+"""What the safety gate allows; every limit is a number that a user can set in ``[safety]``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from math import isfinite
+
+from hardware_bridge.errors import BridgeError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fence:
+    """A polygon that cars must not leave, fixed to a static node."""
+
+    node: int
+    """Id of the static node that its corners are relative to."""
+    corners: tuple[tuple[float, float], ...]
+    """[m] World frame (x east, y magnetic north), in order, at least three."""
+
+    def __post_init__(self) -> None:
+        if len(self.corners) < 3:
+            raise BridgeError(f"corners: expected at least 3, got {len(self.corners)}")
+        if any(max(abs(x), abs(y)) > 1e4 for x, y in self.corners):
+            raise BridgeError("corners: expected metres within 10 km")
+        if abs(_area(self.corners)) < 0.1:
+            raise BridgeError("corners: expected a polygon with an area")
+
+
+def _area(corners: tuple[tuple[float, float], ...]) -> float:
+    turned = (*corners[1:], corners[0])
+    return 0.5 * sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(corners, turned, strict=True))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SafetyParams:
+    """Limits of the gate. A car that was stopped for good must be armed again."""
+
+    max_speed: float = 1.5
+    """[m/s] Of any car."""
+    max_steering: float = 0.42
+    """[rad]"""
+    max_accel: float = 3.0
+    """[m/s2] Commanded speed rises no faster; it may fall at once."""
+    max_steering_rate: float = 6.0
+    """[rad/s] Of the command; servos turn 3 to 6 rad/s."""
+    slow: float = 0.3
+    """[m/s] Where a rule says slow."""
+    silence: float = 0.06
+    """[s] Without a word from the process that decides; then cars are stopped for good. With a
+    tick and a write this leaves 20 ms of the 100 within which neutral is on the wire."""
+    stale_slow: float = 0.15
+    """[s] Since a car's node was last heard."""
+    stale_stop: float = 0.3
+    """[s] Likewise; stopped for good."""
+    sigma_slow: float = 0.5
+    """[m] Largest standard deviation of where another is."""
+    sigma_stop: float = 1.0
+    """[m] Likewise; stopped for good."""
+    hysteresis: float = 0.8
+    """[-] What went over a limit counts as below it again at this share of it."""
+    health: float = 0.5
+    """[s] Everything must have been well for so long before a car can be armed."""
+    braking: float = 2.0
+    """[m/s2] What cars surely brake with. 1:10 cars on a clean floor reach 2.5."""
+    reaction: float = 0.25
+    """[s] From what estimates tell to brakes that bite: horizon, tick, wire and motor."""
+    separation: float = 0.5
+    """[m] Between the middles of two cars, never less; a 1:10 car is 0.42 m long."""
+    confidence: float = 2.0
+    """[-] Standard deviations that distances are believed to be off."""
+    range_limit: float = 1.0
+    """[s] Where positions are not known, a range as old as this says nothing any more; stopped
+    for good."""
+    fence: Fence | None = None
+    """None where there is none."""
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            value = getattr(self, f.name)
+            if f.name == "fence":
+                continue
+            if not (isfinite(value) and value > 0.0):
+                raise BridgeError(f"{f.name}: expected more than 0, got {value!r}")
+        for low, high in (("stale_slow", "stale_stop"), ("sigma_slow", "sigma_stop")):
+            if getattr(self, low) >= getattr(self, high):
+                limit = getattr(self, high)
+                raise BridgeError(f"{low}: expected below {high} = {limit:g}")
+        if self.hysteresis > 1.0:
+            raise BridgeError(f"hysteresis: expected at most 1, got {self.hysteresis:g}")
+        if self.silence > 0.1:
+            raise BridgeError(f"silence: expected at most 0.1 s, got {self.silence:g}")
+        if self.slow > self.max_speed:
+            raise BridgeError(f"slow: expected at most max_speed = {self.max_speed:g}")

@@ -1,0 +1,147 @@
+"""The supervisor: the gate with its cars' drivers, pure; `process` gives it ports and a clock."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from hardware_bridge.drivers.base import CarDriver
+from hardware_bridge.safety.gate import Gate, GateOutput, reason_text
+from hardware_bridge.safety.messages import Decision, Message, Notice, Order, Report, Word
+from hardware_bridge.safety.params import SafetyParams
+from hardware_bridge.safety.picture import Picture, blank_picture
+from tracking.arrays import F64, Bool
+
+LATE = 0.02
+"""[s] A tick later than this is counted as missed."""
+
+
+class Supervisor:
+    """Holds the cars of one group to the rules, tick by tick."""
+
+    def __init__(self, params: SafetyParams, n_cars: int, drivers: Mapping[int, CarDriver]) -> None:
+        """Begin with nothing armed.
+
+        Args:
+            params: Limits.
+            n_cars: Slots.
+            drivers: Of the slots that have a car.
+        """
+        self._gate = Gate(params, 1, n_cars)
+        self._drivers = dict(drivers)
+        self._picture: Picture = blank_picture(1, n_cars)
+        self._word = np.full(1, -np.inf)
+        self._heard: F64 = np.full((1, n_cars), -np.inf)
+        self._linked: Bool = np.zeros((1, n_cars), dtype=bool)
+        self._now = np.full(1, -np.inf)
+        self._output: GateOutput | None = None
+        self._armed: Bool = np.zeros(n_cars, dtype=bool)
+        self._late, self._missed = 0.0, 0
+        self._lag, self._decided = 0.0, -np.inf
+        self.quit = False
+        """Asked to end."""
+
+    def take(self, message: Message) -> list[Notice]:
+        """A message from the deciding process; what of it the user should read."""
+        match message:
+            case Word(t, heard):
+                self._word[0], self._heard[0] = t, heard
+            case Decision(picture):
+                self._picture = picture
+                self._word[0] = max(float(picture.t[0]), self._word[0])
+            case Order("arm"):
+                return self._arm()
+            case Order("disarm"):
+                self._gate.disarm()
+            case Order("stop"):
+                self._gate.stop()
+                return [Notice("emergency stop")]
+            case Order("clear"):
+                self._gate.clear()
+            case Order("quit"):
+                self._gate.disarm()
+                self.quit = True
+        return []
+
+    def abandon(self) -> None:
+        """The deciding process is gone: nothing will move again."""
+        self._gate.stop()
+        self.quit = True
+
+    def tick(self, now: float, late: float, linked: Sequence[int]) -> dict[int, bytes]:
+        """What every car is sent now.
+
+        Args:
+            now: [s]
+            late: How late this tick is [s].
+            linked: Slots of the cars whose port is open.
+
+        Returns:
+            Bytes by slot, for those with a car, whether its port is open or not.
+        """
+        self._late, self._missed = max(late, self._late), self._missed + (late > LATE)
+        self._linked[:] = False
+        self._linked[0, list(linked)] = True
+        self._now[0] = now
+        out = self._gate.step(self._picture, self._now, self._word, self._heard, self._linked)
+        self._output = out
+        sent = {}
+        for slot, driver in self._drivers.items():
+            if out.moving[0, slot]:
+                sent[slot] = driver.drive(float(out.speed[0, slot]), float(out.steering[0, slot]))
+            else:
+                sent[slot] = driver.neutral()
+        return sent
+
+    def written(self, now: float) -> None:
+        """What the last tick asked for was handed to the ports at this time [s]."""
+        t = float(self._picture.t[0])
+        if t > self._decided:
+            self._decided, self._lag = t, now - t
+
+    def stopped(self) -> list[Notice]:
+        """Cars that were stopped for good since the last call, and why."""
+        assert self._output is not None
+        armed, reason = self._output.armed[0], self._output.reason[0]
+        lost = np.flatnonzero(self._armed & ~armed)
+        self._armed = armed.copy()
+        return [Notice(f"car {k} stopped: {reason_text(int(reason[k]))}") for k in lost.tolist()]
+
+    def report(self) -> Report:
+        """What the gate did at the last tick."""
+        assert self._output is not None
+        out = self._output
+        report = Report(
+            t=float(self._now[0]),
+            speed=out.speed[0],
+            steering=out.steering[0],
+            cap=out.cap[0],
+            armed=out.armed[0].astype(np.float64),
+            linked=self._linked[0].astype(np.float64),
+            reason=out.reason[0].astype(np.float64),
+            well_for=self._gate.well_for(self._now)[0],
+            emergency=bool(self._gate.emergency[0]),
+            late=self._late,
+            missed=self._missed,
+            lag=self._lag,
+        )
+        self._late = 0.0
+        return report
+
+    def _arm(self) -> list[Notice]:
+        cars = np.zeros_like(self._linked)
+        cars[0, list(self._drivers)] = True
+        armed = self._gate.arm(self._now, cars)
+        self._armed = armed[0].copy()
+        refused = np.flatnonzero(cars[0] & ~armed[0]).tolist()
+        if self._gate.emergency[0]:
+            return [Notice("not armed: emergency stop, clear it first")]
+        why = self._output.reason[0] if self._output is not None else np.full(len(armed[0]), -2)
+        return [
+            Notice(
+                f"car {k} not armed: {reason_text(int(why[k]))}; "
+                f"all must be well for {self._gate.params.health:g} s"
+            )
+            for k in refused
+        ]
