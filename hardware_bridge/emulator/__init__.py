@@ -1,0 +1,1 @@
+"""Nodes and cars that are not there, behind real serial devices."""

@@ -1,0 +1,165 @@
+"""An emulated node: what it measured becomes bytes of its formats, by its own clock.
+
+It knows nothing of the group but the ids of others, and nothing of the host.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hardware_bridge.decoders.base import Encoder
+from hardware_bridge.emulator.formats import WireFormat
+from hardware_bridge.emulator.measured import Measured
+from hardware_bridge.emulator.node_clock import NodeClock
+from hardware_bridge.readings import (
+    HeartbeatReading,
+    ImuReading,
+    RangeReading,
+    Reading,
+    Source,
+    StateReading,
+    StatusReading,
+)
+from tracking.measurements import Kind
+
+GRAVITY = 9.81
+"""[m/s2] Of a twin that lies on a table."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NodeParams:
+    """How the devices differ from perfect ones."""
+
+    drift_ppm: float = 20.0
+    """[ppm] Standard deviation of how much too fast a clock runs; crystals of such boards are
+    good for 10 to 40 ppm."""
+    most_offset: float = 600.0
+    """[s] Devices were switched on up to so long before the world began."""
+    voltage: float = 3.9
+    """[V] What they say of their batteries."""
+    status_every: float = 1.0
+    """[s] Between two reports of it."""
+
+
+class EmulatedNode:
+    """A node with one port or several, each with a format of its own.
+
+    Laws: the same rows, times and generator give the same bytes; a sample that is sent carries
+    the time at which it was measured, by the node's clock.
+    """
+
+    def __init__(
+        self,
+        node: int,
+        formats: Sequence[WireFormat],
+        ids: Sequence[int],
+        rng: np.random.Generator,
+        params: NodeParams,
+    ) -> None:
+        """Switch it on before the world begins.
+
+        Args:
+            node: Its id.
+            formats: Those of its ports; a reading goes out by the first that can say it.
+            ids: Ids of all nodes, by index.
+            rng: For its clock and its boot numbers.
+            params: Of all nodes.
+        """
+        self.node, self.formats, self.params = node, tuple(formats), params
+        self._ids = tuple(ids)
+        self._rng = rng
+        self.clock = NodeClock(
+            float(rng.uniform(0.0, params.most_offset)),
+            1e-6 * params.drift_ppm * float(rng.standard_normal()),
+        )
+        self._silent_until = self._stuck_until = self._next_status = -np.inf
+        self._start()
+
+    def say(self, rows: Sequence[Measured], t: float) -> list[list[bytes]]:
+        """What it sends, frames in order, by port.
+
+        Args:
+            rows: What it measured since the last call.
+            t: Now [s].
+        """
+        sent: list[list[bytes]] = [[] for _ in self.formats]
+        for row in rows:
+            reading = self._reading(row)
+            if reading is not None and row.t >= self._silent_until:
+                self._send(sent, reading, row.t)
+        if t >= max(self._silent_until, self._next_status):
+            self._next_status = t + self.params.status_every
+            self._send(sent, HeartbeatReading(Source()), t)
+            self._send(sent, StatusReading(Source(), self.params.voltage), t)
+        return sent
+
+    def reboot(self, t: float, seconds: float) -> None:
+        """Start anew: silent for so long, then with a new boot number and a clock from 0."""
+        self._silent_until = t + seconds
+        self.clock.restart(t + seconds)
+        self._start()
+
+    def be_silent(self, until: float) -> None:
+        """Measure on and say nothing."""
+        self._silent_until = max(self._silent_until, until)
+
+    def stick(self, until: float) -> None:
+        """Let the IMU repeat its last sample."""
+        self._stuck_until = until
+
+    def _start(self) -> None:
+        """What a boot begins with."""
+        self.boot = int(self._rng.integers(1, 1 << 32))
+        self.sequences = [0] * len(self.formats)
+        """Messages of this boot, by port."""
+        self._encoders: list[Encoder] = [f.build(self.node, self.boot) for f in self.formats]
+        self._next_status = -np.inf
+        self._mag: tuple[float, float, float] | None = None
+        self._sample: ImuReading | None = None
+
+    def _reading(self, row: Measured) -> Reading | None:
+        """What a row is in SI units; the magnetometer's goes with the next IMU sample."""
+        v, nobody = row.values, Source()
+        if row.kind is Kind.MAG:
+            self._mag = v[0], v[1], v[2]
+            return None
+        if row.kind is Kind.STATE:
+            return StateReading(nobody, (v[0], v[1], v[2], v[3]), (v[4], v[5], v[6]))
+        if row.kind is Kind.RANGE:
+            to = str(self._ids[row.other])
+            powers = (v[1], v[2]) if row.has_power else (None, None)
+            return RangeReading(nobody, to, v[0], *powers)
+        if self._sample is None or row.t >= self._stuck_until:
+            gyr, acc = (v[0], v[1], v[2]), (v[3], v[4], v[5])
+            self._sample = ImuReading(nobody, gyr, acc, self._mag)
+        self._mag = None
+        return self._sample
+
+    def _send(self, sent: list[list[bytes]], reading: Reading, t: float) -> None:
+        """Put a reading into the first format that can say it."""
+        for port, wire in enumerate(self.formats):
+            if type(reading) not in wire.says:
+                continue
+            ticks = None if wire.clock is None else self.clock.ticks(t, wire.clock)
+            sequence = self.sequences[port]
+            source = Source(wire.name_of(self.node), self.boot, sequence, ticks, wire.clock)
+            self.sequences[port] = (sequence + 1) % (1 << 32)
+            named = replace(reading, source=source)
+            if isinstance(named, RangeReading):
+                named = replace(named, to=wire.name_of(int(named.to)))
+            told: list[Reading] = [named]
+            if wire.always_voltage and not isinstance(named, StatusReading):
+                told.append(StatusReading(source, self.params.voltage))
+            frame = self._encoders[port].encode(told)
+            if frame:
+                sent[port].append(frame)
+            return
+
+
+def at_rest(rows: Sequence[Measured]) -> list[Measured]:
+    """What a twin says instead: the same, but its IMU lies on a table."""
+    still = (0.0, 0.0, 0.0, 0.0, 0.0, GRAVITY)
+    return [row._replace(values=still) if row.kind is Kind.IMU else row for row in rows]

@@ -1,0 +1,126 @@
+"""Everything of a live swarm opened in its order, and closed whatever happens."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from importlib.metadata import version
+from pathlib import Path
+from types import TracebackType
+
+from hardware_bridge.config.swarm import SwarmConfig
+from hardware_bridge.errors import BridgeError
+from hardware_bridge.links.links import Links
+from hardware_bridge.live.env import LiveFormationEnv
+from hardware_bridge.live.feed import LiveFeed
+from hardware_bridge.live.start import Start, StartParams
+from hardware_bridge.live.swarm import LiveSwarm, load_calibration
+from hardware_bridge.live.warm_up import warm_up
+from hardware_bridge.recording import Header, Recorder
+from hardware_bridge.safety.process import Charge, SupervisorProcess
+from tracking.calibration.file import calibration_toml
+
+
+class Bridge:
+    """Ports, trackers, a recording, and a supervisor where cars are driven."""
+
+    def __init__(
+        self,
+        config: SwarmConfig,
+        *,
+        drive: bool = False,
+        arm: bool = False,
+        wait: float = 60.0,
+        record: Path | str | None = None,
+        now_ns: Callable[[], int] = time.monotonic_ns,
+    ) -> None:
+        """Open everything.
+
+        Args:
+            config: Of the swarm.
+            drive: Whether a gate is there; without, nothing but listening.
+            arm: Whether the ports of the cars are opened, so that they can be armed. A drive
+                without is a dry run.
+            wait: So long is waited for all to be well before cars are armed [s].
+            record: File of the recording; must not be there yet.
+            now_ns: The host's monotonic clock [ns].
+
+        Raises:
+            BridgeError: A port, a calibration or the recording cannot be used, or cars are to
+                move and their ranges or sensors were never calibrated.
+        """
+        if arm and not config.cars:
+            raise BridgeError("cars: none in the configuration, nothing can be armed")
+        if arm and config.calibration is None:
+            raise BridgeError(
+                "calibration: missing; make one with `relpos calibrate`, or say "
+                "uncalibrated = true if measurements are good as they come"
+            )
+        calibration = load_calibration(config)
+        self.config = config
+        self._stack = ExitStack()
+        warm_up(config)
+        with ExitStack() as stack:
+            self.links = Links([link.port for link in config.links], now_ns)
+            stack.callback(self.links.close)
+            start_ns = now_ns()
+            self.swarm = LiveSwarm(config, start_ns, calibration)
+            self.recorder: Recorder | None = None
+            if record is not None:
+                header = Header(
+                    software=f"relpos-env {version('relpos-env')}",
+                    config=config.text,
+                    links=tuple(self.swarm.intake.streams),
+                    monotonic_ns=start_ns,
+                    wall_ns=time.time_ns(),
+                )
+                self.recorder = Recorder(record, header)
+                stack.callback(self.recorder.close)
+                if calibration is not None:
+                    text = calibration_toml(calibration)
+                    self.recorder.add_event(start_ns, "calibration", text=text)
+                self.recorder.add_event(start_ns, "start")
+            self.supervisor: SupervisorProcess | None = None
+            if drive:
+                cars = tuple((config.slot_of(car), car) for car in config.cars) if arm else ()
+                charge = Charge(config.safety, config.n_slots, cars)
+                self.supervisor = SupervisorProcess(charge)
+                stack.callback(self.supervisor.close)
+            self.feed = LiveFeed(
+                self.swarm,
+                self.links,
+                now_ns,
+                supervisor=self.supervisor,
+                recorder=self.recorder,
+            )
+            self.start = Start(self.feed, arm=arm, params=StartParams(wait=wait))
+            self._stack = stack.pop_all()
+
+    def env(
+        self, *, observation: str = "estimate", history: int = 1, max_cycles: int = 600
+    ) -> LiveFormationEnv:
+        """The environment on these cars; see `LiveFormationEnv`."""
+        return LiveFormationEnv(
+            self.swarm,
+            self.feed,
+            observation=observation,
+            history=history,
+            max_cycles=max_cycles,
+            prepare=self.start.run,
+        )
+
+    def close(self) -> None:
+        """Let the cars stand and close everything."""
+        self._stack.close()
+
+    def __enter__(self) -> Bridge:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()

@@ -1,0 +1,85 @@
+"""`formation_v0` on real cars: the same agents, spaces, observations and actions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from hardware_bridge.live.group import Feed, LiveGroup
+from hardware_bridge.live.swarm import LiveSwarm
+from relpos_env.interface.actions import action_mode
+from relpos_env.interface.cars_env import CarsEnv
+from relpos_env.interface.observations import observation_mode
+
+
+class LiveFormationEnv(CarsEnv):
+    """Cars that are moved by motors, in real time: a step takes a tenth of a second.
+
+    What the gate allows is what happens; `info` says what that was. Formation errors and rewards
+    are those that the cars believe in (``info["rewards_from"]`` is ``"estimates"``).
+    """
+
+    def __init__(
+        self,
+        swarm: LiveSwarm,
+        feed: Feed,
+        *,
+        observation: str = "estimate",
+        history: int = 1,
+        actions: str = "continuous",
+        max_cycles: int = 600,
+        prepare: Callable[[LiveGroup], None] | None = None,
+    ) -> None:
+        """Give a swarm the face of the environment.
+
+        Args:
+            swarm: Trackers of the cars.
+            feed: Ports and supervisor, or a recording.
+            observation: One of `relpos_env.interface.observations.OBSERVATIONS`.
+            history: So many observations in one, the newest first.
+            actions: One of `relpos_env.interface.actions.ACTIONS`.
+            max_cycles: Steps until truncation.
+            prepare: Called at every reset, before the episode: see `Start`.
+
+        Raises:
+            EnvError: No such mode.
+            BridgeError: A mode that needs the truth.
+        """
+        n = swarm.config.n_slots
+        mode = observation_mode(observation, n)
+        self.group = LiveGroup(swarm, feed, mode, history=history, max_cycles=max_cycles)
+        super().__init__(self.group, mode.fields, action_mode(actions), n_cars=n, history=history)
+        self.render_mode = None
+        self._prepare = prepare
+
+    def render(self) -> None:
+        """Nothing: `relpos live --view` shows the swarm."""
+
+    def close(self) -> None:
+        """Let the cars stand; the environment can be reset again."""
+        if self._begun:
+            self.group.let_stand()
+        self.agents = []
+        self._begun = False
+
+    def _begin(self) -> None:
+        self.group.begin()
+        if self._prepare is not None:
+            self._prepare(self.group)
+            self.group.begin()
+
+    def _infos(self, agents: list[str]) -> dict[str, Any]:
+        group = self.group
+        task, view = group.task, group.swarm.view
+        infos: dict[str, Any] = {}
+        for agent in agents:
+            k = self._numbers[agent]
+            infos[agent] = {
+                "formation_error": float(task.error[0, k]),
+                "tracked": int(view.ok[0, k].sum()),
+                "collisions": 0,
+                "present": bool(view.present[0, k]),
+                "rewards": dict(zip(task.terms, task.rewards[0, k].tolist(), strict=True)),
+                "rewards_from": "estimates",
+            }
+        return infos

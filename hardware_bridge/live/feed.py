@@ -1,0 +1,143 @@
+"""Time that passes: ports are read, trackers fed, the supervisor told that all is well.
+
+One thread does all of it, the one that decides, so that a sign of life is one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from hardware_bridge.links.links import Links
+from hardware_bridge.links.ports import Chunk
+from hardware_bridge.live.swarm import LiveSwarm
+from hardware_bridge.recording import Kind, Recorder
+from hardware_bridge.safety.messages import Decision, Notice, Order, Report, Telemetry, Word
+from hardware_bridge.safety.picture import Picture
+from hardware_bridge.safety.process import SupervisorProcess
+from relpos_env.timing import DECISION
+
+DECISION_NS = round(DECISION * 1e9)
+WORD_NS = 10_000_000
+"""[ns] From one sign of life to the next."""
+
+
+class LiveFeed:
+    """Ports and supervisor as a `hardware_bridge.live.group.Feed`."""
+
+    def __init__(
+        self,
+        swarm: LiveSwarm,
+        links: Links,
+        now_ns: Callable[[], int],
+        *,
+        supervisor: SupervisorProcess | None = None,
+        recorder: Recorder | None = None,
+    ) -> None:
+        """Put together what is open.
+
+        Args:
+            swarm: Is fed.
+            links: Ports that measure.
+            now_ns: The host's monotonic clock [ns].
+            supervisor: Has the cars; None where nothing is driven.
+            recorder: Keeps what comes.
+        """
+        self._swarm, self._links, self._now_ns = swarm, links, now_ns
+        self._supervisor, self._recorder = supervisor, recorder
+        self._index = {name: k for k, name in enumerate(swarm.intake.streams)}
+        if supervisor is not None:
+            links.watch(supervisor.fileno())
+        self._due = now_ns()
+        self._spoken = 0
+        self._told_of_disk = False
+        self.report: Report | None = None
+        """What the gate did, the latest."""
+        self.notices: list[tuple[int, str]] = []
+        """Time [ns] and what the user should read; whoever takes them clears the list."""
+        self.n_late = 0
+        """Decisions that were due while the one before was still made."""
+        self.attend: Callable[[], None] | None = None
+        """Called while waiting, every hundredth of a second or so: for keys and screens."""
+
+    def advance(self) -> int:
+        """Wait for the next decision; see `Feed`."""
+        self._due += DECISION_NS
+        now = self._now_ns()
+        if now > self._due:
+            self.n_late += 1
+            self._due = now
+        while (now := self._now_ns()) < self._due:
+            self._speak(now)
+            patience = min(self._due - now, WORD_NS)
+            for chunk in self._links.wait(patience * 1e-9):
+                self._take(chunk)
+            self._listen()
+            if self.attend is not None:
+                self.attend()
+        # What came while the last of it was handled still belongs to this decision.
+        for chunk in self._links.wait(0.0):
+            self._take(chunk)
+        self._note_links()
+        now = self._now_ns()
+        self._speak(now)
+        if self.report is not None:
+            self._swarm.apply(self.report.speed, self.report.steering)
+        if self._recorder is not None:
+            if self.report is not None:
+                speed, steering = self.report.speed.tolist(), self.report.steering.tolist()
+                self._recorder.add_event(now, "applied", speed=speed, steering=steering)
+            self._recorder.add(Kind.TICK, 0, now)
+        return now
+
+    def decide(self, picture: Picture) -> None:
+        """Let the gate have it; see `Feed`."""
+        if self._supervisor is not None:
+            self._supervisor.send(Decision(picture))
+            self._spoken = self._now_ns()
+
+    def order(self, what: str) -> None:
+        """Pass on what a person asks for; see `Order`."""
+        if self._supervisor is not None:
+            self._supervisor.send(Order(what))
+        self.note(self._now_ns(), what)
+
+    def note(self, t_ns: int, text: str) -> None:
+        """Let the user, and the recording, have a line."""
+        self.notices.append((t_ns, text))
+        if self._recorder is not None:
+            self._recorder.add_event(t_ns, "notice", text=text)
+
+    def _take(self, chunk: Chunk) -> None:
+        if self._recorder is not None:
+            self._recorder.add(Kind.BYTES_IN, self._index[chunk.link], chunk.t_ns, chunk.data)
+        self._swarm.take(chunk)
+
+    def _speak(self, now: int) -> None:
+        if self._supervisor is not None and now - self._spoken >= WORD_NS // 2:
+            self._supervisor.send(Word(now * 1e-9, self._swarm.heard()))
+            self._spoken = now
+
+    def _listen(self) -> None:
+        if self._supervisor is None:
+            return
+        for message in self._supervisor.receive():
+            match message:
+                case Telemetry(car, t_ns, data):
+                    name = f"cars.{self._swarm.group.ids[car]}"
+                    self._take(Chunk(name, t_ns, data))
+                case Report():
+                    self.report = message
+                case Notice(text):
+                    self.note(self._now_ns(), text)
+
+    def _note_links(self) -> None:
+        for notice in self._links.drain_notices():
+            state = "up" if notice.up else f"down: {notice.reason}"
+            self.note(notice.t_ns, f"{notice.link} {state}")
+        intake = self._swarm.intake
+        for t_ns, text in intake.notices:
+            self.note(t_ns, text)
+        intake.notices.clear()
+        if self._recorder is not None and self._recorder.failing and not self._told_of_disk:
+            self._told_of_disk = True
+            self.notices.append((self._now_ns(), f"recording fails: {self._recorder.lost}"))

@@ -1,0 +1,162 @@
+"""A group of real cars in arrays, as the simulation has one: observations, rewards, an end.
+
+Rewards and errors come from the estimates, since there is no truth; they say so in ``info``.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from hardware_bridge.errors import BridgeError
+from hardware_bridge.live.believed import Believed
+from hardware_bridge.live.picture import draw_picture
+from hardware_bridge.live.swarm import LiveSwarm
+from hardware_bridge.safety.picture import Picture
+from relpos_env.interface.observations import ObservationMode, total_size
+from relpos_env.interface.observations.base import F32
+from relpos_env.tasks import make_task, reward_weights
+from relpos_env.timing import DECISION
+from tracking.arrays import F64, Bool
+
+FASTEST_COMMAND = 2.0
+"""[m/s] Largest velocity asked of a car, as by the simulated operator."""
+
+
+class Feed(Protocol):
+    """Where chunks come from and pictures go to: ports and a supervisor, or a recording."""
+
+    def advance(self) -> int | None:
+        """Feed the swarm until the next decision is due.
+
+        Returns:
+            Its time by the host's clock [ns]; None if there is nothing more to come.
+        """
+
+    def decide(self, picture: Picture) -> None:
+        """Let the gate have what is wanted and known."""
+
+
+class LiveGroup:
+    """One environment of real cars; see `relpos_env.interface.cars_env.Group`."""
+
+    def __init__(
+        self,
+        swarm: LiveSwarm,
+        feed: Feed,
+        mode: ObservationMode,
+        *,
+        history: int = 1,
+        max_cycles: int = 600,
+    ) -> None:
+        """Make the arrays.
+
+        Args:
+            swarm: Trackers of the cars.
+            feed: What moves time on.
+            mode: What the cars observe.
+            history: So many observations in one, the newest first.
+            max_cycles: Decisions until truncation.
+
+        Raises:
+            BridgeError: The mode needs the truth.
+        """
+        if mode.needs_truth:
+            raise BridgeError("observation: real cars know no truth, choose another mode")
+        self.swarm, self._feed = swarm, feed
+        config = swarm.config
+        n = config.n_slots
+        self.task = make_task(config.task.name, n, 1, config.task.room, **config.task.options)
+        self._weights = reward_weights(config.task.name, self.task.terms, None)
+        self.believed = Believed(n)
+        self._command: F64 = np.zeros((1, n, 2))
+        swarm.share(self.task.target, self.task.has_target, self._command)
+        self._size, self._history, self._max_cycles = total_size(mode.fields), history, max_cycles
+        self.observations: F32 = np.zeros((1, n, history * self._size), np.float32)
+        self.rewards: F64 = np.zeros((1, n))
+        self.active: Bool = np.zeros((1, n), dtype=bool)
+        self.left: Bool = np.zeros((1, n), dtype=bool)
+        self.terminated: Bool = np.zeros(1, dtype=bool)
+        self.truncated: Bool = np.zeros(1, dtype=bool)
+        self.cycles = 0
+        self.asked: F64 = np.zeros((n, 2))
+        """Speed [m/s] and steering [rad] of the last actions, (slot, 2)."""
+        self.t_ns = 0
+        """Host time of the last decision [ns]."""
+        self._begun = 0
+        self.placed = False
+        """Whether places were given out knowing where all cars are."""
+        self._newest: F32 = np.zeros((1, n, self._size), np.float32)
+        self._mode = mode
+        self._nobody: F64 = np.zeros((1, n))
+
+    def seed(self, env: int, rng: np.random.Generator) -> None:
+        """Nothing here is drawn."""
+
+    def begin(self) -> None:
+        """Begin an episode from wherever the cars are."""
+        self.cycles = 0
+        self.placed = False
+        self.active[:] = True
+        self.terminated[:] = self.truncated[:] = False
+        self.observations[:] = 0.0
+        self._look(first=True)
+
+    def step(self, speed: F64, steering: F64) -> None:
+        """Ask the cars for speeds and steering angles and let a decision's time pass.
+
+        Args:
+            speed: (1, slot) [m/s]
+            steering: (1, slot) [rad]
+        """
+        fence = self.swarm.config.safety.fence
+        t = self.t_ns * 1e-9
+        self.asked[:, 0], self.asked[:, 1] = speed[0], steering[0]
+        self._feed.decide(draw_picture(self.swarm, t, speed[0], steering[0], fence))
+        self.cycles += 1
+        self._look(first=False)
+
+    def let_stand(self) -> None:
+        """Ask for no motion, without waiting."""
+        fence, n = self.swarm.config.safety.fence, self.swarm.config.n_slots
+        still = np.zeros(n)
+        self._feed.decide(draw_picture(self.swarm, self.t_ns * 1e-9, still, still, fence))
+
+    def _look(self, first: bool) -> None:
+        t_ns = self._feed.advance()
+        if t_ns is None:
+            self.truncated[:] = True
+            return
+        self.t_ns = t_ns
+        swarm, task, believed = self.swarm, self.task, self.believed
+        swarm.step(t_ns)
+        believed.update(swarm.view, DECISION)
+        here = slice(0, 1)
+        if first or (not self.placed and believed.complete):
+            # Until all are known, places are given by what is known; then once more.
+            self.placed = believed.complete
+            task.reset(believed, here)
+            self._begun = self.cycles
+        now = np.array([(self.cycles - self._begun) * DECISION])
+        task.update(believed, now, self._nobody, here)
+        self._ask()
+        self.rewards[0] = np.where(believed.present[0], task.rewards[0] @ self._weights, 0.0)
+        self.terminated[:] = task.done
+        self.truncated[:] = self.cycles >= self._max_cycles
+        self._observe()
+
+    def _ask(self) -> None:
+        """The velocity that cars are asked for: the plan, and an operator's trim."""
+        wanted = self.task.plan + self.swarm.trim
+        speed = np.hypot(wanted[..., 0], wanted[..., 1])[..., None]
+        limited = wanted * FASTEST_COMMAND / np.maximum(speed, FASTEST_COMMAND)
+        self._command[:] = np.where(self.swarm.view.present[..., None], limited, 0.0)
+
+    def _observe(self) -> None:
+        self._mode.bind(self.swarm.view, self._newest)()
+        observations, size = self.observations, self._size
+        if self._history > 1:
+            observations[..., size:] = observations[..., :-size].copy()
+        observations[..., :size] = self._newest
+        observations[~self.swarm.view.present] = 0.0

@@ -1,0 +1,244 @@
+"""From bytes to measurements: decode, find out who speaks and when, refuse what cannot be.
+
+    Chunk -> Decoder -> Identities -> StreamTime -> Plausibility -> Events
+
+Pure: the same chunks with the same times give the same measurements.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hardware_bridge.clocks import DeviceTime, HostTime, StreamTime
+from hardware_bridge.config.swarm import CarConfig, LinkConfig, SwarmConfig
+from hardware_bridge.decoders import make_decoder
+from hardware_bridge.decoders.base import Decoder
+from hardware_bridge.drivers import make_driver
+from hardware_bridge.identity import Identities, Verdict
+from hardware_bridge.links.ports import Chunk
+from hardware_bridge.live.events import Events
+from hardware_bridge.plausibility import Plausibility
+from hardware_bridge.readings import (
+    NOBODY,
+    ImuReading,
+    MotionReading,
+    OperatorReading,
+    RangeReading,
+    Reading,
+    Source,
+    StateReading,
+    StatusReading,
+)
+from tracking.constellation import Constellation
+from tracking.errors import ConfigError
+from tracking.measurements import Kind
+
+NS = 1e-9
+MOST_STRANGERS = 32
+"""Devices that are not in the configuration are told of so many times."""
+
+
+@dataclass(slots=True)
+class Stream:
+    """What is known of one port."""
+
+    name: str
+    decoder: Decoder
+    node: int | None
+    """Id of who speaks, where the format does not say."""
+    ids: dict[str, int]
+    identities: Identities
+    times: dict[int, StreamTime] = field(default_factory=dict)
+    """By node index."""
+    source: Source | None = None
+    """Of the last reading: those of one message share it, and are taken or refused together."""
+    verdict: Verdict = Verdict.UNNUMBERED
+    t_ns: int = 0
+
+
+class Intake:
+    """The streams of a swarm."""
+
+    def __init__(self, config: SwarmConfig, start_ns: int) -> None:
+        """Begin with nothing heard.
+
+        Args:
+            config: Links and cars.
+            start_ns: Host time that is 0 s of the measurements [ns].
+
+        Raises:
+            BridgeError: A format or driver that does not fit its options.
+        """
+        self.group = config.constellation
+        self.start_ns = start_ns
+        self.events = Events()
+        self.plausibility = Plausibility()
+        self.heard_ns: dict[int, int] = {}
+        """Host time at which each node was last heard, by index."""
+        self.motion: dict[int, MotionReading] = {}
+        """What each car last said of its motion, by index."""
+        self.trim: dict[int, tuple[int, tuple[float, float]]] = {}
+        """What an operator last asked of each car, with its host time [ns], by index."""
+        self.voltage: dict[int, float] = {}
+        """Of each node, by index [V]."""
+        self.refused: Counter[str] = Counter()
+        """Readings that were not used, by reason."""
+        self.notices: list[tuple[int, str]] = []
+        """Time [ns] and what the user should read; whoever takes them clears the list."""
+        self._strangers: set[tuple[str, str]] = set()
+        open_ids, keyed_ids = Identities(), Identities(authenticated=True)
+        self._identities = (open_ids, keyed_ids)
+        self.streams = {
+            link.port.name: self._stream(link, keyed_ids if link.key else open_ids)
+            for link in config.links
+        }
+        for car in config.cars:
+            self.streams[car.port.name] = self._telemetry(car)
+        self.antennas = [_only_antenna(self.group, node) for node in self.group.ids]
+
+    def take(self, chunk: Chunk) -> None:
+        """Take bytes as they came."""
+        stream = self.streams[chunk.link]
+        for reading in stream.decoder.feed(chunk.data):
+            self._take(stream, reading, chunk.t_ns)
+        for identities in self._identities:
+            if identities.notices:
+                self.notices += identities.notices
+                identities.notices.clear()
+
+    def release(self, node: int, t_ns: int) -> None:
+        """Believe a node again that was quarantined; by its id."""
+        for identities in self._identities:
+            identities.release(node, t_ns)
+
+    def seconds(self, t_ns: int) -> float:
+        """Host time as that of measurements [s]."""
+        return (t_ns - self.start_ns) * NS
+
+    def _stream(self, link: LinkConfig, identities: Identities) -> Stream:
+        decoder = make_decoder(link.format, link.key)
+        return Stream(link.port.name, decoder, link.node, dict(link.ids), identities)
+
+    def _telemetry(self, car: CarConfig) -> Stream:
+        driver = make_driver(car.driver, car.node, car.options, car.key, 0, lambda: 0)
+        # The car's controller numbers its own messages: it is another device than its node.
+        return Stream(car.port.name, driver.telemetry, car.node, {}, Identities(bool(car.key)))
+
+    def _take(self, stream: Stream, reading: Reading, arrival_ns: int) -> None:
+        source = reading.source
+        if isinstance(reading, OperatorReading):
+            self._take_trim(stream, reading, arrival_ns)
+            return
+        node = self._node(stream, source.device, arrival_ns)
+        if node is None:
+            return
+        if source is not stream.source or source is NOBODY:
+            self._judge(stream, source, node, arrival_ns)
+        if not stream.verdict.accepted:
+            return
+        t_ns = stream.t_ns
+        if self._use(stream, reading, node, t_ns, arrival_ns) and stream.name.startswith("links."):
+            self.heard_ns[node] = arrival_ns
+
+    def _judge(self, stream: Stream, source: Source, node: int, arrival_ns: int) -> None:
+        """Find out whether a message is to be believed, and when it was measured."""
+        verdict = stream.identities.check(stream.name, source, arrival_ns, self.group.ids[node])
+        stream.source, stream.verdict = source, verdict
+        if not verdict.accepted:
+            self.refused[verdict.value] += 1
+            return
+        clock = self._clock(stream, node, source)
+        if verdict is Verdict.REBOOT:
+            clock.restart()
+        stream.t_ns = clock.map(source.ticks, arrival_ns)
+
+    def _use(self, stream: Stream, reading: Reading, node: int, t_ns: int, arrival_ns: int) -> bool:
+        """Turn a reading into what the tracker takes; whether it was believed."""
+        t = self.seconds(t_ns)
+        match reading:
+            case ImuReading(gyr=gyr, acc=acc, mag=mag):
+                if not self.plausibility.allows_imu(reading):
+                    return False
+                if mag is not None:
+                    self.events.add(t, Kind.MAG, node, mag)
+                self.events.add(t, Kind.IMU, node, (*gyr, *acc))
+            case StateReading(q_wb=q, accel_w=accel):
+                if not self.plausibility.allows_state(reading):
+                    return False
+                self.events.add(t, Kind.STATE, node, (*q, *accel, 0.0))
+            case RangeReading():
+                return self._use_range(stream, reading, node, t_ns, arrival_ns)
+            case MotionReading():
+                self.motion[node] = reading
+            case StatusReading(voltage=voltage) if voltage is not None:
+                self.voltage[node] = voltage
+        return True
+
+    def _use_range(
+        self, stream: Stream, reading: RangeReading, node: int, t_ns: int, arrival_ns: int
+    ) -> bool:
+        near = node
+        if reading.nearer is not None:
+            end = self._node(stream, reading.nearer, arrival_ns)
+            if end is None:
+                return False
+            near = end
+        far = self._node(stream, reading.to, arrival_ns, named=True)
+        if far is None or far == near:
+            return False
+        if not self.plausibility.allows_range(near, far, reading.distance, t_ns):
+            return False
+        antennas = self.antennas[near], self.antennas[far]
+        powers = reading.rx_power, reading.fp_power
+        values = (reading.distance,)
+        if powers[0] is not None and powers[1] is not None:
+            values = (reading.distance, powers[0], powers[1])  # type: ignore[assignment]
+        self.events.add_range(self.seconds(t_ns), (near, far), antennas, values)
+        if stream.name.startswith("links."):
+            self.heard_ns[near] = self.heard_ns[far] = arrival_ns  # it answered
+        return True
+
+    def _take_trim(self, stream: Stream, reading: OperatorReading, arrival_ns: int) -> None:
+        node = self._node(stream, reading.to, arrival_ns, named=True)
+        x, y = reading.velocity
+        if node is not None and np.isfinite(x) and np.isfinite(y):
+            self.trim[node] = arrival_ns, (x, y)
+
+    def _node(
+        self, stream: Stream, device: str | None, t_ns: int, *, named: bool = False
+    ) -> int | None:
+        """Index of the node that a device is; None for strangers, who are told of once."""
+        if device is None:
+            node = stream.node
+        elif device in stream.ids:
+            node = stream.ids[device]
+        elif not named and not stream.ids and stream.node is not None:
+            node = stream.node
+        else:
+            node = int(device) if device.isascii() and device.isdigit() else None
+        index = None if node is None else self.group.index_of.get(node)
+        if index is None:
+            self.refused["stranger"] += 1
+            who = (stream.name, device or "?")
+            if who not in self._strangers and len(self._strangers) < MOST_STRANGERS:
+                self._strangers.add(who)
+                text = f"{stream.name}: device {who[1]} is no node of the configuration"
+                self.notices.append((t_ns, f"{text}; name it in its ids"))
+        return index
+
+    def _clock(self, stream: Stream, node: int, source: Source) -> StreamTime:
+        if node not in stream.times:
+            has_time = source.ticks is not None and source.clock is not None
+            stream.times[node] = DeviceTime(source.clock) if has_time else HostTime()  # type: ignore
+        return stream.times[node]
+
+
+def _only_antenna(group: Constellation, node: int) -> int:
+    """Index of the antenna that a node's ranges are between; the first of several."""
+    try:
+        return group.antenna_index(node, None)
+    except ConfigError:
+        return next(k for k, antenna in enumerate(group.all_antennas) if antenna.node == node)

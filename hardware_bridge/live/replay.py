@@ -1,0 +1,89 @@
+"""A recording in place of ports: the same chunks and decisions, so the same estimates."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from hardware_bridge.config import SwarmConfig, parse_config
+from hardware_bridge.errors import BridgeError
+from hardware_bridge.links.ports import Chunk
+from hardware_bridge.live.swarm import LiveSwarm
+from hardware_bridge.recording import Kind, Recording, read_recording
+from hardware_bridge.safety.picture import Picture
+from tracking.calibration.calibration import Calibration
+from tracking.calibration.file import parse_calibration
+
+
+class ReplayFeed:
+    """A recording as a `hardware_bridge.live.group.Feed`."""
+
+    def __init__(self, recording: Recording, pace: Callable[[int], None] | None = None) -> None:
+        """Open a recording.
+
+        Args:
+            recording: As `read_recording` gives it.
+            pace: Called with the time of every decision [ns]; it may wait. None is as fast as
+                possible.
+
+        Raises:
+            BridgeError: Its configuration makes no sense here.
+        """
+        self.recording, self._pace = recording, pace
+        file = recording.path.name
+        self.config: SwarmConfig = parse_config(
+            recording.header.config, file=file, beside=Path(), with_files=False
+        )
+        self.swarm = LiveSwarm(self.config, recording.header.monotonic_ns, _calibration(recording))
+        for name in self.swarm.intake.streams:
+            if name not in recording.header.links:
+                raise BridgeError(f"{file}: has no stream {name} of its own configuration")
+        self._records = iter(recording)
+        self.notices: list[tuple[int, str]] = []
+        """What the user was told then; time [ns] and text."""
+
+    def advance(self) -> int | None:
+        """Go on to the next decision; see `Feed`."""
+        names = self.recording.header.links
+        for record in self._records:
+            if record.kind == Kind.BYTES_IN:
+                self.swarm.take(Chunk(names[record.link], record.t_ns, record.payload))
+            elif record.kind == Kind.EVENT:
+                event = record.event()
+                if event.get("event") == "applied":
+                    self.swarm.apply(np.array(event["speed"]), np.array(event["steering"]))
+                elif event.get("event") == "notice":
+                    self.notices.append((record.t_ns, str(event.get("text", ""))))
+            elif record.kind == Kind.TICK:
+                self.swarm.intake.notices.clear()
+                if self._pace is not None:
+                    self._pace(record.t_ns)
+                return record.t_ns
+        return None
+
+    def decide(self, picture: Picture) -> None:
+        """Nothing moves in a recording."""
+
+
+def open_replay(path: Path | str, pace: Callable[[int], None] | None = None) -> ReplayFeed:
+    """A recording from its file.
+
+    Raises:
+        BridgeError: It is none, or its configuration makes no sense here.
+    """
+    return ReplayFeed(read_recording(path), pace)
+
+
+def _calibration(recording: Recording) -> Calibration | None:
+    """The calibration that the recording was made with, which is in it."""
+    for record in recording:
+        if record.kind != Kind.EVENT:
+            continue
+        event = record.event()
+        if event.get("event") == "calibration":
+            return parse_calibration(str(event["text"]), recording.path.name)
+        if event.get("event") == "start":
+            return None
+    return None

@@ -1,0 +1,130 @@
+"""How a drive begins: all is well, the cars are armed, and they find out where the others are.
+
+While they stand, ranges leave open how the group is turned or mirrored. So at first every car
+wriggles within a hand's breadth or two of its place, each in its own rhythm, until the trackers
+are sure; only then is it asked for anything.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from hardware_bridge.errors import BridgeError
+from hardware_bridge.live.feed import LiveFeed
+from hardware_bridge.live.group import LiveGroup
+from hardware_bridge.safety.gate import reason_text
+from relpos_env.timing import DECISION
+from tracking.arrays import F64
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StartParams:
+    """Of a start."""
+
+    wait: float = 60.0
+    """[s] For all to be well; cars that cannot be armed for so long end it."""
+    find: float = 30.0
+    """[s] For cars to find each other; then the drive begins as it is."""
+    sure: float = 1.0
+    """[s] All places must have been known for so long."""
+    speed: float = 0.3
+    """[m/s] Of the wriggling."""
+    steering: float = 0.4
+    """[rad] Likewise."""
+    period: float = 1.6
+    """[s] Forwards and back of the first car; the others take longer by fifths."""
+
+
+class Start:
+    """Arms the cars and lets them find each other."""
+
+    def __init__(self, feed: LiveFeed, *, arm: bool, params: StartParams | None = None) -> None:
+        """Prepare for a start.
+
+        Args:
+            feed: Of ports and supervisor.
+            arm: Whether cars may move; otherwise nothing is done and nothing waited for.
+            params: How long, and how they wriggle.
+        """
+        self._feed, self._arm = feed, arm
+        self._params = params or StartParams()
+        self.attend: Callable[[], bool] | None = None
+        """Called after every decision; True ends it all with KeyboardInterrupt."""
+
+    def run(self, group: LiveGroup) -> None:
+        """Do what is to be done before a drive.
+
+        Args:
+            group: Of the cars, begun.
+
+        Raises:
+            BridgeError: The cars could not be armed.
+        """
+        if not self._arm:
+            return
+        self._get_armed(group)
+        self._find(group)
+
+    def _get_armed(self, group: LiveGroup) -> None:
+        """Let the cars stand and listen until all is well, and arm them."""
+        config, feed = group.swarm.config, self._feed
+        slots = [config.slot_of(car) for car in config.cars]
+        still = np.zeros((1, config.n_slots))
+        for _ in range(round(self._params.wait / DECISION)):
+            self._step(group, still, still)
+            report = feed.report
+            if report is None:
+                continue
+            if report.armed[slots].all():
+                return
+            if (report.well_for[slots] > config.safety.health).all() and not report.emergency:
+                feed.order("arm")
+        if feed.report is None:
+            raise BridgeError("supervisor: no word from it")
+        slot = next(k for k in slots if not feed.report.armed[k])
+        silent = not np.isfinite(group.swarm.heard()[slot])
+        why = "was not heard" if silent else reason_text(int(feed.report.reason[slot]))
+        raise BridgeError(
+            f"cars.{group.swarm.group.ids[slot]}: not well within {self._params.wait:g} s: {why}; "
+            "see `relpos doctor`"
+        )
+
+    def _find(self, group: LiveGroup) -> None:
+        """Let the cars wriggle until all know where the others are."""
+        p, n = self._params, group.swarm.config.n_slots
+        known = 0.0
+        for k in range(round(p.find / DECISION)):
+            known = known + DECISION if group.believed.complete else 0.0
+            if known >= p.sure:
+                break
+            self._step(group, *wriggle(p, n, k * DECISION))
+        still = np.zeros((1, n))
+        for _ in range(round(0.5 / DECISION)):
+            self._step(group, still, still)
+
+    def _step(self, group: LiveGroup, speed: F64, steering: F64) -> None:
+        group.step(speed, steering)
+        if self.attend is not None and self.attend():
+            raise KeyboardInterrupt
+
+
+def wriggle(p: StartParams, n_cars: int, t: float) -> tuple[F64, F64]:
+    """Speeds and steering angles that keep cars near their places.
+
+    Args:
+        p: How they wriggle.
+        n_cars: How many.
+        t: Since it began [s].
+
+    Returns:
+        Speed [m/s] and steering [rad], each (1, car).
+    """
+    k = np.arange(n_cars)
+    phase = 2.0 * np.pi * t / (p.period * (1.0 + 0.2 * k)) + 2.1 * k
+    speed = p.speed * np.where(np.sin(phase) >= 0.0, 1.0, -1.0)
+    # The wheels stay turned to one side for a while, so that it comes round as well.
+    steering = p.steering * np.where(np.sin(0.4 * phase + k) >= 0.0, 1.0, -1.0)
+    return speed[None], steering[None]

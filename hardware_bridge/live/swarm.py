@@ -1,0 +1,173 @@
+"""A swarm as its trackers see it, from chunks of bytes and times of decisions alone.
+
+Pure: what a live drive saw is what its recording gives, to the last bit.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hardware_bridge.config.swarm import SwarmConfig
+from hardware_bridge.errors import BridgeError
+from hardware_bridge.links.ports import Chunk
+from hardware_bridge.live.intake import Intake
+from relpos_env.interface.perception import Perception
+from relpos_env.interface.views import View
+from tracking.arrays import F64, Bool
+from tracking.calibration.calibration import Calibration, merge
+from tracking.calibration.file import read_calibration
+from tracking.estimate import TeamEstimate
+from tracking.horizon import HorizonParams
+from tracking.measurements import Kind, MeasurementBlock
+from tracking.tracker import TrackerParams
+
+GONE = 5.0
+"""[s] A node that was not heard for so long has left, until it is heard again."""
+OPERATOR_SILENT = 0.5
+"""[s] What an operator asked for so long ago is not asked any more."""
+ROOM = 1024
+"""[-] Measurements that there is room for at first."""
+
+
+class LiveSwarm:
+    """Intake and trackers of one swarm."""
+
+    def __init__(
+        self, config: SwarmConfig, start_ns: int, calibration: Calibration | None = None
+    ) -> None:
+        """Begin with nothing heard.
+
+        Args:
+            config: Who is in it, and where bytes come from.
+            start_ns: Host time that is 0 s of the estimates [ns].
+            calibration: Of the sensors; None takes them as they come.
+        """
+        self.config, self.group = config, config.constellation
+        self.intake = Intake(config, start_ns)
+        self._calibration = calibration
+        self._block = MeasurementBlock.empty(1, ROOM)
+        self._powered: Bool = np.zeros((1, config.n_slots), dtype=bool)
+        self._room = ROOM
+        self._here: set[int] = set()
+        self._applied: tuple[F64, F64] = (np.zeros(config.n_slots), np.zeros(config.n_slots))
+        params = TrackerParams(horizon=HorizonParams(delay=config.tracker.delay))
+        self._perception = Perception(
+            self.group,
+            params,
+            self._block,
+            self._powered,
+            filter=config.tracker.filter,
+            room=self._room,
+        )
+        self.trim: F64 = np.zeros((1, config.n_slots, 2))
+        """Velocity that an operator asks for on top of the plan, (1, slot, 2) [m/s]."""
+
+    @property
+    def view(self) -> View:
+        """What every car sees now; of one environment."""
+        return self._perception.view
+
+    @property
+    def estimate(self) -> TeamEstimate:
+        """The tracker's last estimate, as old as the horizon, overwritten by the next."""
+        return self._perception.estimate
+
+    @property
+    def n_late(self) -> int:
+        """Measurements that came later than the horizon waits."""
+        return int(self._perception.horizon.n_late[0])
+
+    def share(self, target: F64, wanted: Bool, command: F64) -> None:
+        """Let the view have what the task wants; see `Perception.share`."""
+        self._perception.share(target, wanted, command)
+
+    def take(self, chunk: Chunk) -> None:
+        """Take bytes as they came."""
+        self.intake.take(chunk)
+
+    def apply(self, speed: F64, steering: F64) -> None:
+        """Note what the gate let the cars do, for cars that do not tell themselves.
+
+        Args:
+            speed: (slot) [m/s]
+            steering: (slot) [rad]
+        """
+        self._applied = speed.copy(), steering.copy()
+
+    def step(self, t_ns: int) -> None:
+        """Let the trackers catch up with what arrived, and see.
+
+        Args:
+            t_ns: Now, by the host's clock [ns]; not before the last step or chunk.
+        """
+        now = self.intake.seconds(t_ns)
+        self._let_go(t_ns, now)
+        events = self.intake.events
+        self._make_room(len(events))
+        events.move_into(self._block)
+        if self._calibration is not None:
+            corrected = self._calibration.apply(self._block, self.group)
+            self._block.values[:] = corrected.values
+        self._note_cars(t_ns)
+        self.view.now[0] = now
+        self._perception.step()
+
+    def heard(self, never: float = -np.inf) -> F64:
+        """When each car's node was last heard, by the host's clock, (slot) [s]."""
+        heard_ns = self.intake.heard_ns
+        return np.array([heard_ns[k] * 1e-9 if k in heard_ns else never for k in self._slots])
+
+    @property
+    def _slots(self) -> range:
+        return range(self.config.n_slots)
+
+    def _let_go(self, t_ns: int, now: float) -> None:
+        """Nodes that have fallen silent leave; they are back when they are heard."""
+        recent = {k for k, t in self.intake.heard_ns.items() if (t_ns - t) * 1e-9 <= GONE}
+        for node in self._here - recent:
+            self.intake.events.add(now, Kind.LEAVE, node, ())
+        self._here = recent
+
+    def _make_room(self, n: int) -> None:
+        """Grow, after a pause in which much has piled up."""
+        waiting = int(self._perception.horizon.state.n_waiting[0])
+        if n + waiting <= self._room:
+            return
+        while self._room < n + waiting:
+            self._room *= 2
+        self._block = MeasurementBlock.empty(1, self._room)
+        self._perception.make_room(self._room)
+        self._perception.rebind(self._block, self._powered)
+
+    def _note_cars(self, t_ns: int) -> None:
+        """What the cars are known to do, and what is asked of them."""
+        view, intake = self.view, self.intake
+        for k in self._slots:
+            here = k in self._here
+            self._powered[0, k] = view.present[0, k] = here
+            speed, steering = self._applied[0][k], self._applied[1][k]
+            said = intake.motion.get(k)
+            if said is not None:
+                speed = said.speed
+                steering = steering if said.steering is None else said.steering
+            view.speed[0, k], view.steering[0, k] = speed, steering
+            asked = intake.trim.get(k)
+            fresh = asked is not None and (t_ns - asked[0]) * 1e-9 <= OPERATOR_SILENT
+            self.trim[0, k] = asked[1] if fresh and asked is not None else 0.0
+
+
+def load_calibration(config: SwarmConfig) -> Calibration | None:
+    """What is known of the sensors' errors; None where they are taken as they come.
+
+    Raises:
+        BridgeError: A file is wrong, or ranges are calibrated and a node's antenna is not.
+    """
+    if not config.calibration:
+        return None
+    calibration = merge(read_calibration(path) for path in config.calibration)
+    if calibration.ranges is not None:
+        missing = set(config.constellation.ids) - set(calibration.ranges.offset)
+        if missing:
+            names = ", ".join(map(str, sorted(missing)))
+            raise BridgeError(f"calibration: no range offset of node {names}; calibrate it too")
+    return calibration

@@ -1,0 +1,71 @@
+"""A drive that nobody sees, before the real one: what is loaded when first used is loaded then.
+
+Compiled code comes from the disk when it is first called, which takes longer than a car may be
+left without a decision.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hardware_bridge.config.swarm import SwarmConfig
+from hardware_bridge.live.group import LiveGroup
+from hardware_bridge.live.swarm import LiveSwarm
+from hardware_bridge.safety.picture import Picture
+from relpos_env.interface.observations import observation_mode
+from relpos_env.timing import DECISION
+from tracking.geometry import GRAVITY
+from tracking.measurements import Kind
+
+SECONDS = 3.0
+"""[s] Of it, long enough that estimates begin."""
+RATE = 50
+"""[1/s] Of samples and of ranges."""
+
+
+class _Pretend:
+    """Nodes that go round on circles of their own."""
+
+    def __init__(self, swarm: LiveSwarm) -> None:
+        self._swarm, self._k = swarm, 0
+
+    def advance(self) -> int:
+        """A decision's worth of samples and ranges."""
+        for _ in range(round(DECISION * RATE)):
+            self._k += 1
+            self._sample(self._k / RATE)
+        return round(self._k / RATE * 1e9)
+
+    def decide(self, picture: Picture) -> None:
+        """Nothing moves."""
+
+    def _sample(self, t: float) -> None:
+        swarm = self._swarm
+        events, group, antenna = swarm.intake.events, swarm.group, swarm.intake.antennas
+        pos = [np.array([3.0 * k + math.sin(t + k), math.cos(t * (1 + 0.1 * k)), 0.0])
+               for k in range(group.n_nodes)]  # fmt: skip
+        for k in range(swarm.config.n_slots):
+            swarm.intake.heard_ns[k] = round(t * 1e9)
+            events.add(t, Kind.MAG, k, (20.0, 0.0, -40.0))
+            events.add(t, Kind.IMU, k, (0.0, 0.0, 0.1, 0.3 * math.sin(t), 0.0, GRAVITY))
+        for i, j in group.pairs.tolist():
+            distance = float(np.linalg.norm(pos[j] - pos[i]))
+            events.add_range(t, (i, j), (antenna[i], antenna[j]), (distance, -80.0, -82.0))
+
+
+def warm_up(config: SwarmConfig, observation: str = "estimate") -> None:
+    """Run everything once that a drive needs, on a swarm of its own.
+
+    Args:
+        config: Of the swarm.
+        observation: What its cars will see.
+    """
+    swarm = LiveSwarm(config, 0)
+    mode = observation_mode(observation, config.n_slots)
+    group = LiveGroup(swarm, _Pretend(swarm), mode)
+    group.begin()
+    still = np.zeros((1, config.n_slots))
+    for _ in range(round(SECONDS / DECISION)):
+        group.step(still, still)
