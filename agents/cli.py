@@ -10,12 +10,15 @@ from agents.commands.bench import bench
 from agents.commands.calibrate import calibrate
 from agents.commands.compare import compare
 from agents.commands.demo import demo
+from agents.commands.doctor import doctor
+from agents.commands.emulate import emulate
 from agents.commands.evaluate import evaluate
 from agents.commands.export import export
 from agents.commands.policy import policy
 from agents.commands.protocol import protocol
 from agents.commands.rllib import rllib
 from agents.commands.simulate import simulate
+from agents.commands.sniff import sniff
 from agents.commands.track import track
 from agents.commands.train import train
 from agents.errors import UsageError
@@ -32,6 +35,7 @@ for command in (
     calibrate,
     simulate,
     demo,
+    emulate,
     evaluate,
     compare,
     train,
@@ -39,6 +43,8 @@ for command in (
     policy,
     rllib,
     protocol,
+    doctor,
+    sniff,
     bench,
 ):
     cli.add_command(command)
@@ -46,6 +52,7 @@ for command in (
 
 def main() -> None:
     """Run the command line; what a user can mend ends in one line and status 2."""
+    from hardware_bridge.errors import BridgeError
     from relpos_env.errors import EnvError
     from tracking.errors import TrackingError
 
@@ -58,6 +65,6 @@ def main() -> None:
         sys.exit(2)
     except BrokenPipeError:
         sys.exit(1)
-    except (TrackingError, EnvError, UsageError, OSError) as error:
+    except (TrackingError, EnvError, BridgeError, UsageError, OSError) as error:
         click.echo(f"Error: {error}", err=True)
         sys.exit(2)

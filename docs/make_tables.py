@@ -20,6 +20,9 @@ from typing import Any
 
 from agents.settings import leaves
 from agents.train.config import TrainConfig
+from hardware_bridge.decoders import DECODERS
+from hardware_bridge.drivers import DRIVERS
+from hardware_bridge.wire.tables import header_table, message_table
 from relpos_env import config
 from relpos_env.interface.actions import ACTIONS, MAX_SPEED, MAX_STEERING, DiscreteActions
 from relpos_env.interface.observations import (
@@ -199,6 +202,27 @@ def training() -> str:
     return markdown(("option", "default", "meaning"), rows)
 
 
+def driver(name: str) -> str:
+    """The options of a car driver."""
+    options = DRIVERS[name].options
+    told = docstrings(options)
+    rows = [[f"`{f.name}`", f"`{default_of(f)}`", told[f.name]] for f in fields(options)]
+    return markdown(("option", "default", "meaning"), rows)
+
+
+def decoders() -> str:
+    """The formats of devices that can be read."""
+    rows = []
+    for name, entry in DECODERS.items():
+        tells = ", ".join(kind.__name__.removesuffix("Reading").lower() for kind in entry.tells)
+        who = "itself" if entry.names_itself else "`node` of the link"
+        when = "its clock" if entry.has_time else "on arrival"
+        check = "with a key" if entry.keyed else "yes" if entry.checked else "no"
+        rows.append([f"`{name}`", entry.device, tells, who, when, str(entry.baud), check])
+    head = ("format", "device", "tells", "who speaks", "time", "baud", "check sum")
+    return markdown(head, rows, right="baud")
+
+
 TABLES: dict[str, Callable[[], str]] = {
     "sizes": sizes,
     **{f"observation-{mode}": partial(observations, mode) for mode in OBSERVATIONS},
@@ -208,6 +232,10 @@ TABLES: dict[str, Callable[[], str]] = {
     "arguments": arguments,
     "scenarios": scenarios,
     "training": training,
+    **{f"driver-{name}": partial(driver, name) for name in DRIVERS},
+    "wire-header": lambda: markdown(*header_table(), right="offset"),
+    "wire-messages": lambda: markdown(*message_table()),
+    "decoders": decoders,
 }
 """Name to what makes it."""
 

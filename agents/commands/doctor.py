@@ -1,0 +1,89 @@
+"""`relpos doctor`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from agents.console import emit_json
+
+if TYPE_CHECKING:
+    from agents.diagnosis import LinkReport
+    from agents.doctor import Diagnosis, PortReport
+
+
+@click.command()
+@click.option("--config", type=Path, help="swarm.toml: listen to its links and cars too.")
+@click.option("--seconds", default=3.0, show_default=True, help="How long to listen, 0.1 to 3600.")
+@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+def doctor(config: Path | None, seconds: float, as_json: bool) -> None:
+    """See whether ports, links and cars are as they should be; nothing moves.
+
+    Ends with status 0 if all is well, else with 2 and a line for each problem.
+    """
+    from agents.doctor import doctor as run
+
+    swarm = None
+    if config is not None:
+        from hardware_bridge.config import read_config  # type: ignore
+
+        swarm = read_config(config)
+    diagnosis = run(swarm, seconds=seconds)
+    if as_json:
+        emit_json(diagnosis.records)
+    else:
+        _print(diagnosis)
+    if not diagnosis.ok:
+        sys.exit(2)
+
+
+def _print(diagnosis: Diagnosis) -> None:
+    click.echo("Serial ports")
+    for port in diagnosis.ports:
+        _print_port(port)
+    if not diagnosis.ports:
+        click.echo("  none: plug an adapter in")
+    if diagnosis.configured:
+        click.echo("\nLinks and cars")
+    for link in diagnosis.links:
+        _print_link(link)
+    problems = sum(len(link.problems) for link in diagnosis.links)
+    if diagnosis.configured:
+        click.echo(f"\n{'all well' if not problems else f'{problems} to mend'}")
+
+
+def _print_port(port: PortReport) -> None:
+    info = port.info
+    what = " ".join(x for x in (info.maker, info.product) if x)
+    number = f'port = "serial:{info.serial_number}"' if info.serial_number else ""
+    told = [x for x in (what, number, info.by_id) if x]
+    if port.users:
+        told.append("in use by " + ", ".join(port.users))
+    state = "ok     " if not port.remedy else "problem"
+    click.echo(f"  {state} {info.path}" + "".join(f"  {x}" for x in told))
+    if port.remedy:
+        click.echo(f"          no permission: {port.remedy}")
+
+
+def _print_link(link: LinkReport) -> None:
+    state = "ok     " if link.ok else "problem"
+    line = f"  {state} {link.name}  {link.format}  {link.port}"
+    if link.up:
+        line += f"  {link.bytes_hz:.0f} bytes/s"
+    if link.frames_hz:
+        line += f"  {link.frames_hz:.0f} frames/s  {100 * link.damaged_share:.1f} % damaged"
+    elif link.up and link.ok and not link.bytes_hz:
+        line += "  opens; a car that is not asked says nothing"
+    click.echo(line)
+    for node in link.nodes:
+        name = f"node {node.node}" if node.known else f"device {node.node}"
+        told = [f"IMU {node.imu_hz:.0f} Hz"] if node.imu_hz else []
+        told += [f"range to {to} {hz:.1f} Hz" for to, hz in node.ranges_hz.items()]
+        if node.missing_share:
+            told.append(f"{100 * node.missing_share:.1f} % missing")
+        click.echo(f"          {name}: {', '.join(told) or 'status only'}")
+    for problem in link.problems:
+        click.echo(f"          {problem}")

@@ -1,0 +1,6 @@
+"""Real cars driven by policies and controllers: what `relpos drive` does."""
+
+from agents.drive.result import DriveResult
+from agents.drive.run import drive
+
+__all__ = ["DriveResult", "drive"]

@@ -1,0 +1,162 @@
+"""An emulation that is stepped by hand: a world, its devices, and their ports in a folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from agents.emulate.options import EmulateOptions
+from agents.emulate.swarm_file import OPERATOR_PORT, car_port, node_port, swarm_toml
+from agents.emulate.world import EmulatedWorld
+from hardware_bridge.emulator.cars import make_firmware
+from hardware_bridge.emulator.cars.emulated_car import EmulatedCar
+from hardware_bridge.emulator.devices import OPERATOR, CarDevice, NodeDevice, OperatorDevice
+from hardware_bridge.emulator.emulator import Emulator
+from hardware_bridge.emulator.faults import FaultInjector, FaultParams
+from hardware_bridge.emulator.line import Line
+from hardware_bridge.emulator.node import EmulatedNode
+from hardware_bridge.emulator.ports import DevicePort, MemoryPort, PortBuilder
+from hardware_bridge.emulator.pty import PtyPort
+from hardware_bridge.wire.encoder import RelposEncoder
+from relpos_env.timing import DT
+from tracking.measurements import MeasurementBlock
+
+STEP_NS = round(1e9 * DT)
+"""[ns] From step to step."""
+SWARM_FILE = "swarm.toml"
+
+
+class EmulatedRig:
+    """World, devices and ports; a step takes no time but that of its computation.
+
+    Law: same options and same bytes to the cars at the same times, same everything, bit for bit.
+    """
+
+    def __init__(
+        self,
+        options: EmulateOptions,
+        folder: Path | None = None,
+        *,
+        ports: PortBuilder | None = None,
+        record: bool = False,
+    ) -> None:
+        """Make everything, and write ``swarm.toml`` once all ports can be opened.
+
+        Args:
+            options: What it is made of.
+            folder: For the ports and ``swarm.toml``; made if it is not there. None writes nothing.
+            ports: Gives ports by their names; by default pseudo terminals in the folder, or lines
+                in memory without one.
+            record: Keep measurements and truth, see `EmulatedWorld.recording`.
+
+        Raises:
+            EnvError: An unknown name or a number out of range.
+            BridgeError: Likewise of devices, or a port that cannot be made.
+        """
+        self.options = options
+        self._formats = options.formats()
+        self.world = EmulatedWorld(options.parts(), options.seed, record=record)
+        self.constellation = self.world.swarm.constellation
+        ids = self.constellation.ids
+        for node in ids:
+            make_firmware(options.driver, node, options.driver_options, self._car_key)
+        # Links must mean the same wherever somebody else stands.
+        self.folder = None if folder is None else folder.resolve()
+        if self.folder is not None:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            (self.folder / SWARM_FILE).unlink(missing_ok=True)
+        self._make_port = ports or _ports_in(self.folder)
+        self.ports: dict[str, DevicePort] = {}
+        """By name."""
+        self._rng = np.random.default_rng([options.seed, _DEVICES])
+        try:
+            self.emulator = self._plug_in(ids)
+        except BaseException:
+            for port in self.ports.values():
+                port.unplug()
+            raise
+        self._t_ns = 0
+        if self.folder is not None:
+            self._write(self.folder)
+
+    def step(self, t_ns: int | None = None) -> MeasurementBlock:
+        """Go on by 10 ms of the world.
+
+        Args:
+            t_ns: Now, of the host; by default 10 ms after the last step.
+
+        Returns:
+            What was measured, faults or not; valid until the next step.
+        """
+        self._t_ns = self._t_ns + STEP_NS if t_ns is None else t_ns
+        return self.emulator.step(self._t_ns)
+
+    def close(self) -> None:
+        """Unplug everything."""
+        self.emulator.close()
+
+    def _write(self, folder: Path) -> None:
+        """Write ``swarm.toml``, at once and whole."""
+        nodes = [(d.node, [line.name for line in d.lines]) for d in self.emulator.nodes]
+        text = swarm_toml(self.options, self.world.parts, self.constellation, nodes, folder)
+        scratch = folder / f".{SWARM_FILE}.new"
+        scratch.write_text(text, encoding="utf-8")
+        scratch.replace(folder / SWARM_FILE)
+
+    @property
+    def _car_key(self) -> bytes | None:
+        return self.options.key if self.options.driver == "relpos" else None
+
+    def _plug_in(self, ids: tuple[int, ...]) -> Emulator:
+        """All devices on their lines."""
+        options = self.options
+        nodes = [self._node(k, ids) for k in range(len(ids))]
+        cars = []
+        for node in ids:
+
+            def make(node: int = node) -> EmulatedCar:
+                boot = int(self._rng.integers(1, 1 << 32))
+                firmware = make_firmware(
+                    options.driver, node, options.driver_options, self._car_key, boot
+                )
+                return EmulatedCar(firmware, options.deadman)
+
+            line = self._line(car_port(node), FaultParams())
+            cars.append(CarDevice(node, line, make, CAR_VOLTAGE))
+        operator = None
+        if options.operator:
+            boot = int(self._rng.integers(1, 1 << 32))
+            encoder = RelposEncoder(OPERATOR, boot, options.key)
+            operator = OperatorDevice(self._line(OPERATOR_PORT, FaultParams()), encoder, boot, ids)
+        return Emulator(self.world, nodes, cars, operator, options.faults)
+
+    def _node(self, k: int, ids: tuple[int, ...]) -> NodeDevice:
+        """A node with its ports."""
+        options = self.options
+        names = [node_port(ids[k], p) for p in range(len(self._formats))]
+        lines = [self._line(name, options.faults.frames) for name in names]
+        own, other = self._rng.spawn(2)
+
+        def make(rng: np.random.Generator) -> EmulatedNode:
+            return EmulatedNode(ids[k], self._formats, ids, rng, options.nodes)
+
+        return NodeDevice(make(own), lines, lambda: make(other))
+
+    def _line(self, name: str, faults: FaultParams) -> Line:
+        """A port and what happens on the way to it."""
+        self.ports[name] = port = self._make_port(name)
+        return Line(name, port, FaultInjector(faults, self._rng.spawn(1)[0]))
+
+
+_DEVICES = 0x0DE71CE5
+"""Sets the draws of devices apart from those of the world, which has the seed alone."""
+CAR_VOLTAGE = 7.6
+"""[V] Of a battery of two cells."""
+
+
+def _ports_in(folder: Path | None) -> PortBuilder:
+    """Pseudo terminals in a folder, or lines in memory without one."""
+    if folder is None:
+        return lambda name: MemoryPort()
+    return lambda name: PtyPort(folder / name)
