@@ -4,10 +4,14 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
-.PHONY: demo test check format clean
+.PHONY: demo demo-hardware test check format clean
 
 demo: $(VENV)/.core
 	$(BIN)/relpos demo --out demo
+
+# Emulated nodes and cars behind pseudo terminals, driven through the whole hardware path.
+demo-hardware: $(VENV)/.hardware
+	$(BIN)/relpos demo-hardware --out demo-hardware
 
 test: $(VENV)/.dev
 	$(BIN)/python -m pytest -n auto
@@ -37,6 +41,11 @@ $(VENV)/.dev: pyproject.toml constraints.txt | $(BIN)/python
 	$(PIP) install -c constraints.txt -e '.[dev]'
 	@touch $@ $(VENV)/.core
 
+$(VENV)/.hardware: pyproject.toml constraints.txt | $(BIN)/python
+	@[ -e $(VENV)/.dev ] && [ $(VENV)/.dev -nt pyproject.toml ] && [ $(VENV)/.dev -nt constraints.txt ] \
+	  || { echo "installing relpos-env for hardware into $(VENV) ..."; $(PIP) install -c constraints.txt -e '.[hardware]'; }
+	@touch $@ $(VENV)/.core
+
 clean:
-	rm -rf $(VENV) demo .mypy_cache .ruff_cache .pytest_cache .import_linter_cache
+	rm -rf $(VENV) demo demo-hardware .mypy_cache .ruff_cache .pytest_cache .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -10,12 +10,16 @@ from agents.commands.bench import bench
 from agents.commands.calibrate import calibrate
 from agents.commands.compare import compare
 from agents.commands.demo import demo
+from agents.commands.demo_hardware import demo_hardware
 from agents.commands.doctor import doctor
+from agents.commands.drive import drive
 from agents.commands.emulate import emulate
 from agents.commands.evaluate import evaluate
 from agents.commands.export import export
+from agents.commands.live import live
 from agents.commands.policy import policy
 from agents.commands.protocol import protocol
+from agents.commands.replay import replay
 from agents.commands.rllib import rllib
 from agents.commands.simulate import simulate
 from agents.commands.sniff import sniff
@@ -36,6 +40,8 @@ for command in (
     simulate,
     demo,
     emulate,
+    drive,
+    demo_hardware,
     evaluate,
     compare,
     train,
@@ -45,6 +51,8 @@ for command in (
     protocol,
     doctor,
     sniff,
+    live,
+    replay,
     bench,
 ):
     cli.add_command(command)

@@ -32,6 +32,8 @@ class NodeReport:
     imu_hz: float
     ranges_hz: dict[str, float]
     """How often [1/s] to which other node, ``2``, or between which two, ``2-3``."""
+    positions_hz: float
+    """How often another tracker tells of it [1/s]."""
     missing_share: float
     """Messages that did not arrive [-], by their numbers; 0 where they have none."""
     boots: int
@@ -132,8 +134,8 @@ def share_a_device(reports: list[LinkReport]) -> None:
     first: dict[str, LinkReport] = {}
     for report in reports:
         for node in report.nodes:
-            if not node.known:
-                continue
+            if not node.known or node.positions_hz:
+                continue  # who is told of does not speak
             other = first.setdefault(node.node, report)
             if other is not report:
                 report.problems.append(
@@ -166,6 +168,7 @@ def _node(device: str | None, voice: Voice, link: LinkLike, seconds: float) -> N
         known=node is not None,
         imu_hz=voice.imu / seconds,
         ranges_hz={_label(ends, link): n / seconds for ends, n in voice.ranges.items()},
+        positions_hz=voice.positions / seconds,
         missing_share=voice.missing / total if total else 0.0,
         boots=voice.boots,
     )

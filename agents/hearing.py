@@ -9,7 +9,15 @@ from typing import Protocol
 from hardware_bridge.decoders.base import Decoder
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.ports import Chunk
-from hardware_bridge.readings import ImuReading, RangeReading, Reading, Source, StateReading
+from hardware_bridge.readings import (
+    ImuReading,
+    PairReading,
+    PoseReading,
+    RangeReading,
+    Reading,
+    Source,
+    StateReading,
+)
 
 ENOUGH_FRAMES = 3
 """[-] With fewer good frames a format may have been met by chance."""
@@ -54,6 +62,8 @@ class Voice:
     imu: int = 0
     ranges: dict[tuple[str | None, str], int] = field(default_factory=dict)
     """How many between which ends; the first is None where it is the speaker."""
+    positions: int = 0
+    """How often another tracker told of it, alone or in a pair."""
     missing: int = 0
     """Messages that its sequence numbers say were sent and did not arrive."""
     numbered: int = 0
@@ -159,6 +169,13 @@ def why_nothing_fits(hearing: Hearing, baud: int, formats: Formats) -> str:
 
 def _count(voices: dict[str | None, Voice], reading: Reading) -> None:
     source = reading.source
+    if isinstance(reading, PairReading | PoseReading):
+        names = (reading.i, reading.j) if isinstance(reading, PairReading) else (reading.node,)
+        for name in names:
+            told = voices.setdefault(name, Voice())
+            told.readings += 1
+            told.positions += 1
+        return
     voice = voices.setdefault(source.device, Voice())
     voice.readings += 1
     if isinstance(reading, ImuReading | StateReading):

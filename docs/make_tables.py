@@ -22,6 +22,8 @@ from agents.settings import leaves
 from agents.train.config import TrainConfig
 from hardware_bridge.decoders import DECODERS
 from hardware_bridge.drivers import DRIVERS
+from hardware_bridge.safety.params import SafetyParams
+from hardware_bridge.safety.rules import RULES
 from hardware_bridge.wire.tables import header_table, message_table
 from relpos_env import config
 from relpos_env.interface.actions import ACTIONS, MAX_SPEED, MAX_STEERING, DiscreteActions
@@ -223,6 +225,22 @@ def decoders() -> str:
     return markdown(head, rows, right="baud")
 
 
+def safety_rules() -> str:
+    """The rules of the safety gate, in the order in which reasons are told."""
+    rows = []
+    for rule in RULES:
+        does = inspect.getdoc(rule.check) or ""
+        rows.append([f"`{rule.name}`", does.partition("\n")[0], rule.effect, rule.meaning])
+    return markdown(("rule", "when", "then", "told as"), rows)
+
+
+def safety_limits() -> str:
+    """The limits of the safety gate."""
+    told = docstrings(SafetyParams)
+    rows = [[f"`{f.name}`", f"`{default_of(f)}`", told[f.name]] for f in fields(SafetyParams)]
+    return markdown(("limit", "default", "meaning"), rows)
+
+
 TABLES: dict[str, Callable[[], str]] = {
     "sizes": sizes,
     **{f"observation-{mode}": partial(observations, mode) for mode in OBSERVATIONS},
@@ -236,6 +254,8 @@ TABLES: dict[str, Callable[[], str]] = {
     "wire-header": lambda: markdown(*header_table(), right="offset"),
     "wire-messages": lambda: markdown(*message_table()),
     "decoders": decoders,
+    "safety-rules": safety_rules,
+    "safety-limits": safety_limits,
 }
 """Name to what makes it."""
 

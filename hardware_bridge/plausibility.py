@@ -10,10 +10,13 @@ from __future__ import annotations
 import math
 from collections import Counter
 from dataclasses import dataclass, fields
+from typing import TypeAlias
 
 from hardware_bridge.readings import ImuReading, StateReading, Vector
 
 NS = 1_000_000_000
+Place: TypeAlias = tuple[float, ...]
+"""A distance, or a vector [m]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,14 +55,14 @@ class PlausibilityParams:
 
 
 @dataclass(slots=True)
-class _Pair:
-    """Ranges of one pair of nodes."""
+class _Course:
+    """Ranges of one pair of nodes, or places of one node or pair."""
 
-    distance: float
+    place: Place
     t_ns: int
     agreeing: int = 0
-    """Refused ranges in a row that agree; the last of them follows."""
-    other: float = 0.0
+    """Refused ones in a row that agree; the last of them follows."""
+    other: Place = ()
     other_ns: int = 0
 
 
@@ -77,7 +80,7 @@ class Plausibility:
 
     def __init__(self, params: PlausibilityParams | None = None) -> None:
         self._params = PlausibilityParams() if params is None else params
-        self._pairs: dict[tuple[int, int], _Pair] = {}
+        self._courses: dict[tuple[int | str, ...], _Course] = {}
         self.refused = Counter()
 
     def allows_range(self, i: int, j: int, distance: float, t_ns: int) -> bool:
@@ -91,6 +94,18 @@ class Plausibility:
         """
         reason = self._wrong_range((min(i, j), max(i, j)), distance, t_ns)
         return self._count(reason)
+
+    def allows_place(self, who: tuple[int, ...], pos: Vector, t_ns: int) -> bool:
+        """Whether a node, or one relative to another, can be there.
+
+        Args:
+            who: The node, or both.
+            pos: [m]
+            t_ns: As in `allows_range`.
+        """
+        if not all(math.isfinite(each) for each in pos):
+            return self._count("not a number")
+        return self._count(self._jump(("place", *who), pos, t_ns))
 
     def allows_imu(self, reading: ImuReading) -> bool:
         """Whether a sample is within the scales of its sensors."""
@@ -127,24 +142,31 @@ class Plausibility:
             return "too near"
         if distance > p.farthest:
             return "too far"
-        pair = self._pairs.get(key)
-        if pair is None:
-            self._pairs[key] = _Pair(distance, t_ns)
+        return self._jump(key, (distance,), t_ns)
+
+    def _jump(self, key: tuple[int | str, ...], place: Place, t_ns: int) -> str | None:
+        p = self._params
+        course = self._courses.get(key)
+        if course is None:
+            self._courses[key] = _Course(place, t_ns)
             return None
-        if not self._can_follow(distance - pair.distance, t_ns - pair.t_ns):
-            recent = abs(t_ns - pair.other_ns) <= p.agreeing_within * NS
-            agrees = recent and self._can_follow(distance - pair.other, t_ns - pair.other_ns)
-            pair.agreeing = pair.agreeing + 1 if pair.agreeing and agrees else 1
-            pair.other, pair.other_ns = distance, t_ns
-            if pair.agreeing < p.agreeing:
+        if not self._can_follow(math.dist(place, course.place), t_ns - course.t_ns):
+            recent = abs(t_ns - course.other_ns) <= p.agreeing_within * NS
+            agrees = course.agreeing > 0 and recent
+            if agrees:
+                change = math.dist(place, course.other)
+                agrees = self._can_follow(change, t_ns - course.other_ns)
+            course.agreeing = course.agreeing + 1 if agrees else 1
+            course.other, course.other_ns = place, t_ns
+            if course.agreeing < p.agreeing:
                 return "jump"
-        pair.distance, pair.t_ns, pair.agreeing = distance, t_ns, 0
+        course.place, course.t_ns, course.agreeing = place, t_ns, 0
         return None
 
     def _can_follow(self, change: float, passed_ns: int) -> bool:
-        """Whether a distance may change by this [m] within this time [ns]."""
+        """Whether a place may change by this [m] within this time [ns]."""
         p = self._params
-        return abs(change) <= p.jump + p.closing_speed * abs(passed_ns) / NS
+        return change <= p.jump + p.closing_speed * abs(passed_ns) / NS
 
 
 def _wrong(reason: str, values: Vector, scale: float) -> str | None:

@@ -10,6 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from tracking.estimate import Status
+
 Vector: TypeAlias = tuple[float, float, float]
 
 
@@ -155,6 +157,45 @@ class DriveReading:
     """Stand still, whatever speed and steering say."""
 
 
+@dataclass(frozen=True, slots=True)
+class PairReading:
+    """Where one node is relative to another, by a tracker that is not ours; world frame."""
+
+    source: Source
+    i: str
+    """One node, written like `Source.device`."""
+    j: str
+    """The other."""
+    pos: Vector
+    """[m] p_j - p_i."""
+    vel: Vector | None = None
+    """[m/s] v_j - v_i."""
+    cov: tuple[float, ...] | None = None
+    """Of the position, 3 x 3 [m2], or of position and velocity, 6 x 6; row by row."""
+    status: Status = Status.OK
+    nlos: float = 0.0
+    """[-] Probability that it rests on what was not in sight."""
+
+
+@dataclass(frozen=True, slots=True)
+class PoseReading:
+    """Where a node is, where it points and how it moves, as far as a tracker tells; world frame."""
+
+    source: Source
+    node: str
+    """Written like `Source.device`."""
+    pos: Vector | None = None
+    """[m] From any origin that is the same for all nodes."""
+    vel: Vector | None = None
+    """[m/s]"""
+    cov: tuple[float, ...] | None = None
+    """As of `PairReading`."""
+    q_wb: tuple[float, float, float, float] | None = None
+    """w x y z, body to world."""
+    speed: float | None = None
+    """[m/s] Forward."""
+
+
 Reading: TypeAlias = (
     ImuReading
     | StateReading
@@ -165,4 +206,6 @@ Reading: TypeAlias = (
     | HeartbeatReading
     | OperatorReading
     | DriveReading
+    | PairReading
+    | PoseReading
 )

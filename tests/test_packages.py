@@ -19,6 +19,8 @@ HEAVY = (
     "filterpy",
     "onnx",
     "onnxruntime",
+    "mcap",
+    "rerun",
 )
 
 

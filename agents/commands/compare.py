@@ -2,12 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from agents.console import emit_json, print_table, progress_bar
+from agents.errors import UsageError
+
+if TYPE_CHECKING:
+    from agents.compare.result import CompareResult
+
+SIMULATED = {
+    "scenarios": "--scenario", "task": "--task", "cars": "--cars", "proximity": "--proximity",
+    "level": "--level", "first_seed": "--first-seed", "jobs": "--jobs", "engine": "--engine",
+    "address": "--address",
+}  # fmt: skip
+"""Options that real cars do not have, by parameter."""
+WHY = "which has its own cars and task; they drive one after the other"
 
 
 @click.command()
@@ -42,7 +55,7 @@ from agents.console import emit_json, print_table, progress_bar
     help="Beams that measure distances round each car, 0 to 32; default: as the policies.",
 )
 @click.option("--level", type=int, help="Randomisation of a level, 0 to 4, in every scenario.")
-@click.option("--episodes", default=100, show_default=True, help="Of each of them.")
+@click.option("--episodes", type=int, help="Of each of them; default: 100, on real cars 10.")
 @click.option("--first-seed", default=1000, show_default=True, help="Of the first episode.")
 @click.option("--seconds", default=60.0, show_default=True, help="Length of an episode, to 3600.")
 @click.option("--settle", default=10.0, show_default=True, help="Errors are scored from then on.")
@@ -51,46 +64,41 @@ from agents.console import emit_json, print_table, progress_bar
 )
 @click.option("--engine", default="local", show_default=True, help="Where jobs run: local or ray.")
 @click.option("--address", help="Of a Ray cluster that runs, for --engine ray: auto or host:port.")
+@click.option("--swarm", type=Path, help="A swarm.toml: compare on real cars, in turns.")
+@click.option("--arm", is_flag=True, help="With --swarm: the cars may move.")
 @click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
 @click.option("--out", type=Path, help="New folder for report.html, its pictures, results.jsonl.")
 def compare(
     names: tuple[str, ...],
     observations: tuple[str, ...],
-    scenarios: tuple[str, ...],
-    jobs: int,
-    engine: str,
-    address: str | None,
+    swarm: Path | None,
+    arm: bool,
     as_json: bool,
     out: Path | None,
-    **numbers: Any,
+    **options: Any,
 ) -> None:
     """Compare drivers on the same episodes: formation error, contacts, energy, with intervals.
 
     NAME is a controller (consensus, leader-follower, range-only) or a trained policy: its name,
     its file or its folder.
+
+    With --swarm on real cars, in real time; errors are what the cars believe. On a terminal:
+    space stops all at once, c clears the stop, q quits.
     """
-    from agents.compare.compare import compare as run
-    from agents.compare.film import median_films
     from agents.output import check_folder, check_new, write_results
     from agents.report import compare_report as report
 
     if out is not None:
         check_new(out)
         check_folder(out, ["report.html"])
-    with progress_bar("compare") as tell:
-        result = run(
-            drivers=names,
-            observations=observations,
-            scenarios=scenarios or (None,),
-            jobs=jobs,
-            engine=engine,
-            address=address,
-            progress=tell,
-            **numbers,
-        )
+    chosen = {k: v for k, v in options.items() if v is not None}
+    if swarm is None:
+        if arm:
+            raise UsageError("--arm: expected together with --swarm")
+        result, films = _simulated(names, observations, chosen, filmed=out is not None)
+    else:
+        result, films = _on_cars(names, observations, swarm, arm, chosen), []
     if out is not None:
-        with progress_bar("film") as tell:
-            films = median_films(result, jobs=jobs, engine=engine, address=address, progress=tell)
         write_results(out, report.compare_files(result, films))
     if as_json:
         emit_json(result.records)
@@ -101,3 +109,55 @@ def compare(
         click.echo(line)
     if out is not None:
         click.echo(f"written: {out / 'report.html'}")
+
+
+def _simulated(
+    names: tuple[str, ...], observations: tuple[str, ...], options: dict[str, Any], *, filmed: bool
+) -> tuple[CompareResult, list[dict[str, Any]]]:
+    """The comparison in the simulator, and its films."""
+    from agents.compare.compare import compare as run
+    from agents.compare.film import median_films
+
+    scenarios = options.pop("scenarios") or (None,)
+    with progress_bar("compare") as tell:
+        result = run(
+            drivers=names, observations=observations, scenarios=scenarios, progress=tell, **options
+        )
+    if not filmed:
+        return result, []
+    work = {k: options[k] for k in ("jobs", "engine", "address") if k in options}
+    with progress_bar("film") as tell:
+        return result, median_films(result, progress=tell, **work)
+
+
+def _on_cars(
+    names: tuple[str, ...],
+    observations: tuple[str, ...],
+    swarm: Path,
+    arm: bool,
+    options: dict[str, Any],
+) -> CompareResult:
+    """The comparison with real cars."""
+    from agents.compare.hardware import compare_hardware
+    from agents.drive.keys import key_by_key, read_orders
+
+    context = click.get_current_context()
+    for name, option in SIMULATED.items():
+        if context.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT:
+            raise UsageError(f"{option}: expected without --swarm, {WHY}")
+
+    def attend(order: Callable[[str], None]) -> None:
+        for what in read_orders():
+            order(what)
+
+    given = {k: options[k] for k in ("episodes", "seconds", "settle") if k in options}
+    with progress_bar("compare") as tell, key_by_key():
+        return compare_hardware(
+            swarm=swarm,
+            drivers=names,
+            observations=observations,
+            arm=arm,
+            attend=attend,
+            progress=tell,
+            **given,
+        )

@@ -81,6 +81,7 @@ def _print_link(link: LinkReport) -> None:
     for node in link.nodes:
         name = f"node {node.node}" if node.known else f"device {node.node}"
         told = [f"IMU {node.imu_hz:.0f} Hz"] if node.imu_hz else []
+        told += [f"positions {node.positions_hz:.0f} Hz"] if node.positions_hz else []
         told += [f"range to {to} {hz:.1f} Hz" for to, hz in node.ranges_hz.items()]
         if node.missing_share:
             told.append(f"{100 * node.missing_share:.1f} % missing")

@@ -128,14 +128,9 @@ def emulate(
 
 
 def _key(text: str | None) -> bytes | None:
-    """The key that hex digits are."""
-    if text is None:
-        return None
+    from hardware_bridge.wire.key import parse_key
+
     try:
-        key = bytes.fromhex(text)
-    except ValueError:
-        key = b""
-    if len(key) != 16:
-        # Never show what may be a secret with a slip in it.
-        raise UsageError("--key: expected 16 bytes as 32 hex digits")
-    return key
+        return parse_key(text)
+    except ValueError as error:
+        raise UsageError(f"--key: {error}") from error

@@ -27,7 +27,7 @@ def sniff(
 ) -> None:
     """Show what a device at PORT says; nothing is sent to it.
 
-    PORT is a path, serial:NUMBER or tcp:host:port.
+    PORT is a path, serial:NUMBER, tcp:host:port or file:path.
     """
     from agents.sniff import as_line, as_record
     from agents.sniff import sniff as run
@@ -72,12 +72,9 @@ def sniff(
 
 
 def _key(text: str | None) -> bytes | None:
-    if text is None:
-        return None
+    from hardware_bridge.wire.key import parse_key
+
     try:
-        key = bytes.fromhex(text)
-    except ValueError:
-        key = b""
-    if len(key) != 16:
-        raise UsageError("--key: expected 32 hex digits")
-    return key
+        return parse_key(text)
+    except ValueError as error:
+        raise UsageError(f"--key: {error}") from error

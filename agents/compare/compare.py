@@ -4,27 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
+from agents.compare.arguments import check_numbers, each_once, modes
 from agents.compare.contender import Contender, find_entry, line_up
-from agents.compare.episode import EpisodeResult, run_episodes
+from agents.compare.episode import run_episodes
+from agents.compare.meter import EpisodeResult
 from agents.compare.result import CompareResult, Row
 from agents.compare.setting import Setting
 from agents.demo import SETTLE
 from agents.engines import check_jobs, find_engine
 from agents.errors import UsageError
 from relpos_env.interface.beams import MOST_BEAMS
-from relpos_env.interface.observations import OBSERVATIONS
 
 FIRST_SEED = 1000
 """Training never uses the seeds from here on."""
 BATCH = 10
 """[-] Episodes that a process runs side by side."""
-SHORTEST, LONGEST = 0.1, 3600.0
-"""[s]"""
-MOST_EPISODES = 10_000
-
-Name = TypeVar("Name")
 
 
 def compare(
@@ -76,7 +72,7 @@ def compare(
             the option is named.
         EnvError: A scenario, task or number of cars that does not exist or fit.
     """
-    _check_numbers(episodes, first_seed, seconds, settle)
+    check_numbers(episodes, first_seed, seconds, settle)
     check_jobs(jobs)
     work = find_engine(engine, address)
     settings = [
@@ -89,11 +85,11 @@ def compare(
             seconds=seconds,
             settle=settle,
         )
-        for scenario in _each_once("--scenario", scenarios)
+        for scenario in each_once("--scenario", scenarios)
     ]
     if proximity is not None and not 0 <= proximity <= MOST_BEAMS:
         raise UsageError(f"--proximity: expected 0 to {MOST_BEAMS}, got {proximity}")
-    chosen = line_up(_each_once("NAME", drivers), _modes(observations), proximity)
+    chosen = line_up(each_once("NAME", drivers), modes(observations), proximity)
     empty, notes = _who_can(chosen, settings)
     seeds = range(first_seed, first_seed + episodes)
     tasks = [
@@ -153,45 +149,3 @@ def _who_can(
     if len(found) < len(settings):
         raise UsageError("--scenario: expected scenarios of different names")
     return rows, notes
-
-
-def _modes(names: Sequence[str]) -> list[str]:
-    """Modes of observations as they were named, each once.
-
-    Raises:
-        UsageError: No such mode, or none at all.
-    """
-    chosen = _each_once("--observation", names)
-    for name in chosen:
-        if name not in OBSERVATIONS:
-            modes = ", ".join(OBSERVATIONS)
-            raise UsageError(f"--observation: expected names of {modes}, got {name!r}")
-    return chosen
-
-
-def _each_once(option: str, names: Sequence[Name]) -> list[Name]:
-    """Names in order.
-
-    Raises:
-        UsageError: None at all.
-    """
-    chosen = list(dict.fromkeys(names))
-    if not chosen:
-        raise UsageError(f"{option}: expected at least one, got none")
-    return chosen
-
-
-def _check_numbers(episodes: int, first_seed: int, seconds: float, settle: float) -> None:
-    """See that numbers are in range.
-
-    Raises:
-        UsageError: One is not; the option is named.
-    """
-    if not 1 <= episodes <= MOST_EPISODES:
-        raise UsageError(f"--episodes: expected 1 to {MOST_EPISODES}, got {episodes}")
-    if first_seed < 0:
-        raise UsageError(f"--first-seed: expected 0 or more, got {first_seed}")
-    if not SHORTEST <= seconds <= LONGEST:
-        raise UsageError(f"--seconds: expected {SHORTEST:g} to {LONGEST:g}, got {seconds:g}")
-    if not 0.0 <= settle < seconds:
-        raise UsageError(f"--settle: expected 0 to less than --seconds, got {settle:g}")

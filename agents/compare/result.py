@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from agents.compare.contender import Contender
-from agents.compare.episode import EpisodeResult
+from agents.compare.meter import EpisodeResult
 from agents.compare.setting import Setting
 from agents.compare.statistics import Interval, mean, ratio
 from tracking.arrays import F64
@@ -17,7 +17,7 @@ from tracking.arrays import F64
 FIGURES = (
     "formation_error", "tracking_error", "collisions_per_min", "time_in_formation", "energy",
 )  # fmt: skip
-"""What is measured in every episode, see `agents.compare.episode.EpisodeResult`."""
+"""What is measured in every episode, see `agents.compare.meter.EpisodeResult`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,7 +70,12 @@ class CompareResult:
     notes: tuple[str, ...]
     """What was left out, and why."""
     first_seed: int
+    """On real cars the number of the first round."""
     seeds: int
+    errors_from: Literal["truth", "estimates"] = "truth"
+    """Whether errors are true, or what real cars believed."""
+    remarks: tuple[str, ...] = ()
+    """What happened to real cars on the way."""
 
     @property
     def scenarios(self) -> tuple[str, ...]:
@@ -114,6 +119,7 @@ class CompareResult:
                 "observation": row.contender.observation,
                 "proximity": row.contender.proximity,
                 "scenario": row.scenario,
+                "errors_from": self.errors_from,
                 "seed": e.seed,
                 **{name: _number(getattr(e, name)) for name in FIGURES},
                 "seconds": e.seconds,
@@ -137,6 +143,7 @@ class CompareResult:
             "level": row.setting.level,
             "cars": row.cars,
             "episodes": len(row.episodes),
+            "errors_from": self.errors_from,
             "formation_error": _value(error),
             "ci95": _ends(error),
             **{name: _value(m) for name, m in zip(FIGURES[1:], others, strict=True)},

@@ -18,13 +18,17 @@ from hardware_bridge.emulator.line import Line
 from hardware_bridge.emulator.node import EmulatedNode
 from hardware_bridge.emulator.ports import DevicePort, MemoryPort, PortBuilder
 from hardware_bridge.emulator.pty import PtyPort
+from hardware_bridge.errors import BridgeError
 from hardware_bridge.wire.encoder import RelposEncoder
 from relpos_env.timing import DT
+from tracking.log import Log
 from tracking.measurements import MeasurementBlock
 
 STEP_NS = round(1e9 * DT)
 """[ns] From step to step."""
 SWARM_FILE = "swarm.toml"
+TRUTH_EVERY = 2
+"""[-] A log has the truth of every so-manieth step."""
 
 
 class EmulatedRig:
@@ -92,14 +96,36 @@ class EmulatedRig:
         self._t_ns = self._t_ns + STEP_NS if t_ns is None else t_ns
         return self.emulator.step(self._t_ns)
 
+    def log(self, name: str) -> Log:
+        """What was measured since the beginning, with the truth.
+
+        Args:
+            name: Of the log.
+
+        Raises:
+            BridgeError: Nothing was kept.
+        """
+        recording, scenario = self.world.recording, self.world.parts.scenario.name
+        if recording is None:
+            raise BridgeError("record: expected an emulation that keeps measurements")
+        return recording.to_log(name, scenario, self.constellation, truth_every=TRUTH_EVERY)
+
     def close(self) -> None:
         """Unplug everything."""
         self.emulator.close()
 
+    def swarm_toml(self, folder: Path) -> str:
+        """The text of ``swarm.toml``.
+
+        Args:
+            folder: Where the ports are.
+        """
+        nodes = [(d.node, [line.name for line in d.lines]) for d in self.emulator.nodes]
+        return swarm_toml(self.options, self.world.parts, self.constellation, nodes, folder)
+
     def _write(self, folder: Path) -> None:
         """Write ``swarm.toml``, at once and whole."""
-        nodes = [(d.node, [line.name for line in d.lines]) for d in self.emulator.nodes]
-        text = swarm_toml(self.options, self.world.parts, self.constellation, nodes, folder)
+        text = self.swarm_toml(folder)
         scratch = folder / f".{SWARM_FILE}.new"
         scratch.write_text(text, encoding="utf-8")
         scratch.replace(folder / SWARM_FILE)

@@ -16,7 +16,7 @@ import numpy as np
 from agents.emulate.options import EmulateOptions
 from agents.emulate.pace import Lateness, Pace
 from agents.emulate.result import EmulateResult, line_figures
-from agents.emulate.rig import STEP_NS, EmulatedRig
+from agents.emulate.rig import STEP_NS, TRUTH_EVERY, EmulatedRig
 from agents.emulate.warm_up import warm_up
 from relpos_env.errors import EnvError
 from relpos_env.timing import DECISION, STAND_STILL
@@ -24,8 +24,6 @@ from tracking.log import check_target, write_log
 
 SECOND = round(1e9 / STEP_NS)
 """[-] Steps of a report."""
-TRUTH_EVERY = 2
-"""[-] A log has the truth of every so-manieth step."""
 LONGEST_WAIT = 3600.0
 """[s]"""
 
@@ -118,9 +116,7 @@ class _Run:
         t, error = np.array(self._rows, dtype=np.float64).reshape(-1, 2).T
         log = None
         if world.recording is not None and self.lateness.steps >= TRUTH_EVERY:
-            log = world.recording.to_log(
-                name, parts.scenario.name, rig.constellation, truth_every=TRUTH_EVERY
-            )
+            log = rig.log(name)
         return EmulateResult(
             scenario=parts.scenario.name,
             task=parts.config.task,

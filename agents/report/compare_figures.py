@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from agents.compare.episode import IN_FORMATION
+from agents.compare.meter import IN_FORMATION
 from agents.compare.result import FIGURES, CompareResult, Row
 from agents.compare.statistics import Interval
 from relpos_env.timing import DECISION
@@ -51,21 +51,28 @@ def figures(result: CompareResult) -> dict[str, tuple[str, Figure, str]]:
             f"Median over the episodes, and the band of the middle half of them. Grey: before "
             f"{settle:g} s, not scored.",
         ),
-        "compare-scatter.png": (
+    }
+    if "tracking_error" in _measured(result):
+        drawn["compare-scatter.png"] = (
             "What the tracker costs",
             _scatter(result),
             "Every episode: formation error over the error of the relative positions that the "
             "cars knew. Rings: means.",
-        ),
-    }
+        )
     if len(result.contenders) > 1:
         drawn["compare-ratios.png"] = (
             "Ratio to the best controller",
             _ratios(result),
-            "Formation error over that of the reference on the same seeds, with 95 % intervals; "
-            "left of 1 is better. Dotted: a fifth better.",
+            "Formation error over that of the reference on the same seeds (real cars: in the same "
+            "rounds), with 95 % intervals; left of 1 is better. Dotted: a "
+            "fifth better.",
         )
     return drawn
+
+
+def _measured(result: CompareResult) -> list[str]:
+    """Figures that anybody has."""
+    return [name for name in FIGURES if any(row.means[name] for row in result.rows)]
 
 
 def _colours(result: CompareResult) -> dict[str, str]:
@@ -76,17 +83,17 @@ def _colours(result: CompareResult) -> dict[str, str]:
 def _bars(result: CompareResult) -> Figure:
     from matplotlib.figure import Figure
 
-    colours, scenarios = _colours(result), result.scenarios
+    colours, scenarios, measured = _colours(result), result.scenarios, _measured(result)
     counts = [len(result.of(s)) for s in scenarios]
     height = sum(0.34 * n + 0.9 for n in counts) + 0.2
     figure = Figure(figsize=(12, height), layout="constrained")
     axes = figure.subplots(
-        len(scenarios), len(FIGURES), squeeze=False, sharey="row",
+        len(scenarios), len(measured), squeeze=False, sharey="row",
         height_ratios=[n + 0.6 for n in counts],
     )  # fmt: skip
     for line, scenario in zip(axes, scenarios, strict=True):
         rows = result.of(scenario)
-        for ax, name in zip(line, FIGURES, strict=True):
+        for ax, name in zip(line, measured, strict=True):
             scale = 100.0 if name == "time_in_formation" else 1.0
             for y, row in enumerate(rows):
                 bar = name != "energy"
@@ -98,7 +105,7 @@ def _bars(result: CompareResult) -> Figure:
             ax.locator_params(axis="x", nbins=4)
         line[0].set_yticks(range(len(rows)), [r.contender.label for r in rows])
         line[0].set_title(scenario, fontsize=10, loc="left", fontweight="bold")
-    for ax, name in zip(axes[-1], FIGURES, strict=True):
+    for ax, name in zip(axes[-1], measured, strict=True):
         ax.set_xlabel(LABELS[name])
     return figure
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from agents.compare.contender import sees
-from agents.compare.episode import IN_FORMATION
+from agents.compare.meter import IN_FORMATION
 from agents.compare.result import CompareResult, Row
 from agents.report import compare_figures as figures
 from agents.report.animation import player_markup
@@ -70,23 +70,36 @@ def notes(result: CompareResult) -> list[str]:
         by.setdefault(result.reference(scenario).contender.label, []).append(scenario)
     references = "; ".join(f"{label} in {', '.join(names)}" for label, names in by.items())
     last = result.first_seed + result.seeds - 1
-    return [
-        f"Task {setting.task}, {result.seeds} episodes of {setting.seconds:g} s each, seeds "
-        f"{result.first_seed} to {last}, the same for all; means with 95 % intervals.",
+    if result.errors_from == "truth":
+        alike, whole = "on the same seeds", "hits (contacts of all cars) and the energy of a car"
+        order = f"seeds {result.first_seed} to {last}, the same for all"
+    else:
+        alike, whole = "in the same rounds", "the energy of a car, by its odometer,"
+        order = "in rounds, one driver after the other, with real cars"
+    lines = [
+        f"Task {setting.task}, {result.seeds} episodes of {setting.seconds:g} s each, {order}; "
+        "means with 95 % intervals.",
         f"Errors [m] and the time formed (every car's error below {IN_FORMATION:g} m) count from "
-        f"{setting.settle:g} s on; hits (contacts of all cars) and the energy of a car from the "
-        "start.",
-        f"ratio: formation error over that of {references}, on the same seeds.",
-        *(f"Left out: {note}." for note in result.notes),
+        f"{setting.settle:g} s on; {whole} from the start.",
+        f"ratio: formation error over that of {references}, {alike}.",
     ]
+    if result.errors_from == "estimates":
+        lines.append(
+            "Errors are what the cars believed themselves: nobody knows the truth, tracking error "
+            "and contacts among it."
+        )
+    lines += [f"Left out: {note}." for note in result.notes]
+    return lines + [f"{remark}." for remark in result.remarks]
 
 
-def compare_files(result: CompareResult, films: Sequence[dict[str, Any]]) -> dict[str, str | bytes]:
+def compare_files(
+    result: CompareResult, films: Sequence[dict[str, Any]] = ()
+) -> dict[str, str | bytes]:
     """Everything that goes into the folder, by name.
 
     Args:
         result: What was found.
-        films: Frames of the median episode of every row.
+        films: Frames of the median episode of every row; real cars have none.
     """
     drawn = figures.figures(result)
     names = ", ".join(dict.fromkeys(c.called for c in result.contenders))
@@ -99,8 +112,8 @@ def compare_files(result: CompareResult, films: Sequence[dict[str, Any]]) -> dic
     for name, (title, figure, caption) in drawn.items():
         page.heading(title)
         page.figure(figure, f"{caption} ({name})")
-    filmed = list(zip(result.rows, films, strict=True))
-    for n, scenario in enumerate(result.scenarios):
+    filmed = list(zip(result.rows, films, strict=True)) if films else []
+    for n, scenario in enumerate(result.scenarios if films else ()):
         page.heading(f"Median episodes in {scenario}")
         drives = {_title(r): frames for r, frames in filmed if r.scenario == scenario}
         page.raw(player_markup(drives, running=n == 0))

@@ -86,7 +86,7 @@ def parse_config(text: str, *, file: str, beside: Path, with_files: bool = True)
     config = SwarmConfig(
         name=head.name or Path(file).stem,
         constellation=constellation,
-        links=tuple(read_links(raw, constellation, where)),
+        links=tuple(read_links(raw, constellation, where, beside)),
         cars=tuple(read_cars(raw, constellation, where)),
         calibration=_calibration(raw, where, beside, with_files),
         task=_task(raw, constellation, where),
@@ -149,9 +149,22 @@ def _check(config: SwarmConfig, where: Where) -> None:
         raise where.key("tracker").error(str(error)) from error
     if not 0.0 <= config.tracker.delay <= 1.0:
         raise where.key("tracker").key("delay").error("expected 0 to 1 s")
+    _check_source(config, where)
     fence, group = config.safety.fence, config.constellation
     if fence is not None:
         at = where.key("safety").key("fence").key("node")
         check_node(fence.node, group, at)
         if not group.is_static[group.index_of[fence.node]]:
             raise at.error(f"node {fence.node} moves, expected a static one")
+
+
+def _check_source(config: SwarmConfig, where: Where) -> None:
+    """Positions come from links of that format, and only where they are asked for."""
+    formats = {link.format for link in config.links}
+    ready = config.tracker.source == "positions"
+    if ready and "positions" not in formats:
+        at = where.key("tracker").key("source")
+        raise at.error('"positions" needs a link with format = "positions"')
+    if not ready and "positions" in formats:
+        at = where.key("tracker").key("source")
+        raise at.error('a link has format = "positions": expected source = "positions"')

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from hardware_bridge.config.keys import check_node, node_id, tables_of, without
 from hardware_bridge.config.swarm import CarConfig, LinkConfig
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.ports import PortSpec
+from hardware_bridge.wire.key import parse_key
 from tracking.constellation import Constellation
 from tracking.tables import TableReader, Where
 
@@ -31,8 +33,10 @@ class _Car:
     key: str | None = None
 
 
-def read_links(raw: Mapping[str, Any], group: Constellation, where: Where) -> Iterator[LinkConfig]:
-    """The streams that measure."""
+def read_links(
+    raw: Mapping[str, Any], group: Constellation, where: Where, beside: Path
+) -> Iterator[LinkConfig]:
+    """The streams that measure; files are looked for beside."""
     from hardware_bridge.decoders import DECODERS
 
     for key, table in tables_of(raw, "links", where):
@@ -50,11 +54,15 @@ def read_links(raw: Mapping[str, Any], group: Constellation, where: Where) -> It
             raise at.key("ids").error("two devices are the same node")
         if link.node is not None:
             check_node(link.node, group, at.key("node"))
-        elif not entry.names_itself:
+        elif not (entry.names_itself or entry.tells_of_others):
             raise at.key("node").error(f"missing: {link.format} does not say who speaks")
         yield LinkConfig(
             name=key,
-            port=PortSpec(name=f"links.{key}", port=link.port, baud=link.baud or entry.baud),
+            port=PortSpec(
+                name=f"links.{key}",
+                port=_placed(link.port, beside, at),
+                baud=link.baud or entry.baud,
+            ),
             format=link.format,
             node=link.node,
             ids=named,
@@ -87,14 +95,18 @@ def read_cars(raw: Mapping[str, Any], group: Constellation, where: Where) -> lis
     return sorted(cars, key=lambda each: group.index_of[each.node])
 
 
+def _placed(port: str, beside: Path, where: Where) -> str:
+    """A port; the path of a file starts from the folder of the configuration."""
+    if not port.startswith("file:"):
+        return port
+    name = port.removeprefix("file:")
+    if not name:
+        raise where.key("port").error("expected file:path")
+    return f"file:{beside / name}"
+
+
 def _key(text: str | None, where: Where) -> bytes | None:
-    if text is None:
-        return None
     try:
-        key = bytes.fromhex(text)
-    except ValueError:
-        key = b""
-    if len(key) != 16:
-        # Never show what may be a secret with a slip in it.
-        raise where.key("key").error("expected 16 bytes as 32 hex digits")
-    return key
+        return parse_key(text)
+    except ValueError as error:
+        raise where.key("key").error(str(error)) from error

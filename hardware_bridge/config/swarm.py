@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from hardware_bridge.links.ports import PortSpec
+from hardware_bridge.live.ready_params import ReadyParams
 from hardware_bridge.safety.params import SafetyParams
 from tracking.constellation import Constellation
 from tracking.filters import DEFAULT_FILTER
@@ -63,10 +64,14 @@ class TaskConfig:
 class TrackerConfig:
     """How the group is tracked."""
 
+    source: Literal["measurements", "positions"] = "measurements"
+    """Whether our tracker makes positions of measurements, or they come ready from another."""
     filter: str = DEFAULT_FILTER
     """One of `tracking.filters.FILTERS`."""
     delay: float = 0.1
     """[s] Measurements wait so long for later ones that were taken before them."""
+    positions: ReadyParams = ReadyParams()
+    """What is believed of ready positions."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

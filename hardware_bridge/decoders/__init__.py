@@ -12,6 +12,7 @@ from hardware_bridge.decoders.base import Decoder
 from hardware_bridge.decoders.dw1000 import dw1000_decoder
 from hardware_bridge.decoders.dwm1001 import dwm1001_decoder
 from hardware_bridge.decoders.linktrack import linktrack_decoder
+from hardware_bridge.decoders.positions import positions_decoder
 from hardware_bridge.decoders.relpos import RelposDecoder
 from hardware_bridge.decoders.uwb_core import uwb_core_decoder
 from hardware_bridge.decoders.witmotion import witmotion_decoder
@@ -21,6 +22,8 @@ from hardware_bridge.readings import (
     ImuReading,
     MotionReading,
     OperatorReading,
+    PairReading,
+    PoseReading,
     RangeReading,
     StateReading,
     StatusReading,
@@ -41,6 +44,8 @@ class DecoderEntry:
     """[1/s] Of the device as it is usually set."""
     names_itself: bool = False
     """Every reading says who speaks; else the configuration of the port does."""
+    tells_of_others: bool = False
+    """Readings name the nodes that they are about, and who speaks does not matter."""
     has_time: bool = False
     """Readings carry the device's clock; else they are stamped on arrival."""
     keyed: bool = False
@@ -97,6 +102,13 @@ DECODERS: dict[str, DecoderEntry] = {
         build=lambda key: witmotion_decoder(),
         tells=(ImuReading,),
         checked=True,
+    ),
+    "positions": DecoderEntry(
+        device="any tracker that writes lines of positions",
+        build=lambda key: positions_decoder(),
+        tells=(PairReading, PoseReading),
+        tells_of_others=True,
+        has_time=True,
     ),
 }
 """Name of the format, as in a configuration, to what is known of it."""

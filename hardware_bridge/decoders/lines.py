@@ -29,9 +29,15 @@ class Lines:
     line after a damaged one is read.
     """
 
-    def __init__(self, read: LineReader) -> None:
+    def __init__(self, read: LineReader, most: int = MOST_LINE) -> None:
+        """Begin with nothing read.
+
+        Args:
+            read: A line to readings.
+            most: Longer lines are given up [bytes].
+        """
         self.counts = Counts()
-        self._read = read
+        self._read, self._most = read, most
         self._line = bytearray()
         self._too_long = False
 
@@ -54,7 +60,7 @@ class Lines:
     def _add(self, piece: bytes) -> None:
         if not self._too_long:
             self._line += piece
-            if len(self._line) <= MOST_LINE:
+            if len(self._line) <= self._most:
                 return
             piece = bytes(self._line)
             self._line.clear()

@@ -71,7 +71,7 @@ def check_distinct(specs: Sequence[PortSpec]) -> None:
             raise BridgeError(f"{spec.name}: there are two ports of this name")
         names.add(spec.name)
         is_path = not spec.port.startswith(("tcp:", "serial:"))
-        device = os.path.realpath(spec.port) if is_path else spec.port
+        device = os.path.realpath(spec.port.removeprefix("file:")) if is_path else spec.port
         if device in seen:
             raise BridgeError(
                 f"{spec.name}: {spec.port} is the port of {seen[device]} too; give each its own"

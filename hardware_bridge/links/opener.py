@@ -28,6 +28,10 @@ def open_port(spec: PortSpec) -> Port:
         from hardware_bridge.links.tcp_port import TcpPort
 
         return TcpPort(spec)
+    if spec.port.startswith("file:"):
+        from hardware_bridge.links.file_port import FilePort
+
+        return FilePort(spec)
     from hardware_bridge.links.serial_port import SerialPort
 
     return SerialPort(spec)

@@ -13,9 +13,9 @@ class PortSpec:
     """What it is called in messages and recordings, ``links.left`` or ``cars.1``."""
     port: str
     """A device path such as ``/dev/serial/by-id/...``, ``serial:NUMBER`` for the USB serial
-    number of an adapter, or ``tcp:host:port``."""
+    number of an adapter, ``tcp:host:port``, or ``file:path`` for a file that may still grow."""
     baud: int = 115200
-    """[1/s] Without meaning for TCP."""
+    """[1/s] Without meaning for TCP and files."""
 
 
 @dataclass(frozen=True, slots=True)

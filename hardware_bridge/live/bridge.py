@@ -18,7 +18,8 @@ from hardware_bridge.live.start import Start, StartParams
 from hardware_bridge.live.swarm import LiveSwarm, load_calibration
 from hardware_bridge.live.warm_up import warm_up
 from hardware_bridge.recording import Header, Recorder
-from hardware_bridge.safety.process import Charge, SupervisorProcess
+from hardware_bridge.safety.charge import Charge
+from hardware_bridge.safety.process import SupervisorProcess
 from tracking.calibration.file import calibration_toml
 
 
@@ -52,7 +53,8 @@ class Bridge:
         """
         if arm and not config.cars:
             raise BridgeError("cars: none in the configuration, nothing can be armed")
-        if arm and config.calibration is None:
+        measures = config.tracker.source == "measurements"
+        if arm and measures and config.calibration is None:
             raise BridgeError(
                 "calibration: missing; make one with `relpos calibrate`, or say "
                 "uncalibrated = true if measurements are good as they come"
@@ -98,14 +100,20 @@ class Bridge:
             self._stack = stack.pop_all()
 
     def env(
-        self, *, observation: str = "estimate", history: int = 1, max_cycles: int = 600
+        self,
+        *,
+        observation: str = "estimate",
+        history: int = 1,
+        actions: str = "continuous",
+        max_cycles: int = 600,
     ) -> LiveFormationEnv:
-        """The environment on these cars; see `LiveFormationEnv`."""
+        """The environment on these cars, see `LiveFormationEnv`; the last one is the one to use."""
         return LiveFormationEnv(
             self.swarm,
             self.feed,
             observation=observation,
             history=history,
+            actions=actions,
             max_cycles=max_cycles,
             prepare=self.start.run,
         )

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.links import Links
 from hardware_bridge.links.ports import Chunk
 from hardware_bridge.live.swarm import LiveSwarm
@@ -77,6 +78,7 @@ class LiveFeed:
         # What came while the last of it was handled still belongs to this decision.
         for chunk in self._links.wait(0.0):
             self._take(chunk)
+        self._listen()
         self._note_links()
         now = self._now_ns()
         self._speak(now)
@@ -129,6 +131,9 @@ class LiveFeed:
                     self.report = message
                 case Notice(text):
                     self.note(self._now_ns(), text)
+        if self._supervisor.gone:
+            # Their controllers stop them by themselves; nobody is left to tell them anything.
+            raise BridgeError("supervisor: it is gone, so the cars stand; start the drive anew")
 
     def _note_links(self) -> None:
         for notice in self._links.drain_notices():

@@ -148,7 +148,9 @@ class LiveGroup:
 
     def _ask(self) -> None:
         """The velocity that cars are asked for: the plan, and an operator's trim."""
-        wanted = self.task.plan + self.swarm.trim
+        wanted = self.task.plan
+        if self.swarm.config.task.command == "link":
+            wanted = wanted + self.swarm.trim
         speed = np.hypot(wanted[..., 0], wanted[..., 1])[..., None]
         limited = wanted * FASTEST_COMMAND / np.maximum(speed, FASTEST_COMMAND)
         self._command[:] = np.where(self.swarm.view.present[..., None], limited, 0.0)

@@ -8,24 +8,28 @@ Pure: the same chunks with the same times give the same measurements.
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field
 
 import numpy as np
 
-from hardware_bridge.clocks import DeviceTime, HostTime, StreamTime
+from hardware_bridge.clocks import DeviceTime, EvenTime, HostTime, StreamTime
 from hardware_bridge.config.swarm import CarConfig, LinkConfig, SwarmConfig
 from hardware_bridge.decoders import make_decoder
-from hardware_bridge.decoders.base import Decoder
 from hardware_bridge.drivers import make_driver
 from hardware_bridge.identity import Identities, Verdict
 from hardware_bridge.links.ports import Chunk
 from hardware_bridge.live.events import Events
+from hardware_bridge.live.repeated import RepeatedSamples
+from hardware_bridge.live.stream import Stream
+from hardware_bridge.live.told import Told
 from hardware_bridge.plausibility import Plausibility
 from hardware_bridge.readings import (
+    MICROSECONDS_64,
     NOBODY,
     ImuReading,
     MotionReading,
     OperatorReading,
+    PairReading,
+    PoseReading,
     RangeReading,
     Reading,
     Source,
@@ -34,29 +38,15 @@ from hardware_bridge.readings import (
 )
 from tracking.constellation import Constellation
 from tracking.errors import ConfigError
+from tracking.estimate import Status
 from tracking.measurements import Kind
 
 NS = 1e-9
 MOST_STRANGERS = 32
 """Devices that are not in the configuration are told of so many times."""
 
-
-@dataclass(slots=True)
-class Stream:
-    """What is known of one port."""
-
-    name: str
-    decoder: Decoder
-    node: int | None
-    """Id of who speaks, where the format does not say."""
-    ids: dict[str, int]
-    identities: Identities
-    times: dict[int, StreamTime] = field(default_factory=dict)
-    """By node index."""
-    source: Source | None = None
-    """Of the last reading: those of one message share it, and are taken or refused together."""
-    verdict: Verdict = Verdict.UNNUMBERED
-    t_ns: int = 0
+OF_STREAM = NO_NODE = -1
+"""In place of a node, where one clock stamps all; in place of an id, of an operator without."""
 
 
 class Intake:
@@ -75,9 +65,13 @@ class Intake:
         self.group = config.constellation
         self.start_ns = start_ns
         self.events = Events()
+        self.told = Told()
         self.plausibility = Plausibility()
         self.heard_ns: dict[int, int] = {}
         """Host time at which each node was last heard, by index."""
+        self.sensed_ns: dict[int, int] = {}
+        """Host time of each node's last word of its own motion, by index. Others that measure
+        ranges to a node do not say which way it turns."""
         self.motion: dict[int, MotionReading] = {}
         """What each car last said of its motion, by index."""
         self.trim: dict[int, tuple[int, tuple[float, float]]] = {}
@@ -88,6 +82,7 @@ class Intake:
         """Readings that were not used, by reason."""
         self.notices: list[tuple[int, str]] = []
         """Time [ns] and what the user should read; whoever takes them clears the list."""
+        self._repeated = RepeatedSamples([node.imu_hz for node in self.group.nodes])
         self._strangers: set[tuple[str, str]] = set()
         open_ids, keyed_ids = Identities(), Identities(authenticated=True)
         self._identities = (open_ids, keyed_ids)
@@ -132,6 +127,9 @@ class Intake:
         if isinstance(reading, OperatorReading):
             self._take_trim(stream, reading, arrival_ns)
             return
+        if isinstance(reading, PairReading | PoseReading):
+            self._take_told(stream, reading, arrival_ns)
+            return
         node = self._node(stream, source.device, arrival_ns)
         if node is None:
             return
@@ -160,15 +158,24 @@ class Intake:
         t = self.seconds(t_ns)
         match reading:
             case ImuReading(gyr=gyr, acc=acc, mag=mag):
-                if not self.plausibility.allows_imu(reading):
+                if not self.plausibility.allows_imu(reading) or self._repeats(
+                    reading.source, node, (*gyr, *acc), arrival_ns
+                ):
                     return False
+                if reading.source.ticks is None:
+                    even = stream.even.setdefault(node, EvenTime(self.group.nodes[node].imu_hz))
+                    t = self.seconds(even.map(None, arrival_ns))
                 if mag is not None:
                     self.events.add(t, Kind.MAG, node, mag)
                 self.events.add(t, Kind.IMU, node, (*gyr, *acc))
+                self.sensed_ns[node] = arrival_ns
             case StateReading(q_wb=q, accel_w=accel):
-                if not self.plausibility.allows_state(reading):
+                if not self.plausibility.allows_state(reading) or self._repeats(
+                    reading.source, node, (*q, *accel), arrival_ns
+                ):
                     return False
                 self.events.add(t, Kind.STATE, node, (*q, *accel, 0.0))
+                self.sensed_ns[node] = arrival_ns
             case RangeReading():
                 return self._use_range(stream, reading, node, t_ns, arrival_ns)
             case MotionReading():
@@ -176,6 +183,19 @@ class Intake:
             case StatusReading(voltage=voltage) if voltage is not None:
                 self.voltage[node] = voltage
         return True
+
+    def _repeats(
+        self, source: Source, node: int, values: tuple[float, ...], arrival_ns: int
+    ) -> bool:
+        """Whether a sample is the one before once more; of a stuck sensor it is told once."""
+        known = node in self._repeated.stuck
+        why = self._repeated.refusal(node, source, values, arrival_ns)
+        if why:
+            self.refused[why] += 1
+        if why == "stuck" and not known:
+            text = f"node {self.group.ids[node]} repeats its last sample: its sensor is stuck"
+            self.notices.append((arrival_ns, text))
+        return bool(why)
 
     def _use_range(
         self, stream: Stream, reading: RangeReading, node: int, t_ns: int, arrival_ns: int
@@ -202,10 +222,45 @@ class Intake:
         return True
 
     def _take_trim(self, stream: Stream, reading: OperatorReading, arrival_ns: int) -> None:
+        source, device = reading.source, reading.source.device
+        if source is not stream.source or source is NOBODY:
+            # A remote control is none of the nodes; it has an id of its own.
+            who = int(device) if device and device.isascii() and device.isdigit() else NO_NODE
+            stream.verdict = stream.identities.check(stream.name, source, arrival_ns, who)
+            stream.source = source
+            if not stream.verdict.accepted:
+                self.refused[stream.verdict.value] += 1
+        if not stream.verdict.accepted:
+            return
         node = self._node(stream, reading.to, arrival_ns, named=True)
         x, y = reading.velocity
         if node is not None and np.isfinite(x) and np.isfinite(y):
             self.trim[node] = arrival_ns, (x, y)
+
+    def _take_told(
+        self, stream: Stream, reading: PairReading | PoseReading, arrival_ns: int
+    ) -> None:
+        """What another tracker tells, by one clock for all nodes."""
+        names = (reading.i, reading.j) if isinstance(reading, PairReading) else (reading.node,)
+        found = [self._node(stream, name, arrival_ns, named=True) for name in names]
+        nodes = tuple(node for node in found if node is not None)
+        clock = stream.times.setdefault(OF_STREAM, DeviceTime(MICROSECONDS_64))
+        t_ns = clock.map(reading.source.ticks, arrival_ns)
+        if len(set(nodes)) < len(names):
+            return
+        if reading.pos is not None and not self.plausibility.allows_place(nodes, reading.pos, t_ns):
+            return
+        t = self.seconds(t_ns)
+        if isinstance(reading, PairReading):
+            self.told.add_pair(t, nodes, reading)
+            known = reading.status not in (Status.LOST, Status.ABSENT)
+        else:
+            self.told.add_pose(t, nodes[0], reading)
+            known = True
+            if reading.speed is not None:
+                self.motion[nodes[0]] = MotionReading(reading.source, speed=reading.speed)
+        if known:
+            self.heard_ns.update(dict.fromkeys(nodes, arrival_ns))
 
     def _node(
         self, stream: Stream, device: str | None, t_ns: int, *, named: bool = False

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,28 +16,43 @@ from hardware_bridge.recording import Kind, Recording, read_recording
 from hardware_bridge.safety.picture import Picture
 from tracking.calibration.calibration import Calibration
 from tracking.calibration.file import parse_calibration
+from tracking.filters import filter_builder
 
 
 class ReplayFeed:
     """A recording as a `hardware_bridge.live.group.Feed`."""
 
-    def __init__(self, recording: Recording, pace: Callable[[int], None] | None = None) -> None:
+    def __init__(
+        self,
+        recording: Recording,
+        pace: Callable[[int], None] | None = None,
+        *,
+        filter: str | None = None,
+    ) -> None:
         """Open a recording.
 
         Args:
             recording: As `read_recording` gives it.
             pace: Called with the time of every decision [ns]; it may wait. None is as fast as
                 possible.
+            filter: In place of the recorded one; one of `tracking.filters.FILTERS`.
 
         Raises:
-            BridgeError: Its configuration makes no sense here.
+            BridgeError: Its configuration makes no sense here, or its calibration is damaged.
+            ConfigError: No such filter.
         """
         self.recording, self._pace = recording, pace
         file = recording.path.name
-        self.config: SwarmConfig = parse_config(
-            recording.header.config, file=file, beside=Path(), with_files=False
-        )
-        self.swarm = LiveSwarm(self.config, recording.header.monotonic_ns, _calibration(recording))
+        config = parse_config(recording.header.config, file=file, beside=Path(), with_files=False)
+        if filter is not None:
+            filter_builder(filter)
+            config = replace(config, tracker=replace(config.tracker, filter=filter))
+        self.config: SwarmConfig = config
+        self.calibration = _calibration(recording)
+        """What the measurements were corrected with; None took them as they came."""
+        if config.calibration and self.calibration is None:
+            raise BridgeError(f"{file}: the calibration in it is lost, nothing can be tracked")
+        self.swarm = LiveSwarm(config, recording.header.monotonic_ns, self.calibration)
         for name in self.swarm.intake.streams:
             if name not in recording.header.links:
                 raise BridgeError(f"{file}: has no stream {name} of its own configuration")
@@ -49,7 +65,9 @@ class ReplayFeed:
         names = self.recording.header.links
         for record in self._records:
             if record.kind == Kind.BYTES_IN:
-                self.swarm.take(Chunk(names[record.link], record.t_ns, record.payload))
+                name = names[record.link] if record.link < len(names) else ""
+                if name in self.swarm.intake.streams:
+                    self.swarm.take(Chunk(name, record.t_ns, record.payload))
             elif record.kind == Kind.EVENT:
                 event = record.event()
                 if event.get("event") == "applied":
@@ -67,13 +85,19 @@ class ReplayFeed:
         """Nothing moves in a recording."""
 
 
-def open_replay(path: Path | str, pace: Callable[[int], None] | None = None) -> ReplayFeed:
-    """A recording from its file.
+def open_replay(
+    path: Path | str,
+    pace: Callable[[int], None] | None = None,
+    *,
+    filter: str | None = None,
+) -> ReplayFeed:
+    """A recording from its file; arguments as of `ReplayFeed`.
 
     Raises:
         BridgeError: It is none, or its configuration makes no sense here.
+        ConfigError: No such filter.
     """
-    return ReplayFeed(read_recording(path), pace)
+    return ReplayFeed(read_recording(path), pace, filter=filter)
 
 
 def _calibration(recording: Recording) -> Calibration | None:

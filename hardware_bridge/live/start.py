@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from hardware_bridge.errors import BridgeError
-from hardware_bridge.live.feed import LiveFeed
 from hardware_bridge.live.group import LiveGroup
 from hardware_bridge.safety.gate import reason_text
+from hardware_bridge.safety.messages import Report
 from relpos_env.timing import DECISION
 from tracking.arrays import F64
 
@@ -38,14 +39,24 @@ class StartParams:
     """[s] Forwards and back of the first car; the others take longer by fifths."""
 
 
+class Gated(Protocol):
+    """Something with a gate at its end: ports and a supervisor, or both in memory."""
+
+    report: Report | None
+    """What the gate did, the latest; None before the first word from it."""
+
+    def order(self, what: str) -> None:
+        """Pass on what a person asks for; see `Order`."""
+
+
 class Start:
     """Arms the cars and lets them find each other."""
 
-    def __init__(self, feed: LiveFeed, *, arm: bool, params: StartParams | None = None) -> None:
+    def __init__(self, feed: Gated, *, arm: bool, params: StartParams | None = None) -> None:
         """Prepare for a start.
 
         Args:
-            feed: Of ports and supervisor.
+            feed: Of the cars' gate.
             arm: Whether cars may move; otherwise nothing is done and nothing waited for.
             params: How long, and how they wriggle.
         """

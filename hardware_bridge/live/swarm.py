@@ -5,12 +5,15 @@ Pure: what a live drive saw is what its recording gives, to the last bit.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from hardware_bridge.config.swarm import SwarmConfig
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.ports import Chunk
 from hardware_bridge.live.intake import Intake
+from hardware_bridge.live.ready import ReadyPerception
 from relpos_env.interface.perception import Perception
 from relpos_env.interface.views import View
 from tracking.arrays import F64, Bool
@@ -50,15 +53,10 @@ class LiveSwarm:
         self._room = ROOM
         self._here: set[int] = set()
         self._applied: tuple[F64, F64] = (np.zeros(config.n_slots), np.zeros(config.n_slots))
-        params = TrackerParams(horizon=HorizonParams(delay=config.tracker.delay))
-        self._perception = Perception(
-            self.group,
-            params,
-            self._block,
-            self._powered,
-            filter=config.tracker.filter,
-            room=self._room,
-        )
+        self._perception = self._make_perception()
+        self.tap: Callable[[MeasurementBlock], None] | None = None
+        """Called with what was measured since the last step, as it came, without calibration; the
+        block is overwritten by the next."""
         self.trim: F64 = np.zeros((1, config.n_slots, 2))
         """Velocity that an operator asks for on top of the plan, (1, slot, 2) [m/s]."""
 
@@ -69,13 +67,16 @@ class LiveSwarm:
 
     @property
     def estimate(self) -> TeamEstimate:
-        """The tracker's last estimate, as old as the horizon, overwritten by the next."""
+        """The tracker's last estimate, as old as the horizon, overwritten by the next.
+
+        Where positions come ready it is that of now.
+        """
         return self._perception.estimate
 
     @property
     def n_late(self) -> int:
         """Measurements that came later than the horizon waits."""
-        return int(self._perception.horizon.n_late[0])
+        return int(self._perception.n_late[0])
 
     def share(self, target: F64, wanted: Bool, command: F64) -> None:
         """Let the view have what the task wants; see `Perception.share`."""
@@ -105,6 +106,8 @@ class LiveSwarm:
         events = self.intake.events
         self._make_room(len(events))
         events.move_into(self._block)
+        if self.tap is not None:
+            self.tap(self._block)
         if self._calibration is not None:
             corrected = self._calibration.apply(self._block, self.group)
             self._block.values[:] = corrected.values
@@ -113,13 +116,30 @@ class LiveSwarm:
         self._perception.step()
 
     def heard(self, never: float = -np.inf) -> F64:
-        """When each car's node was last heard, by the host's clock, (slot) [s]."""
+        """When each car's node last told of its motion, by the host's clock, (slot) [s]."""
         heard_ns = self.intake.heard_ns
+        if self.config.tracker.source != "positions":
+            heard_ns = heard_ns | self.intake.sensed_ns
         return np.array([heard_ns[k] * 1e-9 if k in heard_ns else never for k in self._slots])
 
     @property
     def _slots(self) -> range:
         return range(self.config.n_slots)
+
+    def _make_perception(self) -> Perception | ReadyPerception:
+        tracker, group = self.config.tracker, self.group
+        if tracker.source == "positions":
+            told = self.intake.told
+            return ReadyPerception(group, tracker.positions, told, self._block, self._powered)
+        params = TrackerParams(horizon=HorizonParams(delay=tracker.delay))
+        return Perception(
+            group,
+            params,
+            self._block,
+            self._powered,
+            filter=tracker.filter,
+            room=self._room,
+        )
 
     def _let_go(self, t_ns: int, now: float) -> None:
         """Nodes that have fallen silent leave; they are back when they are heard."""
@@ -130,7 +150,7 @@ class LiveSwarm:
 
     def _make_room(self, n: int) -> None:
         """Grow, after a pause in which much has piled up."""
-        waiting = int(self._perception.horizon.state.n_waiting[0])
+        waiting = int(self._perception.n_waiting[0])
         if n + waiting <= self._room:
             return
         while self._room < n + waiting:

@@ -12,14 +12,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hardware_bridge.safety.moment import Moment
 from hardware_bridge.safety.params import SafetyParams
 from hardware_bridge.safety.picture import Picture
-from hardware_bridge.safety.rules import RULES, Moment
+from hardware_bridge.safety.recent import Recent, at_rest
+from hardware_bridge.safety.rules import RULES
 from tracking.arrays import F64, I64, Bool
 
 NO_REASON = -1
 NOT_ARMED = -2
 EMERGENCY = -3
+LONGEST = 0.1
+"""[s] After a longer pause commands change by no more than after this one."""
 REASONS = {NO_REASON: "", NOT_ARMED: "not armed", EMERGENCY: "emergency stop"}
 
 
@@ -57,14 +61,14 @@ class Gate:
         self._well_since: F64 = np.full(shape, np.inf)
         self._held: I64 = np.full(shape, NOT_ARMED)
         self._slow: Bool = np.zeros((len(RULES), *shape), dtype=bool)
-        self._speed: F64 = np.zeros(shape)
-        self._steering: F64 = np.zeros(shape)
+        self._recent: Recent = at_rest(shape)
         self._last: F64 = np.full(n_envs, -np.inf)
 
     def stop(self, envs: slice = slice(None)) -> None:
         """Emergency stop of whole groups."""
         self.emergency[envs] = True
         self.armed[envs] = False
+        self._held[envs] = NOT_ARMED
 
     def clear(self, envs: slice = slice(None)) -> None:
         """End an emergency stop; every car must be armed again."""
@@ -107,50 +111,61 @@ class Gate:
         """
         p = self.params
         forward, backward = np.full((2, *heard.shape), p.max_speed)
+        left, right = np.full((2, *heard.shape), p.max_steering)
         wanted = np.nan_to_num(
             picture.speed_wanted, nan=0.0, posinf=p.max_speed, neginf=-p.max_speed
         )
-        limiting = np.full(heard.shape, NO_REASON)
-        hold = np.zeros(heard.shape, dtype=bool)
-        for k, rule in enumerate(RULES):
-            moment = Moment(picture, now, word, heard, linked, self._slow[k])
-            verdict = rule.check(moment, p)
-            self._slow[k] = (verdict.forward < p.max_speed) | (verdict.backward < p.max_speed)
-            cap = np.where(wanted >= 0.0, verdict.forward, verdict.backward)
-            tighter = cap < np.where(wanted >= 0.0, forward, backward)
-            limiting[tighter & (cap < np.abs(wanted))] = k
-            newly = verdict.hold & self.armed & ~hold
-            self._held[newly] = k
-            hold |= verdict.hold
-            # NaN is no number to drive by.
-            forward = np.fmin(forward, np.where(np.isnan(verdict.forward), 0.0, verdict.forward))
-            backward = np.fmin(
-                backward, np.where(np.isnan(verdict.backward), 0.0, verdict.backward)
-            )
+        ahead = wanted >= 0.0
+        limiting, holding = np.full((2, *heard.shape), NO_REASON)
+        # What is not a number passes no comparison; rules see to it that it passes for unwell.
+        with np.errstate(invalid="ignore", over="ignore"):
+            for k, rule in enumerate(RULES):
+                verdict = rule.check(
+                    Moment(
+                        picture, now, word, heard, linked,
+                        self.armed, self._recent, self._slow[k],
+                    ), p
+                )  # fmt: skip
+                on, back = (np.where(cap >= 0.0, cap, 0.0) for cap in verdict[:2])
+                self._slow[k] = (on < p.max_speed) | (back < p.max_speed)
+                cap = np.where(ahead, on, back)
+                limiting[(cap < np.where(ahead, forward, backward)) & (cap < np.abs(wanted))] = k
+                holding[verdict.hold & (holding == NO_REASON)] = k
+                forward, backward = np.minimum(forward, on), np.minimum(backward, back)
+                left, right = np.fmin(left, verdict.left), np.fmin(right, verdict.right)
+        hold = holding != NO_REASON
+        self._held = np.where(hold & self.armed, holding, self._held)
         self.armed &= ~hold & ~self.emergency[:, None]
         self._well_since = np.where(hold, np.inf, np.minimum(self._well_since, now[:, None]))
         speed = np.clip(wanted, -backward, forward)
-        elapsed = np.clip(np.where(np.isfinite(self._last), now - self._last, 0.0), 0.0, 0.1)
-        self._last = now.copy()
-        speed = self._ramp(speed, elapsed[:, None])
-        steering = np.clip(np.nan_to_num(picture.steering_wanted), -p.max_steering, p.max_steering)
-        turn = p.max_steering_rate * elapsed[:, None]
-        steering = np.clip(steering, self._steering - turn, self._steering + turn)
-        self._speed = np.where(self.armed, speed, 0.0)
-        self._steering = np.where(self.armed, steering, 0.0)
-        held = np.where(self.emergency[:, None], EMERGENCY, self._held)
+        steering = np.clip(np.nan_to_num(picture.steering_wanted), -right, left)
+        self._move(speed, steering, now)
+        held = np.where(self.emergency[:, None], EMERGENCY, np.where(hold, holding, self._held))
         return GateOutput(
-            speed=self._speed.copy(),
-            steering=self._steering.copy(),
+            speed=self._recent.speed.copy(),
+            steering=self._recent.steering.copy(),
             moving=self.armed.copy(),
             armed=self.armed.copy(),
-            cap=np.where(wanted >= 0.0, forward, backward),
+            cap=np.where(ahead, forward, backward),
             reason=np.where(self.armed, limiting, held),
         )
 
-    def _ramp(self, speed: F64, elapsed: F64) -> F64:
-        """Speeds that rise no faster than allowed; they may fall, and reverse through zero."""
-        before, most = self._speed, self.params.max_accel * elapsed
+    def _move(self, speed: F64, steering: F64, now: F64) -> None:
+        """Go towards what is allowed, no faster than commands may change."""
+        p = self.params
+        elapsed = np.where(np.isfinite(self._last), now - self._last, 0.0)[:, None]
+        self._last = now.copy()
+        change = np.clip(elapsed, 0.0, LONGEST)
+        speed = self._ramp(speed, p.max_accel * change)
+        before, turn = self._recent.steering, p.max_steering_rate * change
+        steering = np.clip(steering, before - turn, before + turn)
+        speed = np.where(self.armed, speed, 0.0)
+        steering = np.where(self.armed, steering, 0.0)
+        self._recent = self._recent.after(speed, steering, elapsed, p.braking)
+
+    def _ramp(self, speed: F64, most: F64) -> F64:
+        """Speeds that rise by so much at most; they may fall, and reverse through zero."""
+        before = self._recent.speed
         same = np.sign(speed) * np.sign(before) >= 0.0
         start = np.where(same, np.abs(before), 0.0)
         ramped: F64 = np.sign(speed) * np.minimum(np.abs(speed), start + most)

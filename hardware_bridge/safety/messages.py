@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -90,19 +90,23 @@ class Ready:
 
 Message: TypeAlias = Word | Decision | Order | Telemetry | Report | Notice | Ready
 _REPORT = struct.Struct("<dd?qd")
+_TELEMETRY = struct.Struct("<Bq")
+_TIME = struct.Struct("<d")
+ROWS = 7
+"""Of numbers of every car in a report."""
 
 
 def pack(message: Message) -> bytes:
     """The bytes of a message."""
     match message:
         case Word(t, heard):
-            return b"W" + struct.pack("<d", t) + heard.tobytes()
+            return b"W" + _TIME.pack(t) + heard.tobytes()
         case Decision(picture):
             return b"D" + picture.to_bytes()
         case Order(what):
             return b"O" + what.encode()
         case Telemetry(car, t_ns, data):
-            return b"T" + struct.pack("<Bq", car, t_ns) + data
+            return b"T" + _TELEMETRY.pack(car, t_ns) + data
         case Report():
             r = message
             rows = (r.speed, r.steering, r.cap, r.armed, r.linked, r.reason, r.well_for)
@@ -122,17 +126,17 @@ def unpack(data: bytes, n_cars: int) -> Message:
     """
     kind, rest = data[:1], data[1:]
     if kind == b"W":
-        return Word(struct.unpack_from("<d", rest)[0], np.frombuffer(rest[8:]))
+        return Word(_head(_TIME, rest)[0], _numbers(rest[_TIME.size :], n_cars))
     if kind == b"D":
         return Decision(Picture.from_bytes(rest, n_cars))
     if kind == b"O":
         return Order(rest.decode())
     if kind == b"T":
-        car, t_ns = struct.unpack_from("<Bq", rest)
-        return Telemetry(car, t_ns, rest[9:])
+        car, t_ns = _head(_TELEMETRY, rest)
+        return Telemetry(car, t_ns, rest[_TELEMETRY.size :])
     if kind == b"R":
-        t, late, emergency, missed, lag = _REPORT.unpack_from(rest)
-        rows = np.frombuffer(rest[_REPORT.size :]).reshape(7, n_cars)
+        t, late, emergency, missed, lag = _head(_REPORT, rest)
+        rows = _numbers(rest[_REPORT.size :], ROWS * n_cars).reshape(ROWS, n_cars)
         speed, steering, cap, armed, linked, reason, well_for = rows
         return Report(
             t, speed, steering, cap, armed, linked, reason, well_for, emergency, late, missed, lag
@@ -142,3 +146,15 @@ def unpack(data: bytes, n_cars: int) -> Message:
     if kind == b"Y":
         return Ready(rest.decode())
     raise ValueError(f"unknown kind {kind!r}")
+
+
+def _head(layout: struct.Struct, data: bytes) -> tuple[Any, ...]:
+    if len(data) < layout.size:
+        raise ValueError(f"expected at least {layout.size} bytes, got {len(data)}")
+    return layout.unpack_from(data)
+
+
+def _numbers(data: bytes, count: int) -> F64:
+    if len(data) != 8 * count:
+        raise ValueError(f"expected {count} numbers, got {len(data)} bytes")
+    return np.frombuffer(data, dtype=np.float64)

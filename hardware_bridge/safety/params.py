@@ -5,7 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from math import isfinite
 
+import numpy as np
+
 from hardware_bridge.errors import BridgeError
+from hardware_bridge.safety.polygon import area
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,15 +23,10 @@ class Fence:
     def __post_init__(self) -> None:
         if len(self.corners) < 3:
             raise BridgeError(f"corners: expected at least 3, got {len(self.corners)}")
-        if any(max(abs(x), abs(y)) > 1e4 for x, y in self.corners):
+        if not all(max(abs(x), abs(y)) <= 1e4 for x, y in self.corners):
             raise BridgeError("corners: expected metres within 10 km")
-        if abs(_area(self.corners)) < 0.1:
+        if abs(area(np.array(self.corners))) < 0.1:
             raise BridgeError("corners: expected a polygon with an area")
-
-
-def _area(corners: tuple[tuple[float, float], ...]) -> float:
-    turned = (*corners[1:], corners[0])
-    return 0.5 * sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(corners, turned, strict=True))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,12 +60,26 @@ class SafetyParams:
     """[s] Everything must have been well for so long before a car can be armed."""
     braking: float = 2.0
     """[m/s2] What cars surely brake with. 1:10 cars on a clean floor reach 2.5."""
+    hardest: float = 5.0
+    """[m/s2] What cars surely do not brake harder with: one that drives away does not stand at
+    once."""
     reaction: float = 0.25
-    """[s] From what estimates tell to brakes that bite: horizon, tick, wire and motor."""
+    """[s] From a moment that the estimates tell of to brakes that bite, the age of the decision
+    not counted: tick, wire, motor and its controller, and what estimates lag behind."""
+    turning_radius: float = 0.65
+    """[m] Of the cars' tightest turn: wheelbase over the tangent of `max_steering`."""
+    turning_room: float = 0.4
+    """[m] With less room to something abeam, cars may turn towards it by a share of
+    `max_steering` only."""
+    deadman: float = 0.2
+    """[s] A car that hears nothing stops by itself after so long; counted for the others where a
+    car's port is lost."""
     separation: float = 0.5
     """[m] Between the middles of two cars, never less; a 1:10 car is 0.42 m long."""
-    confidence: float = 2.0
-    """[-] Standard deviations that distances are believed to be off."""
+    confidence: float = 2.5
+    """[-] Standard deviations that positions are believed to be off at most."""
+    range_error: float = 0.2
+    """[m] By which a range alone is believed to be too long at most: no line of sight."""
     range_limit: float = 1.0
     """[s] Where positions are not known, a range as old as this says nothing any more; stopped
     for good."""

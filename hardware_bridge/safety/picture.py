@@ -62,13 +62,15 @@ class Picture(NamedTuple):
         Raises:
             ValueError: The length is not that of a picture of so many cars.
         """
-        numbers, blank = np.frombuffer(data, dtype=np.float64), blank_picture(1, n_cars)
+        blank = blank_picture(1, n_cars)
+        expected = sum(array.nbytes for array in blank)
+        if len(data) != expected:
+            raise ValueError(f"expected {expected} bytes, got {len(data)}")
+        numbers = np.frombuffer(data, dtype=np.float64)
         parts, start = [], 0
         for array in blank:
             parts.append(numbers[start : start + array.size].reshape(array.shape))
             start += array.size
-        if start != len(numbers):
-            raise ValueError(f"expected {start} numbers, got {len(numbers)}")
         return cls(*parts)
 
 

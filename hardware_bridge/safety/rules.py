@@ -1,7 +1,8 @@
 """The rules of the gate, a table: each caps speeds, and may stop a car for good.
 
-A rule looks at the picture and the clock, array over (env, car), and remembers nothing but what
-hysteresis needs. `docs/safety.md` has the table in words.
+A rule looks at one moment, arrays over (env, car), and remembers nothing. Comparisons are such that
+what is not a number, or comes from the future, counts as unwell. `docs/safety.md` has the table in
+words, and the reasoning behind the distances.
 """
 
 from __future__ import annotations
@@ -11,44 +12,21 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hardware_bridge.safety.approach import REAR, age_of, ahead_of, approach, bearing
 from hardware_bridge.safety.braking import stopping_speed, stopping_way
+from hardware_bridge.safety.moment import FREE, Moment, Verdict
 from hardware_bridge.safety.params import SafetyParams
 from hardware_bridge.safety.picture import Picture
+from hardware_bridge.safety.polygon import outwards, to_edges
+from hardware_bridge.safety.turning import gain
 from tracking.arrays import F64, Bool
 from tracking.estimate import Status
 
-FREE = np.inf
-SWERVE = 0.5
-"""[-] Sine of how far a car may turn towards something while it brakes from any speed."""
-SWERVE_SLOW = 0.15
-"""[-] Likewise when it is slow."""
-
-
-class Moment(NamedTuple):
-    """All that rules see."""
-
-    picture: Picture
-    now: F64
-    """(env) [s]"""
-    word: F64
-    """When the deciding process last gave a sign of life, (env) [s]."""
-    heard: F64
-    """When each car's node was last heard, (env, car) [s]."""
-    linked: Bool
-    """Whether the car's own port is open, (env, car)."""
-    was_slow: Bool
-    """Whether the last verdict of this rule capped or stopped, (env, car): for hysteresis."""
-
-
-class Verdict(NamedTuple):
-    """What a rule says of every car."""
-
-    forward: F64
-    """Speed at most, (env, car) [m/s]."""
-    backward: F64
-    """Likewise, backwards."""
-    hold: Bool
-    """Stop for good: only arming again lets it move, (env, car)."""
+AHEAD = 0.05
+"""[s] A time so far ahead of the clock is no time."""
+DIRECTION = 1.0
+"""[-] Standard deviations that the direction of another that is too near is believed to be off;
+with more, cars beside each other could not part."""
 
 
 class Rule(NamedTuple):
@@ -57,33 +35,47 @@ class Rule(NamedTuple):
     name: str
     check: Callable[[Moment, SafetyParams], Verdict]
     meaning: str
+    """What a user is told."""
+    effect: str
+    """What it does, for `docs/safety.md`."""
 
 
 def silence(m: Moment, p: SafetyParams) -> Verdict:
     """The process that decides hangs, was stopped or is gone."""
-    quiet: Bool = np.zeros(m.heard.shape, dtype=bool) | (m.now - m.word > p.silence)[:, None]
-    return _capped(np.where(quiet, 0.0, FREE), quiet)
+    quiet: Bool = _never(m) | ~_within(m.now - m.word, p.silence)[:, None]
+    return _held(quiet)
+
+
+def link(m: Moment, p: SafetyParams) -> Verdict:
+    """The car's own port is lost."""
+    return _held(~m.linked)
+
+
+def absent(m: Moment, p: SafetyParams) -> Verdict:
+    """The car takes no part: none would look out for it."""
+    return _held(m.picture.present != 1.0)
 
 
 def stale(m: Moment, p: SafetyParams) -> Verdict:
     """What is known of the car is old: its node was not heard, or nothing was estimated."""
-    age = m.now[:, None] - np.minimum(m.heard, m.picture.t[:, None])
-    cap = np.where(age > p.stale_stop, 0.0, np.where(age > p.stale_slow, p.slow, FREE))
-    return _capped(cap, age > p.stale_stop)
+    times = (m.now[:, None] - m.heard, (m.now - m.picture.t)[:, None])
+    old = ~(_within(times[0], p.stale_stop) & _within(times[1], p.stale_stop))
+    older = ~(_within(times[0], p.stale_slow) & _within(times[1], p.stale_slow))
+    return _capped(np.where(old, 0.0, np.where(older, p.slow, FREE)), old)
 
 
 def covariance(m: Moment, p: SafetyParams) -> Verdict:
     """A covariance is none: not finite, not symmetric or not positive definite."""
-    bad: Bool = np.any(_judged(m.picture) & (m.picture.sound == 0.0), axis=-1)
-    return _capped(np.where(bad, 0.0, FREE), bad)
+    q = m.picture
+    bad: Bool = np.any(_judged(q) & ((q.sound != 1.0) | ~(q.sigma >= 0.0)), axis=-1)
+    return _held(bad)
 
 
 def sigma(m: Moment, p: SafetyParams) -> Verdict:
     """Where another is, is not known well enough."""
     worst = np.where(_judged(m.picture), m.picture.sigma, 0.0).max(axis=-1)
-    # NaN compares as False; it is a matter of `covariance`, but must not pass for small here.
-    over = np.logical_not(worst <= p.sigma_slow * np.where(m.was_slow, p.hysteresis, 1.0))
-    far = np.logical_not(worst <= p.sigma_stop)
+    over = ~(worst <= p.sigma_slow * np.where(m.was_slow, p.hysteresis, 1.0))
+    far = ~(worst <= p.sigma_stop)
     return _capped(np.where(far, 0.0, np.where(over, p.slow, FREE)), far)
 
 
@@ -91,41 +83,55 @@ def unknown(m: Moment, p: SafetyParams) -> Verdict:
     """The position of another is not known yet, or its ranges contradict each other."""
     q = m.picture
     unsure = _others(q) & ~_judged(q)
-    old = unsure & ~(m.now[:, None, None] - q.ranged <= p.range_limit)
-    hold: Bool = np.any(old, axis=-1)
-    slow: Bool = np.any(unsure, axis=-1)
-    # Only the distance is known: whichever way the car goes may be the wrong one.
-    way = np.where(unsure, q.distance - p.separation, FREE).min(axis=-1, initial=FREE)
-    cap = np.minimum(p.slow, stopping_speed(way, p.reaction, p.braking))
-    return _capped(np.where(hold, 0.0, np.where(slow, cap, FREE)), hold)
+    age = m.now[:, None, None] - q.ranged
+    known = _within(age, p.range_limit) & np.isfinite(q.distance)
+    hold: Bool = np.any(unsure & ~known, axis=-1)
+    # Doubt lasts for seconds, and only cars that move dispel it: a formation that crept through
+    # it would fall apart. One that has yet to find itself creeps.
+    slow: Bool = np.any(unsure & (q.status != Status.DOUBTFUL), axis=-1)
+    # Only the distance is known: whichever way the car goes may be the wrong one, for both.
+    way = 0.5 * (q.distance - p.range_error - p.separation)
+    speed = stopping_speed(way, p.reaction + np.where(known, np.maximum(age, 0.0), 0.0), p.braking)
+    cap = np.where(unsure, speed, FREE).min(axis=-1)
+    return _capped(np.where(hold, 0.0, np.where(slow, np.minimum(cap, p.slow), cap)), hold)
 
 
 def lost_heading(m: Moment, p: SafetyParams) -> Verdict:
     """The car does not know where it points."""
-    return _capped(np.where(m.picture.oriented == 0.0, 0.0, FREE), _never(m))
-
-
-def link(m: Moment, p: SafetyParams) -> Verdict:
-    """The car's own port is lost."""
-    return _capped(np.where(m.linked, FREE, 0.0), ~m.linked)
+    sure = (m.picture.oriented == 1.0) & np.isfinite(m.picture.heading)
+    return _capped(np.where(sure, FREE, 0.0), _never(m))
 
 
 def separation(m: Moment, p: SafetyParams) -> Verdict:
-    """Another car is nearer than both need to stop."""
-    q = m.picture
-    known = _others(q) & _judged(q)
-    elapsed = (m.now - q.t)[:, None, None, None]
-    pos = q.pos + np.where(np.isfinite(elapsed), elapsed, 0.0) * q.vel
-    d = np.maximum(np.hypot(pos[..., 0], pos[..., 1]), 1e-9)
-    towards = pos / d[..., None]
-    ahead = np.stack([np.cos(q.heading), np.sin(q.heading)], axis=-1)
-    own = (q.speed[..., None] * ahead)[:, :, None]
-    their = -((own + q.vel) * towards).sum(axis=-1)
-    room = d - p.separation - p.confidence * q.sigma - stopping_way(their, p.reaction, p.braking)
-    approach = (ahead[:, :, None] * towards).sum(axis=-1)
-    caps = (_approached(room, sign * approach, known, p).min(axis=-1) for sign in (1.0, -1.0))
-    forward, backward = caps
-    return Verdict(forward, backward, _never(m))
+    """Another car is nearer than both need to stop.
+
+    Of the room between two, a car may use half, or what the other cannot use at its speed if that
+    is more; of one that nobody holds to rules it may use that alone.
+    """
+    q, recent = m.picture, m.recent
+    ahead = ahead_of(q)
+    d = np.maximum(np.hypot(q.pos[..., 0], q.pos[..., 1]), 1e-9)
+    towards = q.pos / d[..., None]
+    room = d - p.separation - p.confidence * q.sigma
+    time = p.reaction + age_of(m) + np.where(m.linked, 0.0, p.deadman)
+    angle, _ = bearing(ahead[:, None, :], -towards)
+    sure = (q.oriented == 1.0)[:, None, :]
+    swing, used = np.arctan(REAR / p.turning_radius), np.zeros(())
+    for sign, told in ((1.0, recent.forward), (-1.0, recent.backward)):
+        way = stopping_way(np.maximum(sign * q.speed, told), time, p.braking)[:, None, :]
+        off = angle if sign > 0.0 else np.pi - angle
+        turned = np.where(sure, np.maximum(off - swing, 0.0), 0.0)
+        used = np.maximum(used, gain(way, turned, p.turning_radius))
+        gone = np.minimum(sign * q.speed, sign * recent.speed)[:, None, :] * -np.cos(off)
+        room = room + np.where(sure, np.maximum(gone, 0.0) ** 2, 0.0) / (2.0 * p.hardest)
+    share = np.maximum(room - used, np.where(m.armed[:, None, :], 0.5 * room, 0.0))
+    # Where they may be that near already, the other may be in any direction of a lens: that of the
+    # error, which has the estimate in its middle, without the separation round the car.
+    error, least = DIRECTION * q.sigma, p.separation
+    cosine = (least * least + d * d - error * error) / (2.0 * least * d)
+    spread = np.where(d < least + error, np.arccos(np.clip(cosine, -1.0, 1.0)), 0.0)
+    spread = np.where(d + error < least, np.arcsin(np.minimum(error / d, 1.0)), spread)
+    return approach(m, p, towards, share, spread, _judged(q))
 
 
 def fence(m: Moment, p: SafetyParams) -> Verdict:
@@ -133,61 +139,33 @@ def fence(m: Moment, p: SafetyParams) -> Verdict:
     if p.fence is None:
         return _capped(np.full(m.heard.shape, FREE), _never(m))
     q = m.picture
-    placed = q.placed == 1.0
-    elapsed = np.maximum(m.now - q.t, 0.0)[:, None]
-    ahead = np.stack([np.cos(q.heading), np.sin(q.heading)], axis=-1)
-    moved = np.where(np.isfinite(elapsed), elapsed, 0.0) * q.speed
-    place = q.place + moved[..., None] * ahead
-    inside, offset = to_edges(place, np.array(p.fence.corners))
-    d = np.hypot(offset[..., 0], offset[..., 1])
+    placed = (q.placed == 1.0) & np.isfinite(q.place).all(axis=-1) & (q.place_sigma >= 0)
+    corners = np.array(p.fence.corners)
     margin = p.confidence * q.place_sigma
-    out = placed & ~inside & (d.min(axis=-1) > margin)
-    towards = offset / np.maximum(d, 1e-9)[..., None] * np.where(inside, 1.0, -1.0)[..., None, None]
-    room = np.where(inside[..., None], d, -d) - margin[..., None]
-    approach = (ahead[:, :, None] * towards).sum(axis=-1)
-    everywhere = np.ones(room.shape, dtype=bool)
-    forward, backward = (
-        np.where(placed, _approached(room, sign * approach, everywhere, p).min(axis=-1), 0.0)
-        for sign in (1.0, -1.0)
-    )
-    return Verdict(forward, backward, out)
+    inside, offset = to_edges(q.place, corners)
+    away = np.hypot(offset[..., 0], offset[..., 1])
+    out = placed & ~inside & ~(away.min(axis=-1) <= margin)
+    # A place outside is an error as long as it may be one: the car is on the fence then.
+    nearest = np.take_along_axis(offset, away.argmin(axis=-1)[..., None, None], axis=-2)[..., 0, :]
+    place = np.where(inside[..., None], q.place, q.place + nearest)
+    _, offset = to_edges(place, corners)
+    d = np.hypot(offset[..., 0], offset[..., 1])[..., None]
+    towards = np.where(d > 1e-6, offset / np.maximum(d, 1e-6), outwards(corners))
+    room = d[..., 0] - margin[..., None]
+    near = approach(m, p, towards, room, np.zeros(()), np.ones(room.shape, dtype=bool))
+    forward, backward = (np.where(placed, cap, 0.0) for cap in near[:2])
+    return Verdict(forward, backward, out, near.left, near.right)
 
 
-def to_edges(place: F64, corners: F64) -> tuple[Bool, F64]:
-    """Whether places are inside a polygon, and the way to the nearest point of each edge.
-
-    Args:
-        place: (..., 2) [m]
-        corners: (corner, 2) [m]
-
-    Returns:
-        Inside, (...); offsets to the edges, (..., corner, 2) [m].
-    """
-    a, b = corners, np.roll(corners, -1, axis=0)
-    edge, from_a = b - a, place[..., None, :] - a
-    along = np.clip((from_a * edge).sum(axis=-1) / np.maximum((edge**2).sum(axis=-1), 1e-12), 0, 1)
-    offset: F64 = a + along[..., None] * edge - place[..., None, :]
-    y, x = place[..., None, 1], place[..., None, 0]
-    spans = (a[:, 1] > y) != (b[:, 1] > y)
-    rise = np.where(edge[:, 1] == 0.0, 1.0, edge[:, 1])
-    crosses = spans & (x < a[:, 0] + (y - a[:, 1]) / rise * edge[:, 0])
-    inside: Bool = crosses.sum(axis=-1) % 2 == 1
-    return inside, offset
-
-
-def _approached(room: F64, approach: F64, counts: Bool, p: SafetyParams) -> F64:
-    """Speed at most, by the room to things [m] and the cosine of the angle towards each."""
-    speed = stopping_speed(room, p.reaction, p.braking)
-    fast = speed / np.clip(approach + SWERVE, 1e-9, 1.0)
-    slow = np.minimum(p.slow, speed / np.clip(approach + SWERVE_SLOW, 1e-9, 1.0))
-    fast = np.where(approach + SWERVE <= 0.0, FREE, fast)
-    slow = np.where(approach + SWERVE_SLOW <= 0.0, p.slow, slow)
-    return np.where(counts, np.maximum(fast, slow), FREE)
+def _within(age: F64, limit: float) -> Bool:
+    """Whether an age is one, and below a limit."""
+    good: Bool = (age <= limit) & (age >= -AHEAD)
+    return good
 
 
 def _others(q: Picture) -> Bool:
-    """Pairs of present cars, (env, car, other)."""
-    here = q.present == 1.0
+    """Pairs of cars that may be there, (env, car, other)."""
+    here = q.present != 0.0
     both: Bool = here[:, :, None] & here[:, None, :]
     return both & ~np.eye(here.shape[1], dtype=bool)
 
@@ -195,7 +173,7 @@ def _others(q: Picture) -> Bool:
 def _judged(q: Picture) -> Bool:
     """Pairs whose position is said to be known, and so is judged by its covariance."""
     known = (q.status == Status.OK) | (q.status == Status.LOST)
-    judged: Bool = known & _others(q)
+    judged: Bool = known & np.isfinite(q.pos).all(axis=-1) & _others(q)
     return judged
 
 
@@ -203,19 +181,44 @@ def _capped(cap: F64, hold: Bool) -> Verdict:
     return Verdict(cap, cap, hold)
 
 
+def _held(hold: Bool) -> Verdict:
+    return _capped(np.where(hold, 0.0, FREE), hold)
+
+
 def _never(m: Moment) -> Bool:
     return np.zeros(m.heard.shape, dtype=bool)
 
 
 RULES = (
-    Rule("silence", silence, "the deciding process gave no sign of life"),
-    Rule("link", link, "the car's port is lost"),
-    Rule("stale", stale, "its node was not heard, or nothing was estimated"),
-    Rule("covariance", covariance, "a covariance is not positive definite"),
-    Rule("sigma", sigma, "where another car is, is not known well enough"),
-    Rule("unknown", unknown, "the position of another car is not known"),
-    Rule("heading", lost_heading, "the heading is not known"),
-    Rule("separation", separation, "another car is too near to go on"),
-    Rule("fence", fence, "the fence is too near to go on"),
-)
+    Rule(
+        "silence", silence, "the deciding process gave no sign of life",
+        "stops for good after `silence`",
+    ),
+    Rule("link", link, "the car's port is lost", "stops for good"),
+    Rule("absent", absent, "it takes no part", "stops for good"),
+    Rule(
+        "stale", stale, "its node was not heard, or nothing was estimated",
+        "`slow` after `stale_slow`, stops for good after `stale_stop`",
+    ),
+    Rule("covariance", covariance, "a covariance is not positive definite", "stops for good"),
+    Rule(
+        "sigma", sigma, "where another car is, is not known well enough",
+        "`slow` above `sigma_slow`, stops for good above `sigma_stop`",
+    ),
+    Rule(
+        "unknown", unknown, "the position of another car is not known",
+        "`slow` (not where ranges contradict each other), and half of what the last range leaves; "
+        "stops for good if that is older than `range_limit`",
+    ),
+    Rule("heading", lost_heading, "the heading is not known", "stands until it is"),
+    Rule(
+        "separation", separation, "another car is too near to go on",
+        "only as fast, and turning towards it only as far, as leaves both their ways to a stop",
+    ),
+    Rule(
+        "fence", fence, "the fence is too near to go on",
+        "only as fast, and turning towards it only as far, as leaves the way to a stop; stops for "
+        "good outside",
+    ),
+)  # fmt: skip
 """In the order in which reasons are told."""

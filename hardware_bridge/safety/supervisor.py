@@ -11,7 +11,7 @@ from hardware_bridge.safety.gate import Gate, GateOutput, reason_text
 from hardware_bridge.safety.messages import Decision, Message, Notice, Order, Report, Word
 from hardware_bridge.safety.params import SafetyParams
 from hardware_bridge.safety.picture import Picture, blank_picture
-from tracking.arrays import F64, Bool
+from tracking.arrays import F64, I64, Bool
 
 LATE = 0.02
 """[s] A tick later than this is counted as missed."""
@@ -20,16 +20,23 @@ LATE = 0.02
 class Supervisor:
     """Holds the cars of one group to the rules, tick by tick."""
 
-    def __init__(self, params: SafetyParams, n_cars: int, drivers: Mapping[int, CarDriver]) -> None:
+    def __init__(
+        self,
+        params: SafetyParams,
+        n_cars: int,
+        drivers: Mapping[int, CarDriver],
+        names: Mapping[int, str],
+    ) -> None:
         """Begin with nothing armed.
 
         Args:
             params: Limits.
             n_cars: Slots.
             drivers: Of the slots that have a car.
+            names: What each of these is called in notices.
         """
         self._gate = Gate(params, 1, n_cars)
-        self._drivers = dict(drivers)
+        self._drivers, self._names = dict(drivers), dict(names)
         self._picture: Picture = blank_picture(1, n_cars)
         self._word = np.full(1, -np.inf)
         self._heard: F64 = np.full((1, n_cars), -np.inf)
@@ -39,6 +46,7 @@ class Supervisor:
         self._armed: Bool = np.zeros(n_cars, dtype=bool)
         self._late, self._missed = 0.0, 0
         self._lag, self._decided = 0.0, -np.inf
+        self._broken: dict[int, str] = {}
         self.quit = False
         """Asked to end."""
 
@@ -48,8 +56,10 @@ class Supervisor:
             case Word(t, heard):
                 self._word[0], self._heard[0] = t, heard
             case Decision(picture):
-                self._picture = picture
-                self._word[0] = max(float(picture.t[0]), self._word[0])
+                # One that was overtaken by a later one, or is of no time, is not looked at.
+                if picture.t[0] >= self._picture.t[0]:
+                    self._picture = picture
+                    self._word[0] = max(float(picture.t[0]), self._word[0])
             case Order("arm"):
                 return self._arm()
             case Order("disarm"):
@@ -62,6 +72,8 @@ class Supervisor:
             case Order("quit"):
                 self._gate.disarm()
                 self.quit = True
+            case Order(what):
+                return [Notice(f"unknown order {what!r}")]
         return []
 
     def abandon(self) -> None:
@@ -78,21 +90,30 @@ class Supervisor:
             linked: Slots of the cars whose port is open.
 
         Returns:
-            Bytes by slot, for those with a car, whether its port is open or not.
+            Bytes by slot, for those with a car, whether its port is open or not. Of a driver that
+            fails there are none: its car stops by itself, and the others are told as ever.
         """
         self._late, self._missed = max(late, self._late), self._missed + (late > LATE)
         self._linked[:] = False
-        self._linked[0, list(linked)] = True
+        self._linked[0, [slot for slot in linked if slot not in self._broken]] = True
         self._now[0] = now
         out = self._gate.step(self._picture, self._now, self._word, self._heard, self._linked)
         self._output = out
-        sent = {}
-        for slot, driver in self._drivers.items():
-            if out.moving[0, slot]:
-                sent[slot] = driver.drive(float(out.speed[0, slot]), float(out.steering[0, slot]))
-            else:
-                sent[slot] = driver.neutral()
-        return sent
+        return {slot: self._bytes(slot, out) for slot in self._drivers}
+
+    def _bytes(self, slot: int, out: GateOutput) -> bytes:
+        """What a car is sent; nothing where its driver cannot even say neutral."""
+        driver = self._drivers[slot]
+        if out.moving[0, slot]:
+            try:
+                return driver.drive(float(out.speed[0, slot]), float(out.steering[0, slot]))
+            except Exception as error:  # whatever it is, the car must be told to stop
+                self._broken[slot] = str(error)
+        try:
+            return driver.neutral()
+        except Exception as error:
+            self._broken[slot] = str(error)
+            return b""
 
     def written(self, now: float) -> None:
         """What the last tick asked for was handed to the ports at this time [s]."""
@@ -106,7 +127,11 @@ class Supervisor:
         armed, reason = self._output.armed[0], self._output.reason[0]
         lost = np.flatnonzero(self._armed & ~armed)
         self._armed = armed.copy()
-        return [Notice(f"car {k} stopped: {reason_text(int(reason[k]))}") for k in lost.tolist()]
+        return [Notice(f"{self._names[k]} stopped: {self._why(k, reason)}") for k in lost.tolist()]
+
+    def _why(self, slot: int, reason: I64) -> str:
+        broken = self._broken.get(slot)
+        return reason_text(int(reason[slot])) if broken is None else f"its driver failed: {broken}"
 
     def report(self) -> Report:
         """What the gate did at the last tick."""
@@ -130,6 +155,8 @@ class Supervisor:
         return report
 
     def _arm(self) -> list[Notice]:
+        # Well it is only after the next ticks, if its driver works again by then.
+        self._broken.clear()
         cars = np.zeros_like(self._linked)
         cars[0, list(self._drivers)] = True
         armed = self._gate.arm(self._now, cars)
@@ -140,7 +167,7 @@ class Supervisor:
         why = self._output.reason[0] if self._output is not None else np.full(len(armed[0]), -2)
         return [
             Notice(
-                f"car {k} not armed: {reason_text(int(why[k]))}; "
+                f"{self._names[k]} not armed: {reason_text(int(why[k]))}; "
                 f"all must be well for {self._gate.params.health:g} s"
             )
             for k in refused

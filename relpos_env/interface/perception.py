@@ -14,7 +14,7 @@ import numpy as np
 
 from relpos_env.interface._view_kernels import forget_all, note_ranges
 from relpos_env.interface.views import View, bind_view, make_view
-from tracking.arrays import F64, Bool
+from tracking.arrays import F64, I64, Bool
 from tracking.compiled import bind
 from tracking.constellation import Constellation
 from tracking.estimate import TeamEstimate
@@ -80,6 +80,16 @@ class Perception:
         )
         part.rebind(block, powered)
         return part
+
+    @property
+    def n_late(self) -> I64:
+        """Measurements that came later than the horizon waits, (env)."""
+        return self.horizon.n_late
+
+    @property
+    def n_waiting(self) -> I64:
+        """Measurements that wait in the horizon, (env)."""
+        return self.horizon.state.n_waiting
 
     def share(self, target: F64, wanted: Bool, command: F64) -> None:
         """Let the view have what the task and the operator want, in their own memory.

@@ -14,8 +14,9 @@ from agents.cli import main
 from agents.compare import contender as contenders
 from agents.compare.compare import compare
 from agents.compare.contender import Contender, ControllerEntry, find_entry, line_up
-from agents.compare.episode import IN_FORMATION, run_episodes
+from agents.compare.episode import run_episodes
 from agents.compare.film import median_films
+from agents.compare.meter import IN_FORMATION
 from agents.compare.setting import Setting
 from agents.controllers import CONTROLLERS, Consensus
 from agents.errors import UsageError

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from line_formats import FORMATS, LineFormat, Talker, line
 
 from agents.cli import cli
-from agents.diagnosis import diagnose_link
+from agents.diagnosis import diagnose_link, share_a_device
 from agents.doctor import doctor
 from agents.errors import UsageError
 from agents.hearing import Hearing, known_formats
@@ -18,7 +18,7 @@ from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.port_list import SerialPortInfo
 from hardware_bridge.links.port_users import port_users
 from hardware_bridge.links.ports import Chunk, PortSpec
-from hardware_bridge.readings import MICROSECONDS_32, ImuReading, RangeReading, Source
+from hardware_bridge.readings import MICROSECONDS_32, ImuReading, PoseReading, RangeReading, Source
 
 
 def link(port="p", format="alpha", name="left", baud=115200, node=None, ids=None, key=None):
@@ -140,6 +140,21 @@ def test_devices_become_nodes_by_ids():
     nameless = [line("alpha", "-", "7", 1.0) for _ in range(10)]
     assert problem(nameless).endswith("set `node`")
     assert diagnose(nameless, node=9).nodes[0].node == "9"
+
+
+def test_nodes_that_another_tracker_tells_of():
+    """They do not speak, and several links may tell of them."""
+    said = b'{"i": 1, "j": 2, "pos": [1, 2]}\n{"node": 2, "yaw": 0}\n{"node": "b", "yaw": 0}\n'
+    reports = [
+        diagnose([said] * 100, known_formats(), format="positions", ids={"B": 9}) for _ in "ab"
+    ]
+    told = {(n.node, n.positions_hz) for n in reports[0].nodes}
+    assert told == {("1", 100.0), ("2", 200.0), ("9", 100.0)}
+    share_a_device(reports)
+    assert reports[0].ok
+    assert reports[1].ok
+    stranger = problem([said] * 100, known_formats(), format="positions")
+    assert stranger == 'device B is no node: add `ids = { "B" = NODE }`'
 
 
 def test_a_wrong_key():
@@ -316,7 +331,8 @@ def said_by(encoder, device, to):
         source = Source(device, ticks=1000 + k, clock=MICROSECONDS_32)
         imu = ImuReading(source, (0.01 * k, 0.0, 0.0), (0.0, 0.0, 9.8))
         ranging = RangeReading(source, to, 3.0 + k / 100, rx_power=-80.0, fp_power=-82.0)
-        said.append(encoder.encode([imu, ranging]))
+        pose = PoseReading(source, device, (3.0, 0.0, 0.0))
+        said.append(encoder.encode([imu, ranging, pose]))
     return said
 
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from agents.compare.contender import Contender
-from agents.compare.episode import IN_FORMATION, run_episodes
+from agents.compare.episode import run_episodes
+from agents.compare.meter import IN_FORMATION
 from agents.compare.setting import Setting
 from agents.policy import load_policy, shipped_names
 from agents.settings import from_json

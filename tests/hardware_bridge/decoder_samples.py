@@ -114,6 +114,18 @@ ANGLE = witmotion_frame(0x53, 1, 2, 3, 2500)
 MAG = witmotion_frame(0x54, 200, -100, -400, 2500)
 QUATERNION = witmotion_frame(0x59, 32767, 0, 0, 0)
 
+POSITIONS = (
+    b'{"time": 81250000, "i": 1, "j": 2, "pos": [1.25, -0.5, 0.125], "vel": [0.1, 0, -0.2], '
+    b'"cov": 0.02}\n',
+    b'{"time": 81250000, "i": 2, "j": "3", "pos": [1, 2], "cov": [[4e-4, 1e-4], [1e-4, 9e-4]], '
+    b'"status": "lost", "nlos": 0.25}\n',
+    b'{"time": 81250001.0, "node": 1, "pos": [3.5, 0.25, 0.1], "q": [0.6, 0, 0, 0.8], '
+    b'"speed": 0.75}\n',
+    b'{"time": 81250002, "node": "car b", "yaw": 1.5707963267948966}\n',
+    b'{"time": 81250003, "node": 1, "pos": [NaN, NaN, NaN]}\n',
+    b'{"time": 81250003, "frame": 17}\n',
+)
+
 
 def relpos_frames():
     """Two messages of each kind that a node sends."""
@@ -164,6 +176,13 @@ SAMPLES = {
         unit=DWM1001[0],
         frames=DWM1001[1:],
         tokens=(b"DIST,", b"DIST,99", b",AN0,", b",POS,", b"dwm> ", b"\r\n", b",0.00"),
+    ),
+    "positions": Sample(
+        unit=POSITIONS[0],
+        frames=POSITIONS[1:],
+        tokens=(b'{"time": ', b'"i": 1, "j": 2, ', b'"pos": [', b'"cov": [[', b'"q": [', b"NaN",
+                b"null", b"1e999", b"9" * 900, b"[" * 900, b"\n", b'"node": "', b"\\u0664",
+                b"true"),
     ),
     "witmotion": Sample(
         unit=ACC + GYR + MAG,

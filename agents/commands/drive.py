@@ -1,0 +1,153 @@
+"""`relpos drive`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from agents.console import emit_json, print_table
+from agents.errors import UsageError
+
+if TYPE_CHECKING:
+    from hardware_bridge.live.env import LiveFormationEnv
+    from hardware_bridge.live.opened import OpenBridge
+
+EVERY = 10
+"""[-] Decisions from one line or record to the next."""
+
+
+@click.command()
+@click.option("--config", type=Path, required=True, help="A swarm.toml, see docs/hardware.md.")
+@click.option("--policy", metavar="NAME_OR_PATH", help="A trained policy drives.")
+@click.option(
+    "--controller",
+    metavar="NAME",
+    help="Who drives: consensus, leader-follower or range-only.  [default: consensus]",
+)
+@click.option("--observation", help="What they see; default: as the policy, or estimate.")
+@click.option("--arm", is_flag=True, help="Cars may move; without it nothing is sent to them.")
+@click.option("--seconds", type=float, help="Length, 1 to 86400; by default until Ctrl-C.")
+@click.option(
+    "--wait", default=60.0, show_default=True, help="Seconds in which all must be well once."
+)
+@click.option("--record", type=Path, help="New file for a recording of all that came and went.")
+@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+def drive(
+    config: Path,
+    policy: str | None,
+    controller: str | None,
+    observation: str | None,
+    arm: bool,
+    seconds: float | None,
+    wait: float,
+    record: Path | None,
+    as_json: bool,
+) -> None:
+    """Drive real cars on the estimates of their trackers. Dry run unless --arm.
+
+    On a terminal: space stops all at once, c clears the stop, a arms again, q quits.
+    """
+    from agents.drive import drive as run
+
+    if policy is not None and controller is not None:
+        raise UsageError("--policy: expected either a policy or a --controller, got both")
+    if seconds is not None and not 1.0 <= seconds <= 86400.0:
+        raise UsageError(f"--seconds: expected 1 to 86400, got {seconds:g}")
+    if not 1.0 <= wait <= 3600.0:
+        raise UsageError(f"--wait: expected 1 to 3600, got {wait:g}")
+    with _Screen(as_json) as screen:
+        result = run(
+            config=config,
+            name=policy or controller or "consensus",
+            observation=observation,
+            arm=arm,
+            seconds=seconds,
+            wait=wait,
+            record=record,
+            watch=screen.show,
+            attend=screen.attend,
+        )
+    if as_json:
+        emit_json([result.summary])
+        return
+    rows = [[name, _text(value)] for name, value in result.summary.items() if name != "result"]
+    print_table("Drive", ["", "value"], rows)
+
+
+class _Screen:
+    """What is shown and asked for while it lasts."""
+
+    def __init__(self, as_json: bool) -> None:
+        self._json, self._n, self._told = as_json, 0, 0
+        self._live: Any = None
+        self._keys: Any = None
+
+    def __enter__(self) -> _Screen:
+        from rich.console import Console
+        from rich.live import Live
+
+        from agents.drive.keys import key_by_key
+
+        console = Console(stderr=True)
+        if console.is_terminal and not self._json:
+            self._live = Live(console=console, auto_refresh=False)
+            self._live.start()
+        self._keys = key_by_key()
+        self._keys.__enter__()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._keys.__exit__(None, None, None)
+        if self._live is not None:
+            self._live.stop()
+
+    def attend(self, order: Any) -> None:
+        """Pass on what was pressed."""
+        from agents.drive.keys import read_orders
+
+        for what in read_orders():
+            order(what)
+
+    def show(self, bridge: OpenBridge, env: LiveFormationEnv) -> None:
+        """After every decision."""
+        from agents.drive.status import HEADER, car_rows, status_record
+
+        notices = [text for _, text in bridge.feed.notices]
+        self._n += 1
+        if self._live is not None:
+            from agents.drive.keys import HELP
+            from agents.drive.status import LINES
+
+            self._live.update(_table(HEADER, car_rows(bridge, env), notices[-LINES:], HELP))
+            self._live.refresh()
+            return
+        for text in notices[self._told :]:
+            click.echo(text, err=True)
+        self._told = len(notices)
+        if self._json and self._n % EVERY == 0:
+            emit_json([status_record(bridge, env)])
+            sys.stdout.flush()
+
+
+def _table(header: tuple[str, ...], rows: list[list[str]], notices: list[str], keys: str) -> Any:
+    from rich import box
+    from rich.console import Group
+    from rich.markup import escape
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=box.SIMPLE)
+    for name in header:
+        table.add_column(escape(name))
+    for row in rows:
+        table.add_row(*(escape(cell) for cell in row))
+    return Group(table, Text("\n".join(notices)), Text(keys, style="bold"))
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.3g}"
+    return ", ".join(value) if isinstance(value, list) else str(value)

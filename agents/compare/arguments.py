@@ -1,0 +1,57 @@
+"""Arguments of comparisons, checked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeVar
+
+from agents.errors import UsageError
+from relpos_env.interface.observations import OBSERVATIONS
+
+SHORTEST, LONGEST = 0.1, 3600.0
+"""[s]"""
+MOST_EPISODES = 10_000
+
+Name = TypeVar("Name")
+
+
+def modes(names: Sequence[str]) -> list[str]:
+    """Modes of observations as they were named, each once.
+
+    Raises:
+        UsageError: No such mode, or none at all.
+    """
+    chosen = each_once("--observation", names)
+    for name in chosen:
+        if name not in OBSERVATIONS:
+            modes = ", ".join(OBSERVATIONS)
+            raise UsageError(f"--observation: expected names of {modes}, got {name!r}")
+    return chosen
+
+
+def each_once(option: str, names: Sequence[Name]) -> list[Name]:
+    """Names in order.
+
+    Raises:
+        UsageError: None at all; the option is named.
+    """
+    chosen = list(dict.fromkeys(names))
+    if not chosen:
+        raise UsageError(f"{option}: expected at least one, got none")
+    return chosen
+
+
+def check_numbers(episodes: int, first_seed: int, seconds: float, settle: float) -> None:
+    """See that numbers are in range.
+
+    Raises:
+        UsageError: One is not; the option is named.
+    """
+    if not 1 <= episodes <= MOST_EPISODES:
+        raise UsageError(f"--episodes: expected 1 to {MOST_EPISODES}, got {episodes}")
+    if first_seed < 0:
+        raise UsageError(f"--first-seed: expected 0 or more, got {first_seed}")
+    if not SHORTEST <= seconds <= LONGEST:
+        raise UsageError(f"--seconds: expected {SHORTEST:g} to {LONGEST:g}, got {seconds:g}")
+    if not 0.0 <= settle < seconds:
+        raise UsageError(f"--settle: expected 0 to less than --seconds, got {settle:g}")

@@ -1,0 +1,63 @@
+"""What a drive looks like while it lasts: a table of the cars."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hardware_bridge.live.env import LiveFormationEnv
+from hardware_bridge.live.opened import OpenBridge
+from hardware_bridge.safety.gate import reason_text
+from tracking.estimate import Status
+
+HEADER = ("car", "state", "asked [m/s]", "passed [m/s]", "error [m]", "sees", "why")
+LINES = 6
+"""[-] Of notices below the table."""
+
+
+def car_rows(bridge: OpenBridge, env: LiveFormationEnv) -> list[list[str]]:
+    """One row a slot, as `HEADER`."""
+    report, group = bridge.feed.report, env.group
+    view, config = bridge.swarm.view, bridge.config
+    driven = {config.slot_of(car) for car in config.cars}
+    rows = []
+    for k in range(config.n_slots):
+        state, passed, why = "listening", "", ""
+        if not view.present[0, k]:
+            state = "silent"
+        if report is not None and k in driven:
+            armed = bool(report.armed[k])
+            state = "STOP" if report.emergency else "armed" if armed else state
+            passed, why = f"{report.speed[k]:.2f}", reason_text(int(report.reason[k]))
+        others = [j for j in range(config.n_slots) if j != k]
+        sees = " ".join(Status(int(view.status[0, k, j])).name.lower() for j in others)
+        rows.append(
+            [
+                str(bridge.swarm.group.ids[k]),
+                state,
+                f"{group.asked[k, 0]:.2f}",
+                passed,
+                f"{group.task.error[0, k]:.2f}",
+                sees,
+                why,
+            ]
+        )
+    return rows
+
+
+def status_record(bridge: OpenBridge, env: LiveFormationEnv) -> dict[str, Any]:
+    """The state of a drive as a record."""
+    report, group = bridge.feed.report, env.group
+    present = group.believed.present[0]
+    error = group.task.error[0, present]
+    return {
+        "result": "second",
+        "t": round(group.t_ns * 1e-9, 3),
+        "error": float(error.mean()) if present.any() else None,
+        "present": int(present.sum()),
+        "armed": int(np.sum(report.armed)) if report is not None else 0,
+        "emergency": bool(report.emergency) if report is not None else False,
+        "lag_ms": round(1e3 * report.lag, 3) if report is not None else None,
+        "missed_ticks": report.missed if report is not None else 0,
+    }

@@ -1,0 +1,275 @@
+"""Emulated cars driven through the whole path, serial bytes and all, beside the simulator.
+
+The emulator is a process of its own, or steps together with the drive under a virtual clock; its
+truth scores the drive, which knows nothing of it.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from agents.compare.contender import Contender, find_entry
+from agents.compare.episode import run_episodes
+from agents.compare.setting import Setting
+from agents.compare.statistics import Interval, ratio
+from agents.demo import SETTLE
+from agents.drive import DriveResult, drive, drive_on
+from agents.emulate import EmulateOptions, emulate
+from agents.emulate.virtual import START_NS, VirtualBridge
+from relpos_env.timing import DECISION
+from tracking.arrays import F64
+from tracking.log import Log, read_log
+
+LONGEST_START = 120.0
+"""[s] From the first byte to cars that drive."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HardwareDemoResult:
+    """One emulated drive and its twin in the simulator."""
+
+    seed: int
+    drive: DriveResult
+    log: Log
+    """What was measured, with the truth."""
+    t: F64
+    """Since the drive began, (decision) [s]."""
+    error: F64
+    """Formation error by the truth, mean over the cars, (decision) [m]."""
+    simulated: F64
+    """That of the same driver in the same room of the simulator, (decision) [m]."""
+    contacts: int
+    """[-] That cars began, start included."""
+    simulated_contacts: int
+    """[-] In the simulator."""
+    late_steps: int
+    """[-] Of the emulator, by more than 10 ms: what it then did was no fault of the drive."""
+    virtual: bool = False
+    """Whether it was driven in memory, under a virtual clock."""
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The figures."""
+        late = self.t >= SETTLE
+        error = float(np.nanmean(self.error[late])) if late.any() else None
+        twin = float(np.nanmean(self.simulated[round(SETTLE / DECISION) :]))
+        return {
+            **self.drive.summary,
+            "result": "hardware-demo",
+            "seed": self.seed,
+            "formation_error": error,
+            "simulated_error": twin,
+            "ratio": None if error is None else error / twin,
+            "contacts": self.contacts,
+            "simulated_contacts": self.simulated_contacts,
+            "late_steps": self.late_steps,
+            "virtual": self.virtual,
+        }
+
+
+def error_ratio(results: Sequence[HardwareDemoResult]) -> Interval | None:
+    """Mean formation error through the bridge over that in the simulator, on the same seeds.
+
+    Args:
+        results: Of different seeds.
+
+    Returns:
+        With its 95 % interval; None without any drive that could be scored.
+    """
+    rows = [result.summary for result in results]
+    ours = np.array([row["formation_error"] for row in rows], dtype=np.float64)
+    return ratio(ours, np.array([row["simulated_error"] for row in rows]))
+
+
+def hardware_demo(
+    *,
+    options: EmulateOptions,
+    name: str = "consensus",
+    folder: Path | str | None = None,
+    virtual: bool = False,
+    progress: Callable[[float], None] | None = None,
+) -> HardwareDemoResult:
+    """Emulate cars, drive them, and drive their twins in the simulator.
+
+    Args:
+        options: The emulation; its `seconds` are those of the drive.
+        name: A controller or a policy, as for `relpos drive`.
+        folder: For the ports, the truth and the recording; by default one that is thrown away.
+        virtual: In memory and under a virtual clock, as fast as it goes: the same bytes, without
+            ports, processes and what a machine makes late.
+        progress: Called with the share done, 0 to 1.
+
+    Raises:
+        EnvError: An unknown name or a number out of range.
+        BridgeError: The cars could not be armed.
+        UsageError: No driver of that name, or not for such cars.
+    """
+    entry = find_entry(name)
+    contender = Contender(name, entry.trained_on or "estimate")
+    setting = Setting(
+        scenario=options.parts().scenario.name if options.scenario is None else options.scenario,  # type: ignore[arg-type]
+        task=options.task,
+        task_options=options.task_options,
+        cars=options.cars,
+        seconds=options.seconds,
+    )
+    twin = run_episodes(contender, setting, [options.seed])[0]
+    if virtual:
+        drove = _drive_virtually(options, name, progress)
+    else:
+        with tempfile.TemporaryDirectory(prefix="relpos-") as scratch:
+            drove = _drive_ports(options, name, Path(folder or scratch), progress)
+    result, log = drove.result, drove.log
+    t: F64 = np.asarray((result.t_ns - drove.start_ns) * 1e-9, dtype=np.float64)
+    return HardwareDemoResult(
+        seed=options.seed,
+        drive=result,
+        log=log,
+        t=t - t[0] + DECISION if len(t) else t,
+        error=true_error(result, log, t),
+        simulated=twin.error,
+        contacts=drove.contacts,
+        simulated_contacts=round(twin.collisions_per_min * twin.seconds / 60.0),
+        late_steps=drove.late_steps,
+        virtual=virtual,
+    )
+
+
+def true_error(result: DriveResult, log: Log, t: F64) -> F64:
+    """Formation error of a drive by the truth, mean over the cars, (decision) [m].
+
+    Args:
+        result: What was wanted when.
+        log: With the truth of the same nodes.
+        t: Times of the decisions by the log's clock, (decision) [s].
+    """
+    n = log.constellation.n_nodes
+    times = log.truth.times()
+    pos = log.truth.pos_w.reshape(len(times), n, 3)[:, :, :2]
+    there = log.truth.valid.reshape(len(times), n)
+    k = np.clip(np.searchsorted(times, t), 0, len(times) - 1)
+    apart = pos[k][:, None, :] - pos[k][:, :, None]
+    both = there[k][:, None, :] & there[k][:, :, None] & result.wanted
+    off = np.linalg.norm(apart - result.target, axis=-1)
+    counted = both.sum(axis=(1, 2))
+    error: F64 = np.where(both, off, 0.0).sum(axis=(1, 2)) / np.maximum(counted, 1)
+    return np.where((counted > 0) & (t <= times[-1]), error, np.nan)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Drove:
+    """A drive and what the emulator says of it."""
+
+    result: DriveResult
+    log: Log
+    start_ns: int
+    contacts: int
+    late_steps: int = 0
+
+
+def _drive_ports(
+    options: EmulateOptions, name: str, place: Path, progress: Callable[[float], None] | None
+) -> _Drove:
+    """In real time, with ports in a folder."""
+    with _Emulation(options, place) as emulation:
+        result = drive(
+            config=place / "swarm.toml",
+            name=name,
+            arm=True,
+            seconds=options.seconds,
+            record=place / "drive.relpos",
+            watch=_teller(options, progress),
+        )
+    return _Drove(
+        result=result,
+        log=read_log(place / "truth"),
+        start_ns=emulation.start_ns,
+        contacts=emulation.contacts,
+        late_steps=emulation.late_steps,
+    )
+
+
+def _drive_virtually(
+    options: EmulateOptions, name: str, progress: Callable[[float], None] | None
+) -> _Drove:
+    """In memory."""
+    longer = replace(options, seconds=options.seconds + LONGEST_START)
+    bridge = VirtualBridge(longer, record=True)
+    result = drive_on(
+        lambda: bridge,
+        bridge.config.n_slots,
+        name=name,
+        seconds=options.seconds,
+        watch=_teller(options, progress),
+    )
+    log = bridge.rig.log(f"emulation-{options.seed}")
+    contacts = bridge.rig.world.contacts
+    return _Drove(result=result, log=log, start_ns=START_NS, contacts=contacts)
+
+
+def _teller(
+    options: EmulateOptions, progress: Callable[[float], None] | None
+) -> Callable[[Any, Any], None]:
+    """What tells of the share done after every decision."""
+
+    def tell(_: Any, env: Any) -> None:
+        if progress is not None:
+            progress(min(env.group.cycles / options.cycles, 1.0))
+
+    return tell
+
+
+class _Emulation:
+    """The emulator's process, for as long as the drive needs it."""
+
+    start_ns = 0
+    contacts = 0
+    late_steps = 0
+
+    def __init__(self, options: EmulateOptions, place: Path) -> None:
+        spawn = multiprocessing.get_context("spawn")
+        self._pipe, theirs = spawn.Pipe()
+        self._process = spawn.Process(target=_emulate, args=(options, place, theirs))
+
+    def __enter__(self) -> _Emulation:
+        self._process.start()
+        said = self._pipe.recv() if self._pipe.poll(LONGEST_START) else None
+        if said != "ready":
+            self._process.kill()
+            raise said if isinstance(said, Exception) else TimeoutError("emulator: did not start")
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        if self._process.pid is not None and self._process.is_alive():
+            os.kill(self._process.pid, signal.SIGINT)
+        if self._pipe.poll(LONGEST_START):
+            self.start_ns, self.contacts, self.late_steps = self._pipe.recv()
+        self._process.join(timeout=LONGEST_START)
+        self._process.close()
+
+
+def _emulate(options: EmulateOptions, place: Path, pipe: Connection) -> None:
+    """What that process does, until it is interrupted."""
+    try:
+        result = emulate(
+            folder=place,
+            options=options,
+            wait=LONGEST_START,
+            seconds=options.seconds + LONGEST_START,
+            log=place / "truth",
+            ready=lambda rig: pipe.send("ready"),
+        )
+    except Exception as error:
+        pipe.send(error)
+        return
+    pipe.send((result.start_ns, result.contacts, result.lateness.late))

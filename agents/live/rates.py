@@ -1,0 +1,62 @@
+"""How many samples and ranges of each node come in a second."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from tracking.arrays import F64, I64
+from tracking.measurements import Kind, MeasurementBlock
+
+WINDOW = 2.0
+"""[s] Rates are means over the last so many seconds."""
+
+
+class Rates:
+    """Counts of the last seconds, by node index."""
+
+    def __init__(self, n_nodes: int) -> None:
+        self._n = n_nodes
+        self._now = self._nothing()
+        self._first: float | None = None
+        self._recent: deque[tuple[float, I64]] = deque()
+        self.totals: dict[str, int] = {kind.name.lower(): 0 for kind in _COUNTED}
+        """Measurements since the beginning, by kind."""
+
+    def take(self, block: MeasurementBlock) -> None:
+        """Count the measurements of a block of one environment."""
+        valid = block.valid[0]
+        kind, i, j = block.kind[0][valid], block.i[0][valid], block.j[0][valid]
+        motion, ranged = np.isin(kind, (Kind.IMU, Kind.STATE)), kind == Kind.RANGE
+        for row, nodes in ((0, i[motion]), (1, i[ranged]), (1, j[ranged])):
+            self._now[row] += np.bincount(nodes, minlength=self._n)
+        for each in _COUNTED:
+            self.totals[each.name.lower()] += int(np.sum(kind == each))
+
+    def close(self, t: float) -> None:
+        """What was counted since the last call came up to this time [s]."""
+        if self._first is None:
+            # How long the first of it took to come is not known.
+            self._first, self._now = t, self._nothing()
+            return
+        self._recent.append((t, self._now))
+        self._now = self._nothing()
+        while self._recent[0][0] <= t - WINDOW:
+            self._recent.popleft()
+
+    @property
+    def hz(self) -> F64:
+        """Samples and ranges a second, (2, node) [1/s]; zeros before anything is known."""
+        if not self._recent or self._first is None:
+            return np.zeros((2, self._n))
+        elapsed = min(WINDOW, self._recent[-1][0] - self._first)
+        total = np.sum([counts for _, counts in self._recent], axis=0)
+        hz: F64 = total / max(elapsed, 1e-3)
+        return hz
+
+    def _nothing(self) -> I64:
+        return np.zeros((2, self._n), dtype=np.int64)
+
+
+_COUNTED = (Kind.IMU, Kind.MAG, Kind.STATE, Kind.RANGE)

@@ -1,0 +1,239 @@
+"""Positions of any other tracker, a JSON object a line; docs/positions.md has the format.
+
+    {"time": 81250000, "i": 1, "j": 2, "pos": [1.2, -0.4, 0.0], "vel": [0.1, 0.0, 0.0], "cov": 0.02}
+    {"time": 81250000, "node": 1, "pos": [3.1, 0.2, 0.1], "q": [1, 0, 0, 0], "speed": 0.8}
+
+World frame: x east, y magnetic north, z up; metres, seconds, radians; `time` counts microseconds.
+Null, or a NaN among the numbers, is what was not measured. Keys that are not known say nothing to
+us, and neither do objects without nodes. There is no check sum: what cannot be is refused here,
+and positions that jump by `hardware_bridge.plausibility`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from hardware_bridge.decoders.lines import Lines
+from hardware_bridge.decoders.plausible import Damaged
+from hardware_bridge.decoders.uwb_core import parse
+from hardware_bridge.readings import (
+    MICROSECONDS_64,
+    NOBODY,
+    PairReading,
+    PoseReading,
+    Reading,
+    Source,
+    Vector,
+)
+from tracking.estimate import Status
+
+MOST_LINE = 2048
+"""[bytes] A line with a covariance of 36 numbers in full has 1200."""
+MOST_PLACE = 1e4
+"""[m] From the origin of the world, and from node to node."""
+MOST_SPEED = 100.0
+"""[m/s]"""
+MOST_VARIANCE = 1e6
+"""[m2]"""
+MOST_NAME = 32
+"""[-] Characters of a node's name."""
+UNIT = 0.05
+"""[-] How far the length of a quaternion may be from 1."""
+
+
+def read_line(line: str) -> list[Reading]:
+    """A line to its reading.
+
+    Raises:
+        Damaged: It is no object, or what it says cannot be.
+    """
+    # The objects hold no others; the end of a line before may be lost.
+    at = line.rfind("{")
+    if at < 0:
+        return []
+    said = parse(line[at:])
+    if "i" in said and "j" in said:
+        return pair_of(said)
+    return pose_of(said) if "node" in said else []
+
+
+def pair_of(said: dict[str, Any]) -> list[Reading]:
+    """What is said of a pair."""
+    i, j = name_of(said["i"]), name_of(said["j"])
+    if i == j:
+        raise Damaged
+    source, nlos = source_of(said), number(said.get("nlos"), 1.0)
+    status = status_of(said.get("status"))
+    if nlos is not None and nlos < 0.0:
+        raise Damaged
+    pos, vel, cov = motion_of(said)
+    if pos is None:
+        return []
+    return [PairReading(source, i, j, pos, vel, cov, status, nlos or 0.0)]
+
+
+def pose_of(said: dict[str, Any]) -> list[Reading]:
+    """What is said of a node."""
+    node, source = name_of(said["node"]), source_of(said)
+    pos, vel, cov = motion_of(said)
+    q, speed = attitude_of(said), number(said.get("speed"), MOST_SPEED)
+    if pos is None and q is None and speed is None:
+        return []
+    return [PoseReading(source, node, pos, vel, cov, q, speed)]
+
+
+Motion = tuple[Vector | None, Vector | None, tuple[float, ...] | None]
+
+
+def motion_of(said: dict[str, Any]) -> Motion:
+    """Position, velocity and covariance, as far as they were measured."""
+    pos = vector(said.get("pos"), MOST_PLACE)
+    vel = vector(said.get("vel"), MOST_SPEED)
+    n = len(said["pos"]) if pos is not None else 3
+    cov = covariance(said.get("cov"), n)
+    if pos is None:
+        return None, None, None
+    if cov is not None and vel is None:
+        cov = tuple(cov[r * 6 + c] for r in range(3) for c in range(3)) if len(cov) == 36 else cov
+    return pos, vel, cov
+
+
+def source_of(said: dict[str, Any]) -> Source:
+    """The time that the line tells."""
+    time = said.get("time")
+    if time is None:
+        return NOBODY
+    if type(time) is float and math.isfinite(time):
+        time = int(time)
+    if type(time) is not int or not 0 <= time < MICROSECONDS_64.modulus:
+        raise Damaged
+    return Source(ticks=time, clock=MICROSECONDS_64)
+
+
+def name_of(value: Any) -> str:
+    """The name of a node: a number or a text."""
+    if type(value) is int and 0 <= value < 10**9:
+        return str(value)
+    if type(value) is str and 0 < len(value) <= MOST_NAME and value.isprintable():
+        return value.upper()
+    raise Damaged
+
+
+def status_of(value: Any) -> Status:
+    """A status by its name or its number."""
+    if value is None:
+        return Status.OK
+    try:
+        return Status[value.upper()] if type(value) is str else Status(whole(value))
+    except (KeyError, ValueError):
+        raise Damaged from None
+
+
+def whole(value: Any) -> int:
+    """An integer that is no bool."""
+    if type(value) is not int:
+        raise Damaged
+    return value
+
+
+def number(value: Any, most: float) -> float | None:
+    """A number, or None where it was not measured."""
+    if value is None or (type(value) is float and math.isnan(value)):
+        return None
+    if type(value) not in (int, float) or not -most <= value <= most:
+        raise Damaged
+    return float(value)
+
+
+def vector(value: Any, most: float) -> Vector | None:
+    """Two or three numbers, z is 0 if there are two; None where one of them was not measured."""
+    if value is None:
+        return None
+    if type(value) is not list or len(value) not in (2, 3):
+        raise Damaged
+    numbers = [number(each, most) for each in value]
+    if None in numbers:
+        return None
+    x, y, z = (*numbers, 0.0)[:3]
+    return x, y, z  # type: ignore[return-value]
+
+
+def attitude_of(said: dict[str, Any]) -> tuple[float, float, float, float] | None:
+    """The orientation, by a quaternion or by the angle from east, counter-clockwise."""
+    value, yaw = said.get("q"), number(said.get("yaw"), 1e6)
+    if value is None:
+        return None if yaw is None else (math.cos(yaw / 2.0), 0.0, 0.0, math.sin(yaw / 2.0))
+    if type(value) is not list or len(value) != 4:
+        raise Damaged
+    numbers = [number(each, 1.0 + UNIT) for each in value]
+    if None in numbers:
+        return None
+    w, x, y, z = (each or 0.0 for each in numbers)
+    length = math.hypot(w, x, y, z)
+    if abs(length - 1.0) > UNIT:
+        raise Damaged
+    return w / length, x / length, y / length, z / length
+
+
+def covariance(value: Any, n: int) -> tuple[float, ...] | None:
+    """Of n axes, or of position and velocity: a standard deviation, or n or 2n rows.
+
+    Returns:
+        3 x 3 or 6 x 6; across the plane, where n is 2, with the larger variance of the two.
+    """
+    if value is None:
+        return None
+    if type(value) is not list:
+        std = number(value, math.sqrt(MOST_VARIANCE))
+        if std is not None and std <= 0.0:
+            raise Damaged
+        if std is None:
+            return None
+        return tuple(std * std if r == c else 0.0 for r in range(3) for c in range(3))
+    size = len(value)
+    if size not in (n, 2 * n) or any(type(row) is not list or len(row) != size for row in value):
+        raise Damaged
+    rows = [[number(each, MOST_VARIANCE) for each in row] for row in value]
+    if any(each is None for row in rows for each in row):
+        return None
+    return spread(rows, n)  # type: ignore[arg-type]
+
+
+def spread(rows: list[list[float]], n: int) -> tuple[float, ...]:
+    """A covariance of n axes as one of three."""
+    check_definite(rows)
+    blocks = len(rows) // n
+    full = [[0.0] * (3 * blocks) for _ in range(3 * blocks)]
+    for r, row in enumerate(rows):
+        for c, each in enumerate(row):
+            # The mean with its mirror image: what is printed is rounded.
+            full[r // n * 3 + r % n][c // n * 3 + c % n] = 0.5 * (each + rows[c][r])
+    if n == 2:
+        for b in range(blocks):
+            full[3 * b + 2][3 * b + 2] = max(full[3 * b][3 * b], full[3 * b + 1][3 * b + 1])
+    return tuple(each for row in full for each in row)
+
+
+def check_definite(rows: list[list[float]]) -> None:
+    """Refuse what is not symmetric and positive definite, by Cholesky's decomposition."""
+    size = len(rows)
+    low = [[0.0] * size for _ in range(size)]
+    largest = max(abs(each) for row in rows for each in row)
+    for r in range(size):
+        for c in range(r + 1):
+            if abs(rows[r][c] - rows[c][r]) > 1e-6 * largest:
+                raise Damaged
+            rest = 0.5 * (rows[r][c] + rows[c][r])
+            rest -= sum(low[r][k] * low[c][k] for k in range(c))
+            if r != c:
+                low[r][c] = rest / low[c][c]
+            elif rest > 0.0:
+                low[r][r] = math.sqrt(rest)
+            else:
+                raise Damaged
+
+
+def positions_decoder() -> Lines:
+    """The decoder of one port."""
+    return Lines(read_line, MOST_LINE)

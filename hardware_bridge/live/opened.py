@@ -1,0 +1,56 @@
+"""What a drive needs of a bridge, whether ports and a clock are behind it or neither."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+from hardware_bridge.config.swarm import SwarmConfig
+from hardware_bridge.live.env import LiveFormationEnv
+from hardware_bridge.live.group import Feed
+from hardware_bridge.live.start import Gated, Start
+from hardware_bridge.live.swarm import LiveSwarm
+
+
+class OpenFeed(Feed, Gated, Protocol):
+    """A feed with a gate at its end."""
+
+    notices: list[tuple[int, str]]
+    """Time [ns] and what the user should read; whoever takes them clears the list."""
+    n_late: int
+    """Decisions that were due while the one before was still made."""
+    attend: Callable[[], None] | None
+    """Called while waiting, every hundredth of a second or so: for keys and screens."""
+
+
+class OpenBridge(Protocol):
+    """Everything of a swarm, opened; see `hardware_bridge.live.bridge.Bridge`."""
+
+    @property
+    def config(self) -> SwarmConfig:
+        """Of the swarm."""
+
+    @property
+    def swarm(self) -> LiveSwarm:
+        """Trackers of the cars."""
+
+    @property
+    def feed(self) -> OpenFeed:
+        """Where bytes come from and pictures go to."""
+
+    @property
+    def start(self) -> Start:
+        """What happens before a drive."""
+
+    def env(
+        self,
+        *,
+        observation: str = "estimate",
+        history: int = 1,
+        actions: str = "continuous",
+        max_cycles: int = 600,
+    ) -> LiveFormationEnv:
+        """The environment on these cars; the last one that was made is the one to use."""
+
+    def close(self) -> None:
+        """Let the cars stand and close everything."""

@@ -1,0 +1,30 @@
+"""What is known of one port that measures, or of a car's telemetry."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from hardware_bridge.clocks import EvenTime, StreamTime
+from hardware_bridge.decoders.base import Decoder
+from hardware_bridge.identity import Identities, Verdict
+from hardware_bridge.readings import Source
+
+
+@dataclass(slots=True)
+class Stream:
+    """What is known of one port."""
+
+    name: str
+    decoder: Decoder
+    node: int | None
+    """Id of who speaks, where the format does not say."""
+    ids: dict[str, int]
+    identities: Identities
+    times: dict[int, StreamTime] = field(default_factory=dict)
+    """By node index."""
+    even: dict[int, EvenTime] = field(default_factory=dict)
+    """Likewise, of samples that tell no time."""
+    source: Source | None = None
+    """Of the last reading: those of one message share it, and are taken or refused together."""
+    verdict: Verdict = Verdict.UNNUMBERED
+    t_ns: int = 0

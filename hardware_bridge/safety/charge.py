@@ -1,0 +1,25 @@
+"""What a supervisor is responsible for, and the rhythm it keeps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from hardware_bridge.config.swarm import CarConfig
+from hardware_bridge.safety.params import SafetyParams
+
+TICK_NS = 10_000_000
+"""[ns] From tick to tick."""
+REPORT_EVERY = 5
+"""[ticks]"""
+ROOM = 1 << 20
+"""[bytes] Of the buffers between the deciding process and the supervisor."""
+
+
+@dataclass(frozen=True, slots=True)
+class Charge:
+    """What a supervisor is started with."""
+
+    params: SafetyParams
+    n_cars: int
+    cars: tuple[tuple[int, CarConfig], ...]
+    """Slot and configuration; none in a dry run."""

@@ -1,0 +1,48 @@
+"""What a rule of the gate sees, and what it says."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hardware_bridge.safety.picture import Picture
+from hardware_bridge.safety.recent import Recent
+from tracking.arrays import F64, Bool
+
+FREE = np.inf
+
+
+class Moment(NamedTuple):
+    """All that rules see."""
+
+    picture: Picture
+    now: F64
+    """(env) [s]"""
+    word: F64
+    """When the deciding process last gave a sign of life, (env) [s]."""
+    heard: F64
+    """When each car's node was last heard, (env, car) [s]."""
+    linked: Bool
+    """Whether the car's own port is open, (env, car)."""
+    armed: Bool
+    """Whether the gate holds the car to its rules, (env, car)."""
+    recent: Recent
+    """What the cars were told lately."""
+    was_slow: Bool
+    """Whether the last verdict of this rule capped or stopped, (env, car): for hysteresis."""
+
+
+class Verdict(NamedTuple):
+    """What a rule says of every car."""
+
+    forward: F64
+    """Speed at most, (env, car) [m/s]."""
+    backward: F64
+    """Likewise, backwards."""
+    hold: Bool
+    """Stop for good: only arming again lets it move, (env, car)."""
+    left: F64 | float = FREE
+    """Steering angle at most to the left, (env, car) [rad]."""
+    right: F64 | float = FREE
+    """Likewise to the right."""

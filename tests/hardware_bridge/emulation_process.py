@@ -1,0 +1,114 @@
+"""An emulation in real time, in a process of its own, that writes down what its cars receive.
+
+    python emulation_process.py FOLDER '{"scenario": "cars-nlos", ...}'
+
+One JSON line a step goes to FOLDER/heard.jsonl; orders come as JSON lines on stdin.
+"""
+
+import contextlib
+import gc
+import json
+import os
+import sys
+import threading
+import time
+from pathlib import Path
+
+from agents.emulate import EmulatedRig, EmulateOptions
+from agents.emulate.pace import Pace
+from agents.emulate.rig import STEP_NS
+from agents.emulate.warm_up import warm_up
+from hardware_bridge.emulator.fault_plan import Fault
+from hardware_bridge.emulator.pty import PtyPort
+
+
+class Tap(PtyPort):
+    """A port that keeps all that its device said to a host."""
+
+    def __init__(self, link, copy):
+        self._copy = open(copy, "wb", buffering=0)  # noqa: SIM115
+        super().__init__(link)
+
+    def write(self, data):
+        before = self.counts.written
+        super().write(data)
+        self._copy.write(data[: self.counts.written - before])
+
+
+class Ears:
+    """Commands that a car understood since the last step."""
+
+    def __init__(self, device):
+        self.commands = []
+        make = device._make
+
+        def listening():
+            car = make()
+            feed = car.feed
+
+            def heard(t_ns, data):
+                commands = feed(t_ns, data)
+                self.commands += [(t_ns, c.brake, c.speed) for c in commands]
+                return commands
+
+            car.feed = heard
+            return car
+
+        device._make, device._car = listening, listening()
+
+    def take(self):
+        commands, self.commands = self.commands, []
+        return commands
+
+
+def main(folder, options):
+    folder = Path(folder)
+    warm_up(options)
+    # Priority as a device has it, which waits for nobody's computer; where that is allowed.
+    with contextlib.suppress(OSError):
+        os.setpriority(os.PRIO_PROCESS, 0, -15)
+    copies = folder / "said"
+    copies.mkdir(parents=True)
+    rig = EmulatedRig(
+        options, folder / "rig", ports=lambda name: Tap(folder / "rig" / name, copies / name)
+    )
+    orders = []
+    thread = threading.Thread(target=listen, args=(orders,), daemon=True)
+    thread.start()
+    ears = [Ears(car) for car in rig.emulator.cars]
+    gc.collect()
+    gc.freeze()
+    print(json.dumps({"ready": str(rig.folder / "swarm.toml")}), flush=True)
+    pace = Pace(STEP_NS, time.monotonic_ns, time.sleep)
+    with open(folder / "heard.jsonl", "w", buffering=1) as heard:
+        while True:
+            t_ns = pace.wait()
+            while orders:
+                order = orders.pop(0)
+                if order is None:
+                    rig.close()
+                    return
+                fault = Fault(t=max(rig.world.t, 0.0), **order)
+                rig.emulator._befall(fault, rig.world.t)
+                print(json.dumps({"befell": order, "t_ns": time.monotonic_ns()}), flush=True)
+            rig.step(t_ns)
+            state = rig.world.swarm.state
+            line = {
+                "t_ns": t_ns,
+                "heard": [ear.take() for ear in ears],
+                "motor": [float(v) for v in rig.emulator._speed],
+                "speed": [round(float(v), 4) for v in state.speed[0]],
+                "late": pace.lateness.late,
+            }
+            heard.write(json.dumps(line) + "\n")
+
+
+def listen(orders):
+    """Lines of stdin; None at its end."""
+    for line in sys.stdin:
+        orders.append(json.loads(line))
+    orders.append(None)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], EmulateOptions(**json.loads(sys.argv[2])))

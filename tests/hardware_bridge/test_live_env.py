@@ -1,0 +1,262 @@
+"""The environment on cars is that of the simulator: spaces, loops, wrappers; without real time."""
+
+import numpy as np
+import pytest
+from pettingzoo.test import api_test, parallel_api_test
+from pettingzoo.utils import OrderEnforcingWrapper
+from pettingzoo.utils.conversions import aec_to_parallel, parallel_to_aec
+from pettingzoo.utils.wrappers import BaseParallelWrapper
+
+from agents.controllers import Consensus
+from agents.emulate import EmulateOptions
+from agents.emulate.virtual import LAG, START_NS, VirtualBridge
+from hardware_bridge.errors import BridgeError
+from hardware_bridge.links.ports import Chunk
+from hardware_bridge.live.env import LiveFormationEnv
+from hardware_bridge.live.replay import ReplayFeed
+from hardware_bridge.recording import Header, Recorder, read_recording
+from hardware_bridge.recording import Kind as Record
+from relpos_env import formation_v0
+from relpos_env.errors import EnvError
+from relpos_env.interface.actions import ACTIONS
+from relpos_env.interface.cars_env import CarsEnv
+from relpos_env.interface.observations import OBSERVATIONS
+
+OPTIONS = EmulateOptions(scenario="cars-nlos", seed=3, seconds=600.0)
+SIMULATOR = {"scenario": "cars-nlos"}
+MODES = [name for name in OBSERVATIONS if name != "truth"]
+
+
+@pytest.fixture
+def bridge():
+    """Cars that are never armed: a reset takes no time, and whatever is asked for, they stand."""
+    with_nobody = VirtualBridge(OPTIONS, arm=False)
+    yield with_nobody
+    with_nobody.close()
+
+
+@pytest.fixture(scope="module")
+def armed():
+    """Cars that are armed, and know where the others are."""
+    started = VirtualBridge(OPTIONS)
+    started.env().reset()
+    yield started
+    started.close()
+
+
+def drive(env, act, seed=7):
+    """A policy loop as anybody writes it; observations, rewards and the last infos."""
+    seen, rewards = [], []
+    observations, infos = env.reset(seed=seed)
+    while env.agents:
+        actions = {agent: act(env, agent, observations[agent]) for agent in env.agents}
+        observations, reward, terminated, truncated, infos = env.step(actions)
+        seen.append(observations)
+        rewards.append(reward)
+        assert set(terminated) == set(truncated) == set(observations) == set(infos)
+    return seen, rewards, infos
+
+
+@pytest.mark.parametrize("history", [1, 3])
+@pytest.mark.parametrize("mode", MODES)
+def test_spaces_are_those_of_the_simulator(bridge, mode, history):
+    ours = bridge.env(observation=mode, history=history)
+    theirs = formation_v0.parallel_env(**SIMULATOR, observation=mode, history=history)
+    assert isinstance(ours, CarsEnv)
+    assert isinstance(theirs, CarsEnv)
+    assert ours.possible_agents == theirs.possible_agents
+    assert ours.observation_spaces == theirs.observation_spaces
+    assert ours.action_spaces == theirs.action_spaces
+    assert ours.fields == theirs.fields
+    assert ours.metadata["name"] == theirs.metadata["name"] == "formation_v0"
+
+
+@pytest.mark.parametrize("actions", ACTIONS)
+def test_actions_are_those_of_the_simulator(bridge, actions):
+    ours = bridge.env(actions=actions)
+    theirs = formation_v0.parallel_env(**SIMULATOR, actions=actions)
+    assert ours.action_spaces == theirs.action_spaces
+    ours.reset()
+    with pytest.raises(EnvError, match="action of car_1: expected shape"):
+        ours.step({**{a: s.sample() for a, s in ours.action_spaces.items()}, "car_1": [0.0] * 3})
+
+
+def test_truth_is_refused(bridge):
+    with pytest.raises(BridgeError, match="real cars know no truth"):
+        bridge.env(observation="truth")
+
+
+@pytest.mark.parametrize("history", [1, 2])
+@pytest.mark.parametrize("mode", MODES)
+def test_observations_are_inside_their_spaces(bridge, mode, history):
+    env = bridge.env(observation=mode, history=history, max_cycles=20)
+
+    def sample(env, agent, observation):
+        assert env.observation_space(agent).contains(observation)
+        return env.action_space(agent).sample()
+
+    seen, _, infos = drive(env, sample)
+    assert len(seen) == 20
+    for observations in seen:
+        for agent, observation in observations.items():
+            assert env.observation_space(agent).contains(observation)
+    assert {info["rewards_from"] for info in infos.values()} == {"estimates"}
+
+
+@pytest.mark.filterwarnings("ignore:Observation numpy array is all zeros:UserWarning")
+def test_the_checkers_of_pettingzoo_pass(bridge):
+    parallel_api_test(bridge.env(max_cycles=12), num_cycles=30)
+    api_test(OrderEnforcingWrapper(parallel_to_aec(bridge.env(max_cycles=8))), num_cycles=40)
+
+
+class Slower(BaseParallelWrapper):
+    """A wrapper as somebody wrote it for the simulator: gentler, and rewards in tenths."""
+
+    def step(self, actions):
+        gentler = {agent: np.float32([0.9, 1.0]) * action for agent, action in actions.items()}
+        observations, rewards, *rest = super().step(gentler)
+        return observations, {agent: 0.1 * r for agent, r in rewards.items()}, *rest
+
+
+def wrapped(env):
+    """In wrappers, there and back again."""
+    return aec_to_parallel(parallel_to_aec(Slower(env)))
+
+
+def consensus(env, agent, observation):
+    return Consensus(env.unwrapped.fields).act(observation)
+
+
+@pytest.mark.parametrize("wrap", [lambda env: env, Slower, wrapped], ids=["bare", "own", "turns"])
+def test_a_loop_with_wrappers_runs_on_both(armed, wrap):
+    """The same lines drive simulated and emulated cars into formation."""
+    live = armed.env(max_cycles=60)
+    simulated = formation_v0.parallel_env(**SIMULATOR, max_cycles=60)
+    fields = simulated.fields
+    driver = Consensus(fields)
+    for env in (simulated, live):
+        seen, rewards, infos = drive(wrap(env), lambda env, agent, seen: driver.act(seen))
+        assert len(seen) == len(rewards) == 60
+        assert sum(info["formation_error"] for info in infos.values()) < 3 * 0.4
+
+
+def test_a_reset_arms_and_lets_cars_find_each_other():
+    bridge = VirtualBridge(OPTIONS)
+    env = bridge.env(max_cycles=5)
+    env.reset()
+    assert [text for _, text in bridge.feed.notices] == ["arm"]
+    assert env.group.believed.complete
+    assert bridge.feed.report.armed.all()
+    t_ns = bridge.feed.t_ns
+    assert t_ns > START_NS
+    drive(env, consensus)
+    # Armed already, and known: the next episode begins after a second of looking and standing.
+    assert bridge.feed.t_ns - t_ns < 10_000_000_000
+    assert [text for _, text in bridge.feed.notices] == ["arm"]
+    env.close()
+    assert env.agents == []
+    with pytest.raises(EnvError, match="must be reset first"):
+        env.step({})
+    bridge.close()
+
+
+def test_a_virtual_drive_is_the_same_every_time():
+    def once():
+        bridge = VirtualBridge(OPTIONS)
+        env = LiveFormationEnv(bridge.swarm, bridge.feed, max_cycles=40)
+        seen, rewards = [], []
+        observations, _ = env.reset()
+        while env.agents:
+            if len(seen) == 22:
+                bridge.feed.order("arm")
+            seen.append(list(observations.values()))
+            observations, reward, *_ = env.step(
+                {a: consensus(env, a, o) for a, o in observations.items()}
+            )
+            rewards.append(reward)
+        assert bridge.feed.report.lag == pytest.approx(LAG)
+        assert np.abs(bridge.swarm.view.speed).max() > 0.1
+        bridge.close()
+        return seen, rewards
+
+    (one, first), (other, second) = once(), once()
+    np.testing.assert_array_equal(one, other)
+    assert first == second
+
+
+def test_commands_pass_the_gate(armed):
+    """What is asked for beyond the limits does not reach the cars, and a stop stops."""
+    limit = armed.config.safety.max_speed
+    env = armed.env()
+    env.reset()
+    for _ in range(5):
+        env.step({agent: np.float32([1.0, 0.0]) for agent in env.agents})
+        assert (np.abs(armed.feed.report.speed) <= limit + 1e-9).all()
+    armed.feed.order("stop")
+    for _ in range(15):
+        env.step({agent: np.float32([1.0, 0.0]) for agent in env.agents})
+    assert not armed.feed.report.armed.any()
+    assert np.abs(armed.rig.world.motion()[0]).max() < 0.05
+    armed.feed.order("clear")
+    env.reset()
+    assert armed.feed.report.armed.all()
+
+
+def test_unplugged_cars_are_known_to_be():
+    bridge = VirtualBridge(OPTIONS)
+    env = LiveFormationEnv(bridge.swarm, bridge.feed)
+    env.reset()
+    assert bridge.feed.report.linked.tolist() == [1.0, 1.0, 1.0]
+    bridge.rig.emulator.cars[0].line.unplug(1.0)
+    env.step({agent: np.zeros(2, np.float32) for agent in env.agents})
+    assert bridge.feed.report.linked.tolist() == [0.0, 1.0, 1.0]
+    bridge.close()
+
+
+class Recorded:
+    """A feed that keeps what went through it, as the real one does."""
+
+    def __init__(self, feed, recorder, names):
+        self._feed, self._recorder, self._names = feed, recorder, names
+
+    def advance(self):
+        t_ns = self._feed.advance()
+        report = self._feed.report
+        if report is not None:
+            speed, steering = report.speed.tolist(), report.steering.tolist()
+            self._recorder.add_event(t_ns, "applied", speed=speed, steering=steering)
+        self._recorder.add(Record.TICK, 0, t_ns)
+        return t_ns
+
+    def decide(self, picture):
+        self._feed.decide(picture)
+
+
+def test_a_replay_is_the_same_environment(tmp_path, monkeypatch):
+    bridge = VirtualBridge(OPTIONS, arm=False)
+    swarm = bridge.swarm
+    names = tuple(swarm.intake.streams)
+    header = Header(
+        software="test", config=bridge.config.text, links=names, monotonic_ns=START_NS, wall_ns=0
+    )
+    recorder = Recorder(tmp_path / "run.relpos", header)
+    recorder.add_event(START_NS, "start")
+    take = swarm.take
+
+    def keep(chunk: Chunk) -> None:
+        recorder.add(Record.BYTES_IN, names.index(chunk.link), chunk.t_ns, chunk.data)
+        take(chunk)
+
+    monkeypatch.setattr(swarm, "take", keep)
+    live = LiveFormationEnv(swarm, Recorded(bridge.feed, recorder, names), max_cycles=40)
+    seen, rewards, _ = drive(live, consensus)
+    recorder.close()
+    bridge.close()
+    feed = ReplayFeed(read_recording(tmp_path / "run.relpos"))
+    again, same, _ = drive(LiveFormationEnv(feed.swarm, feed, max_cycles=40), consensus)
+    assert rewards == same
+    for one, other in zip(seen, again, strict=True):
+        np.testing.assert_array_equal(list(one.values()), list(other.values()))
+    # A recording that has no more to give truncates the episode, and passes the checker.
+    feed = ReplayFeed(read_recording(tmp_path / "run.relpos"))
+    parallel_api_test(LiveFormationEnv(feed.swarm, feed, max_cycles=10), num_cycles=20)

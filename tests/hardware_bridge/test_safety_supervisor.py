@@ -1,0 +1,168 @@
+"""The supervisor, pure: what it tells the cars, whoever fails."""
+
+import numpy as np
+import pytest
+from safety_group import TICK, picture
+
+from hardware_bridge.safety.messages import Decision, Notice, Order, Word
+from hardware_bridge.safety.params import SafetyParams
+from hardware_bridge.safety.supervisor import Supervisor
+
+NEUTRAL = b"stand"
+
+
+class Driver:
+    """Says what it was asked for; may fail."""
+
+    def __init__(self):
+        self.fails, self.fails_neutral = False, False
+
+    def drive(self, speed, steering):
+        if self.fails:
+            raise RuntimeError("out of ideas")
+        return b"%.3f %.3f" % (speed, steering)
+
+    def neutral(self):
+        if self.fails_neutral:
+            raise OSError("out of everything")
+        return NEUTRAL
+
+
+class Drive:
+    """A supervisor of two cars with a clock, told that all is well."""
+
+    def __init__(self):
+        self.drivers = {0: Driver(), 1: Driver()}
+        self.supervisor = Supervisor(SafetyParams(), 2, self.drivers, {0: "cars.1", 1: "cars.2"})
+        self.q, self.now, self.linked = picture(), 0.0, [0, 1]
+
+    def tick(self, n=1, *, talk=True):
+        for _ in range(n):
+            self.now += TICK
+            if talk:
+                self.q.t[:] = self.q.ranged[:] = self.now
+                self.supervisor.take(Word(self.now, np.full(2, self.now)))
+                self.supervisor.take(Decision(self.q._replace(t=self.q.t.copy())))
+            sent = self.supervisor.tick(self.now, 0.0, self.linked)
+        return sent
+
+    def arm(self):
+        return self.supervisor.take(Order("arm"))
+
+
+@pytest.fixture
+def drive():
+    made = Drive()
+    made.tick(60)
+    assert made.arm() == []
+    made.tick(20)
+    assert made.supervisor.stopped() == []
+    return made
+
+
+def stands(sent):
+    return [data == NEUTRAL for _, data in sorted(sent.items())]
+
+
+def test_before_arming_all_are_told_to_stand_and_why_is_told():
+    made = Drive()
+    assert stands(made.tick(10)) == [True, True]
+    notices = made.arm()
+    assert [n.text[:15] for n in notices] == ["cars.1 not arme", "cars.2 not arme"]
+    assert stands(made.tick(10)) == [True, True]
+
+
+def test_an_order_before_the_first_tick_is_refused():
+    made = Drive()
+    assert len(made.arm()) == 2
+
+
+def test_armed_cars_drive(drive):
+    assert stands(drive.tick()) == [False, False]
+    report = drive.supervisor.report()
+    assert report.armed.tolist() == [1.0, 1.0]
+    assert (report.speed > 0.0).all()
+
+
+@pytest.mark.parametrize("bad", [0, 1])
+def test_a_driver_that_fails_keeps_no_other_from_being_told(drive, bad):
+    drive.drivers[bad].fails = True
+    sent = drive.tick()
+    assert sent[bad] == NEUTRAL
+    assert sent[1 - bad] != NEUTRAL
+    sent = drive.tick()
+    assert sent[bad] == NEUTRAL
+    assert sent[1 - bad] != NEUTRAL
+    (notice,) = drive.supervisor.stopped()
+    assert notice.text == f"cars.{bad + 1} stopped: its driver failed: out of ideas"
+
+
+@pytest.mark.parametrize("bad", [0, 1])
+def test_emergency_reaches_all_though_one_cannot_even_stand(drive, bad):
+    drive.drivers[bad].fails = drive.drivers[bad].fails_neutral = True
+    assert drive.supervisor.take(Order("stop")) == [Notice("emergency stop")]
+    sent = drive.tick()
+    assert sent[bad] == b""
+    assert sent[1 - bad] == NEUTRAL
+
+
+def test_a_driver_that_works_again_moves_only_after_arming(drive):
+    drive.drivers[0].fails = True
+    drive.tick(3)
+    drive.drivers[0].fails = False
+    assert drive.tick(100)[0] == NEUTRAL
+    assert len(drive.arm()) == 1
+    assert drive.tick(40)[0] == NEUTRAL
+    drive.tick(20)
+    assert drive.arm() == []
+    assert stands(drive.tick(5)) == [False, False]
+
+
+def test_a_port_that_comes_back_moves_nothing(drive):
+    drive.linked = [1]
+    assert stands(drive.tick()) == [True, False]
+    assert "port is lost" in drive.supervisor.stopped()[0].text
+    drive.linked = [0, 1]
+    assert stands(drive.tick(200)) == [True, False]
+    assert drive.arm() == []
+    assert stands(drive.tick(5)) == [False, False]
+
+
+def test_silence_stops_all(drive):
+    assert stands(drive.tick(5, talk=False)) == [False, False]
+    assert stands(drive.tick(2, talk=False)) == [True, True]
+    assert stands(drive.tick(200)) == [True, True]
+
+
+def test_pictures_that_were_overtaken_or_are_of_no_time_are_not_looked_at(drive):
+    old = drive.q._replace(t=drive.q.t - 0.05, speed_wanted=np.zeros((1, 2)))
+    drive.supervisor.take(Decision(old))
+    drive.supervisor.take(Decision(old._replace(t=np.full(1, np.nan))))
+    assert stands(drive.tick(1, talk=False)) == [False, False]
+    assert (drive.supervisor.report().speed > 0.0).all()
+
+
+@pytest.mark.parametrize(("order", "again"), [("stop", False), ("disarm", True), ("quit", True)])
+def test_orders(drive, order, again):
+    drive.supervisor.take(Order(order))
+    assert stands(drive.tick(100)) == [True, True]
+    assert drive.supervisor.quit == (order == "quit")
+    assert (drive.arm() == []) == again
+    if not again:
+        drive.supervisor.take(Order("clear"))
+        assert stands(drive.tick(100)) == [True, True]
+        assert drive.arm() == []
+    assert stands(drive.tick(5)) == [False, False]
+
+
+def test_unknown_orders_move_nothing_and_are_told(drive):
+    (notice,) = drive.supervisor.take(Order("dance"))
+    assert "dance" in notice.text
+
+
+def test_left_alone_nothing_moves_again(drive):
+    drive.supervisor.abandon()
+    assert stands(drive.tick(100)) == [True, True]
+    drive.arm()
+    assert stands(drive.tick(5)) == [True, True]
+    assert drive.supervisor.quit
