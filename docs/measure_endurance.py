@@ -21,7 +21,6 @@ import sys
 import tempfile
 import threading
 import time
-import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -83,9 +82,9 @@ def real(seconds: float, cars: int, scenario: str) -> None:
         while drive.poll() is None:
             time.sleep(every)
             pids = {"emulator": emulation.pid, "drive": drive.pid, **children(drive.pid)}
-            row = {name: round(memory(pid), 2) for name, pid in pids.items()}
-            row = {"t": round(time.monotonic() - begin, 1), **row, "missed": said.get("missed")}
-            row["late_decisions"] = said.get("late")
+            row: dict[str, Any] = {"t": round(time.monotonic() - begin, 1)}
+            row |= {name: round(memory(pid), 2) for name, pid in pids.items()}
+            row |= {"missed": said.get("missed"), "late_decisions": said.get("late")}
             if drive.poll() is None:
                 rows.append(row)
                 print(json.dumps(row), flush=True)
@@ -139,15 +138,13 @@ def virtual(seconds: float, cars: int, scenario: str) -> None:
                 drive.order("arm")
             drive.errors[:-100] = []
             drive.notices[:-100] = []
-            if k == 0:
-                tracemalloc.start(1)
-            rows.append((memory(os.getpid()), tracemalloc.get_traced_memory()[0] / 1e6))
-            row = {"t": round((k + 1) * every, 1), "rss_mb": round(rows[-1][0], 2)}
-            row |= {"traced_mb": round(rows[-1][1], 3), "armed": sum(drive.armed)}
+            rows.append(memory(os.getpid()))
+            row = {"t": round((k + 1) * every, 1), "rss_mb": round(rows[-1], 2)}
+            row["armed"] = sum(drive.armed)
             row["took"] = round(time.perf_counter() - begin, 1)
             print(json.dumps(row), flush=True)
         drive.close()
-        grew = rows[-1][0] - rows[min(2, len(rows) - 1)][0]
+        grew = rows[-1] - rows[min(2, len(rows) - 1)]
         print(json.dumps({"seconds": seconds, "cars": cars, "rss_growth_mb": round(grew, 2)}))
 
 
@@ -156,7 +153,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--seconds", type=float, default=180.0)
     parser.add_argument("--cars", type=int, default=6)
-    parser.add_argument("--scenario", default="swarm-nlos")
+    parser.add_argument("--scenario", default="ring-nlos")
     parser.add_argument("--virtual", action="store_true")
     chosen = parser.parse_args()
     (virtual if chosen.virtual else real)(chosen.seconds, chosen.cars, chosen.scenario)

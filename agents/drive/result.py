@@ -12,7 +12,10 @@ from tracking.arrays import F64, I64, Bool
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveResult:
-    """One drive; arrays over (decision, ...), from when the cars were armed on."""
+    """One drive; arrays over (decision, ...), from when the cars were armed on.
+
+    Of drives of more than ten minutes they have the last decisions only.
+    """
 
     driver: str
     """The controller or policy."""
@@ -20,6 +23,8 @@ class DriveResult:
     """Whether the cars were; else it was a dry run."""
     t_ns: I64
     """Host time of the decisions, (decision) [ns], whole numbers."""
+    began_ns: int
+    """Host time of the first of all [ns]."""
     target: F64
     """Where the others should have been, (decision, slot, other, 2) [m]."""
     wanted: Bool
@@ -32,6 +37,8 @@ class DriveResult:
     """What the gate let pass, (decision, slot, 2)."""
     lag: F64
     """From the last byte that a decision rests on to its command's bytes, (decision) [s]."""
+    decisions: int
+    """[-] All of them."""
     late_decisions: int
     """[-] That were due while the one before was still made."""
     missed_ticks: int
@@ -42,7 +49,7 @@ class DriveResult:
     @property
     def seconds(self) -> float:
         """Length [s]."""
-        return 1e-9 * float(self.t_ns[-1] - self.t_ns[0]) if len(self.t_ns) else 0.0
+        return 1e-9 * float(self.t_ns[-1] - self.began_ns) if len(self.t_ns) else 0.0
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -55,7 +62,7 @@ class DriveResult:
             "driver": self.driver,
             "armed": self.armed,
             "seconds": round(self.seconds, 3),
-            "decisions": len(self.t_ns),
+            "decisions": self.decisions,
             "believed_error": float(error.mean()) if len(error) else None,
             "lag_p50_ms": 1e3 * float(np.quantile(lag, 0.5)) if len(lag) else None,
             "lag_p99_ms": 1e3 * float(np.quantile(lag, 0.99)) if len(lag) else None,

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
-from contextlib import closing, suppress
-from dataclasses import dataclass, field
+from contextlib import closing
 from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
 
 from agents.compare.contender import find_entry
+from agents.drive.log import DriveLog
 from agents.drive.result import DriveResult
 from agents.driver import Driver
 from agents.errors import UsageError
@@ -20,11 +19,9 @@ from hardware_bridge.live.bridge import Bridge
 from hardware_bridge.live.env import LiveFormationEnv
 from hardware_bridge.live.opened import OpenBridge
 from relpos_env.timing import DECISION
-from tracking.arrays import F64, Bool
 
 CONTROLLER = "consensus"
 Watch: TypeAlias = Callable[[OpenBridge, LiveFormationEnv], None]
-STOPPED = " stopped: "
 MOST_CYCLES = 800_000
 
 
@@ -61,9 +58,6 @@ def drive(
         UsageError: No driver of that name, or not for such cars.
     """
     swarm = config if isinstance(config, SwarmConfig) else read_config(config)
-    if arm:
-        with suppress(OSError, AttributeError):  # without the right to, the default has to do
-            os.setpriority(os.PRIO_PROCESS, 0, -5)
 
     def open_bridge() -> Bridge:
         return Bridge(swarm, drive=True, arm=arm, wait=wait, record=record)
@@ -120,7 +114,7 @@ def drive_on(
     cycles = MOST_CYCLES if seconds is None else round(seconds / DECISION)
     with closing(open_bridge()) as bridge:
         env = bridge.env(observation=seen, history=entry.history, max_cycles=cycles)
-        log = _Log(entry.title, bridge, env)
+        log = DriveLog(entry.title, bridge, env, cycles)
         orders = _Orders(bridge)
         if attend is not None:
             bridge.feed.attend = lambda: attend(orders.take)
@@ -152,7 +146,9 @@ class _Orders:
         return self._quit
 
 
-def _drive(env: LiveFormationEnv, driver: Driver, log: _Log, is_over: Callable[[], bool]) -> None:
+def _drive(
+    env: LiveFormationEnv, driver: Driver, log: DriveLog, is_over: Callable[[], bool]
+) -> None:
     """Decide until the time is up, the task is done, or somebody says so."""
     for space in env.observation_spaces.values():
         driver.act(np.zeros(space.shape, np.float32))  # loads what is loaded when first used
@@ -164,58 +160,3 @@ def _drive(env: LiveFormationEnv, driver: Driver, log: _Log, is_over: Callable[[
         log.add()
         if is_over():
             return
-
-
-@dataclass(slots=True)
-class _Log:
-    """What is kept of every decision."""
-
-    title: str
-    bridge: OpenBridge
-    env: LiveFormationEnv
-    n_late: int = 0
-    t_ns: list[int] = field(default_factory=list)
-    target: list[F64] = field(default_factory=list)
-    wanted: list[Bool] = field(default_factory=list)
-    error: list[float] = field(default_factory=list)
-    command: list[F64] = field(default_factory=list)
-    passed: list[F64] = field(default_factory=list)
-    lag: list[float] = field(default_factory=list)
-
-    def first(self) -> None:
-        """The drive begins."""
-        self.n_late = self.bridge.feed.n_late
-
-    def add(self) -> None:
-        """A decision has passed."""
-        group, report = self.env.group, self.bridge.feed.report
-        present = group.believed.present[0]
-        task, n = group.task, self.bridge.config.n_slots
-        self.t_ns.append(group.t_ns)
-        self.target.append(task.target[0].copy())
-        self.wanted.append(task.has_target[0].copy())
-        self.error.append(float(task.error[0, present].mean()) if present.any() else np.nan)
-        self.command.append(group.asked.copy())
-        gated = (report.speed, report.steering) if report else (np.zeros(n), np.zeros(n))
-        self.passed.append(np.stack(gated, axis=-1))
-        self.lag.append(report.lag if report is not None and report.lag > 0.0 else np.nan)
-
-    def result(self, armed: bool) -> DriveResult:
-        """All of it."""
-        n, report = self.bridge.config.n_slots, self.bridge.feed.report
-        k = len(self.t_ns)
-        notices = [text for _, text in self.bridge.feed.notices]
-        return DriveResult(
-            driver=self.title,
-            armed=armed,
-            t_ns=np.array(self.t_ns, dtype=np.int64),
-            target=np.array(self.target).reshape(k, n, n, 2),
-            wanted=np.array(self.wanted, dtype=bool).reshape(k, n, n),
-            error=np.array(self.error),
-            command=np.array(self.command).reshape(k, n, 2),
-            passed=np.array(self.passed).reshape(k, n, 2),
-            lag=np.array(self.lag),
-            late_decisions=self.bridge.feed.n_late - self.n_late,
-            missed_ticks=report.missed if report is not None else 0,
-            stops=tuple(text for text in notices if STOPPED in text),
-        )

@@ -2,7 +2,8 @@
 
 While they stand, ranges leave open how the group is turned or mirrored. So at first every car
 wriggles within a hand's breadth or two of its place, each in its own rhythm, until the trackers
-are sure; only then is it asked for anything.
+are sure; only then is it asked for anything. Every car ends where it began, and pointing as it
+did: what somebody has put down in a formation is still one, and not turned towards a wall.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from hardware_bridge.live.group import LiveGroup
 from hardware_bridge.safety.gate import reason_text
 from hardware_bridge.safety.messages import Report
 from relpos_env.timing import DECISION
-from tracking.arrays import F64
+from tracking.arrays import F64, Bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,7 +29,7 @@ class StartParams:
     wait: float = 60.0
     """[s] For all to be well; cars that cannot be armed for so long end it."""
     find: float = 30.0
-    """[s] For cars to find each other; then the drive begins as it is."""
+    """[s] For cars to find each other; then the drive begins as it is, once all are home."""
     sure: float = 1.0
     """[s] All places must have been known for so long."""
     speed: float = 0.3
@@ -36,7 +37,7 @@ class StartParams:
     steering: float = 0.4
     """[rad] Likewise."""
     period: float = 1.6
-    """[s] Forwards and back of the first car; the others take longer by fifths."""
+    """[s] Forwards and back of the first car; the others take longer by fifths of it."""
 
 
 class Gated(Protocol):
@@ -106,12 +107,15 @@ class Start:
     def _find(self, group: LiveGroup) -> None:
         """Let the cars wriggle until all know where the others are."""
         p, n = self._params, group.swarm.config.n_slots
-        known = 0.0
-        for k in range(round(p.find / DECISION)):
+        known, k, home = 0.0, 0, np.zeros(n, dtype=bool)
+        while not home.all():
             known = known + DECISION if group.believed.complete else 0.0
-            if known >= p.sure:
-                break
-            self._step(group, *wriggle(p, n, k * DECISION))
+            t = k * DECISION
+            if home.any() or known >= p.sure or t >= p.find:
+                home |= is_home(p, n, t)
+            speed, steering = wriggle(p, n, t)
+            self._step(group, np.where(home, 0.0, speed), np.where(home, 0.0, steering))
+            k += 1
         still = np.zeros((1, n))
         for _ in range(round(0.5 / DECISION)):
             self._step(group, still, still)
@@ -134,8 +138,33 @@ def wriggle(p: StartParams, n_cars: int, t: float) -> tuple[F64, F64]:
         Speed [m/s] and steering [rad], each (1, car).
     """
     k = np.arange(n_cars)
-    phase = 2.0 * np.pi * t / (p.period * (1.0 + 0.2 * k)) + 2.1 * k
-    speed = p.speed * np.where(np.sin(phase) >= 0.0, 1.0, -1.0)
-    # The wheels stay turned to one side for a while, so that it comes round as well.
-    steering = p.steering * np.where(np.sin(0.4 * phase + k) >= 0.0, 1.0, -1.0)
+    turns = t / _periods(p, n_cars)
+    speed = p.speed * np.where(np.sin(2.0 * np.pi * turns + 2.1 * k) >= 0.0, 1.0, -1.0)
+    # The wheels stay turned to one side while the car goes forwards and back: it retraces its arc,
+    # and is where it was.
+    side = np.floor(turns + 1e-9).astype(int) + k
+    steering = p.steering * np.where(side % 2 == 0, 1.0, -1.0)
     return speed[None], steering[None]
+
+
+def is_home(p: StartParams, n_cars: int, t: float) -> Bool:
+    """Whether cars that wriggle are where they began, to the nearest decision.
+
+    Args:
+        p: How they wriggle.
+        n_cars: How many.
+        t: Since it began [s].
+
+    Returns:
+        (car)
+    """
+    periods = _periods(p, n_cars)
+    off = np.abs(t - np.round(t / periods) * periods)
+    home: Bool = off <= 0.5 * DECISION + 1e-9
+    return home
+
+
+def _periods(p: StartParams, n_cars: int) -> F64:
+    """Forwards and back, (car) [s]."""
+    periods: F64 = np.asarray(p.period * (1.0 + 0.2 * np.arange(n_cars)), dtype=np.float64)
+    return periods

@@ -78,9 +78,9 @@ def main(folder, options):
     ears = [Ears(car) for car in rig.emulator.cars]
     gc.collect()
     gc.freeze()
-    print(json.dumps({"ready": str(rig.folder / "swarm.toml")}), flush=True)
     pace = Pace(STEP_NS, time.monotonic_ns, time.sleep)
     with open(folder / "heard.jsonl", "w", buffering=1) as heard:
+        print(json.dumps({"ready": str(rig.folder / "swarm.toml")}), flush=True)
         while True:
             t_ns = pace.wait()
             while orders:

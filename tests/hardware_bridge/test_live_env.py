@@ -14,6 +14,7 @@ from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.ports import Chunk
 from hardware_bridge.live.env import LiveFormationEnv
 from hardware_bridge.live.replay import ReplayFeed
+from hardware_bridge.live.start import StartParams, is_home, wriggle
 from hardware_bridge.recording import Header, Recorder, read_recording
 from hardware_bridge.recording import Kind as Record
 from relpos_env import formation_v0
@@ -211,6 +212,27 @@ def test_unplugged_cars_are_known_to_be():
     env.step({agent: np.zeros(2, np.float32) for agent in env.agents})
     assert bridge.feed.report.linked.tolist() == [0.0, 1.0, 1.0]
     bridge.close()
+
+
+def test_cars_that_wriggle_come_home():
+    """Bicycles without slip, in thousandths of a second."""
+    p, n, dt, wheelbase = StartParams(), 5, 1e-3, 0.26
+    pose, home = np.zeros((n, 3)), np.zeros(n)
+    for k in range(20_000):
+        at_home = is_home(p, n, k * dt)
+        middle = np.abs(k * dt - np.round(k * dt / (p.period * (1 + 0.2 * np.arange(n))))
+                        * p.period * (1 + 0.2 * np.arange(n))) < dt / 2  # fmt: skip
+        assert at_home[middle].all()
+        home += middle
+        assert np.abs(pose[middle]).max(initial=0.0) < 5e-3
+        assert np.abs(pose[:, :2]).max() < 0.3
+        speed, steering = wriggle(p, n, (k + 0.5) * dt)
+        turn = speed[0] * np.tan(steering[0]) / wheelbase
+        heading = pose[:, 2] + 0.5 * dt * turn
+        pose[:, 0] += dt * speed[0] * np.cos(heading)
+        pose[:, 1] += dt * speed[0] * np.sin(heading)
+        pose[:, 2] += dt * turn
+    assert (home >= 6).all()
 
 
 class Recorded:

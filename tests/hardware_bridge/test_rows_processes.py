@@ -227,7 +227,7 @@ def test_unplugged_car(garage, figures):
             assert brakes(emulation, start, now, [car]) == []
             gap = longest_gap(emulation, car, start, now)
             figures.append(f"unplugged car 1: longest gap of car {car + 1} {gap:.0f} ms")
-            assert gap < 100.0
+            assert gap < 150.0
         assert drives(emulation, start + 20 * MS, now, [0]) == []
         assert brakes(emulation, up, now, [0])
         figures.append(f"unplugged car: back after {(up - start) / MS:.0f} ms of 1000")
@@ -250,7 +250,7 @@ def test_unplugged_node(garage, figures):
         assert stood - start < 450 * MS
         assert drives(emulation, stood + 1, now, [0]) == []
         for car in CARS:
-            assert longest_gap(emulation, car, start, now) < 100.0
+            assert longest_gap(emulation, car, start, now) < 150.0
         assert up - start < 3 * SECOND
         return (down - start) / MS
 
@@ -271,7 +271,7 @@ def test_full_disk(garage, figures):
     figures.append(
         f"full disk: longest gap {max(gaps):.0f} ms, told after {(told - start) / MS:.0f} ms"
     )
-    assert max(gaps) < 100.0
+    assert max(gaps) < 150.0
     freed = drive.tell(disk=-1)
     time.sleep(2.5)
     end = drive.signal(signal.SIGKILL)
