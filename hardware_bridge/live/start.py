@@ -166,5 +166,4 @@ def is_home(p: StartParams, n_cars: int, t: float) -> Bool:
 
 def _periods(p: StartParams, n_cars: int) -> F64:
     """Forwards and back, (car) [s]."""
-    periods: F64 = np.asarray(p.period * (1.0 + 0.2 * np.arange(n_cars)), dtype=np.float64)
-    return periods
+    return np.array([p.period * (1.0 + 0.2 * k) for k in range(n_cars)], dtype=np.float64)

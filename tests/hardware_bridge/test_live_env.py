@@ -217,22 +217,22 @@ def test_unplugged_cars_are_known_to_be():
 def test_cars_that_wriggle_come_home():
     """Bicycles without slip, in thousandths of a second."""
     p, n, dt, wheelbase = StartParams(), 5, 1e-3, 0.26
-    pose, home = np.zeros((n, 3)), np.zeros(n)
+    pose, n_home = np.zeros((n, 3)), np.zeros(n)
+    period = p.period * (1.0 + 0.2 * np.arange(n))
     for k in range(20_000):
-        at_home = is_home(p, n, k * dt)
-        middle = np.abs(k * dt - np.round(k * dt / (p.period * (1 + 0.2 * np.arange(n))))
-                        * p.period * (1 + 0.2 * np.arange(n))) < dt / 2  # fmt: skip
-        assert at_home[middle].all()
-        home += middle
-        assert np.abs(pose[middle]).max(initial=0.0) < 5e-3
-        assert np.abs(pose[:, :2]).max() < 0.3
-        speed, steering = wriggle(p, n, (k + 0.5) * dt)
+        t = k * dt
+        home = np.abs(t - np.round(t / period) * period) < 0.5 * dt
+        assert is_home(p, n, t)[home].all()
+        n_home += home
+        assert np.abs(pose[home]).max(initial=0.0) < 5e-3
+        assert np.abs(pose[:, :2]).max() < 0.5
+        speed, steering = wriggle(p, n, t + 0.5 * dt)
         turn = speed[0] * np.tan(steering[0]) / wheelbase
         heading = pose[:, 2] + 0.5 * dt * turn
-        pose[:, 0] += dt * speed[0] * np.cos(heading)
-        pose[:, 1] += dt * speed[0] * np.sin(heading)
-        pose[:, 2] += dt * turn
-    assert (home >= 6).all()
+        pose += dt * np.stack(
+            [speed[0] * np.cos(heading), speed[0] * np.sin(heading), turn], axis=-1
+        )
+    assert (n_home >= 6).all()
 
 
 class Recorded:
