@@ -55,7 +55,7 @@ class TrackedSwarm:
         proximity: int = 0,
     ) -> None:
         self.swarm = swarm = Swarm(scenario, n_cars, n_envs, n_steps, proximity)
-        self._perception = Perception(
+        self.perception = Perception(
             swarm.constellation,
             params,
             swarm.block,
@@ -69,18 +69,18 @@ class TrackedSwarm:
     @property
     def view(self) -> View:
         """What every car sees now."""
-        return self._perception.view
+        return self.perception.view
 
     @property
     def estimate(self) -> TeamEstimate:
         """The tracker's last estimate, as old as the horizon, overwritten by the next."""
-        return self._perception.estimate
+        return self.perception.estimate
 
     def part(self, envs: slice) -> TrackedSwarm:
         """Some of the groups; shares their memory."""
         part = copy.copy(self)
         part.swarm = self.swarm.part(envs)
-        part._perception = self._perception.part(envs, part.swarm.block, part.swarm.powered)
+        part.perception = self.perception.part(envs, part.swarm.block, part.swarm.powered)
         part._singles = {}
         return part
 
@@ -92,7 +92,7 @@ class TrackedSwarm:
             wanted: As in `View`.
             command: As in `View`.
         """
-        self._perception.share(target, wanted, command)
+        self.perception.share(target, wanted, command)
         self._singles = {}
 
     def begin(
@@ -111,7 +111,7 @@ class TrackedSwarm:
             watch: Called with the group after each of its steps.
         """
         self.swarm.begin(env, episode, rng)
-        self._perception.reset(env)
+        self.perception.reset(env)
         if env not in self._singles:
             self._singles[env] = self.part(slice(env, env + 1))
         still = np.zeros((1, self.view.speed.shape[1]))
@@ -135,7 +135,7 @@ class TrackedSwarm:
         view.speed[:] = swarm.odometer
         view.steering[:] = state.steering
         view.near[:] = swarm.proximity
-        self._perception.step()
+        self.perception.step()
 
     def __getstate__(self) -> dict[str, object]:
         """Parts stay behind."""
@@ -143,4 +143,4 @@ class TrackedSwarm:
 
     def __setstate__(self, state: dict[str, object]) -> None:
         self.__dict__.update(state)
-        self._perception.rebind(self.swarm.block, self.swarm.powered)
+        self.perception.rebind(self.swarm.block, self.swarm.powered)

@@ -97,7 +97,7 @@ def compare_hardware(
             remarks.append(f"Ended early: {error}")
         finally:
             bridge.feed.order("quit")
-        remarks += [text.capitalize() for _, text in bridge.feed.notices if STOPPED in text]
+        remarks += [text for _, text in bridge.feed.notices if STOPPED in text]
     rounds = min(len(seat.rounds) for seat in seats)
     if rounds == 0:
         raise UsageError("nothing compared: it ended before every driver had driven once")

@@ -19,8 +19,8 @@ from hardware_bridge.drivers import make_driver
 from hardware_bridge.drivers.base import CarDriver
 from hardware_bridge.emulator.ports import MemoryPort
 from hardware_bridge.links.ports import Chunk
-from hardware_bridge.live.env import LiveFormationEnv
 from hardware_bridge.live.feed import DECISION_NS
+from hardware_bridge.live.opened import OpenBridge
 from hardware_bridge.live.start import Start, StartParams
 from hardware_bridge.live.swarm import LiveSwarm, load_calibration
 from hardware_bridge.safety.charge import REPORT_EVERY
@@ -140,7 +140,7 @@ class VirtualFeed:
         return self.t_ns // 1000
 
 
-class VirtualBridge:
+class VirtualBridge(OpenBridge):
     """Emulated cars as an `OpenBridge`."""
 
     def __init__(
@@ -171,25 +171,6 @@ class VirtualBridge:
         self.swarm = LiveSwarm(self.config, START_NS, load_calibration(self.config))
         self.feed = VirtualFeed(self.rig, self.swarm, arm=arm, lag=lag)
         self.start = Start(self.feed, arm=arm, params=StartParams(wait=wait))
-
-    def env(
-        self,
-        *,
-        observation: str = "estimate",
-        history: int = 1,
-        actions: str = "continuous",
-        max_cycles: int = 600,
-    ) -> LiveFormationEnv:
-        """The environment on these cars; see `OpenBridge`."""
-        return LiveFormationEnv(
-            self.swarm,
-            self.feed,
-            observation=observation,
-            history=history,
-            actions=actions,
-            max_cycles=max_cycles,
-            prepare=self.start.run,
-        )
 
     def close(self) -> None:
         """Unplug everything."""

@@ -16,6 +16,8 @@ class CarDriver(Protocol):
 
     baud: int
     """[1/s] Of its port by default."""
+    gap: float
+    """[s] Commands that follow each other faster pile up in the controller; 0 where none do."""
     telemetry: Decoder
     """For what the controller answers: `MotionReading`, `StatusReading`, `AckReading`."""
 

@@ -134,6 +134,7 @@ class PwmDriver:
     """A car behind a PWM board, see the head of this file."""
 
     baud = 115200
+    gap = 0.03
 
     def __init__(self, options: PwmOptions) -> None:
         self.options = options

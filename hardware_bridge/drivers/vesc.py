@@ -131,6 +131,7 @@ class VescDriver:
     """A car with a VESC, see the head of this file."""
 
     baud = 115200
+    gap = 0.0
 
     def __init__(self, options: VescOptions) -> None:
         self.options = options

@@ -12,8 +12,8 @@ from types import TracebackType
 from hardware_bridge.config.swarm import SwarmConfig
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.links import Links
-from hardware_bridge.live.env import LiveFormationEnv
 from hardware_bridge.live.feed import LiveFeed
+from hardware_bridge.live.opened import OpenBridge
 from hardware_bridge.live.start import Start, StartParams
 from hardware_bridge.live.swarm import LiveSwarm, load_calibration
 from hardware_bridge.live.warm_up import warm_up
@@ -23,8 +23,10 @@ from hardware_bridge.safety.process import SupervisorProcess
 from tracking.calibration.file import calibration_toml
 
 
-class Bridge:
+class Bridge(OpenBridge):
     """Ports, trackers, a recording, and a supervisor where cars are driven."""
+
+    feed: LiveFeed
 
     def __init__(
         self,
@@ -98,25 +100,6 @@ class Bridge:
             )
             self.start = Start(self.feed, arm=arm, params=StartParams(wait=wait))
             self._stack = stack.pop_all()
-
-    def env(
-        self,
-        *,
-        observation: str = "estimate",
-        history: int = 1,
-        actions: str = "continuous",
-        max_cycles: int = 600,
-    ) -> LiveFormationEnv:
-        """The environment on these cars, see `LiveFormationEnv`; the last one is the one to use."""
-        return LiveFormationEnv(
-            self.swarm,
-            self.feed,
-            observation=observation,
-            history=history,
-            actions=actions,
-            max_cycles=max_cycles,
-            prepare=self.start.run,
-        )
 
     def close(self) -> None:
         """Let the cars stand and close everything."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Protocol
 
@@ -23,24 +24,17 @@ class OpenFeed(Feed, Gated, Protocol):
     """Called while waiting, every hundredth of a second or so: for keys and screens."""
 
 
-class OpenBridge(Protocol):
-    """Everything of a swarm, opened; see `hardware_bridge.live.bridge.Bridge`."""
+class OpenBridge(ABC):
+    """Everything of a swarm, opened: over ports and processes, or in memory."""
 
-    @property
-    def config(self) -> SwarmConfig:
-        """Of the swarm."""
-
-    @property
-    def swarm(self) -> LiveSwarm:
-        """Trackers of the cars."""
-
-    @property
-    def feed(self) -> OpenFeed:
-        """Where bytes come from and pictures go to."""
-
-    @property
-    def start(self) -> Start:
-        """What happens before a drive."""
+    config: SwarmConfig
+    """Of the swarm."""
+    swarm: LiveSwarm
+    """Trackers of the cars."""
+    feed: OpenFeed
+    """Where bytes come from and pictures go to."""
+    start: Start
+    """What happens before a drive."""
 
     def env(
         self,
@@ -50,7 +44,17 @@ class OpenBridge(Protocol):
         actions: str = "continuous",
         max_cycles: int = 600,
     ) -> LiveFormationEnv:
-        """The environment on these cars; the last one that was made is the one to use."""
+        """The environment on these cars, see `LiveFormationEnv`; the last one is the one to use."""
+        return LiveFormationEnv(
+            self.swarm,
+            self.feed,
+            observation=observation,
+            history=history,
+            actions=actions,
+            max_cycles=max_cycles,
+            prepare=self.start.run,
+        )
 
+    @abstractmethod
     def close(self) -> None:
         """Let the cars stand and close everything."""

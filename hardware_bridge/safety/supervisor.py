@@ -13,6 +13,8 @@ from hardware_bridge.safety.params import SafetyParams
 from hardware_bridge.safety.picture import Picture, blank_picture
 from tracking.arrays import F64, I64, Bool
 
+HALF_A_TICK = 0.005
+"""[s]"""
 LATE = 0.02
 """[s] A tick later than this is counted as missed."""
 
@@ -47,6 +49,8 @@ class Supervisor:
         self._late, self._missed = 0.0, 0
         self._lag, self._decided = 0.0, -np.inf
         self._broken: dict[int, str] = {}
+        self._told: dict[int, tuple[float, bool]] = {}
+        """When each car was last told something, and whether it was to move."""
         self.quit = False
         """Asked to end."""
 
@@ -99,7 +103,19 @@ class Supervisor:
         self._now[0] = now
         out = self._gate.step(self._picture, self._now, self._word, self._heard, self._linked)
         self._output = out
-        return {slot: self._bytes(slot, out) for slot in self._drivers}
+        return {
+            slot: self._bytes(slot, out) if self._is_due(slot, now, out) else b""
+            for slot in self._drivers
+        }
+
+    def _is_due(self, slot: int, now: float, out: GateOutput) -> bool:
+        """Whether a controller takes a command by now; the first that stops it is always due."""
+        t, moved = self._told.get(slot, (-np.inf, True))
+        moves = bool(out.moving[0, slot])
+        due = now - t >= self._drivers[slot].gap - HALF_A_TICK or (moved and not moves)
+        if due:
+            self._told[slot] = now, moves
+        return due
 
     def _bytes(self, slot: int, out: GateOutput) -> bytes:
         """What a car is sent; nothing where its driver cannot even say neutral."""

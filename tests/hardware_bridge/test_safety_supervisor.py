@@ -14,6 +14,8 @@ NEUTRAL = b"stand"
 class Driver:
     """Says what it was asked for; may fail."""
 
+    gap = 0.0
+
     def __init__(self):
         self.fails, self.fails_neutral = False, False
 
@@ -166,3 +168,12 @@ def test_left_alone_nothing_moves_again(drive):
     drive.arm()
     assert stands(drive.tick(5)) == [True, True]
     assert drive.supervisor.quit
+
+
+def test_a_controller_that_is_slow_to_take_commands_is_not_swamped():
+    driver = Driver()
+    driver.gap = 0.03
+    supervisor = Supervisor(SafetyParams(), 1, {0: driver}, {0: "cars.1"})
+    sent = [bool(supervisor.tick(0.01 * k, 0.0, [0])[0]) for k in range(1, 31)]
+    assert sent.count(True) == 10
+    assert sent[0]

@@ -32,7 +32,7 @@ BOUND: tuple[tuple[str, str], ...] = (
     ("view", "_turn"),
     ("view", "_see"),
 )
-"""Part, and the function that a `TrackedSwarm` has for it."""
+"""Part, and the function that a `Perception` has for it."""
 REST = "rest"
 """Checks, copies, infos, and Python between the parts."""
 
@@ -114,10 +114,10 @@ def _turn(batch: Batch) -> Parts:
         for name, owner, method in METHODS:
             timed = watch.round(getattr(owner, method), name)
             patches.enter_context(patch.object(owner, method, timed))
-        loop = batch.env.formation.loop
+        perception = batch.env.formation.loop.perception
         for name, function in BOUND:
-            timed = watch.round(getattr(loop, function), name)
-            patches.enter_context(patch.object(loop, function, timed))
+            timed = watch.round(getattr(perception, function), name)
+            patches.enter_context(patch.object(perception, function, timed))
         solver = watch.solver(Group.solve)
         patches.enter_context(patch.object(Group, "solve", solver))
         total = batch.turn()
