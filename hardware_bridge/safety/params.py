@@ -81,8 +81,8 @@ class SafetyParams:
     range_error: float = 0.2
     """[m] By which a range alone is believed to be too long at most: no line of sight."""
     range_limit: float = 1.0
-    """[s] Where positions are not known, a range as old as this says nothing any more; stopped
-    for good."""
+    """[s] Where positions are not known, a range as old as this says nothing any more; the car
+    stands."""
     fence: Fence | None = None
     """None where there is none."""
 

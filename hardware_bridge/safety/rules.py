@@ -29,6 +29,10 @@ DIRECTION = 1.0
 with more, cars beside each other could not part."""
 
 
+LONG_AGO = 60.0
+"""[s] A range as old is none."""
+
+
 class Rule(NamedTuple):
     """One line of the table."""
 
@@ -84,8 +88,11 @@ def unknown(m: Moment, p: SafetyParams) -> Verdict:
     q = m.picture
     unsure = _others(q) & ~_judged(q)
     age = m.now[:, None, None] - q.ranged
-    known = _within(age, p.range_limit) & np.isfinite(q.distance)
-    hold: Bool = np.any(unsure & ~known, axis=-1)
+    ranged = _within(age, LONG_AGO) & np.isfinite(q.distance)
+    known = ranged & (age <= p.range_limit)
+    # A wall between two lasts for a while, and who stands goes on when it is past.
+    hold: Bool = np.any(unsure & ~ranged, axis=-1)
+    stand: Bool = np.any(unsure & ~known, axis=-1)
     # Doubt lasts for seconds, and only cars that move dispel it: a formation that crept through
     # it would fall apart. One that has yet to find itself creeps.
     slow: Bool = np.any(unsure & (q.status != Status.DOUBTFUL), axis=-1)
@@ -93,7 +100,8 @@ def unknown(m: Moment, p: SafetyParams) -> Verdict:
     way = 0.5 * (q.distance - p.range_error - p.separation)
     speed = stopping_speed(way, p.reaction + np.where(known, np.maximum(age, 0.0), 0.0), p.braking)
     cap = np.where(unsure, speed, FREE).min(axis=-1)
-    return _capped(np.where(hold, 0.0, np.where(slow, np.minimum(cap, p.slow), cap)), hold)
+    cap = np.where(slow, np.minimum(cap, p.slow), cap)
+    return _capped(np.where(stand, 0.0, cap), hold)
 
 
 def lost_heading(m: Moment, p: SafetyParams) -> Verdict:
@@ -208,7 +216,7 @@ RULES = (
     Rule(
         "unknown", unknown, "the position of another car is not known",
         "`slow` (not where ranges contradict each other), and half of what the last range leaves; "
-        "stops for good if that is older than `range_limit`",
+        "stands while that is older than `range_limit`, and stops for good if there was none",
     ),
     Rule("heading", lost_heading, "the heading is not known", "stands until it is"),
     Rule(

@@ -101,12 +101,15 @@ def test_doubt_caps_by_the_distance_alone():
     assert caps(check("unknown", q)) == (0.0, False)
 
 
-@pytest.mark.parametrize(("age", "hold"), [(1.0, False), (1.001, True)])
-def test_a_range_says_nothing_after_a_second(age, hold):
-    q = picture()
+@pytest.mark.parametrize(
+    ("age", "cap", "hold"), [(1.0, 0.0, False), (1.001, 0.0, False), (61.0, 0.0, True)]
+)
+def test_a_range_says_nothing_after_a_second(age, cap, hold):
+    q = picture(spacing=30.0)
     q.status[:] = Status.AMBIGUOUS
     q.ranged[:] = -age
-    assert caps(check("unknown", q))[1] == hold
+    found = caps(check("unknown", q))
+    assert found == (P.slow if age <= P.range_limit else cap, hold)
 
 
 def test_a_place_that_is_no_number_is_not_known():
