@@ -6,6 +6,7 @@ step is the business of a `Group`.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import Any, Protocol
 
 import numpy as np
@@ -54,7 +55,7 @@ class Group(Protocol):
         """Drive for one decision; speed [m/s] and steering [rad], each (env, car)."""
 
 
-class CarsEnv(ParallelEnv):  # type: ignore[misc]
+class CarsEnv(ParallelEnv, ABC):  # type: ignore[misc]
     """An agent is a car.
 
     One that joins in mid-episode becomes an agent in that step; one that leaves for good is
@@ -162,13 +163,13 @@ class CarsEnv(ParallelEnv):  # type: ignore[misc]
             self._infos(concerned),
         )
 
+    @abstractmethod
     def _begin(self) -> None:
         """Begin an episode of the group."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _infos(self, agents: list[str]) -> dict[str, Any]:
         """What agents are told beside their observations."""
-        raise NotImplementedError
 
     def _show(self) -> None:
         """After every reset and step."""
