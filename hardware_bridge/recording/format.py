@@ -39,7 +39,8 @@ class Kind(IntEnum):
     BYTES_IN = 2
     """What was read from a link at once."""
     BYTES_OUT = 3
-    """What was sent to a link at once."""
+    """What was sent to a link at once. A drive writes EVENTs ``applied`` in its place: the
+    supervisor, which sends, is another process."""
     TICK = 4
     """A decision: the tracker was asked for an estimate at this time. No payload."""
     EVENT = 5
