@@ -177,10 +177,9 @@ def as_record(t: float, reading: Reading) -> dict[str, Any]:
     for name in ("device", "boot", "sequence", "ticks"):
         if getattr(source, name) is not None:
             record[name] = getattr(source, name)
-    for each in fields(reading):
-        value = getattr(reading, each.name)
-        if each.name != "source" and value is not None:
-            record[each.name] = _plain(value)
+    for name, value in zip(reading._fields, reading, strict=True):
+        if name != "source" and value is not None:
+            record[name] = _plain(value)
     return record
 
 

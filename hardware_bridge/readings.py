@@ -7,16 +7,14 @@ clocks become the host's in `hardware_bridge.intake`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from tracking.estimate import Status
 
 Vector: TypeAlias = tuple[float, float, float]
 
 
-@dataclass(frozen=True, slots=True)
-class DeviceClock:
+class DeviceClock(NamedTuple):
     """A counter of a device."""
 
     hz: float
@@ -34,8 +32,7 @@ RADIO_40 = DeviceClock(128 * 499.2e6, 1 << 40)
 """Time stamps of DW1000 and DW3000; wraps every 17.2 s."""
 
 
-@dataclass(frozen=True, slots=True)
-class Source:
+class Source(NamedTuple):
     """Who said it, and when by its own clock; None is what the format does not tell."""
 
     device: str | None = None
@@ -53,8 +50,7 @@ NOBODY = Source()
 """Of formats that tell nothing."""
 
 
-@dataclass(frozen=True, slots=True)
-class ImuReading:
+class ImuReading(NamedTuple):
     """A sample of an inertial sensor, and of the magnetometer where it has one."""
 
     source: Source
@@ -66,8 +62,7 @@ class ImuReading:
     """[uT]"""
 
 
-@dataclass(frozen=True, slots=True)
-class StateReading:
+class StateReading(NamedTuple):
     """What a node sends that filters its orientation itself."""
 
     source: Source
@@ -77,8 +72,7 @@ class StateReading:
     """[m/s2] Without gravity."""
 
 
-@dataclass(frozen=True, slots=True)
-class RangeReading:
+class RangeReading(NamedTuple):
     """A distance between two devices."""
 
     source: Source
@@ -94,8 +88,7 @@ class RangeReading:
     """The end that is not `to`, where it is not the one that says it."""
 
 
-@dataclass(frozen=True, slots=True)
-class MotionReading:
+class MotionReading(NamedTuple):
     """What a car says of its own motion."""
 
     source: Source
@@ -105,8 +98,7 @@ class MotionReading:
     """[rad] Of the front wheels, left is positive."""
 
 
-@dataclass(frozen=True, slots=True)
-class StatusReading:
+class StatusReading(NamedTuple):
     """How a device does."""
 
     source: Source
@@ -116,8 +108,7 @@ class StatusReading:
     """0 is none; else what its maker says."""
 
 
-@dataclass(frozen=True, slots=True)
-class AckReading:
+class AckReading(NamedTuple):
     """A device took a command."""
 
     source: Source
@@ -125,15 +116,13 @@ class AckReading:
     """Sequence number of that command."""
 
 
-@dataclass(frozen=True, slots=True)
-class HeartbeatReading:
+class HeartbeatReading(NamedTuple):
     """A device is alive."""
 
     source: Source
 
 
-@dataclass(frozen=True, slots=True)
-class OperatorReading:
+class OperatorReading(NamedTuple):
     """Somebody with a remote control trims a car: a velocity on top of what the plan asks for."""
 
     source: Source
@@ -143,8 +132,7 @@ class OperatorReading:
     """[m/s] World frame, x and y."""
 
 
-@dataclass(frozen=True, slots=True)
-class DriveReading:
+class DriveReading(NamedTuple):
     """A command to a car, as the car reads it."""
 
     source: Source
@@ -157,8 +145,7 @@ class DriveReading:
     """Stand still, whatever speed and steering say."""
 
 
-@dataclass(frozen=True, slots=True)
-class PairReading:
+class PairReading(NamedTuple):
     """Where one node is relative to another, by a tracker that is not ours; world frame."""
 
     source: Source
@@ -177,8 +164,7 @@ class PairReading:
     """[-] Probability that it rests on what was not in sight."""
 
 
-@dataclass(frozen=True, slots=True)
-class PoseReading:
+class PoseReading(NamedTuple):
     """Where a node is, where it points and how it moves, as far as a tracker tells; world frame."""
 
     source: Source

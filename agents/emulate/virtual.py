@@ -80,7 +80,8 @@ class VirtualFeed:
         self.notices += self._swarm.intake.notices
         self._swarm.intake.notices.clear()
         if self.report is not None:
-            self._swarm.apply(self.report.speed, self.report.steering)
+            report = self.report
+            self._swarm.apply(report.speed, report.steering, report.armed)
         return self.t_ns
 
     def decide(self, picture: Picture) -> None:

@@ -6,7 +6,7 @@ It knows nothing of the group but the ids of others, and nothing of the host.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -147,9 +147,9 @@ class EmulatedNode:
             sequence = self.sequences[port]
             source = Source(wire.name_of(self.node), self.boot, sequence, ticks, wire.clock)
             self.sequences[port] = (sequence + 1) % (1 << 32)
-            named = replace(reading, source=source)
+            named = reading._replace(source=source)
             if isinstance(named, RangeReading):
-                named = replace(named, to=wire.name_of(int(named.to)))
+                named = named._replace(to=wire.name_of(int(named.to)))
             told: list[Reading] = [named]
             if wire.always_voltage and not isinstance(named, StatusReading):
                 told.append(StatusReading(source, self.params.voltage))

@@ -82,12 +82,13 @@ class LiveFeed:
         self._note_links()
         now = self._now_ns()
         self._speak(now)
-        if self.report is not None:
-            self._swarm.apply(self.report.speed, self.report.steering)
+        if (report := self.report) is not None:
+            applied = {"speed": report.speed, "steering": report.steering, "armed": report.armed}
+            self._swarm.apply(**applied)
+            if self._recorder is not None:
+                said = {name: value.tolist() for name, value in applied.items()}
+                self._recorder.add_event(now, "applied", **said)
         if self._recorder is not None:
-            if self.report is not None:
-                speed, steering = self.report.speed.tolist(), self.report.steering.tolist()
-                self._recorder.add_event(now, "applied", speed=speed, steering=steering)
             self._recorder.add(Kind.TICK, 0, now)
         return now
 

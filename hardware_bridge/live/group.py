@@ -85,6 +85,7 @@ class LiveGroup:
         self.t_ns = 0
         """Host time of the last decision [ns]."""
         self._begun = 0
+        self._armed: Bool = swarm.armed.copy()
         self.placed = False
         """Whether places were given out knowing where all cars are."""
         self._newest: F32 = np.zeros((1, n, self._size), np.float32)
@@ -133,6 +134,10 @@ class LiveGroup:
         swarm.step(t_ns)
         believed.update(swarm.view, DECISION)
         here = slice(0, 1)
+        if (swarm.armed & ~self._armed).any():
+            # While it stood the plan went on: nobody is near the place that was given to it.
+            self.placed = False
+        self._armed = swarm.armed.copy()
         if first or (not self.placed and believed.complete):
             # Until all are known, places are given by what is known; then once more.
             self.placed = believed.complete

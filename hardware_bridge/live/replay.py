@@ -71,7 +71,8 @@ class ReplayFeed:
             elif record.kind == Kind.EVENT:
                 event = record.event()
                 if event.get("event") == "applied":
-                    self.swarm.apply(np.array(event["speed"]), np.array(event["steering"]))
+                    told = (np.array(event[key]) for key in ("speed", "steering", "armed"))
+                    self.swarm.apply(*told)
                 elif event.get("event") == "notice":
                     self.notices.append((record.t_ns, str(event.get("text", ""))))
             elif record.kind == Kind.TICK:

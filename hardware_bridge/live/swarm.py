@@ -53,6 +53,8 @@ class LiveSwarm:
         self._room = ROOM
         self._here: set[int] = set()
         self._applied: tuple[F64, F64] = (np.zeros(config.n_slots), np.zeros(config.n_slots))
+        self.armed: Bool = np.zeros(config.n_slots, dtype=bool)
+        """Which cars the gate lets move, (slot)."""
         self._perception = self._make_perception()
         self.tap: Callable[[MeasurementBlock], None] | None = None
         """Called with what was measured since the last step, as it came, without calibration; the
@@ -86,14 +88,16 @@ class LiveSwarm:
         """Take bytes as they came."""
         self.intake.take(chunk)
 
-    def apply(self, speed: F64, steering: F64) -> None:
+    def apply(self, speed: F64, steering: F64, armed: F64) -> None:
         """Note what the gate let the cars do, for cars that do not tell themselves.
 
         Args:
             speed: (slot) [m/s]
             steering: (slot) [rad]
+            armed: 1 where the car may move, (slot).
         """
         self._applied = speed.copy(), steering.copy()
+        self.armed = armed > 0.0
 
     def step(self, t_ns: int) -> None:
         """Let the trackers catch up with what arrived, and see.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import Any, TypeAlias
 
 from hardware_bridge.readings import (
@@ -29,6 +30,12 @@ UNIT_WITHIN = 1e-3
 """[-] A quaternion whose length is farther from 1 is none."""
 NODE_LIMIT = 1 << 16
 WORD_LIMIT = 1 << 32
+
+
+@cache
+def name_of(node: float) -> str:
+    """How a reading names a node, 0 to 65535."""
+    return str(int(node))
 
 
 def node_number(name: str, device: str) -> int:
@@ -133,7 +140,7 @@ def _as_range(s: Source, v: Row) -> Reading:
     has = int(v[6])
     rx = v[3] if has & 2 else None
     fp = v[4] if has & 4 else None
-    return RangeReading(s, str(int(v[0])), v[2], rx, fp, str(int(v[1])) if has & 1 else None)
+    return RangeReading(s, name_of(v[0]), v[2], rx, fp, name_of(v[1]) if has & 1 else None)
 
 
 def _as_motion(s: Source, v: Row) -> Reading:
@@ -145,7 +152,7 @@ def _as_status(s: Source, v: Row) -> Reading:
 
 
 def _as_drive(s: Source, v: Row) -> Reading:
-    return DriveReading(s, str(int(v[0])), v[1], v[2], bool(int(v[3]) & 1))
+    return DriveReading(s, name_of(v[0]), v[1], v[2], bool(int(v[3]) & 1))
 
 
 AS_READING: dict[int, Callable[[Source, Row], Reading | None]] = {
@@ -157,7 +164,7 @@ AS_READING: dict[int, Callable[[Source, Row], Reading | None]] = {
     wire.STATUS.type: _as_status,
     wire.HEARTBEAT.type: lambda s, v: HeartbeatReading(s),
     wire.COMMAND.type: _as_drive,
-    wire.REMOTE.type: lambda s, v: OperatorReading(s, str(int(v[0])), (v[1], v[2])),
+    wire.REMOTE.type: lambda s, v: OperatorReading(s, name_of(v[0]), (v[1], v[2])),
     wire.ACK.type: lambda s, v: AckReading(s, int(v[0])),
 }
 """By type of message: a row of values to a reading, None where a number cannot be."""

@@ -1,6 +1,6 @@
 """What happens to bytes on the way, and what decoders make of it."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from random import Random
 
 from decoder_samples import SAMPLES, decoder_of
@@ -104,7 +104,7 @@ def wrongly_accepted(name, kind, trials, seed=0):
             continue
         sent = true[frame] + true[other]
         # A magnetometer that got lost makes nothing wrong.
-        sent += [replace(r, mag=None) for r in sent if isinstance(r, ImuReading)]
+        sent += [r._replace(mag=None) for r in sent if isinstance(r, ImuReading)]
         strange = [r for r in decoder_of(name).feed(damaged) if r not in sent]
         wrong += bool(strange)
         told = {(r.to, r.distance) for r in sent if isinstance(r, RangeReading)}

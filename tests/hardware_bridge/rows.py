@@ -41,10 +41,11 @@ class Talking:
             self._changed.notify_all()
 
     def tell(self, **order):
-        """Send an order; when it was sent [ns]."""
+        """Send an order; a time before it was heard [ns]."""
+        t_ns = time.monotonic_ns()
         self.process.stdin.write(json.dumps(order) + "\n")
         self.process.stdin.flush()
-        return time.monotonic_ns()
+        return t_ns
 
     def wait_for(self, fits, seconds=60.0, since=0):
         """The first line at or after a time [ns] that fits."""
@@ -154,9 +155,10 @@ class Drive(Talking):
         return self.moving(self.tell(order="arm"))["t_ns"]
 
     def signal(self, what):
-        """Send a signal to the deciding process; when it was sent [ns]."""
+        """Send a signal to the deciding process; a time before it came [ns]."""
+        t_ns = time.monotonic_ns()
         os.kill(self.process.pid, what)
-        return time.monotonic_ns()
+        return t_ns
 
     def close(self):
         if self.process.poll() is None:

@@ -1,7 +1,5 @@
 """What the devices' ends write is what the decoders read, within the resolution of the format."""
 
-from dataclasses import replace
-
 import pytest
 from decoder_samples import decoder_of
 from hypothesis import given
@@ -38,8 +36,8 @@ def decoded(name, device, readings):
 
 
 def same_ranges(got, sent, metres, decibels):
-    assert [replace(r, distance=0.0, rx_power=None, fp_power=None) for r in got] == [
-        replace(r, distance=0.0, rx_power=None, fp_power=None) for r in sent
+    assert [r._replace(distance=0.0, rx_power=None, fp_power=None) for r in got] == [
+        r._replace(distance=0.0, rx_power=None, fp_power=None) for r in sent
     ]
     for g, s in zip(got, sent, strict=True):
         assert g.distance == pytest.approx(s.distance, abs=metres)
@@ -87,7 +85,7 @@ def test_linktrack_sends_a_frame_for_each_sample_of_the_imu():
     ]
     got = decoded("linktrack", "3", samples)
     assert [r for r in got if isinstance(r, ImuReading)] == samples
-    same = [replace(r, source=samples[0].source) for r in samples]
+    same = [r._replace(source=samples[0].source) for r in samples]
     assert [r for r in decoded("linktrack", "3", same) if isinstance(r, ImuReading)] == same
 
 

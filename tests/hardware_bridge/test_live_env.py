@@ -245,8 +245,8 @@ class Recorded:
         t_ns = self._feed.advance()
         report = self._feed.report
         if report is not None:
-            speed, steering = report.speed.tolist(), report.steering.tolist()
-            self._recorder.add_event(t_ns, "applied", speed=speed, steering=steering)
+            told = {key: getattr(report, key).tolist() for key in ("speed", "steering", "armed")}
+            self._recorder.add_event(t_ns, "applied", **told)
         self._recorder.add(Record.TICK, 0, t_ns)
         return t_ns
 

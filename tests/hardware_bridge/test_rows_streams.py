@@ -4,7 +4,6 @@ import ast
 import datetime
 import itertools
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -217,7 +216,7 @@ class Attacker:
                 for f in self.forgers
             )
         if name == "operator":
-            source = replace(source, device="65534")
+            source = source._replace(device="65534")
             said += b"".join(f.encode([OperatorReading(source, "1", (2.0, 2.0))])
                              for f in self.operators)  # fmt: skip
         self.commands.append(dict(self.each.sent))

@@ -2,7 +2,6 @@
 
 import math
 import random
-from dataclasses import replace
 
 import pytest
 from cobs import cobs
@@ -49,8 +48,8 @@ def said(chunks, key=None):
 def test_what_was_encoded_is_decoded(spoken, key, boot):
     encoder = RelposEncoder(7, boot, key)
     met, counts = said([encoder.encode(spoken)], key)
-    assert [replace(r, source=r.source) for r in met] == [
-        replace(was, source=replace(r.source, ticks=was.source.ticks))
+    assert [r._replace(source=r.source) for r in met] == [
+        was._replace(source=r.source._replace(ticks=was.source.ticks))
         for was, r in zip(spoken, met, strict=True)
     ]
     numbers = [r.source.sequence for r in met]
@@ -168,7 +167,7 @@ def test_no_pair_of_boot_and_sequence_comes_twice():
 @pytest.mark.parametrize(("reading", "match"), [
     (HeartbeatReading(Source()), "source.ticks"),
     (HeartbeatReading(Source(ticks=1, clock=RADIO_40)), "source.clock: expected microseconds"),
-    (HeartbeatReading(replace(NOW, device="8")), "source.device: expected 9, got '8'"),
+    (HeartbeatReading(NOW._replace(device="8")), "source.device: expected 9, got '8'"),
     (MotionReading(NOW, math.nan), "MotionReading: expected finite"),
     (MotionReading(NOW, 1.0, math.inf), "finite"),
     (ImuReading(NOW, (0.0, -math.inf, 0.0), (0.0, 0.0, 0.0)), "finite"),
@@ -223,7 +222,7 @@ def test_commands_are_numbered_and_sealed():
     data = car.opening() + car.drive(9.0, -9.0) + car.neutral() + car.ask()
     assert car.sequence == 2
     source = Source(str(HOST), 6, 0, 100, MICROSECONDS_32)
-    then = replace(source, sequence=1, ticks=200)
+    then = source._replace(sequence=1, ticks=200)
     assert said([b"\x07rubbish", data], KEY)[0] == [
         DriveReading(source, "4", 2.0, -0.42, brake=False),
         DriveReading(then, "4", 0.0, 0.0, brake=True),

@@ -84,7 +84,7 @@ class VirtualDrive:
         for _ in range(STEPS):
             self._tick()
         self.report = self.supervisor.report()
-        self.swarm.apply(self.report.speed, self.report.steering)
+        self.swarm.apply(self.report.speed, self.report.steering, self.report.armed)
         self.notices += [text for _, text in self.swarm.intake.notices]
         self.swarm.intake.notices.clear()
         self.errors.append(self.error())

@@ -95,7 +95,7 @@ def payloads(draw):
 
 words = st.integers(0, (1 << 32) - 1)
 nodes = st.integers(0, (1 << 16) - 1)
-sources = st.builds(Source, ticks=words, clock=st.just(MICROSECONDS_32))
+sources = words.map(lambda ticks: Source(ticks=ticks, clock=MICROSECONDS_32))
 
 
 def steps(bits, per):
@@ -112,7 +112,7 @@ names = nodes.map(str)
 turns = st.sampled_from([(1.0, 0.0, 0.0, 0.0), (0.5, -0.5, 0.5, -0.5), (0.0, 0.6, -0.8, 0.0)])
 
 readings = st.one_of(
-    st.builds(ImuReading, sources, gyr, acc, st.none() | mag),
+    st.builds(ImuReading, sources, gyr, acc, mag=st.none() | mag),
     st.builds(StateReading, sources, turns, acc),
     st.builds(RangeReading, sources, names, steps(32, 10_000), powers, powers, st.none() | names),
     st.builds(MotionReading, sources, steps(16, 1000), st.none() | steps(16, 10_000)),
