@@ -14,7 +14,8 @@ demo-hardware: $(VENV)/.hardware
 	$(BIN)/relpos demo-hardware --out demo-hardware
 
 test: $(VENV)/.dev
-	$(BIN)/python -m pytest -n auto
+	$(BIN)/python -m pytest -n auto -m 'not realtime'
+	$(BIN)/python -m pytest -m realtime
 
 check: $(VENV)/.dev
 	$(BIN)/ruff format --check .

@@ -236,12 +236,15 @@ def test_cars_that_wriggle_come_home():
 
 
 class Recorded:
-    """A feed that keeps what went through it, as the real one does."""
+    """A feed that keeps what went through it, as the real one does; cars are armed for a while."""
 
     def __init__(self, feed, recorder, names):
-        self._feed, self._recorder, self._names = feed, recorder, names
+        self._feed, self._recorder, self._names, self._n = feed, recorder, names, 0
 
     def advance(self):
+        self._n += 1
+        if self._n in (15, 25):
+            self._feed.order("arm" if self._n == 15 else "disarm")
         t_ns = self._feed.advance()
         report = self._feed.report
         if report is not None:
@@ -255,7 +258,7 @@ class Recorded:
 
 
 def test_a_replay_is_the_same_environment(tmp_path, monkeypatch):
-    bridge = VirtualBridge(OPTIONS, arm=False)
+    bridge = VirtualBridge(OPTIONS)
     swarm = bridge.swarm
     names = tuple(swarm.intake.streams)
     header = Header(
@@ -277,6 +280,7 @@ def test_a_replay_is_the_same_environment(tmp_path, monkeypatch):
     feed = ReplayFeed(read_recording(tmp_path / "run.relpos"))
     again, same, _ = drive(LiveFormationEnv(feed.swarm, feed, max_cycles=40), consensus)
     assert rewards == same
+    assert swarm.view.speed.any()
     for one, other in zip(seen, again, strict=True):
         np.testing.assert_array_equal(list(one.values()), list(other.values()))
     # A recording that has no more to give truncates the episode, and passes the checker.

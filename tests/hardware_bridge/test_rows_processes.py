@@ -10,7 +10,7 @@ from rows import MS, Drive, Emulation
 
 from hardware_bridge.recording import Kind, read_recording
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.realtime]
 SECOND = 1_000_000_000
 CARS = range(3)
 
