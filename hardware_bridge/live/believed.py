@@ -1,7 +1,9 @@
 """Where cars believe themselves to be, in the place of a truth that nobody has.
 
-Relative positions leave one place open: it is chosen so that the present cars' middle is the
-origin. Tasks ask for nothing that depends on it but where a path lies in the room.
+Relative positions leave one place open: it is chosen so that the middle of the cars with a place
+is the origin. Tasks ask for nothing that depends on it but where a path lies in the room.
+
+For the seconds in which the tracker is not sure of a car, its place goes on by its odometer.
 """
 
 from __future__ import annotations
@@ -26,6 +28,7 @@ class Believed:
         self.present: Bool = np.zeros(shape, dtype=bool)
         self.known: Bool = np.zeros(shape, dtype=bool)
         """Whose place is known relative to the others'."""
+        self._placed: Bool = np.zeros(n_cars, dtype=bool)
 
     def update(self, view: View, seconds: float) -> None:
         """Take over what the cars see now.
@@ -35,22 +38,31 @@ class Believed:
             seconds: Since the last update [s].
         """
         present = view.present[0]
-        ok = view.ok[0] & present[:, None] & present[None, :]
         self.present[0] = present
+        self._move(view, seconds)
+        self._placed &= present
+        ok = view.ok[0] & present[:, None] & present[None, :]
         self.known[0] = False
-        self.pos_w[0] = 0.0
         if present.any():
             # Seen from whoever knows most of the others.
             seer = int(np.argmax(ok.sum(axis=1) + 0.5 * present))
             known = ok[seer].copy()
             known[seer] = True
-            pos = np.where(known[:, None], view.pos[0, seer], 0.0)
-            self.pos_w[0] = np.where(known[:, None], pos - pos[known].mean(axis=0), 0.0)
             self.known[0] = known
+            went_on = self.pos_w[0] - self.pos_w[0, seer]
+            pos = np.where(known[:, None], view.pos[0, seer], went_on)
+            self._placed = known | (self._placed & self._placed[seer])
+            self.pos_w[0] = np.where(
+                self._placed[:, None], pos - pos[self._placed].mean(axis=0), 0.0
+            )
+
+    def _move(self, view: View, seconds: float) -> None:
+        """Everyone's place goes on by its odometer and heading."""
         ahead = np.stack([np.cos(view.heading[0]), np.sin(view.heading[0])], axis=-1)
-        moves = present & view.oriented[0]
+        moves = view.present[0] & view.oriented[0]
         vel = np.where(moves[:, None], view.speed[0][:, None] * ahead, 0.0)
         self.accel_w[0] = (vel - self.vel_w[0]) / max(seconds, 1e-3)
+        self.pos_w[0] += 0.5 * (vel + self.vel_w[0]) * seconds
         self.vel_w[0] = vel
 
     @property

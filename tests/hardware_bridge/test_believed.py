@@ -1,0 +1,61 @@
+"""Where cars believe themselves to be: as seen, and while it is not sure, as the wheels say."""
+
+import numpy as np
+import pytest
+
+from hardware_bridge.live.believed import Believed
+from relpos_env.interface.views import make_view
+
+DT, RADIUS, RATE = 0.1, 1.5, 0.8
+START = np.array([0.0, 2.1, 4.2])
+
+
+def seen_at(view, t, ok):
+    """Three cars on one circle, as an exact tracker that is sure of some sees them."""
+    phase = START + RATE * t
+    pos = RADIUS * np.stack([np.cos(phase), np.sin(phase)], axis=-1)
+    view.present[0] = view.oriented[0] = True
+    view.ok[0] = ok[:, None] & ok & ~np.eye(3, dtype=bool)
+    view.pos[0] = np.where(view.ok[0][..., None], pos[None] - pos[:, None], 0.0)
+    view.heading[0] = phase + 0.5 * np.pi
+    view.speed[0] = RADIUS * RATE
+    return pos - pos.mean(axis=0)
+
+
+@pytest.mark.parametrize("lost", range(3))
+def test_a_car_of_which_nobody_is_sure_goes_on_by_its_odometer(lost):
+    believed, view = Believed(3), make_view(1, 3)
+    doubtful = np.arange(3) != lost
+    for k in range(60):
+        sure = not 20 <= k < 40
+        true = seen_at(view, k * DT, np.ones(3, dtype=bool) if sure else doubtful)
+        believed.update(view, DT)
+        assert believed.complete == sure
+        np.testing.assert_allclose(believed.pos_w[0], true, atol=1e-12 if sure else 0.02)
+        np.testing.assert_allclose(np.hypot(*believed.vel_w[0].T), RADIUS * RATE)
+
+
+def test_a_car_that_was_never_seen_has_no_place():
+    believed, view = Believed(3), make_view(1, 3)
+    for k in range(5):
+        seen_at(view, k * DT, np.array([True, True, False]))
+        believed.update(view, DT)
+        assert not believed.complete
+        assert believed.known[0].tolist() == [True, True, False]
+        np.testing.assert_array_equal(believed.pos_w[0, 2], 0.0)
+        np.testing.assert_allclose(believed.pos_w[0, :2].sum(axis=0), 0.0, atol=1e-12)
+
+
+def test_a_car_that_left_and_came_back_has_none_until_it_is_seen():
+    believed, view = Believed(3), make_view(1, 3)
+    seen_at(view, 0.0, np.ones(3, dtype=bool))
+    believed.update(view, DT)
+    seen_at(view, DT, np.array([True, True, False]))
+    view.present[0, 2] = False
+    believed.update(view, DT)
+    assert believed.present[0].tolist() == [True, True, False]
+    assert believed.complete
+    seen_at(view, 2 * DT, np.array([True, True, False]))
+    believed.update(view, DT)
+    np.testing.assert_array_equal(believed.pos_w[0, 2], 0.0)
+    assert not believed.complete
