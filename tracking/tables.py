@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import types
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING as REQUIRED
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import lru_cache
@@ -61,7 +61,15 @@ class TableReader:
 
     presets: Mapping[type, Preset] = field(default_factory=dict)
 
-    def read(self, kind: type[T], table: object, where: Where, base: T | None = None) -> T:
+    def read(
+        self,
+        kind: type[T],
+        table: object,
+        where: Where,
+        base: T | None = None,
+        *,
+        beside: Sequence[str] = (),
+    ) -> T:
         """Make an instance of a dataclass from a table.
 
         Args:
@@ -69,6 +77,7 @@ class TableReader:
             table: Of a TOML file.
             where: The table is, for messages.
             base: What the table does not say; None are the defaults of the class.
+            beside: Keys that somebody else reads.
 
         Raises:
             ConfigError: Names the file and the key; or what `where` says.
@@ -77,7 +86,7 @@ class TableReader:
             raise where.error(f"expected a table, got {_described(table)}")
         hints = readable(kind)  # type: ignore[arg-type]
         preset = self.presets.get(kind)
-        expected = [preset.key, *hints] if preset else list(hints)
+        expected = [*([preset.key] if preset else []), *hints, *beside]
         for name in table:
             if name not in expected:
                 shown = where.key(name if name.isprintable() and name else repr(name))

@@ -42,7 +42,7 @@ def read_links(
     for key, table in tables_of(raw, "links", where):
         at = where.key("links").key(key)
         rest, ids = without(table, "ids", at)
-        link = TableReader().read(_Link, rest, at)
+        link = TableReader().read(_Link, rest, at, beside=("ids",))
         if link.format not in DECODERS:
             known = ", ".join(DECODERS)
             raise at.key("format").error(f"expected one of {known}, got {link.format!r}")
@@ -78,7 +78,7 @@ def read_cars(raw: Mapping[str, Any], group: Constellation, where: Where) -> lis
     for key, table in tables_of(raw, "cars", where):
         at = where.key("cars").key(key)
         rest, options = without(table, "options", at)
-        car, node = TableReader().read(_Car, rest, at), node_id(key, at)
+        car, node = TableReader().read(_Car, rest, at, beside=("options",)), node_id(key, at)
         check_node(node, group, at)
         if group.is_static[group.index_of[node]]:
             raise at.error(f"node {node} is static, expected one that moves")

@@ -18,6 +18,8 @@ class CarDriver(Protocol):
     """[1/s] Of its port by default."""
     gap: float
     """[s] Commands that follow each other faster pile up in the controller; 0 where none do."""
+    slowest: float
+    """[m/s] Forwards; asked for less it stands."""
     telemetry: Decoder
     """For what the controller answers: `MotionReading`, `StatusReading`, `AckReading`."""
 

@@ -138,6 +138,7 @@ class PwmDriver:
 
     def __init__(self, options: PwmOptions) -> None:
         self.options = options
+        self.slowest = options.forward[0][0]
         self.telemetry: Decoder = NoTelemetry()
 
     def opening(self) -> bytes:

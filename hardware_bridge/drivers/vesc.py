@@ -135,6 +135,7 @@ class VescDriver:
 
     def __init__(self, options: VescOptions) -> None:
         self.options = options
+        self.slowest = options.min_erpm / abs(options.speed_to_erpm)
         self.telemetry: Decoder = VescTelemetry(options.speed_to_erpm)
         self._brake = set_current_brake(max(1, round(options.brake_current * 1e3)))
 

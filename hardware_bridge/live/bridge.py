@@ -14,7 +14,7 @@ from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.links import Links
 from hardware_bridge.live.feed import LiveFeed
 from hardware_bridge.live.opened import OpenBridge
-from hardware_bridge.live.start import Start, StartParams
+from hardware_bridge.live.start import Start, StartParams, check_pace
 from hardware_bridge.live.swarm import LiveSwarm, load_calibration
 from hardware_bridge.live.warm_up import warm_up
 from hardware_bridge.recording import Header, Recorder
@@ -61,6 +61,8 @@ class Bridge(OpenBridge):
                 "calibration: missing; make one with `relpos calibrate`, or say "
                 "uncalibrated = true if measurements are good as they come"
             )
+        if arm:
+            check_pace(config)
         calibration = load_calibration(config)
         self.config = config
         self._stack = ExitStack()

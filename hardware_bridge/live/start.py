@@ -14,6 +14,8 @@ from typing import Protocol
 
 import numpy as np
 
+from hardware_bridge.config.swarm import SwarmConfig
+from hardware_bridge.drivers import make_driver
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.live.group import LiveGroup
 from hardware_bridge.safety.gate import reason_text
@@ -124,6 +126,29 @@ class Start:
         group.step(speed, steering)
         if self.attend is not None and self.attend():
             raise KeyboardInterrupt
+
+
+def check_pace(config: SwarmConfig, params: StartParams | None = None) -> None:
+    """Refuse cars that cannot drive as slowly as a start asks for, before anything is opened.
+
+    Args:
+        config: Of the swarm.
+        params: How it starts.
+
+    Raises:
+        BridgeError: Names the first car that would stand, and what to change.
+    """
+    if config.tracker.source == "positions":
+        return  # where the others are is known without moving
+    asked = min((params or StartParams()).speed, config.safety.slow)
+    for car in config.cars:
+        driver = make_driver(car.driver, car.node, car.options, car.key, 0, lambda: 0)
+        if driver.slowest > asked:
+            raise BridgeError(
+                f"cars.{car.node}.options: slower than {driver.slowest:.2g} m/s it stands, and at "
+                f"the start cars find each other at {asked:g} m/s; teach it to drive slower, or "
+                "raise slow of [safety] if that limits it"
+            )
 
 
 def wriggle(p: StartParams, n_cars: int, t: float) -> tuple[F64, F64]:

@@ -38,13 +38,10 @@ class Kind(IntEnum):
     """`Header` as JSON; the first record and no other."""
     BYTES_IN = 2
     """What was read from a link at once."""
-    BYTES_OUT = 3
-    """What was sent to a link at once. A drive writes EVENTs ``applied`` in its place: the
-    supervisor, which sends, is another process."""
-    TICK = 4
+    TICK = 3
     """A decision: the tracker was asked for an estimate at this time. No payload."""
-    EVENT = 5
-    """A JSON object with the field ``event``: a link came or went, a gate opened, records were
+    EVENT = 4
+    """A JSON object with the field ``event``: a notice, what the gate let pass, records that were
     lost."""
 
 

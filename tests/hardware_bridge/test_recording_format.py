@@ -29,7 +29,7 @@ HEADER = Header(
 
 records = st.builds(
     Record,
-    kind=st.sampled_from([Kind.BYTES_IN, Kind.BYTES_OUT, Kind.TICK, Kind.EVENT]),
+    kind=st.sampled_from([Kind.BYTES_IN, Kind.TICK, Kind.EVENT]),
     link=st.integers(0, 2**16 - 1),
     t_ns=st.integers(-(2**63), 2**63 - 1),
     payload=st.binary(max_size=60),

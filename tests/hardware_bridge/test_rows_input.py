@@ -106,7 +106,7 @@ WRONG = {
         lambda t: t.replace("[safety]\n", "[safety]\nmax_sped = 1.0\n"), "safety.max_sped",
     ),
     "unknown key of a link": (
-        lambda t: t.replace(N1, N1 + "\nbaudrate = 9600", 1), "links.n1.baudrate",
+        lambda t: t.replace(N1, N1 + "\nbaudrate = 9600", 1), "links.n1.baudrate: unknown", "ids",
     ),
     "one port twice": (
         lambda t: t.replace('/n2"', '/n1"'), "links.n2.port", "is that of links.n1 already",
@@ -129,6 +129,15 @@ WRONG = {
     ),
     "unknown format": (lambda t: t.replace(N1, 'format = "nmea"', 1), "links.n1.format"),
     "unknown driver": (lambda t: t.replace('driver = "relpos"', 'driver = "rc"'), "driver"),
+    "car that cannot drive slowly": (
+        lambda t: t.replace('driver = "relpos"', 'driver = "pwm"', 1), "cars.1.options",
+        "slower than 0.4 m/s it stands", "teach it to drive slower",
+    ),
+    "slow that is too slow for a VESC": (
+        lambda t: t.replace('driver = "relpos"', 'driver = "vesc"', 1).replace(
+            "[safety]\n", "[safety]\nslow = 0.1\n"
+        ), "cars.1.options", "slower than 0.2 m/s it stands", "raise slow",
+    ),
     "limit that is none": (
         lambda t: t.replace("[safety]\n", "[safety]\nstale_stop = 0.1\n"), "stale_slow",
     ),
