@@ -256,7 +256,7 @@ def test_the_bytes_are_those_of_the_documentation(place):
         + b"mark"
         + record(1, 0, 0, 1, json.dumps(header).encode())
         + record(2, 0, 1, 5, b"frame")
-        + record(4, 0, 2, -7, b"")
+        + record(3, 0, 2, -7, b"")
     )
     recording = read_recording(path)
     assert recording.header.links == ("links.a",)
