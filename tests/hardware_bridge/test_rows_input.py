@@ -2,6 +2,7 @@
 
 import errno
 import json
+import os
 import sys
 import threading
 import time
@@ -63,6 +64,7 @@ def rig(tmp_path_factory):
 @pytest.fixture
 def relpos(monkeypatch, capfd):
     """The command line: the one line that it says, and its status."""
+    monkeypatch.setattr(os, "setpriority", lambda *_: None)  # other tests share this process
 
     def run(*args):
         monkeypatch.setattr(sys, "argv", ["relpos", *map(str, args)])
