@@ -92,19 +92,22 @@ def bench_codec(frames: int, as_json: bool) -> None:
 @bench.command("train")
 @click.option("--updates", default=6, show_default=True, help="Updates per turn.")
 @click.option("--threads", default=2, show_default=True, help="Of simulation and learning.")
+@click.option("--after", default=2, show_default=True, help="Updates before it is measured.")
 @click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
-def bench_train(updates: int, threads: int, as_json: bool) -> None:
+def bench_train(updates: int, threads: int, after: int, as_json: bool) -> None:
     """Frames per second of training, beside an environment that costs nothing."""
     if not 1 <= updates <= 10_000:
         raise UsageError(f"--updates: expected 1 to 10000, got {updates}")
     if not 1 <= threads <= 64:
         raise UsageError(f"--threads: expected 1 to 64, got {threads}")
+    if not 1 <= after <= 10_000:
+        raise UsageError(f"--after: expected 1 to 10000, got {after}")
     try:
         from agents.bench.train import bench_train as run
     except ImportError as error:
         raise UsageError(f"training needs {error.name}: pip install 'relpos-env[train]'") from error
     with progress_bar("training") as report:
-        rows = run(updates=updates, threads=threads, progress=report)
+        rows = run(updates=updates, threads=threads, after=after, progress=report)
     _show_bench("Frames per second of training", rows, as_json)
 
 

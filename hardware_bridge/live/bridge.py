@@ -17,6 +17,7 @@ from hardware_bridge.live.opened import OpenBridge
 from hardware_bridge.live.start import Start, StartParams, check_pace
 from hardware_bridge.live.swarm import LiveSwarm, load_calibration
 from hardware_bridge.live.warm_up import warm_up
+from hardware_bridge.pauses import short_pauses
 from hardware_bridge.recording import Header, Recorder
 from hardware_bridge.safety.charge import Charge
 from hardware_bridge.safety.process import SupervisorProcess
@@ -68,6 +69,7 @@ class Bridge(OpenBridge):
         self._stack = ExitStack()
         warm_up(config)
         with ExitStack() as stack:
+            stack.enter_context(short_pauses())
             self.links = Links([link.port for link in config.links], now_ns)
             stack.callback(self.links.close)
             start_ns = now_ns()

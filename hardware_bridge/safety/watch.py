@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from hardware_bridge.drivers import make_driver
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.links import Links
+from hardware_bridge.pauses import short_pauses
 from hardware_bridge.safety.charge import REPORT_EVERY, ROOM, TICK_NS, Charge
 from hardware_bridge.safety.messages import (
     Decision,
@@ -47,8 +48,9 @@ def supervise(charge: Charge, talk: socket.socket) -> None:
         talk.close()
         return
     try:
-        talk.send(pack(Ready()))
-        watch.run()
+        with short_pauses():
+            talk.send(pack(Ready()))
+            watch.run()
     finally:
         watch.close()
 

@@ -28,7 +28,11 @@ CASES: dict[str, tuple[str, ...]] = {
 
 
 def bench_train(
-    *, updates: int = 6, threads: int = 2, progress: Callable[[float], None] | None = None
+    *,
+    updates: int = 6,
+    threads: int = 2,
+    after: int = 2,
+    progress: Callable[[float], None] | None = None,
 ) -> list[Row]:
     """Frames per second of whole training, simulation and learning together.
 
@@ -39,6 +43,8 @@ def bench_train(
     Args:
         updates: Of a turn.
         threads: Of simulation and learning.
+        after: Updates before it is measured: cars that cannot drive yet push against walls and
+            each other, which the simulation pays for.
         progress: Called with the share done, 0 to 1.
     """
     torch.set_num_threads(threads)
@@ -49,7 +55,7 @@ def bench_train(
         rooms = make_rooms(config, None)
         ours = _quiet(make_model(config, rooms))
         # Compiles what is not, and puts the cars somewhere.
-        run_leg(ours, replace(config, leg=2), 0)
+        run_leg(ours, replace(config, leg=after), 0)
         peer = _quiet(make_model(config, Nothing(rooms, rooms.reset())))
         run_leg(peer, replace(config, leg=1), 0)
         us, peer_us = best_of_turns([_turn(ours, config), _turn(peer, config)], TURNS)
@@ -63,6 +69,7 @@ def bench_train(
                 "peer_value": 1e6 / peer_us,
                 "ratio": peer_us / us,
                 "threads": threads,
+                "after_frames": after * config.ppo.steps * rooms.num_envs,
                 "us_per_frame": us,
             }
         )

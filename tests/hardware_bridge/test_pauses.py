@@ -1,0 +1,26 @@
+"""What was there before is not looked through again; garbage made since is still found."""
+
+import gc
+import weakref
+
+from hardware_bridge.pauses import short_pauses
+
+
+class Knot:
+    """Refers to itself: only a collection finds it."""
+
+    def __init__(self):
+        self.itself = self
+
+
+def test_what_was_there_is_left_out_and_what_comes_is_collected():
+    gc.unfreeze()
+    with short_pauses():
+        assert gc.get_freeze_count() > 10_000
+        assert len(gc.get_objects()) < 10_000
+        knot = Knot()
+        gone = weakref.ref(knot)
+        del knot
+        gc.collect()
+        assert gone() is None
+    assert gc.get_freeze_count() == 0
