@@ -129,23 +129,22 @@ def virtual(seconds: float, cars: int, scenario: str) -> None:
     from agents.emulate import EmulateOptions
 
     options = EmulateOptions(scenario=scenario, cars=cars, seed=3, seconds=seconds + START)
-    with tempfile.TemporaryDirectory() as folder:
-        drive = VirtualDrive(options, Path(folder) / "rig").start()
-        begin, rows, every = time.perf_counter(), [], min(60.0, seconds / 10.0)
-        for k in range(round(seconds / every)):
-            drive.drive(every)
-            if not all(drive.armed):
-                drive.order("arm")
-            drive.errors[:-100] = []
-            drive.notices[:-100] = []
-            rows.append(memory(os.getpid()))
-            row = {"t": round((k + 1) * every, 1), "rss_mb": round(rows[-1], 2)}
-            row["armed"] = sum(drive.armed)
-            row["took"] = round(time.perf_counter() - begin, 1)
-            print(json.dumps(row), flush=True)
-        drive.close()
-        grew = rows[-1] - rows[min(2, len(rows) - 1)]
-        print(json.dumps({"seconds": seconds, "cars": cars, "rss_growth_mb": round(grew, 2)}))
+    drive = VirtualDrive(options).start()
+    begin, rows, every = time.perf_counter(), [], min(60.0, seconds / 10.0)
+    for k in range(round(seconds / every)):
+        drive.drive(every)
+        if not all(drive.armed):
+            drive.order("arm")
+        drive.errors[:-100] = []
+        drive.feed.notices[:-100] = []
+        rows.append(memory(os.getpid()))
+        row = {"t": round((k + 1) * every, 1), "rss_mb": round(rows[-1], 2)}
+        row["armed"] = sum(drive.armed)
+        row["took"] = round(time.perf_counter() - begin, 1)
+        print(json.dumps(row), flush=True)
+    drive.close()
+    grew = rows[-1] - rows[min(2, len(rows) - 1)]
+    print(json.dumps({"seconds": seconds, "cars": cars, "rss_growth_mb": round(grew, 2)}))
 
 
 def main() -> None:

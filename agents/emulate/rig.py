@@ -9,6 +9,7 @@ import numpy as np
 from agents.emulate.options import EmulateOptions
 from agents.emulate.swarm_file import OPERATOR_PORT, car_port, node_port, swarm_toml
 from agents.emulate.world import EmulatedWorld
+from hardware_bridge.emulator.boots import boot_numbers
 from hardware_bridge.emulator.cars import make_firmware
 from hardware_bridge.emulator.cars.emulated_car import EmulatedCar
 from hardware_bridge.emulator.devices import OPERATOR, CarDevice, NodeDevice, OperatorDevice
@@ -138,21 +139,10 @@ class EmulatedRig:
         """All devices on their lines."""
         options = self.options
         nodes = [self._node(k, ids) for k in range(len(ids))]
-        cars = []
-        for node in ids:
-
-            def make(node: int = node) -> EmulatedCar:
-                boot = int(self._rng.integers(1, 1 << 32))
-                firmware = make_firmware(
-                    options.driver, node, options.driver_options, self._car_key, boot
-                )
-                return EmulatedCar(firmware, options.deadman)
-
-            line = self._line(car_port(node), FaultParams())
-            cars.append(CarDevice(node, line, make, CAR_VOLTAGE))
+        cars = [self._car(node) for node in ids]
         operator = None
         if options.operator:
-            boot = int(self._rng.integers(1, 1 << 32))
+            boot = next(boot_numbers(self._rng))
             encoder = RelposEncoder(OPERATOR, boot, options.key)
             operator = OperatorDevice(self._line(OPERATOR_PORT, FaultParams()), encoder, boot, ids)
         return Emulator(self.world, nodes, cars, operator, options.faults)
@@ -168,6 +158,19 @@ class EmulatedRig:
             return EmulatedNode(ids[k], self._formats, ids, rng, options.nodes)
 
         return NodeDevice(make(own), lines, lambda: make(other))
+
+    def _car(self, node: int) -> CarDevice:
+        """A car's controller on its line."""
+        options, boots = self.options, boot_numbers(self._rng)
+
+        def make() -> EmulatedCar:
+            firmware = make_firmware(
+                options.driver, node, options.driver_options, self._car_key, next(boots)
+            )
+            return EmulatedCar(firmware, options.deadman)
+
+        line = self._line(car_port(node), FaultParams())
+        return CarDevice(node, line, make, CAR_VOLTAGE)
 
     def _line(self, name: str, faults: FaultParams) -> Line:
         """A port and what happens on the way to it."""

@@ -63,7 +63,8 @@ class VirtualFeed:
             self._cars[config.slot_of(car)] = car.port.name, port, driver
         drivers = {slot: driver for slot, (_, _, driver) in self._cars.items()}
         names = {slot: name for slot, (name, _, _) in self._cars.items()}
-        self._supervisor = Supervisor(config.safety, config.n_slots, drivers, names)
+        self.supervisor = Supervisor(config.safety, config.n_slots, drivers, names)
+        """Gate and drivers of the cars; whoever watches may ask it, but tells it nothing."""
         self._up: set[int] = set()
         self._decided: tuple[int, Picture] | None = None
         self.report: Report | None = None
@@ -110,7 +111,7 @@ class VirtualFeed:
         self._tell(Word(then * 1e-9, self._swarm.heard()))
         self._act()
         if (then - START_NS) // STEP_NS % REPORT_EVERY == 0:
-            self.report = self._supervisor.report()
+            self.report = self.supervisor.report()
             for _, port, driver in self._cars.values():
                 port.send(driver.ask())
 
@@ -126,13 +127,13 @@ class VirtualFeed:
             self._cars[slot][1].send(self._cars[slot][2].opening())
         self._up = up
         now = self.t_ns * 1e-9
-        for slot, data in self._supervisor.tick(now, 0.0, sorted(up)).items():
+        for slot, data in self.supervisor.tick(now, 0.0, sorted(up)).items():
             self._cars[slot][1].send(data)
-        self._supervisor.written(now)
-        self._note(self._supervisor.stopped())
+        self.supervisor.written(now)
+        self._note(self.supervisor.stopped())
 
     def _tell(self, message: Message) -> None:
-        self._note(self._supervisor.take(message))
+        self._note(self.supervisor.take(message))
 
     def _note(self, notices: list[Notice]) -> None:
         self.notices += [(self.t_ns, notice.text) for notice in notices]
@@ -152,6 +153,7 @@ class VirtualBridge(OpenBridge):
         wait: float = 60.0,
         lag: float = LAG,
         record: bool = False,
+        ports: Callable[[str], MemoryPort] | None = None,
     ) -> None:
         """Plug everything in.
 
@@ -161,12 +163,14 @@ class VirtualBridge(OpenBridge):
             wait: So long is waited for all to be well before cars are armed [s].
             lag: Time that a decision takes [s].
             record: Keep measurements and truth in ``rig.world.recording``.
+            ports: Gives lines by their names, for those that change or keep what goes over them; by
+                default plain ones. See `EmulatedRig.ports`.
 
         Raises:
             EnvError: An unknown name or a number out of range.
             BridgeError: Likewise of devices.
         """
-        self.rig = EmulatedRig(options, record=record)
+        self.rig = EmulatedRig(options, ports=ports, record=record)
         text = self.rig.swarm_toml(NOWHERE)
         self.config: SwarmConfig = parse_config(text, file="swarm.toml", beside=NOWHERE)
         self.swarm = LiveSwarm(self.config, START_NS, load_calibration(self.config))

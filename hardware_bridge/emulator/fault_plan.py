@@ -47,7 +47,7 @@ class Fault:
     """[s] When, since the world began."""
     kind: str
     """``unplug``: the port is gone, and comes back under the same name. ``reboot``: silence, then
-    a new boot number and a clock from 0; a car forgets its command. ``clock-step``: the node's
+    the next boot number and a clock from 0; a car forgets its command. ``clock-step``: the node's
     clock jumps. ``stuck-sensor``: the IMU repeats its last sample. ``silence``: it works and says
     nothing. ``twin``: another device speaks under the same id on the same line."""
     target: str

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hardware_bridge.decoders.base import Encoder
+from hardware_bridge.emulator.boots import boot_numbers
 from hardware_bridge.emulator.formats import WireFormat
 from hardware_bridge.emulator.measured import Measured
 from hardware_bridge.emulator.node_clock import NodeClock
@@ -65,16 +66,16 @@ class EmulatedNode:
             node: Its id.
             formats: Those of its ports; a reading goes out by the first that can say it.
             ids: Ids of all nodes, by index.
-            rng: For its clock and its boot numbers.
+            rng: For its clock and its first boot number.
             params: Of all nodes.
         """
         self.node, self.formats, self.params = node, tuple(formats), params
         self._ids = tuple(ids)
-        self._rng = rng
         self.clock = NodeClock(
             float(rng.uniform(0.0, params.most_offset)),
             1e-6 * params.drift_ppm * float(rng.standard_normal()),
         )
+        self._boots = boot_numbers(rng)
         self._silent_until = self._stuck_until = self._next_status = -np.inf
         self._start()
 
@@ -97,7 +98,7 @@ class EmulatedNode:
         return sent
 
     def reboot(self, t: float, seconds: float) -> None:
-        """Start anew: silent for so long, then with a new boot number and a clock from 0."""
+        """Start anew: silent for so long, then with the next boot number and a clock from 0."""
         self._silent_until = t + seconds
         self.clock.restart(t + seconds)
         self._start()
@@ -112,7 +113,7 @@ class EmulatedNode:
 
     def _start(self) -> None:
         """What a boot begins with."""
-        self.boot = int(self._rng.integers(1, 1 << 32))
+        self.boot = next(self._boots)
         self.sequences = [0] * len(self.formats)
         """Messages of this boot, by port."""
         self._encoders: list[Encoder] = [f.build(self.node, self.boot) for f in self.formats]

@@ -9,6 +9,7 @@ from hardware_bridge.emulator.measured import Measured, by_node
 from hardware_bridge.emulator.node import EmulatedNode, NodeParams, at_rest
 from hardware_bridge.emulator.node_clock import NodeClock
 from hardware_bridge.errors import BridgeError
+from hardware_bridge.identity import Identities, Verdict
 from hardware_bridge.readings import (
     MICROSECONDS_32,
     RADIO_40,
@@ -166,9 +167,23 @@ def test_after_a_reboot_it_is_silent_and_begins_anew():
     after = said(node, [r for r in rows if r.t >= 1.505])[0]
     assert before
     assert silent == []
-    assert {r.source.boot for r in after} == {node.boot} != {old}
+    assert {r.source.boot for r in after} == {node.boot}
+    assert node.boot > old
     assert after[0].source.sequence == 0
     assert 0 <= after[0].source.ticks < 20_000
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_node_with_a_key_is_believed_after_every_reboot(seed):
+    rows = by_node(block_of(100), 3)[0]
+    node, identities = node_of("relpos", key=KEY, seed=seed), Identities(authenticated=True)
+    found = []
+    for k in range(5):
+        (readings,) = said(node, [r for r in rows if 0.2 * k <= r.t < 0.2 * k + 0.15], key=KEY)
+        found.append([identities.check("a", r.source, 0, 1) for r in readings])
+        node.reboot(0.2 * k + 0.15, 0.05)
+    assert [each[0] for each in found] == [Verdict.FRESH, *[Verdict.REBOOT] * 4]
+    assert {verdict for each in found for verdict in each[1:]} == {Verdict.FRESH}
 
 
 def test_a_stuck_sensor_repeats_itself_and_ranges_go_on():

@@ -27,9 +27,9 @@ CAR_LENGTH = 0.42
 class Watched(VirtualDrive):
     """A drive in which nothing moves that should not, and nobody comes too near."""
 
-    def __init__(self, options, folder):
+    def __init__(self, options):
         self.nearest, self._stood = np.inf, {}
-        super().__init__(options, folder)
+        super().__init__(options)
 
     def advance(self):
         t_ns = super().advance()
@@ -51,13 +51,13 @@ class Watched(VirtualDrive):
 
 
 @pytest.fixture
-def drive(tmp_path):
+def drive():
     """Begin a drive of three cars that have found each other."""
     begun = []
 
     def begin(**options):
         chosen = EmulateOptions(**{"scenario": "cars-nlos", "seed": 3, "seconds": 600.0} | options)
-        begun.append(Watched(chosen, tmp_path / f"rig{len(begun)}").start())
+        begun.append(Watched(chosen).start())
         return begun[-1]
 
     yield begin
@@ -67,10 +67,10 @@ def drive(tmp_path):
 
 
 @pytest.fixture(scope="module")
-def usual(tmp_path_factory):
+def usual():
     """Error of a drive in which all is well [m]."""
     options = EmulateOptions(scenario="cars-nlos", seed=3, seconds=600.0)
-    each = Watched(options, tmp_path_factory.mktemp("usual")).start()
+    each = Watched(options).start()
     n = len(each.errors)
     each.drive(12.0)
     each.close()
@@ -103,8 +103,9 @@ def test_frames_lost_doubled_late_reordered_and_damaged(drive, usual, form):
     assert each.mean_error(n) < 1.5 * usual + 0.05
 
 
-def test_reboot(drive, usual):
-    each = drive()
+@pytest.mark.parametrize("key", [None, KEY], ids=["open", "keyed"])
+def test_reboot(drive, usual, key):
+    each = drive(key=key)
     each.drive(2.0).befall("reboot", "nodes.1", 1.0)
     each.drive(3.0)
     assert each.notices == [f"cars.1 {SILENT}", "node 1 started anew, on link links.n1"]
@@ -235,9 +236,9 @@ class Attacker:
             source = source._replace(device="65534")
             said += b"".join(f.encode([OperatorReading(source, "1", (2.0, 2.0))])
                              for f in self.operators)  # fmt: skip
-        self.commands.append(dict(self.each.sent))
-        for slot, old in (self.commands[-400] if len(self.commands) > 400 else {}).items():
-            self.each.rig.ports[f"car{slot + 1}"].send(old)
+        self.commands.append(self.each.sent())
+        for car, old in (self.commands[-400] if len(self.commands) > 400 else {}).items():
+            self.each.rig.ports[car].slip_in(old)
         return said
 
 
