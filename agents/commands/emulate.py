@@ -35,7 +35,7 @@ from agents.errors import UsageError
     "--seconds",
     default=60.0,
     show_default=True,
-    help="Length, 0.1 to 86400, from when the cars are let go; Ctrl-C ends it before.",
+    help="Length, 0.1 to 86400, from when the cars are let go; Ctrl-C or SIGTERM ends it before.",
 )
 @click.option(
     "--format",

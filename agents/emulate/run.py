@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from agents.emulate.interrupts import Interrupts
 from agents.emulate.options import EmulateOptions
 from agents.emulate.pace import Lateness, Pace
 from agents.emulate.result import EmulateResult, line_figures
@@ -45,6 +46,9 @@ def emulate(
 ) -> EmulateResult:
     """Run devices in a simulated world in real time, until the time is up or Ctrl-C.
 
+    Ctrl-C, or what else raises KeyboardInterrupt, ends it between two steps. From then on nothing
+    does before the log is there, whole.
+
     Args:
         folder: Gets the ports, and ``swarm.toml`` once they can be opened.
         options: What to emulate.
@@ -67,25 +71,31 @@ def emulate(
     if log is not None:
         check_target(Path(log))
     warm_up(chosen)
-    rig = EmulatedRig(chosen, Path(folder), record=log is not None)
-    run = _Run(rig, report)
     n_steps = round(1e9 * (STAND_STILL + DECISION * chosen.cycles)) // STEP_NS
-    try:
-        if ready is not None:
-            ready(rig)
-        _wait_for_host(rig, wait, clock, sleep)
-        with _no_pauses():
-            pace = Pace(STEP_NS, clock, sleep)
-            run.lateness = pace.lateness
-            for _ in range(n_steps):
-                run.step(pace.wait())
-    except KeyboardInterrupt:
-        pass
-    finally:
-        rig.close()
-    result = run.result(f"emulation-{chosen.seed}")
-    if log is not None and result.log is not None:
-        write_log(Path(log), result.log)
+    with Interrupts() as interrupts:
+        rig = EmulatedRig(chosen, Path(folder), record=log is not None)
+        run = _Run(rig, report)
+        try:
+            with interrupts.allowed():
+                if ready is not None:
+                    ready(rig)
+                _wait_for_host(rig, wait, clock, sleep)
+            with _no_pauses():
+                pace = Pace(STEP_NS, clock, sleep)
+                run.lateness = pace.lateness
+                for _ in range(n_steps):
+                    with interrupts.allowed():
+                        t_ns = pace.wait()
+                    run.step(t_ns)
+                    with interrupts.allowed():
+                        run.tell()
+        except KeyboardInterrupt:
+            pass
+        finally:
+            rig.close()
+        result = run.result(f"emulation-{chosen.seed}")
+        if log is not None and result.log is not None:
+            write_log(Path(log), result.log)
     return result
 
 
@@ -106,7 +116,10 @@ class _Run:
         self.rig.step(t_ns)
         if world.just_judged:
             self._rows.append((world.t - STAND_STILL, world.error))
-        if self._report is not None and round(world.t * 1e9 / STEP_NS) % SECOND == 0:
+
+    def tell(self) -> None:
+        """Report, once a second."""
+        if self._report is not None and round(self.rig.world.t * 1e9 / STEP_NS) % SECOND == 0:
             self._report(self._second())
 
     def result(self, name: str) -> EmulateResult:

@@ -1,6 +1,7 @@
 """The emulated world is the simulated one, whatever is between it and the host."""
 
 import json
+import signal
 import subprocess
 import sys
 import tomllib
@@ -11,6 +12,7 @@ import pytest
 from gymnasium.utils import seeding
 
 from agents.emulate import EmulatedRig, EmulateOptions, emulate
+from agents.emulate.interrupts import Interrupts
 from agents.emulate.pace import Pace
 from agents.emulate.rig import STEP_NS
 from agents.emulate.world import AT_REST, STEPS, EmulatedWorld
@@ -207,6 +209,9 @@ def test_faults_happen_to_what_they_are_aimed_at():
     boots = {k: {r.source.boot for r in host.readings[f"n{k}"]} for k in (1, 2, 3)}
     assert [len(boots[k]) for k in (1, 2, 3)] == [1, 2, 2]
     assert {r.source.device for r in host.readings["n3"]} == {"3"}
+    starts = [r.source.boot for r in host.readings["car2"] if isinstance(r, MotionReading)]
+    assert starts == sorted(starts)
+    assert len(set(starts)) == 2
     ticks = [r.source.ticks for r in host.readings["n1"]]
     assert max(np.diff(ticks)) > 4_900_000
     gyros = [r.gyr for r in host.readings["n2"] if isinstance(r, ImuReading)]
@@ -395,6 +400,79 @@ def test_whoever_ends_it_from_outside_gets_its_figures(tmp_path):
     assert process.returncode == 0
     assert json.loads(rest[-1])["result"] == "emulation"
     assert not (tmp_path / "n1").is_symlink()
+
+
+def test_whoever_ends_it_from_outside_gets_its_log(tmp_path):
+    command = [str(RELPOS), "emulate", "--folder", str(tmp_path / "e"), "--json"]
+    command += ["--log", str(tmp_path / "log")]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    with process:
+        told = [json.loads(process.stdout.readline())["result"] for _ in range(3)]
+        assert told == ["ready", "second", "second"]
+        process.terminate()
+        rest = process.stdout.read().splitlines()
+    assert process.returncode == 0
+    assert json.loads(rest[-1])["result"] == "emulation"
+    assert 1.9 < read_log(tmp_path / "log").duration < 30.0
+
+
+INTERRUPTED = """
+import gzip, os, signal, sys
+from agents.cli import main
+
+compress = gzip.compress
+
+def interrupted(*args, **options):
+    # Before every file of the log.
+    for which in (signal.SIGTERM, signal.SIGINT):
+        os.kill(os.getpid(), which)
+    print("interrupted", file=sys.stderr)
+    return compress(*args, **options)
+
+gzip.compress = interrupted
+main()
+"""
+
+
+def test_a_log_that_is_being_written_is_written_whole(tmp_path):
+    command = [sys.executable, "-c", INTERRUPTED, "emulate", "--folder", str(tmp_path / "e")]
+    command += ["--json", "--seconds", "0.5", "--log", str(tmp_path / "log")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert set(done.stderr.splitlines()) == {"interrupted"}
+    assert json.loads(done.stdout.splitlines()[-1])["result"] == "emulation"
+    assert read_log(tmp_path / "log").duration == pytest.approx(STAND_STILL + 0.5, abs=0.05)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["e", "log"]
+
+
+def test_interrupts_come_where_they_are_allowed_and_only_once():
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with Interrupts() as interrupts:
+            with interrupts.allowed():
+                pass
+            signal.raise_signal(signal.SIGINT)
+            with pytest.raises(KeyboardInterrupt), interrupts.allowed():
+                pytest.fail("it came before")
+            with interrupts.allowed():
+                pass
+            with pytest.raises(KeyboardInterrupt), interrupts.allowed():
+                signal.raise_signal(signal.SIGINT)
+            signal.raise_signal(signal.SIGINT)
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def test_signals_that_mean_something_else_are_left_alone():
+    heard = []
+    own = signal.signal(signal.SIGTERM, lambda number, frame: heard.append(number))
+    try:
+        with Interrupts() as interrupts, interrupts.allowed():
+            signal.raise_signal(signal.SIGTERM)
+    finally:
+        signal.signal(signal.SIGTERM, own)
+    assert heard == [signal.SIGTERM]
 
 
 def test_the_page_holds():
