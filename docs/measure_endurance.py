@@ -62,6 +62,7 @@ def real(seconds: float, cars: int, scenario: str) -> None:
     folder = Path(tempfile.mkdtemp(prefix="endurance"))
     env = os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
     options = {"scenario": scenario, "cars": cars, "seed": 3, "seconds": seconds + START}
+    options["keep"] = False  # its disk may be slow, which is not what is measured
     emulation = subprocess.Popen(
         [sys.executable, TESTS / "emulation_process.py", folder, json.dumps(options)],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=env,

@@ -51,7 +51,7 @@ class EmulateOptions:
     deadman: float | None = None
     """[s] In place of that of the cars' firmware."""
     key: bytes | None = None
-    """16 bytes that sign messages of our own format; None signs none."""
+    """16 bytes that sign messages of our own format; None signs none. Cars have `car_key`."""
     operator: bool = True
     """Emulate the operator's remote control, which asks for a velocity on top of the plan; else
     the plan alone is to be followed."""
@@ -68,6 +68,16 @@ class EmulateOptions:
             raise BridgeError(f"key: expected {KEY_BYTES} bytes, got {len(self.key)}")
         if self.deadman is not None and not 0.0 < self.deadman <= 60.0:
             raise BridgeError(f"deadman: expected above 0 and at most 60 s, got {self.deadman!r}")
+
+    @property
+    def car_key(self) -> bytes | None:
+        """Signs what cars of our own format hear and say: every bit is that of `key` turned over.
+
+        A car and its node have one id, so that with one key what one says could pass for the other.
+        """
+        if self.key is None or self.driver != "relpos":
+            return None
+        return bytes(byte ^ 0xFF for byte in self.key)
 
     @property
     def cycles(self) -> int:

@@ -65,7 +65,7 @@ class EmulatedRig:
         self.constellation = self.world.swarm.constellation
         ids = self.constellation.ids
         for node in ids:
-            make_firmware(options.driver, node, options.driver_options, self._car_key)
+            make_firmware(options.driver, node, options.driver_options, self.options.car_key)
         # Links must mean the same wherever somebody else stands.
         self.folder = None if folder is None else folder.resolve()
         if self.folder is not None:
@@ -131,10 +131,6 @@ class EmulatedRig:
         scratch.write_text(text, encoding="utf-8")
         scratch.replace(folder / SWARM_FILE)
 
-    @property
-    def _car_key(self) -> bytes | None:
-        return self.options.key if self.options.driver == "relpos" else None
-
     def _plug_in(self, ids: tuple[int, ...]) -> Emulator:
         """All devices on their lines."""
         options = self.options
@@ -165,7 +161,7 @@ class EmulatedRig:
 
         def make() -> EmulatedCar:
             firmware = make_firmware(
-                options.driver, node, options.driver_options, self._car_key, next(boots)
+                options.driver, node, options.driver_options, self.options.car_key, next(boots)
             )
             return EmulatedCar(firmware, options.deadman)
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import gc
 import math
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,6 +17,7 @@ from agents.emulate.pace import Lateness, Pace
 from agents.emulate.result import EmulateResult, line_figures
 from agents.emulate.rig import STEP_NS, TRUTH_EVERY, EmulatedRig
 from agents.emulate.warm_up import warm_up
+from hardware_bridge.pauses import short_pauses
 from relpos_env.errors import EnvError
 from relpos_env.timing import DECISION, STAND_STILL
 from tracking.log import check_target, write_log
@@ -80,7 +79,7 @@ def emulate(
                 if ready is not None:
                     ready(rig)
                 _wait_for_host(rig, wait, clock, sleep)
-            with _no_pauses():
+            with short_pauses():
                 pace = Pace(STEP_NS, clock, sleep)
                 run.lateness = pace.lateness
                 for _ in range(n_steps):
@@ -161,17 +160,6 @@ class _Run:
             "frames": frames,
             "faults": len(self.rig.emulator.happened),
         }
-
-
-@contextmanager
-def _no_pauses() -> Iterator[None]:
-    """Leave what is there out of the garbage collection, which takes up to a tenth of a second."""
-    gc.collect()
-    gc.freeze()
-    try:
-        yield
-    finally:
-        gc.unfreeze()
 
 
 def _wait_for_host(

@@ -95,7 +95,7 @@ def _car(options: EmulateOptions, port: Path) -> dict[str, Any]:
     car: dict[str, Any] = {"port": str(port), "driver": options.driver}
     if options.driver_options:
         car["options"] = _options(options.driver_options)
-    return _with_key(car, options.key if options.driver == "relpos" else None)
+    return _with_key(car, options.car_key)
 
 
 def _with_key(table: dict[str, Any], key: bytes | None) -> dict[str, Any]:

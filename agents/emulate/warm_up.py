@@ -20,7 +20,7 @@ def warm_up(options: EmulateOptions) -> None:
         options: Of the run that is to come.
     """
     rig = EmulatedRig(options)
-    key = options.key if options.driver == "relpos" else None
+    key = options.car_key
     drivers = [
         make_driver(options.driver, node, options.driver_options, key, 1, lambda: 0)
         for node in rig.constellation.ids

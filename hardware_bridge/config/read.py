@@ -149,6 +149,7 @@ def _check(config: SwarmConfig, where: Where) -> None:
         raise where.key("tracker").error(str(error)) from error
     if not 0.0 <= config.tracker.delay <= 1.0:
         raise where.key("tracker").key("delay").error("expected 0 to 1 s")
+    _check_keys(config, where)
     _check_source(config, where)
     fence, group = config.safety.fence, config.constellation
     if fence is not None:
@@ -156,6 +157,19 @@ def _check(config: SwarmConfig, where: Where) -> None:
         check_node(fence.node, group, at)
         if not group.is_static[group.index_of[fence.node]]:
             raise at.error(f"node {fence.node} moves, expected a static one")
+
+
+def _check_keys(config: SwarmConfig, where: Where) -> None:
+    """Refuse one key for a node and a car.
+
+    A controller and the node on its car have one id: with one key, what one said passes for the
+    other when somebody sends it again on the other's line.
+    """
+    links = {link.key: link.port.name for link in config.links if link.key is not None}
+    for car in config.cars:
+        if car.key in links:
+            at = where.key(car.port.name).key("key")
+            raise at.error(f"is that of {links[car.key]}, expected one that only cars have")
 
 
 def _check_source(config: SwarmConfig, where: Where) -> None:

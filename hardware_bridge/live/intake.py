@@ -18,6 +18,7 @@ from hardware_bridge.drivers import make_driver
 from hardware_bridge.identity import Identities, Verdict
 from hardware_bridge.links.ports import Chunk
 from hardware_bridge.live.events import Events
+from hardware_bridge.live.naming import Naming
 from hardware_bridge.live.repeated import RepeatedSamples
 from hardware_bridge.live.stream import Stream
 from hardware_bridge.live.told import Told
@@ -42,9 +43,6 @@ from tracking.estimate import Status
 from tracking.measurements import Kind
 
 NS = 1e-9
-MOST_STRANGERS = 32
-"""Devices that are not in the configuration are told of so many times."""
-
 OF_STREAM = NO_NODE = -1
 """In place of a node, where one clock stamps all; in place of an id, of an operator without."""
 
@@ -83,9 +81,9 @@ class Intake:
         self.notices: list[tuple[int, str]] = []
         """Time [ns] and what the user should read; whoever takes them clears the list."""
         self._repeated = RepeatedSamples([node.imu_hz for node in self.group.nodes])
-        self._strangers: set[tuple[str, str]] = set()
+        self._naming = Naming(self.group, self.refused, self.notices)
         open_ids, keyed_ids = Identities(), Identities(authenticated=True)
-        self._identities = (open_ids, keyed_ids)
+        self._identities = [open_ids, keyed_ids]
         self.streams = {
             link.port.name: self._stream(link, keyed_ids if link.key else open_ids)
             for link in config.links
@@ -120,7 +118,10 @@ class Intake:
     def _telemetry(self, car: CarConfig) -> Stream:
         driver = make_driver(car.driver, car.node, car.options, car.key, 0, lambda: 0)
         # The car's controller numbers its own messages: it is another device than its node.
-        return Stream(car.port.name, driver.telemetry, car.node, {}, Identities(bool(car.key)))
+        identities = Identities(authenticated=bool(car.key))
+        self._identities.append(identities)
+        ids = {str(car.node): car.node}
+        return Stream(car.port.name, driver.telemetry, car.node, ids, identities, is_car=True)
 
     def _take(self, stream: Stream, reading: Reading, arrival_ns: int) -> None:
         source = reading.source
@@ -130,7 +131,7 @@ class Intake:
         if isinstance(reading, PairReading | PoseReading):
             self._take_told(stream, reading, arrival_ns)
             return
-        node = self._node(stream, source.device, arrival_ns)
+        node = self._naming.index(stream, source.device, arrival_ns)
         if node is None:
             return
         if source is not stream.source or source is NOBODY:
@@ -202,11 +203,11 @@ class Intake:
     ) -> bool:
         near = node
         if reading.nearer is not None:
-            end = self._node(stream, reading.nearer, arrival_ns)
+            end = self._naming.index(stream, reading.nearer, arrival_ns)
             if end is None:
                 return False
             near = end
-        far = self._node(stream, reading.to, arrival_ns, named=True)
+        far = self._naming.index(stream, reading.to, arrival_ns, named=True)
         if far is None or far == near:
             return False
         if not self.plausibility.allows_range(near, far, reading.distance, t_ns):
@@ -232,7 +233,7 @@ class Intake:
                 self.refused[stream.verdict.value] += 1
         if not stream.verdict.accepted:
             return
-        node = self._node(stream, reading.to, arrival_ns, named=True)
+        node = self._naming.index(stream, reading.to, arrival_ns, named=True)
         x, y = reading.velocity
         if node is not None and np.isfinite(x) and np.isfinite(y):
             self.trim[node] = arrival_ns, (x, y)
@@ -242,7 +243,7 @@ class Intake:
     ) -> None:
         """What another tracker tells, by one clock for all nodes."""
         names = (reading.i, reading.j) if isinstance(reading, PairReading) else (reading.node,)
-        found = [self._node(stream, name, arrival_ns, named=True) for name in names]
+        found = [self._naming.index(stream, name, arrival_ns, named=True) for name in names]
         nodes = tuple(node for node in found if node is not None)
         clock = stream.times.setdefault(OF_STREAM, DeviceTime(MICROSECONDS_64))
         t_ns = clock.map(reading.source.ticks, arrival_ns)
@@ -261,28 +262,6 @@ class Intake:
                 self.motion[nodes[0]] = MotionReading(reading.source, speed=reading.speed)
         if known:
             self.heard_ns.update(dict.fromkeys(nodes, arrival_ns))
-
-    def _node(
-        self, stream: Stream, device: str | None, t_ns: int, *, named: bool = False
-    ) -> int | None:
-        """Index of the node that a device is; None for strangers, who are told of once."""
-        if device is None:
-            node = stream.node
-        elif device in stream.ids:
-            node = stream.ids[device]
-        elif not named and not stream.ids and stream.node is not None:
-            node = stream.node
-        else:
-            node = int(device) if device.isascii() and device.isdigit() else None
-        index = None if node is None else self.group.index_of.get(node)
-        if index is None:
-            self.refused["stranger"] += 1
-            who = (stream.name, device or "?")
-            if who not in self._strangers and len(self._strangers) < MOST_STRANGERS:
-                self._strangers.add(who)
-                text = f"{stream.name}: device {who[1]} is no node of the configuration"
-                self.notices.append((t_ns, f"{text}; name it in its ids"))
-        return index
 
     def _clock(self, stream: Stream, node: int, source: Source) -> StreamTime:
         if node not in stream.times:

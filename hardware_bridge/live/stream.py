@@ -20,6 +20,8 @@ class Stream:
     """Id of who speaks, where the format does not say."""
     ids: dict[str, int]
     identities: Identities
+    is_car: bool = False
+    """Of a car's controller: nobody else speaks there."""
     times: dict[int, StreamTime] = field(default_factory=dict)
     """By node index."""
     even: dict[int, EvenTime] = field(default_factory=dict)

@@ -91,7 +91,7 @@ class Host:
 
     def __init__(self, rig):
         self.rig, options, ids = rig, rig.options, rig.constellation.ids
-        key = options.key if options.driver == "relpos" else None
+        key = options.car_key
         self.drivers = [
             make_driver(options.driver, k, options.driver_options, key, 7, lambda: 0) for k in ids
         ]

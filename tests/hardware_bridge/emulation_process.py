@@ -2,7 +2,8 @@
 
     python emulation_process.py FOLDER '{"scenario": "cars-nlos", ...}'
 
-One JSON line a step goes to FOLDER/heard.jsonl; orders come as JSON lines on stdin.
+One JSON line a step goes to FOLDER/heard.jsonl, what devices said to FOLDER/said, unless
+``"keep": false``; orders come as JSON lines on stdin.
 """
 
 import contextlib
@@ -61,7 +62,7 @@ class Ears:
         return commands
 
 
-def main(folder, options):
+def main(folder, options, keep):
     folder = Path(folder)
     warm_up(options)
     # Priority as a device has it, which waits for nobody's computer; where that is allowed.
@@ -69,9 +70,12 @@ def main(folder, options):
         os.setpriority(os.PRIO_PROCESS, 0, -15)
     copies = folder / "said"
     copies.mkdir(parents=True)
-    rig = EmulatedRig(
-        options, folder / "rig", ports=lambda name: Tap(folder / "rig" / name, copies / name)
-    )
+
+    def port(name):
+        link = folder / "rig" / name
+        return Tap(link, copies / name) if keep else PtyPort(link)
+
+    rig = EmulatedRig(options, folder / "rig", ports=port)
     orders = []
     thread = threading.Thread(target=listen, args=(orders,), daemon=True)
     thread.start()
@@ -100,7 +104,8 @@ def main(folder, options):
                 "speed": [round(float(v), 4) for v in state.speed[0]],
                 "late": pace.lateness.late,
             }
-            heard.write(json.dumps(line) + "\n")
+            if keep:
+                heard.write(json.dumps(line) + "\n")
 
 
 def listen(orders):
@@ -111,4 +116,6 @@ def listen(orders):
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], EmulateOptions(**json.loads(sys.argv[2])))
+    chosen = json.loads(sys.argv[2])
+    keeps = chosen.pop("keep", True)
+    main(sys.argv[1], EmulateOptions(**chosen), keeps)

@@ -90,6 +90,7 @@ def written(tmp_path, rig, change):
     return path
 
 
+KEY = "00112233445566778899aabbccddeeff"
 N1 = 'format = "relpos"'
 WRONG = {
     "port that is not there": (
@@ -144,6 +145,11 @@ WRONG = {
         lambda t: t.replace("[safety]\n", "[safety]\nstale_stop = 0.1\n"), "stale_slow",
     ),
     "key that is none": (lambda t: t.replace(N1, N1 + '\nkey = "abc"', 1), "links.n1.key"),
+    "one key for a node and its car": (
+        lambda t: t.replace(N1, N1 + f'\nkey = "{KEY}"', 1).replace(
+            'driver = "relpos"', f'driver = "relpos"\nkey = "{KEY}"', 1
+        ), "cars.1.key: is that of links.n1", "only cars have",
+    ),
     "no TOML": (lambda t: t + "]", "expected TOML"),
 }  # fmt: skip
 

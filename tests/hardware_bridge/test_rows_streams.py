@@ -225,9 +225,9 @@ class Attacker:
         before.append(data)
         said = data + b"".join(before[-100:-97])
         source = Source("1", 0xFFFFFFF0, self.n, self.n * 1000, MICROSECONDS_32)
+        # What was said on the other lines, by nodes, cars and the operator.
+        said += b"".join(b"".join(h[-50:-49]) for h in self.heard.values())
         if name.startswith("n"):
-            # What another node says as well, and forged samples.
-            said += b"".join(b"".join(h[-50:-49]) for n, h in self.heard.items() if n[0] == "n")
             said += b"".join(
                 f.encode([ImuReading(source, (9.0, 0.0, 9.0), (50.0, 0.0, 0.0))])
                 for f in self.forgers
