@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from hardware_bridge.decoders.base import Counts
 from hardware_bridge.readings import MICROSECONDS_32, Reading, Source
 from hardware_bridge.wire.codec import MOST_CODED, Batch, Codec
-from hardware_bridge.wire.conversion import AS_READING, name_of
+from hardware_bridge.wire.conversion import AS_READING, made, name_of
 
 
 class RelposDecoder:
@@ -70,7 +70,7 @@ class RelposDecoder:
         values = batch.values[: batch.n_rows].tolist()
         readings: list[Reading] = []
         for kind, _, node, boot, sequence, time, first, rows in frames:
-            source = Source(name_of(node), boot, sequence, time, MICROSECONDS_32)
+            source = made(Source, (name_of(node), boot, sequence, time, MICROSECONDS_32))
             as_reading = AS_READING[kind]
             for row in values[first : first + rows]:
                 reading = as_reading(source, row)

@@ -43,7 +43,7 @@ class Batch:
     n_rows: int = 0
 
     def __post_init__(self) -> None:
-        self.frames = np.zeros(self.capacity, FRAME).view(np.recarray)
+        self.frames = np.zeros(self.capacity, FRAME)
         self.values = np.zeros((4 * self.capacity + MOST_ROWS, COLUMNS))
 
 

@@ -26,6 +26,8 @@ from hardware_bridge.wire.definition import Message
 Row: TypeAlias = Sequence[float]
 Spoken: TypeAlias = tuple[Message, tuple[float, ...]]
 
+made: Callable[[type, tuple[Any, ...]], Any] = tuple.__new__
+"""A reading of all its fields, in a third less time than by its name: of what comes most often."""
 UNIT_WITHIN = 1e-3
 """[-] A quaternion whose length is farther from 1 is none."""
 NODE_LIMIT = 1 << 16
@@ -125,11 +127,15 @@ def message_of(reading: Reading) -> Spoken:
 
 
 def _as_imu(s: Source, v: Row) -> Reading:
-    return ImuReading(s, (v[0], v[1], v[2]), (v[3], v[4], v[5]))
+    reading: Reading = made(ImuReading, (s, (v[0], v[1], v[2]), (v[3], v[4], v[5]), None))
+    return reading
 
 
 def _as_imu_mag(s: Source, v: Row) -> Reading:
-    return ImuReading(s, (v[0], v[1], v[2]), (v[3], v[4], v[5]), (v[6], v[7], v[8]))
+    reading: Reading = made(
+        ImuReading, (s, (v[0], v[1], v[2]), (v[3], v[4], v[5]), (v[6], v[7], v[8]))
+    )
+    return reading
 
 
 def _as_state(s: Source, v: Row) -> Reading | None:
@@ -140,7 +146,9 @@ def _as_range(s: Source, v: Row) -> Reading:
     has = int(v[6])
     rx = v[3] if has & 2 else None
     fp = v[4] if has & 4 else None
-    return RangeReading(s, name_of(v[0]), v[2], rx, fp, name_of(v[1]) if has & 1 else None)
+    nearer = name_of(v[1]) if has & 1 else None
+    reading: Reading = made(RangeReading, (s, name_of(v[0]), v[2], rx, fp, nearer))
+    return reading
 
 
 def _as_motion(s: Source, v: Row) -> Reading:

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from hardware_bridge.wire.definition import MESSAGES
 
 Records: TypeAlias = NDArray[Any]
-"""Their fields are attributes, compiled and, to step through kernels, not."""
 
 FRAME = np.dtype(
     [
@@ -50,7 +49,7 @@ COLUMNS = max(message.columns for message in MESSAGES)
 
 
 def _tables() -> tuple[Records, Records]:
-    messages = np.zeros(256, _MESSAGE).view(np.recarray)
+    messages = np.zeros(256, _MESSAGE)
     columns: list[tuple[int, bool, float, int, int]] = []
     for message in MESSAGES:
         row = (True, message.repeated, len(columns), message.columns, message.size)
@@ -58,7 +57,7 @@ def _tables() -> tuple[Records, Records]:
         for field in message.fields:
             signed = field.type[0] == "i"
             columns += [(field.size, signed, field.steps, *field.limits)] * field.n
-    return messages, np.array(columns, _COLUMN).view(np.recarray)
+    return messages, np.array(columns, _COLUMN)
 
 
 MESSAGE_TABLE, COLUMN_TABLE = _tables()
