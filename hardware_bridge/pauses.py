@@ -14,9 +14,11 @@ def short_pauses() -> Iterator[None]:
     Modules and compiled kernels are a hundred thousand objects. A collection that looks through all
     of them is rare and takes 30 to 100 ms: two ticks of the supervisor, or a decision.
     """
+    outermost = gc.get_freeze_count() == 0
     gc.collect()
     gc.freeze()
     try:
         yield
     finally:
-        gc.unfreeze()
+        if outermost:
+            gc.unfreeze()

@@ -24,6 +24,13 @@ LONGEST = 86400.0
 KEY_BYTES = 16
 
 
+SLOW_PWM = {
+    "forward": ((0.1, 1525), (3.0, 1750)),
+    "reverse": ((0.1, 1475), (3.0, 1250)),
+}
+"""Cars behind PWM boards that can drive as slowly as a start asks for, both ways."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EmulateOptions:
     """One emulation. World, nodes and faults follow from these alone."""
@@ -47,7 +54,7 @@ class EmulateOptions:
     driver: str = "relpos"
     """Of the cars, one of `hardware_bridge.drivers.DRIVERS`."""
     driver_options: Mapping[str, Any] = field(default_factory=dict)
-    """Fields of the driver's options, the same for all cars."""
+    """Fields of the driver's options, the same for all cars; by default `SLOW_PWM` for ``pwm``."""
     deadman: float | None = None
     """[s] In place of that of the cars' firmware."""
     key: bytes | None = None
@@ -61,6 +68,8 @@ class EmulateOptions:
     """How far the nodes' clocks are off."""
 
     def __post_init__(self) -> None:
+        if self.driver == "pwm" and not self.driver_options:
+            object.__setattr__(self, "driver_options", SLOW_PWM)
         if not DECISION <= self.seconds <= LONGEST:
             raise EnvError(f"seconds: expected {DECISION:g} to {LONGEST:g}, got {self.seconds!r}")
         whole_number("seed", self.seed, 0, (1 << 63) - 1)

@@ -52,6 +52,8 @@ def read_links(
             check_node(node, group, at.key("ids").key(device))
         if len(set(named.values())) < len(named):
             raise at.key("ids").error("two devices are the same node")
+        if link.node is not None and link.key is not None:
+            raise at.key("node").error("signed messages say who speaks, leave it out")
         if link.node is not None:
             check_node(link.node, group, at.key("node"))
         elif not (entry.names_itself or entry.tells_of_others):

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from heapq import heappop, heappush
 
-from hardware_bridge.decoders.base import Counts
+from hardware_bridge.counts import Counts
 from hardware_bridge.decoders.plausible import Damaged
 from hardware_bridge.readings import Reading
 

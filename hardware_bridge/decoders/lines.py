@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable
 from typing import TypeAlias
 
-from hardware_bridge.decoders.base import Counts
+from hardware_bridge.counts import Counts
 from hardware_bridge.decoders.plausible import Damaged
 from hardware_bridge.readings import Reading
 

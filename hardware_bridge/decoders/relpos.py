@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hardware_bridge.decoders.base import Counts
+from hardware_bridge.counts import Counts
 from hardware_bridge.readings import MICROSECONDS_32, Reading, Source
 from hardware_bridge.wire.codec import MOST_CODED, Batch, Codec
 from hardware_bridge.wire.conversion import AS_READING, made, name_of

@@ -19,7 +19,7 @@ class CarDriver(Protocol):
     gap: float
     """[s] Commands that follow each other faster pile up in the controller; 0 where none do."""
     slowest: float
-    """[m/s] Forwards; asked for less it stands."""
+    """[m/s] Asked for less it stands, one way or the other."""
     telemetry: Decoder
     """For what the controller answers: `MotionReading`, `StatusReading`, `AckReading`."""
 

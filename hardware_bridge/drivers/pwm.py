@@ -20,7 +20,8 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import TypeAlias
 
-from hardware_bridge.decoders.base import Counts, Decoder
+from hardware_bridge.counts import Counts
+from hardware_bridge.decoders.base import Decoder
 from hardware_bridge.drivers.options import expect
 from hardware_bridge.readings import Reading
 
@@ -138,7 +139,8 @@ class PwmDriver:
 
     def __init__(self, options: PwmOptions) -> None:
         self.options = options
-        self.slowest = options.forward[0][0]
+        backwards = options.reverse[0][0] if options.reverse else 0.0  # never, and known
+        self.slowest = max(options.forward[0][0], backwards)
         self.telemetry: Decoder = NoTelemetry()
 
     def opening(self) -> bytes:

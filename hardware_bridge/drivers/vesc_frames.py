@@ -18,7 +18,7 @@ from __future__ import annotations
 import re
 from binascii import crc_hqx
 
-from hardware_bridge.decoders.base import Counts
+from hardware_bridge.counts import Counts
 
 GET_VALUES = 4
 SET_RPM = 8

@@ -49,9 +49,11 @@ class Believed:
             known = ok[seer].copy()
             known[seer] = True
             self.known[0] = known
-            went_on = self.pos_w[0] - self.pos_w[0, seer]
-            pos = np.where(known[:, None], view.pos[0, seer], went_on)
-            self._placed = known | (self._placed & self._placed[seer])
+            seen, both = view.pos[0, seer], known & self._placed
+            # What went on is put beside those that are seen and had a place before.
+            shift = (seen - self.pos_w[0])[both].mean(axis=0) if both.any() else 0.0
+            pos = np.where(known[:, None], seen, self.pos_w[0] + shift)
+            self._placed = known | (self._placed & both.any())
             self.pos_w[0] = np.where(
                 self._placed[:, None], pos - pos[self._placed].mean(axis=0), 0.0
             )

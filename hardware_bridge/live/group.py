@@ -129,10 +129,11 @@ class LiveGroup:
         if t_ns is None:
             self.truncated[:] = True
             return
+        seconds = DECISION if first else (t_ns - self.t_ns) * 1e-9
         self.t_ns = t_ns
         swarm, task, believed = self.swarm, self.task, self.believed
         swarm.step(t_ns)
-        believed.update(swarm.view, DECISION)
+        believed.update(swarm.view, seconds)
         here = slice(0, 1)
         if (swarm.armed & ~self._armed).any():
             # While it stood the plan went on: nobody is near the place that was given to it.

@@ -26,6 +26,8 @@ from hardware_bridge.plausibility import Plausibility
 from hardware_bridge.readings import (
     MICROSECONDS_64,
     NOBODY,
+    AckReading,
+    HeartbeatReading,
     ImuReading,
     MotionReading,
     OperatorReading,
@@ -45,6 +47,9 @@ from tracking.measurements import Kind
 NS = 1e-9
 OF_STREAM = NO_NODE = -1
 """In place of a node, where one clock stamps all; in place of an id, of an operator without."""
+
+OF_A_CAR = (MotionReading, StatusReading, AckReading, HeartbeatReading)
+"""What a car's controller can say; nothing else is believed on its line."""
 
 
 class Intake:
@@ -70,8 +75,8 @@ class Intake:
         self.sensed_ns: dict[int, int] = {}
         """Host time of each node's last word of its own motion, by index. Others that measure
         ranges to a node do not say which way it turns."""
-        self.motion: dict[int, MotionReading] = {}
-        """What each car last said of its motion, by index."""
+        self.motion: dict[int, tuple[int, MotionReading]] = {}
+        """What each car last said of its motion, with its host time [ns], by index."""
         self.trim: dict[int, tuple[int, tuple[float, float]]] = {}
         """What an operator last asked of each car, with its host time [ns], by index."""
         self.voltage: dict[int, float] = {}
@@ -125,6 +130,9 @@ class Intake:
 
     def _take(self, stream: Stream, reading: Reading, arrival_ns: int) -> None:
         source = reading.source
+        if stream.is_car and not isinstance(reading, OF_A_CAR):
+            self.refused["stranger"] += 1
+            return
         if isinstance(reading, OperatorReading):
             self._take_trim(stream, reading, arrival_ns)
             return
@@ -180,7 +188,7 @@ class Intake:
             case RangeReading():
                 return self._use_range(stream, reading, node, t_ns, arrival_ns)
             case MotionReading():
-                self.motion[node] = reading
+                self.motion[node] = arrival_ns, reading
             case StatusReading(voltage=voltage) if voltage is not None:
                 self.voltage[node] = voltage
         return True
@@ -259,7 +267,8 @@ class Intake:
             self.told.add_pose(t, nodes[0], reading)
             known = True
             if reading.speed is not None:
-                self.motion[nodes[0]] = MotionReading(reading.source, speed=reading.speed)
+                moves = MotionReading(reading.source, speed=reading.speed)
+                self.motion[nodes[0]] = arrival_ns, moves
         if known:
             self.heard_ns.update(dict.fromkeys(nodes, arrival_ns))
 

@@ -26,8 +26,9 @@ from tracking.tracker import TrackerParams
 
 GONE = 5.0
 """[s] A node that was not heard for so long has left, until it is heard again."""
-OPERATOR_SILENT = 0.5
-"""[s] What an operator asked for so long ago is not asked any more."""
+SILENT = 0.5
+"""[s] What an operator asked for so long ago is not asked any more; what a car said of its motion
+is not true any more."""
 ROOM = 1024
 """[-] Measurements that there is room for at first."""
 
@@ -170,13 +171,13 @@ class LiveSwarm:
             here = k in self._here
             self._powered[0, k] = view.present[0, k] = here
             speed, steering = self._applied[0][k], self._applied[1][k]
-            said = intake.motion.get(k)
-            if said is not None:
+            at_ns, said = intake.motion.get(k, (0, None))
+            if said is not None and (t_ns - at_ns) * 1e-9 <= SILENT:
                 speed = said.speed
                 steering = steering if said.steering is None else said.steering
             view.speed[0, k], view.steering[0, k] = speed, steering
             asked = intake.trim.get(k)
-            fresh = asked is not None and (t_ns - asked[0]) * 1e-9 <= OPERATOR_SILENT
+            fresh = asked is not None and (t_ns - asked[0]) * 1e-9 <= SILENT
             self.trim[0, k] = asked[1] if fresh and asked is not None else 0.0
 
 

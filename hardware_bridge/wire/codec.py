@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from hardware_bridge.decoders.base import Counts
+from hardware_bridge.counts import Counts
 from hardware_bridge.wire import _codec_kernels as kernels
 from hardware_bridge.wire.definition import MOST_FRAME, MOST_ROWS
 from hardware_bridge.wire.layout import (

@@ -4,7 +4,7 @@ import os
 import threading
 from dataclasses import dataclass, field
 
-from hardware_bridge.decoders.base import Counts
+from hardware_bridge.counts import Counts
 from hardware_bridge.readings import ImuReading, RangeReading, Source
 
 

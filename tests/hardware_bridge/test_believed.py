@@ -7,15 +7,16 @@ from hardware_bridge.live.believed import Believed
 from relpos_env.interface.views import make_view
 
 DT, RADIUS, RATE = 0.1, 1.5, 0.8
-START = np.array([0.0, 2.1, 4.2])
+START = np.array([0.0, 2.1, 4.2, 5.3])
 
 
 def seen_at(view, t, ok):
-    """Three cars on one circle, as an exact tracker that is sure of some sees them."""
-    phase = START + RATE * t
+    """Cars on one circle, as an exact tracker that is sure of some sees them."""
+    n = len(ok)
+    phase = START[:n] + RATE * t
     pos = RADIUS * np.stack([np.cos(phase), np.sin(phase)], axis=-1)
     view.present[0] = view.oriented[0] = True
-    view.ok[0] = ok[:, None] & ok & ~np.eye(3, dtype=bool)
+    view.ok[0] = ok[:, None] & ok & ~np.eye(n, dtype=bool)
     view.pos[0] = np.where(view.ok[0][..., None], pos[None] - pos[:, None], 0.0)
     view.heading[0] = phase + 0.5 * np.pi
     view.speed[0] = RADIUS * RATE
@@ -59,3 +60,19 @@ def test_a_car_that_left_and_came_back_has_none_until_it_is_seen():
     believed.update(view, DT)
     np.testing.assert_array_equal(believed.pos_w[0, 2], 0.0)
     assert not believed.complete
+
+
+def test_a_place_that_goes_on_outlasts_who_comes_back():
+    believed, view = Believed(4), make_view(1, 4)
+    of_three = np.array([True, True, True, False])
+    for k in range(40):
+        # Nobody is sure of car 3 any more; then car 0 is away for a while.
+        ok = np.ones(4, dtype=bool) if k < 10 else of_three.copy()
+        ok[0] = not 15 <= k < 20
+        true = seen_at(view, k * DT, ok)
+        view.present[0, 0] = ok[0]
+        believed.update(view, DT)
+        here = view.present[0]
+        np.testing.assert_allclose(
+            believed.pos_w[0, here], true[here] - true[here].mean(axis=0), atol=0.02
+        )

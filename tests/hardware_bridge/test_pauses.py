@@ -24,3 +24,12 @@ def test_what_was_there_is_left_out_and_what_comes_is_collected():
         gc.collect()
         assert gone() is None
     assert gc.get_freeze_count() == 0
+
+
+def test_an_inner_one_leaves_the_outer_one_as_it_is():
+    gc.unfreeze()
+    with short_pauses():
+        with short_pauses():
+            pass
+        assert gc.get_freeze_count() > 10_000
+    assert gc.get_freeze_count() == 0

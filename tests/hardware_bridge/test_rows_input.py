@@ -150,6 +150,22 @@ WRONG = {
             'driver = "relpos"', f'driver = "relpos"\nkey = "{KEY}"', 1
         ), "cars.1.key: is that of links.n1", "only cars have",
     ),
+    "a node for messages that are signed": (
+        lambda t: t.replace(N1, N1 + f'\nkey = "{KEY}"\nnode = 1', 1), "links.n1.node",
+        "say who speaks",
+    ),
+    "VESC that is never fast enough": (
+        lambda t: t.replace(
+            'driver = "relpos"', 'driver = "vesc"\noptions = { max_speed = 0.1 }', 1
+        ), "cars.1.options", "max_speed", "at least 0.195",
+    ),
+    "car that cannot drive slowly backwards": (
+        lambda t: t.replace(
+            'driver = "relpos"',
+            'driver = "pwm"\noptions = { forward = [[0.2, 1560], [3.0, 1750]], '
+            "reverse = [[0.6, 1440], [3.0, 1250]] }", 1
+        ), "cars.1.options", "slower than 0.6 m/s it stands",
+    ),
     "no TOML": (lambda t: t + "]", "expected TOML"),
 }  # fmt: skip
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from wire_twin import KEY, frame, payload, payloads, siphash, words
 
-from hardware_bridge.decoders.base import Counts
+from hardware_bridge.counts import Counts
 from hardware_bridge.decoders.relpos import RelposDecoder
 from hardware_bridge.wire import _codec_kernels
 from hardware_bridge.wire import definition as wire

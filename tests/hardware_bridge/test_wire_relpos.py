@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from wire_twin import KEY, frame, mutate, readings, spread, words
 
-from hardware_bridge.decoders.base import MOST_WAITING, Counts
+from hardware_bridge.counts import Counts
+from hardware_bridge.decoders.base import MOST_WAITING
 from hardware_bridge.decoders.relpos import RelposDecoder
 from hardware_bridge.drivers.relpos import RelposDriver, RelposOptions
 from hardware_bridge.errors import BridgeError
@@ -48,6 +49,7 @@ def said(chunks, key=None):
 def test_what_was_encoded_is_decoded(spoken, key, boot):
     encoder = RelposEncoder(7, boot, key)
     met, counts = said([encoder.encode(spoken)], key)
+    assert [type(r) for r in met] == [type(r) for r in spoken]
     assert [r._replace(source=r.source) for r in met] == [
         was._replace(source=r.source._replace(ticks=was.source.ticks))
         for was, r in zip(spoken, met, strict=True)

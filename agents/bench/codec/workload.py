@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hardware_bridge.decoders.base import Counts
+from hardware_bridge.counts import Counts
 from hardware_bridge.wire.codec import Batch, Codec
 from hardware_bridge.wire.definition import IMU, RANGES, Message
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from hardware_bridge.decoders.base import Counts
+from hardware_bridge.counts import Counts
 from hardware_bridge.readings import DriveReading, Reading
 
 DEADMAN = 0.2

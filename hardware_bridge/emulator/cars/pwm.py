@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from hardware_bridge.decoders.base import Counts
+from hardware_bridge.counts import Counts
 from hardware_bridge.drivers.pwm import LEAST_PULSE, MOST_PULSE, PwmOptions, speed_of
 from hardware_bridge.emulator.cars.base import DEADMAN
 from hardware_bridge.readings import NOBODY, DriveReading, Reading

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import struct
 
-from hardware_bridge.decoders.base import Counts
+from hardware_bridge.counts import Counts
 from hardware_bridge.drivers.vesc import VescOptions
 from hardware_bridge.drivers.vesc_frames import (
     GET_VALUES,
