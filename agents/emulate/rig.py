@@ -130,6 +130,8 @@ class EmulatedRig:
         scratch = folder / f".{SWARM_FILE}.new"
         scratch.write_text(text, encoding="utf-8")
         scratch.replace(folder / SWARM_FILE)
+        # These devices are new: what others of the same ids said before is nothing to them.
+        (folder / SWARM_FILE).with_suffix(".marks.json").unlink(missing_ok=True)
 
     def _plug_in(self, ids: tuple[int, ...]) -> Emulator:
         """All devices on their lines."""

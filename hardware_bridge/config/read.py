@@ -55,7 +55,9 @@ def read_config(path: Path | str) -> SwarmConfig:
         raise BridgeError(f"{path}: cannot be read ({error.strerror})") from error
     except UnicodeDecodeError as error:
         raise BridgeError(f"{path.name}: expected TOML, found bytes that are no text") from error
-    return parse_config(text, file=path.name, beside=path.parent)
+    config = parse_config(text, file=path.name, beside=path.parent)
+    keys = [link.key for link in config.links] + [car.key for car in config.cars]
+    return replace(config, marks=path.with_suffix(".marks.json")) if any(keys) else config
 
 
 def parse_config(text: str, *, file: str, beside: Path, with_files: bool = True) -> SwarmConfig:

@@ -91,6 +91,8 @@ class SwarmConfig:
     safety: SafetyParams
     text: str
     """The file itself, for recordings."""
+    marks: Path | None = None
+    """Keeps which signed messages are old, where any are signed; None keeps nothing."""
 
     @property
     def n_slots(self) -> int:

@@ -13,6 +13,7 @@ from hardware_bridge.config.swarm import SwarmConfig
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.links import Links
 from hardware_bridge.live.feed import LiveFeed
+from hardware_bridge.live.marks import KeptMarks
 from hardware_bridge.live.opened import OpenBridge
 from hardware_bridge.live.start import Start, StartParams, check_pace
 from hardware_bridge.live.swarm import LiveSwarm, load_calibration
@@ -74,6 +75,10 @@ class Bridge(OpenBridge):
             stack.callback(self.links.close)
             start_ns = now_ns()
             self.swarm = LiveSwarm(config, start_ns, calibration)
+            self.marks: KeptMarks | None = None
+            if config.marks is not None:
+                self.marks = KeptMarks(config.marks, self.swarm.intake)
+                stack.callback(self.marks.close)
             self.recorder: Recorder | None = None
             if record is not None:
                 header = Header(
@@ -88,6 +93,8 @@ class Bridge(OpenBridge):
                 if calibration is not None:
                     text = calibration_toml(calibration)
                     self.recorder.add_event(start_ns, "calibration", text=text)
+                if self.marks is not None:
+                    self.recorder.add_event(start_ns, "marks", known=self.marks.known)
                 self.recorder.add_event(start_ns, "start")
             self.supervisor: SupervisorProcess | None = None
             if drive:
@@ -101,6 +108,7 @@ class Bridge(OpenBridge):
                 now_ns,
                 supervisor=self.supervisor,
                 recorder=self.recorder,
+                marks=self.marks,
             )
             self.start = Start(self.feed, arm=arm, params=StartParams(wait=wait))
             self._stack = stack.pop_all()

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.links import Links
 from hardware_bridge.links.ports import Chunk
+from hardware_bridge.live.marks import KeptMarks
 from hardware_bridge.live.swarm import LiveSwarm
 from hardware_bridge.recording import Kind, Recorder
 from hardware_bridge.safety.messages import Decision, Notice, Order, Report, Telemetry, Word
@@ -33,6 +34,7 @@ class LiveFeed:
         *,
         supervisor: SupervisorProcess | None = None,
         recorder: Recorder | None = None,
+        marks: KeptMarks | None = None,
     ) -> None:
         """Put together what is open.
 
@@ -42,7 +44,9 @@ class LiveFeed:
             now_ns: The host's monotonic clock [ns].
             supervisor: Has the cars; None where nothing is driven.
             recorder: Keeps what comes.
+            marks: Keep which signed messages are old.
         """
+        self._marks = marks
         self._swarm, self._links, self._now_ns = swarm, links, now_ns
         self._supervisor, self._recorder = supervisor, recorder
         self._index = {name: k for k, name in enumerate(swarm.intake.streams)}
@@ -82,6 +86,8 @@ class LiveFeed:
         self._note_links()
         now = self._now_ns()
         self._speak(now)
+        if self._marks is not None:
+            self._marks.keep(now)
         if (report := self.report) is not None:
             applied = {"speed": report.speed, "steering": report.steering, "armed": report.armed}
             self._swarm.apply(**applied)

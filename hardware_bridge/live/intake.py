@@ -8,6 +8,7 @@ Pure: the same chunks with the same times give the same measurements.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -16,18 +17,17 @@ from hardware_bridge.config.swarm import CarConfig, LinkConfig, SwarmConfig
 from hardware_bridge.decoders import make_decoder
 from hardware_bridge.drivers import make_driver
 from hardware_bridge.identity import Identities, Verdict
+from hardware_bridge.identity.verdict import Mark
 from hardware_bridge.links.ports import Chunk
 from hardware_bridge.live.events import Events
 from hardware_bridge.live.naming import Naming
 from hardware_bridge.live.repeated import RepeatedSamples
-from hardware_bridge.live.stream import Stream
+from hardware_bridge.live.stream import OF_A_CAR, Stream
 from hardware_bridge.live.told import Told
 from hardware_bridge.plausibility import Plausibility
 from hardware_bridge.readings import (
     MICROSECONDS_64,
     NOBODY,
-    AckReading,
-    HeartbeatReading,
     ImuReading,
     MotionReading,
     OperatorReading,
@@ -47,9 +47,6 @@ from tracking.measurements import Kind
 NS = 1e-9
 OF_STREAM = NO_NODE = -1
 """In place of a node, where one clock stamps all; in place of an id, of an operator without."""
-
-OF_A_CAR = (MotionReading, StatusReading, AckReading, HeartbeatReading)
-"""What a car's controller can say; nothing else is believed on its line."""
 
 
 class Intake:
@@ -89,6 +86,7 @@ class Intake:
         self._naming = Naming(self.group, self.refused, self.notices)
         open_ids, keyed_ids = Identities(), Identities(authenticated=True)
         self._identities = [open_ids, keyed_ids]
+        self._signed = {"links": keyed_ids}
         self.streams = {
             link.port.name: self._stream(link, keyed_ids if link.key else open_ids)
             for link in config.links
@@ -112,6 +110,15 @@ class Intake:
         for identities in self._identities:
             identities.release(node, t_ns)
 
+    def marks(self, ahead: int = 0) -> dict[str, dict[int, Mark]]:
+        """The newest signed messages, by who shares a key; see `Identities.high_water`."""
+        return {who: each.high_water(ahead) for who, each in self._signed.items()}
+
+    def restore(self, marks: Mapping[str, Mapping[int, Mark]]) -> None:
+        """Believe nothing that is as old as these marks."""
+        for who, each in self._signed.items():
+            each.restore(marks.get(who, {}))
+
     def seconds(self, t_ns: int) -> float:
         """Host time as that of measurements [s]."""
         return (t_ns - self.start_ns) * NS
@@ -125,6 +132,8 @@ class Intake:
         # The car's controller numbers its own messages: it is another device than its node.
         identities = Identities(authenticated=bool(car.key))
         self._identities.append(identities)
+        if car.key:
+            self._signed[car.port.name] = identities
         ids = {str(car.node): car.node}
         return Stream(car.port.name, driver.telemetry, car.node, ids, identities, is_car=True)
 

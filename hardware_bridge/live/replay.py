@@ -11,6 +11,7 @@ import numpy as np
 from hardware_bridge.config import SwarmConfig, parse_config
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.ports import Chunk
+from hardware_bridge.live.marks import Marks, parse_marks
 from hardware_bridge.live.swarm import LiveSwarm
 from hardware_bridge.recording import Kind, Recording, read_recording
 from hardware_bridge.safety.picture import Picture
@@ -53,6 +54,7 @@ class ReplayFeed:
         if config.calibration and self.calibration is None:
             raise BridgeError(f"{file}: the calibration in it is lost, nothing can be tracked")
         self.swarm = LiveSwarm(config, recording.header.monotonic_ns, self.calibration)
+        self.swarm.intake.restore(_marks(recording))
         for name in self.swarm.intake.streams:
             if name not in recording.header.links:
                 raise BridgeError(f"{file}: has no stream {name} of its own configuration")
@@ -112,3 +114,15 @@ def _calibration(recording: Recording) -> Calibration | None:
         if event.get("event") == "start":
             return None
     return None
+
+
+def _marks(recording: Recording) -> Marks:
+    """Which signed messages were old when it began."""
+    for record in recording:
+        if record.kind == Kind.EVENT:
+            event = record.event()
+            if event.get("event") == "marks":
+                return parse_marks(event["known"])
+            if event.get("event") == "start":
+                break
+    return {}

@@ -7,7 +7,16 @@ from dataclasses import dataclass, field
 from hardware_bridge.clocks import EvenTime, StreamTime
 from hardware_bridge.decoders.base import Decoder
 from hardware_bridge.identity import Identities, Verdict
-from hardware_bridge.readings import Source
+from hardware_bridge.readings import (
+    AckReading,
+    HeartbeatReading,
+    MotionReading,
+    Source,
+    StatusReading,
+)
+
+OF_A_CAR = (MotionReading, StatusReading, AckReading, HeartbeatReading)
+"""What a car's controller can say; nothing else is believed on its line."""
 
 
 @dataclass(slots=True)
