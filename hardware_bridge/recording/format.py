@@ -16,7 +16,7 @@ from typing import Any
 
 MAGIC = b"\x89RELPOS\n"
 """A byte above 127 and a line end show a file that was sent as text."""
-VERSION = 1
+VERSION = 2
 HEAD = struct.Struct("<8sHH4s")
 """Magic, version, 0, marker."""
 PREFIX = struct.Struct("<4sBHQqI")

@@ -79,10 +79,10 @@ def _read(path: Path, file: BinaryIO) -> Recording:
     if len(head) >= HEAD.size:
         _, version, _, marker = HEAD.unpack_from(head)
         first = decode_record(head, HEAD.size, marker)
-    if version > VERSION:
+    if version != VERSION:
+        advice = "update it" if version > VERSION else "replay it with the software that wrote it"
         raise BridgeError(
-            f"{path}: a recording of version {version}, this software reads up to {VERSION}; "
-            "update it"
+            f"{path}: a recording of version {version}, this software reads {VERSION}; {advice}"
         )
     if first is None or first.kind != Kind.HEADER:
         raise BridgeError(f"{path}: the header of the recording is damaged")

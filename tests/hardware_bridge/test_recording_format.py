@@ -223,11 +223,12 @@ def test_a_header_that_says_nothing_is_refused(place, payload):
         read_recording(path)
 
 
-def test_a_later_version_and_no_file_are_refused(place, tmp_path):
+def test_other_versions_and_no_file_are_refused(place, tmp_path):
     path = place()
-    path.write_bytes(HEAD.pack(b"\x89RELPOS\n", VERSION + 1, 0, b"abcd"))
-    with pytest.raises(BridgeError, match="update"):
-        read_recording(path)
+    for version, advice in ((VERSION + 1, "update"), (VERSION - 1, "that wrote it")):
+        path.write_bytes(HEAD.pack(b"\x89RELPOS\n", version, 0, b"abcd"))
+        with pytest.raises(BridgeError, match=advice):
+            read_recording(path)
     for nothing in (tmp_path / "none.rec", tmp_path):
         with pytest.raises(BridgeError, match="cannot be read"):
             read_recording(nothing)
@@ -252,7 +253,7 @@ def test_the_bytes_are_those_of_the_documentation(place):
     path = place()
     path.write_bytes(
         b"\x89RELPOS\n"
-        + bytes([1, 0, 0, 0])
+        + bytes([2, 0, 0, 0])
         + b"mark"
         + record(1, 0, 0, 1, json.dumps(header).encode())
         + record(2, 0, 1, 5, b"frame")
