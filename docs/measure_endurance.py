@@ -3,8 +3,9 @@
 python docs/measure_endurance.py --seconds 3600 --cars 6
 
 Prints the memory of every process once a minute and, at the end, how far it grew since the first
-minute, and how many ticks of the supervisor were more than 20 ms late. Beside it a process that
-only sleeps, with a high priority and its memory locked, tells how often the machine itself stood.
+minute, and how many ticks of the supervisor were more than 20 ms late. On every core a process that
+only sleeps, with a higher priority than all else and its memory locked, tells how often the machine
+itself stood; beside each missed tick is how long it did in the two seconds before that was told.
 
 python docs/measure_endurance.py --seconds 3600 --cars 6 --virtual
 
@@ -32,8 +33,12 @@ from typing import Any
 ROOT = Path(__file__).parent.parent
 TESTS = ROOT / "tests" / "hardware_bridge"
 KB = 1024.0
-LATE = 0.02
-"""[s]"""
+NAP, STOOD = 0.002, 0.01
+"""[s] A process that sleeps for so long, and wakes up so much later, was on a core that stood."""
+NUMBERS = ("t", "missed", "late_decisions")
+"""Fields of a row that are not the memory of a process."""
+TOLD = 2.0
+"""[s] A missed tick is told within that time."""
 START = 120.0
 """[s] For a drive to begin."""
 
@@ -47,21 +52,46 @@ def memory(pid: int) -> float:
     return next((int(li.split()[1]) / KB for li in lines if li.startswith("VmRSS")), 0.0)
 
 
-def watch_machine(talk: Connection) -> None:
-    """Sleep for 2 ms at a time until told to end; then tell when it took more than 20 [s, ms]."""
-    with contextlib.suppress(OSError):
-        os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(50))
+def watch_core(core: int, talk: Connection) -> None:
+    """Sleep for 2 ms at a time until told to end; then tell when it took longer, [[s, ms], ...]."""
+    with contextlib.suppress(OSError, AttributeError):
+        os.sched_setaffinity(0, {core})
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(60))
     ctypes.CDLL(None).mlockall(3)  # what is there and what will be
     gc.disable()
-    begin = last = time.monotonic()
+    last = time.monotonic()
     stood = []
     while not talk.poll():
-        time.sleep(0.002)
+        time.sleep(NAP)
         now = time.monotonic()
-        if now - last > LATE:
-            stood.append((round(now - begin, 1), round(1e3 * (now - last), 1)))
+        if now - last > STOOD:
+            stood.append((now, round(1e3 * (now - last - NAP), 1)))
         last = now
     talk.send(stood)
+
+
+class Watch:
+    """Processes that see the machine stand, one on each core."""
+
+    def __init__(self) -> None:
+        spawn = multiprocessing.get_context("spawn")
+        self._talks, self._processes = [], []
+        for core in sorted(os.sched_getaffinity(0)):
+            near, far = multiprocessing.Pipe()
+            self._talks.append(near)
+            self._processes.append(spawn.Process(target=watch_core, args=(core, far)))
+            self._processes[-1].start()
+
+    def end(self) -> list[list[tuple[float, float]]]:
+        """When each core stood [s], and for how long [ms]."""
+        for talk in self._talks:
+            talk.send("end")
+        return [talk.recv() for talk in self._talks]
+
+    def close(self) -> None:
+        """End the processes."""
+        for process in self._processes:
+            process.terminate()
 
 
 def children(pid: int) -> dict[str, int]:
@@ -98,12 +128,10 @@ def real(seconds: float, cars: int, scenario: str) -> None:
         [sys.executable, TESTS / "drive_process.py", config, json.dumps(chosen)],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=env,
     )  # fmt: skip
-    said: dict[str, Any] = {"stops": []}
+    said: dict[str, Any] = {"stops": [], "misses": []}
     listener = threading.Thread(target=_listen, args=(drive, said), daemon=True)
     listener.start()
-    near, far = multiprocessing.Pipe()
-    watch = multiprocessing.get_context("spawn").Process(target=watch_machine, args=(far,))
-    watch.start()
+    watch = Watch()
     rows = []
     try:
         begin, every = time.monotonic(), min(60.0, seconds / 10.0)
@@ -117,20 +145,37 @@ def real(seconds: float, cars: int, scenario: str) -> None:
                 rows.append(row)
                 print(json.dumps(row), flush=True)
             _arm_again(drive, said)
-        near.send("end")
-        print(json.dumps({"machine_stood": near.recv()}))
+        print(json.dumps(_stood(watch.end(), said["misses"], begin)))
     finally:
-        watch.terminate()
+        watch.close()
         if drive.poll() is None:
             drive.terminate()
         emulation.stdin.close()
         emulation.wait()
     listener.join(5.0)
-    first = rows[1] if len(rows) > 1 else rows[0]
-    growth = {n: round(rows[-1][n] - first[n], 2) for n in ("emulator", "drive", "supervisor")}
+    rows = [row for row in rows if "supervisor" in row] or rows
+    first = rows[min(1, len(rows) - 1)]
+    growth = {n: round(rows[-1][n] - first[n], 2) for n in first if n not in NUMBERS}
     record = folder / "long.relpos"
     print(json.dumps({"growth_mb": growth, "recording_mb": record.stat().st_size / 1e6}))
     print(json.dumps(said.get("summary", said)))
+
+
+def _stood(
+    stood: list[list[tuple[float, float]]], misses: list[float], begin: float
+) -> dict[str, Any]:
+    """How often and how long each core stood; the same shortly before each missed tick."""
+    return {
+        "cores_stood_20_ms": [sum(ms > 20.0 for _, ms in core) for core in stood],
+        "longest_ms": [max((ms for _, ms in core), default=0.0) for core in stood],
+        "missed_at_s_beside_longest_ms": [
+            [
+                round(t - begin, 1),
+                [max((ms for s, ms in core if 0.0 <= t - s < TOLD), default=0.0) for core in stood],
+            ]
+            for t in misses
+        ],
+    }
 
 
 def _arm_again(drive: subprocess.Popen[str], said: dict[str, Any]) -> None:
@@ -148,6 +193,8 @@ def _listen(drive: subprocess.Popen[str], said: dict[str, Any]) -> None:
         fields = json.loads(line)
         if "notice" in fields:
             print(fields["notice"], file=sys.stderr, flush=True)
+        if fields.get("missed", 0) > said.get("missed", 0):
+            said["misses"].append(time.monotonic())
         said.update(fields)
         said["moved"] = said.get("moved") or all(said.get("armed", [False]))
 
