@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tracking.compiled import kernel, small_kernel
 from tracking.filters.joint._carrier_kernels import apply_carriers, centre
-from tracking.filters.joint._linear_kernels import absorb, project
+from tracking.filters.joint._linear_kernels import absorb, project, settle
 from tracking.filters.joint._motion_kernels import predict, sum_inertial, take_state
 from tracking.filters.joint._range_kernels import antenna_offset, change_sight, range_model
 from tracking.filters.joint._start_kernels import begin_node, begin_pair, forget_sums
@@ -69,6 +69,7 @@ def run_bound(coefficients, layout, s, scratch, block, hidden, truth, t_out, out
     for k in range(t.shape[1]):
         what, now = kind[0, k], t[0, k]
         while o < t_out.shape[0] and t_out[o] < now:
+            settle(s, 0, c.n)
             write_positions(s, d, n, o, out)
             o += 1
         if what == STATE:
@@ -81,6 +82,7 @@ def run_bound(coefficients, layout, s, scratch, block, hidden, truth, t_out, out
             for i in range(n):
                 if not s.nodes[i].static:
                     sum_inertial(c, s.nodes, s.held, s.pre, i, now)
+            settle(s, 0, c.n)
             predict(c, s, 0, now - group.t, scratch)
             s.pre[:, :N_PRE] = 0.0
             group.t = now
@@ -98,6 +100,7 @@ def run_bound(coefficients, layout, s, scratch, block, hidden, truth, t_out, out
             i, j, a_i, a_j = j, i, a_j, a_i
         learn_range(c, s, layout, scratch, layout.pair_index[i, j], a_i, a_j, hidden[k], what)
     while o < t_out.shape[0]:
+        settle(s, 0, c.n)
         write_positions(s, d, n, o, out)
         o += 1
 
@@ -116,8 +119,8 @@ def learn_range(c, s, layout, scratch, p, a_i, a_j, is_hidden, what):
             change_sight(c, s, 0, p, 1.0)
         variance = c.white_var + s.nlos[0, p] * c.excess_white_var
     _, m = range_model(c, s, 0, p, (i0, i1, i2), (j0, j1, j2), scratch.idx, scratch.val)
-    S = project(s.P, 0, c.n, m, scratch.idx, scratch.val, scratch.w) + variance
-    absorb(s.x, s.P, s.moved, 0, c.n, scratch.w, 0.0, S)
+    S = project(s, 0, c.n, m, scratch.idx, scratch.val, scratch.w) + variance
+    absorb(s, 0, c.n, scratch.w, 0.0, S)
 
 
 @small_kernel

@@ -123,26 +123,53 @@ def test_moving_the_centre_changes_nothing_relative(dimensions):
     assert np.linalg.eigvalsh(s.P[0])[0] > 0.0
 
 
+def holding(x, P, room):  # noqa: N803
+    """Arrays with one hypothesis of the given states, of which as many corrections may wait."""
+    n = len(x)
+    none = dict.fromkeys(JointState._fields)
+    return JointState(**none)._replace(
+        x=x[None].copy(),
+        P=P[None].copy(),
+        waiting=np.zeros((1, room, n)),
+        n_waiting=np.zeros(1, dtype=np.int64),
+        moved=np.zeros((1, n)),
+        alive=np.ones(1, dtype=bool),
+    )
+
+
 @settings(max_examples=30, deadline=None, suppress_health_check=list(HealthCheck))
-@given(seed=st.integers(0, 2**31), n=st.integers(2, 20), m=st.integers(1, 6))
-def test_a_correction_is_the_textbook_one(seed, n, m):
+@given(
+    seed=st.integers(0, 2**31),
+    n=st.integers(2, 40),
+    m=st.integers(1, 6),
+    corrections=st.integers(1, 12),
+    room=st.sampled_from([0, 1, 3, 5, 16]),
+)
+def test_corrections_are_the_textbook_ones(seed, n, m, corrections, room):
+    """Also while they wait: whatever is asked of the covariance knows of them."""
     rng = np.random.default_rng(seed)
     A = rng.standard_normal((n, n))
-    P = A @ A.T + 0.1 * np.eye(n)
-    x, idx = rng.standard_normal(n), rng.permutation(n)[: min(m, n)].astype(np.int64)
-    val, nu, R = rng.standard_normal(len(idx)), 0.7, 0.3
-    H = np.zeros(n)
-    H[idx] = val
-    S = H @ P @ H + R
-    K = P @ H / S
-    states, covariance, w, moved = x[None].copy(), P[None].copy(), np.zeros(n), np.zeros((1, n))
-    variance = _linear_kernels.project(covariance, 0, n, len(idx), idx, val, w)
-    _linear_kernels.absorb(states, covariance, moved, 0, n, w, nu, variance + R)
-    np.testing.assert_allclose(states[0], x + K * nu, atol=1e-9)
-    np.testing.assert_allclose(moved[0], K * nu, atol=1e-12)
-    joseph = (np.eye(n) - np.outer(K, H)) @ P @ (np.eye(n) - np.outer(K, H)).T + R * np.outer(K, K)
-    np.testing.assert_allclose(covariance[0], joseph, atol=1e-8)
-    np.testing.assert_array_equal(covariance[0], covariance[0].T)
+    P, x, w = A @ A.T + 0.1 * np.eye(n), rng.standard_normal(n), np.zeros(n)
+    s, moved, nu, R = holding(x, P, room), np.zeros(n), 0.7, 0.3
+    for _ in range(corrections):
+        idx = rng.permutation(n)[: min(m, n)].astype(np.int64)
+        val, H = rng.standard_normal(len(idx)), np.zeros(n)
+        H[idx] = val
+        K = P @ H / (H @ P @ H + R)
+        variance = _linear_kernels.project(s, 0, n, len(idx), idx, val, w)
+        assert variance == pytest.approx(H @ P @ H, abs=1e-8)
+        _linear_kernels.absorb(s, 0, n, w, nu, variance + R)
+        x, moved = x + K * nu, moved + K * nu
+        left = np.eye(n) - np.outer(K, H)
+        P = left @ P @ left.T + R * np.outer(K, K)  # Joseph
+        a, b = rng.integers(n, size=2)
+        assert _linear_kernels.covariance(s, 0, a, b) == pytest.approx(P[a, b], abs=1e-8)
+    np.testing.assert_allclose(s.x[0], x, atol=1e-8)
+    np.testing.assert_allclose(s.moved[0], moved, atol=1e-8)
+    _linear_kernels.settle_all(s, n)
+    assert s.n_waiting[0] == 0
+    np.testing.assert_allclose(s.P[0], P, atol=1e-7)
+    np.testing.assert_array_equal(s.P[0], s.P[0].T)
 
 
 @pytest.mark.parametrize("dimensions", [2, 3])

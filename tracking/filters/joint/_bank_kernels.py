@@ -55,25 +55,53 @@ def centred(c, s, h):
 def flatness(c, s, h):
     """Extent of the layout across itself over its standard deviation; large for few nodes."""
     n, d = s.nodes.shape[0], c.d
-    out, present = centred(c, s, h)
+    mean, present = np.zeros(3), 0
+    for i in range(n):
+        if s.nodes[i].present:
+            present += 1
+            for k in range(d):
+                mean[k] += s.x[h, s.nodes[i].at_p + k]
     if present <= d:
         return np.inf
-    pos = out[0].copy()
-    eigenvalues, E = np.linalg.eigh(pos.T.copy() @ pos)
-    variance = 0.0
-    for k in range(d):
-        for q in range(d):
-            total, own = 0.0, 0.0
-            for i in range(n):
-                if not s.nodes[i].present:
-                    continue
-                at_i = s.nodes[i].at_p + k
-                own += s.P[h, at_i, s.nodes[i].at_p + q]
-                for j in range(n):
-                    if s.nodes[j].present:
-                        total += s.P[h, at_i, s.nodes[j].at_p + q]
-            variance += E[k, 0] * E[q, 0] * (own - total / present)
-    return np.sqrt(max(eigenvalues[0], 0.0) / max(variance, 1e-12))
+    mean /= present
+    scatter = np.zeros((d, d))
+    for i in range(n):
+        if s.nodes[i].present:
+            at = s.nodes[i].at_p
+            for k in range(d):
+                for q in range(d):
+                    scatter[k, q] += (s.x[h, at + k] - mean[k]) * (s.x[h, at + q] - mean[q])
+    squared, across = least_axis(scatter)
+    # (e^T P e) of the positions along it, less that of their mean
+    own, total = 0.0, 0.0
+    for i in range(n):
+        if not s.nodes[i].present:
+            continue
+        for j in range(n):
+            if not s.nodes[j].present:
+                continue
+            for k in range(d):
+                for q in range(d):
+                    P_kq = s.P[h, s.nodes[i].at_p + k, s.nodes[j].at_p + q]
+                    part = across[k] * across[q] * P_kq
+                    total += part
+                    if i == j:
+                        own += part
+    return np.sqrt(squared / max(own - total / present, 1e-12))
+
+
+@kernel
+def least_axis(scatter):
+    """The least eigenvalue of a symmetric 2x2 or 3x3 matrix, at least 0, and its direction."""
+    if scatter.shape[0] == 3:
+        eigenvalues, E = np.linalg.eigh(scatter)
+        return max(eigenvalues[0], 0.0), E[:, 0].copy()
+    # In the plane without a library, which takes longer for it than all else here.
+    a, b, c = scatter[0, 0], scatter[0, 1], scatter[1, 1]
+    angle = 0.5 * np.arctan2(2.0 * b, a - c)  # of the greatest
+    across = np.array([-np.sin(angle), np.cos(angle)])
+    least = 0.5 * (a + c) - np.hypot(0.5 * (a - c), b)
+    return max(least, 0.0), across
 
 
 @kernel
@@ -88,11 +116,11 @@ def add_mirror_image(c, s):
         return
     out, _ = centred(c, s, h)
     pos = out[0].copy()
-    _, E = np.linalg.eigh(pos.T.copy() @ pos)
+    _, across = least_axis(pos.T.copy() @ pos)
     M = np.eye(d)
     for r in range(d):
         for k in range(d):
-            M[r, k] -= 2.0 * E[r, 0] * E[k, 0]
+            M[r, k] -= 2.0 * across[r] * across[k]
     turn_hypothesis(c, s, target, M)
 
 
@@ -190,7 +218,9 @@ def remove_node(c, s, layout, i):
                 pair.start_n = 0
     for h in range(s.alive.shape[0]):
         if s.alive[h]:
-            for r in range(node.at_p, node.at_p + (c.d if node.static else 3 * c.d + 1)):
+            for r in range(node.at_p, node.at_p + (c.d if node.static else 2 * c.d)):
+                decouple(s.x, s.P, h, c.n, r, 1.0)
+            for r in range(node.at_b, node.at_b + (0 if node.static else c.d + 1)):
                 decouple(s.x, s.P, h, c.n, r, 1.0)
             for k in range(s.nodes.shape[0]):
                 at = s.pairs[layout.pair_index[i, k]].at_e if k != i else -1

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from tracking.compiled import small_kernel
-from tracking.filters.joint._linear_kernels import absorb, project, symmetrise
+from tracking.filters.joint._linear_kernels import absorb, project, settle, symmetrise
 from tracking.filters.joint._sleep_kernels import rests
 
 CENTRE_VAR = 1.0
@@ -45,11 +45,11 @@ def apply_carriers(c, s, h, t, dt, scratch):
 @small_kernel
 def judge(c, s, h, nu, m, variance, scratch):
     """Correct with a constraint, and let it speak for or against the hypothesis."""
-    S = project(s.P, h, c.n, m, scratch.idx, scratch.val, scratch.w) + variance
+    S = project(s, h, c.n, m, scratch.idx, scratch.val, scratch.w) + variance
     s.loglik[h] -= 0.5 * (min(nu * nu / S, c.max_nis) + math.log(S))
     if nu * nu > 25.0 * S:
         S = nu * nu / 25.0  # a jolt or a skid: it counts for less
-    absorb(s.x, s.P, s.moved, h, c.n, scratch.w, nu, S)
+    absorb(s, h, c.n, scratch.w, nu, S)
 
 
 @small_kernel
@@ -96,8 +96,8 @@ def hold_speed(c, s, h, dt, scratch):
                 scratch.idx[a], scratch.val[a] = at, 1.0 / m
                 mean += s.x[h, at] / m
                 a += 1
-        S = project(s.P, h, c.n, m, scratch.idx, scratch.val, scratch.w) + variance
-        absorb(s.x, s.P, s.moved, h, c.n, scratch.w, -mean, S)
+        S = project(s, h, c.n, m, scratch.idx, scratch.val, scratch.w) + variance
+        absorb(s, h, c.n, scratch.w, -mean, S)
 
 
 @small_kernel
@@ -113,6 +113,7 @@ def centre(c, s, h, w):
         present += s.nodes[i].present
     if present == 0:
         return
+    settle(s, h, c.n)
     for k in range(c.d):
         mean = 0.0
         for r in range(c.n):

@@ -16,6 +16,8 @@ def copy_hypothesis(s, h):
             s.loglik[free] = s.loglik[h]
             s.x[free] = s.x[h]
             s.P[free] = s.P[h]
+            s.waiting[free] = s.waiting[h]
+            s.n_waiting[free] = s.n_waiting[h]
             s.moved[free] = s.moved[h]
             s.nlos[free] = s.nlos[h]
             s.group[0].n_alive += 1

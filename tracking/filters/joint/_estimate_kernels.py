@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from tracking.compiled import kernel
 from tracking.filters._clear_kernels import clear_estimate
+from tracking.filters.joint._linear_kernels import take_off
 from tracking.filters.joint._motion_kernels import predict, sum_inertial
 from tracking.filters.joint.state import JointState
 
@@ -82,6 +83,7 @@ def look_ahead(c, s, scratch, t):
     h, n = s.group[0].best, s.nodes.shape[0]
     scratch.x[0] = s.x[h]
     scratch.P[0] = s.P[h]
+    take_off(scratch.P, 0, s.waiting, h, s.n_waiting[h], c.n)
     scratch.pre[:] = s.pre
     for i in range(n):
         scratch.t_pre[i] = s.nodes[i].t_pre
@@ -97,6 +99,8 @@ def look_ahead(c, s, scratch, t):
             s.group,
             scratch.x,
             scratch.P,
+            s.waiting,
+            s.n_waiting,
             scratch.x,
             scratch.nlos,
             s.alive,

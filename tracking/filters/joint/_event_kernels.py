@@ -15,6 +15,7 @@ from tracking.filters.joint._carrier_kernels import apply_carriers, centre
 from tracking.filters.joint._cut_off_kernels import doubt_acceleration
 from tracking.filters.joint._doubt_kernels import note_fit, watch_nodes
 from tracking.filters.joint._estimate_kernels import write_estimate
+from tracking.filters.joint._linear_kernels import settle, settle_all
 from tracking.filters.joint._motion_kernels import predict, sum_inertial, take_state
 from tracking.filters.joint._range_kernels import (
     antenna_offset,
@@ -88,6 +89,7 @@ def run_events(coefficients, layout, state, scratch, block, t_out, out):
                     what == SURVEY,
                 )
             elif what == LEAVE or (what == JOIN and s.nodes[i].present):
+                settle_all(s, c.n)
                 remove_node(c, s, layout, i)
         while o < t_out.shape[1]:
             write_estimate(c, s, scratch, t_out[e, o], e, o, out)
@@ -105,6 +107,8 @@ def one_env(state, e):
         state.group[e],
         state.x[e],
         state.P[e],
+        state.waiting[e],
+        state.n_waiting[e],
         state.moved[e],
         state.nlos[e],
         state.alive[e],
@@ -119,6 +123,7 @@ def advance_all(coefficients, layout, state, scratch, t):
         s = one_env(state, e)
         if s.group[0].started:
             advance(coefficients[0], s, layout, scratch, t[e])
+            settle_all(s, coefficients[0].n)
 
 
 @small_kernel
@@ -145,6 +150,7 @@ def advance(c, s, layout, scratch, t):
     """Carry every hypothesis to time t, and use what is known about the carriers."""
     group = s.group[0]
     if group.asleep and not none_moved(c, s, t):
+        settle_all(s, c.n)
         wake_up(c, s, layout)
     if t - group.t > SAME:
         for i in range(s.nodes.shape[0]):
@@ -153,6 +159,7 @@ def advance(c, s, layout, scratch, t):
         first, end = bank_range(s)
         for h in range(first, end):
             if s.alive[h]:
+                settle(s, h, c.n)
                 follow_rotation(c, s, h)
                 predict(c, s, h, t - group.t, scratch)
         for i in range(s.nodes.shape[0]):
@@ -219,6 +226,7 @@ def take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, evidence, is_sur
 def take_first_range(c, s, layout, i, j, p, t, distance, is_survey):
     """A range or survey of a pair that does not run yet, i < j."""
     collect(c, s.pairs[p], t, distance, is_survey)
+    settle_all(s, c.n)
     if not s.group[0].started:
         try_start(c, s, layout, t)
         return
@@ -233,6 +241,7 @@ def take_first_range(c, s, layout, i, j, p, t, distance, is_survey):
 @kernel
 def look_at_group(c, s, layout, t):
     """From time to time: who left, and which hypotheses are worth their time."""
+    settle_all(s, c.n)
     remove_silent(c, s, layout, t)
     prune_bank(c, s)
     watch_mirror(c, s)

@@ -3,21 +3,30 @@
 A measurement is a list of states and derivatives, so that its cost is that of one sweep over
 the covariance. With the optimal gain ``K = PH / S`` the Joseph form reduces to
 ``P - (PH)(PH)^T / S``; written with ``w = PH / sqrt(S)`` it is symmetric to the last bit.
+
+A covariance of many states does not fit the nearest cache, and a sweep over it costs more than
+the sums. So in larger groups corrections wait: the covariance is ``P - W^T W`` with one row of W
+each, and one sweep takes them all off before P is used for anything else (`settle`).
 """
 
 from __future__ import annotations
 
 import math
 
-from tracking.compiled import small_kernel
+import numpy as np
+
+from tracking.compiled import kernel, small_kernel
+
+BLOCK = 16
+"""Size of the blocks of P on whose diagonal both halves are computed."""
 
 
 @small_kernel
-def project(P, h, n, m, idx, val, w):
+def project(s, h, n, m, idx, val, w):
     """Write ``w = P H`` of hypothesis h; returns ``H P H^T``.
 
     Args:
-        P: Covariances, (hyp, state, state).
+        s: JointState of one environment.
         h: Hypothesis.
         n: Number of states.
         m: Number of non-zero derivatives.
@@ -25,6 +34,7 @@ def project(P, h, n, m, idx, val, w):
         val: The derivatives.
         w: Written, (state).
     """
+    P, W = s.P, s.waiting
     first, v = idx[0], val[0]
     for r in range(n):
         w[r] = v * P[h, first, r]
@@ -32,6 +42,12 @@ def project(P, h, n, m, idx, val, w):
         row, v = idx[k], val[k]
         for r in range(n):
             w[r] += v * P[h, row, r]
+    for q in range(s.n_waiting[h]):
+        v = 0.0
+        for k in range(m):
+            v += val[k] * W[h, q, idx[k]]
+        for r in range(n):
+            w[r] -= v * W[h, q, r]
     variance = 0.0
     for k in range(m):
         variance += val[k] * w[idx[k]]
@@ -39,11 +55,21 @@ def project(P, h, n, m, idx, val, w):
 
 
 @small_kernel
-def absorb(x, P, moved, h, n, w, nu, S):
+def covariance(s, h, a, b):
+    """One element of the covariance of hypothesis h, what waits included."""
+    total = s.P[h, a, b]
+    for q in range(s.n_waiting[h]):
+        total -= s.waiting[h, q, a] * s.waiting[h, q, b]
+    return total
+
+
+@small_kernel
+def absorb(s, h, n, w, nu, S):
     """Correct hypothesis h with an innovation nu of variance S; w is ``P H``, overwritten.
 
-    What the states are moved by is added to `moved`, (hyp, state).
+    What the states are moved by is added to `moved`.
     """
+    x, P, W, moved = s.x, s.P, s.waiting, s.moved
     gain = nu / S
     for r in range(n):
         x[h, r] += w[r] * gain
@@ -51,10 +77,67 @@ def absorb(x, P, moved, h, n, w, nu, S):
     scale = 1.0 / math.sqrt(S)
     for r in range(n):
         w[r] *= scale
+    room = W.shape[1]
+    if room == 0:
+        for r in range(n):
+            w_r = w[r]
+            for c in range(n):
+                P[h, r, c] -= w_r * w[c]
+        return
+    if s.n_waiting[h] == room:
+        settle(s, h, n)
+    q = s.n_waiting[h]
     for r in range(n):
-        w_r = w[r]
-        for c in range(n):
-            P[h, r, c] -= w_r * w[c]
+        W[h, q, r] = w[r]
+    s.n_waiting[h] = q + 1
+
+
+@small_kernel
+def settle(s, h, n):
+    """Take off what waits: from here on P is the covariance of hypothesis h."""
+    if s.n_waiting[h] > 0:
+        take_off(s.P, h, s.waiting, h, s.n_waiting[h], n)
+        s.n_waiting[h] = 0
+
+
+@small_kernel
+def settle_all(s, n):
+    """Take off what waits in every hypothesis."""
+    for h in range(s.alive.shape[0]):
+        if s.alive[h]:
+            settle(s, h, n)
+
+
+@kernel
+def take_off(P, h, W, g, m, n):
+    """``P[h] - W[g]^T W[g]`` of the first m rows of W.
+
+    Two rows of P and four of W at a time: each number that is loaded serves several sums. What is
+    left of the diagonal blocks is copied from what is right of them.
+    """
+    end = np.uint64(n)
+    for r in range(0, n, 2):
+        s = min(r + 1, n - 1)  # the last row of an odd number is its own neighbour
+        first = np.uint64(r - r % BLOCK)
+        for q in range(0, m - m % 4, 4):
+            a0, a1, a2, a3 = W[g, q, r], W[g, q + 1, r], W[g, q + 2, r], W[g, q + 3, r]
+            b0, b1, b2, b3 = W[g, q, s], W[g, q + 1, s], W[g, q + 2, s], W[g, q + 3, s]
+            for k in range(first, end):
+                w0, w1, w2, w3 = W[g, q, k], W[g, q + 1, k], W[g, q + 2, k], W[g, q + 3, k]
+                row = P[h, r, k] - ((a0 * w0 + a1 * w1) + (a2 * w2 + a3 * w3))
+                P[h, s, k] -= (b0 * w0 + b1 * w1) + (b2 * w2 + b3 * w3)
+                P[h, r, k] = row
+        for q in range(m - m % 4, m):
+            a0, b0 = W[g, q, r], W[g, q, s]
+            for k in range(first, end):
+                row = P[h, r, k] - a0 * W[g, q, k]
+                P[h, s, k] -= b0 * W[g, q, k]
+                P[h, r, k] = row
+    for row in range(BLOCK, n, BLOCK):
+        for column in range(0, row, BLOCK):
+            for r in range(row, min(row + BLOCK, n)):
+                for k in range(np.uint64(column), np.uint64(column + BLOCK)):
+                    P[h, r, k] = P[h, k, r]
 
 
 @small_kernel

@@ -137,7 +137,7 @@ def predict(c, s, h, step, scratch):
         scale[r] = 1.0
     for i in range(nodes.shape[0]):
         speed[i] = 0.0
-        if nodes[i].present and not nodes[i].static:
+        if moves(nodes[i]):
             move_mean(c, nodes[i], s.pre, x, h, i, scale, w, speed)
             for k in range(d):
                 s.moved[h, nodes[i].at_p + k] += s.pre[i, 0] * s.moved[h, nodes[i].at_v + k]
@@ -152,14 +152,11 @@ def predict(c, s, h, step, scratch):
         x[h, at] *= scale[at]
         x[h, at + 1] *= scale[at + 1]
         x[h, at + 1] += (1.0 - scale[at + 1]) * hidden * c.excess
-    # Rows, then columns: P <- F P F^T.
     for i in range(nodes.shape[0]):
-        if nodes[i].present and not nodes[i].static:
+        if moves(nodes[i]):
             move_rows(d, n, nodes[i], P, h, i, w)
-    for i in range(nodes.shape[0]):
-        if nodes[i].present and not nodes[i].static:
-            move_columns(d, n, nodes[i], P, h, i, w, scale)
-    fade(P, h, n, pairs, scale)
+    move_columns(c.n_motion, n, d, nodes, P, h, w)
+    fade(P, h, n, scale)
     for i in range(nodes.shape[0]):
         if nodes[i].present:
             add_noise(c, nodes[i], s.pre, P, h, i, scale, step)
@@ -229,39 +226,37 @@ def move_rows(d, n, node, P, h, i, w):
 
 
 @small_kernel
-def move_columns(d, n, node, P, h, i, w, scale):
-    """``(F P) F^T``: the columns of node i; those of bias and heading error fade as well."""
-    p, v, b, y = node.at_p, node.at_v, node.at_b, node.at_h
-    T, pc, ps, vc, vs = w[i, 0], w[i, 1], w[i, 2], w[i, 3], w[i, 4]
-    yp0, yp1, yv0, yv1 = w[i, 5], w[i, 6], w[i, 7], w[i, 8]
-    keep_b, keep_y, half = scale[b], scale[y], 0.5 * T * T
-    for r in range(n):
-        b0, b1, y0, v0, v1 = P[h, r, b], P[h, r, b + 1], P[h, r, y], P[h, r, v], P[h, r, v + 1]
-        P[h, r, p] += T * v0 - pc * b0 + ps * b1 + yp0 * y0
-        P[h, r, p + 1] += T * v1 - ps * b0 - pc * b1 + yp1 * y0
-        P[h, r, v] = v0 - vc * b0 + vs * b1 + yv0 * y0
-        P[h, r, v + 1] = v1 - vs * b0 - vc * b1 + yv1 * y0
-        P[h, r, b], P[h, r, b + 1], P[h, r, y] = keep_b * b0, keep_b * b1, keep_y * y0
-        if d == 3:
-            v2, b2 = P[h, r, v + 2], P[h, r, b + 2]
-            P[h, r, p + 2] += T * v2 - half * b2
-            P[h, r, v + 2] = v2 - T * b2
-            P[h, r, b + 2] = keep_b * b2
+def moves(node):
+    """True for a node of the group that is not fixed."""
+    return node.present and not node.static
 
 
 @small_kernel
-def fade(P, h, n, pairs, scale):
-    """What decays: the columns of range errors, and the rows of all that does."""
-    first = n
-    for p in range(pairs.shape[0]):
-        if pairs[p].at_e >= 0:
-            first = min(first, pairs[p].at_e)
+def move_columns(n_motion, n, d, nodes, P, h, w):
+    """``F P F^T``, the rows done: ``F (F P)^T``, which only positions and velocities differ in.
+
+    Rows of what does not move are those of P, so their part of ``P F^T`` is that of ``F P`` across
+    the diagonal.
+    """
+    end = np.uint64(n_motion)  # unsigned: no index from the end
+    for r in range(end, np.uint64(n)):
+        for k in range(end):
+            P[h, r, k] = P[h, k, r]
+    for r in range(n_motion):
+        for k in range(r):
+            P[h, r, k], P[h, k, r] = P[h, k, r], P[h, r, k]
+    for i in range(nodes.shape[0]):
+        if moves(nodes[i]):
+            move_rows(d, n_motion, nodes[i], P, h, i, w)
+
+
+@small_kernel
+def fade(P, h, n, scale):
+    """Rows and columns of what decays."""
     for r in range(n):
-        for k in range(np.uint64(first), np.uint64(n)):  # unsigned: no index from the end
-            P[h, r, k] *= scale[k]
-        if scale[r] != 1.0:
-            for k in range(n):
-                P[h, r, k] *= scale[r]
+        s = scale[r]
+        for k in range(n):
+            P[h, r, k] *= s * scale[k]
 
 
 @small_kernel

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 
 from tracking.compiled import small_kernel
-from tracking.filters.joint._linear_kernels import absorb, project
+from tracking.filters.joint._linear_kernels import absorb, covariance, project
 from tracking.filters.joint._motion_kernels import decay
 
 MIN_DISTANCE = 0.01
@@ -65,10 +65,10 @@ def range_model(c, s, h, p, lever_i, lever_j, idx, val):
     node_i, node_j = s.nodes[pair.i], s.nodes[pair.j]
     i0, i1 = lever_i[0], lever_i[1]
     j0, j1 = lever_j[0], lever_j[1]
-    if not node_i.static:
+    if not node_i.static and (i0 != 0.0 or i1 != 0.0):
         a = s.x[h, node_i.at_h]
         i0, i1 = math.cos(a) * i0 - math.sin(a) * i1, math.sin(a) * i0 + math.cos(a) * i1
-    if not node_j.static:
+    if not node_j.static and (j0 != 0.0 or j1 != 0.0):
         a = s.x[h, node_j.at_h]
         j0, j1 = math.cos(a) * j0 - math.sin(a) * j1, math.sin(a) * j0 + math.cos(a) * j1
     at_i, at_j = node_i.at_p, node_j.at_p
@@ -122,6 +122,13 @@ def bend(c, s, h, p, val):
             along += u_a * P_ab * u_b * (1.0 if a == b else 2.0)
             if a == b:
                 trace += P_ab
+    for q in range(s.n_waiting[h]):
+        part = 0.0
+        for a in range(c.d):
+            off = s.waiting[h, q, node_j.at_p + a] - s.waiting[h, q, node_i.at_p + a]
+            part += off * (val[2 + a] if a < 2 else val[5])
+            trace -= off * off
+        along -= part * part
     return 0.5 * max(trace - along, 0.0) / math.sqrt(squared + 0.01)
 
 
@@ -154,7 +161,7 @@ def fuse_range(c, s, h, p, dt, distance, levers, evidence, scratch):
     """
     predicted, m = range_model(c, s, h, p, levers[:3], levers[3:], scratch.idx, scratch.val)
     nu = distance - predicted
-    variance = project(s.P, h, c.n, m, scratch.idx, scratch.val, scratch.w)
+    variance = project(s, h, c.n, m, scratch.idx, scratch.val, scratch.w)
     S = variance + c.white_var
     switched, sane, loglik = judge_sight(c, s, h, p, dt, nu, variance, evidence, scratch.w)
     s.loglik[h] += c.evidence * max(loglik, -0.5 * (c.max_nis + math.log(S)))
@@ -163,7 +170,7 @@ def fuse_range(c, s, h, p, dt, distance, levers, evidence, scratch):
         change_sight(c, s, h, p, switched)
         predicted, m = range_model(c, s, h, p, levers[:3], levers[3:], scratch.idx, scratch.val)
         nu = distance - predicted
-        variance = project(s.P, h, c.n, m, scratch.idx, scratch.val, scratch.w)
+        variance = project(s, h, c.n, m, scratch.idx, scratch.val, scratch.w)
     bent = min(c.bend_gain * bend(c, s, h, p, scratch.val), 0.2)
     R = c.white_var + bent * bent + s.nlos[h, p] * c.excess_white_var
     # A pair whose ranges have long contradicted all else is believed less and less; where most
@@ -173,7 +180,7 @@ def fuse_range(c, s, h, p, dt, distance, levers, evidence, scratch):
     if doubt > 1.0 and not s.group[0].lost:
         trust /= doubt * doubt * doubt * doubt
     if trust > 1e-3:
-        absorb(s.x, s.P, s.moved, h, c.n, scratch.w, nu, variance + R / trust)
+        absorb(s, h, c.n, scratch.w, nu, variance + R / trust)
     return before, nis, sane
 
 
@@ -208,7 +215,7 @@ def judge_sight(c, s, h, p, dt, nu, variance, evidence, w):
     nu_leave, S_leave = nu, S
     if at > 0:
         nu_leave = nu + s.x[h, at]
-        S_leave += max(s.P[h, at, at] - 2.0 * w[at], -0.9 * variance) + c.slow_var
+        S_leave += max(covariance(s, h, at, at) - 2.0 * w[at], -0.9 * variance) + c.slow_var
     hidden = math.exp(evidence)
     stays = math.exp(-0.5 * nu * nu / S) / math.sqrt(S)
     los_los = (1.0 - before) * (1.0 - enter) * stays
@@ -244,6 +251,8 @@ def change_sight(c, s, h, p, switched):
     for r in range(c.n):
         s.P[h, at, r] *= stays
         s.P[h, r, at] *= stays
+    for q in range(s.n_waiting[h]):
+        s.waiting[h, q, at] *= stays
     hidden = s.nlos[h, p]
     s.P[h, at, at] += (1.0 - stays * stays) * (c.slow_var + hidden * c.excess_var)
     s.x[h, at] = stays * s.x[h, at] + switched * hidden * c.excess
@@ -254,5 +263,5 @@ def fuse_survey(c, s, h, p, distance, scratch):
     """Correct hypothesis h with a surveyed distance between the origins of two nodes."""
     none = scratch.none
     predicted, m = range_model(c, s, h, p, none, none, scratch.idx, scratch.val)
-    variance = project(s.P, h, c.n, m, scratch.idx, scratch.val, scratch.w)
-    absorb(s.x, s.P, s.moved, h, c.n, scratch.w, distance - predicted, variance + c.survey_var)
+    variance = project(s, h, c.n, m, scratch.idx, scratch.val, scratch.w)
+    absorb(s, h, c.n, scratch.w, distance - predicted, variance + c.survey_var)

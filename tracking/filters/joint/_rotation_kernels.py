@@ -59,9 +59,7 @@ def turn_covariance(c, s, h, share):
     n, axes = c.n, 3 if c.d == 3 else 1
     N, G = np.zeros((axes, n)), np.zeros((axes, n))
     turned(c, s, h, N, G)
-    NN = N @ N.T.copy()
-    # A line has no rotation about itself.
-    A = np.linalg.solve(NN + (1e-3 * np.trace(NN) + 1e-9) * np.eye(axes), N)
+    A = best_rotation(N)
     B = np.zeros((axes, n))
     for r in range(n):
         for a in range(axes):
@@ -70,12 +68,46 @@ def turn_covariance(c, s, h, share):
                     B[a, k] += A[a, r] * s.P[h, r, k]
     G *= share
     B += 0.5 * (A @ B.T.copy()) @ G
-    for a in range(axes):
-        for r in range(n):
-            g, b = G[a, r], B[a, r]
+    P = s.P
+    for r in range(n):
+        g, b = G[0, r], B[0, r]
+        if axes == 1:
             for k in range(n):
-                s.P[h, r, k] += g * B[a, k] + b * G[a, k]
+                P[h, r, k] += g * B[0, k] + b * G[0, k]
+        else:
+            g1, b1, g2, b2 = G[1, r], B[1, r], G[2, r], B[2, r]
+            for k in range(n):
+                turn = (g * B[0, k] + b * G[0, k]) + (g1 * B[1, k] + b1 * G[1, k])
+                P[h, r, k] += turn + (g2 * B[2, k] + b2 * G[2, k])
     s.moved[h, :] = 0.0
+
+
+@kernel
+def best_rotation(N):
+    """``(N N^T)^-1 N``, which reads the rotation off an error, (axis, state).
+
+    A few elements by hand: calling a library for them takes longer than all else here.
+    """
+    axes, n = N.shape
+    M, inverse = np.zeros((axes, axes)), np.zeros((axes, axes))
+    trace = 0.0
+    for a in range(axes):
+        for b in range(axes):
+            for r in range(n):
+                M[a, b] += N[a, r] * N[b, r]
+        trace += M[a, a]
+    for a in range(axes):
+        M[a, a] += 1e-3 * trace + 1e-9  # a line has no rotation about itself
+    if axes == 1:
+        inverse[0, 0] = 1.0 / M[0, 0]
+    else:
+        for a in range(3):
+            u, v = (a + 1) % 3, (a + 2) % 3
+            for b in range(3):
+                f, g = (b + 1) % 3, (b + 2) % 3
+                inverse[b, a] = M[u, f] * M[v, g] - M[u, g] * M[v, f]
+        inverse /= M[0, 0] * inverse[0, 0] + M[0, 1] * inverse[1, 0] + M[0, 2] * inverse[2, 0]
+    return inverse @ N
 
 
 @kernel

@@ -53,7 +53,9 @@ _NUMBERS = (
     "doubt",
     "evidence",
 )
-COEFFICIENTS = np.dtype([("d", "i8"), ("n", "i8"), *((name, "f8") for name in _NUMBERS)])
+COEFFICIENTS = np.dtype(
+    [("d", "i8"), ("n", "i8"), ("n_motion", "i8"), *((name, "f8") for name in _NUMBERS)]
+)
 """Constants derived once from `JointParams`, under the same names; ``_var`` and ``2``: squared."""
 
 
@@ -86,7 +88,8 @@ def make_coefficients(constellation: Constellation, params: JointParams) -> Reco
     }
     c = np.zeros(1, dtype=COEFFICIENTS)
     c["d"] = constellation.dimensions
-    c["n"] = count_states(constellation, params)
+    c["n"] = count_rows(constellation, params)
+    c["n_motion"] = count_motion(constellation)
     for name in _NUMBERS:
         sources = [p for p in (e, v, s, params) if hasattr(p, name)]
         c[name] = values[name] if name in values else getattr(sources[0], name)
@@ -94,12 +97,26 @@ def make_coefficients(constellation: Constellation, params: JointParams) -> Reco
 
 
 def count_states(constellation: Constellation, params: JointParams) -> int:
-    """Length of the state vector."""
+    """How many states there are."""
     d = constellation.dimensions
-    n = sum(d if static else 3 * d + 1 for static in constellation.is_static)
+    n = count_motion(constellation) + (d + 1) * int((~constellation.is_static).sum())
     if has_range_errors(constellation, params):
         n += 2 * int(moving_pairs(constellation).sum())
     return n
+
+
+def count_rows(constellation: Constellation, params: JointParams) -> int:
+    """Length of the arrays of states: up to three behind the last mean nothing.
+
+    Compiled code takes four numbers at a time, and what is left one by one.
+    """
+    return -(-count_states(constellation, params) // 4) * 4
+
+
+def count_motion(constellation: Constellation) -> int:
+    """How many states are positions and velocities: the first of the vector."""
+    d = constellation.dimensions
+    return sum(d if static else 2 * d for static in constellation.is_static)
 
 
 def moving_pairs(constellation: Constellation) -> Bool:

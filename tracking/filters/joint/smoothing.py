@@ -19,7 +19,7 @@ from tracking.arrays import F64, I64
 from tracking.constellation import Constellation
 from tracking.estimate import Status, TeamEstimate
 from tracking.filters.joint.records import Records
-from tracking.filters.joint.state import JointState
+from tracking.filters.joint.state import JointState, room_to_wait
 
 
 def with_clones(
@@ -57,6 +57,8 @@ def with_clones(
         group=group,
         x=np.ascontiguousarray(state.x[envs, best][:, None, every]),
         P=np.ascontiguousarray(state.P[envs, best][:, None, every][..., every]),
+        waiting=np.zeros((len(envs), 1, room_to_wait(len(every)), len(every))),
+        n_waiting=np.zeros((len(envs), 1), dtype=np.int64),
         moved=np.zeros((len(envs), 1, len(every))),
         nlos=state.nlos[envs, best][:, None].copy(),
         alive=state.alive[envs, best][:, None].copy(),

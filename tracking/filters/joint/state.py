@@ -2,14 +2,13 @@
 
 One state vector holds all nodes of a group, in one world frame:
 
-    moving node    position (d) [m], velocity (d) [m/s], acceleration bias (d) [m/s2],
-                   heading error [rad]
-    static node    position (d) [m]
+    node           position (d) [m]; velocity (d) [m/s] of those that move
+    moving node    acceleration bias (d) [m/s2], heading error [rad]
     pair           fast and slow part of its range error [m], in small groups
 
-``d`` is 2 or 3. The states of nodes that are not in the group are decoupled, with unit
-variance. Axes: ``env``, independent groups; ``hyp``, the bank of hypotheses about rotation and
-mirror image.
+in this order: what moves of all nodes, then what only fades. ``d`` is 2 or 3. The states of nodes
+that are not in the group are decoupled, with unit variance. Axes: ``env``, independent groups;
+``hyp``, the bank of hypotheses about rotation and mirror image.
 """
 
 from __future__ import annotations
@@ -20,7 +19,12 @@ import numpy as np
 
 from tracking.arrays import F64, I64, Bool
 from tracking.constellation import Constellation
-from tracking.filters.joint.coefficients import count_states, has_range_errors, moving_pairs
+from tracking.filters.joint.coefficients import (
+    count_motion,
+    count_rows,
+    has_range_errors,
+    moving_pairs,
+)
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.records import GROUP, NODE, PAIR, Records
 from tracking.filters.rotations import starting_rotations
@@ -48,7 +52,11 @@ class JointState(NamedTuple):
     x: F64
     """States, (env, hyp, state)."""
     P: F64
-    """Covariance, (env, hyp, state, state)."""
+    """Covariance, (env, hyp, state, state), before what waits is taken off."""
+    waiting: F64
+    """Corrections that wait, ``P - W^T W`` is the covariance, (env, hyp, correction, state)."""
+    n_waiting: I64
+    """How many do, (env, hyp)."""
     moved: F64
     """How far measurements moved the states since P last followed, (env, hyp, state)."""
     nlos: F64
@@ -76,14 +84,19 @@ def make_layout(constellation: Constellation, params: JointParams) -> Layout:
     return Layout(constellation.pair_index, constellation.antenna_offset_b, rotations)
 
 
+def room_to_wait(n_states: int) -> int:
+    """How many corrections may wait: none where the covariance fits the nearest cache."""
+    return 16 if n_states > 48 else 0
+
+
 def make_state(
     constellation: Constellation, params: JointParams, n_envs: int, n_hyps: int
 ) -> JointState:
     """The state before any measurement."""
     n, p, d = constellation.n_nodes, constellation.n_pairs, constellation.dimensions
-    n_states = count_states(constellation, params)
+    n_states = count_rows(constellation, params)
     nodes = np.zeros((n_envs, n), dtype=NODE)
-    at = 0
+    at, fades = 0, count_motion(constellation)
     for k, node in enumerate(constellation.nodes):
         carrier = params.carriers[node.vehicle]
         static = node.kind == "static"
@@ -105,19 +118,20 @@ def make_state(
             "slip": carrier.slip,
             "at_p": at,
             "at_v": -1 if static else at + d,
-            "at_b": -1 if static else at + 2 * d,
-            "at_h": -1 if static else at + 3 * d,
+            "at_b": -1 if static else fades,
+            "at_h": -1 if static else fades + d,
         }
         for name, value in constants.items():
             nodes[name][:, k] = value
-        at += d if static else 3 * d + 1
+        at += d if static else 2 * d
+        fades += 0 if static else d + 1
     pairs = np.zeros((n_envs, p), dtype=PAIR)
     pairs["i"], pairs["j"] = constellation.pairs.T
     pairs["at_e"] = -1
     if has_range_errors(constellation, params):
         for pair in np.nonzero(moving_pairs(constellation))[0]:
-            pairs["at_e"][:, pair] = at
-            at += 2
+            pairs["at_e"][:, pair] = fades
+            fades += 2
     held = np.zeros((n_envs, n, 7))
     held[..., 0] = 1.0
     P = np.zeros((n_envs, n_hyps, n_states, n_states))  # noqa: N806
@@ -130,6 +144,8 @@ def make_state(
         group=np.zeros((n_envs, 1), dtype=GROUP),
         x=np.zeros((n_envs, n_hyps, n_states)),
         P=P,
+        waiting=np.zeros((n_envs, n_hyps, room_to_wait(n_states), n_states)),
+        n_waiting=np.zeros((n_envs, n_hyps), dtype=np.int64),
         moved=np.zeros((n_envs, n_hyps, n_states)),
         nlos=np.zeros((n_envs, n_hyps, p)),
         alive=np.zeros((n_envs, n_hyps), dtype=bool),
