@@ -9,6 +9,7 @@ from math import ceil
 import numpy as np
 
 from agents.bench.tracker.workload import Workload
+from tracking.estimate import Status
 from tracking.log import Log
 from tracking.tracker import Tracker
 
@@ -17,7 +18,7 @@ REPEATS = 5
 STARTING = 5.0
 """[s] Beginning of a recording, in which the group starts."""
 WARM_UP, PATIENCE = 15.0, 60.0
-"""[s] Time a group is given to settle, and time by which it must be ok."""
+"""[s] Time a group is given to settle, and time by which one hypothesis must be left."""
 FIRST_ROUNDS = 10
 """Enough to start the group."""
 
@@ -47,7 +48,7 @@ def step_cost(workload: Workload, name: str, steps: int) -> float:
 
 
 def started(workload: Workload, name: str) -> tuple[Tracker, int]:
-    """A tracker whose pairs are all ok, and the number of the next step.
+    """A tracker of one hypothesis, and the number of the next step.
 
     Raises:
         RuntimeError: The group does not start.
@@ -64,7 +65,7 @@ def started(workload: Workload, name: str) -> tuple[Tracker, int]:
         chunk = workload.block(done, second)
         estimate = tracker.step(chunk, float(chunk.t[0, -1]))
         done += second
-        enough = estimate.ok.all() if name == "joint" else True
+        enough = (estimate.status > Status.AMBIGUOUS).all() if name == "joint" else True
         if done * workload.dt > WARM_UP and enough:
             return tracker, done
     raise RuntimeError(f"bench: {workload.n} nodes did not start within {PATIENCE:g} s")
