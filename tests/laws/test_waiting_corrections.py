@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 
+from agents.simulate import simulate
 from tracking import Tracker
-from tracking.filters.joint import state
+from tracking.bounds import posterior_bound
+from tracking.filters.joint import smoothing, state
+from tracking.filters.joint.params import JointParams
 from tracking.measurements import Kind
 
 
@@ -19,15 +22,49 @@ def crowd(make_group):
     return group
 
 
-def test_waiting_changes_nothing_but_rounding(crowd, monkeypatch):
+@pytest.fixture
+def at_once(monkeypatch):
+    """Call it, and corrections wait no longer."""
+
+    def no_room() -> None:
+        for module in (state, smoothing):
+            monkeypatch.setattr(module, "room_to_wait", lambda _: 0)
+
+    return no_room
+
+
+def test_waiting_changes_nothing_but_rounding(crowd, at_once):
     t_out = np.arange(1.0, 12.0, 0.13)
     waited = Tracker(crowd.constellation).run(crowd.block, t_out)
-    monkeypatch.setattr(state, "room_to_wait", lambda _: 0)
-    at_once = Tracker(crowd.constellation).run(crowd.block, t_out)
-    np.testing.assert_array_equal(waited.status, at_once.status)
-    np.testing.assert_allclose(waited.pos_ij_w, at_once.pos_ij_w, atol=1e-8)
-    np.testing.assert_allclose(waited.cov, at_once.cov, atol=1e-8)
-    np.testing.assert_allclose(waited.nlos_prob, at_once.nlos_prob, atol=1e-8)
+    at_once()
+    same = Tracker(crowd.constellation).run(crowd.block, t_out)
+    np.testing.assert_array_equal(waited.status, same.status)
+    np.testing.assert_allclose(waited.pos_ij_w, same.pos_ij_w, atol=1e-8)
+    np.testing.assert_allclose(waited.cov, same.cov, atol=1e-8)
+    np.testing.assert_allclose(waited.nlos_prob, same.nlos_prob, atol=1e-8)
+
+
+def test_smoothing_is_the_same(crowd, at_once):
+    now = int(np.searchsorted(crowd.block.t[0], 9.0, side="right"))
+    later = int(np.searchsorted(crowd.block.t[0], 9.1, side="right"))
+    estimates = []
+    for _ in range(2):
+        tracker = Tracker(crowd.constellation)
+        tracker.step(crowd.block.take(slice(0, now)), 9.0)
+        estimates.append(tracker.smooth(crowd.block.take(slice(now, later)), 9.0))
+        at_once()
+    waited, same = estimates
+    np.testing.assert_allclose(waited.pos_ij_w, same.pos_ij_w, atol=1e-8)
+    np.testing.assert_allclose(waited.cov, same.cov, atol=1e-8)
+
+
+def test_the_bound_is_the_same(at_once):
+    log = simulate(scenario="human", seconds=8.0, seed=0)
+    waited = posterior_bound(log, JointParams(), skip=2.0)
+    at_once()
+    same = posterior_bound(log, JointParams(), skip=2.0)
+    assert waited.rmse == pytest.approx(same.rmse, rel=1e-8)
+    assert waited.rmse_shape == pytest.approx(same.rmse_shape, rel=1e-8)
 
 
 def test_a_split_within_a_message_changes_nothing(crowd):

@@ -82,7 +82,10 @@ def read_clones(
     """
     constellation = estimate.constellation
     n, d = constellation.n_nodes, constellation.dimensions
-    x, P = clones.x[:, 0, n_states:], clones.P[:, 0, n_states:, n_states:]  # noqa: N806
+    x, W = clones.x[:, 0, n_states:], clones.waiting[:, 0, :, n_states:]  # noqa: N806
+    waits = np.arange(W.shape[1]) < clones.n_waiting
+    W = np.where(waits[..., None], W, 0.0)  # noqa: N806
+    P = clones.P[:, 0, n_states:, n_states:] - np.swapaxes(W, -1, -2) @ W  # noqa: N806
     moving = np.nonzero(~constellation.is_static)[0]
     at_v = np.full(n, -1)
     at_v[moving] = n * d + d * np.arange(len(moving))
