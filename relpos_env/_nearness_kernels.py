@@ -32,7 +32,7 @@ def touches_soon(body, present, box_body, boxes, room, size, e):
             return True
     half_l, half_w = size[e, 0], size[e, 1]
     for n in range(body.shape[1]):
-        if not present[e, n]:
+        if not present[e, n] or is_far(body, present, boxes, room, half_l + half_w, e, n):
             continue
         x, y = body[e, n, 0], body[e, n, 1]
         c, s = math.cos(body[e, n, 2]), math.sin(body[e, n, 2])
@@ -68,3 +68,25 @@ def touches_soon(body, present, box_body, boxes, room, size, e):
             ):
                 return True
     return False
+
+
+@small_kernel
+def is_far(body, present, boxes, room, reach, e, n):
+    """True if a car is far from all else, however turned; half of any is below reach [m]."""
+    x, y, far = body[e, n, 0], body[e, n, 1], reach + MARGIN
+    if abs(x) + far > room[e, 0] or abs(y) + far > room[e, 1]:
+        return False
+    for b in range(boxes.shape[1]):
+        if boxes[e, b, 2] == 0.0:
+            continue
+        corner = boxes[e, b, 2] + boxes[e, b, 3]
+        if abs(x - boxes[e, b, 0]) < corner + far and abs(y - boxes[e, b, 1]) < corner + far:
+            return False
+    for m in range(n + 1, body.shape[1]):
+        if (
+            present[e, m]
+            and abs(body[e, m, 0] - x) < far + reach
+            and abs(body[e, m, 1] - y) < far + reach
+        ):
+            return False
+    return True

@@ -23,25 +23,46 @@ from relpos_env.sensors.radio._radio_kernels import run_env_window
 from tracking.compiled import kernel, small_kernel
 
 MAG, IMU, RANGE = 1, 2, 5
+SOON = 1e-9
+"""[s] Events are due that much earlier, for the roundings of times."""
 CALM = 5
 """[-] Steps that the solver keeps a room in which nothing touches any more: it remembers contacts
 for three."""
 
 
 @kernel
-def begin_decision(bodies, events):
-    """Forget what the last decision brought."""
+def begin_decision(bodies, events, t, next_life, speed, steering):
+    """Forget what the last decision brought; who is absent is not driven.
+
+    Args:
+        bodies: Bodies, updated.
+        events: Events, updated.
+        t: Now, (env) [s].
+        next_life: When somebody comes or goes next, (env) [s].
+        speed: Commands, (env, car) [m/s], updated.
+        steering: Commands, (env, car) [rad], updated.
+
+    Returns:
+        In how many environments somebody comes or goes now.
+    """
+    n_due = 0
     for e in range(bodies.done.shape[0]):
         bodies.done[e] = 0
         events.used[e] = 0
+        n_due += next_life[e] <= t[e] + SOON
         for k in range(events.valid.shape[1]):
             events.valid[e, k] = False
         for n in range(bodies.contacts.shape[1]):
             bodies.contacts[e, n] = 0.0
+            if not bodies.present[e, n]:
+                speed[e, n] = steering[e, n] = 0.0
+    return n_due
 
 
 @kernel
-def run_steps(bodies, sensors, radio, scenes, n_steps, dt, events, speed, steering, waiting):
+def run_steps(
+    bodies, sensors, radio, scenes, n_steps, dt, events, speed, steering, t, waiting
+):  # fmt: skip
     """Go on with the decision of every environment until it is over or must wait.
 
     Args:
@@ -54,6 +75,7 @@ def run_steps(bodies, sensors, radio, scenes, n_steps, dt, events, speed, steeri
         events: Events, appended.
         speed: Commands, (env, car) [m/s].
         steering: Commands, (env, car) [rad].
+        t: Time since each environment began, (env) [s], written.
         waiting: Numbers of the environments that wait for the solver, written.
 
     Returns:
@@ -80,6 +102,7 @@ def run_steps(bodies, sensors, radio, scenes, n_steps, dt, events, speed, steeri
             bodies.tick[e] += 1
             sense(bodies, sensors, radio, scenes, dt, events, e)
             bodies.done[e] += 1
+        t[e] = bodies.tick[e] * dt
     return n_waiting
 
 

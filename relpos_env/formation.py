@@ -24,6 +24,9 @@ from relpos_env.tasks import reward_weights
 from relpos_env.timing import DECISION, DT, STAND_STILL
 from relpos_env.world_state import WorldState
 from tracking.arrays import F64, I64, Bool
+from tracking.compiled import repeated
+
+_judge, _tracking_errors = repeated(judge), repeated(tracking_errors)
 
 MOST_ENVS = 1 << 20
 N_TRUTH = 8
@@ -73,6 +76,8 @@ class Formation:
         self.terminated: Bool = np.zeros(n_envs, dtype=bool)
         self.truncated: Bool = np.zeros(n_envs, dtype=bool)
         self.cycles: I64 = np.zeros(n_envs, dtype=np.int64)
+        self._tracking_error: F64 = np.zeros((n_envs, n))
+        self._t: F64 = np.zeros(n_envs)
         self._rngs = [np.random.default_rng(k) for k in range(n_envs)]
         self._newest: F32 = self.observations
         if config.history > 1:
@@ -137,8 +142,9 @@ class Formation:
 
     @property
     def t(self) -> F64:
-        """Time since the cars were let go, (env) [s]."""
-        return self.loop.swarm.t - STAND_STILL
+        """Time since the cars were let go, (env) [s]; written again at the next step."""
+        np.subtract(self.loop.swarm.t, STAND_STILL, out=self._t)
+        return self._t
 
     def truth(self) -> F64:
         """The truth for critics, (env, 8 car); zeros for absent cars.
@@ -185,10 +191,9 @@ class Formation:
 
         Mean over the others that a car can use; NaN where it can use none.
         """
-        error = np.empty(self.rewards.shape)
         view = self.loop.view
-        tracking_errors(self.loop.swarm.body, view.pos, view.ok, error)
-        return error
+        _tracking_errors(self.loop.swarm.body, view.pos, view.ok, self._tracking_error)
+        return self._tracking_error.copy()
 
     def close(self) -> None:
         """Release the threads."""
@@ -201,7 +206,7 @@ class Formation:
         swarm, config = self.loop.swarm, self.parts.config
         self.task.update(self.state, self.t, swarm.contacts, envs)
         self.operator.sample(self.state, self.task, envs)
-        judge(
+        _judge(
             envs.start, envs.stop, self.state.present, swarm.to_come, swarm.contacts,
             self.task.rewards, self.weights, self.task.done, self.cycles, config.max_cycles,
             config.end_on_collision, self.rewards, self.active, self.left, self.terminated,

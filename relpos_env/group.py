@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from relpos_env._step_kernels import SOON
 from relpos_env.bodies import Bodies, box_row
 from relpos_env.room import Room
 from relpos_env.scenarios.life import LifeEvent
@@ -16,8 +17,6 @@ from relpos_env.timing import DT
 from relpos_env.vehicle import CarParams
 from tracking.arrays import F64, Bool
 
-SOON = 1e-9
-"""[s] Events are due that much earlier, for the roundings of times."""
 WAIT = 0.5
 """[s] A car that cannot come in, because another stands there, tries again after so long."""
 

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from relpos_env._step_kernels import begin_decision, run_steps
+from relpos_env._step_kernels import SOON, begin_decision, run_steps
 from relpos_env._vehicle_kernels import STEERING
 from relpos_env.bodies import Bodies, make_bodies, place_bodies
-from relpos_env.group import SOON, Group
+from relpos_env.group import Group
 from relpos_env.interface.beams import beam_directions
 from relpos_env.scenarios import Scenario
 from relpos_env.scenarios.episode import Episode
@@ -174,19 +174,16 @@ class Swarm:
         Returns:
             Measurements, roughly in order; valid until the next step.
         """
-        present = self._bodies.present
-        np.multiply(speed, present, out=self._speed)
-        np.multiply(steering, present, out=self._steering)
-        if self._next_life.min() <= self.t.max() + SOON:
+        self._speed[...] = speed
+        self._steering[...] = steering
+        if self._begin_decision():
             for env in np.nonzero(self._next_life <= self.t + SOON)[0].tolist():
                 t = float(self.t[env])
                 self._groups[env].live(self._bodies, self._radio, self._scene.pos1, env, t)
                 self._look_ahead(env)
-        self._begin_decision()
         while n_waiting := self._run_steps():
             for env in self._waiting[:n_waiting].tolist():
                 self._groups[env].solve(self._bodies, env)
-        np.multiply(self._bodies.tick, DT, out=self.t)
         self._read_odometers()
         if self.proximity.shape[-1]:
             self._read_proximity()
@@ -229,10 +226,13 @@ class Swarm:
         )
         self._speed, self._steering = np.zeros_like(self.odometer), np.zeros_like(self.odometer)
         self._waiting = np.zeros(self.n_envs, dtype=np.int64)
-        self._begin_decision = bind(begin_decision, bodies, self.events)
+        self._begin_decision = bind(
+            begin_decision, bodies, self.events, self.t, self._next_life, self._speed,
+            self._steering,
+        )  # fmt: skip
         self._run_steps = bind(
             run_steps, bodies, sensors, self._radio.kernel_arguments, self._scene, self.n_steps,
-            DT, self.events, self._speed, self._steering, self._waiting,
+            DT, self.events, self._speed, self._steering, self.t, self._waiting,
         )  # fmt: skip
         self._read_odometers = bind(
             read_odometers, sensors.odometer, sensors.odometer_seed, bodies.tick, bodies.body,

@@ -8,26 +8,29 @@ those that come after it, which is one comparison for one that arrives in order.
 from __future__ import annotations
 
 from tracking.compiled import kernel, small_kernel
+from tracking.measurements import N_VALUES
+
+TIME, KIND, NODE_I, NODE_J, ANTENNA_I, ANTENNA_J, VALUES, HAS_POWER = 0, 1, 2, 3, 4, 5, 6, 14
+"""Columns of a slot: the fields of `MeasurementBlock` [s, -], their order that of handling."""
+N_COLUMNS = 16
+"""Columns of a slot, two lines of the cache; the last means nothing."""
 
 
 @small_kernel
 def is_before(s, e, a, b):
     """Whether the event in slot a is handled before that in slot b: time, kind, nodes."""
-    if s.t[e, a] != s.t[e, b]:
-        return s.t[e, a] < s.t[e, b]
-    if s.kind[e, a] != s.kind[e, b]:
-        return s.kind[e, a] < s.kind[e, b]
-    if s.i[e, a] != s.i[e, b]:
-        return s.i[e, a] < s.i[e, b]
-    return s.j[e, a] < s.j[e, b]
+    for column in range(TIME, NODE_J + 1):
+        if s.slots[e, a, column] != s.slots[e, b, column]:
+            return s.slots[e, a, column] < s.slots[e, b, column]
+    return False
 
 
 @small_kernel
 def is_same(s, e, a, b):
     """Whether two events that neither comes before the other are one measurement."""
-    same = s.antenna_i[e, a] == s.antenna_i[e, b] and s.antenna_j[e, a] == s.antenna_j[e, b]
-    for v in range(s.values.shape[2]):
-        same = same and s.values[e, a, v] == s.values[e, b, v]
+    same = True
+    for column in range(ANTENNA_I, HAS_POWER):
+        same = same and s.slots[e, a, column] == s.slots[e, b, column]
     return same
 
 
@@ -35,12 +38,13 @@ def is_same(s, e, a, b):
 def put_in_slot(s, e, slot, block, k):
     """Copy the event in column k of a block into a slot."""
     t, kind, i, j, antenna_i, antenna_j, values, has_power, _ = block
-    s.t[e, slot], s.kind[e, slot] = t[e, k], kind[e, k]
-    s.i[e, slot], s.j[e, slot] = i[e, k], j[e, k]
-    s.antenna_i[e, slot], s.antenna_j[e, slot] = antenna_i[e, k], antenna_j[e, k]
-    for v in range(s.values.shape[2]):
-        s.values[e, slot, v] = values[e, k, v]
-    s.has_power[e, slot] = has_power[e, k]
+    slots = s.slots
+    slots[e, slot, TIME], slots[e, slot, KIND] = t[e, k], kind[e, k]
+    slots[e, slot, NODE_I], slots[e, slot, NODE_J] = i[e, k], j[e, k]
+    slots[e, slot, ANTENNA_I], slots[e, slot, ANTENNA_J] = antenna_i[e, k], antenna_j[e, k]
+    for v in range(N_VALUES):
+        slots[e, slot, VALUES + v] = values[e, k, v]
+    slots[e, slot, HAS_POWER] = has_power[e, k]
 
 
 @small_kernel
@@ -105,7 +109,7 @@ def count_due(s, until):
         low, high = 0, s.n_waiting[e]
         while low < high:
             middle = (low + high) // 2
-            if s.t[e, s.order[e, (s.head[e] + middle) & mask]] <= until[e]:
+            if s.slots[e, s.order[e, (s.head[e] + middle) & mask], TIME] <= until[e]:
                 low = middle + 1
             else:
                 high = middle
@@ -125,23 +129,21 @@ def hand_on(s, until, remove, out):
             need is padding.
     """
     t, kind, i, j, antenna_i, antenna_j, values, has_power, valid = out
+    slots = s.slots
     mask = s.order.shape[1] - 1
     for e in range(t.shape[0]):
         n = 0
         while n < s.n_waiting[e]:
             slot = s.order[e, (s.head[e] + n) & mask]
-            if s.t[e, slot] > until[e]:
+            if slots[e, slot, TIME] > until[e]:
                 break
-            t[e, n], kind[e, n], i[e, n], j[e, n] = (
-                s.t[e, slot],
-                s.kind[e, slot],
-                s.i[e, slot],
-                s.j[e, slot],
-            )
-            antenna_i[e, n], antenna_j[e, n] = s.antenna_i[e, slot], s.antenna_j[e, slot]
-            for v in range(s.values.shape[2]):
-                values[e, n, v] = s.values[e, slot, v]
-            has_power[e, n], valid[e, n] = s.has_power[e, slot], True
+            t[e, n], kind[e, n] = slots[e, slot, TIME], int(slots[e, slot, KIND])
+            i[e, n], j[e, n] = int(slots[e, slot, NODE_I]), int(slots[e, slot, NODE_J])
+            antenna_i[e, n] = int(slots[e, slot, ANTENNA_I])
+            antenna_j[e, n] = int(slots[e, slot, ANTENNA_J])
+            for v in range(N_VALUES):
+                values[e, n, v] = slots[e, slot, VALUES + v]
+            has_power[e, n], valid[e, n] = slots[e, slot, HAS_POWER] > 0.0, True
             n += 1
         for k in range(n, t.shape[1]):
             valid[e, k] = False
@@ -167,6 +169,6 @@ def sum_turns(s, kind, dt, out):
             out[e, n] = 0.0
         for k in range(s.n_waiting[e]):
             slot = s.order[e, (s.head[e] + k) & mask]
-            if s.kind[e, slot] == kind:
-                i = s.i[e, slot]
-                out[e, i] += s.values[e, slot, 2] * dt[i]
+            if s.slots[e, slot, KIND] == kind:
+                i = int(s.slots[e, slot, NODE_I])
+                out[e, i] += s.slots[e, slot, VALUES + 2] * dt[i]

@@ -10,6 +10,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from functools import cache, partial
+from operator import is_
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -21,9 +22,16 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 def kernel(function: Function) -> Function:
     """Compile a function with numba, without the interpreter, and keep the result on disk.
 
-    It holds no lock of the interpreter, so several threads can run kernels at a time.
+    It holds no lock of the interpreter, so several threads can run kernels at a time. It makes no
+    arrays and calls nothing that returns one: so nobody counts who holds which, which costs
+    atomic operations wherever an array is named.
     """
-    return _compile(function, inline=False)
+    return _compile(function)
+
+
+def allocating_kernel(function: Function) -> Function:
+    """A kernel that makes arrays of its own: what runs now and then, not for every measurement."""
+    return _compile(function, nrt=True)
 
 
 def small_kernel(function: Function) -> Function:
@@ -48,10 +56,31 @@ def bind(kernel: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
     return partial(entry, *arguments)
 
 
-def _compile(function: Function, *, inline: bool) -> Function:
-    compiled = njit(
-        cache=True, nogil=True, error_model="numpy", forceinline=inline, _nrt=not inline
-    )(function)
+def repeated(kernel: Function) -> Function:
+    """A kernel that is called with the very same arguments most of the time, as `bind` is for.
+
+    It finds out types anew only when an argument is another object than at the last call.
+    """
+    if config.DISABLE_JIT:
+        return kernel
+    compiled: Any = kernel
+    last: tuple[tuple[Any, ...], Callable[..., Any]] = ((), kernel)
+
+    def call(*arguments: Any) -> Any:
+        nonlocal last
+        before, entry = last  # one object, so threads cannot mix up two of them
+        if len(arguments) != len(before) or not all(map(is_, arguments, before)):
+            entry = compiled.compile(tuple(typeof(argument) for argument in arguments))
+            last = (arguments, entry)
+        return entry(*arguments)
+
+    return call  # type: ignore[return-value]
+
+
+def _compile(function: Function, *, inline: bool = False, nrt: bool = False) -> Function:
+    compiled = njit(cache=True, nogil=True, error_model="numpy", forceinline=inline, _nrt=nrt)(
+        function
+    )
     if not config.DISABLE_JIT:
         package = function.__module__.partition(".")[0]
         folder = Path(inspect.getfile(function))

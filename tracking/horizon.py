@@ -14,12 +14,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tracking._horizon_kernels import count_due, hand_on, sum_turns, take_in
-from tracking.arrays import F64, I64, Bool
+from tracking._horizon_kernels import N_COLUMNS, count_due, hand_on, sum_turns, take_in
+from tracking.arrays import F64, I64
 from tracking.compiled import bind
 from tracking.constellation import Constellation
 from tracking.errors import ConfigError
-from tracking.measurements import N_VALUES, Kind, MeasurementBlock
+from tracking.measurements import Kind, MeasurementBlock
 
 LONG_BLOCK = 4096
 """[-] Longer blocks are sorted before they are put in order, event by event."""
@@ -36,15 +36,8 @@ class HorizonParams:
 class HorizonState(NamedTuple):
     """What waits, and what was counted; the slots are as many as a power of two."""
 
-    t: F64
-    """Of the event in each slot, (env, slot) [s]; those that follow are `MeasurementBlock`'s."""
-    kind: I64
-    i: I64
-    j: I64
-    antenna_i: I64
-    antenna_j: I64
-    values: F64
-    has_power: Bool
+    slots: F64
+    """Events, in columns that `_horizon_kernels` names, (env, slot, N_COLUMNS)."""
     order: I64
     """Slots, a ring: from `head` on those that wait, in order, then the free ones, (env, slot)."""
     head: I64
@@ -71,14 +64,7 @@ def make_state(n_envs: int, n_slots: int = 64) -> HorizonState:
         return np.zeros((n_envs, *shape), dtype=np.int64)
 
     return HorizonState(
-        t=np.zeros((n_envs, n_slots)),
-        kind=ints(n_slots),
-        i=ints(n_slots),
-        j=ints(n_slots),
-        antenna_i=ints(n_slots),
-        antenna_j=ints(n_slots),
-        values=np.zeros((n_envs, n_slots, N_VALUES)),
-        has_power=np.zeros((n_envs, n_slots), dtype=bool),
+        slots=np.zeros((n_envs, n_slots, N_COLUMNS)),
         order=np.tile(np.arange(n_slots), (n_envs, 1)),
         head=ints(),
         n_waiting=ints(),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -72,7 +73,7 @@ class ContinuousActions:
         except (TypeError, ValueError) as error:
             raise EnvError(f"{where}: expected numbers, got {actions!r}") from error
         # The sum is finite unless some number is not, or is beyond all reason.
-        if not np.isfinite(actions.sum()):
+        if not math.isfinite(actions.sum()):
             bad = np.argwhere(~np.isfinite(actions))[0]
             raise EnvError(f"{where}: expected finite numbers, got {actions[tuple(bad)]}")
         clipped = np.minimum(np.maximum(actions, -1.0), 1.0)

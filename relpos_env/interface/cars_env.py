@@ -176,17 +176,16 @@ class CarsEnv(ParallelEnv, ABC):  # type: ignore[misc]
 
     def _decode(self, actions: dict[str, Any]) -> tuple[F64, F64]:
         """Commands of all cars; those of nobody are zero."""
-        n, mode = len(self.possible_agents), self._actions
+        n, mode, agents = len(self.possible_agents), self._actions, self.agents
         speed, steering = np.zeros((1, n)), np.zeros((1, n))
-        for agent in self.agents:
-            if agent not in actions:
-                raise EnvError(f"actions: none for {agent}")
         try:
-            rows = np.array([actions[agent] for agent in self.agents])
-            if rows.shape == (len(self.agents), *mode.shape):
-                cars = [self._numbers[agent] for agent in self.agents]
+            rows = np.array([actions[agent] for agent in agents])
+            if rows.shape == (len(agents), *mode.shape):
+                cars = [self._numbers[agent] for agent in agents] if len(agents) < n else slice(n)
                 speed[0, cars], steering[0, cars] = mode.decode(rows, "actions")
                 return speed, steering
+        except KeyError as error:
+            raise EnvError(f"actions: none for {error.args[0]}") from error
         except (ValueError, EnvError):
             pass
         # Something is wrong with one of them: say with which.

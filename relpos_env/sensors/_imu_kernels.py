@@ -65,21 +65,26 @@ def read_imu(p, seed, count, bias, drift, e, n, truth, speed, out, row):
     gyr_var = p.gyr_noise**2 + (share * p.gyr_vibration) ** 2
     acc_var = p.acc_noise**2 + (share * p.vibration) ** 2
     gyr_std, acc_std = math.sqrt(gyr_var), math.sqrt(acc_var)
+    gyr_steps, acc_steps = steps_per_unit(p.gyr_resolution), steps_per_unit(p.acc_resolution)
     for k in range(3):
         one, two = normal_pair(key, k)
         gyr = truth[k] + bias[e, n, k] + drift[e, n, k] + gyr_std * one
         acc = truth[3 + k] + bias[e, n, 3 + k] + drift[e, n, 3 + k] + acc_std * two
-        out[e, row, k] = quantise(gyr, p.gyr_range, p.gyr_resolution)
-        out[e, row, 3 + k] = quantise(acc, p.acc_range, p.acc_resolution)
+        out[e, row, k] = quantise(gyr, p.gyr_range, p.gyr_resolution, gyr_steps)
+        out[e, row, 3 + k] = quantise(acc, p.acc_range, p.acc_resolution, acc_steps)
 
 
 @small_kernel
-def quantise(reading, full_scale, resolution):
-    """A reading cut at +- full scale and rounded to the converter's resolution, 0 for none."""
+def steps_per_unit(resolution):
+    """How many steps of a converter make a unit; 0 for a resolution of 0, which means none."""
+    return 1.0 / resolution if resolution > 0.0 else 0.0
+
+
+@small_kernel
+def quantise(reading, full_scale, resolution, steps):
+    """A reading cut at +- full scale and rounded to the converter's resolution, if it has one."""
     cut = min(max(reading, -full_scale), full_scale)
-    if resolution == 0.0:
-        return cut
-    return math.floor(cut / resolution + 0.5) * resolution
+    return math.floor(cut * steps + 0.5) * resolution if steps > 0.0 else cut
 
 
 @small_kernel

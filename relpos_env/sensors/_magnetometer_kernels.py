@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from relpos_env.sensors._imu_kernels import STARTS, quantise
+from relpos_env.sensors._imu_kernels import STARTS, quantise, steps_per_unit
 from relpos_env.sensors.radio._random_kernels import draw_key, normal_pair, uniform
 from tracking.compiled import kernel, small_kernel
 
@@ -81,6 +81,13 @@ def read_magnetometer(p, seed, count, waves, hard_iron, e, n, at, heading, roll,
     key = draw_key(seed, np.uint64(count * 64 + n))
     one, two = normal_pair(key, 0)
     three, _ = normal_pair(key, 1)
-    out[e, row, 0] = quantise(x + hard_iron[e, n, 0] + p.noise * one, p.full_scale, p.resolution)
-    out[e, row, 1] = quantise(y + hard_iron[e, n, 1] + p.noise * two, p.full_scale, p.resolution)
-    out[e, row, 2] = quantise(z + hard_iron[e, n, 2] + p.noise * three, p.full_scale, p.resolution)
+    steps = steps_per_unit(p.resolution)
+    out[e, row, 0] = quantise(
+        x + hard_iron[e, n, 0] + p.noise * one, p.full_scale, p.resolution, steps
+    )
+    out[e, row, 1] = quantise(
+        y + hard_iron[e, n, 1] + p.noise * two, p.full_scale, p.resolution, steps
+    )
+    out[e, row, 2] = quantise(
+        z + hard_iron[e, n, 2] + p.noise * three, p.full_scale, p.resolution, steps
+    )

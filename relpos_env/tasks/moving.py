@@ -12,6 +12,9 @@ from relpos_env.tasks.base import COMMON_TERMS, Task, Truth
 from relpos_env.tasks.curves import Curve
 from relpos_env.tasks.shapes import Formation
 from tracking.arrays import F64, I64, Bool
+from tracking.compiled import repeated
+
+_update_frame = repeated(update_frame)
 
 ERROR_SCALE = 0.5
 """[m] Formation error at which the formation term is exp(-1)."""
@@ -101,7 +104,7 @@ class MovingFormation(Task):
 
     def compute(self, state: Truth, t: F64, collided: F64, start: int, stop: int) -> int:
         """One compiled call."""
-        n_changed: int = update_frame(
+        n_changed: int = _update_frame(
             start,
             stop,
             state.pos_w,

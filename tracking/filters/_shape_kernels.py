@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.compiled import kernel
+from tracking.compiled import allocating_kernel, kernel
 
 SURVEYED = 1_000_000
 """So many ranges a surveyed distance counts as."""
@@ -60,7 +60,7 @@ def choose_members(c, s, layout, members):
     return 0
 
 
-@kernel
+@allocating_kernel
 def place(d, min_spread, merge_distance, known, distance, sides):
     """Where a node is, from its distances to known ones; both candidates if a mirror fits too.
 
@@ -108,7 +108,7 @@ def place(d, min_spread, merge_distance, known, distance, sides):
     return 1 if spanned == d or height < merge_distance else 2
 
 
-@kernel
+@allocating_kernel
 def first_shape(s, layout, members, m, d):
     """Classical MDS of the first ranges: positions of the members round their centre, (m, 3)."""
     D2 = np.zeros((m, m))

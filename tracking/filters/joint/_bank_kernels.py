@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.compiled import kernel
+from tracking.compiled import allocating_kernel, kernel, small_kernel
 from tracking.filters._shape_kernels import SURVEYED
 from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_hypothesis
 from tracking.filters.joint._linear_kernels import decouple
@@ -23,7 +23,7 @@ LOST_SPEED = 0.7
 """[m/sqrt(s), m/s/sqrt(s)] How fast a lost filter forgets positions and velocities."""
 
 
-@kernel
+@allocating_kernel
 def centred(c, s, h):
     """Positions and velocities round their means in hypothesis h, (2, node, d), and how many.
 
@@ -51,7 +51,7 @@ def centred(c, s, h):
     return out, present
 
 
-@kernel
+@allocating_kernel
 def flatness(c, s, h):
     """Extent of the layout across itself over its standard deviation; large for few nodes."""
     n, d = s.nodes.shape[0], c.d
@@ -90,7 +90,7 @@ def flatness(c, s, h):
     return np.sqrt(squared / max(own - total / present, 1e-12))
 
 
-@kernel
+@allocating_kernel
 def least_axis(scatter):
     """The least eigenvalue of a symmetric 2x2 or 3x3 matrix, at least 0, and its direction."""
     if scatter.shape[0] == 3:
@@ -104,7 +104,7 @@ def least_axis(scatter):
     return max(least, 0.0), across
 
 
-@kernel
+@allocating_kernel
 def add_mirror_image(c, s):
     """Make the mirror image of the reported hypothesis one, if the bank has room.
 
@@ -170,8 +170,9 @@ def prune_bank(c, s):
                 and are_same(c, s, a, b)
             ):
                 s.alive[b] = False
-    group.n_alive = np.sum(s.alive)
+    group.n_alive = 0
     for h in range(n_hyps):
+        group.n_alive += s.alive[h]
         s.loglik[h] -= top
 
 
@@ -182,12 +183,42 @@ def are_same(c, s, a, b):
     Velocities count over one second: a layout and its mirror image may meet in a line, but
     they go on to different sides.
     """
-    one, _ = centred(c, s, a)
-    other, _ = centred(c, s, b)
+    z = c.d - 1
+    way = (mean_gap(s, a, b, 0, False), mean_gap(s, a, b, 1, False), mean_gap(s, a, b, z, False))
+    pace = (mean_gap(s, a, b, 0, True), mean_gap(s, a, b, 1, True), mean_gap(s, a, b, z, True))
     for i in range(s.nodes.shape[0]):
-        if np.sum((one[:, i] - other[:, i]) ** 2) > c.merge_distance**2:
+        node = s.nodes[i]
+        if not node.present:
+            continue
+        squared = 0.0
+        for k in range(c.d):
+            p, v = node.at_p + k, node.at_v + k
+            squared += (s.x[a, p] - s.x[b, p] - way[k]) ** 2
+            if not node.static:
+                squared += (s.x[a, v] - s.x[b, v] - pace[k]) ** 2
+        if squared > c.merge_distance**2:
             return False
     return True
+
+
+@small_kernel
+def mean_gap(s, a, b, k, of_velocities):
+    """How far apart two hypotheses put the centre of the group along axis k, or how it moves.
+
+    Beside static nodes, velocities have no common part that is free.
+    """
+    total, present, moving = 0.0, 0, 0
+    for i in range(s.nodes.shape[0]):
+        node = s.nodes[i]
+        if node.present:
+            present += 1
+            moving += not node.static
+            at = node.at_v if of_velocities else node.at_p
+            if not (of_velocities and node.static):
+                total += s.x[a, at + k] - s.x[b, at + k]
+    if of_velocities and moving != present:
+        return 0.0
+    return total / max(present, 1)
 
 
 @kernel

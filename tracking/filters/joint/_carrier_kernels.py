@@ -46,7 +46,8 @@ def apply_carriers(c, s, h, t, dt, scratch):
 def judge(c, s, h, nu, m, variance, scratch):
     """Correct with a constraint, and let it speak for or against the hypothesis."""
     S = project(s, h, c.n, m, scratch.idx, scratch.val, scratch.w) + variance
-    s.loglik[h] -= 0.5 * (min(nu * nu / S, c.max_nis) + math.log(S))
+    if s.group[0].n_alive > 1:
+        s.loglik[h] -= 0.5 * (min(nu * nu / S, c.max_nis) + math.log(S))
     if nu * nu > 25.0 * S:
         S = nu * nu / 25.0  # a jolt or a skid: it counts for less
     absorb(s, h, c.n, scratch.w, nu, S)
@@ -56,8 +57,12 @@ def judge(c, s, h, nu, m, variance, scratch):
 def hold_on_wheels(c, s, h, i, scratch):
     """The rear axle moves sideways by the slip of its tyres only; wheeled nodes do not rise."""
     node = s.nodes[i]
-    angle = node.yaw + s.x[h, node.at_h]
-    cos_y, sin_y = math.cos(angle), math.sin(angle)
+    error = s.x[h, node.at_h]
+    cos_e, sin_e = math.cos(error), math.sin(error)
+    cos_y, sin_y = (
+        node.cos_yaw * cos_e - node.sin_yaw * sin_e,
+        node.sin_yaw * cos_e + node.cos_yaw * sin_e,
+    )
     v0, v1 = s.x[h, node.at_v], s.x[h, node.at_v + 1]
     sideways, forward = -sin_y * v0 + cos_y * v1, cos_y * v0 + sin_y * v1
     # Its tyres need a slip angle for the force that a curve takes, v yaw_rate; so it drifts out.

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.compiled import kernel
+from tracking.compiled import allocating_kernel
 
 
-@kernel
+@allocating_kernel
 def copy_hypothesis(s, h):
     """A copy of a hypothesis in a free place of the bank; -1 if there is none."""
     for free in range(s.alive.shape[0]):
@@ -25,18 +25,17 @@ def copy_hypothesis(s, h):
     return -1
 
 
-@kernel
+@allocating_kernel
 def turn_hypothesis(c, s, h, M):
     """Turn or mirror the layout of a hypothesis about its centre, velocities as well.
 
     Args:
         c: Coefficients.
         s: JointState of one environment.
-        h: Hypothesis, updated.
+        h: Hypothesis, updated; nothing of it waits.
         M: Orthogonal, (d, d).
     """
     d = c.d
-    T = np.eye(c.n)
     mean, mean_v, present, moving = np.zeros(d), np.zeros(d), 0, 0
     for i in range(s.nodes.shape[0]):
         node = s.nodes[i]
@@ -52,21 +51,32 @@ def turn_hypothesis(c, s, h, M):
     for i in range(s.nodes.shape[0]):
         node = s.nodes[i]
         if node.present:
-            turn_part(s.x, T, h, node.at_p, mean, M)
+            turn_part(s, c.n, h, node.at_p, mean, M)
             if not node.static:
-                turn_part(s.x, T, h, node.at_v, mean_v, M)
+                turn_part(s, c.n, h, node.at_v, mean_v, M)
     s.moved[h, :] = 0.0
-    s.P[h] = T @ s.P[h].copy() @ T.T.copy()
 
 
-@kernel
-def turn_part(x, T, h, at, mean, M):
-    """Turn one vector of the state about a mean, and note it in the matrix of the whole."""
+@allocating_kernel
+def turn_part(s, n, h, at, mean, M):
+    """Turn one vector of the state about a mean, and its rows and columns of the covariance."""
     d = M.shape[0]
-    out = x[h, at : at + d] - mean
+    x, P, out = s.x, s.P, s.x[h, at : at + d] - mean
     for r in range(d):
-        total = mean[r]
+        x[h, at + r] = mean[r]
         for k in range(d):
-            total += M[r, k] * out[k]
-            T[at + r, at + k] = M[r, k]
-        x[h, at + r] = total
+            x[h, at + r] += M[r, k] * out[k]
+    for r in range(n):
+        for k in range(d):
+            out[k] = P[h, at + k, r]
+        for k in range(d):
+            P[h, at + k, r] = 0.0
+            for q in range(d):
+                P[h, at + k, r] += M[k, q] * out[q]
+    for r in range(n):
+        for k in range(d):
+            out[k] = P[h, r, at + k]
+        for k in range(d):
+            P[h, r, at + k] = 0.0
+            for q in range(d):
+                P[h, r, at + k] += M[k, q] * out[q]

@@ -6,7 +6,7 @@ from tracking.compiled import kernel
 from tracking.filters._clear_kernels import clear_estimate
 from tracking.filters.joint._linear_kernels import take_off
 from tracking.filters.joint._motion_kernels import predict, sum_inertial
-from tracking.filters.joint.state import JointState
+from tracking.filters.joint.state import N_PRE, JointState
 
 # Plain numbers of `Status`: kernels do not know enums.
 ABSENT, STARTING, AMBIGUOUS, OK, LOST, DOUBTFUL = 0, 1, 2, 3, 4, 5
@@ -81,16 +81,20 @@ def pair_covariance(P, node_i, node_j, a, b, d):
 def look_ahead(c, s, scratch, t):
     """The states at time t, written to the scratch."""
     h, n = s.group[0].best, s.nodes.shape[0]
-    scratch.x[0] = s.x[h]
-    scratch.P[0] = s.P[h]
+    for r in range(c.n):
+        scratch.x[0, r] = s.x[h, r]
+        for k in range(c.n):
+            scratch.P[0, r, k] = s.P[h, r, k]
     take_off(scratch.P, 0, s.waiting, h, s.n_waiting[h], c.n)
-    scratch.pre[:] = s.pre
     for i in range(n):
+        for k in range(N_PRE):
+            scratch.pre[i, k] = s.pre[i, k]
         scratch.t_pre[i] = s.nodes[i].t_pre
         if s.nodes[i].present and not s.nodes[i].static:
             sum_inertial(c, s.nodes, s.held, scratch.pre, i, t)
     if t > s.group[0].t:
-        scratch.nlos[0] = s.nlos[h]
+        for p in range(s.pairs.shape[0]):
+            scratch.nlos[0, p] = s.nlos[h, p]
         ahead = JointState(
             s.nodes,
             s.held,

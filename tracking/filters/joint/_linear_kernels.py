@@ -35,13 +35,7 @@ def project(s, h, n, m, idx, val, w):
         w: Written, (state).
     """
     P, W = s.P, s.waiting
-    first, v = idx[0], val[0]
-    for r in range(n):
-        w[r] = v * P[h, first, r]
-    for k in range(1, m):
-        row, v = idx[k], val[k]
-        for r in range(n):
-            w[r] += v * P[h, row, r]
+    sum_rows(P, h, n, m, idx, val, w)
     for q in range(s.n_waiting[h]):
         v = 0.0
         for k in range(m):
@@ -52,6 +46,31 @@ def project(s, h, n, m, idx, val, w):
     for k in range(m):
         variance += val[k] * w[idx[k]]
     return max(variance, 0.0)
+
+
+@small_kernel
+def sum_rows(P, h, n, m, idx, val, w):
+    """Write ``w = P[h] H``, several rows at a time: each number of w is stored less often."""
+    k = 1
+    if m >= 4:
+        i0, i1, i2, i3 = idx[0], idx[1], idx[2], idx[3]
+        v0, v1, v2, v3 = val[0], val[1], val[2], val[3]
+        for r in range(n):
+            w[r] = (v0 * P[h, i0, r] + v1 * P[h, i1, r]) + (v2 * P[h, i2, r] + v3 * P[h, i3, r])
+        k = 4
+    else:
+        i0, v0 = idx[0], val[0]
+        for r in range(n):
+            w[r] = v0 * P[h, i0, r]
+    while k + 1 < m:
+        i0, i1, v0, v1 = idx[k], idx[k + 1], val[k], val[k + 1]
+        for r in range(n):
+            w[r] += v0 * P[h, i0, r] + v1 * P[h, i1, r]
+        k += 2
+    if k < m:
+        i0, v0 = idx[k], val[k]
+        for r in range(n):
+            w[r] += v0 * P[h, i0, r]
 
 
 @small_kernel

@@ -19,7 +19,7 @@ import math
 import numpy as np
 
 from tracking.compiled import small_kernel
-from tracking.filters._level_kernels import level
+from tracking.filters._level_kernels import angle_between, direction, level
 
 
 @small_kernel
@@ -51,7 +51,7 @@ def sum_inertial(c, nodes, held, pre, i, t):
         pre[i, 1 + k] += dt * a
     cos_b, sin_b = (1.0, 0.0) if aided else (0.0, 0.0)
     if node.levelled and aided:
-        cos_b, sin_b = math.cos(node.yaw), math.sin(node.yaw)
+        cos_b, sin_b = node.cos_yaw, node.sin_yaw
     pre[i, 9] += dt * pre[i, 7] + half * cos_b
     pre[i, 10] += dt * pre[i, 8] + half * sin_b
     pre[i, 7] += dt * cos_b
@@ -65,7 +65,7 @@ def take_state(c, nodes, held, pre, i, t, values, e, k):
     node = nodes[i]
     sum_inertial(c, nodes, held, pre, i, t)
     w, x, y, z = values[e, k, 0], values[e, k, 1], values[e, k, 2], values[e, k, 3]
-    yaw = math.atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
+    cos_yaw, sin_yaw = direction(w, x, y, z)
     a0, a1, a2 = values[e, k, 4], values[e, k, 5], values[e, k, 6]
     dt = t - node.t_state
     fresh = not node.has_state or dt > c.unaided_after
@@ -74,15 +74,14 @@ def take_state(c, nodes, held, pre, i, t, values, e, k):
         qw, qx, qy, qz = held[i, 0], held[i, 1], held[i, 2], held[i, 3]
         cosine = abs(w * qw + x * qx + y * qy + z * qz)
         angle = 2.0 * math.sqrt(max(2.0 * (1.0 - min(cosine, 1.0)), 0.0))
-        turn = yaw - node.yaw
-        turn -= 2.0 * math.pi * math.floor(turn / (2.0 * math.pi) + 0.5)
+        turn = angle_between(node.cos_yaw, node.sin_yaw, cos_yaw, sin_yaw)
         keep = decay(dt / 0.05)
         node.yaw_rate = keep * node.yaw_rate + (1.0 - keep) * turn / dt
         keep = decay(dt / 0.1)
         node.turning = keep * node.turning + (1.0 - keep) * angle / dt
     held[i, 0], held[i, 1], held[i, 2], held[i, 3] = w, x, y, z
     if node.levelled:
-        a0, a1 = level(w, x, y, z, a0, a1, a2)
+        a0, a1 = level(w, x, y, z, a0, a1, a2, cos_yaw, sin_yaw)
     if not fresh:
         # The first sample was held; the mean of both is nearer to what happened.
         half_v, half_p = 0.5 * dt, 0.25 * dt * dt
@@ -93,7 +92,7 @@ def take_state(c, nodes, held, pre, i, t, values, e, k):
         pre[i, 5] += half_p * (a1 - held[i, 5])
         pre[i, 6] += half_p * (a2 - held[i, 6])
     held[i, 4], held[i, 5], held[i, 6] = a0, a1, a2
-    node.yaw = yaw
+    node.cos_yaw, node.sin_yaw = cos_yaw, sin_yaw
     node.t_state = t
     node.has_state = True
     watch_rest(c, node, t, dt, math.sqrt(a0 * a0 + a1 * a1 + a2 * a2), fresh)
@@ -155,8 +154,10 @@ def predict(c, s, h, step, scratch):
     for i in range(nodes.shape[0]):
         if moves(nodes[i]):
             move_rows(d, n, nodes[i], P, h, i, w)
-    move_columns(c.n_motion, n, d, nodes, P, h, w)
-    fade(P, h, n, scale)
+    for i in range(nodes.shape[0]):
+        if moves(nodes[i]):
+            move_columns(d, nodes[i], P, h, i, w)
+    fade(P, h, c.n_motion, n, scale)
     for i in range(nodes.shape[0]):
         if nodes[i].present:
             add_noise(c, nodes[i], s.pre, P, h, i, scale, step)
@@ -232,30 +233,42 @@ def moves(node):
 
 
 @small_kernel
-def move_columns(n_motion, n, d, nodes, P, h, w):
-    """``F P F^T``, the rows done: ``F (F P)^T``, which only positions and velocities differ in.
+def move_columns(d, node, P, h, i, w):
+    """``F P F^T``, the rows done: the columns of position and velocity of node i.
 
-    Rows of what does not move are those of P, so their part of ``P F^T`` is that of ``F P`` across
-    the diagonal.
+    Down to the diagonal: `fade` copies what is left of it.
     """
-    end = np.uint64(n_motion)  # unsigned: no index from the end
-    for r in range(end, np.uint64(n)):
-        for k in range(end):
-            P[h, r, k] = P[h, k, r]
-    for r in range(n_motion):
-        for k in range(r):
-            P[h, r, k], P[h, k, r] = P[h, k, r], P[h, r, k]
-    for i in range(nodes.shape[0]):
-        if moves(nodes[i]):
-            move_rows(d, n_motion, nodes[i], P, h, i, w)
+    p, v, b, y = node.at_p, node.at_v, node.at_b, node.at_h
+    T, pc, ps, vc, vs = w[i, 0], w[i, 1], w[i, 2], w[i, 3], w[i, 4]
+    yp0, yp1, yv0, yv1 = w[i, 5], w[i, 6], w[i, 7], w[i, 8]
+    half = 0.5 * T * T
+    for r in range(v + d):
+        b0, b1, y0 = P[h, r, b], P[h, r, b + 1], P[h, r, y]
+        v0, v1 = P[h, r, v], P[h, r, v + 1]
+        P[h, r, p] += T * v0 - pc * b0 + ps * b1 + yp0 * y0
+        P[h, r, p + 1] += T * v1 - ps * b0 - pc * b1 + yp1 * y0
+        P[h, r, v] = v0 + (-vc * b0 + vs * b1 + yv0 * y0)
+        P[h, r, v + 1] = v1 + (-vs * b0 - vc * b1 + yv1 * y0)
+        if d == 3:
+            P[h, r, p + 2] += T * P[h, r, v + 2] - half * P[h, r, b + 2]
+            P[h, r, v + 2] -= T * P[h, r, b + 2]
 
 
 @small_kernel
-def fade(P, h, n, scale):
-    """Rows and columns of what decays."""
-    for r in range(n):
+def fade(P, h, n_motion, n, scale):
+    """What decays, right of positions and velocities and below; then left of the diagonal."""
+    for r in range(n_motion):
+        for k in range(r):
+            P[h, r, k] = P[h, k, r]
+    end = np.uint64(n)  # unsigned: no index from the end
+    for r in range(n_motion):
+        for k in range(np.uint64(n_motion), end):
+            P[h, r, k] *= scale[k]
+    for r in range(np.uint64(n_motion), end):
         s = scale[r]
-        for k in range(n):
+        for k in range(n_motion):
+            P[h, r, k] = P[h, k, r]
+        for k in range(np.uint64(n_motion), end):
             P[h, r, k] *= s * scale[k]
 
 

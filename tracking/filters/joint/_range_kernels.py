@@ -163,8 +163,10 @@ def fuse_range(c, s, h, p, dt, distance, levers, evidence, scratch):
     nu = distance - predicted
     variance = project(s, h, c.n, m, scratch.idx, scratch.val, scratch.w)
     S = variance + c.white_var
-    switched, sane, loglik = judge_sight(c, s, h, p, dt, nu, variance, evidence, scratch.w)
-    s.loglik[h] += c.evidence * max(loglik, -0.5 * (c.max_nis + math.log(S)))
+    switched, sane, likelihood = judge_sight(c, s, h, p, dt, nu, variance, evidence, scratch.w)
+    if s.group[0].n_alive > 1:
+        loglik = math.log(likelihood)
+        s.loglik[h] += c.evidence * max(loglik, -0.5 * (c.max_nis + math.log(S)))
     before, nis = nu, nu * nu / S
     if switched > 0.01 and s.pairs[p].at_e >= 0:
         change_sight(c, s, h, p, switched)
@@ -204,7 +206,7 @@ def judge_sight(c, s, h, p, dt, nu, variance, evidence, w):
         w: ``P H``.
 
     Returns:
-        Probability that the sight changed; that the range meant anything; log-likelihood.
+        Probability that the sight changed; that the range meant anything; likelihood.
     """
     at = s.pairs[p].at_e + 1
     before = s.nlos[h, p]
@@ -234,11 +236,11 @@ def judge_sight(c, s, h, p, dt, nu, variance, evidence, w):
     s.nlos[h, p] = min(max((los_nlos + nlos_nlos) / max(total, 1e-300), MIN_PROB), 1.0 - MIN_PROB)
     if total < 1e-300:
         s.nlos[h, p] = before
-        return 0.0, 0.0, math.log(wild)
+        return 0.0, 0.0, wild
     # The power says nothing about where the nodes are: it is no evidence for a hypothesis.
     norm = 1.0 + (s.nlos[h, p]) * (hidden - 1.0) if hidden > 1.0 else 1.0
     switched = (los_nlos + nlos_los) / total
-    return switched, total / (total + wild), math.log(total / norm + wild)
+    return switched, total / (total + wild), total / norm + wild
 
 
 @small_kernel

@@ -24,7 +24,7 @@ import math
 
 import numpy as np
 
-from tracking.compiled import kernel, small_kernel
+from tracking.compiled import allocating_kernel, small_kernel
 
 ENOUGH = 0.01
 """[-] The covariance follows once the positions have moved by this share of the group's extent."""
@@ -53,7 +53,7 @@ def follow_rotation(c, s, h):
         turn_covariance(c, s, h, min(1.0, MOST * math.sqrt(extent2 / moved2)))
 
 
-@kernel
+@allocating_kernel
 def turn_covariance(c, s, h, share):
     """``P <- T P T^T`` for the given share of what was moved."""
     n, axes = c.n, 3 if c.d == 3 else 1
@@ -82,7 +82,7 @@ def turn_covariance(c, s, h, share):
     s.moved[h, :] = 0.0
 
 
-@kernel
+@allocating_kernel
 def best_rotation(N):
     """``(N N^T)^-1 N``, which reads the rotation off an error, (axis, state).
 
@@ -110,7 +110,7 @@ def best_rotation(N):
     return inverse @ N
 
 
-@kernel
+@allocating_kernel
 def turned(c, s, h, N, G):
     """The positions before the move, turned about the centre, and the move, turned as well.
 

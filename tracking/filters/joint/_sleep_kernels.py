@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.compiled import kernel, small_kernel
+from tracking.compiled import allocating_kernel, small_kernel
 from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_hypothesis
 
 SETTLE = 0.5
@@ -48,7 +48,7 @@ def may_move(s, t):
     return False
 
 
-@kernel
+@allocating_kernel
 def wake_up(c, s, layout):
     """Follow all rotations and mirror images from now on.
 

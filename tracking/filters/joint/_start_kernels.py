@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.compiled import kernel
+from tracking.compiled import allocating_kernel, kernel
 from tracking.filters._shape_kernels import (
     choose_members,
     first_shape,
@@ -29,7 +29,7 @@ JOIN_SPREAD = 0.75
 it, an error of a range counts several times."""
 
 
-@kernel
+@allocating_kernel
 def try_start(c, s, layout, t):
     """Start the group with the nodes whose pairs are all ready."""
     n = s.nodes.shape[0]
@@ -76,7 +76,7 @@ def try_start(c, s, layout, t):
     group.misfit, group.fit = 1.0, 1.0
 
 
-@kernel
+@allocating_kernel
 def spread_rotation(c, s, h, members, m, Y):
     """Add the uncertainty of the rotation, and of where the centre is, to P of hypothesis h."""
     for axis in range(3 if c.d == 3 else 1):
@@ -128,7 +128,7 @@ def begin_pair(c, s, h, p):
         decouple(s.x, s.P, h, c.n, at + 1, max(c.slow_var, 1e-12))
 
 
-@kernel
+@allocating_kernel
 def try_join(c, s, layout, new, t):
     """Take a node in once it is ready with enough of the others."""
     n = s.nodes.shape[0]
@@ -162,7 +162,7 @@ def try_join(c, s, layout, new, t):
     s.nodes[new].present = True
 
 
-@kernel
+@allocating_kernel
 def add_node(c, s, layout, h, new, pos, t):
     """Put a node at a position, as uncertain as the centre of the others and its own error."""
     begin_node(c, s, h, new, t)

@@ -15,7 +15,8 @@ NODE = np.dtype(
         ("t_pre", "f8"),  # time up to which the inertial samples are summed [s]
         ("t_state", "f8"),  # time of the last STATE event [s]
         ("t_heard", "f8"),  # time of the last range it took part in [s]
-        ("yaw", "f8"),  # of the last STATE event, as measured [rad]
+        ("cos_yaw", "f8"),  # of the last STATE event, as measured
+        ("sin_yaw", "f8"),
         ("yaw_rate", "f8"),  # [rad/s]
         ("accel_mean", "f8"),  # running mean of |accel| [m/s2]
         ("accel_var", "f8"),  # running mean square of accel about its mean [m2/s4]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.compiled import kernel, small_kernel
+from tracking.compiled import allocating_kernel, kernel, small_kernel
 from tracking.filters._shape_kernels import SURVEYED
 from tracking.filters.pair._mds_kernels import add_pair, factor, move_pair, solve, weigh
 from tracking.filters.pair._start_kernels import (
@@ -54,7 +54,7 @@ def refine_group(c, s, layout, scratch):
                 move_pair(s.x, s.P, p, h, c.d, W, a, b, y, scratch.nu)
 
 
-@kernel
+@allocating_kernel
 def flatness(c, s, layout):
     """Extent of the reported layout across itself over its standard deviation."""
     h, d, n = s.group[0].best, c.d, s.nodes.shape[0]
@@ -100,7 +100,7 @@ def watch_mirror(c, s, layout):
         add_mirror_image(c, s, layout)
 
 
-@kernel
+@allocating_kernel
 def add_mirror_image(c, s, layout):
     """Make the mirror image of the reported hypothesis one, if the bank has room.
 
@@ -124,7 +124,7 @@ def add_mirror_image(c, s, layout):
         s.P[p, target] = M @ s.P[p, h].copy() @ M.T.copy()
 
 
-@kernel
+@allocating_kernel
 def prune_bank(c, s):
     """Drop hypotheses that are unlikely or the same as a better one; choose the best."""
     group = s.group[0]

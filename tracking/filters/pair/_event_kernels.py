@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracking.compiled import kernel, small_kernel
+from tracking.compiled import allocating_kernel, kernel, small_kernel
 from tracking.filters._clear_kernels import clear_estimate
-from tracking.filters._level_kernels import level
+from tracking.filters._level_kernels import direction, level
 from tracking.filters._shape_kernels import collect
 from tracking.filters.pair._bank_kernels import (
     prune_bank,
@@ -55,7 +55,7 @@ class Scratch(NamedTuple):
     """(6)"""
 
 
-@kernel
+@allocating_kernel
 def run_events(coefficients, layout, state, block, t_out, out):
     """Handle the events of every environment in order.
 
@@ -144,7 +144,7 @@ def take_state(c, s, layout, i, t, values, e, k):
         s.held[i, column] = values[e, k, column]
     if node.levelled:
         w, x, y, z = s.held[i, 0], s.held[i, 1], s.held[i, 2], s.held[i, 3]
-        a0, a1 = level(w, x, y, z, s.held[i, 4], s.held[i, 5], s.held[i, 6])
+        a0, a1 = level(w, x, y, z, s.held[i, 4], s.held[i, 5], s.held[i, 6], *direction(w, x, y, z))
         s.held[i, 4], s.held[i, 5] = a0, a1
     node.t_state = t
     node.has_state = True
@@ -203,7 +203,7 @@ def look_at_group(c, s, layout, t):
     s.group[0].t_check = t
 
 
-@kernel
+@allocating_kernel
 def write_estimate(c, s, t, e, o, out):
     """The best hypothesis at time t, without touching the state."""
     clear_estimate(e, o, out)

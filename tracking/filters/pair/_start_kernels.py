@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.compiled import kernel
+from tracking.compiled import allocating_kernel, kernel
 from tracking.filters._shape_kernels import (
     choose_members,
     first_shape,
@@ -53,7 +53,7 @@ def forget_mean(s):
     s.mean_cov[:, 1, 1] = MEAN_SPEED_VAR
 
 
-@kernel
+@allocating_kernel
 def try_start(c, s, layout, t):
     """Start the group with the nodes whose pairs are all ready."""
     members = np.empty(s.nodes.shape[0], np.int64)
@@ -101,7 +101,7 @@ def hypothesis_positions(s, layout, h, pos):
             pos[j, k] = total / n_present
 
 
-@kernel
+@allocating_kernel
 def try_join(c, s, layout, new, t):
     """Take a node in once it is ready with enough of the others."""
     n = s.nodes.shape[0]
@@ -140,7 +140,7 @@ def try_join(c, s, layout, new, t):
     forget_mean(s)
 
 
-@kernel
+@allocating_kernel
 def copy_hypothesis(s, h):
     """A copy of a hypothesis in a free place of the bank; -1 if there is none."""
     for free in range(s.alive.shape[0]):
