@@ -24,9 +24,7 @@ from relpos_env.tasks import reward_weights
 from relpos_env.timing import DECISION, DT, STAND_STILL
 from relpos_env.world_state import WorldState
 from tracking.arrays import F64, I64, Bool
-from tracking.compiled import repeated
-
-_judge, _tracking_errors = repeated(judge), repeated(tracking_errors)
+from tracking.compiled import bind
 
 MOST_ENVS = 1 << 20
 N_TRUTH = 8
@@ -191,8 +189,7 @@ class Formation:
 
         Mean over the others that a car can use; NaN where it can use none.
         """
-        view = self.loop.view
-        _tracking_errors(self.loop.swarm.body, view.pos, view.ok, self._tracking_error)
+        self._compare()
         return self._tracking_error.copy()
 
     def close(self) -> None:
@@ -203,27 +200,19 @@ class Formation:
 
     def _judge(self, envs: slice) -> None:
         """What the task, the operator and the clock say of now."""
-        swarm, config = self.loop.swarm, self.parts.config
-        self.task.update(self.state, self.t, swarm.contacts, envs)
+        self.task.update(self.state, self.t, self.loop.swarm.contacts, envs)
         self.operator.sample(self.state, self.task, envs)
-        _judge(
-            envs.start, envs.stop, self.state.present, swarm.to_come, swarm.contacts,
-            self.task.rewards, self.weights, self.task.done, self.cycles, config.max_cycles,
-            config.end_on_collision, self.rewards, self.active, self.left, self.terminated,
-            self.truncated,
-        )  # fmt: skip
+        if envs.stop - envs.start == self.n_envs:
+            self._judge_all()
+        else:
+            judge(envs.start, envs.stop, *self._verdict)
 
     def _observe(self, envs: slice) -> None:
-        """Write the observations of some environments."""
-        everything = envs.stop - envs.start == self.n_envs
-        here = self.loop.view if everything else self.loop.view.part(envs)
+        """Write the observations of some environments; those of the others stay what they are."""
         if self.parts.mode.needs_truth:
             s = self.state
-            reveal(here, s.pos_w[envs], s.vel_w[envs], s.heading[envs])
-        if everything:
-            self._write()
-        else:
-            self.parts.mode.bind(here, self._newest[envs])()
+            reveal(self.loop.view, s.pos_w, s.vel_w, s.heading)
+        self._write()
         if self.parts.config.history == 1:
             return
         observations, size = self.observations[envs], self._size
@@ -232,16 +221,25 @@ class Formation:
         observations[~self.loop.view.present[envs]] = 0.0
 
     def _share_out(self) -> None:
-        """Cut the batch into parts for the threads."""
+        """Cut the batch into parts for the threads; put together what kernels take."""
         edges = np.linspace(0, self.n_envs, self._threads + 1).astype(int)
         slices = [slice(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
         self._lanes = [(envs, self.loop.part(envs)) for envs in slices] if len(slices) > 1 else []
         self._write = self.parts.mode.bind(self.loop.view, self._newest)
+        swarm, view, config = self.loop.swarm, self.loop.view, self.parts.config
+        self._verdict = (
+            self.state.present, swarm.to_come, swarm.contacts, self.task.rewards, self.weights,
+            self.task.done, self.cycles, config.max_cycles, config.end_on_collision, self.rewards,
+            self.active, self.left, self.terminated, self.truncated,
+        )  # fmt: skip
+        self._judge_all = bind(judge, 0, self.n_envs, *self._verdict)
+        self._compare = bind(tracking_errors, swarm.body, view.pos, view.ok, self._tracking_error)
         self._pool = ThreadPoolExecutor(self._threads) if self._threads > 1 else None
 
     def __getstate__(self) -> dict[str, object]:
         """Threads and views stay behind."""
-        return {k: v for k, v in self.__dict__.items() if k not in ("_lanes", "_pool", "_write")}
+        behind = ("_lanes", "_pool", "_write", "_verdict", "_judge_all", "_compare")
+        return {k: v for k, v in self.__dict__.items() if k not in behind}
 
     def __setstate__(self, state: dict[str, object]) -> None:
         self.__dict__.update(state)

@@ -129,25 +129,25 @@ class FormationEnv(CarsEnv):
 
     def _infos(self, agents: list[str]) -> dict[str, Any]:
         """Errors, reward terms and whereabouts of cars."""
-        formation = self._formation
-        terms = formation.task.terms
-        values = formation.task.rewards[0].tolist()
-        errors = formation.task.error[0].tolist()
+        formation, loop = self._formation, self._formation.loop
+        task = formation.task
+        terms, values, errors = task.terms, task.rewards[0].tolist(), task.error[0].tolist()
         tracking = formation.tracking_error()[0].tolist()
-        tracked = formation.loop.view.ok[0].sum(axis=-1).tolist()
-        contacts = formation.loop.swarm.contacts[0].tolist()
-        present = formation.state.present[0].tolist()
+        usable = loop.view.ok[0].tolist()
+        contacts = loop.swarm.contacts[0].tolist()
+        present = loop.swarm.state.present[0].tolist()
         infos: dict[str, Any] = {}
         for agent in agents:
             k = self._numbers[agent]
+            tracked = usable[k].count(True)
             infos[agent] = info = {
                 "formation_error": errors[k],
-                "tracked": tracked[k],
+                "tracked": tracked,
                 "collisions": int(contacts[k]),
                 "present": present[k],
                 "rewards": dict(zip(terms, values[k], strict=True)),
             }
-            if tracked[k]:
+            if tracked:
                 info["tracking_error"] = tracking[k]
         return infos
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from functools import cache, partial
-from operator import is_
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -54,27 +53,6 @@ def bind(kernel: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
     compiled: Any = kernel
     entry = compiled.compile(tuple(typeof(argument) for argument in arguments))
     return partial(entry, *arguments)
-
-
-def repeated(kernel: Function) -> Function:
-    """A kernel that is called with the very same arguments most of the time, as `bind` is for.
-
-    It finds out types anew only when an argument is another object than at the last call.
-    """
-    if config.DISABLE_JIT:
-        return kernel
-    compiled: Any = kernel
-    last: tuple[tuple[Any, ...], Callable[..., Any]] = ((), kernel)
-
-    def call(*arguments: Any) -> Any:
-        nonlocal last
-        before, entry = last  # one object, so threads cannot mix up two of them
-        if len(arguments) != len(before) or not all(map(is_, arguments, before)):
-            entry = compiled.compile(tuple(typeof(argument) for argument in arguments))
-            last = (arguments, entry)
-        return entry(*arguments)
-
-    return call  # type: ignore[return-value]
 
 
 def _compile(function: Function, *, inline: bool = False, nrt: bool = False) -> Function:

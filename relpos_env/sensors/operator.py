@@ -21,9 +21,6 @@ from numpy.typing import NDArray
 from relpos_env.errors import EnvError
 from relpos_env.sensors._operator_kernels import operate
 from tracking.arrays import F64, Bool
-from tracking.compiled import repeated
-
-_operate = repeated(operate)
 
 CONTROL_STEP = 0.1
 """[s] From sample to sample."""
@@ -146,7 +143,7 @@ class Operator:
         start, stop, step = envs.indices(self._n_envs)
         if step != 1:
             raise EnvError(f"envs: expected a contiguous slice, got {envs}")
-        _operate(
+        operate(
             start,
             stop,
             state.pos_w,

@@ -74,10 +74,12 @@ class Curve:
         found: F64 = np.einsum("sap,sp->sa", self.pieces[k], powers)
         return found
 
-    def nearest(self, pos: F64) -> float:
-        """Arc of the point nearest to a position (2) [m], to a few centimetres [m]."""
+    def nearest(self, pos: F64) -> F64:
+        """Arcs of the points nearest to positions (..., 2) [m], to a few centimetres, (...) [m]."""
         s = np.arange(0.0, self.length, 0.03)
-        return float(s[np.argmin(np.linalg.norm(self.at(s) - pos, axis=1))])
+        away = self.at(s) - pos[..., None, :]
+        found: F64 = s[np.argmin((away * away).sum(axis=-1), axis=-1)]
+        return found
 
 
 def _arc(trace: F64) -> F64:

@@ -16,9 +16,6 @@ from relpos_env.tasks.moving import ERROR_SCALE, MARGIN, TOLERANCE
 from relpos_env.tasks.options import half_room, points, positive
 from relpos_env.tasks.shapes import Formation
 from tracking.arrays import F64, I64, Bool
-from tracking.compiled import repeated
-
-_update_gap = repeated(update_gap)
 
 APPROACH = 0.6
 """[m] From the wall to the waypoints before and behind the gap: straight through with a car."""
@@ -128,7 +125,7 @@ class Gap(Task):
 
     def compute(self, state: Truth, t: F64, collided: F64, start: int, stop: int) -> int:
         """One compiled call."""
-        n_changed: int = _update_gap(
+        n_changed: int = update_gap(
             start,
             stop,
             state.pos_w,

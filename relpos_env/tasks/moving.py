@@ -12,9 +12,6 @@ from relpos_env.tasks.base import COMMON_TERMS, Task, Truth
 from relpos_env.tasks.curves import Curve
 from relpos_env.tasks.shapes import Formation
 from tracking.arrays import F64, I64, Bool
-from tracking.compiled import repeated
-
-_update_frame = repeated(update_frame)
 
 ERROR_SCALE = 0.5
 """[m] Formation error at which the formation term is exp(-1)."""
@@ -93,7 +90,7 @@ class MovingFormation(Task):
         if motion.half is not None:
             anchor = np.clip(middle, -np.array(motion.half), motion.half)
         elif motion.curve.length > 0.0 and motion.curve.closed:
-            arc = motion.curve.nearest(pos[cars[0]] if self._led else middle)
+            arc = float(motion.curve.nearest(pos[cars[0]] if self._led else middle))
         heading = 0.0 if motion.turning else motion.heading
         self._frame[env] = (*anchor, arc, heading)
         self._give(env, pos, cars, 0.0)
@@ -104,7 +101,7 @@ class MovingFormation(Task):
 
     def compute(self, state: Truth, t: F64, collided: F64, start: int, stop: int) -> int:
         """One compiled call."""
-        n_changed: int = _update_frame(
+        n_changed: int = update_frame(
             start,
             stop,
             state.pos_w,

@@ -12,9 +12,6 @@ from relpos_env.tasks.base import COMMON_TERMS, Task, Truth
 from relpos_env.tasks.moving import ERROR_SCALE, MARGIN
 from relpos_env.tasks.options import half_room, not_negative, points, positive
 from tracking.arrays import F64, I64, Bool
-from tracking.compiled import repeated
-
-_update_meeting = repeated(update_meeting)
 
 ROOM_OF_CAR = 0.35
 """[m] A disc of this radius times the root of the number of cars has room for all."""
@@ -76,7 +73,7 @@ class Rendezvous(Task):
 
     def compute(self, state: Truth, t: F64, collided: F64, start: int, stop: int) -> int:
         """One compiled call."""
-        n_changed: int = _update_meeting(
+        n_changed: int = update_meeting(
             start,
             stop,
             state.pos_w,

@@ -19,9 +19,6 @@ from relpos_env.tasks.moving import ERROR_SCALE
 from relpos_env.tasks.options import half_room, not_negative, positive
 from relpos_env.tasks.shapes import MIN_SPACING
 from tracking.arrays import F64, I64, Bool
-from tracking.compiled import repeated
-
-_update_ring = repeated(update_ring)
 
 SHARE = 0.28
 """[-] Radius of the ring over the smaller side of the room."""
@@ -81,7 +78,7 @@ class Ring(Task):
 
     def compute(self, state: Truth, t: F64, collided: F64, start: int, stop: int) -> int:
         """One compiled call."""
-        n_changed: int = _update_ring(
+        n_changed: int = update_ring(
             start, stop, state.pos_w, state.vel_w, state.accel_w, state.present, t, collided,
             self._seated, self._arc, self._curve.pieces, self._motion, self.target, self.plan,
             self.goal_w, self.error, self.rewards,
@@ -89,7 +86,7 @@ class Ring(Task):
         return n_changed
 
     def _give(self, env: int, pos: F64, cars: I64, t: float) -> None:
-        arc = np.array([self._curve.nearest(p) for p in pos[cars]])
+        arc = self._curve.nearest(pos[cars])
         self._arc[env] = 0.0
         self._arc[env, cars] = assign_round(arc, self._curve.length) - self._motion[1] * t
 

@@ -42,7 +42,8 @@ def running(dimensions, vehicle="car", seed=0, static=()):
         s.held[k, :4] = rng.standard_normal(4)
         s.held[k, :4] /= np.linalg.norm(s.held[k, :4])
         s.held[k, 4:] = rng.standard_normal(3)
-        s.nodes["yaw"][k] = rng.uniform(-3.0, 3.0)
+        yaw = rng.uniform(-3.0, 3.0)
+        s.nodes["cos_yaw"][k], s.nodes["sin_yaw"][k] = np.cos(yaw), np.sin(yaw)
     s.nodes["has_state"], s.nodes["t_state"] = True, 0.0
     s.nlos[:] = 0.0
     return c[0], s, make_scratch(3, 3, n), make_layout(constellation, params)

@@ -41,6 +41,7 @@ class JointEkf:
         self._coefficients = make_coefficients(constellation, params)
         self._layout = make_layout(constellation, params)
         self._state = self._fresh(n_envs)
+        self._blank = self._fresh(1)
         self._scratch = make_scratch(
             constellation.n_nodes, constellation.n_pairs, int(self._coefficients[0]["n"])
         )
@@ -88,8 +89,8 @@ class JointEkf:
 
     def reset(self, env: int) -> None:
         """Forget everything of one environment."""
-        for array, fresh in zip(self._state, self._fresh(1), strict=True):
-            array[env] = fresh[0]
+        for array, blank in zip(self._state, self._blank, strict=True):
+            array[env] = blank[0]
 
     def part(self, envs: slice) -> JointEkf:
         """Some of the environments; shares their memory."""
