@@ -41,7 +41,8 @@ class JointEkf:
         self._coefficients = make_coefficients(constellation, params)
         self._layout = make_layout(constellation, params)
         self._state = self._fresh(n_envs)
-        self._blank = self._fresh(1)
+        # Of one hypothesis: all begin alike.
+        self._blank = make_state(constellation, params, 1, 1)
         self._scratch = make_scratch(
             constellation.n_nodes, constellation.n_pairs, int(self._coefficients[0]["n"])
         )
