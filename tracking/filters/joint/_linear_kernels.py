@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from tracking.compiled import kernel, small_kernel
+from tracking.compiled import contracted_kernel, small_kernel
 
 BLOCK = 16
 """Size of the blocks of P on whose diagonal both halves are computed."""
@@ -36,7 +36,17 @@ def project(s, h, n, m, idx, val, w):
     """
     P, W = s.P, s.waiting
     sum_rows(P, h, n, m, idx, val, w)
-    for q in range(s.n_waiting[h]):
+    n_waiting = s.n_waiting[h]
+    for q in range(0, n_waiting - n_waiting % 4, 4):
+        v0, v1, v2, v3 = 0.0, 0.0, 0.0, 0.0
+        for k in range(m):
+            v, at = val[k], idx[k]
+            v0, v1 = v0 + v * W[h, q, at], v1 + v * W[h, q + 1, at]
+            v2, v3 = v2 + v * W[h, q + 2, at], v3 + v * W[h, q + 3, at]
+        for r in range(n):
+            first = v0 * W[h, q, r] + v1 * W[h, q + 1, r]
+            w[r] -= first + (v2 * W[h, q + 2, r] + v3 * W[h, q + 3, r])
+    for q in range(n_waiting - n_waiting % 4, n_waiting):
         v = 0.0
         for k in range(m):
             v += val[k] * W[h, q, idx[k]]
@@ -127,31 +137,33 @@ def settle_all(s, n):
             settle(s, h, n)
 
 
-@kernel
+@contracted_kernel
 def take_off(P, h, W, g, m, n):
-    """``P[h] - W[g]^T W[g]`` of the first m rows of W.
+    """``P[h] - W[g]^T W[g]`` of the first m rows of W; those up to the next multiple of 4 are lost.
 
-    Two rows of P and four of W at a time: each number that is loaded serves several sums. What is
+    Four rows of P and four of W at a time: each number that is loaded serves four sums. What is
     left of the diagonal blocks is copied from what is right of them.
     """
     end = np.uint64(n)
-    for r in range(0, n, 2):
-        s = min(r + 1, n - 1)  # the last row of an odd number is its own neighbour
+    for q in range(m, -(-m // 4) * 4):
+        for k in range(n):
+            W[g, q, k] = 0.0
+    for r in range(0, n, 4):
+        # Behind the last row comes the last row again.
+        s, t, u = min(r + 1, n - 1), min(r + 2, n - 1), min(r + 3, n - 1)
         first = np.uint64(r - r % BLOCK)
-        for q in range(0, m - m % 4, 4):
+        for q in range(0, m, 4):
             a0, a1, a2, a3 = W[g, q, r], W[g, q + 1, r], W[g, q + 2, r], W[g, q + 3, r]
             b0, b1, b2, b3 = W[g, q, s], W[g, q + 1, s], W[g, q + 2, s], W[g, q + 3, s]
+            c0, c1, c2, c3 = W[g, q, t], W[g, q + 1, t], W[g, q + 2, t], W[g, q + 3, t]
+            d0, d1, d2, d3 = W[g, q, u], W[g, q + 1, u], W[g, q + 2, u], W[g, q + 3, u]
             for k in range(first, end):
                 w0, w1, w2, w3 = W[g, q, k], W[g, q + 1, k], W[g, q + 2, k], W[g, q + 3, k]
-                row = P[h, r, k] - ((a0 * w0 + a1 * w1) + (a2 * w2 + a3 * w3))
-                P[h, s, k] -= (b0 * w0 + b1 * w1) + (b2 * w2 + b3 * w3)
-                P[h, r, k] = row
-        for q in range(m - m % 4, m):
-            a0, b0 = W[g, q, r], W[g, q, s]
-            for k in range(first, end):
-                row = P[h, r, k] - a0 * W[g, q, k]
-                P[h, s, k] -= b0 * W[g, q, k]
-                P[h, r, k] = row
+                p_r = P[h, r, k] - ((a0 * w0 + a1 * w1) + (a2 * w2 + a3 * w3))
+                p_s = P[h, s, k] - ((b0 * w0 + b1 * w1) + (b2 * w2 + b3 * w3))
+                p_t = P[h, t, k] - ((c0 * w0 + c1 * w1) + (c2 * w2 + c3 * w3))
+                p_u = P[h, u, k] - ((d0 * w0 + d1 * w1) + (d2 * w2 + d3 * w3))
+                P[h, r, k], P[h, s, k], P[h, t, k], P[h, u, k] = p_r, p_s, p_t, p_u
     for row in range(BLOCK, n, BLOCK):
         for column in range(0, row, BLOCK):
             for r in range(row, min(row + BLOCK, n)):
