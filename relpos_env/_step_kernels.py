@@ -20,11 +20,10 @@ from relpos_env._vehicle_kernels import (
 from relpos_env.sensors._imu_kernels import felt_on_car, read_imu
 from relpos_env.sensors._magnetometer_kernels import read_magnetometer
 from relpos_env.sensors.radio._radio_kernels import run_env_window
+from relpos_env.timing import SOON
 from tracking.compiled import kernel, small_kernel
 
 MAG, IMU, RANGE = 1, 2, 5
-SOON = 1e-9
-"""[s] Events are due that much earlier, for the roundings of times."""
 CALM = 5
 """[-] Steps that the solver keeps a room in which nothing touches any more: it remembers contacts
 for three."""

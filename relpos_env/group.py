@@ -7,13 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from relpos_env._step_kernels import SOON
 from relpos_env.bodies import Bodies, box_row
 from relpos_env.room import Room
 from relpos_env.scenarios.life import LifeEvent
 from relpos_env.scenarios.obstacle import Obstacle
 from relpos_env.sensors.radio.radio import Radio
-from relpos_env.timing import DT
+from relpos_env.timing import DT, SOON
 from relpos_env.vehicle import CarParams
 from tracking.arrays import F64, Bool
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from relpos_env._step_kernels import SOON, begin_decision, run_steps
+from relpos_env._step_kernels import begin_decision, run_steps
 from relpos_env._vehicle_kernels import STEERING
 from relpos_env.bodies import Bodies, make_bodies, place_bodies
 from relpos_env.group import Group
@@ -24,7 +24,7 @@ from relpos_env.sensors.batch import Events, Sensors, make_events, make_sensors,
 from relpos_env.sensors.radio._radio_kernels import Scene
 from relpos_env.sensors.radio.radio import Radio
 from relpos_env.sight import pairs_in_sight
-from relpos_env.timing import DT
+from relpos_env.timing import DT, SOON
 from relpos_env.world_state import WorldState
 from tracking.arrays import F64, Bool
 from tracking.compiled import bind

@@ -13,12 +13,11 @@ import numpy as np
 from gymnasium.utils import seeding
 
 from relpos_env.config import Parts
-from relpos_env.group import SOON
 from relpos_env.recording import Recording
 from relpos_env.scenarios.episode import Episode, draw_episode
 from relpos_env.sensors.operator import Operator
 from relpos_env.swarm import Swarm
-from relpos_env.timing import DECISION, DT, STAND_STILL
+from relpos_env.timing import DECISION, DT, SOON, STAND_STILL
 from tracking.arrays import F64, Bool
 from tracking.measurements import MeasurementBlock
 

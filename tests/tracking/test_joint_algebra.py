@@ -1,0 +1,106 @@
+"""Kernels of the joint filter against plain twins in numpy."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tracking import Constellation, NodeConfig
+from tracking.filters._level_kernels import angle_between, direction
+from tracking.filters.joint._bank_kernels import are_same
+from tracking.filters.joint._copy_kernels import turn_hypothesis
+from tracking.filters.joint._linear_kernels import take_off
+from tracking.filters.joint.coefficients import make_coefficients
+from tracking.filters.joint.params import JointParams
+from tracking.filters.joint.records import as_records
+from tracking.filters.joint.state import JointState, make_state
+from tracking.geometry import quat_from_yaw
+
+angles = st.floats(-3.1, 3.1)
+
+
+def bank(dimensions, kinds=("moving", "moving", "moving"), n_hyps=2, seed=0):
+    """One environment with hypotheses of random states and covariances."""
+    nodes = tuple(NodeConfig(id=k, kind=kind) for k, kind in enumerate(kinds))
+    constellation = Constellation(nodes=nodes, dimensions=dimensions)
+    c = as_records(make_coefficients(constellation, JointParams()))[0]
+    batch = make_state(constellation, JointParams(), 1, n_hyps)
+    s = JointState._make(as_records(a[0]) if a.dtype.names else a[0] for a in batch)
+    rng = np.random.default_rng(seed)
+    s.nodes["present"], s.alive[:] = True, True
+    s.x[:] = rng.uniform(-2.0, 2.0, s.x.shape)
+    A = rng.standard_normal(s.P.shape)
+    s.P[:] = A @ np.swapaxes(A, -1, -2)
+    return c, s
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+@pytest.mark.parametrize("kinds", [("moving",) * 3, ("moving", "static", "moving")])
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_a_turned_hypothesis_is_turned_as_a_whole(dimensions, kinds, mirrored):
+    c, s = bank(dimensions, kinds, seed=1)
+    d = dimensions
+    M, _ = np.linalg.qr(np.random.default_rng(2).standard_normal((d, d)))
+    M[0] *= np.sign(np.linalg.det(M)) * (-1.0 if mirrored else 1.0)
+    x, P = s.x[1].copy(), s.P[1].copy()
+    T = np.eye(len(x))
+    vectors = [(s.nodes["at_p"], np.ones(3, dtype=bool)), (s.nodes["at_v"], ~s.nodes["static"])]
+    for at, there in vectors:
+        rows = [slice(a, a + d) for a in at[there]]
+        mean = np.mean([x[row] for row in rows], axis=0)
+        if not there.all():
+            mean = np.zeros(d)  # velocities beside static nodes
+        for row in rows:
+            x[row] = mean + M @ (x[row] - mean)
+            T[row, row] = M
+    turn_hypothesis(c, s, 1, np.ascontiguousarray(M))
+    np.testing.assert_allclose(s.x[1], x, atol=1e-12)
+    np.testing.assert_allclose(s.P[1], T @ P @ T.T, atol=1e-11)
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+@pytest.mark.parametrize("kinds", [("moving",) * 3, ("moving", "static", "moving")])
+def test_hypotheses_are_the_same_where_they_agree_about_the_centre(dimensions, kinds):
+    c, s = bank(dimensions, kinds, seed=3)
+    moving = ~s.nodes["static"]
+    s.x[1] = s.x[0]
+    for k in range(dimensions):  # all of the group elsewhere, and faster if it is free
+        s.x[1, s.nodes["at_p"] + k] += 5.0
+        s.x[1, s.nodes["at_v"][moving] + k] += 3.0 * moving.all()
+    assert are_same(c, s, 0, 1)
+    limit = c["merge_distance"]
+    at = s.nodes["at_v"][0]
+    # One of n moves: it is off by (n - 1) / n of that from the mean, or by all beside static ones.
+    share = 2.0 / 3.0 if moving.all() else 1.0
+    s.x[1, at] += 0.95 * limit / share
+    assert are_same(c, s, 0, 1)
+    s.x[1, at] += 0.1 * limit / share
+    assert not are_same(c, s, 0, 1)
+
+
+@pytest.mark.parametrize("n", [4, 16, 27, 30, 88, 89])
+@pytest.mark.parametrize("m", [1, 3, 4, 15, 16])
+def test_what_is_taken_off_is_the_product(n, m):
+    rng = np.random.default_rng(n + m)
+    A = rng.standard_normal((n, n))
+    P, W = np.stack([A @ A.T, A @ A.T]), rng.standard_normal((2, 16, n))
+    expected = P[1] - W[0, :m].T @ W[0, :m]
+    before = P[0].copy()
+    take_off(P, 1, W, 0, m, n)
+    np.testing.assert_allclose(P[1], expected, atol=1e-11)
+    np.testing.assert_array_equal(P[0], before)
+    if n > 16:  # beyond the blocks on the diagonal, equal to the last bit
+        np.testing.assert_array_equal(P[1, 16:, :16], P[1, :16, 16:].T)
+
+
+@given(angles)
+def test_the_direction_of_a_quaternion_is_its_yaw(yaw):
+    q = quat_from_yaw(np.array(yaw))
+    assert direction(*q) == pytest.approx((np.cos(yaw), np.sin(yaw)), abs=1e-12)
+
+
+@given(angles, st.one_of(angles, st.floats(-0.06, 0.06)))
+def test_the_angle_between_directions(a, turn):
+    b = a + turn
+    found = angle_between(np.cos(a), np.sin(a), np.cos(b), np.sin(b))
+    assert found == pytest.approx(turn, abs=1e-11)
