@@ -11,6 +11,7 @@ from tracking.filters.joint import (
     _linear_kernels,
     _motion_kernels,
     _rotation_kernels,
+    _sample_kernels,
 )
 from tracking.filters.joint._range_kernels import range_model
 from tracking.filters.joint.coefficients import make_coefficients
@@ -55,8 +56,8 @@ def carry(c, s, scratch, x, P, t=0.05):  # noqa: N803
     s.pre[:], s.nodes["t_pre"] = 0.0, 0.0
     for k in range(3):
         if not s.nodes["static"][k]:
-            _motion_kernels.sum_inertial(c, s.nodes, s.held, s.pre, k, 0.5 * t)
-            _motion_kernels.sum_inertial(c, s.nodes, s.held, s.pre, k, t)
+            _sample_kernels.sum_inertial(c, s.nodes, s.held, s.pre, k, 0.5 * t)
+            _sample_kernels.sum_inertial(c, s.nodes, s.held, s.pre, k, t)
     _motion_kernels.predict(c, s, 0, t, scratch)
     return s.x[0].copy(), s.P[0].copy()
 

@@ -96,20 +96,20 @@ def _batch(effort: Effort, name: str, drive: str) -> list[Row]:
 
 
 def _threads(effort: Effort) -> list[Row]:
-    """Two threads beside one."""
+    """Two threads beside one, and beside pymunk, which has one."""
     rows = []
     for n_envs in effort.two_cores:
         one, two = (Batch(n_envs, followed, resets=effort.resets, threads=k) for k in (1, 2))
+        theirs = Rooms(n_envs, resets=effort.resets, name=SCENARIO)
         for batch in (one, two):
             batch.warm_up(effort.warm_up)
-        peer_cost, cost = best_of_turns([one.turn, two.turn], effort.turns)
+        alone, cost, bare = best_of_turns([one.turn, two.turn, theirs.turn], effort.turns)
         one.close()
         two.close()
-        rows.append(
-            _row(
-                "two threads", cost, envs=n_envs, threads=2, peer="one thread", peer_cost=peer_cost
+        for peer, peer_cost in (("one thread", alone), (pymunk_name(), bare)):
+            rows.append(
+                _row("two threads", cost, envs=n_envs, threads=2, peer=peer, peer_cost=peer_cost)
             )
-        )
     return rows
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from tracking.compiled import kernel
 from tracking.filters._clear_kernels import clear_estimate
 from tracking.filters.joint._linear_kernels import take_off
-from tracking.filters.joint._motion_kernels import predict, sum_inertial
+from tracking.filters.joint._motion_kernels import predict
+from tracking.filters.joint._sample_kernels import sum_inertial
 from tracking.filters.joint.state import N_PRE, JointState
 
 # Plain numbers of `Status`: kernels do not know enums.

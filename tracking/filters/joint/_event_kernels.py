@@ -16,7 +16,7 @@ from tracking.filters.joint._cut_off_kernels import doubt_acceleration
 from tracking.filters.joint._doubt_kernels import note_fit, watch_nodes
 from tracking.filters.joint._estimate_kernels import write_estimate
 from tracking.filters.joint._linear_kernels import settle, settle_all
-from tracking.filters.joint._motion_kernels import predict, sum_inertial, take_state
+from tracking.filters.joint._motion_kernels import predict
 from tracking.filters.joint._range_kernels import (
     antenna_offset,
     fuse_range,
@@ -24,6 +24,7 @@ from tracking.filters.joint._range_kernels import (
     gap_evidence,
 )
 from tracking.filters.joint._rotation_kernels import follow_rotation
+from tracking.filters.joint._sample_kernels import sum_inertial, take_state
 from tracking.filters.joint._sleep_kernels import may_move, none_moved, wake_up
 from tracking.filters.joint._start_kernels import try_join, try_start
 from tracking.filters.joint._stuck_kernels import is_stuck

@@ -16,7 +16,7 @@ import math
 
 from tracking.compiled import small_kernel
 from tracking.filters.joint._linear_kernels import absorb, covariance, project
-from tracking.filters.joint._motion_kernels import decay
+from tracking.filters.joint._sample_kernels import decay
 
 MIN_DISTANCE = 0.01
 """[m] Closer than this a direction has no meaning."""
