@@ -145,7 +145,7 @@ def holding(x, P, room):  # noqa: N803
     n=st.integers(2, 40),
     m=st.integers(1, 6),
     corrections=st.integers(1, 12),
-    room=st.sampled_from([0, 1, 3, 5, 16]),
+    room=st.sampled_from([0, 4, 8, 16]),
 )
 def test_corrections_are_the_textbook_ones(seed, n, m, corrections, room):
     """Also while they wait: whatever is asked of the covariance knows of them."""

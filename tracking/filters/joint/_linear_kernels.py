@@ -139,7 +139,9 @@ def settle_all(s, n):
 
 @contracted_kernel
 def take_off(P, h, W, g, m, n):
-    """``P[h] - W[g]^T W[g]`` of the first m rows of W; those up to the next multiple of 4 are lost.
+    """``P[h] - W[g]^T W[g]`` of the first m rows of W, which has a multiple of 4.
+
+    Those between m and the next such multiple are lost.
 
     Four rows of P and four of W at a time: each number that is loaded serves four sums. What is
     left of the diagonal blocks is copied from what is right of them.

@@ -85,7 +85,10 @@ def make_layout(constellation: Constellation, params: JointParams) -> Layout:
 
 
 def room_to_wait(n_states: int) -> int:
-    """How many corrections may wait: none where the covariance fits the nearest cache."""
+    """How many corrections may wait: none where the covariance fits the nearest cache.
+
+    A multiple of 4, as they are taken off.
+    """
     return 16 if n_states > 48 else 0
 
 
