@@ -2,6 +2,7 @@
 
 import os
 import threading
+import tty
 from dataclasses import dataclass, field
 
 from hardware_bridge.counts import Counts
@@ -67,6 +68,7 @@ class Talker:
 
     def __init__(self, said=None, every=0.01):
         self.master, self.slave = os.openpty()
+        tty.setraw(self.slave)  # or the terminal echoes what is said before anybody listens
         os.set_blocking(self.master, False)
         self.path = os.ttyname(self.slave)
         self._end = threading.Event()
