@@ -155,6 +155,7 @@ def doctor(
     specs = [link.port for link in config.links] + [car.port for car in config.cars]
     hearings = {link.port.name: Hearing(formats, link.key) for link in config.links}
     hearings |= {car.port.name: Hearing(formats) for car in config.cars}
+    Hearing.get_ready(formats)
     with Links(specs, now_ns, wait_for_ports=True) as links:
         listened = listen(links, hearings, seconds, now_ns)
         reasons = {spec.name: links.reason(spec.name) for spec in specs}
