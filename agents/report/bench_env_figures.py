@@ -10,6 +10,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 ENV_PICTURE = "env_cost.png"
+LONG = 5.0
+"""[-] Times that differ by more are drawn on a logarithmic scale."""
 
 
 def env_figure(rows: Sequence[dict[str, Any]]) -> Figure:
@@ -34,12 +36,16 @@ def env_figure(rows: Sequence[dict[str, Any]]) -> Figure:
 def _curve(axes: Axes, rows: Sequence[dict[str, Any]], key: str, label: str) -> None:
     from matplotlib.ticker import FuncFormatter, LogLocator
 
-    x = [r[key] for r in rows]
-    axes.plot(x, [r["us_per_env_step"] for r in rows], "o-", color="tab:blue")
-    axes.set(xscale="log", yscale="log", xlabel=label, ylabel="us per env-step, one core")
+    x, y = [r[key] for r in rows], [r["us_per_env_step"] for r in rows]
+    axes.plot(x, y, "o-", color="tab:blue")
+    axes.set(xscale="log", xlabel=label, ylabel="us per env-step, one core")
     axes.set_xticks(x, [str(n) for n in x], fontsize=7)
-    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
+    if max(y) > LONG * min(y):
+        axes.set_yscale("log")
+        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
+    else:
+        axes.set_ylim(0.0, 1.1 * max(y))
     axes.minorticks_off()
     axes.grid(alpha=0.3)
 
