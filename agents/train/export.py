@@ -110,5 +110,14 @@ def to_onnx(actor: Actor, size: int) -> bytes:
             external_data=False,
         )
     assert program is not None
-    data: bytes = program.model_proto.SerializeToString()
+    model = program.model_proto
+    graph = model.graph
+    # The exporter notes of everything where in whose folders it was written.
+    for part in (
+        model, graph, *graph.node, *graph.input, *graph.output, *graph.value_info,
+        *graph.initializer,
+    ):  # fmt: skip
+        part.ClearField("metadata_props")
+        part.ClearField("doc_string")
+    data: bytes = model.SerializeToString()
     return data

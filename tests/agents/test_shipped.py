@@ -8,6 +8,7 @@ from agents.compare.episode import run_episodes
 from agents.compare.meter import IN_FORMATION
 from agents.compare.setting import Setting
 from agents.policy import load_policy, shipped_names
+from agents.policy.find import find_policy
 from agents.settings import from_json
 from agents.train.config import TrainConfig
 
@@ -34,6 +35,12 @@ def test_cards_tell_how_a_policy_was_made_and_what_it_reached(name):
     assert card.training["frames"] <= config.frames * 1.2
     assert all({"scenario", "formation_error", "ci95"} <= set(r) for r in card.results)
     assert card.results
+
+
+@pytest.mark.parametrize("name", shipped_names())
+def test_networks_do_not_tell_where_they_were_written(name):
+    network, _ = find_policy(name)
+    assert b".py" not in network.read_bytes()
 
 
 @pytest.mark.parametrize("name", shipped_names())

@@ -187,6 +187,10 @@ def test_rooms_of_several_scenarios_share_the_seats():
     assert np.array_equal(again.step_wait()[0], seen)
 
 
+def test_an_exported_network_does_not_tell_where_it_was_written(policy):
+    assert b".py" not in policy.read_bytes()
+
+
 def test_the_exported_policy_does_what_the_trained_one_does(run, policy):
     loaded = load_policy(policy)
     actor = make_policy(run.config)
