@@ -41,7 +41,7 @@ def small_kernel(function: Function) -> Function:
 def contracted_kernel(function: Function) -> Function:
     """A kernel whose products are added without being rounded before, where the machine can.
 
-    That is twice as fast where sums of products are all there is, and off by a rounding.
+    That is faster where sums of products are all there is, and off by a rounding.
     """
     return _compile(function, contract=True)
 
