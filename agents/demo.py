@@ -24,8 +24,8 @@ from tracking.filters import FILTERS
 
 TOLD = ("estimate", "truth", "nothing")
 """What the cars are told in the drives of a demonstration."""
-CONTROLLER = "consensus"
-"""Drives the cars if nothing else is said."""
+CONTROLLER, TASK = "consensus", "ring"
+"""Who drives the cars, and what they do, if nothing else is said."""
 SETTLE = 10.0
 """[s] Errors are averaged from here on."""
 
@@ -86,7 +86,7 @@ class DemoResult:
 def demo(
     *,
     scenario: str | Path | None = None,
-    task: str = "ring",
+    task: str | None = None,
     seconds: float = 60.0,
     seed: int = 0,
     cars: int | None = None,
@@ -98,9 +98,9 @@ def demo(
     """Drive a formation on estimates and, for comparison, on the truth and on nothing.
 
     Args:
-        scenario: One of `relpos_env.scenarios.SCENARIOS` or a TOML file; by default that of
-            the task.
-        task: One of `relpos_env.tasks.TASKS`.
+        scenario: One of `relpos_env.scenarios.SCENARIOS` or a TOML file; by default one that the
+            policy was trained in, or that of the task.
+        task: One of `relpos_env.tasks.TASKS`; by default that of the policy, or `TASK`.
         seconds: Length, less where the task is done before.
         seed: Same seed, same run.
         cars: Number of cars; by default that of the scenario.
@@ -120,6 +120,10 @@ def demo(
         raise UsageError("policy: expected either a policy or a controller, got both")
     trained = None if policy is None else load_policy(policy)
     controller = controller or CONTROLLER
+    trained_task, trained_scenario = _trained_for(trained)
+    task = task or trained_task or TASK
+    if scenario is None and task == trained_task:
+        scenario = trained_scenario
     drives: dict[str, Drive] = {}
     modes, history = _modes(trained), 1 if trained is None else trained.layout.history
     if trained is not None:
@@ -172,6 +176,16 @@ def demo(
         tracks=tuple(track_log(log, filter=name) for name in FILTERS),
         frames=ours.frames,
     )
+
+
+def _trained_for(policy: TrainedPolicy | None) -> tuple[str | None, str | None]:
+    """Task and first scenario that a policy was trained for, where its card tells."""
+    training: Any = {} if policy is None else policy.card.training
+    try:
+        env = training["config"]["env"]
+        return str(env["task"]), str(env["scenarios"][0])
+    except (KeyError, IndexError, TypeError):
+        return None, None
 
 
 def _modes(policy: TrainedPolicy | None) -> dict[str, str]:

@@ -16,13 +16,11 @@ from agents.errors import UsageError
 @click.option(
     "--scenario",
     help="cars-los, cars-nlos, gap, hall, open, random, ring-los, ring-nlos, swarm-nlos, "
-    "warehouse, or a file *.toml; by default that of the task.",
+    "warehouse, or a file *.toml; by default that of the policy or of the task.",
 )
 @click.option(
     "--task",
-    default="ring",
-    show_default=True,
-    help="ring, hold, travel, gap, rendezvous or follow.",
+    help="ring, hold, travel, gap, rendezvous or follow; by default that of the policy, or ring.",
 )
 @click.option("--seconds", default=60.0, show_default=True, help="Length, 15 to 3600.")
 @click.option("--seed", default=0, show_default=True, help="Same seed, same run.")
@@ -66,7 +64,7 @@ def demo(
         raise UsageError(f"--proximity: expected 0 to 32, got {names['proximity']}")
     if names["policy"] is not None and names["controller"] is not None:
         raise UsageError("--policy: expected either a policy or a --controller, got both")
-    with progress_bar(f"{names['task']}, seed {seed}") as report:
+    with progress_bar(f"{names['task'] or names['policy'] or 'ring'}, seed {seed}") as report:
         result = run(seconds=seconds, seed=seed, cars=cars, progress=report, **names)
     write_results(out, {"report.html": demo_report(result)})
     if as_json:

@@ -83,6 +83,14 @@ def test_a_policy_drives_the_demonstration(tmp_path, layout, has_truth):
     assert result.summary[-1]["driver"] == "small"
 
 
+def test_a_policy_does_what_it_was_trained_for(tmp_path):
+    shown = demo(policy="hold", seconds=0.5)
+    assert (shown.task, shown.scenario) == ("hold", "cars-nlos")
+    assert demo(policy="hold", task="ring", seconds=0.5).scenario == demo(seconds=0.5).scenario
+    untold = small(tmp_path, LAYOUT)  # its card does not say
+    assert demo(policy=untold, scenario="cars-nlos", seconds=0.5).task == "ring"
+
+
 def test_beams_of_a_demonstration_are_those_of_the_policy(tmp_path):
     small(tmp_path, Layout("estimate", 3, 1, 4), name="small")
     policy = tmp_path / "small.onnx"
