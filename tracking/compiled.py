@@ -22,14 +22,18 @@ def kernel(function: Function) -> Function:
     """Compile a function with numba, without the interpreter, and keep the result on disk.
 
     It holds no lock of the interpreter, so several threads can run kernels at a time. It makes no
-    arrays and calls nothing that returns one: so nobody counts who holds which, which costs
-    atomic operations wherever an array is named.
+    arrays, only views of those it is given: so nobody counts who holds which, which costs atomic
+    operations wherever an array is named.
     """
     return _compile(function)
 
 
 def allocating_kernel(function: Function) -> Function:
-    """A kernel that makes arrays of its own: what runs now and then, not for every measurement."""
+    """A kernel that makes arrays of its own: what runs now and then, not for every measurement.
+
+    It counts who holds them. So it must not take an array that a plain kernel returns, which
+    nobody has counted.
+    """
     return _compile(function, nrt=True)
 
 

@@ -70,6 +70,18 @@ def talkers():
         each.close()
 
 
+def test_formats_are_ready_before_anybody_listens():
+    fed = []
+
+    def build(_):
+        return SimpleNamespace(feed=lambda data: fed.append(data) or [], waiting=0)
+
+    formats = {"alpha": SimpleNamespace(build=build, baud=1, keyed=False)}
+    Hearing.get_ready(formats)
+    assert len(fed) == 1
+    assert fed[0]
+
+
 def test_a_good_link():
     report = diagnose(GOOD)
     assert report.ok

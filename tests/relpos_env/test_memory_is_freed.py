@@ -4,13 +4,15 @@ import gc
 import weakref
 
 import numpy as np
+import pytest
 
 from relpos_env.config import configure
 from relpos_env.formation import Formation
 
 
-def test_an_environment_that_is_gone_leaves_nothing_behind():
-    parts = configure({"scenario": "ring-los", "task": "ring", "n_cars": 3})
+@pytest.mark.parametrize("name", ["joint", "ekf-mds"])
+def test_an_environment_that_is_gone_leaves_nothing_behind(name):
+    parts = configure({"scenario": "ring-los", "task": "ring", "n_cars": 3, "filter": name})
     formation = Formation(parts, n_envs=2, threads=2)
     for env in range(2):
         formation.seed(env, np.random.default_rng(env))
