@@ -1,13 +1,14 @@
 """One decision of every environment: cars drive, sensors read, radios talk, step by step.
 
-An environment runs through its steps by itself until something is about to touch; it then
-waits for the rigid-body solver to make that one move, and goes on.
+Steps in which something touches, or nearly, are the rigid-body solver's. It needs a space for
+that, so an environment in which something comes near waits for one, and goes on.
 """
 
 from __future__ import annotations
 
 import math
 
+from relpos_env._contact_kernels import solve
 from relpos_env._nearness_kernels import touches_soon
 from relpos_env._vehicle_kernels import (
     PITCH,
@@ -60,12 +61,13 @@ def begin_decision(bodies, events, t, next_life, speed, steering):
 
 @kernel
 def run_steps(
-    bodies, sensors, radio, scenes, n_steps, dt, events, speed, steering, t, waiting
+    bodies, solver, sensors, radio, scenes, n_steps, dt, events, speed, steering, t, waiting
 ):  # fmt: skip
     """Go on with the decision of every environment until it is over or must wait.
 
     Args:
         bodies: Bodies, updated.
+        solver: Solver, updated.
         sensors: Sensors, updated.
         radio: SessionNumbers, RadioNumbers, Air and RangeBuffer; updated.
         scenes: Scene of all environments.
@@ -75,7 +77,7 @@ def run_steps(
         speed: Commands, (env, car) [m/s].
         steering: Commands, (env, car) [rad].
         t: Time since each environment began, (env) [s], written.
-        waiting: Numbers of the environments that wait for the solver, written.
+        waiting: Numbers of the environments that wait for a space, written.
 
     Returns:
         How many wait.
@@ -83,21 +85,25 @@ def run_steps(
     n_waiting = 0
     for e in range(bodies.done.shape[0]):
         while bodies.done[e] < n_steps:
-            if not bodies.moved[e]:
+            if not bodies.pushed[e]:
                 push_cars(bodies, speed, steering, dt, e)
                 near = touches_soon(
                     bodies.body, bodies.present, bodies.box_body, bodies.boxes, bodies.room,
                     bodies.size, e,
                 )  # fmt: skip
                 bodies.calm[e] = CALM if near else max(bodies.calm[e] - 1, 0)
-                if bodies.calm[e] > 0:
+                bodies.pushed[e] = True
+            if bodies.calm[e] > 0:
+                if solver.calls[e].ready != bodies.tick[e]:
                     waiting[n_waiting] = e
                     n_waiting += 1
                     break
+                solve(bodies, solver, e, dt)
+            else:
                 for n in range(bodies.body.shape[1]):
                     if bodies.present[e, n]:
                         integrate_car(bodies.cars[e], bodies.body, bodies.wrench, e, n, dt)
-            bodies.moved[e] = False
+            bodies.pushed[e] = False
             bodies.tick[e] += 1
             sense(bodies, sensors, radio, scenes, dt, events, e)
             bodies.done[e] += 1

@@ -50,8 +50,8 @@ class Bodies(NamedTuple):
     """Steps of this decision that are done, (env)."""
     calm: Array
     """Steps for which the solver keeps the room yet, (env)."""
-    moved: Array
-    """The solver has made the move of the step under way, (env)."""
+    pushed: Array
+    """The forces of the step under way are known, (env)."""
 
 
 def make_bodies(n_envs: int, n_cars: int, n_boxes: int) -> Bodies:
@@ -73,7 +73,7 @@ def make_bodies(n_envs: int, n_cars: int, n_boxes: int) -> Bodies:
         tick=np.zeros(e, dtype=np.int64),
         done=np.zeros(e, dtype=np.int64),
         calm=np.zeros(e, dtype=np.int64),
-        moved=np.zeros(e, dtype=bool),
+        pushed=np.zeros(e, dtype=bool),
     )
 
 
@@ -99,7 +99,7 @@ def place_bodies(b: Bodies, env: int, episode: Episode, room: tuple[float, float
         b.box_body[env, k, :3] = box.x, box.y, box.angle
         b.boxes[env, k] = box_row(box.x, box.y, box.width, box.height, box.angle)
     b.tick[env] = b.done[env] = b.calm[env] = 0
-    b.moved[env] = False
+    b.pushed[env] = False
 
 
 def box_row(x: float, y: float, width: float, height: float, angle: float) -> tuple[float, ...]:

@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from relpos_env.bodies import Bodies, box_row
+from relpos_env.bodies import Bodies
 from relpos_env.room import Room
 from relpos_env.scenarios.life import LifeEvent
 from relpos_env.scenarios.obstacle import Obstacle
 from relpos_env.sensors.radio.radio import Radio
-from relpos_env.timing import DT, SOON
+from relpos_env.solver import Solver, connect, disconnect
+from relpos_env.timing import SOON
 from relpos_env.vehicle import CarParams
 from tracking.arrays import F64, Bool
 
@@ -33,9 +34,7 @@ class Group:
     size: tuple[float, float] = (0.0, 0.0)
     """[m] Width and depth of the room."""
     room: Room | None = None
-    """Made when something is about to touch, and kept until nothing does."""
-    solved: int = -1
-    """The last step that it made."""
+    """Made when something is about to touch, for the solver that is connected to it."""
 
     def __getstate__(self) -> dict[str, Any]:
         """Everything but the room: what is touching then is solved anew."""
@@ -61,27 +60,29 @@ class Group:
         movable[: len(self.obstacles)] = [box.movable for box in self.obstacles]
         return movable
 
-    def solve(self, b: Bodies, env: int) -> None:
-        """Make one move of the environment with the rigid-body solver."""
-        tick = int(b.tick[env])
-        # The order in which a space takes its contacts is a matter of what it had before, so that
-        # each time something touches begins with a new one.
-        if self.room is None or tick != self.solved + 1:
-            cars = np.nonzero(b.present[env])[0]
-            self.room = Room(self.size, self.obstacles, self.car, cars)
-        self.solved = tick
-        self.room.step(b.body[env], b.wrench[env], b.box_body[env], b.contacts[env], DT)
-        for k, box in enumerate(self.obstacles):
-            if box.movable:
-                x, y, angle = b.box_body[env, k, :3]
-                b.boxes[env, k] = box_row(x, y, box.width, box.height, angle)
-        b.moved[env] = True
+    def open_room(self, b: Bodies, solver: Solver, env: int) -> None:
+        """Let the rigid-body solver make the next moves of the environment.
 
-    def live(self, b: Bodies, radio: Radio, antennas: F64, env: int, t: float) -> None:
+        The order in which a space takes its contacts is a matter of what it had before, so that
+        each time something touches begins with a new one.
+        """
+        cars = np.nonzero(b.present[env])[0]
+        self.room = Room(self.size, self.obstacles, self.car, cars)
+        connect(solver, env, self.room, int(b.tick[env]))
+
+    def close_room(self, solver: Solver, env: int) -> None:
+        """Let what touches next begin anew."""
+        disconnect(solver, env)
+        self.room = None
+
+    def live(
+        self, b: Bodies, solver: Solver, radio: Radio, antennas: F64, env: int, t: float
+    ) -> None:
         """Let happen what is due.
 
         Args:
             b: Cars, updated.
+            solver: Disconnected where another number of cars is present from now on.
             radio: Their radios, updated.
             antennas: Where these are, (env, car, 3) [m], updated.
             env: Number of the environment in these.
@@ -104,7 +105,7 @@ class Group:
                 b.body[env, n, 3:] = 0.0
                 b.present[env, n] = False
             if event.what in ("join", "leave"):
-                self.room = None
+                self.close_room(solver, env)
             on = event.what in ("join", "power-on")
             if on and not b.powered[env, n]:
                 radio.switch_on(env, n, boot=int(self.boots.integers(256)))

@@ -24,6 +24,7 @@ from relpos_env.sensors.batch import Events, Sensors, make_events, make_sensors,
 from relpos_env.sensors.radio._radio_kernels import Scene
 from relpos_env.sensors.radio.radio import Radio
 from relpos_env.sight import pairs_in_sight
+from relpos_env.solver import Solver, make_solver
 from relpos_env.timing import DT, SOON
 from relpos_env.world_state import WorldState
 from tracking.arrays import F64, Bool
@@ -84,6 +85,7 @@ class Swarm:
         )
         self.events = make_events(e, n, n_steps, self._radio.room)
         self._groups = [Group() for _ in range(e)]
+        self._solver = make_solver(e, n, self._bodies.boxes.shape[1])
         self._next_life = np.full(e, np.inf)
         self.to_come: Bool = np.zeros((e, n), dtype=bool)
         """Cars that will come in, for the first time or again, (env, car)."""
@@ -112,6 +114,11 @@ class Swarm:
         return self._bodies.contacts
 
     @property
+    def solver_moves(self) -> int:
+        """Steps that the rigid-body solver has made, in all groups together."""
+        return int(self._solver.calls["moves"].sum())
+
+    @property
     def boxes(self) -> F64:
         """What stands in the rooms, (env, box, 6); half sizes are zero for nothing.
 
@@ -135,6 +142,7 @@ class Swarm:
         part._radio = self._radio.part(envs)
         part._scene = Scene._make(a[envs] for a in self._scene)
         part._groups = self._groups[envs]
+        part._solver = Solver._make(a[envs] for a in self._solver)
         part._next_life, part.to_come = self._next_life[envs], self.to_come[envs]
         part.events, part.t = Events._make(a[envs] for a in self.events), self.t[envs]
         part._bind()
@@ -154,7 +162,8 @@ class Swarm:
         self.t[env] = 0.0
         self._scene.pos1[env, :, :2] = b.body[env, :, :2]
         self._scene.pos1[env, :, 2] = self._sensors.mast[env]
-        group.life, group.room, group.solved = episode.events, None, -1
+        group.life = episode.events
+        group.close_room(self._solver, env)
         group.obstacles, group.car, group.size = episode.obstacles, episode.car, self.scenario.room
         self._radio.reset(env, int(rng.integers(1 << 62)), episode.radio)
         group.boots = rng.spawn(1)[0]
@@ -179,11 +188,12 @@ class Swarm:
         if self._begin_decision():
             for env in np.nonzero(self._next_life <= self.t + SOON)[0].tolist():
                 t = float(self.t[env])
-                self._groups[env].live(self._bodies, self._radio, self._scene.pos1, env, t)
+                group = self._groups[env]
+                group.live(self._bodies, self._solver, self._radio, self._scene.pos1, env, t)
                 self._look_ahead(env)
         while n_waiting := self._run_steps():
             for env in self._waiting[:n_waiting].tolist():
-                self._groups[env].solve(self._bodies, env)
+                self._groups[env].open_room(self._bodies, self._solver, env)
         self._read_odometers()
         if self.proximity.shape[-1]:
             self._read_proximity()
@@ -205,13 +215,15 @@ class Swarm:
         self.to_come[env, group.to_come()] = True
 
     def __getstate__(self) -> dict[str, Any]:
-        """What is put together by `_bind` stays behind."""
+        """What is put together by `_bind` stays behind, and the solver with its addresses."""
         bound = {"_begin_decision", "_run_steps", "_read_odometers", "_read_proximity"}
-        bound |= {"block", "state"}
+        bound |= {"block", "state", "_solver"}
         return {k: v for k, v in self.__dict__.items() if k not in bound}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
+        n_envs, n_cars, _ = self._bodies.body.shape
+        self._solver = make_solver(n_envs, n_cars, self._bodies.boxes.shape[1])
         self._bind()
 
     def _bind(self) -> None:
@@ -230,9 +242,10 @@ class Swarm:
             begin_decision, bodies, self.events, self.t, self._next_life, self._speed,
             self._steering,
         )  # fmt: skip
+        solver = self._solver._replace(calls=as_records(self._solver.calls))
         self._run_steps = bind(
-            run_steps, bodies, sensors, self._radio.kernel_arguments, self._scene, self.n_steps,
-            DT, self.events, self._speed, self._steering, self.t, self._waiting,
+            run_steps, bodies, solver, sensors, self._radio.kernel_arguments, self._scene,
+            self.n_steps, DT, self.events, self._speed, self._steering, self.t, self._waiting,
         )  # fmt: skip
         self._read_odometers = bind(
             read_odometers, sensors.odometer, sensors.odometer_seed, bodies.tick, bodies.body,

@@ -50,7 +50,7 @@ def run(scenario, seed, seconds, drivers, free=None):
             # The solver keeps a room for so many steps after it was needed last.
             swarm._bodies.calm[:] = ALWAYS
         if free is not None and (free[step] or (step > 0 and free[step - 1])):
-            swarm._groups[0].room = None
+            swarm._groups[0].close_room(swarm._solver, 0)
         swarm.step(command.speed[None], command.steering[None])
         unsolved.append(swarm._bodies.calm[0] == 0)
         contacts += swarm.contacts.sum()

@@ -11,18 +11,18 @@ from unittest.mock import patch
 
 from agents.bench.env.batch import Batch
 from relpos_env.formation import Formation
-from relpos_env.group import Group
 from relpos_env.sensors.operator import Operator
 from relpos_env.swarm import Swarm
 from relpos_env.tasks.base import Task
 from relpos_env.timing import DECISION, DT
 
+RESETS = "resets"
 METHODS: tuple[tuple[str, type, str], ...] = (
     ("cars, sensors, radio", Swarm, "step"),
     ("task, operator", Task, "update"),
     ("task, operator", Operator, "sample"),
     ("observations", Formation, "_observe"),
-    ("resets", Formation, "begin"),
+    (RESETS, Formation, "begin"),
 )
 """Part, and the class with the method that is timed for it."""
 BOUND: tuple[tuple[str, str], ...] = (
@@ -47,17 +47,16 @@ class Parts:
     """[us per env-step] of each part."""
     solver_share: float
     """[-] Sub-steps that the rigid-body solver makes, since something is about to touch."""
-    solver_cost: float
-    """[us per env-step] Of the solver, within that of the cars."""
 
 
 @dataclass
 class _Stopwatch:
     """Time by name. What is called inside of something timed counts for the outer one."""
 
+    swarm: Swarm
     spent: dict[str, float] = field(default_factory=dict)
-    solver_calls: int = 0
-    solver_spent: float = 0.0
+    moves_of_resets: int = 0
+    """Of the solver, while episodes began."""
     _running: str = ""
 
     @contextmanager
@@ -66,12 +65,14 @@ class _Stopwatch:
             yield
             return
         self._running = name
-        began = time.perf_counter()
+        moves, began = self.swarm.solver_moves, time.perf_counter()
         try:
             yield
         finally:
             self.spent[name] = self.spent.get(name, 0.0) + time.perf_counter() - began
             self._running = ""
+            if name == RESETS:
+                self.moves_of_resets += self.swarm.solver_moves - moves
 
     def round(self, function: Callable[..., Any], name: str) -> Callable[..., Any]:
         """The function with its time counted."""
@@ -81,19 +82,6 @@ class _Stopwatch:
                 return function(*args, **kwargs)
 
         return timed
-
-    def solver(self, function: Callable[..., Any]) -> Callable[..., Any]:
-        """The solver with its moves counted, except while an episode begins."""
-
-        def counted(*args: Any, **kwargs: Any) -> Any:
-            began = time.perf_counter()
-            result = function(*args, **kwargs)
-            if self._running != "resets":
-                self.solver_spent += time.perf_counter() - began
-                self.solver_calls += 1
-            return result
-
-        return counted
 
 
 def parts_of(batch: Batch, turns: int = 1) -> Parts:
@@ -109,7 +97,8 @@ def parts_of(batch: Batch, turns: int = 1) -> Parts:
 
 
 def _turn(batch: Batch) -> Parts:
-    watch = _Stopwatch()
+    swarm = batch.env.formation.loop.swarm
+    watch, moves = _Stopwatch(swarm), swarm.solver_moves
     with ExitStack() as patches:
         for name, owner, method in METHODS:
             timed = watch.round(getattr(owner, method), name)
@@ -118,17 +107,10 @@ def _turn(batch: Batch) -> Parts:
         for name, function in BOUND:
             timed = watch.round(getattr(perception, function), name)
             patches.enter_context(patch.object(perception, function, timed))
-        solver = watch.solver(Group.solve)
-        patches.enter_context(patch.object(Group, "solve", solver))
         total = batch.turn()
     env_steps = batch.steps * batch.n_envs
     cost = dict.fromkeys([name for name, *_ in METHODS] + [name for name, _ in BOUND], 0.0)
     cost |= {name: 1e6 * spent / env_steps for name, spent in watch.spent.items()}
     cost[REST] = total - sum(cost.values())
-    sub_steps = env_steps * round(DECISION / DT)
-    return Parts(
-        total=total,
-        cost=cost,
-        solver_share=watch.solver_calls / sub_steps,
-        solver_cost=1e6 * watch.solver_spent / env_steps,
-    )
+    moves = swarm.solver_moves - moves - watch.moves_of_resets
+    return Parts(total, cost, moves / (env_steps * round(DECISION / DT)))

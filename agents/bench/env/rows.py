@@ -89,7 +89,7 @@ def _batch(effort: Effort, name: str, drive: str) -> list[Row]:
     ours.close()
     what = f"{name}, {drive}"
     row = _row(what, cost, envs=effort.envs, peer=pymunk_name(), peer_cost=peer_cost)
-    row |= {"solver_share": parts.solver_share, "solver_us_per_env_step": parts.solver_cost}
+    row["solver_share"] = parts.solver_share
     return [row] + [
         _row(f"{what}: {part}", spent, envs=effort.envs) for part, spent in parts.cost.items()
     ]

@@ -1,0 +1,153 @@
+"""A move of an environment by the rigid-body solver, without the interpreter."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+
+from llvmlite import ir
+from numba import config, types
+from numba.extending import intrinsic
+
+from tracking.compiled import kernel, small_kernel
+
+BOX_FRICTION = 0.4
+"""[-] Of a movable box on the floor."""
+GRAVITY = 9.81
+REST = 1e-4
+"""[m/s, rad/s] A box that is slower stands."""
+
+
+def _call(returns, *arguments):
+    """An intrinsic's type and code: a call of a C function by its address, the first argument."""
+
+    def generate(context, builder, signature, values):
+        kinds = [context.get_value_type(kind) for kind in signature.args[1:]]
+        function = ir.FunctionType(ir.VoidType(), kinds).as_pointer()
+        builder.call(builder.inttoptr(values[0], function), values[1:])
+        return context.get_dummy_value()
+
+    return returns(types.uint64, *arguments), generate
+
+
+@intrinsic
+def call_step(context, function, space, dt):
+    """``function(space, dt)``: the step of a space."""
+    return _call(types.void, types.uint64, types.float64)
+
+
+@intrinsic
+def call_each(context, function, space, visit, data):
+    """``function(space, visit, data)``: `visit` for all bodies or contacts of a space."""
+    return _call(types.void, types.uint64, types.uint64, types.uint64)
+
+
+if config.DISABLE_JIT:
+    _STEP = ctypes.CFUNCTYPE(None, ctypes.c_size_t, ctypes.c_double)
+    _EACH = ctypes.CFUNCTYPE(None, ctypes.c_size_t, ctypes.c_size_t, ctypes.c_size_t)
+
+    def call_step(function, space, dt):
+        """The same for the interpreter."""
+        _STEP(int(function))(int(space), dt)
+
+    def call_each(function, space, visit, data):
+        """The same for the interpreter."""
+        _EACH(int(function))(int(space), int(visit), int(data))
+
+
+@kernel
+def solve(bodies, solver, e, dt):
+    """Make one move of an environment.
+
+    Args:
+        bodies: Bodies; the state of cars and boxes and the contacts are updated.
+        solver: Solver; connected.
+        e: Environment.
+        dt: [s]
+    """
+    calls = solver.calls[e]
+    put_bodies(bodies, solver, e, dt)
+    calls.put_num = 0
+    call_each(calls.each_body, calls.space, calls.put, calls.put_data)
+    call_step(calls.step, calls.space, dt)
+    calls.got_num = 0
+    call_each(calls.each_body, calls.space, calls.get, calls.got_data)
+    take_bodies(bodies, solver, e)
+    calls.met_num = 0
+    call_each(calls.each_contact, calls.space, calls.tell, calls.met_data)
+    count_contacts(bodies, solver, e, calls.met_num // solver.met.shape[2])
+    calls.ready += 1
+    calls.moves += 1
+
+
+@small_kernel
+def put_bodies(bodies, solver, e, dt):
+    """Where everything is and what pushes it, in the order of the space."""
+    rows = solver.bodies
+    row = 0
+    for n in range(bodies.body.shape[1]):
+        if solver.car_ids[e, n] != 0:
+            for k in range(6):
+                rows[e, row, k] = bodies.body[e, n, k]
+            for k in range(3):
+                rows[e, row, 6 + k] = bodies.wrench[e, n, k]
+            row += 1
+    for b in range(bodies.box_body.shape[1]):
+        if solver.boxes[e, b, 0] > 0.0:
+            for k in range(6):
+                rows[e, row, k] = bodies.box_body[e, b, k]
+            push_by_floor(bodies, solver, e, b, dt, row)
+            row += 1
+    # The room itself is a body, behind the others.
+    for k in range(rows.shape[2]):
+        rows[e, row, k] = 0.0
+
+
+@small_kernel
+def push_by_floor(bodies, solver, e, b, dt, row):
+    """Friction of the floor on a box, no more than what stops it."""
+    body, rows = bodies.box_body, solver.bodies
+    mass, inertia, arm = solver.boxes[e, b, 0], solver.boxes[e, b, 1], solver.boxes[e, b, 2]
+    grip = BOX_FRICTION * mass * GRAVITY
+    speed, spin = math.hypot(body[e, b, 3], body[e, b, 4]), abs(body[e, b, 5])
+    against = min(mass / dt, grip / speed) if speed > 0.0 else 0.0
+    rows[e, row, 6] = -against * body[e, b, 3]
+    rows[e, row, 7] = -against * body[e, b, 4]
+    against = min(inertia / dt, grip * arm / spin) if spin > 0.0 else 0.0
+    rows[e, row, 8] = -against * body[e, b, 5]
+
+
+@small_kernel
+def take_bodies(bodies, solver, e):
+    """Where everything is after the step."""
+    rows = solver.moved
+    row = 0
+    for n in range(bodies.body.shape[1]):
+        if solver.car_ids[e, n] != 0:
+            for k in range(6):
+                bodies.body[e, n, k] = rows[e, row, k]
+            row += 1
+    for b in range(bodies.box_body.shape[1]):
+        if solver.boxes[e, b, 0] > 0.0:
+            body = bodies.box_body
+            stands = True
+            for k in range(6):
+                body[e, b, k] = rows[e, row, k]
+                stands = stands and (k < 3 or abs(rows[e, row, k]) < REST)
+            if stands:
+                body[e, b, 3] = body[e, b, 4] = body[e, b, 5] = 0.0
+            bodies.boxes[e, b, 0], bodies.boxes[e, b, 1] = body[e, b, 0], body[e, b, 1]
+            bodies.boxes[e, b, 4] = math.cos(body[e, b, 2])
+            bodies.boxes[e, b, 5] = math.sin(body[e, b, 2])
+            row += 1
+
+
+@small_kernel
+def count_contacts(bodies, solver, e, n_met):
+    """Add the contacts that are new to those that the cars began."""
+    for k in range(n_met):
+        if solver.met[e, k, 2] != 0:
+            for n in range(bodies.contacts.shape[1]):
+                number = solver.car_ids[e, n]
+                if number != 0 and number in (solver.met[e, k, 0], solver.met[e, k, 1]):
+                    bodies.contacts[e, n] += 1.0

@@ -1,0 +1,160 @@
+"""Moves of the solver without the interpreter are those that pymunk makes with it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pymunk
+import pytest
+from pymunk.batch import BodyFields, Buffer, get_space_bodies, set_space_bodies
+
+from relpos_env import solver as solver_module
+from relpos_env._contact_kernels import BOX_FRICTION, GRAVITY, REST, solve
+from relpos_env.bodies import make_bodies, place_bodies
+from relpos_env.group import Group
+from relpos_env.room import Room
+from relpos_env.scenarios import SCENARIOS, draw_episode
+from relpos_env.scenarios.obstacle import Obstacle
+from relpos_env.solver import connect, disconnect, make_solver
+from relpos_env.timing import DT
+from relpos_env.vehicle import CarParams
+
+STATE = BodyFields.POSITION | BodyFields.ANGLE | BodyFields.VELOCITY | BodyFields.ANGULAR_VELOCITY
+INPUT = STATE | BodyFields.FORCE | BodyFields.TORQUE
+SIZE = (3.0, 2.4)
+CAR = CarParams(mass=2.3)
+BOXES = (
+    Obstacle(x=0.4, y=0.1, width=0.3, height=0.2, angle=0.4, movable=True),
+    Obstacle(x=-0.9, y=-0.7, width=0.3, height=0.4),
+    Obstacle(x=0.9, y=-0.6, width=0.2, height=0.2, movable=True),
+)
+CARS = np.array([0, 1, 3])
+N_CARS = 4
+
+
+class Plain:
+    """A room stepped through the interface of pymunk."""
+
+    def __init__(self):
+        self.room = Room(SIZE, BOXES, CAR, CARS)
+        self.inbox, self.outbox = Buffer(), Buffer()
+        self.room.space.on_collision(begin=self.count)
+        self.contacts = np.zeros(N_CARS)
+
+    def count(self, arbiter, space, data):
+        for shape in arbiter.shapes:
+            for car, number in self.room.car_ids.items():
+                self.contacts[car] += shape.body is not None and shape.body.id == number
+
+    def step(self, body, wrench, box_body):
+        movable = list(self.room.movable)
+        rows = np.zeros((len(CARS) + len(movable) + 1, 9))
+        rows[: len(CARS)] = np.hstack([body[CARS], wrench[CARS]])
+        for row, box in zip(rows[len(CARS) :], movable, strict=False):
+            row[:6] = box_body[box]
+            mass, inertia, arm = self.room.movable[box]
+            grip = BOX_FRICTION * mass * GRAVITY
+            speed, spin = np.hypot(*row[3:5]), abs(row[5])
+            if speed > 0.0:
+                row[6:8] = -min(mass / DT, grip / speed) * row[3:5]
+            if spin > 1e-300:
+                row[8] = -min(inertia / DT, grip * arm / spin) * row[5]
+            elif spin > 0.0:
+                row[8] = -inertia / DT * row[5]
+        self.inbox.set_float_buf(rows)
+        set_space_bodies(self.room.space, INPUT, self.inbox)
+        self.room.space.step(DT)
+        self.outbox.clear()
+        get_space_bodies(self.room.space, STATE, self.outbox)
+        out = np.frombuffer(self.outbox.float_buf()).reshape(-1, 6)
+        body[CARS] = out[: len(CARS)]
+        for box, row in zip(movable, out[len(CARS) :], strict=False):
+            box_body[box] = row
+            if (np.abs(row[3:]) < REST).all():
+                box_body[box, 3:] = 0.0
+
+
+def crowded(n_envs=3, env=1):
+    """Bodies in which an environment is full of cars and boxes, and its solver."""
+    bodies = make_bodies(n_envs, N_CARS, len(BOXES))
+    present = np.isin(np.arange(N_CARS), CARS)
+    start = np.array([[-0.5, 0.2, 0.0], [0.9, 0.5, 2.0], [9.0, 9.0, 1.0], [-0.2, -0.7, 1.0]])
+    drawn = draw_episode(SCENARIOS["cars-los"], N_CARS, 10.0, np.random.default_rng(0))
+    episode = replace(drawn, start=start, present=present, obstacles=BOXES, car=CAR)
+    place_bodies(bodies, env, episode, SIZE)
+    return bodies, make_solver(n_envs, N_CARS, len(BOXES))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_moves_and_contacts_are_those_of_pymunk_bit_for_bit(seed):
+    rng = np.random.default_rng(seed)
+    bodies, solver = crowded()
+    plain, room = Plain(), Room(SIZE, BOXES, CAR, CARS)
+    connect(solver, 1, room, 0)
+    body, box_body = bodies.body[1].copy(), bodies.box_body[1].copy()
+    for k in range(400):
+        if k % 40 == 0:
+            push = rng.normal(size=(N_CARS, 3)) * [40.0, 40.0, 2.0]
+        bodies.wrench[1] = push
+        solve(bodies, solver, 1, DT)
+        plain.step(body, push, box_body)
+        np.testing.assert_array_equal(bodies.body[1], body, err_msg=f"step {k}")
+        np.testing.assert_array_equal(bodies.box_body[1], box_body, err_msg=f"step {k}")
+        np.testing.assert_array_equal(bodies.contacts[1], plain.contacts, err_msg=f"step {k}")
+    assert plain.contacts[CARS].min() > 2
+    assert plain.contacts[2] == 0
+    assert solver.calls["moves"].tolist() == [0, 400, 0]
+    assert solver.calls["ready"].tolist() == [-1, 400, -1]
+    moved = np.abs(bodies.box_body[1, :, :2] - [(b.x, b.y) for b in BOXES]).max(axis=1)
+    assert (moved[[0, 2]] > 0.1).any()
+    assert moved[1] == 0.0
+    for array in (bodies.body, bodies.box_body, bodies.contacts, solver.bodies, solver.moved):
+        assert not array[[0, 2]].any()
+
+
+def test_a_box_is_drawn_where_it_stands():
+    bodies, solver = crowded()
+    room = Room(SIZE, BOXES, CAR, CARS)
+    connect(solver, 1, room, 0)
+    bodies.box_body[1, 0, 3:] = 0.5, 0.2, 1.0
+    for _ in range(10):
+        solve(bodies, solver, 1, DT)
+    x, y, angle = bodies.box_body[1, 0, :3]
+    expected = [x, y, 0.15, 0.1, np.cos(angle), np.sin(angle)]
+    np.testing.assert_allclose(bodies.boxes[1, 0], expected, rtol=1e-15)
+    assert angle != 0.4
+
+
+def test_the_solvers_arrays_keep_their_room():
+    # Where it finds too little room the C code takes other memory.
+    bodies, solver = crowded()
+    room = Room(SIZE, BOXES, CAR, CARS)
+    connect(solver, 1, room, 0)
+    calls = solver.calls[1]
+    places = [int(calls[f"{way}_arr"]) for way in ("put", "got", "met")]
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        bodies.body[1, CARS, :2] = rng.uniform(-1.0, 1.0, (len(CARS), 2))  # all in each other
+        bodies.box_body[1, [0, 2], :2] = rng.uniform(-1.0, 1.0, (2, 2))
+        solve(bodies, solver, 1, DT)
+    assert [int(calls[f"{way}_arr"]) for way in ("put", "got", "met")] == places
+    assert [calls[f"{way}_max"] for way in ("put", "got", "met")] == [
+        solver.bodies[1].size, solver.moved[1].size, solver.met[1].size
+    ]  # fmt: skip
+
+
+def test_a_group_opens_and_closes_its_room():
+    bodies, solver = crowded()
+    bodies.tick[1] = 7
+    group = Group(obstacles=BOXES, car=CAR, size=SIZE)
+    group.open_room(bodies, solver, 1)
+    assert solver.calls["ready"].tolist() == [-1, 7, -1]
+    assert sorted(np.nonzero(solver.car_ids[1])[0]) == CARS.tolist()
+    group.close_room(solver, 1)
+    assert group.room is None
+    assert (solver.calls["ready"] == -1).all()
+    disconnect(solver, 1)
+
+
+def test_a_solver_of_another_layout_is_refused():
+    with pytest.raises(ImportError, match=rf"pymunk {pymunk.version}: expected pmIntArray of 8"):
+        solver_module._expect_layout("pmIntArray", 8, {"num": 0})
