@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import ctypes
 import math
 
 from llvmlite import ir
-from numba import config, types
+from numba import types
 from numba.extending import intrinsic
 
 from tracking.compiled import kernel, small_kernel
@@ -40,19 +39,6 @@ def call_step(context, function, space, dt):
 def call_each(context, function, space, visit, data):
     """``function(space, visit, data)``: `visit` for all bodies or contacts of a space."""
     return _call(types.void, types.uint64, types.uint64, types.uint64)
-
-
-if config.DISABLE_JIT:
-    _STEP = ctypes.CFUNCTYPE(None, ctypes.c_size_t, ctypes.c_double)
-    _EACH = ctypes.CFUNCTYPE(None, ctypes.c_size_t, ctypes.c_size_t, ctypes.c_size_t)
-
-    def call_step(function, space, dt):
-        """The same for the interpreter."""
-        _STEP(int(function))(int(space), dt)
-
-    def call_each(function, space, visit, data):
-        """The same for the interpreter."""
-        _EACH(int(function))(int(space), int(visit), int(data))
 
 
 @kernel

@@ -7,7 +7,9 @@ import warnings
 from typing import Any
 
 import numpy as np
+import torch
 from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.utils import set_random_seed
 
 from agents.train.buffer import SwarmRolloutBuffer
@@ -89,4 +91,26 @@ def run_leg(model: PPO, config: TrainConfig, leg: int) -> None:
     # Nothing observed yet: learning begins with a reset.
     model._last_obs = None
     frames = config.leg * config.ppo.steps * model.n_envs
-    model.learn(frames, reset_num_timesteps=False, log_interval=config.leg)
+    threads = _Threads(config.threads)
+    model.learn(frames, threads, reset_num_timesteps=False, log_interval=config.leg)
+
+
+class _Threads(BaseCallback):  # type: ignore[misc]
+    """All threads for learning, one for the networks while environments are stepped.
+
+    The networks are small then, and a thread that helped with them stays awake for a while,
+    waiting for more, on a core that the simulation needs.
+    """
+
+    def __init__(self, threads: int) -> None:
+        super().__init__()
+        self._most = threads
+
+    def _on_rollout_start(self) -> None:
+        torch.set_num_threads(1)
+
+    def _on_rollout_end(self) -> None:
+        torch.set_num_threads(self._most)
+
+    def _on_step(self) -> bool:
+        return True
