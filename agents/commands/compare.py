@@ -37,8 +37,9 @@ WHY = "which has its own cars and task; they drive one after the other"
     "--scenario",
     "scenarios",
     multiple=True,
-    help="cars-los, cars-nlos, gap, hall, open, random, ring-los, ring-nlos, swarm-nlos, "
-    "warehouse, or a file *.toml; may be given several times. By default that of the task.",
+    help="cars-los, cars-nlos, gap, hall, open, random, ring-los, ring-nlos, rooms-3x5, "
+    "rooms-5x5, rooms-9x7, swarm-nlos, warehouse, or a file *.toml; may be given several times. "
+    "By default that of the task.",
 )
 @click.option(
     "--task",

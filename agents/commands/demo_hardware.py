@@ -16,8 +16,8 @@ from agents.errors import UsageError
     "--scenario",
     default="cars-nlos",
     show_default=True,
-    help="cars-los, cars-nlos, gap, hall, open, random, ring-los, ring-nlos, swarm-nlos, "
-    "warehouse, or a file *.toml.",
+    help="cars-los, cars-nlos, gap, hall, open, random, ring-los, ring-nlos, rooms-3x5, "
+    "rooms-5x5, rooms-9x7, swarm-nlos, warehouse, or a file *.toml.",
 )
 @click.option(
     "--task",

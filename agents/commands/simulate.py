@@ -16,8 +16,8 @@ from agents.console import emit_json, progress_bar
     "--scenario",
     default="cars-nlos",
     show_default=True,
-    help="cars-los, cars-nlos, gap, hall, open, random, ring-los, ring-nlos, swarm-nlos, "
-    "warehouse, or a file *.toml; human or human-mocap.",
+    help="cars-los, cars-nlos, gap, hall, open, random, ring-los, ring-nlos, rooms-3x5, "
+    "rooms-5x5, rooms-9x7, swarm-nlos, warehouse, or a file *.toml; human or human-mocap.",
 )
 @click.option(
     "--seconds", default=120.0, show_default=True, help="Length, 3 to 86400; people to 1800."

@@ -90,6 +90,11 @@ def run_leg(model: PPO, config: TrainConfig, leg: int) -> None:
     model.env.seed(int(seeds[1] >> 1))
     # Nothing observed yet: learning begins with a reset.
     model._last_obs = None
+    learn(model, config)
+
+
+def learn(model: PPO, config: TrainConfig) -> None:
+    """Learn for the updates of a leg, from where the episodes are."""
     frames = config.leg * config.ppo.steps * model.n_envs
     threads = _Threads(config.threads)
     model.learn(frames, threads, reset_num_timesteps=False, log_interval=config.leg)

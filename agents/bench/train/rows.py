@@ -16,7 +16,7 @@ from agents.bench.env.turns import best_of_turns
 from agents.bench.train.nothing import Nothing
 from agents.train.config import TrainConfig
 from agents.train.environments import make_rooms
-from agents.train.learner import make_model, run_leg
+from agents.train.learner import learn, make_model, run_leg
 
 Row = dict[str, Any]
 TURNS = 3
@@ -84,12 +84,12 @@ def _quiet(model: PPO) -> PPO:
 
 
 def _turn(model: PPO, config: TrainConfig) -> Callable[[], float]:
-    """A leg; its time for a frame [us]."""
+    """Updates in the middle of a leg; their time for a frame [us]."""
     env: VecEnv = model.env
 
     def turn() -> float:
         start = time.perf_counter()
-        run_leg(model, config, 1)
+        learn(model, config)
         frames = config.leg * config.ppo.steps * env.num_envs
         return 1e6 * (time.perf_counter() - start) / float(frames)
 
