@@ -90,7 +90,8 @@ class TrainConfig:
     threads: int = number(2, 1, 256)
     """Threads of simulation and of learning."""
     eval_episodes: int = number(24, 1, 10000)
-    """Episodes after each leg that tell the best policy, the same every time."""
+    """Episodes after each leg that tell the best policy, shared out among the scenarios, the same
+    every time."""
     env: EnvSetup = field(default_factory=EnvSetup)
     net: Networks = field(default_factory=Networks)
     ppo: Ppo = field(default_factory=Ppo)

@@ -53,8 +53,8 @@ def _weights(given: tuple[str, ...]) -> dict[str, float]:
     return weights
 
 
-def check_environments(config: TrainConfig) -> Parts:
-    """See that all environments of a run can be, at every level; the parts of the first.
+def check_environments(config: TrainConfig) -> tuple[Parts, ...]:
+    """See that all environments of a run can be, at every level; as the scenarios say they are.
 
     Raises:
         UsageError: More cars than the policy has slots for, or no scenario at all.
@@ -63,10 +63,11 @@ def check_environments(config: TrainConfig) -> Parts:
     names, levels = config.env.scenarios, config.env.levels or (None,)
     if not names:
         raise UsageError("--scenarios: expected at least one")
-    if config.ppo.envs < len(names):
-        raise UsageError(
-            f"--envs: expected at least {len(names)}, one for each scenario, got {config.ppo.envs}"
-        )
+    for option, given in (("envs", config.ppo.envs), ("eval-episodes", config.eval_episodes)):
+        if given < len(names):
+            raise UsageError(
+                f"--{option}: expected at least {len(names)}, one for each scenario, got {given}"
+            )
     every = [
         FormationConfig(**env_arguments(config, name, level)).resolve()
         for name in names
@@ -77,20 +78,25 @@ def check_environments(config: TrainConfig) -> Parts:
         raise UsageError(
             f"--cars: expected at least {most}, the cars of the scenarios, got {config.env.cars}"
         )
-    return FormationConfig(**env_arguments(config, names[0], None)).resolve()
+    return tuple(FormationConfig(**env_arguments(config, name, None)).resolve() for name in names)
+
+
+def shares(n: int, scenarios: int) -> list[int]:
+    """So many environments or episodes of each scenario."""
+    counts: list[int] = np.diff(np.linspace(0, n, scenarios + 1).astype(int)).tolist()
+    return counts
 
 
 def make_rooms(config: TrainConfig, level: int | None) -> Rooms:
     """The environments to learn in at a level of the curriculum."""
     scenarios = config.env.scenarios
-    shares = np.diff(np.linspace(0, config.ppo.envs, len(scenarios) + 1).astype(int))
     parts = [
         FormationVecEnv(
-            int(n),
-            threads=min(config.threads, int(n)),
+            n,
+            threads=min(config.threads, n),
             with_truth=config.net.critic == "central",
             **env_arguments(config, scenario, level),
         )
-        for scenario, n in zip(scenarios, shares, strict=True)
+        for scenario, n in zip(scenarios, shares(config.ppo.envs, len(scenarios)), strict=True)
     ]
     return Rooms(parts, layout_of(config))

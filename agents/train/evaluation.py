@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,6 +13,7 @@ from gymnasium.utils import seeding
 from agents.demo import SETTLE
 from agents.policy.layout import Layout
 from agents.policy.padding import Padding
+from agents.train.environments import shares
 from agents.train.network import Actor, SwarmPolicy
 from relpos_env.config import Parts
 from relpos_env.formation import Formation
@@ -23,56 +26,98 @@ FIRST_SEED = 500
 
 
 class Evaluation:
-    """Episodes side by side, driven by what a policy holds for best."""
+    """Episodes of all scenarios, driven by what a policy holds for best."""
 
-    def __init__(self, parts: Parts, layout: Layout, episodes: int, threads: int) -> None:
+    def __init__(self, every: Sequence[Parts], layout: Layout, episodes: int, threads: int) -> None:
         """Make room for them.
 
         Args:
-            parts: What the environments are made of.
+            every: What the environments of each scenario are made of.
             layout: What the policy sees.
-            episodes: How many.
+            episodes: How many, shared out among the scenarios.
             threads: Of the simulation.
         """
-        self._formation = Formation(parts, episodes, min(threads, episodes))
-        self._pad = Padding(layout, Layout.of(parts))
-        self._steps = parts.config.max_cycles - 1
+        self._rooms = [
+            _Room(Formation(parts, n, min(threads, n)), Padding(layout, Layout.of(parts)))
+            for parts, n in zip(every, shares(episodes, len(every)), strict=True)
+        ]
 
     def run(self, policy: SwarmPolicy) -> dict[str, Any]:
         """Mean return of a decision, errors from `SETTLE` on [m], and contacts.
 
-        The tracking error is None where nobody could use any estimate.
+        Means are over cars and times, so scenarios with more cars count for more. The tracking
+        error is None where nobody could use any estimate.
         """
-        f = self._formation
-        for env in range(f.n_envs):
-            f.seed(env, seeding.np_random(FIRST_SEED + env)[0])
-            f.begin(env)
         actor = Actor(policy).eval()
+        first, drives = FIRST_SEED, []
+        for room in self._rooms:
+            drives.append(room.drive(actor, first))
+            first += room.formation.n_envs
+        rewards, decisions, contacts, minutes = (
+            sum(getattr(d, name) for d in drives)
+            for name in ("rewards", "decisions", "contacts", "minutes")
+        )
+        tracking = np.concatenate([d.tracking for d in drives])
+        return {
+            "return": rewards / max(decisions, 1.0),
+            "formation_error": float(np.concatenate([d.error for d in drives]).mean()),
+            "tracking_error": float(tracking.mean()) if tracking.size else None,
+            "collisions_per_min": contacts / minutes,
+        }
+
+    def close(self) -> None:
+        """Release the threads."""
+        for room in self._rooms:
+            room.formation.close()
+
+
+@dataclass(frozen=True, slots=True)
+class _Drive:
+    """What came of the episodes of one scenario."""
+
+    rewards: float
+    """Of all cars and decisions together."""
+    decisions: float
+    contacts: float
+    minutes: float
+    error: F64
+    """Formation errors from `SETTLE` on, of all cars and times [m]."""
+    tracking: F64
+    """Tracking errors likewise, where there are any [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Room:
+    """The episodes of one scenario, side by side."""
+
+    formation: Formation
+    pad: Padding
+
+    def drive(self, actor: Actor, first_seed: int) -> _Drive:
+        """From beginning to end."""
+        f = self.formation
+        for env in range(f.n_envs):
+            f.seed(env, seeding.np_random(first_seed + env)[0])
+            f.begin(env)
         error, tracking, present, contacts, rewards = [], [], [], 0.0, 0.0
-        for _ in range(self._steps):
-            f.step(*f.parts.actions.decode(drive(actor, self._pad(f.observations)), "actions"))
+        steps = f.parts.config.max_cycles - 1
+        for _ in range(steps):
+            f.step(*f.parts.actions.decode(drive(actor, self.pad(f.observations)), "actions"))
             error.append(f.task.error.copy())
             tracking.append(f.tracking_error())
             present.append(f.state.present.copy())
             contacts += float(f.loop.swarm.contacts.sum())
             rewards += float(f.rewards.sum())
         here, settled = np.array(present), round(SETTLE / DECISION)
-        minutes = f.n_envs * self._steps * DECISION / 60.0
-        return {
-            "return": rewards / max(float(here.sum()), 1.0),
-            "formation_error": float(np.array(error)[settled:][here[settled:]].mean()),
-            "tracking_error": _mean(np.array(tracking)[settled:]),
-            "collisions_per_min": contacts / minutes,
-        }
-
-    def close(self) -> None:
-        """Release the threads."""
-        self._formation.close()
-
-
-def _mean(values: F64) -> float | None:
-    found = values[np.isfinite(values)]
-    return float(found.mean()) if found.size else None
+        known = np.array(tracking)[settled:]
+        return _Drive(
+            rewards=rewards,
+            decisions=float(here.sum()),
+            contacts=contacts,
+            minutes=f.n_envs * steps * DECISION / 60.0,
+            error=np.array(error)[settled:][here[settled:]],
+            tracking=known[np.isfinite(known)],
+        )
 
 
 def drive(actor: Actor, observations: F32) -> F32:

@@ -65,12 +65,12 @@ def train(
     run = RunFolder(folder)
     resumed = config is None
     config = run.config() if config is None else config
-    parts = check_environments(config)
+    every = check_environments(config)
     if not resumed:
         run.create(config)
     tensors, state = run.load() or (None, Progress())
     torch.set_num_threads(config.threads)
-    evaluation = Evaluation(parts, layout_of(config), config.eval_episodes, config.threads)
+    evaluation = Evaluation(every, layout_of(config), config.eval_episodes, config.threads)
     logger = Logger(None, [TensorBoardOutputFormat(str(folder / "tensorboard"))])
     learner: _Learner | None = None
     while state.frames < config.frames:

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,8 @@ from agents.policy import load_policy
 from agents.policy.layout import Layout
 from agents.settings import from_options
 from agents.train.config import TrainConfig
-from agents.train.environments import make_rooms
+from agents.train.environments import check_environments, layout_of, make_rooms, shares
+from agents.train.evaluation import Evaluation
 from agents.train.export import export_policy, read_results
 from agents.train.learner import level_of, make_model, make_policy
 from agents.train.network import Actor
@@ -82,6 +84,35 @@ def test_a_run_that_was_stopped_goes_on_as_if_it_had_not_been(run, tmp_path):
     strip = [{k: v for k, v in r.items() if k != "seconds"} for r in run.records]
     assert strip == [{k: v for k, v in r.items() if k != "seconds"} for r in resumed.records]
     assert len(strip) == 3
+
+
+def test_the_best_policy_is_best_in_all_scenarios_together():
+    config = replace(small(), eval_episodes=5)
+    policy, layout = make_policy(config), layout_of(config)
+
+    def measured(*names, episodes):
+        of = replace(config, env=replace(config.env, scenarios=names))
+        evaluation = Evaluation(check_environments(of), layout, episodes, 1)
+        found = evaluation.run(policy)
+        evaluation.close()
+        return found
+
+    one = measured("cars-los", episodes=2)
+    assert one == measured("cars-los", episodes=2)
+    both = measured("cars-los", "ring-los", episodes=5)
+    other = measured("ring-los", episodes=3)
+    # Of equally many cars; the second scenario has other seeds than alone.
+    low, high = sorted([one["return"], other["return"]])
+    assert low - 0.2 < both["return"] < high + 0.2
+    assert both["return"] != one["return"]
+    assert sorted(shares(5, 2)) == [2, 3]
+
+
+def test_every_scenario_needs_an_episode():
+    config = small()
+    both = replace(config.env, scenarios=("cars-los", "ring-los"))
+    with pytest.raises(UsageError, match="--eval-episodes: expected at least 2"):
+        check_environments(replace(config, env=both, eval_episodes=1))
 
 
 @pytest.mark.slow
