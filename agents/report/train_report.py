@@ -31,8 +31,8 @@ def train_report(config: TrainConfig, rows: Rows) -> str:
     page.heading("Learning curves")
     page.figure(
         curves([("", rows)]),
-        f"{config.eval_episodes} episodes in {', '.join(env.scenarios)} after every leg, the same every "
-        "time, driven by the most likely action; errors from 10 s on.",
+        f"{config.eval_episodes} episodes in {', '.join(env.scenarios)} after every leg, the same "
+        "every time, driven by the most likely action; errors from 10 s on.",
     )
     page.heading("Legs")
     page.table(
