@@ -18,8 +18,11 @@ from agents.errors import UsageError
 @click.option(
     "--results", type=Path, help="results.jsonl of `relpos compare`, for the policy's card."
 )
+@click.option("--last", is_flag=True, help="The policy of the last leg instead of the best.")
 @click.option("--json", "as_json", is_flag=True, help="The card as JSON on stdout, nothing else.")
-def export(run: Path, out: Path, name: str | None, results: Path | None, as_json: bool) -> None:
+def export(
+    run: Path, out: Path, name: str | None, results: Path | None, last: bool, as_json: bool
+) -> None:
     """Write the best policy of a training run as files that run without torch."""
     try:
         from agents.train.export import export_policy, read_results
@@ -28,7 +31,7 @@ def export(run: Path, out: Path, name: str | None, results: Path | None, as_json
             f"exporting needs {error.name}: pip install 'relpos-env[train]'"
         ) from error
     told = read_results(results) if results is not None else []
-    path = export_policy(run, out, name=name, results=told)
+    path = export_policy(run, out, name=name, results=told, last=last)
     if as_json:
         from agents.policy import load_policy
 

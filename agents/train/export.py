@@ -19,22 +19,28 @@ from agents.settings import to_json
 from agents.train.environments import layout_of
 from agents.train.learner import make_policy
 from agents.train.network import Actor
-from agents.train.run_folder import BEST, RunFolder, restore_weights
+from agents.train.run_folder import BEST, LAST, RunFolder, restore_weights
 
 PACKAGES = ("relpos-env", "torch", "stable-baselines3", "numpy", "numba")
 """Whose versions a card tells."""
 
 
 def export_policy(
-    run: Path, out: Path, *, name: str | None = None, results: Iterable[dict[str, Any]] = ()
+    run: Path,
+    out: Path,
+    *,
+    name: str | None = None,
+    results: Iterable[dict[str, Any]] = (),
+    last: bool = False,
 ) -> Path:
-    """Write the best policy of a run as a network and a card.
+    """Write a policy of a run as a network and a card.
 
     Args:
         run: Folder of the run.
         out: Folder to write to.
         name: Of the policy; by default that of the run's folder.
         results: What it reached, for the card, as of `relpos compare`.
+        last: That of the last leg instead of the best.
 
     Returns:
         The file with the network.
@@ -44,20 +50,22 @@ def export_policy(
     """
     folder = RunFolder(run)
     config = folder.config()
-    found = folder.load(BEST)
+    which = LAST if last else BEST
+    found = folder.load(which)
     if found is None:
-        raise UsageError(f"{run}: nothing trained yet, expected {BEST}")
+        raise UsageError(f"{run}: nothing trained yet, expected {which}")
     tensors, progress = found
+    measured = progress.log[-1 if last else progress.best_leg]
     policy = make_policy(config)
     restore_weights(policy, tensors)
     layout = layout_of(config)
     training = {
         "observation": config.env.observation,
         "seed": config.seed,
-        "frames": progress.log[progress.best_leg]["frames"],
-        "leg": progress.best_leg,
+        "frames": measured["frames"],
+        "leg": measured["leg"],
         "config": to_json(config),
-        "measured": progress.log[progress.best_leg],
+        "measured": measured,
         "versions": {p: version(p) for p in PACKAGES} | {"python": platform.python_version()},
     }
     card = Card(

@@ -26,7 +26,7 @@ from agents.train.export import export_policy, read_results
 from agents.train.learner import level_of, make_model, make_policy
 from agents.train.network import Actor
 from agents.train.run import train_policy
-from agents.train.run_folder import BEST, CONFIG, LAST, RunFolder
+from agents.train.run_folder import BEST, CONFIG, LAST, RunFolder, restore_weights
 from agents.train.train import train
 
 SMALL = {
@@ -171,6 +171,23 @@ def test_a_policy_with_beams_sees_them_and_is_exported(tmp_path):
         assert not torch.allclose(actor(seen), actor(closer))
     path = export_policy(tmp_path / "run", tmp_path / "out")
     assert load_policy(path).layout == Layout("estimate", 6, 1, 8)
+
+
+def test_the_policy_of_the_last_leg_can_be_exported(run, tmp_path):
+    best, last = (
+        load_policy(export_policy(run.folder, tmp_path, name=f"last-{k}", last=k)).card.training
+        for k in (False, True)
+    )
+    assert best["leg"] == run.progress.best_leg
+    assert last["leg"] == 2
+    assert last["measured"]["return"] == run.records[2]["return"]
+    seen = np.zeros((1, Layout("estimate", 6, 1).size), np.float32)
+    acted = load_policy(tmp_path / "last-True.onnx").driver(Layout("estimate", 6, 1)).act(seen)
+    with torch.no_grad():
+        policy = make_policy(run.config)
+        restore_weights(policy, RunFolder(run.folder).load(LAST)[0])
+        expected = Actor(policy)(torch.from_numpy(seen)).numpy()
+    np.testing.assert_allclose(acted, expected, atol=1e-5)
 
 
 @pytest.mark.parametrize("observation", ["estimate", "estimate_cov", "ranges", "truth"])
