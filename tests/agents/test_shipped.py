@@ -16,13 +16,14 @@ EPISODES = range(2000, 2004)
 
 
 def mean_error(name, **setting):
-    card = load_policy(name).card
-    episodes = run_episodes(Contender(name, card.layout.observation), Setting(**setting), EPISODES)
+    layout = load_policy(name).card.layout
+    contender = Contender(name, layout.observation, proximity=layout.proximity)
+    episodes = run_episodes(contender, Setting(**setting), EPISODES)
     return float(np.mean([e.formation_error for e in episodes]))
 
 
 def test_there_are_some():
-    assert {"ring", "hold"} <= set(shipped_names())
+    assert {"ring", "hold", "hold-beams"} <= set(shipped_names())
 
 
 @pytest.mark.parametrize("name", shipped_names())
@@ -52,9 +53,10 @@ def test_they_keep_their_formation(name):
     assert error < IN_FORMATION
 
 
-@pytest.mark.parametrize("cars", [3, 4, 5, 6])
-def test_one_policy_drives_groups_of_several_sizes_in_a_room_it_has_not_seen(cars):
-    error = mean_error(
-        "ring", task="ring", scenario="ring-nlos", cars=cars, seconds=25.0, settle=15.0
-    )
+@pytest.mark.parametrize(
+    ("name", "task", "cars"),
+    [*(("ring", "ring", n) for n in (3, 4, 5, 6)), *(("hold-beams", "hold", n) for n in (3, 4))],
+)
+def test_one_policy_drives_groups_of_several_sizes_in_a_room_it_has_not_seen(name, task, cars):
+    error = mean_error(name, task=task, scenario="ring-nlos", cars=cars, seconds=25.0, settle=15.0)
     assert error < IN_FORMATION
