@@ -66,17 +66,21 @@ def bench_policy(
     rows.append(_row("observation and act, the same", *best_of_turns(jobs, TURNS)))
     for name in shipped_names():
         policy = load_policy(name)
-        if policy.layout.refusal(seen) is None:
-            jobs = [_turn(_decision(formation, d), n) for d in (policy.driver(seen), theirs)]
-            rows.append(_row(f"observation and act, policy {name}", *best_of_turns(jobs, TURNS)))
+        room = _room(policy.layout.proximity)
+        decisions = (
+            _decision(room, policy.driver(Layout.of(room.parts))),
+            _decision(formation, theirs),
+        )
+        jobs = [_turn(decide, n) for decide in decisions]
+        rows.append(_row(f"observation and act, policy {name}", *best_of_turns(jobs, TURNS)))
     if progress is not None:
         progress(1.0)
     return rows
 
 
-def _room() -> Formation:
+def _room(proximity: int = 0) -> Formation:
     """An environment in which the trackers know something."""
-    formation = Formation(configure({"scenario": SCENARIO}))
+    formation = Formation(configure({"scenario": SCENARIO, "proximity": proximity}))
     formation.seed(0, np.random.default_rng(0))
     formation.begin(0)
     speed, steering = np.full((1, 3), 0.5), np.full((1, 3), 0.2)
