@@ -15,8 +15,9 @@ from agents.errors import UsageError
 @click.command()
 @click.option(
     "--scenario",
-    help="cars-los, cars-nlos, gap, hall, open, random, ring-los, ring-nlos, swarm-nlos, "
-    "warehouse, or a file *.toml; by default that of the policy or of the task.",
+    help="cars-los, cars-nlos, gap, hall, open, random, ring-los, ring-nlos, rooms-3x5, "
+    "rooms-5x5, rooms-9x7, swarm-nlos, warehouse, or a file *.toml; by default that of the "
+    "policy or of the task.",
 )
 @click.option(
     "--task",

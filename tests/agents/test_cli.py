@@ -181,7 +181,11 @@ def test_help_names_the_filters_scenarios_and_tasks():
     from tracking.filters import FILTERS
 
     assert all(name in relpos("track", "--help").stdout for name in FILTERS)
-    for command, names in (("simulate", RECORDABLE), ("demo", [*SCENARIOS, *TASKS])):
+    driving = ("demo", "demo-hardware", "compare", "emulate", "rllib")
+    for command, names in (
+        ("simulate", RECORDABLE),
+        *((command, [*SCENARIOS, *TASKS]) for command in driving),
+    ):
         page = "".join(relpos(command, "--help").stdout.split())  # lines break at hyphens
         assert all(name in page for name in names)
 
