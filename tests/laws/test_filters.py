@@ -72,6 +72,17 @@ def test_noiseless_data_keep_zero_error(name, make_group):
     assert error.max() < 0.02
 
 
+def test_between_measurements_the_estimate_goes_on_as_fast_as_it_says(name, group):
+    """No measurement, so positions change by the reported velocity times the time."""
+    last = group.block.t[0, -1]
+    t = last + np.arange(0.01, 0.08, 0.01)
+    estimate = Tracker(group.constellation, filter=name).run(group.block, t)
+    step = np.diff(estimate.pos_ij_w[0], axis=0)
+    speed = 0.5 * (estimate.vel_ij_w[0, 1:] + estimate.vel_ij_w[0, :-1])
+    assert np.linalg.norm(speed, axis=-1).max() > 0.5
+    np.testing.assert_allclose(step, 0.01 * speed, atol=2e-4)
+
+
 def test_cold_start_finds_rotation_and_mirror_image(name, make_group):
     group = make_group(n=4, seconds=40.0, hz=100.0)
     estimate = Tracker(group.constellation, filter=name).step(group.block, group.t[-1])

@@ -87,10 +87,19 @@ def test_prediction_is_that_of_its_own_derivatives(dimensions, vehicle, static):
     np.testing.assert_allclose(P1, F @ P0 @ F.T + Q, atol=2e-7)
 
 
+def sum_since(c, s, since):
+    """The sums of all nodes over so long [s]."""
+    for k in range(3):
+        _sample_kernels.sum_inertial(c, s.nodes, s.held, s.pre, k, since)
+
+
 @pytest.mark.parametrize("dimensions", [2, 3])
 @pytest.mark.parametrize("seed", range(4))
-def test_range_has_its_own_derivatives(dimensions, seed):
+@pytest.mark.parametrize(("since", "atol"), [(0.0, 1e-7), (0.02, 2e-3)])
+def test_range_has_its_own_derivatives(dimensions, seed, since, atol):
+    """Those by biases and by heading errors of what happened since the states are left out."""
     c, s, scratch, _ = running(dimensions, seed=seed)
+    sum_since(c, s, since)
     lever_i, lever_j = np.array([0.3, -0.2, 0.1]), np.array([-0.1, 0.4, 0.2])
     _, m = range_model(c, s, 0, 1, lever_i, lever_j, scratch.idx, scratch.val)
     written = np.zeros(s.x.shape[1])
@@ -102,7 +111,25 @@ def test_range_has_its_own_derivatives(dimensions, seed):
             idx, val = scratch.idx.copy(), scratch.val.copy()
             values.append(range_model(c, s, 0, 1, lever_i, lever_j, idx, val)[0])
             s.x[0, k] -= h
-        assert written[k] == pytest.approx((values[0] - values[1]) / 2e-6, abs=1e-7)
+        assert written[k] == pytest.approx((values[0] - values[1]) / 2e-6, abs=atol)
+
+
+@pytest.mark.parametrize("vehicle", ["car", "human"])
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_a_range_is_the_same_before_and_after_carrying(dimensions, vehicle):
+    c, s, scratch, layout = running(dimensions, vehicle)
+    s.x[0, s.pairs["at_e"].min() :] = 0.0
+    lever = np.zeros(3)
+    sum_since(c, s, 0.02)
+    late, _ = range_model(c, s, 0, 1, lever, lever, scratch.idx, scratch.val)
+    at_t0 = s.x[0].copy()
+    _motion_kernels.predict(c, s, 0, 0.02, scratch)
+    s.pre[:] = 0.0
+    at_once, _ = range_model(c, s, 0, 1, lever, lever, scratch.idx, scratch.val)
+    assert late == pytest.approx(at_once, abs=1e-12)
+    s.x[0] = at_t0
+    before, _ = range_model(c, s, 0, 1, lever, lever, scratch.idx, scratch.val)
+    assert abs(before - late) > 1e-3
 
 
 @pytest.mark.parametrize("dimensions", [2, 3])

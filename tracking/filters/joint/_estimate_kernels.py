@@ -106,7 +106,7 @@ def look_ahead(c, s, scratch, t):
             scratch.P,
             s.waiting,
             s.n_waiting,
-            scratch.x,
+            s.moved,
             scratch.nlos,
             s.alive,
             s.loglik,

@@ -16,14 +16,14 @@ from tracking.filters.joint._cut_off_kernels import doubt_acceleration
 from tracking.filters.joint._doubt_kernels import note_fit, watch_nodes
 from tracking.filters.joint._estimate_kernels import write_estimate
 from tracking.filters.joint._linear_kernels import settle, settle_all
-from tracking.filters.joint._motion_kernels import predict
+from tracking.filters.joint._motion_kernels import moves, predict
 from tracking.filters.joint._range_kernels import (
     antenna_offset,
     fuse_range,
     fuse_survey,
     gap_evidence,
 )
-from tracking.filters.joint._rotation_kernels import follow_rotation
+from tracking.filters.joint._rotation_kernels import carry_moves, follow_rotation
 from tracking.filters.joint._sample_kernels import sum_inertial, take_state
 from tracking.filters.joint._sleep_kernels import may_move, none_moved, wake_up
 from tracking.filters.joint._start_kernels import try_join, try_start
@@ -123,7 +123,7 @@ def advance_all(coefficients, layout, state, scratch, t):
     for e in range(t.shape[0]):
         s = one_env(state, e)
         if s.group[0].started:
-            advance(coefficients[0], s, layout, scratch, t[e])
+            advance(coefficients[0], s, layout, scratch, t[e], True)
             settle_all(s, coefficients[0].n)
 
 
@@ -136,8 +136,12 @@ def hear(c, s, layout, scratch, i, j, a_i, a_j, t, distance, evidence, is_survey
     node_i, node_j = s.nodes[i], s.nodes[j]
     node_i.heard, node_j.heard = True, True
     node_i.t_heard, node_j.t_heard = t, t
+    runs = node_i.present and node_j.present
     if s.group[0].started:
-        advance(c, s, layout, scratch, t)
+        advance(c, s, layout, scratch, t, not runs)
+        for k in (i, j):
+            if moves(s.nodes[k]):
+                sum_inertial(c, s.nodes, s.held, s.pre, k, t)
         if t - s.group[0].t_check >= c.check_period:
             look_at_group(c, s, layout, t)
     if node_i.present and node_j.present:
@@ -147,27 +151,22 @@ def hear(c, s, layout, scratch, i, j, a_i, a_j, t, distance, evidence, is_survey
 
 
 @small_kernel
-def advance(c, s, layout, scratch, t):
-    """Carry every hypothesis to time t, and use what is known about the carriers."""
+def advance(c, s, layout, scratch, t, at_once):
+    """Carry every hypothesis to time t, and use what is known about the carriers.
+
+    Carrying a covariance costs more than a range does. So unless it has to be `at_once`, the states
+    stay where they are for a while, and ranges tell of them by what happened since
+    (`_range_kernels.range_model`): only the noise of so short a time comes after them, not before.
+    """
     group = s.group[0]
     if group.asleep and not none_moved(c, s, t):
         settle_all(s, c.n)
         wake_up(c, s, layout)
-    if t - group.t > SAME:
-        for i in range(s.nodes.shape[0]):
-            if s.nodes[i].present and not s.nodes[i].static:
-                sum_inertial(c, s.nodes, s.held, s.pre, i, t)
-        first, end = bank_range(s)
-        for h in range(first, end):
-            if s.alive[h]:
-                settle(s, h, c.n)
-                follow_rotation(c, s, h)
-                predict(c, s, h, t - group.t, scratch)
-        for i in range(s.nodes.shape[0]):
-            for k in range(N_PRE):
-                s.pre[i, k] = 0.0
-        group.t = t
-    if t - group.t_carrier >= c.carrier_period:
+    carriers_due = t - group.t_carrier >= c.carrier_period
+    since = t - group.t
+    if since > SAME and (at_once or carriers_due or since + SAME >= c.carry_period):
+        carry(c, s, scratch, t)
+    if carriers_due:
         first, end = bank_range(s)
         for h in range(first, end):
             if s.alive[h]:
@@ -179,6 +178,26 @@ def advance(c, s, layout, scratch, t):
             if s.alive[h]:
                 centre(c, s, h, scratch.w)
         group.t_gauge = t
+
+
+@small_kernel
+def carry(c, s, scratch, t):
+    """Carry every hypothesis to time t."""
+    group = s.group[0]
+    for i in range(s.nodes.shape[0]):
+        if moves(s.nodes[i]):
+            sum_inertial(c, s.nodes, s.held, s.pre, i, t)
+    first, end = bank_range(s)
+    for h in range(first, end):
+        if s.alive[h]:
+            settle(s, h, c.n)
+            follow_rotation(c, s, h)
+            carry_moves(c, s, h)
+            predict(c, s, h, t - group.t, scratch)
+    for i in range(s.nodes.shape[0]):
+        for k in range(N_PRE):
+            s.pre[i, k] = 0.0
+    group.t = t
 
 
 @small_kernel

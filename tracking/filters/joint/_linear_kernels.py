@@ -161,10 +161,11 @@ def take_off(P, h, W, g, m, n):
             d0, d1, d2, d3 = W[g, q, u], W[g, q + 1, u], W[g, q + 2, u], W[g, q + 3, u]
             for k in range(first, end):
                 w0, w1, w2, w3 = W[g, q, k], W[g, q + 1, k], W[g, q + 2, k], W[g, q + 3, k]
-                p_r = P[h, r, k] - ((a0 * w0 + a1 * w1) + (a2 * w2 + a3 * w3))
-                p_s = P[h, s, k] - ((b0 * w0 + b1 * w1) + (b2 * w2 + b3 * w3))
-                p_t = P[h, t, k] - ((c0 * w0 + c1 * w1) + (c2 * w2 + c3 * w3))
-                p_u = P[h, u, k] - ((d0 * w0 + d1 * w1) + (d2 * w2 + d3 * w3))
+                p_r, p_s, p_t, p_u = P[h, r, k], P[h, s, k], P[h, t, k], P[h, u, k]
+                p_r, p_s, p_t, p_u = p_r - a0 * w0, p_s - b0 * w0, p_t - c0 * w0, p_u - d0 * w0
+                p_r, p_s, p_t, p_u = p_r - a1 * w1, p_s - b1 * w1, p_t - c1 * w1, p_u - d1 * w1
+                p_r, p_s, p_t, p_u = p_r - a2 * w2, p_s - b2 * w2, p_t - c2 * w2, p_u - d2 * w2
+                p_r, p_s, p_t, p_u = p_r - a3 * w3, p_s - b3 * w3, p_t - c3 * w3, p_u - d3 * w3
                 P[h, r, k], P[h, s, k], P[h, t, k], P[h, u, k] = p_r, p_s, p_t, p_u
     for row in range(BLOCK, n, BLOCK):
         for column in range(0, row, BLOCK):

@@ -41,8 +41,6 @@ def predict(c, s, h, step, scratch):
         speed[i] = 0.0
         if moves(nodes[i]):
             move_mean(c, nodes[i], s.pre, x, h, i, scale, w, speed)
-            for k in range(d):
-                s.moved[h, nodes[i].at_p + k] += s.pre[i, 0] * s.moved[h, nodes[i].at_v + k]
     for p in range(pairs.shape[0]):
         at = pairs[p].at_e
         if at < 0 or not (nodes[pairs[p].i].present and nodes[pairs[p].j].present):
@@ -108,6 +106,30 @@ def move_mean(c, node, pre, x, h, i, scale, w, speed):
         x[h, b + k] *= keep
     scale[y] = decay(T / node.heading_tau)
     x[h, y] *= scale[y]
+
+
+@small_kernel
+def time_since(s, i):
+    """How much older than the sums of node i the states are [s]; 0 for a static node."""
+    return 0.0 if s.nodes[i].static else s.pre[i, 0]
+
+
+@small_kernel
+def way_since(c, s, h, i):
+    """What `move_mean` would add to the position of node i, three numbers [m]."""
+    node, pre, x, T = s.nodes[i], s.pre, s.x, s.pre[i, 0]
+    psi = x[h, node.at_h]
+    cos_r, sin_r = math.cos(psi), math.sin(psi)
+    b0, b1 = x[h, node.at_b], x[h, node.at_b + 1]
+    dp0, dp1, bp0, bp1 = pre[i, 4], pre[i, 5], pre[i, 9], pre[i, 10]
+    way0, way1, way2 = cos_r * dp0 - sin_r * dp1, sin_r * dp0 + cos_r * dp1, 0.0
+    if node.levelled:
+        bp0, bp1 = cos_r * bp0 - sin_r * bp1, sin_r * bp0 + cos_r * bp1
+    way0 += T * x[h, node.at_v] - (bp0 * b0 - bp1 * b1)
+    way1 += T * x[h, node.at_v + 1] - (bp1 * b0 + bp0 * b1)
+    if c.d == 3:
+        way2 = T * x[h, node.at_v + 2] + pre[i, 6] - 0.5 * T * T * x[h, node.at_b + 2]
+    return way0, way1, way2
 
 
 @small_kernel

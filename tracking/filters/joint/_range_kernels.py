@@ -2,7 +2,8 @@
 
     z = |p_j + l_j - p_i - l_i| + fast + slow + noise
 
-with the antenna offsets l turned by the nodes' orientations and heading errors. Behind an
+with the antenna offsets l turned by the nodes' orientations and heading errors, and p where the
+nodes are by now: the states may be a little older (`_event_kernels.advance`). Behind an
 obstacle an excess is added. Which it was is judged by Bayes' rule, from the residual, from the
 gap between received and first-path power where it is reported, and from what it was before
 (a Markov chain of two states for every pair and hypothesis). The correction is that of both
@@ -16,6 +17,7 @@ import math
 
 from tracking.compiled import small_kernel
 from tracking.filters.joint._linear_kernels import absorb, covariance, project
+from tracking.filters.joint._motion_kernels import time_since, way_since
 from tracking.filters.joint._sample_kernels import decay
 
 MIN_DISTANCE = 0.01
@@ -77,6 +79,13 @@ def range_model(c, s, h, p, lever_i, lever_j, idx, val):
     r2 = lever_j[2] - lever_i[2]
     if c.d == 3:
         r2 += s.x[h, at_j + 2] - s.x[h, at_i + 2]
+    T_i, T_j = time_since(s, pair.i), time_since(s, pair.j)
+    if T_i > 0.0:
+        way0, way1, way2 = way_since(c, s, h, pair.i)
+        r0, r1, r2 = r0 - way0, r1 - way1, r2 - way2
+    if T_j > 0.0:
+        way0, way1, way2 = way_since(c, s, h, pair.j)
+        r0, r1, r2 = r0 + way0, r1 + way1, r2 + way2
     distance = math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
     inverse = 1.0 / max(distance, MIN_DISTANCE)
     u0, u1, u2 = r0 * inverse, r1 * inverse, r2 * inverse
@@ -87,6 +96,15 @@ def range_model(c, s, h, p, lever_i, lever_j, idx, val):
         idx[4], idx[5] = at_i + 2, at_j + 2
         val[4], val[5] = -u2, u2
         m = 6
+    # By biases and heading errors the way changes too, by less than a millimetre: left out.
+    for node, T, sign in ((node_i, T_i, -1.0), (node_j, T_j, 1.0)):
+        if T > 0.0:
+            idx[m], idx[m + 1] = node.at_v, node.at_v + 1
+            val[m], val[m + 1] = sign * T * u0, sign * T * u1
+            m += 2
+            if c.d == 3:
+                idx[m], val[m] = node.at_v + 2, sign * T * u2
+                m += 1
     if not node_i.static and (i0 != 0.0 or i1 != 0.0):
         idx[m], val[m] = node_i.at_h, u0 * i1 - u1 * i0
         m += 1

@@ -53,6 +53,16 @@ def follow_rotation(c, s, h):
         turn_covariance(c, s, h, min(1.0, MOST * math.sqrt(extent2 / moved2)))
 
 
+@small_kernel
+def carry_moves(c, s, h):
+    """What measurements moved velocities by moves positions on until the end of the sums."""
+    for i in range(s.nodes.shape[0]):
+        node = s.nodes[i]
+        if node.present and not node.static:
+            for k in range(c.d):
+                s.moved[h, node.at_p + k] += s.pre[i, 0] * s.moved[h, node.at_v + k]
+
+
 @allocating_kernel
 def turn_covariance(c, s, h, share):
     """``P <- T P T^T`` for the given share of what was moved."""

@@ -46,6 +46,7 @@ _NUMBERS = (
     "rest_rate",
     "rest_after",
     "rest_var",
+    "carry_period",
     "carrier_period",
     "lost_after",
     "leave_after",

@@ -198,6 +198,8 @@ class JointParams:
     """[s] It must have done so for so long."""
     rest_std: float = 0.02
     """[m/s] Speed of a node at rest."""
+    carry_period: float = 0.02
+    """[s] The covariance is carried forward so often; ranges in between do with its older state."""
     carrier_period: float = 0.05
     """[s] Time between two uses of what is known about the carriers."""
     lost_after: float = 1.0

@@ -1,0 +1,24 @@
+"""The covariance is carried now and then: ranges in between say the same of an older state."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from tracking import Tracker, TrackerParams
+from tracking.filters import FilterParams
+from tracking.filters.joint.params import JointParams
+
+
+def test_carrying_late_is_carrying_at_once(make_group):
+    """But for the noise of a fiftieth of a second, and what comes of it later."""
+    group = make_group(n=4, seconds=12.0, hz=100.0)
+    t_out = np.arange(4.0, 12.0, 0.03)
+    often = TrackerParams(filter=FilterParams(joint=replace(JointParams(), carry_period=1e-6)))
+    at_once = Tracker(group.constellation, often).run(group.block, t_out)
+    late = Tracker(group.constellation).run(group.block, t_out)
+    np.testing.assert_array_equal(late.status, at_once.status)
+    off = np.linalg.norm(late.pos_ij_w - at_once.pos_ij_w, axis=-1)
+    std = np.sqrt(np.trace(at_once.cov[..., :3, :3], axis1=-2, axis2=-1))
+    assert np.median(off / std) < 0.05
+    assert np.max(off / std) < 0.3
+    np.testing.assert_allclose(np.median(late.cov), np.median(at_once.cov), rtol=0.02)
