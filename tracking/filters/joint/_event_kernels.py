@@ -72,9 +72,10 @@ def run_events(coefficients, layout, state, scratch, block, t_out, out):
                 a_i, a_j = antenna_i[e, k], antenna_j[e, k]
                 if i > j:
                     i, j, a_i, a_j = j, i, a_j, a_i
-                evidence = 0.0
+                sight = (0.0, c.leave_rate)
                 if has_power[e, k]:
-                    evidence = gap_evidence(c, values[e, k, 1] - values[e, k, 2])
+                    gap = values[e, k, 1] - values[e, k, 2]
+                    sight = (gap_evidence(c, gap), c.leave_rate_with_power)
                 hear(
                     c,
                     s,
@@ -86,7 +87,7 @@ def run_events(coefficients, layout, state, scratch, block, t_out, out):
                     a_j,
                     t[e, k],
                     values[e, k, 0],
-                    evidence,
+                    sight,
                     what == SURVEY,
                 )
             elif what == LEAVE or (what == JOIN and s.nodes[i].present):
@@ -128,7 +129,7 @@ def advance_all(coefficients, layout, state, scratch, t):
 
 
 @small_kernel
-def hear(c, s, layout, scratch, i, j, a_i, a_j, t, distance, evidence, is_survey):
+def hear(c, s, layout, scratch, i, j, a_i, a_j, t, distance, sight, is_survey):
     """A range or survey between nodes i < j."""
     p = layout.pair_index[i, j]
     if not is_survey and is_stuck(c, s, p, t, distance):
@@ -145,7 +146,7 @@ def hear(c, s, layout, scratch, i, j, a_i, a_j, t, distance, evidence, is_survey
         if t - s.group[0].t_check >= c.check_period:
             look_at_group(c, s, layout, t)
     if node_i.present and node_j.present:
-        take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, evidence, is_survey)
+        take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, sight, is_survey)
     else:
         take_first_range(c, s, layout, i, j, p, t, distance, is_survey)
 
@@ -210,7 +211,7 @@ def bank_range(s):
 
 
 @small_kernel
-def take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, evidence, is_survey):
+def take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, sight, is_survey):
     """A range or survey of a running pair, at the time of the states."""
     pair, group = s.pairs[p], s.group[0]
     i0, i1, i2 = antenna_offset(s.held, layout, pair.i, a_i)
@@ -224,7 +225,7 @@ def take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, evidence, is_sur
         if is_survey:
             fuse_survey(c, s, h, p, distance, scratch)
             continue
-        nu, nis, weight = fuse_range(c, s, h, p, dt, distance, levers, evidence, scratch)
+        nu, nis, weight = fuse_range(c, s, h, p, dt, distance, levers, sight, scratch)
         if h == group.best:
             pair.nis = nis
             capped = min(nis, 25.0) if weight > 0.5 else 25.0

@@ -160,7 +160,7 @@ def gap_evidence(c, gap):
 
 
 @small_kernel
-def fuse_range(c, s, h, p, dt, distance, levers, evidence, scratch):
+def fuse_range(c, s, h, p, dt, distance, levers, sight, scratch):
     """Correct hypothesis h with a range of pair p.
 
     Args:
@@ -171,7 +171,8 @@ def fuse_range(c, s, h, p, dt, distance, levers, evidence, scratch):
         dt: Time since the pair's last range [s].
         distance: The range [m].
         levers: Antennas of i and j relative to their nodes, six numbers [m].
-        evidence: Of the power gap, log-likelihood ratio; 0 where there is none.
+        sight: What its powers say of it: log-likelihood ratio of none, 0 where they are not
+            reported; and how often it is regained [1/s].
         scratch: Room.
 
     Returns:
@@ -181,7 +182,7 @@ def fuse_range(c, s, h, p, dt, distance, levers, evidence, scratch):
     nu = distance - predicted
     variance = project(s, h, c.n, m, scratch.idx, scratch.val, scratch.w)
     S = variance + c.white_var
-    switched, sane, likelihood = judge_sight(c, s, h, p, dt, nu, variance, evidence, scratch.w)
+    switched, sane, likelihood = judge_sight(c, s, h, p, dt, nu, variance, sight, scratch.w)
     if s.group[0].n_alive > 1:
         loglik = math.log(likelihood)
         s.loglik[h] += c.evidence * max(loglik, -0.5 * (c.max_nis + math.log(S)))
@@ -205,7 +206,7 @@ def fuse_range(c, s, h, p, dt, distance, levers, evidence, scratch):
 
 
 @small_kernel
-def judge_sight(c, s, h, p, dt, nu, variance, evidence, w):
+def judge_sight(c, s, h, p, dt, nu, variance, sight, w):
     """Bayes' rule over what the sight was and is; updates the pair's NLOS probability.
 
     The slow error holds the excess while there is no sight. So in sight before and after, or
@@ -220,7 +221,7 @@ def judge_sight(c, s, h, p, dt, nu, variance, evidence, w):
         dt: Time since the pair's last range [s].
         nu: Innovation [m].
         variance: Of the prediction [m2].
-        evidence: Of the power gap.
+        sight: As of `fuse_range`.
         w: ``P H``.
 
     Returns:
@@ -228,7 +229,8 @@ def judge_sight(c, s, h, p, dt, nu, variance, evidence, w):
     """
     at = s.pairs[p].at_e + 1
     before = s.nlos[h, p]
-    enter, leave = 1.0 - decay(c.enter_rate * dt), 1.0 - decay(c.leave_rate * dt)
+    evidence, leave_rate = sight
+    enter, leave = 1.0 - decay(c.enter_rate * dt), 1.0 - decay(leave_rate * dt)
     S = variance + c.white_var
     off = nu - c.excess
     S_enter = S + c.excess_var

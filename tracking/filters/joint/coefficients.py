@@ -18,6 +18,7 @@ _NUMBERS = (
     "slow_length",
     "enter_rate",
     "leave_rate",
+    "leave_rate_with_power",
     "excess",
     "excess_var",
     "excess_length",

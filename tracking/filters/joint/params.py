@@ -68,7 +68,7 @@ CARRIERS = {
     "robot": CarrierParams(accel_psd=0.07, bias_std=0.1, bias_tau=30.0, levelled=True),
     # Limbs: larger slow errors are measured, but a filter that may move them also makes them up.
     "human": CarrierParams(
-        accel_psd=0.06,
+        accel_psd=0.1,
         bias_std=0.03,
         bias_tau=5.0,
         heading_std=0.02,
@@ -113,6 +113,8 @@ class NlosParams:
     """[1/s] How often a pair loses sight."""
     leave_rate: float = 3.0
     """[1/s] How often it regains it."""
+    leave_rate_with_power: float = 6.0
+    """[1/s] The same where powers are reported: a range that tells its sight needs less of the past."""
     excess: float = 0.1
     """[m] Mean of what is added to a range behind an obstacle."""
     excess_std: float = 0.2
