@@ -158,7 +158,7 @@ class JointStartParams:
     """[m] Error of a node in the first shape."""
     speed_std: float = 1.5
     """[m/s] Of a node that was not seen at rest."""
-    prune: float = 15.0
+    prune: float = 20.0
     """[-] A hypothesis so much less likely than the best (log-likelihood) is dropped."""
     merge_distance: float = 0.15
     """[m] Two hypotheses as near as this in every pair are one."""
