@@ -114,7 +114,7 @@ class NlosParams:
     leave_rate: float = 3.0
     """[1/s] How often it regains it."""
     leave_rate_with_power: float = 6.0
-    """[1/s] The same where powers are reported: a range that tells its sight needs less of the past."""
+    """[1/s] The same where powers are reported: what each range tells leaves less to the past."""
     excess: float = 0.1
     """[m] Mean of what is added to a range behind an obstacle."""
     excess_std: float = 0.2
