@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from tracking import Constellation, NodeConfig
 from tracking.filters._level_kernels import angle_between, direction
-from tracking.filters.joint._bank_kernels import are_same
+from tracking.filters.joint._agreement_kernels import SAME_TURN, are_same, turn_between
 from tracking.filters.joint._copy_kernels import turn_hypothesis
 from tracking.filters.joint._linear_kernels import take_off
 from tracking.filters.joint.coefficients import make_coefficients
@@ -67,15 +67,33 @@ def test_hypotheses_are_the_same_where_they_agree_about_the_centre(dimensions, k
     for k in range(dimensions):  # all of the group elsewhere, and faster if it is free
         s.x[1, s.nodes["at_p"] + k] += 5.0
         s.x[1, s.nodes["at_v"][moving] + k] += 3.0 * moving.all()
-    assert are_same(c, s, 0, 1)
+    assert are_same(c, s, 0, 1, 0.0)
     limit = c["merge_distance"]
     at = s.nodes["at_v"][0]
     # One of n moves: it is off by (n - 1) / n of that from the mean, or by all beside static ones.
     share = 2.0 / 3.0 if moving.all() else 1.0
     s.x[1, at] += 0.95 * limit / share
-    assert are_same(c, s, 0, 1)
+    assert are_same(c, s, 0, 1, 0.0)
     s.x[1, at] += 0.1 * limit / share
-    assert not are_same(c, s, 0, 1)
+    assert not are_same(c, s, 0, 1, 0.0)
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+@pytest.mark.parametrize("kinds", [("moving",) * 3, ("moving", "static", "moving")])
+@pytest.mark.parametrize("turn", [-0.9 * SAME_TURN, 0.9 * SAME_TURN, 1.1 * SAME_TURN])
+def test_a_hypothesis_that_is_another_one_turned_a_little_is_the_same(dimensions, kinds, turn):
+    c, s = bank(dimensions, kinds, seed=3)
+    s.x[1] = s.x[0]
+    M = np.eye(dimensions)
+    M[:2, :2] = [[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]
+    turn_hypothesis(c, s, 1, M)
+    assert not are_same(c, s, 0, 1, 0.0)
+    found = turn_between(c, s, 0, 1)
+    assert are_same(c, s, 0, 1, found) == (abs(turn) < SAME_TURN)
+    assert found == (pytest.approx(-turn) if abs(turn) < SAME_TURN else 0.0)
+    M[1] *= -1.0  # and its mirror image is not
+    turn_hypothesis(c, s, 1, M)
+    assert not are_same(c, s, 0, 1, turn_between(c, s, 0, 1))
 
 
 @pytest.mark.parametrize("n", [4, 16, 27, 30, 88, 89])

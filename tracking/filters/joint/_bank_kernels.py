@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.compiled import allocating_kernel, kernel, small_kernel
+from tracking.compiled import allocating_kernel, kernel
 from tracking.filters._shape_kernels import SURVEYED
+from tracking.filters.joint._agreement_kernels import are_same, turn_between
 from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_hypothesis
 from tracking.filters.joint._linear_kernels import decouple
 
@@ -18,7 +19,6 @@ FLAT, OPEN = 2.5, 4.0
 """Extent of a layout across itself, in standard deviations: less is flat, more is open again."""
 MISFIT = 3.0
 """[-] Ranges that fit so badly, as a running mean of NIS, bring the mirror image up too."""
-
 LOST_SPEED = 0.7
 """[m/sqrt(s), m/s/sqrt(s)] How fast a lost filter forgets positions and velocities."""
 
@@ -167,58 +167,13 @@ def prune_bank(c, s):
                 and s.alive[b]
                 and b != group.best
                 and (s.loglik[a] >= s.loglik[b] or a == group.best)
-                and are_same(c, s, a, b)
+                and are_same(c, s, a, b, turn_between(c, s, a, b) if a == group.best else 0.0)
             ):
                 s.alive[b] = False
     group.n_alive = 0
     for h in range(n_hyps):
         group.n_alive += s.alive[h]
         s.loglik[h] -= top
-
-
-@kernel
-def are_same(c, s, a, b):
-    """True when two hypotheses agree in position and velocity of every node round the centre.
-
-    Velocities count over one second: a layout and its mirror image may meet in a line, but
-    they go on to different sides.
-    """
-    z = c.d - 1
-    way = (mean_gap(s, a, b, 0, False), mean_gap(s, a, b, 1, False), mean_gap(s, a, b, z, False))
-    pace = (mean_gap(s, a, b, 0, True), mean_gap(s, a, b, 1, True), mean_gap(s, a, b, z, True))
-    for i in range(s.nodes.shape[0]):
-        node = s.nodes[i]
-        if not node.present:
-            continue
-        squared = 0.0
-        for k in range(c.d):
-            p, v = node.at_p + k, node.at_v + k
-            squared += (s.x[a, p] - s.x[b, p] - way[k]) ** 2
-            if not node.static:
-                squared += (s.x[a, v] - s.x[b, v] - pace[k]) ** 2
-        if squared > c.merge_distance**2:
-            return False
-    return True
-
-
-@small_kernel
-def mean_gap(s, a, b, k, of_velocities):
-    """How far apart two hypotheses put the centre of the group along axis k, or how it moves.
-
-    Beside static nodes, velocities have no common part that is free.
-    """
-    total, present, moving = 0.0, 0, 0
-    for i in range(s.nodes.shape[0]):
-        node = s.nodes[i]
-        if node.present:
-            present += 1
-            moving += not node.static
-            at = node.at_v if of_velocities else node.at_p
-            if not (of_velocities and node.static):
-                total += s.x[a, at + k] - s.x[b, at + k]
-    if of_velocities and moving != present:
-        return 0.0
-    return total / max(present, 1)
 
 
 @kernel
