@@ -212,7 +212,7 @@ def bank_range(s):
 
 @small_kernel
 def take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, sight, is_survey):
-    """A range or survey of a running pair, at the time of the states."""
+    """A range or survey of a running pair, at most `carry_period` after the states."""
     pair, group = s.pairs[p], s.group[0]
     i0, i1, i2 = antenna_offset(s.held, layout, pair.i, a_i)
     j0, j1, j2 = antenna_offset(s.held, layout, pair.j, a_j)
