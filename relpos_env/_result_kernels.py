@@ -3,14 +3,28 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
+
+import numpy as np
 
 from tracking.compiled import kernel
 
 
+class TeamResults(NamedTuple):
+    """What came of a step for all cars of an environment that take part, arrays over (env)."""
+
+    reward: np.ndarray
+    """Mean."""
+    error: np.ndarray
+    """Formation error, mean [m]."""
+    contacts: np.ndarray
+    """Begun in the step, of all cars, whether or not they take part."""
+
+
 @kernel
 def judge(
-    first, end, present, to_come, contacts, terms, weights, done, cycles, max_cycles,
-    collision_ends, rewards, active, left, terminated, truncated,
+    first, end, present, to_come, contacts, error, terms, weights, done, cycles, max_cycles,
+    collision_ends, rewards, team, active, left, terminated, truncated,
 ):  # fmt: skip
     """Sum rewards up, and note who left and which episodes are over.
 
@@ -20,6 +34,7 @@ def judge(
         present: Cars in the room, (env, car).
         to_come: Cars that will come in, (env, car).
         contacts: Begun in the step, (env, car).
+        error: Formation errors, (env, car) [m].
         terms: Reward terms, (env, car, term).
         weights: (term)
         done: The task is accomplished, (env).
@@ -27,6 +42,7 @@ def judge(
         max_cycles: After so many it is over.
         collision_ends: Whether a contact ends it.
         rewards: (env, car), written.
+        team: TeamResults, written.
         active: Cars that take part, (env, car), updated.
         left: Cars that left for good, (env, car), written.
         terminated: (env), written.
@@ -35,6 +51,8 @@ def judge(
     for e in range(first, end):
         terminated[e] = done[e]
         truncated[e] = cycles[e] >= max_cycles
+        team.reward[e] = team.error[e] = team.contacts[e] = 0.0
+        size = 0
         for n in range(present.shape[1]):
             total = 0.0
             for k in range(weights.shape[0]):
@@ -43,8 +61,15 @@ def judge(
             stays = present[e, n] or (active[e, n] and to_come[e, n])
             left[e, n] = active[e, n] and not stays
             active[e, n] = stays
-            if collision_ends and contacts[e, n] > 0.0:
-                terminated[e] = True
+            team.contacts[e] += contacts[e, n]
+            if stays:
+                team.reward[e] += total
+                team.error[e] += error[e, n]
+                size += 1
+        team.reward[e] /= max(size, 1)
+        team.error[e] /= max(size, 1)
+        if collision_ends and team.contacts[e] > 0.0:
+            terminated[e] = True
 
 
 @kernel

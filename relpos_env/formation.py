@@ -11,7 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from relpos_env._result_kernels import judge, tracking_errors
+from relpos_env._result_kernels import TeamResults, judge, tracking_errors
 from relpos_env.config import Parts, whole_number
 from relpos_env.interface.observations import total_size
 from relpos_env.interface.observations.base import F32
@@ -67,6 +67,8 @@ class Formation:
         """(env, car, size); zeros for absent cars."""
         self.rewards: F64 = np.zeros((n_envs, n))
         """(env, car); 0 for absent cars."""
+        self.team = TeamResults(np.zeros(n_envs), np.zeros(n_envs), np.zeros(n_envs))
+        """What came of the last step for all cars together, (env)."""
         self.active: Bool = np.zeros((n_envs, n), dtype=bool)
         """Cars that take part, (env, car): in the room, or away and to return."""
         self.left: Bool = np.zeros((n_envs, n), dtype=bool)
@@ -228,9 +230,9 @@ class Formation:
         self._write = self.parts.mode.bind(self.loop.view, self._newest)
         swarm, view, config = self.loop.swarm, self.loop.view, self.parts.config
         self._verdict = (
-            self.state.present, swarm.to_come, swarm.contacts, self.task.rewards, self.weights,
-            self.task.done, self.cycles, config.max_cycles, config.end_on_collision, self.rewards,
-            self.active, self.left, self.terminated, self.truncated,
+            self.state.present, swarm.to_come, swarm.contacts, self.task.error, self.task.rewards,
+            self.weights, self.task.done, self.cycles, config.max_cycles, config.end_on_collision,
+            self.rewards, self.team, self.active, self.left, self.terminated, self.truncated,
         )  # fmt: skip
         self._judge_all = bind(judge, 0, self.n_envs, *self._verdict)
         self._compare = bind(tracking_errors, swarm.body, view.pos, view.ok, self._tracking_error)

@@ -53,13 +53,6 @@ def decode_team(
     return mode.decode(np.reshape(actions, (*batch, n_cars, *mode.shape)), where)
 
 
-def team_rewards(formation: Formation) -> F64:
-    """Mean reward of the cars that take part, (env)."""
-    n = np.maximum(formation.active.sum(axis=1), 1)
-    mean: F64 = (formation.rewards * formation.active).sum(axis=1) / n
-    return mean
-
-
 class FormationGymEnv(gymnasium.Env[F32, Any]):
     """``gymnasium.make("relpos_env/Formation-v0")``. Law as for `FormationEnv`."""
 
@@ -123,7 +116,7 @@ class FormationGymEnv(gymnasium.Env[F32, Any]):
         self._show()
         return (
             formation.observations[0].ravel().copy(),
-            float(team_rewards(formation)[0]),
+            float(formation.team.reward[0]),
             bool(formation.terminated[0]),
             bool(formation.truncated[0]),
             self._info(),
@@ -152,8 +145,8 @@ class FormationGymEnv(gymnasium.Env[F32, Any]):
         tracking = formation.tracking_error()[0]
         known = np.isfinite(tracking)
         info: dict[str, Any] = {
-            "formation_error": float((formation.task.error[0] * active).sum() / n),
-            "collisions": int(formation.loop.swarm.contacts[0].sum()),
+            "formation_error": float(formation.team.error[0]),
+            "collisions": int(formation.team.contacts[0]),
             "active": active.copy(),
             "rewards": dict(zip(formation.task.terms, terms.tolist(), strict=True)),
         }

@@ -17,7 +17,6 @@ from relpos_env.gym_env import (
     decode_team,
     team_action_space,
     team_observation_space,
-    team_rewards,
 )
 from relpos_env.interface.observations.base import F32
 from relpos_env.render.film import Film, check_render_mode
@@ -124,7 +123,7 @@ class FormationVectorEnv(VectorEnv[F32, Any, Any]):
         formation, parts = self.formation, self._parts
         batch = (self.num_envs,)
         formation.step(*decode_team(actions, parts.actions, batch, parts.n_cars, "actions"))
-        rewards = team_rewards(formation)
+        rewards = formation.team.reward.copy()
         terminated, truncated = formation.terminated.copy(), formation.truncated.copy()
         infos = self._infos()
         over = terminated | truncated
@@ -172,12 +171,11 @@ class FormationVectorEnv(VectorEnv[F32, Any, Any]):
     def _infos(self) -> dict[str, Any]:
         """Formation error and contacts of every environment, without a dict for any."""
         f = self.formation
-        n = np.maximum(f.active.sum(axis=1), 1)
         everyone = np.ones(self.num_envs, dtype=bool)
         return {
-            "formation_error": (f.task.error * f.active).sum(axis=1) / n,
+            "formation_error": f.team.error.copy(),
             "_formation_error": everyone,
-            "collisions": f.loop.swarm.contacts.sum(axis=1),
+            "collisions": f.team.contacts.copy(),
             "_collisions": everyone,
             "active": f.active.copy(),
             "_active": everyone,

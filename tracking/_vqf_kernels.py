@@ -69,8 +69,11 @@ def turned(qw, qx, qy, qz, x, y, z):
 
 @small_kernel
 def store_unit(q, e, n, at, w, x, y, z):
-    """Write a quaternion with its length made 1."""
-    scale = 1.0 / math.sqrt(w * w + x * x + y * y + z * z)
+    """Write a quaternion with its length made 1, from which only rounding has taken it.
+
+    One step of Newton for the inverse root: off by the square of what the length is off.
+    """
+    scale = 1.5 - 0.5 * (w * w + x * x + y * y + z * z)
     q[e, n, at], q[e, n, at + 1] = scale * w, scale * x
     q[e, n, at + 2], q[e, n, at + 3] = scale * y, scale * z
 

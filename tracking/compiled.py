@@ -80,9 +80,8 @@ def _compile(
     )(function)
     if not config.DISABLE_JIT:
         package = function.__module__.partition(".")[0]
-        folder = Path(inspect.getfile(function))
-        while folder.name != package:
-            folder = folder.parent
+        file = Path(inspect.getfile(function))
+        folder = next((p for p in file.parents if p.name == package), file.parent)
         index = compiled._cache._cache_file
         index._source_stamp = _stamp(folder)
         index._load_index = _tolerant(index._load_index)

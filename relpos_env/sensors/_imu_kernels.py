@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from relpos_env.sensors.radio._random_kernels import draw_key, normal_pair
+from relpos_env.sensors.radio._normal_kernels import normal
+from relpos_env.sensors.radio._random_kernels import draw_key
 from tracking.compiled import kernel, small_kernel
 
 GRAVITY = 9.81
@@ -33,9 +34,8 @@ def start_imus(p, seed, bias, drift, e):
             constant = p.gyr_bias if half == 0 else p.acc_bias
             slow = p.gyr_drift if half == 0 else p.acc_drift
             for a in range(3):
-                one, two = normal_pair(key, 3 * half + a)
-                bias[e, n, 3 * half + a] = constant * one
-                drift[e, n, 3 * half + a] = slow * two
+                bias[e, n, 3 * half + a] = constant * normal(key, 3 * half + a)
+                drift[e, n, 3 * half + a] = slow * normal(key, 6 + 3 * half + a)
 
 
 @small_kernel
@@ -58,18 +58,17 @@ def read_imu(p, seed, count, bias, drift, e, n, truth, speed, out, row):
     key = draw_key(seed, np.uint64(count * 64 + n))
     if count % DRIFT_EVERY == 0:
         for k in range(3):
-            one, two = normal_pair(key, 3 + k)
-            drift[e, n, k] = p.keep * drift[e, n, k] + p.gyr_step * one
-            drift[e, n, 3 + k] = p.keep * drift[e, n, 3 + k] + p.acc_step * two
+            gyr_noise, acc_noise = normal(key, 6 + k), normal(key, 9 + k)
+            drift[e, n, k] = p.keep * drift[e, n, k] + p.gyr_step * gyr_noise
+            drift[e, n, 3 + k] = p.keep * drift[e, n, 3 + k] + p.acc_step * acc_noise
     share = min(abs(speed) / p.vibration_speed, 1.0)
     gyr_var = p.gyr_noise**2 + (share * p.gyr_vibration) ** 2
     acc_var = p.acc_noise**2 + (share * p.vibration) ** 2
     gyr_std, acc_std = math.sqrt(gyr_var), math.sqrt(acc_var)
     gyr_steps, acc_steps = steps_per_unit(p.gyr_resolution), steps_per_unit(p.acc_resolution)
     for k in range(3):
-        one, two = normal_pair(key, k)
-        gyr = truth[k] + bias[e, n, k] + drift[e, n, k] + gyr_std * one
-        acc = truth[3 + k] + bias[e, n, 3 + k] + drift[e, n, 3 + k] + acc_std * two
+        gyr = truth[k] + bias[e, n, k] + drift[e, n, k] + gyr_std * normal(key, k)
+        acc = truth[3 + k] + bias[e, n, 3 + k] + drift[e, n, 3 + k] + acc_std * normal(key, 3 + k)
         out[e, row, k] = quantise(gyr, p.gyr_range, p.gyr_resolution, gyr_steps)
         out[e, row, 3 + k] = quantise(acc, p.acc_range, p.acc_resolution, acc_steps)
 

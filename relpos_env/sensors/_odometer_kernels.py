@@ -7,7 +7,8 @@ import math
 import numpy as np
 
 from relpos_env.sensors._imu_kernels import STARTS
-from relpos_env.sensors.radio._random_kernels import draw_key, normal_pair
+from relpos_env.sensors.radio._normal_kernels import normal
+from relpos_env.sensors.radio._random_kernels import draw_key
 from tracking.compiled import kernel
 
 
@@ -29,7 +30,7 @@ def read_odometers(p, seeds, tick, body, present, out):
             if present[e, n]:
                 c, s = math.cos(body[e, n, 2]), math.sin(body[e, n, 2])
                 # The wheel radius is wrong by the same share all through an episode.
-                scale, _ = normal_pair(draw_key(seeds[e], np.uint64(STARTS + n)), 0)
-                noise, _ = normal_pair(draw_key(seeds[e], np.uint64(tick[e] * 64 + n)), 0)
+                scale = normal(draw_key(seeds[e], np.uint64(STARTS + n)), 0)
+                noise = normal(draw_key(seeds[e], np.uint64(tick[e] * 64 + n)), 0)
                 speed = c * body[e, n, 3] + s * body[e, n, 4]
                 out[e, n] = (1.0 + p[e].scale_std * scale) * speed + p[e].noise * noise

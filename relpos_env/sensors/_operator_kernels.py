@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from relpos_env.sensors.radio._random_kernels import draw_key, normal_pair
+from relpos_env.sensors.radio._normal_kernels import normal
+from relpos_env.sensors.radio._random_kernels import draw_key
 from tracking.compiled import kernel
 
 
@@ -42,12 +43,12 @@ def operate(
                 y += pos[env, k, 1] - goal[env, k, 1]
                 n += 1
         if std > 0.0:
-            a, b = normal_pair(draw_key(seeds[env], np.uint64(count)), 0)
+            key = draw_key(seeds[env], np.uint64(count))
             # The first draw has the full deviation, so the error is stationary.
             kept = keep if count > 0 else 0.0
             fresh = std * math.sqrt(1.0 - kept * kept)
-            offset[env, 0] = kept * offset[env, 0] + fresh * a
-            offset[env, 1] = kept * offset[env, 1] + fresh * b
+            for axis in range(2):
+                offset[env, axis] = kept * offset[env, axis] + fresh * normal(key, axis)
         slot = count % depth
         seen[env, slot, 0] = x / max(n, 1) + offset[env, 0]
         seen[env, slot, 1] = y / max(n, 1) + offset[env, 1]

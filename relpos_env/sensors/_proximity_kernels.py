@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from relpos_env.sensors.radio._random_kernels import draw_key, normal_pair
+from relpos_env.sensors.radio._normal_kernels import normal
+from relpos_env.sensors.radio._random_kernels import draw_key
 from tracking.compiled import kernel, small_kernel
 
 
@@ -47,8 +48,7 @@ def read_proximity(p, seeds, tick, directions, body, present, size, room, boxes,
                     size, room, boxes, e, n,
                 )  # fmt: skip
                 if near < p[e].max_range:
-                    noise, _ = normal_pair(key, b)
-                    near += (p[e].noise_std + p[e].noise_share * near) * noise
+                    near += (p[e].noise_std + p[e].noise_share * near) * normal(key, b)
                     near = min(max(near, 0.0), p[e].max_range)
                 out[e, n, b] = near
 

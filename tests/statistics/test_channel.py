@@ -9,13 +9,11 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from scipy.stats import kstest
 
 from relpos_env.sensors.radio._air_kernels import hear_message, make_nodes, next_window
 from relpos_env.sensors.radio._air_state import LATENT, NODE, RECEPTION, make_channel
 from relpos_env.sensors.radio._channel_kernels import KNOT
 from relpos_env.sensors.radio._occlusion_kernels import crosses_box, crosses_capsule
-from relpos_env.sensors.radio._random_kernels import draw_key, normal_pair, uniform
 from relpos_env.sensors.radio.channel import CALIBRATED, EXACT, HALL, INDOOR, OUTDOOR
 from relpos_env.sensors.radio.params import RadioSimParams
 from relpos_env.sensors.radio.radio import Radio
@@ -345,36 +343,3 @@ def test_capsules_hide_what_points_along_the_line_say(a, b, p, q, radius, skin):
 
 def test_a_ball_hides_what_is_behind_it():
     check_capsule((-1.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.2, 0.9)
-
-
-# Counted random numbers
-
-
-def key_of(seed, count):
-    return np.uint64(draw_key(np.uint64(seed), np.uint64(count)))
-
-
-NEIGHBOURS = {
-    "counts": lambda k: key_of(7, k),
-    "messages": lambda k: key_of(7, (1 << 40) + 4096 * k),
-    "knots": lambda k: key_of(key_of(7, 2 << 40), k),
-    "seeds": lambda k: key_of(k, 1 << 40),
-}
-"""Keys that a simulation uses side by side."""
-
-
-@pytest.mark.parametrize("what", NEIGHBOURS)
-def test_counted_numbers_are_normal_and_independent(what):
-    n = 20_000
-    keys = [NEIGHBOURS[what](k) for k in range(n)]
-    z = np.array([normal_pair(key, 0) + normal_pair(key, 1) for key in keys]).T
-    for row in z:
-        assert kstest(row, "norm").pvalue > 1e-3
-        for lag in (1, 2, 64):
-            assert abs(np.corrcoef(row[lag:], row[:-lag])[0, 1]) < 4.5 / np.sqrt(n)
-    off = np.corrcoef(z) - np.eye(4)
-    shifted = np.corrcoef(z[:, 1:], z[:, :-1])[:4, 4:]
-    squares = np.corrcoef(z**2) - np.eye(4)
-    for table in (off, shifted, squares):
-        assert np.abs(table).max() < 4.5 / np.sqrt(n)
-    assert kstest([uniform(key, 0) for key in keys], "uniform").pvalue > 1e-3

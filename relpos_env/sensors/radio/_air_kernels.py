@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from relpos_env.sensors.radio._normal_kernels import normal
 from relpos_env.sensors.radio._path_kernels import (
     STARTS,
     enter_next_window,
@@ -11,7 +12,7 @@ from relpos_env.sensors.radio._path_kernels import (
     receive,
     true_time,
 )
-from relpos_env.sensors.radio._random_kernels import draw_key, normal_pair, uniform
+from relpos_env.sensors.radio._random_kernels import draw_key, uniform
 from tracking.compiled import kernel
 from tracking.ranging.timestamps import TICK_HZ
 
@@ -28,11 +29,10 @@ def make_nodes(nodes, seed, clock_offset, antenna_std):
     """
     for k in range(nodes.shape[0]):
         key = draw_key(seed, np.uint64(STARTS + k))
-        offset, antenna = normal_pair(key, 0)
-        offset = min(max(clock_offset * offset, -20e-6), 20e-6)
+        offset = min(max(clock_offset * normal(key, 0), -20e-6), 20e-6)
         nodes[k].base = int(uniform(key, 2) * 2.0**39) + 2**38
         nodes[k].rate = TICK_HZ * (1.0 + offset)
-        nodes[k].antenna = antenna_std * antenna
+        nodes[k].antenna = antenna_std * normal(key, 1)
 
 
 @kernel

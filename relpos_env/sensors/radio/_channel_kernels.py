@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from relpos_env.sensors.radio._random_kernels import draw_key, normal_pair, uniform
+from relpos_env.sensors.radio._normal_kernels import normal
+from relpos_env.sensors.radio._random_kernels import draw_key, uniform
 from tracking.compiled import small_kernel
 
 _DECIBEL = 20.0 / math.log(10.0)
@@ -39,16 +40,13 @@ def bring_latents(c, latent, key, travelled):
 def _draw_knot(c, latent, key, knot, correlated):
     """Move on to a knot, from the one before."""
     here = draw_key(key, np.uint64(knot))
-    a, b = normal_pair(here, 0)
-    d, e = normal_pair(here, 1)
-    f, _ = normal_pair(here, 2)
     latent.fast0, latent.slow0, latent.excess0 = latent.fast1, latent.slow1, latent.excess1
     latent.shadow0, latent.place0 = latent.shadow1, latent.place1
-    latent.fast1 = _step(c.rho_fast, latent.fast0, a, correlated)
-    latent.slow1 = _step(c.rho_slow, latent.slow0, b, correlated)
-    latent.excess1 = _step(c.rho_excess, latent.excess0, d, correlated)
-    latent.shadow1 = _step(c.rho_shadow, latent.shadow0, e, correlated)
-    latent.place1 = _step(c.rho_place, latent.place0, f, correlated)
+    latent.fast1 = _step(c.rho_fast, latent.fast0, normal(here, 0), correlated)
+    latent.slow1 = _step(c.rho_slow, latent.slow0, normal(here, 1), correlated)
+    latent.excess1 = _step(c.rho_excess, latent.excess0, normal(here, 2), correlated)
+    latent.shadow1 = _step(c.rho_shadow, latent.shadow0, normal(here, 3), correlated)
+    latent.place1 = _step(c.rho_place, latent.place0, normal(here, 4), correlated)
 
 
 @small_kernel

@@ -13,8 +13,9 @@ from relpos_env.sensors.radio._channel_kernels import (
     power_gap,
     reported_power,
 )
+from relpos_env.sensors.radio._normal_kernels import normal
 from relpos_env.sensors.radio._occlusion_kernels import crosses_box, crosses_capsule
-from relpos_env.sensors.radio._random_kernels import draw_key, normal_pair, uniform
+from relpos_env.sensors.radio._random_kernels import draw_key, uniform
 from tracking.compiled import small_kernel
 from tracking.ranging.timestamps import SPEED_OF_LIGHT
 
@@ -54,7 +55,7 @@ def enter_next_window(node, seed, window, k, dt, wander):
         dt: Length of the window [s].
         wander: Standard deviation of the change of rate in a second [1].
     """
-    noise, _ = normal_pair(draw_key(seed, np.uint64(CLOCKS + window * 64 + k)), 0)
+    noise = normal(draw_key(seed, np.uint64(CLOCKS + window * 64 + k)), 0)
     total = node.frac + dt * node.rate
     whole = math.floor(total)
     node.base += int(whole)
@@ -123,12 +124,11 @@ def receive(
     weight = bring_latents(c, latent, pair_key, travelled)
     flown += path_error(c, latent, weight, distance, nlos)
     flown += sender.antenna + receiver.antenna
-    stamp_noise, power_noise = normal_pair(key, 1)
     rx.src, rx.bad, rx.nlos = s, False, nlos
-    rx.stamp = nearest_tick(receiver, t + flown / SPEED_OF_LIGHT + c.stamp_std * stamp_noise)
+    rx.stamp = nearest_tick(receiver, t + flown / SPEED_OF_LIGHT + c.stamp_std * normal(key, 0))
     rx.strength = path_strength(c, latent, weight, distance, nlos)
     if readings:
-        rx.rx_power = reported_power(c, rx.strength) + c.power_noise * power_noise
+        rx.rx_power = reported_power(c, rx.strength) + c.power_noise * normal(key, 1)
         rx.fp_power = rx.rx_power - power_gap(c, latent, weight, distance, nlos, key)
         ux, uy, uz = (
             (pos1[s, 0] - pos0[s, 0]) / dt,
@@ -136,11 +136,10 @@ def receive(
             (pos1[s, 2] - pos0[s, 2]) / dt,
         )
         receding = ((vx - ux) * dx + (vy - uy) * dy + (vz - uz) * dz) * inverse
-        carrier_noise, _ = normal_pair(key, 2)
         rx.carrier = (
             (receiver.rate - sender.rate) / sender.rate
             + receding / SPEED_OF_LIGHT
-            + c.carrier_std * carrier_noise
+            + c.carrier_std * normal(key, 2)
         )
     return True
 

@@ -6,8 +6,6 @@ messages and sensors can be computed in any order and still get the same numbers
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from tracking.compiled import small_kernel
@@ -31,16 +29,3 @@ def draw_key(seed, counter):
 def uniform(key, k):
     """The k-th number of a key, uniform in (0, 1)."""
     return (float(draw_key(key, np.uint64(k)) >> _S11) + 0.5) * (1.0 / 9007199254740992.0)
-
-
-@small_kernel
-def normal_pair(key, k):
-    """Two independent standard normal numbers, the k-th of a key (polar method, Marsaglia 1964)."""
-    at = 64 * (k + 1)
-    while True:
-        x, y = 2.0 * uniform(key, at) - 1.0, 2.0 * uniform(key, at + 1) - 1.0
-        square = x * x + y * y
-        if square < 1.0:
-            scale = math.sqrt(-2.0 * math.log(square) / square)
-            return scale * x, scale * y
-        at += 2
