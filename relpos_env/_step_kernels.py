@@ -22,6 +22,7 @@ from relpos_env.sensors._imu_kernels import felt_on_car, read_imu
 from relpos_env.sensors._magnetometer_kernels import read_magnetometer
 from relpos_env.sensors.radio._radio_kernels import run_env_window
 from relpos_env.timing import SOON
+from tracking._angle_kernels import cosine_sine
 from tracking.compiled import kernel, small_kernel
 
 MAG, IMU, RANGE = 1, 2, 5
@@ -140,10 +141,12 @@ def sense(bodies, sensors, radio, scenes, dt, events, e):
         events.pose[e, step, n, 2] = heading
         events.pose[e, step, n, 3] = roll
         events.pose[e, step, n, 4] = pitch
-        place_antenna(sensors, scenes, body, heading, roll, pitch, e, n)
+        level = (math.cos(heading), math.sin(heading))
+        roll, pitch = cosine_sine(roll), cosine_sine(pitch)
+        place_antenna(sensors, scenes, body, level, roll, pitch, e, n)
         if not bodies.powered[e, n] or k + 2 > events.t.shape[1]:
             continue
-        c, s = math.cos(heading), math.sin(heading)
+        c, s = level
         forward = c * accel[e, n, 0] + s * accel[e, n, 1]
         left = c * accel[e, n, 1] - s * accel[e, n, 0]
         truth = felt_on_car(
@@ -154,7 +157,7 @@ def sense(bodies, sensors, radio, scenes, dt, events, e):
         at = (body[e, n, 0], body[e, n, 1])
         read_magnetometer(
             sensors.mag[e], sensors.mag_seed[e], tick, sensors.waves, sensors.hard_iron, e, n, at,
-            heading, roll, pitch, events.values, k,
+            level, roll, pitch, events.values, k,
         )  # fmt: skip
         write_own(events, e, k, t, MAG, n)
         read_imu(
@@ -197,12 +200,17 @@ def write_own(events, e, k, t, kind, n):
 
 @small_kernel
 def place_antenna(sensors, scenes, body, heading, roll, pitch, e, n):
-    """Move the antenna of a car on: where it was, and where it is on its mast."""
+    """Move the antenna of a car on: where it was, and where it is on its mast.
+
+    The angles are pairs of cosine and sine.
+    """
     before, now, h = scenes.pos0, scenes.pos1, sensors.mast[e]
     for a in range(3):
         before[e, n, a] = now[e, n, a]
-    c, s = math.cos(heading), math.sin(heading)
-    ahead, left = h * math.sin(pitch) * math.cos(roll), -h * math.sin(roll)
+    c, s = heading
+    cr, sr = roll
+    cp, sp = pitch
+    ahead, left = h * sp * cr, -h * sr
     now[e, n, 0] = body[e, n, 0] + c * ahead - s * left
     now[e, n, 1] = body[e, n, 1] + s * ahead + c * left
-    now[e, n, 2] = h * math.cos(pitch) * math.cos(roll)
+    now[e, n, 2] = h * cp * cr

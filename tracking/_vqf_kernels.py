@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 
+from tracking._angle_kernels import SERIES, small_turn
 from tracking._gyro_bias_kernels import BIAS, estimate_bias, start_bias
 from tracking._lowpass_kernels import low_pass
 from tracking._magnetic_kernels import COS, SIN, correct_heading, start_magnetic
@@ -27,10 +28,6 @@ Q_GYR, Q_ACC, Q_6D, FORCE, N_GYR_READ, N_ACC_READ = 0, 4, 8, 12, 21, 22
 N_TILT = 23
 """Columns of the memory: the rotations; the low pass of the specific force in the frame of the
 gyroscope; numbers of readings."""
-SERIES = 0.25**2
-"""[rad2] Square of half an angle below which a few terms of its sine and cosine are exact."""
-C1, C2, C3, C4, C5, C6 = ((-1) ** k / math.factorial(2 * k) for k in range(1, 7))
-S1, S2, S3, S4, S5, S6 = ((-1) ** k / math.factorial(2 * k + 1) for k in range(1, 7))
 
 
 @small_kernel
@@ -76,15 +73,6 @@ def store_unit(q, e, n, at, w, x, y, z):
     scale = 1.5 - 0.5 * (w * w + x * x + y * y + z * z)
     q[e, n, at], q[e, n, at + 1] = scale * w, scale * x
     q[e, n, at + 2], q[e, n, at + 3] = scale * y, scale * z
-
-
-@small_kernel
-def small_turn(square):
-    """Cosine of an angle and its sine over itself, from its square, by their Taylor series."""
-    x = square
-    sine = S1 + x * (S2 + x * (S3 + x * (S4 + x * (S5 + x * S6))))
-    cosine = C1 + x * (C2 + x * (C3 + x * (C4 + x * (C5 + x * C6))))
-    return 1.0 + x * cosine, 1.0 + x * sine
 
 
 @small_kernel

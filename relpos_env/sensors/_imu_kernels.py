@@ -94,13 +94,13 @@ def felt_on_car(yaw_rate, forward, left, roll, pitch, roll_rate, pitch_rate):
         yaw_rate: [rad/s]
         forward: Acceleration along the heading, level [m/s2].
         left: Acceleration across it [m/s2].
-        roll: About the forward axis, left side up is positive [rad].
-        pitch: About the left axis, nose down is positive [rad].
+        roll: Cosine and sine of the angle about the forward axis, left side up is positive.
+        pitch: The same about the left axis, nose down is positive.
         roll_rate: [rad/s]
         pitch_rate: [rad/s]
     """
-    sr, cr = math.sin(roll), math.cos(roll)
-    sp, cp = math.sin(pitch), math.cos(pitch)
+    cr, sr = roll
+    cp, sp = pitch
     x = cp * forward - sp * GRAVITY
     z = sp * forward + cp * GRAVITY
     return (

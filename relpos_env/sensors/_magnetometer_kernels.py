@@ -71,9 +71,9 @@ def read_magnetometer(p, seed, count, waves, hard_iron, e, n, at, heading, roll,
         e: Environment.
         n: Node.
         at: x, y of the node [m].
-        heading: [rad]
-        roll: [rad]
-        pitch: [rad]
+        heading: Its cosine and sine.
+        roll: Likewise.
+        pitch: Likewise.
         out: Values of events, (env, event, ...); columns 0 to 2 of the row are written.
         row: Which.
     """
@@ -83,10 +83,10 @@ def read_magnetometer(p, seed, count, waves, hard_iron, e, n, at, heading, roll,
         x += wave * waves[e, k, 3]
         y += wave * waves[e, k, 4]
         z += wave * waves[e, k, 5]
-    c, s = math.cos(heading), math.sin(heading)
+    c, s = heading
     x, y = c * x + s * y, c * y - s * x
-    sr, cr = math.sin(roll), math.cos(roll)
-    sp, cp = math.sin(pitch), math.cos(pitch)
+    cr, sr = roll
+    cp, sp = pitch
     x, z = cp * x - sp * z, sp * x + cp * z
     y, z = cr * y + sr * z, cr * z - sr * y
     key = draw_key(seed, np.uint64(count * 64 + n))

@@ -10,7 +10,7 @@ from tracking.filters.joint.params import JointParams
 
 
 def test_carrying_late_is_carrying_at_once(make_group):
-    """But for the noise of a fiftieth of a second, and what comes of it later."""
+    """But for the noise of a twentieth of a second, and what comes of it later."""
     group = make_group(n=4, seconds=12.0, hz=100.0)
     t_out = np.arange(4.0, 12.0, 0.03)
     often = TrackerParams(filter=FilterParams(joint=replace(JointParams(), carry_period=1e-6)))

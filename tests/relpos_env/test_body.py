@@ -185,7 +185,7 @@ def test_imus_in_space_agree_with_those_of_cars():
     read = imu.sample_3d(quat_from_yaw(heading), rate, np.hstack([accel, z]), np.zeros(2))
     for k, (c, s) in enumerate(zip(np.cos(heading), np.sin(heading), strict=True)):
         ahead, left = c * accel[k, 0] + s * accel[k, 1], c * accel[k, 1] - s * accel[k, 0]
-        felt = felt_on_car(yaw_rate[k], ahead, left, 0.0, 0.0, 0.0, 0.0)
+        felt = felt_on_car(yaw_rate[k], ahead, left, (1.0, 0.0), (1.0, 0.0), 0.0, 0.0)
         np.testing.assert_allclose(read[k], felt, atol=1e-12)
 
 

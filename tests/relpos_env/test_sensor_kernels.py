@@ -17,6 +17,7 @@ from relpos_env.sensors._odometer_kernels import read_odometers
 from relpos_env.sensors.imu import IMU, ImuSimParams, fill_imu
 from relpos_env.sensors.magnetometer import MAG, MagSimParams, fill_mag
 from relpos_env.sensors.odometer import ODOMETER, OdometerSimParams
+from tracking._angle_kernels import cosine_sine
 from tracking.filters.joint.records import as_records
 from tracking.geometry import GRAVITY, quat_conjugate, quat_from_yaw, quat_multiply, rotate
 
@@ -50,7 +51,7 @@ def tilted(roll, pitch):
 @pytest.mark.parametrize(("roll", "pitch"), [(0.0, 0.0), (0.1, 0.0), (0.0, -0.2), (0.3, 0.25)])
 def test_specific_force_has_gravity_in_it_by_roll_and_pitch(roll, pitch):
     forward, left = 1.3, -0.7
-    force = felt_on_car(0.4, forward, left, roll, pitch, 0.0, 0.0)[3:]
+    force = felt_on_car(0.4, forward, left, *map(cosine_sine, (roll, pitch)), 0.0, 0.0)[3:]
     level = np.array([forward, left, GRAVITY])
     np.testing.assert_allclose(
         force, rotate(quat_conjugate(tilted(roll, pitch)), level), atol=1e-12
@@ -67,7 +68,8 @@ def test_angular_rate_is_the_derivative_of_the_orientation():
 
     h = 1e-5
     turn = 2.0 * quat_multiply(quat_conjugate(q(0.0)), (q(h) - q(-h)) / (2.0 * h))
-    felt = felt_on_car(rates["yaw"], 0.0, 0.0, 0.2, -0.1, rates["roll"], rates["pitch"])[:3]
+    lean = (cosine_sine(0.2), cosine_sine(-0.1))
+    felt = felt_on_car(rates["yaw"], 0.0, 0.0, *lean, rates["roll"], rates["pitch"])[:3]
     np.testing.assert_allclose(felt, turn[1:], atol=1e-9)
 
 
@@ -131,7 +133,7 @@ class Magnetometers:
         out = np.zeros((1, n, 7))
         for k in range(n):
             where = (self.p, self.seed, count, self.waves, self.hard_iron, 0, k)
-            read_magnetometer(*where, at, heading, roll, pitch, out, k)
+            read_magnetometer(*where, at, *map(cosine_sine, (heading, roll, pitch)), out, k)
         return out[0, :, :3]
 
 

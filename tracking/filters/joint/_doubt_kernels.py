@@ -22,8 +22,6 @@ RECENT = 0.02
 """[-] Weight of a range in the share of a node's ranges that do not fit."""
 LATELY = 0.1
 """[-] The same of what it ranges beyond what is predicted."""
-OFFSET = 0.36
-"""[m] Every range of a node errs by so much, over the root of how many there are: an offset."""
 STAYS = 0.5
 """[-] It remains one down to this part of it."""
 HELD = 2.0
@@ -63,7 +61,7 @@ def watch_nodes(c, s, layout, t):
         if n < 2:
             continue
         astray = i == worst and blames and node.astray > 1.0 - MOST
-        limit = OFFSET / math.sqrt(n) * (STAYS if node.doubted else 1.0)
+        limit = c.common_error / math.sqrt(n) * (STAYS if node.doubted else 1.0)
         if astray or offset > limit:
             if not node.doubted:
                 free_offset(s, layout, i, JUMP**2)

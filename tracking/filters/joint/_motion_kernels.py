@@ -16,6 +16,7 @@ import math
 
 import numpy as np
 
+from tracking._angle_kernels import cosine_sine
 from tracking.compiled import small_kernel
 from tracking.filters.joint._sample_kernels import decay, is_aided
 
@@ -76,7 +77,7 @@ def move_mean(c, node, pre, x, h, i, scale, w, speed):
     d, T = c.d, pre[i, 0]
     p, v, b, y = node.at_p, node.at_v, node.at_b, node.at_h
     psi = x[h, y]
-    cos_r, sin_r = math.cos(psi), math.sin(psi)
+    cos_r, sin_r = cosine_sine(psi)
     dv0, dv1 = cos_r * pre[i, 1] - sin_r * pre[i, 2], sin_r * pre[i, 1] + cos_r * pre[i, 2]
     dp0, dp1 = cos_r * pre[i, 4] - sin_r * pre[i, 5], sin_r * pre[i, 4] + cos_r * pre[i, 5]
     if not node.levelled:
@@ -119,7 +120,7 @@ def way_since(c, s, h, i):
     """What `move_mean` would add to the position of node i, three numbers [m]."""
     node, pre, x, T = s.nodes[i], s.pre, s.x, s.pre[i, 0]
     psi = x[h, node.at_h]
-    cos_r, sin_r = math.cos(psi), math.sin(psi)
+    cos_r, sin_r = cosine_sine(psi)
     b0, b1 = x[h, node.at_b], x[h, node.at_b + 1]
     dp0, dp1, bp0, bp1 = pre[i, 4], pre[i, 5], pre[i, 9], pre[i, 10]
     way0, way1, way2 = cos_r * dp0 - sin_r * dp1, sin_r * dp0 + cos_r * dp1, 0.0

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 
+from tracking._angle_kernels import cosine_sine
 from tracking.compiled import small_kernel
 from tracking.filters.joint._linear_kernels import absorb, covariance, project
 from tracking.filters.joint._motion_kernels import time_since, way_since
@@ -68,11 +69,11 @@ def range_model(c, s, h, p, lever_i, lever_j, idx, val):
     i0, i1 = lever_i[0], lever_i[1]
     j0, j1 = lever_j[0], lever_j[1]
     if not node_i.static and (i0 != 0.0 or i1 != 0.0):
-        a = s.x[h, node_i.at_h]
-        i0, i1 = math.cos(a) * i0 - math.sin(a) * i1, math.sin(a) * i0 + math.cos(a) * i1
+        cos_r, sin_r = cosine_sine(s.x[h, node_i.at_h])
+        i0, i1 = cos_r * i0 - sin_r * i1, sin_r * i0 + cos_r * i1
     if not node_j.static and (j0 != 0.0 or j1 != 0.0):
-        a = s.x[h, node_j.at_h]
-        j0, j1 = math.cos(a) * j0 - math.sin(a) * j1, math.sin(a) * j0 + math.cos(a) * j1
+        cos_r, sin_r = cosine_sine(s.x[h, node_j.at_h])
+        j0, j1 = cos_r * j0 - sin_r * j1, sin_r * j0 + cos_r * j1
     at_i, at_j = node_i.at_p, node_j.at_p
     r0 = s.x[h, at_j] - s.x[h, at_i] + j0 - i0
     r1 = s.x[h, at_j + 1] - s.x[h, at_i + 1] + j1 - i1

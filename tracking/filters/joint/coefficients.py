@@ -53,6 +53,7 @@ _NUMBERS = (
     "leave_after",
     "ok_var",
     "doubt",
+    "common_error",
     "evidence",
 )
 COEFFICIENTS = np.dtype(

@@ -200,7 +200,7 @@ class JointParams:
     """[s] It must have done so for so long."""
     rest_std: float = 0.02
     """[m/s] Speed of a node at rest."""
-    carry_period: float = 0.02
+    carry_period: float = 0.05
     """[s] The covariance is carried forward so often; ranges in between do with its older state."""
     carrier_period: float = 0.05
     """[s] Time between two uses of what is known about the carriers."""
@@ -210,6 +210,8 @@ class JointParams:
     """[s] A node not heard for so long has left; its states are forgotten."""
     doubt: float = 6.0
     """[-] A pair whose ranges misfit so badly, as a running mean of NIS, is doubtful."""
+    common_error: float = 0.33
+    """[m] A node all of whose ranges err by so much, over the root of their number, is doubted."""
     ok_std: float = 1.0
     """[m] A pair is not ok while its position is less certain than this along an axis."""
 
