@@ -88,6 +88,7 @@ def make_coefficients(constellation: Constellation, params: JointParams) -> Reco
         "survey_var": params.survey_std**2,
         "rest_var": params.rest_std**2,
         "ok_var": params.ok_std**2,
+        "carry_period": min(params.carriers[n.vehicle].carry_period for n in constellation.nodes),
     }
     c = np.zeros(1, dtype=COEFFICIENTS)
     c["d"] = constellation.dimensions

@@ -46,6 +46,9 @@ class CarrierParams:
     inverse of its cornering stiffness per load [1/rad] times gravity."""
     rests: bool = True
     """It stands still now and then, and its IMU tells."""
+    carry_period: float = 0.02
+    """[s] The covariance of a group with such a node is carried forward at least so often; ranges in
+    between do with its older state, which has not the noise of so long."""
 
     def __post_init__(self) -> None:
         _expect_positive(self, "rear_axle", "slip")
@@ -64,6 +67,7 @@ CARRIERS = {
         sideways_std=0.08,
         rear_axle=0.15,
         slip=0.018,
+        carry_period=0.05,
     ),
     "robot": CarrierParams(accel_psd=0.07, bias_std=0.1, bias_tau=30.0, levelled=True),
     # Limbs: larger slow errors are measured, but a filter that may move them also makes them up.
@@ -200,8 +204,6 @@ class JointParams:
     """[s] It must have done so for so long."""
     rest_std: float = 0.02
     """[m/s] Speed of a node at rest."""
-    carry_period: float = 0.05
-    """[s] The covariance is carried forward so often; ranges in between do with its older state."""
     carrier_period: float = 0.05
     """[s] Time between two uses of what is known about the carriers."""
     lost_after: float = 1.0
