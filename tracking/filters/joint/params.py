@@ -47,8 +47,8 @@ class CarrierParams:
     rests: bool = True
     """It stands still now and then, and its IMU tells."""
     carry_period: float = 0.02
-    """[s] The covariance of a group with such a node is carried forward at least so often; ranges in
-    between do with its older state, which has not the noise of so long."""
+    """[s] The covariance of a group with such a node is carried forward so often; ranges in between
+    do with its older state, without the noise of the time since."""
 
     def __post_init__(self) -> None:
         _expect_positive(self, "rear_axle", "slip")
