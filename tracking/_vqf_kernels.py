@@ -121,8 +121,11 @@ def correct_tilt(s, c, e, n, ax, ay, az):
     aw, bx, by, bz = q[e, n, Q_ACC], q[e, n, Q_ACC + 1], q[e, n, Q_ACC + 2], q[e, n, Q_ACC + 3]
     ux, uy, uz = turned(aw, bx, by, bz, q[e, n, FORCE], q[e, n, FORCE + 1], q[e, n, FORCE + 2])
     length = math.sqrt(ux * ux + uy * uy + uz * uz)
-    scale = 1.0 / length if length > 0.0 else 0.0
-    ux, uy, uz = scale * ux, scale * uy, scale * uz
+    if length > 0.0:
+        scale = 1.0 / length
+        ux, uy, uz = scale * ux, scale * uy, scale * uz
+    else:
+        ux, uy, uz = 0.0, 0.0, 1.0  # tells nothing
     # The shortest turn that brings (ux, uy, uz) upright; of those by 180 degrees, one.
     half = math.sqrt(max(0.5 * (uz + 1.0), 0.0))
     cw, cx, cy = 0.0, 1.0, 0.0

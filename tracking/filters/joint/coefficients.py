@@ -66,6 +66,7 @@ def make_coefficients(constellation: Constellation, params: JointParams) -> Reco
     """Derive the constants of the kernels, (1)."""
     e, v, s = params.range_error, params.nlos, params.start
     has_states = has_range_errors(constellation, params)
+    moving = [n for n in constellation.nodes if n.kind != "static"] or constellation.nodes
     white_var = e.white_std**2
     if not has_states:
         # What lasts counts as white noise of the same weight over a second of driving.
@@ -88,7 +89,7 @@ def make_coefficients(constellation: Constellation, params: JointParams) -> Reco
         "survey_var": params.survey_std**2,
         "rest_var": params.rest_std**2,
         "ok_var": params.ok_std**2,
-        "carry_period": min(params.carriers[n.vehicle].carry_period for n in constellation.nodes),
+        "carry_period": min(params.carriers[n.vehicle].carry_period for n in moving),
     }
     c = np.zeros(1, dtype=COEFFICIENTS)
     c["d"] = constellation.dimensions
