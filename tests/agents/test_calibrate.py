@@ -37,8 +37,11 @@ def relpos(*args):
 
 
 @pytest.fixture(scope="module")
-def log():
-    return simulate(scenario="cars-nlos", seconds=25.0, seed=4, antenna_delay=0.3)
+def log(tmp_path_factory):
+    """A drive in a building with much iron in its floor."""
+    scenario = tmp_path_factory.mktemp("scenario") / "iron.toml"
+    scenario.write_text('extends = "cars-nlos"\n[mag]\ndisturbance = 3.0\n')
+    return simulate(scenario=str(scenario), seconds=25.0, seed=6, antenna_delay=0.3)
 
 
 @pytest.fixture(scope="module")

@@ -23,7 +23,7 @@ def mean_error(name, **setting):
 
 
 def test_there_are_some():
-    assert {"ring", "hold", "hold-beams"} <= set(shipped_names())
+    assert {"ring", "hold", "hold-beams", "hold-rooms"} <= set(shipped_names())
 
 
 @pytest.mark.parametrize("name", shipped_names())
@@ -54,9 +54,15 @@ def test_they_keep_their_formation(name):
 
 
 @pytest.mark.parametrize(
-    ("name", "task", "cars"),
-    [*(("ring", "ring", n) for n in (3, 4, 5, 6)), *(("hold-beams", "hold", n) for n in (3, 4))],
+    ("name", "task", "scenario", "cars"),
+    [
+        *(("ring", "ring", "ring-nlos", n) for n in (3, 4, 5, 6)),
+        *(("hold-beams", "hold", "ring-nlos", n) for n in (3, 4)),
+        *(("hold-rooms", "hold", "open", n) for n in (4, 6)),
+    ],
 )
-def test_one_policy_drives_groups_of_several_sizes_in_a_room_it_has_not_seen(name, task, cars):
-    error = mean_error(name, task=task, scenario="ring-nlos", cars=cars, seconds=25.0, settle=15.0)
+def test_one_policy_drives_groups_of_several_sizes_in_a_room_it_has_not_seen(
+    name, task, scenario, cars
+):
+    error = mean_error(name, task=task, scenario=scenario, cars=cars, seconds=25.0, settle=15.0)
     assert error < IN_FORMATION
