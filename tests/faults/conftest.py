@@ -95,6 +95,11 @@ class Run:
         off = self._pos - self._truth
         return float(np.median([rms(off[k][keep[k]]) for k in range(len(off))]))
 
+    def distance(self):
+        """Root mean square distance of the bad car's pairs, median run [m]."""
+        away = self._truth[:, :, self.touched]
+        return float(np.median([rms(one) for one in away]))
+
     def shape_error(self, begin=SETTLED, end=np.inf):
         """The same of the other pairs, after the rotation that fits them best [m]."""
         rows = self._during(begin, end)

@@ -47,13 +47,13 @@ def test_a_late_clock_costs_little(faults):
 
 
 def test_a_wrong_slope_costs_no_more_than_itself(faults):
-    """Ranges five per cent too long: a decimetre at two metres, in all directions alike.
+    """Ranges five per cent too long: pairs of that car are off by no more than that besides.
 
-    The pairs of that car are no further off than said, the others as good as before.
+    Nor are they further off than said, and the others are as good as before.
     """
     run = faults.run(lambda edit: edit.changed(edit.ranges(0.0, np.inf), RANGE, lambda v: 1.05 * v))
     assert run.error() < 2.0 * run.sigma(15.0, np.inf)
-    assert run.error() < np.hypot(faults.clean.error(), 0.05 * 2.5)
+    assert run.error() < np.hypot(faults.clean.error(), 0.05 * faults.clean.distance())
     faults.assert_others_as_before(run, 15.0, np.inf)
 
 
