@@ -80,10 +80,11 @@ def _compile(
     )(function)
     if not config.DISABLE_JIT:
         package = function.__module__.partition(".")[0]
-        file = Path(inspect.getfile(function))
-        folder = next((p for p in file.parents if p.name == package), file.parent)
+        # A kernel of a script has no package, only its own file, whose stamp numba has.
+        parents = Path(inspect.getfile(function)).parents
+        folder = next((p for p in parents if p.name == package), Path(__file__).parent)
         index = compiled._cache._cache_file
-        index._source_stamp = _stamp(folder)
+        index._source_stamp = (index._source_stamp, _stamp(folder))
         index._load_index = _tolerant(index._load_index)
     return compiled  # type: ignore[no-any-return]
 

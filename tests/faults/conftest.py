@@ -150,7 +150,7 @@ class Faults:
     def assert_others_as_without(self, run):
         """Pairs without the bad car keep the accuracy that they have if it is silent: 10 %.
 
-        That it is silent costs them 9 % themselves, of four cars.
+        That it is silent costs them 8 to 9 % themselves, of four cars.
         """
         assert run.shape_error(BEGIN, END) < 1.1 * self.silent.shape_error(BEGIN, END)
 

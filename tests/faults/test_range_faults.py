@@ -141,7 +141,7 @@ def test_ranges_that_stick_are_not_heard(faults):
     run = faults.run(stuck)
     assert run.ok_share(BEGIN + 2.0, END) < 0.05
     assert run.error(BEGIN, END) < 0.25
-    faults.assert_others_as_without(run)
+    faults.assert_others_as_before(run)
     faults.assert_as_good(run, END + 3.0)
 
 
