@@ -18,12 +18,14 @@ from agents.errors import UsageError
 @click.option(
     "--results", type=Path, help="results.jsonl of `relpos compare`, for the policy's card."
 )
-@click.option("--last", is_flag=True, help="The policy of the last leg instead of the best.")
+@click.option(
+    "--last", is_flag=True, help="The policy of the last leg of one run instead of what was chosen."
+)
 @click.option("--json", "as_json", is_flag=True, help="The card as JSON on stdout, nothing else.")
 def export(
     run: Path, out: Path, name: str | None, results: Path | None, last: bool, as_json: bool
 ) -> None:
-    """Write the best policy of a training run as files that run without torch."""
+    """Write the policy that a training run ended with as files that run without torch."""
     try:
         from agents.train.export import export_policy, read_results
     except ImportError as error:

@@ -19,7 +19,11 @@ from agents.train.config import TrainConfig
 @click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
 @options(TrainConfig)
 def train(out: Path | None, resume: Path | None, as_json: bool, **given: str | None) -> None:
-    """Train one policy for all cars; ends with a file that runs without torch, and a report."""
+    """Train one policy for all cars; ends with a file that runs without torch, and a report.
+
+    How good a policy gets depends much on the seed: --runs 2 trains two at a time and keeps the
+    better one.
+    """
     if (out is None) == (resume is None):
         raise UsageError("--out, --resume: expected one of them, a new folder or that of a run")
     changed = [k for k, v in given.items() if v is not None]
@@ -51,10 +55,10 @@ def train(out: Path | None, resume: Path | None, as_json: bool, **given: str | N
         return
     best = result.best
     print_table(
-        "The best policy",
+        "The policy that is kept",
         ["", ""],
         [
-            ["leg, frames", f"{best['leg']}, {best['frames']}"],
+            ["seed, leg, frames", f"{best['seed']}, {best['leg']}, {best['frames']}"],
             ["formation error [m]", f"{best['formation_error']:.3f}"],
             ["tracking error [m]", metres(best["tracking_error"])],
             ["collisions per minute", f"{best['collisions_per_min']:.2f}"],
@@ -66,7 +70,7 @@ def train(out: Path | None, resume: Path | None, as_json: bool, **given: str | N
 def _line(row: dict[str, Any]) -> str:
     rate = row["frames"] / max(row["seconds"], 1e-9)
     return (
-        f"leg {row['leg']:3d}  {row['frames']:>11,d} frames  {rate:7.0f}/s  "
+        f"seed {row['seed']}  leg {row['leg']:3d}  {row['frames']:>11,d} frames  {rate:7.0f}/s  "
         f"return {row['return']:6.3f}  formation {row['formation_error']:.3f} m  "
         f"collisions {row['collisions_per_min']:.2f}/min"
     )

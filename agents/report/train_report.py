@@ -11,41 +11,67 @@ from agents.settings import to_json
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from agents.train.choice import Choice
     from agents.train.config import TrainConfig
 
 Rows = Sequence[dict[str, Any]]
 
 
-def train_report(config: TrainConfig, rows: Rows) -> str:
+def train_report(config: TrainConfig, rows: Rows, choice: Choice) -> str:
     """The page.
 
     Args:
-        config: Of the run.
-        rows: What was measured after every leg.
+        config: Of the runs.
+        rows: What was measured after every leg of each, with its seed.
+        choice: Of the policy that is kept.
     """
     env, last = config.env, rows[-1]
+    seeds = list(dict.fromkeys(r["seed"] for r in rows))
+    kept = choice.measured
     page = Page(
         f"Training: {env.task} on {env.observation}",
-        f"{last['frames']:,} frames in {last['seconds'] / 60.0:.1f} minutes, seed {config.seed}",
+        f"{last['frames']:,} frames in {last['seconds'] / 60.0:.1f} minutes, "
+        f"{_seeds(seeds)}; kept: seed {kept['seed']} after leg {kept['leg']}",
     )
     page.heading("Learning curves")
     page.figure(
-        curves([("", rows)]),
+        curves(
+            [
+                (f"seed {s}" if len(seeds) > 1 else "", [r for r in rows if r["seed"] == s])
+                for s in seeds
+            ]
+        ),
         f"{config.eval_episodes} episodes in {', '.join(env.scenarios)} after every leg, the same "
         "every time, driven by the most likely action; errors from 10 s on.",
     )
+    page.heading("The choice")
+    page.table(
+        ["seed", "leg", "return", "formation [m]", "tracking [m]", "collisions/min"],
+        [[str(r["seed"]), str(r["leg"]), *_measured(r)] for r in choice.rows],
+    )
+    page.text(
+        f"The policy with the highest return in {config.choice_episodes} other episodes is kept, "
+        "among the best by the curves and the last of every run."
+    )
     page.heading("Legs")
     page.table(
-        ["leg", "frames", "level", "return", "formation [m]", "tracking [m]", "collisions/min"],
+        [
+            "seed",
+            "leg",
+            "frames",
+            "level",
+            "return",
+            "formation [m]",
+            "tracking [m]",
+            "collisions/min",
+        ],
         [
             [
+                str(r["seed"]),
                 str(r["leg"]),
                 f"{r['frames']:,}",
                 "-" if r["level"] is None else str(r["level"]),
-                f"{r['return']:.3f}",
-                metres(r["formation_error"]),
-                metres(r["tracking_error"]),
-                f"{r['collisions_per_min']:.2f}",
+                *_measured(r),
             ]
             for r in rows
         ],
@@ -56,6 +82,20 @@ def train_report(config: TrainConfig, rows: Rows) -> str:
         flat.update(value if isinstance(value, dict) else {name: value})
     page.table(["setting", "value"], [[k, str(v)] for k, v in flat.items()])
     return page.render()
+
+
+def _measured(row: dict[str, Any]) -> list[str]:
+    """What both tables tell of a policy."""
+    return [
+        f"{row['return']:.3f}",
+        metres(row["formation_error"]),
+        metres(row["tracking_error"]),
+        f"{row['collisions_per_min']:.2f}",
+    ]
+
+
+def _seeds(seeds: Sequence[int]) -> str:
+    return f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {seeds[0]} to {seeds[-1]}"
 
 
 def curves(runs: Sequence[tuple[str, Rows]]) -> Figure:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from agents.settings import number
 
-FORMAT = 1
+FORMAT = 2
 """Version of the run folder; another one is refused."""
 
 
@@ -65,6 +65,9 @@ class Ppo:
     """Transitions of a gradient step."""
     epochs: int = number(5, 1, 100)
     """Times that every transition is learned from."""
+    reward_scale: float = number(0.05, 1e-06, 1000)
+    """[-] Rewards are multiplied by it for the learner alone. Returns so are of the order of one:
+    the critic's gradient would else be most of what is clipped, and leave the actor little."""
     learning_rate: float = number(1e-3, 1e-07, 1)
     """[-] At first; falls to a hundredth along half a cosine."""
     gamma: float = number(0.95, 0, 1)
@@ -82,16 +85,27 @@ class TrainConfig:
     """A training run."""
 
     frames: int = number(6_000_000, 1000, 1000000000000)
-    """Decisions of cars until the end, those of absent ones counted; the last leg is whole."""
+    """Decisions of cars until the end of a run, those of absent ones counted; the last leg is
+    whole."""
+    runs: int = number(1, 1, 64)
+    """Runs side by side, with seeds from `seed` on, each in a process of its own; the best policy
+    of them is kept."""
     seed: int = number(0, 0, 2147483647)
     """Same seed, same weights, bit for bit on one machine with equal versions and threads."""
     leg: int = number(40, 1, 10000)
     """Updates from checkpoint to checkpoint; each leg begins with new episodes."""
     threads: int = number(2, 1, 256)
-    """Threads of simulation and of learning."""
+    """Threads of simulation and of learning, shared out among the runs."""
     eval_episodes: int = number(24, 1, 10000)
     """Episodes after each leg that tell the best policy, shared out among the scenarios, the same
     every time."""
+    choice_episodes: int = number(200, 1, 10000)
+    """Other episodes, at the end, that tell which policy is kept: the best or the last of a run."""
     env: EnvSetup = field(default_factory=EnvSetup)
     net: Networks = field(default_factory=Networks)
     ppo: Ppo = field(default_factory=Ppo)
+
+    def of_run(self, k: int) -> TrainConfig:
+        """Of one of the runs side by side."""
+        threads = max(self.threads // self.runs, 1)
+        return replace(self, runs=1, seed=self.seed + k, threads=threads)

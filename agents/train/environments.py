@@ -99,4 +99,4 @@ def make_rooms(config: TrainConfig, level: int | None) -> Rooms:
         )
         for scenario, n in zip(scenarios, shares(config.ppo.envs, len(scenarios)), strict=True)
     ]
-    return Rooms(parts, layout_of(config))
+    return Rooms(parts, layout_of(config), reward_scale=config.ppo.reward_scale)

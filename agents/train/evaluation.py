@@ -28,7 +28,15 @@ FIRST_SEED = 500
 class Evaluation:
     """Episodes of all scenarios, driven by what a policy holds for best."""
 
-    def __init__(self, every: Sequence[Parts], layout: Layout, episodes: int, threads: int) -> None:
+    def __init__(
+        self,
+        every: Sequence[Parts],
+        layout: Layout,
+        episodes: int,
+        threads: int,
+        *,
+        first_seed: int = FIRST_SEED,
+    ) -> None:
         """Make room for them.
 
         Args:
@@ -36,7 +44,9 @@ class Evaluation:
             layout: What the policy sees.
             episodes: How many, shared out among the scenarios.
             threads: Of the simulation.
+            first_seed: Of the first episode.
         """
+        self._first_seed = first_seed
         self._rooms = [
             _Room(Formation(parts, n, min(threads, n)), Padding(layout, Layout.of(parts)))
             for parts, n in zip(every, shares(episodes, len(every)), strict=True)
@@ -49,7 +59,7 @@ class Evaluation:
         error is None where nobody could use any estimate.
         """
         actor = Actor(policy).eval()
-        first, drives = FIRST_SEED, []
+        first, drives = self._first_seed, []
         for room in self._rooms:
             drives.append(room.drive(actor, first))
             first += room.formation.n_envs

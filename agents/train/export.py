@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import platform
 import warnings
 from collections.abc import Iterable
@@ -16,6 +17,7 @@ from agents.errors import UsageError
 from agents.policy.card import Card
 from agents.policy.write import write_policy
 from agents.settings import to_json
+from agents.train.choice import read_choice
 from agents.train.environments import layout_of
 from agents.train.learner import make_policy
 from agents.train.network import Actor
@@ -40,7 +42,7 @@ def export_policy(
         out: Folder to write to.
         name: Of the policy; by default that of the run's folder.
         results: What it reached, for the card, as of `relpos compare`.
-        last: That of the last leg instead of the best.
+        last: That of the last leg of one run instead of what was chosen.
 
     Returns:
         The file with the network.
@@ -48,14 +50,20 @@ def export_policy(
     Raises:
         UsageError: No run, nothing trained yet, or the folder cannot be written to.
     """
-    folder = RunFolder(run)
+    chosen = None if last else read_choice(run)
+    folder, which = RunFolder(run), LAST if last else BEST
+    if chosen is not None:
+        folder, which = RunFolder(chosen.run), chosen.weights
     config = folder.config()
-    which = LAST if last else BEST
+    if config.runs > 1:
+        expected = "the folder of one of them" if last else "that they have ended"
+        raise UsageError(f"{run}: {config.runs} runs side by side, expected {expected}")
     found = folder.load(which)
     if found is None:
         raise UsageError(f"{run}: nothing trained yet, expected {which}")
     tensors, progress = found
-    measured = progress.log[-1 if last else progress.best_leg]
+    # Both files were written after the leg whose weights they hold.
+    measured = progress.log[-1]
     policy = make_policy(config)
     restore_weights(policy, tensors)
     layout = layout_of(config)
@@ -66,6 +74,7 @@ def export_policy(
         "leg": measured["leg"],
         "config": to_json(config),
         "measured": measured,
+        "chosen_by": None if chosen is None else chosen.measured,
         "versions": {p: version(p) for p in PACKAGES} | {"python": platform.python_version()},
     }
     card = Card(
@@ -107,6 +116,8 @@ def to_onnx(actor: Actor, size: int) -> bytes:
     with warnings.catch_warnings():
         # The exporter warns of its own future.
         warnings.simplefilter("ignore")
+        # And of packages that are not needed here.
+        logging.getLogger("torch.onnx._internal.exporter._registration").setLevel(logging.ERROR)
         program = torch.onnx.export(
             actor.eval(),
             (torch.zeros(2, size),),

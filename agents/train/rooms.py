@@ -26,14 +26,18 @@ class Rooms(SharedSeats):
     as if the others were absent, and they take no more seats than they need.
     """
 
-    def __init__(self, parts: Sequence[FormationVecEnv], layout: Layout) -> None:
+    def __init__(
+        self, parts: Sequence[FormationVecEnv], layout: Layout, *, reward_scale: float = 1.0
+    ) -> None:
         """Join them.
 
         Args:
             parts: Of one observation mode and action space; all with the truth or none.
             layout: What the policy sees.
+            reward_scale: Rewards are multiplied by it [-].
         """
         self.parts = tuple(parts)
+        self._reward_scale = np.float32(reward_scale)
         self._views = [_SeatView(layout, part) for part in self.parts]
         self._rng = np.random.default_rng(0)
         ends = np.cumsum([p.num_envs for p in parts])
@@ -75,7 +79,7 @@ class Rooms(SharedSeats):
                 if "terminal_observation" in info:
                     info["terminal_observation"] = view(info["terminal_observation"])
             seen.append(view(observations))
-            rewards.append(reward)
+            rewards.append(reward * self._reward_scale)
             dones.append(done)
             infos += told
         return np.concatenate(seen), np.concatenate(rewards), np.concatenate(dones), infos

@@ -9,8 +9,12 @@ from typing import Any
 
 from agents.output import write_results
 from agents.report.train_report import train_report
+from agents.train.choice import choose, keep_choice
 from agents.train.config import TrainConfig
+from agents.train.environments import check_environments
 from agents.train.export import export_policy
+from agents.train.run_folder import RunFolder
+from agents.train.side_by_side import train_side_by_side
 from agents.train.train import train
 
 
@@ -21,9 +25,9 @@ class PolicyResult:
     policy: Path
     """The file with its network; the card is beside it."""
     best: dict[str, Any]
-    """What was measured of it in training."""
+    """What was measured of it when it was chosen: seed and leg too."""
     records: list[dict[str, Any]]
-    """What was measured after every leg."""
+    """What was measured after every leg, of one run after the other, each with its seed."""
 
 
 def train_policy(
@@ -32,7 +36,10 @@ def train_policy(
     *,
     progress: Callable[[float, dict[str, Any]], None] | None = None,
 ) -> PolicyResult:
-    """Train, then write the best policy and a report into the folder of the run.
+    """Train, then write the policy that drives best and a report into the folder of the run.
+
+    Several runs have folders in it, ``seed-0`` and so on, and the calling script must be
+    importable then: its work belongs below `if __name__ == "__main__"`.
 
     Args:
         config: Of a new run; None to go on with the run in the folder.
@@ -43,7 +50,34 @@ def train_policy(
         UsageError: The folder does not fit, or cannot be written to.
         EnvError: An environment that cannot be.
     """
-    result = train(config, folder, progress=progress)
+    resumed = config is None
+    config = RunFolder(folder).config() if config is None else config
+    done = [0.0] * config.runs
+
+    def tell(k: int, share: float, row: dict[str, Any]) -> None:
+        done[k] = share
+        if progress is not None:
+            progress(sum(done) / len(done), {"seed": seeds[k], **row})
+
+    configs = [config.of_run(k) for k in range(config.runs)]
+    seeds = [c.seed for c in configs]
+    if config.runs == 1:
+        folders = [folder]
+        given = None if resumed else config
+        results = [train(given, folder, progress=lambda *leg: tell(0, *leg))]
+    else:
+        if not resumed:
+            check_environments(config)
+            RunFolder(folder).create(config)
+        folders = [folder / f"seed-{seed}" for seed in seeds]
+        results = train_side_by_side(configs, folders, tell)
+    choice = choose(config, folders)
+    keep_choice(folder, choice)
     policy = export_policy(folder, folder)
-    write_results(folder, {"report.html": train_report(result.config, result.records)})
-    return PolicyResult(policy=policy, best=result.best, records=result.records)
+    records = [
+        {"seed": seed, **row}
+        for seed, result in zip(seeds, results, strict=True)
+        for row in result.records
+    ]
+    write_results(folder, {"report.html": train_report(config, records, choice)})
+    return PolicyResult(policy=policy, best=choice.measured, records=records)

@@ -80,6 +80,10 @@ class RunFolder:
     def __init__(self, path: Path) -> None:
         self.path = path
 
+    def exists(self) -> bool:
+        """Whether a run has begun here."""
+        return (self.path / CONFIG).exists()
+
     def create(self, config: TrainConfig) -> None:
         """Begin a new run.
 

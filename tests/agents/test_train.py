@@ -31,7 +31,8 @@ from agents.train.train import train
 
 SMALL = {
     "frames": "1400", "leg": "2", "envs": "3", "steps": "16", "batch": "64", "epochs": "2",
-    "eval_episodes": "2", "seconds": "12", "width": "8", "threads": "1", "cars": "6",
+    "eval_episodes": "2", "choice_episodes": "2", "seconds": "12", "width": "8",
+    "threads": "1", "cars": "6",
 }  # fmt: skip
 
 
@@ -301,9 +302,9 @@ def test_a_full_disk_leaves_the_last_good_checkpoint(run, tmp_path, monkeypatch)
 BAD_CONFIG = [
     ("not json", "damaged"),
     ("[]", "format None"),
-    ('{"format": 0, "config": {}}', "format 0, expected 1"),
-    ('{"format": 1, "config": {}}', "missing field"),
-    ('{"format": 1, "config": {"speed": 1}}', "unknown field 'speed'"),
+    ('{"format": 1, "config": {}}', "format 1, expected 2"),
+    ('{"format": 2, "config": {}}', "missing field"),
+    ('{"format": 2, "config": {"speed": 1}}', "unknown field 'speed'"),
 ]
 
 
