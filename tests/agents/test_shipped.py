@@ -21,7 +21,7 @@ def mean_error(name, **setting):
 
 
 def test_there_are_some():
-    assert {"ring", "hold", "hold-beams", "hold-rooms"} <= set(shipped_names())
+    assert {"ring", "hold", "hold-beams"} <= set(shipped_names())
 
 
 @pytest.mark.parametrize("name", shipped_names())
@@ -57,7 +57,7 @@ def test_they_keep_their_formation(name):
     [
         *(("ring", "ring", "ring-nlos", n) for n in (3, 4, 5, 6)),
         *(("hold-beams", "hold", "ring-nlos", n) for n in (3, 4)),
-        *(("hold-rooms", "hold", "open", n) for n in (4, 6)),
+        *(("hold-beams", "hold", "hall", n) for n in (4, 6)),
     ],
 )
 def test_one_policy_drives_groups_of_several_sizes_in_a_room_it_has_not_seen(
