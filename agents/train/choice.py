@@ -46,7 +46,7 @@ def choose(config: TrainConfig, runs: Sequence[Path]) -> Choice:
         runs: Their folders.
 
     Raises:
-        UsageError: A run is damaged.
+        UsageError: A run is damaged or not finished.
     """
     every, policy = check_environments(config), make_policy(config)
     evaluation = Evaluation(
@@ -58,7 +58,8 @@ def choose(config: TrainConfig, runs: Sequence[Path]) -> Choice:
         run, legs = RunFolder(path), set()
         for name in (BEST, LAST):
             loaded = run.load(name)
-            assert loaded is not None, f"{path} is not finished"
+            if loaded is None:
+                raise UsageError(f"{path}: expected {name} of a finished run, found none")
             tensors, progress = loaded
             row = progress.log[-1]
             if row["leg"] in legs:
@@ -100,8 +101,7 @@ def read_choice(folder: Path) -> Choice | None:
         weights, measured, rows = record["weights"], record["measured"], record["rows"]
     except (OSError, ValueError, TypeError, KeyError) as error:
         raise UsageError(f"{path}: damaged, expected a choice ({error!r})") from error
-    if weights not in (BEST, LAST) or run.resolve().parent not in (
-        folder.resolve(), folder.resolve().parent
-    ):  # fmt: skip
+    here = folder.resolve() in (run.resolve(), run.resolve().parent)
+    if weights not in (BEST, LAST) or not here:
         raise UsageError(f"{path}: damaged, expected a run of this folder")
     return Choice(run=run, weights=weights, measured=measured, rows=rows)

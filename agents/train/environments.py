@@ -63,7 +63,11 @@ def check_environments(config: TrainConfig) -> tuple[Parts, ...]:
     names, levels = config.env.scenarios, config.env.levels or (None,)
     if not names:
         raise UsageError("--scenarios: expected at least one")
-    for option, given in (("envs", config.ppo.envs), ("eval-episodes", config.eval_episodes)):
+    for option, given in (
+        ("envs", config.ppo.envs),
+        ("eval-episodes", config.eval_episodes),
+        ("choice-episodes", config.choice_episodes),
+    ):
         if given < len(names):
             raise UsageError(
                 f"--{option}: expected at least {len(names)}, one for each scenario, got {given}"

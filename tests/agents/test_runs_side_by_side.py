@@ -126,13 +126,22 @@ def test_a_process_that_is_killed_is_told(tmp_path):
 @pytest.mark.parametrize(
     "text",
     ["", "[]", "{}", '{"run": "..", "weights": 3, "measured": {}, "rows": []}',
-     '{"run": "../..", "weights": "last.safetensors", "measured": {}, "rows": []}'],
+     '{"run": "../..", "weights": "last.safetensors", "measured": {}, "rows": []}',
+     '{"run": "../other", "weights": "last.safetensors", "measured": {}, "rows": []}'],
 )  # fmt: skip
-def test_a_damaged_choice_is_refused(two, tmp_path, text):
+def test_a_damaged_choice_is_refused(tmp_path, text):
     (tmp_path / FILE).write_text(text)
     with pytest.raises(UsageError, match="damaged"):
         read_choice(tmp_path)
     assert read_choice(tmp_path / "none") is None
+
+
+def test_what_cannot_be_chosen_is_refused_before_any_training(tmp_path):
+    with pytest.raises(UsageError, match="--choice-episodes: expected at least 2"):
+        train_policy(small(runs="2", choice_episodes="1"), tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+    with pytest.raises(UsageError, match=r"expected best\.safetensors of a finished run"):
+        choose(small(), [tmp_path])
 
 
 def test_the_command_trains_several_and_tells_them_apart(tmp_path):
