@@ -51,6 +51,10 @@ class Networks:
     """What the critic sees: what the car sees, or the truth of all cars as well."""
     log_std: float = number(-1.0, -5, 1)
     """[-] Logarithm of the standard deviation of actions at first."""
+    final_log_std: float = number(-2.3, -5, 1)
+    """[-] The most that it may be in the end: a bound falls to this from `log_std` while half to
+    seven tenths of the run are done. What drives later has no such noise, and should not need
+    it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

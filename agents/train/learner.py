@@ -20,11 +20,19 @@ from agents.train.rooms import Rooms, observation_space
 from relpos_env.formation import N_TRUTH
 from relpos_env.interface.actions import ContinuousActions
 
+FALL = (0.5, 0.7)
+"""[-] Shares of the run between which the bound on the noise of actions falls."""
+
 
 def level_of(config: TrainConfig, frames: int) -> int | None:
     """Level of the curriculum after so many frames; None for what the scenarios say."""
     levels = config.env.levels
     return levels[min(frames * len(levels) // config.frames, len(levels) - 1)] if levels else None
+
+
+def share_done(config: TrainConfig, frames: int) -> float:
+    """Of the run; what Stable-Baselines3 counts itself is that of the leg."""
+    return min(frames / config.frames, 1.0)
 
 
 def make_model(config: TrainConfig, rooms: Rooms) -> PPO:
@@ -33,8 +41,7 @@ def make_model(config: TrainConfig, rooms: Rooms) -> PPO:
     models: list[PPO] = []
 
     def learning_rate(_: float) -> float:
-        # Stable-Baselines3 counts progress within a leg; this is that of the run.
-        share = min(models[0].num_timesteps / config.frames, 1.0) if models else 0.0
+        share = share_done(config, models[0].num_timesteps) if models else 0.0
         return ppo.learning_rate * (0.01 + 0.495 * (1.0 + math.cos(math.pi * share)))
 
     with warnings.catch_warnings():
@@ -96,8 +103,8 @@ def run_leg(model: PPO, config: TrainConfig, leg: int) -> None:
 def learn(model: PPO, config: TrainConfig) -> None:
     """Learn for the updates of a leg, from where the episodes are."""
     frames = config.leg * config.ppo.steps * model.n_envs
-    threads = _Threads(config.threads)
-    model.learn(frames, threads, reset_num_timesteps=False, log_interval=config.leg)
+    callbacks = [_Threads(config.threads), _Noise(config)]
+    model.learn(frames, callbacks, reset_num_timesteps=False, log_interval=config.leg)
 
 
 class _Threads(BaseCallback):  # type: ignore[misc]
@@ -116,6 +123,31 @@ class _Threads(BaseCallback):  # type: ignore[misc]
 
     def _on_rollout_end(self) -> None:
         torch.set_num_threads(self._most)
+
+    def _on_step(self) -> bool:
+        return True
+
+
+class _Noise(BaseCallback):  # type: ignore[misc]
+    """Keeps the noise of actions below a bound that falls along the run.
+
+    Left to learning, noise stays at 0.2 to 0.3 of the largest speed and steering, and policies
+    rely on it: the most likely action alone stands where noise would have moved the car. With less
+    noise from the start, they learn more slowly.
+    """
+
+    def __init__(self, config: TrainConfig) -> None:
+        super().__init__()
+        self._config = config
+
+    def _on_rollout_start(self) -> None:
+        net = self._config.net
+        done = share_done(self._config, self.model.num_timesteps)
+        fallen = min(max((done - FALL[0]) / (FALL[1] - FALL[0]), 0.0), 1.0)
+        if fallen > 0.0:
+            with torch.no_grad():
+                most = net.log_std + fallen * (net.final_log_std - net.log_std)
+                self.model.policy.log_std.clamp_(max=most)
 
     def _on_step(self) -> bool:
         return True

@@ -3,6 +3,10 @@
 A layout and its mirror image have the same ranges; motion tells them apart. While the nodes
 pass through a line (or a plane, in space) the two are one, and the filter may come out on the
 wrong side. So its mirror image is followed beside it from there, until one is unlikely.
+
+What fits badly for seconds on end is turned or mirrored, by a start or join that few ranges
+decided: ranges alone fit any rotation, but moves that go elsewhere than the IMUs say do not.
+Then all rotations and mirror images are followed again.
 """
 
 from __future__ import annotations
@@ -14,11 +18,16 @@ from tracking.filters._shape_kernels import SURVEYED
 from tracking.filters.joint._agreement_kernels import are_same, turn_between
 from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_hypothesis
 from tracking.filters.joint._linear_kernels import decouple
+from tracking.filters.joint._sample_kernels import decay
+from tracking.filters.joint._sleep_kernels import turn_all_ways
+from tracking.filters.joint._start_kernels import begin_pair
 
 FLAT, OPEN = 2.5, 4.0
 """Extent of a layout across itself, in standard deviations: less is flat, more is open again."""
-MISFIT = 3.0
-"""[-] Ranges that fit so badly, as a running mean of NIS, bring the mirror image up too."""
+STRAIN_TAU = 3.3
+"""[s] Time over which the misfit is averaged for it."""
+LOOSE_POSITION, LOOSE_SPEED = 0.2, 0.5
+"""[m, m/s] What is added to the standard deviations then."""
 LOST_SPEED = 0.7
 """[m/sqrt(s), m/s/sqrt(s)] How fast a lost filter forgets positions and velocities."""
 
@@ -125,6 +134,32 @@ def add_mirror_image(c, s):
 
 
 @kernel
+def watch_rotation(c, s, layout, dt):
+    """Follow all rotations and mirror images again where ranges have fitted badly for long."""
+    group = s.group[0]
+    group.strain += (1.0 - decay(dt / STRAIN_TAU)) * (group.misfit - group.strain)
+    if group.n_alive != 1 or group.asleep or group.strain < c.strained:
+        return
+    h = group.best
+    if flatness(c, s, h) == np.inf:
+        return
+    group.strain = 0.0
+    for i in range(s.nodes.shape[0]):
+        node = s.nodes[i]
+        if node.present and not node.static:
+            for k in range(c.d):
+                s.P[h, node.at_p + k, node.at_p + k] += LOOSE_POSITION**2
+                s.P[h, node.at_v + k, node.at_v + k] += LOOSE_SPEED**2
+    for p in range(s.pairs.shape[0]):
+        if s.nodes[s.pairs[p].i].present and s.nodes[s.pairs[p].j].present:
+            begin_pair(c, s, h, p)
+    turn_all_ways(c, s, layout, h)
+    for k in range(s.alive.shape[0]):
+        if s.alive[k] and k != h:
+            s.loglik[k] -= c.head_start
+
+
+@kernel
 def watch_mirror(c, s):
     """Bring the mirror image up where it can no longer be excluded."""
     group = s.group[0]
@@ -135,9 +170,6 @@ def watch_mirror(c, s):
         group.flat = True
     elif group.flat and ratio > OPEN:
         group.flat = False
-        add_mirror_image(c, s)
-    elif group.misfit > MISFIT and ratio > OPEN and ratio < np.inf:
-        group.misfit = 1.0
         add_mirror_image(c, s)
 
 

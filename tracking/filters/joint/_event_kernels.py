@@ -10,12 +10,14 @@ from tracking.filters.joint._bank_kernels import (
     remove_node,
     remove_silent,
     watch_mirror,
+    watch_rotation,
 )
 from tracking.filters.joint._carrier_kernels import apply_carriers, centre
 from tracking.filters.joint._cut_off_kernels import doubt_acceleration
 from tracking.filters.joint._doubt_kernels import note_fit, watch_nodes
 from tracking.filters.joint._estimate_kernels import write_estimate
 from tracking.filters.joint._linear_kernels import settle, settle_all
+from tracking.filters.joint._misplaced_kernels import watch_places
 from tracking.filters.joint._motion_kernels import moves, predict
 from tracking.filters.joint._range_kernels import (
     antenna_offset,
@@ -266,6 +268,8 @@ def look_at_group(c, s, layout, t):
     remove_silent(c, s, layout, t)
     prune_bank(c, s)
     watch_mirror(c, s)
+    watch_rotation(c, s, layout, t - s.group[0].t_check)
+    watch_places(c, s, layout, t)
     watch_nodes(c, s, layout, t)
     if s.group[0].lost:
         open_up(c, s, t - s.group[0].t_check)

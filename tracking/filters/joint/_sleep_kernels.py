@@ -55,22 +55,27 @@ def wake_up(c, s, layout):
     Where a node that joined may be on two sides there are two layouts; the bank has room for a
     few rotations of the second.
     """
-    group = s.group[0]
-    group.asleep = False
-    d, n_hyps = c.d, s.alive.shape[0]
-    first = layout.rotations[0, :d, :d].copy()
+    s.group[0].asleep = False
     was_alive = s.alive.copy()
-    for _ in range(n_hyps):
+    for _ in range(s.alive.shape[0]):
         # The likelier layout first.
         original = -1
-        for h in range(n_hyps):
+        for h in range(s.alive.shape[0]):
             if was_alive[h] and (original < 0 or s.loglik[h] > s.loglik[original]):
                 original = h
         if original < 0:
             return
         was_alive[original] = False
-        for r in range(1, layout.rotations.shape[0]):
-            h = copy_hypothesis(s, original)
-            if h >= 0:
-                turn = layout.rotations[r, :d, :d].copy() @ first.T.copy()
-                turn_hypothesis(c, s, h, np.ascontiguousarray(turn))
+        turn_all_ways(c, s, layout, original)
+
+
+@allocating_kernel
+def turn_all_ways(c, s, layout, original):
+    """Follow a hypothesis in all other rotations and mirrored, while the bank has room."""
+    d = c.d
+    first = layout.rotations[0, :d, :d].copy()
+    for r in range(1, layout.rotations.shape[0]):
+        h = copy_hypothesis(s, original)
+        if h >= 0:
+            turn = layout.rotations[r, :d, :d].copy() @ first.T.copy()
+            turn_hypothesis(c, s, h, np.ascontiguousarray(turn))

@@ -22,11 +22,8 @@ from tracking.filters._shape_kernels import (
 from tracking.filters.joint._carrier_kernels import CENTRE_VAR
 from tracking.filters.joint._copy_kernels import copy_hypothesis
 from tracking.filters.joint._linear_kernels import decouple
+from tracking.filters.joint._place_kernels import JOIN_SPREAD, refine
 from tracking.filters.joint._sleep_kernels import none_moved, rests
-
-JOIN_SPREAD = 0.75
-"""[m] Others that extend less than this along an axis leave the side of a newcomer open: along
-it, an error of a range counts several times."""
 
 
 @allocating_kernel
@@ -155,6 +152,10 @@ def try_join(c, s, layout, new, t):
                 known[a, k] = s.x[h, at + k]
             distance[a] = start_distance(s, layout, new, ready[a])
         n_sides = place(c.d, JOIN_SPREAD, c.merge_distance, known, distance, sides)
+        for side in range(n_sides):
+            refine(c.d, known, distance, sides[side])
+        if np.sum((sides[1] - sides[0]) ** 2) < c.merge_distance**2:
+            n_sides = 1
         for side in range(n_sides):
             target = h if side == 0 else copy_hypothesis(s, h)
             if target >= 0:

@@ -39,6 +39,8 @@ _NUMBERS = (
     "merge_distance",
     "max_nis",
     "check_period",
+    "strained",
+    "head_start",
     "unaided_psd2",
     "unaided_after",
     "static_drift2",

@@ -170,6 +170,12 @@ class JointStartParams:
     """[-] A single measurement counts for at most this in the likelihood."""
     check_period: float = 0.1
     """[s] Time between two looks at the bank."""
+    strained: float = 0.8
+    """[-] Slow mean of the NIS of ranges from which on it is doubted how the layout is turned. It
+    is 0.4 where all is well, as a range is believed less than its noise alone would allow, and up
+    to 1.0 in recordings of sensors that are known less well."""
+    head_start: float = 10.0
+    """[-] Log-likelihood by which other rotations have to make up for being looked at so late."""
 
     def __post_init__(self) -> None:
         _expect_positive(self)

@@ -81,6 +81,7 @@ GROUP = np.dtype(
         ("t_carrier", "f8"),
         ("t_gauge", "f8"),
         ("misfit", "f8"),  # running mean of the NIS of ranges in the best hypothesis [-]
+        ("strain", "f8"),  # slow running mean of the misfit [-]
         ("fit", "f8"),  # running share of ranges that fit [-]
         ("lost", "?"),  # most ranges do not fit, and no single node is to blame
         ("nis_sum", "f8"),

@@ -1,0 +1,100 @@
+"""Where a node is, by its distances to others that are known: the place that fits best.
+
+Least squares of squared distances need no first guess (`_shape_kernels.place`), but are far off
+where the others are nearly in line; from there the distances themselves are fitted. Obstacles
+only lengthen ranges, so a distance that is too short says more than one that is too long, and
+none more than a little.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tracking.compiled import allocating_kernel, kernel, small_kernel
+from tracking.filters._shape_kernels import place
+
+JOIN_SPREAD = 0.75
+"""[m] Others that extend less than this along an axis leave the side of a node open: along it, an
+error of a range counts several times."""
+SHORT, LONG = 0.12, 0.3
+"""[m] Scales of ranges shorter and longer than they should be."""
+MOST = 16.0
+"""[-] A single range says no more than this, as a squared error in these scales."""
+STEPS = 10
+"""[-] Of Gauss and Newton from a first place to the one that fits best."""
+
+
+@small_kernel
+def misfit(error):
+    """What an error [m] says against a place."""
+    scaled = error / (LONG if error > 0.0 else SHORT)
+    return min(scaled * scaled, MOST)
+
+
+@kernel
+def sum_of_misfits(known, distance, pos):
+    """What distances (other) to known places say against a position."""
+    total = 0.0
+    for a in range(known.shape[0]):
+        squared = 0.0
+        for k in range(3):
+            squared += (known[a, k] - pos[k]) ** 2
+        total += misfit(distance[a] - np.sqrt(squared))
+    return total
+
+
+@allocating_kernel
+def best_place(d, known, distance, pos):
+    """Replace a position by the one that the distances say least against; returns what they say.
+
+    Looked for from where least squares put it, from both sides of the others, and from the
+    mirror image of where it is.
+    """
+    first = np.zeros((3, 3))
+    place(d, JOIN_SPREAD, 0.0, known, distance, first[:2])
+    first[2] = mirror_image(d, known, pos)
+    least = np.inf
+    for a in range(3):
+        refine(d, known, distance, first[a])
+        total = sum_of_misfits(known, distance, first[a])
+        if total < least:
+            least = total
+            pos[:] = first[a]
+    return least
+
+
+@allocating_kernel
+def mirror_image(d, known, pos):
+    """Of a position across the line, or plane, that known places are nearest to."""
+    centre = np.zeros(3)
+    for a in range(known.shape[0]):
+        centre += known[a] / known.shape[0]
+    out = known - centre
+    _, E = np.linalg.eigh(out[:, :d].T.copy() @ out[:, :d].copy())
+    image = pos.copy()
+    off = 0.0
+    for k in range(d):
+        off += E[k, 0] * (pos[k] - centre[k])
+    for k in range(d):
+        image[k] -= 2.0 * off * E[k, 0]
+    return image
+
+
+@allocating_kernel
+def refine(d, known, distance, pos):
+    """Move a position to where the distances fit best; those that are far off do not count."""
+    for _ in range(STEPS):
+        N, g = 1e-6 * np.eye(d), np.zeros(d)
+        for a in range(known.shape[0]):
+            off = pos[:d] - known[a, :d]
+            way = max(np.sqrt(np.sum(off * off)), 1e-6)
+            error = distance[a] - way
+            scale = LONG if error > 0.0 else SHORT
+            weight = 1.0 / (scale * scale)
+            if misfit(error) >= MOST:
+                weight *= 0.01
+            for k in range(d):
+                g[k] += weight * error * off[k] / way
+                for q in range(d):
+                    N[k, q] += weight * off[k] * off[q] / (way * way)
+        pos[:d] += np.linalg.solve(N, g)
