@@ -20,6 +20,8 @@ SHORT, LONG = 0.12, 0.3
 """[m] Scales of ranges shorter and longer than they should be."""
 MOST = 16.0
 """[-] A single range says no more than this, as a squared error in these scales."""
+FAR_OFF = 0.01
+"""[-] How much a distance pulls that is as far off as can be."""
 STEPS = 10
 """[-] Of Gauss and Newton from a first place to the one that fits best."""
 
@@ -47,16 +49,16 @@ def sum_of_misfits(known, distance, pos):
 def best_place(d, known, distance, pos):
     """Replace a position by the one that the distances say least against; returns what they say.
 
-    Looked for from where least squares put it, from both sides of the others, and from the
-    mirror image of where it is.
+    Looked for from where least squares put it, on both sides of the others, from where it is, and
+    from the mirror image of that.
     """
-    first = np.zeros((3, 3))
+    first = np.zeros((4, 3))
     place(d, JOIN_SPREAD, 0.0, known, distance, first[:2])
     first[2] = mirror_image(d, known, pos)
+    first[3] = pos
     least = np.inf
-    for a in range(3):
-        refine(d, known, distance, first[a])
-        total = sum_of_misfits(known, distance, first[a])
+    for a in range(first.shape[0]):
+        total = refine(d, known, distance, first[a])
         if total < least:
             least = total
             pos[:] = first[a]
@@ -82,7 +84,11 @@ def mirror_image(d, known, pos):
 
 @allocating_kernel
 def refine(d, known, distance, pos):
-    """Move a position to where the distances fit best; those that are far off do not count."""
+    """Move a position to where the distances fit best; returns what they say against that.
+
+    Distances that are far off hardly pull. A step may lead away: the best place passed counts.
+    """
+    best, least = pos.copy(), sum_of_misfits(known, distance, pos)
     for _ in range(STEPS):
         N, g = 1e-6 * np.eye(d), np.zeros(d)
         for a in range(known.shape[0]):
@@ -92,9 +98,15 @@ def refine(d, known, distance, pos):
             scale = LONG if error > 0.0 else SHORT
             weight = 1.0 / (scale * scale)
             if misfit(error) >= MOST:
-                weight *= 0.01
+                weight *= FAR_OFF
             for k in range(d):
                 g[k] += weight * error * off[k] / way
                 for q in range(d):
                     N[k, q] += weight * off[k] * off[q] / (way * way)
         pos[:d] += np.linalg.solve(N, g)
+        total = sum_of_misfits(known, distance, pos)
+        if total < least:
+            least = total
+            best[:] = pos
+    pos[:] = best
+    return least
