@@ -18,7 +18,7 @@ def log(request):
 
 
 def spoiled(log, spoil):
-    """Estimates from when `spoil` changed the positions and velocities, (node, 2), of the filter."""
+    """Estimates from when `spoil` changed the filter's positions and velocities, (node, 2)."""
     tracker = Tracker(log.constellation)
     before = log.block.t[0] <= SPOILED
     tracker.step(log.block.take(before), SPOILED)

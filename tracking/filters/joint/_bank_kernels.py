@@ -140,6 +140,10 @@ def watch_rotation(c, s, layout, dt):
     group.strain += (1.0 - decay(dt / STRAIN_TAU)) * (group.misfit - group.strain)
     if group.n_alive != 1 or group.asleep or group.strain < c.strained:
         return
+    for i in range(s.nodes.shape[0]):
+        # Ranges that contradict the rest are explained by a node that is to blame for them.
+        if s.nodes[i].present and s.nodes[i].doubted:
+            return
     h = group.best
     if flatness(c, s, h) == np.inf:
         return

@@ -22,6 +22,8 @@ RECENT = 0.02
 """[-] Weight of a range in the share of a node's ranges that do not fit."""
 LATELY = 0.1
 """[-] The same of what it ranges beyond what is predicted."""
+FAR = 1.0
+"""[m] A single range pulls no further than this."""
 STAYS = 0.5
 """[-] It remains one down to this part of it."""
 HELD = 2.0
@@ -34,8 +36,12 @@ of its ranges [m/sqrt(s)], may become others."""
 @small_kernel
 def note_fit(s, p, fits, nu):
     """Count a range of pair p, which fits, 1, or not, 0, and was predicted shorter by nu [m]."""
-    s.pairs[p].residual += LATELY * (nu - s.pairs[p].residual)
-    for i in (s.pairs[p].i, s.pairs[p].j):
+    pair = s.pairs[p]
+    pair.residual += LATELY * (nu - pair.residual)
+    off = min(max(nu - pair.beyond, -FAR), FAR)
+    pair.beyond += LATELY * off
+    pair.scatter += LATELY * (abs(off) - pair.scatter)
+    for i in (pair.i, pair.j):
         s.nodes[i].astray += RECENT * (1.0 - fits - s.nodes[i].astray)
 
 

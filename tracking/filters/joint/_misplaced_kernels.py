@@ -2,9 +2,10 @@
 
 A node can settle where some of its ranges fit and others never do: on the wrong side of the
 others, after a start or a join from few ranges. There the filter stays, for the ranges that
-would lead it away fit nothing and hardly count. But an obstacle never shortens a range: a node
-that is nearer to others than it should be, and for which there is a place that all of its
-ranges agree on, is at the wrong one.
+would lead it away fit nothing and hardly count. But what it ranges tells of it: steady ranges,
+some too short, which no obstacle makes them, some too long, and a place that all of them agree
+on. Ranges that err alike are of a wrong calibration, and those that scatter mean nothing: both
+are for `_doubt_kernels`.
 """
 
 from __future__ import annotations
@@ -13,11 +14,13 @@ import numpy as np
 
 from tracking.compiled import allocating_kernel, kernel, small_kernel
 from tracking.filters.joint._doubt_kernels import ranges_now
-from tracking.filters.joint._place_kernels import best_place, misfit, sum_of_misfits
+from tracking.filters.joint._place_kernels import SHORT, best_place, misfit, sum_of_misfits
 from tracking.filters.joint._start_kernels import add_node
 
 SETTLED = 10
 """[-] Ranges after which the running mean of what a pair ranges beyond its prediction counts."""
+STEADY = 0.25
+"""[m] Those that scatter more about it mean nothing."""
 CONTRADICTED = 24.0
 """[-] Sum of misfits of a node's ranges from which on another place is looked for: more than one
 range has to be wrong, for which the other end may be to blame."""
@@ -31,35 +34,41 @@ def watch_places(c, s, layout, t):
     worst, most = -1, CONTRADICTED
     for i in range(s.nodes.shape[0]):
         if s.nodes[i].present and not s.nodes[i].static:
-            sum_i, n = contradiction(c, s, layout, i, t)
-            if n > c.d and sum_i > most:
-                worst, most = i, sum_i
+            total, n = contradiction(c, s, layout, i, t)
+            if n > c.d and total > most:
+                worst, most = i, total
     if worst >= 0:
         move_node(c, s, layout, worst, t)
 
 
 @kernel
 def contradiction(c, s, layout, i, t):
-    """How far the ranges of node i are from what is believed, and how many there are."""
-    total, n = 0.0, 0
+    """What the ranges of node i say against its place, and how many there are.
+
+    Nothing where all of them are too long, or all too short.
+    """
+    total, n, least, greatest = 0.0, 0, 0.0, 0.0
     for k in range(s.nodes.shape[0]):
         if k != i and has_settled(c, s, layout, i, k, t):
-            total += misfit(slow_error(s, layout.pair_index[i, k]))
+            error = slow_error(s, layout.pair_index[i, k])
+            total += misfit(error)
+            least, greatest = min(least, error), max(greatest, error)
             n += 1
-    return total, n
+    return total if least < -SHORT and greatest > SHORT else 0.0, n
 
 
 @small_kernel
 def has_settled(c, s, layout, i, k, t):
     """True if nodes i and k range with each other, and have for a while."""
     p = layout.pair_index[i, k]
-    return ranges_now(c, s, p, t) and s.pairs[p].n_ranges >= SETTLED
+    pair = s.pairs[p]
+    return ranges_now(c, s, p, t) and pair.n_ranges >= SETTLED and pair.scatter < STEADY
 
 
 @small_kernel
 def slow_error(s, p):
     """By how much pair p lately ranges more than its distance [m], in the best hypothesis."""
-    error = s.pairs[p].residual
+    error = s.pairs[p].beyond
     if s.pairs[p].at_e >= 0:
         at, h = s.pairs[p].at_e, s.group[0].best
         error += s.x[h, at] + s.x[h, at + 1]
@@ -93,7 +102,8 @@ def move_node(c, s, layout, i, t):
     if moved:
         s.nodes[i].astray = 0.0
         for a in range(m):
-            s.pairs[layout.pair_index[i, others[a]]].residual = 0.0
+            pair = s.pairs[layout.pair_index[i, others[a]]]
+            pair.residual, pair.beyond = 0.0, 0.0
 
 
 @kernel

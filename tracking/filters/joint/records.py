@@ -59,6 +59,8 @@ PAIR = np.dtype(
         ("n_same", "i8"),  # ranges before it that were equal
         ("way", "f8"),  # what both ends travelled meanwhile [m]
         ("residual", "f8"),  # running mean of its innovations [m]
+        ("beyond", "f8"),  # the same without those that are far off [m]
+        ("scatter", "f8"),  # running mean of their distance from it [m]
         ("start_sum", "f8"),  # sum of the first ranges of a pair not started [m]
         ("start_t", "f8"),  # time of the first of them [s]
         ("start_n", "i8"),  # how many
