@@ -16,7 +16,13 @@ import numpy as np
 from relpos_env.scenarios import HumanScenario, Scenario
 from relpos_env.sensors.radio.channel import ChannelParams
 from relpos_env.timing import DT
-from tracking.filters.joint.params import CARRIERS, JointParams, NlosParams, RangeErrorParams
+from tracking.filters.joint.params import (
+    CARRIERS,
+    JointParams,
+    JointStartParams,
+    NlosParams,
+    RangeErrorParams,
+)
 from tracking.geometry import GRAVITY
 from tracking.ranging.timestamps import SPEED_OF_LIGHT
 
@@ -69,6 +75,8 @@ def matched_params(scenario: Scenario | HumanScenario) -> JointParams:
             gap_los=channel.gap,
             gap_nlos=channel.gap + max(channel.gap_nlos, 0.1),
         ),
+        # The NIS is 1 where noise is what it is believed to be.
+        start=JointStartParams(strained=2.0),
     )
 
 

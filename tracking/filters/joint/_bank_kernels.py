@@ -26,6 +26,9 @@ FLAT, OPEN = 2.5, 4.0
 """Extent of a layout across itself, in standard deviations: less is flat, more is open again."""
 STRAIN_TAU = 3.3
 """[s] Time over which the misfit is averaged for it."""
+RAISED, LIMIT_TAU = 1.5, 60.0
+"""[-, s] After a search, only so much more begins another, until that is forgotten: where noise is
+larger than believed, ranges fit badly for ever."""
 LOOSE_POSITION, LOOSE_SPEED = 0.2, 0.5
 """[m, m/s] What is added to the standard deviations then."""
 LOST_SPEED = 0.7
@@ -138,15 +141,19 @@ def watch_rotation(c, s, layout, dt):
     """Follow all rotations and mirror images again where ranges have fitted badly for long."""
     group = s.group[0]
     group.strain += (1.0 - decay(dt / STRAIN_TAU)) * (group.misfit - group.strain)
-    if group.n_alive != 1 or group.asleep or group.strain < c.strained:
+    group.strain_limit += (1.0 - decay(dt / LIMIT_TAU)) * (c.strained - group.strain_limit)
+    if group.n_alive != 1 or group.asleep or group.strain < group.strain_limit:
         return
+    n_doubted = 0
     for i in range(s.nodes.shape[0]):
-        # Ranges that contradict the rest are explained by a node that is to blame for them.
-        if s.nodes[i].present and s.nodes[i].doubted:
-            return
+        n_doubted += s.nodes[i].present and s.nodes[i].doubted
+    # A single node that contradicts the others is to blame, and not the layout.
+    if n_doubted == 1:
+        return
     h = group.best
     if flatness(c, s, h) == np.inf:
         return
+    group.strain_limit = RAISED * max(group.strain, group.strain_limit)
     group.strain = 0.0
     for i in range(s.nodes.shape[0]):
         node = s.nodes[i]

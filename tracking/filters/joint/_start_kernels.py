@@ -71,6 +71,7 @@ def try_start(c, s, layout, t):
     group.best = 0
     group.t, group.t_check, group.t_carrier, group.t_gauge = t, t, t, t
     group.misfit, group.fit = 1.0, 1.0
+    group.strain, group.strain_limit = 0.0, c.strained
 
 
 @allocating_kernel

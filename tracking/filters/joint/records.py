@@ -84,6 +84,7 @@ GROUP = np.dtype(
         ("t_gauge", "f8"),
         ("misfit", "f8"),  # running mean of the NIS of ranges in the best hypothesis [-]
         ("strain", "f8"),  # slow running mean of the misfit [-]
+        ("strain_limit", "f8"),  # how much of it brings up other rotations [-]
         ("fit", "f8"),  # running share of ranges that fit [-]
         ("lost", "?"),  # most ranges do not fit, and no single node is to blame
         ("nis_sum", "f8"),
