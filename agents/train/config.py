@@ -7,7 +7,7 @@ from typing import Literal
 
 from agents.settings import number
 
-FORMAT = 2
+FORMAT = 3
 """Version of the run folder; another one is refused."""
 
 

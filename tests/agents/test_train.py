@@ -87,6 +87,14 @@ def test_a_run_that_was_stopped_goes_on_as_if_it_had_not_been(run, tmp_path):
     assert len(strip) == 3
 
 
+def test_the_noise_of_actions_falls_to_what_is_asked(run, tmp_path):
+    """But for the few steps of learning since the bound was last looked at."""
+    train(small(final_log_std="1"), tmp_path / "left")
+    free = weights(tmp_path / "left")["policy.log_std"]
+    assert (weights(run.folder)["policy.log_std"] < -2.2).all()
+    assert (free > -1.1).all()
+
+
 def test_the_best_policy_is_best_in_all_scenarios_together():
     config = replace(small(), eval_episodes=5)
     policy, layout = make_policy(config), layout_of(config)
@@ -302,9 +310,9 @@ def test_a_full_disk_leaves_the_last_good_checkpoint(run, tmp_path, monkeypatch)
 BAD_CONFIG = [
     ("not json", "damaged"),
     ("[]", "format None"),
-    ('{"format": 1, "config": {}}', "format 1, expected 2"),
-    ('{"format": 2, "config": {}}', "missing field"),
-    ('{"format": 2, "config": {"speed": 1}}', "unknown field 'speed'"),
+    ('{"format": 1, "config": {}}', "format 1, expected 3"),
+    ('{"format": 3, "config": {}}', "missing field"),
+    ('{"format": 3, "config": {"speed": 1}}', "unknown field 'speed'"),
 ]
 
 
