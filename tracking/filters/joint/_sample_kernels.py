@@ -11,9 +11,6 @@ import math
 from tracking.compiled import small_kernel
 from tracking.filters._level_kernels import angle_between, direction, level
 
-ORIENTED = 1.5
-"""[s] The orientation of a node is being found for so long: that it turns means little."""
-
 
 @small_kernel
 def is_aided(c, node, t):
@@ -99,14 +96,14 @@ def watch_rest(c, node, t, dt, accel, fresh):
         node.accel_var = c.rest_accel * c.rest_accel
         node.turning = c.rest_rate
         node.yaw_rate = 0.0
-        node.t_first = node.t_moved = t
+        node.t_first = node.t_moved = node.t_shaken = t
         return
     keep = decay(dt / 0.1)
     off = accel - node.accel_mean
     node.accel_mean += (1.0 - keep) * off
     node.accel_var = keep * node.accel_var + (1.0 - keep) * off * off
     shaken = node.accel_var + 0.25 * node.accel_mean * node.accel_mean
-    # Nobody starts without being shaken; what turns at first is the orientation, to be found.
-    turns = node.turning >= c.rest_rate and t - node.t_first > ORIENTED
-    if shaken >= c.rest_accel * c.rest_accel or turns:
+    if shaken >= c.rest_accel * c.rest_accel:
+        node.t_moved = node.t_shaken = t
+    elif node.turning >= c.rest_rate:
         node.t_moved = t

@@ -12,8 +12,9 @@ import numpy as np
 from tracking.compiled import allocating_kernel, small_kernel
 from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_hypothesis
 
-SETTLE = 0.5
-"""[s] The first samples of a node look like motion: its orientation is still being found."""
+SETTLE, ORIENTED = 0.5, 1.5
+"""[s] The first samples of a node look like motion: its orientation is still being found. That it
+turns means nothing for longer; but nobody starts without being shaken."""
 
 
 @small_kernel
@@ -33,7 +34,7 @@ def none_moved(c, s, t):
             continue
         if not node.has_state or t - node.t_state > c.unaided_after:
             return False
-        if node.t_moved - node.t_first > SETTLE:
+        if node.t_shaken - node.t_first > SETTLE or node.t_moved - node.t_first > ORIENTED:
             return False
     return True
 

@@ -23,6 +23,7 @@ NODE = np.dtype(
         ("turning", "f8"),  # running mean of the angular rate [rad/s]
         ("t_first", "f8"),  # its first sample, or the first after a long silence [s]
         ("t_moved", "f8"),  # last time it was not at rest [s]
+        ("t_shaken", "f8"),  # last time its acceleration told so [s]
         ("cut_off", "?"),  # its last acceleration was at the end of the sensor's scale
         ("astray", "f8"),  # running share of its ranges that do not fit [-]
         ("t_doubted", "f8"),  # when it last disagreed with the group [s]
