@@ -24,8 +24,6 @@ from tracking.filters.joint._start_kernels import begin_pair
 
 FLAT, OPEN = 2.5, 4.0
 """Extent of a layout across itself, in standard deviations: less is flat, more is open again."""
-MISFIT = 3.0
-"""[-] Ranges that fit so badly, as a running mean of NIS, bring the mirror image up at once."""
 STRAIN_TAU = 3.3
 """[s] Time over which the misfit is averaged for it."""
 RAISED, LIMIT_TAU = 1.5, 60.0
@@ -183,9 +181,6 @@ def watch_mirror(c, s):
         group.flat = True
     elif group.flat and ratio > OPEN:
         group.flat = False
-        add_mirror_image(c, s)
-    elif group.misfit > MISFIT and ratio > OPEN and ratio < np.inf:
-        group.misfit = 1.0
         add_mirror_image(c, s)
 
 
