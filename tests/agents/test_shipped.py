@@ -12,7 +12,7 @@ from agents.policy.find import find_policy
 from agents.settings import from_json, to_json
 from agents.train.config import TrainConfig
 
-EPISODES = range(2000, 2016)
+EPISODES = range(2000, 2004)
 
 
 def mean_error(name, **setting):
