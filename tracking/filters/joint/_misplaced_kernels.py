@@ -101,9 +101,6 @@ def move_node(c, s, layout, i, t):
                     moved = True
     if moved:
         s.nodes[i].astray = 0.0
-        for a in range(m):
-            pair = s.pairs[layout.pair_index[i, others[a]]]
-            pair.residual, pair.beyond = 0.0, 0.0
 
 
 @kernel

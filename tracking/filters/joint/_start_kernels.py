@@ -194,3 +194,4 @@ def add_node(c, s, layout, h, new, pos, t):
             s.pairs[p].t_range = t
             s.pairs[p].n_ranges = 0
             s.pairs[p].misfit = 1.0
+            s.pairs[p].residual, s.pairs[p].beyond, s.pairs[p].scatter = 0.0, 0.0, 0.0
