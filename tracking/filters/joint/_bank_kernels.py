@@ -25,7 +25,7 @@ from tracking.filters.joint._start_kernels import begin_pair
 FLAT, OPEN = 2.5, 4.0
 """Extent of a layout across itself, in standard deviations: less is flat, more is open again."""
 STRAIN_TAU = 3.3
-"""[s] Time over which the misfit is averaged for it."""
+"""[s] Time over which a layout's misfit is averaged before it counts as strained."""
 RAISED, LIMIT_TAU = 1.5, 60.0
 """[-, s] After a search, only so much more begins another, until that is forgotten: where noise is
 larger than believed, ranges fit badly for ever."""
