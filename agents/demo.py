@@ -180,12 +180,9 @@ def demo(
 
 def _trained_for(policy: TrainedPolicy | None) -> tuple[str | None, str | None]:
     """Task and first scenario that a policy was trained for, where its card tells."""
-    training: Any = {} if policy is None else policy.card.training
-    try:
-        env = training["config"]["env"]
-        return str(env["task"]), str(env["scenarios"][0])
-    except (KeyError, IndexError, TypeError):
-        return None, None
+    training = {} if policy is None else policy.card.training
+    task, scenario = training.get("task"), training.get("scenario")
+    return None if task is None else str(task), None if scenario is None else str(scenario)
 
 
 def _modes(policy: TrainedPolicy | None) -> dict[str, str]:

@@ -64,6 +64,28 @@ def from_options(cls: type[T], given: Mapping[str, str | None], base: T | None =
     return built
 
 
+def as_options(settings: Any) -> list[str]:
+    """What a command must be given for these settings: options that are not as by default."""
+    values = dict(_values(settings))
+    words = []
+    for leaf in leaves(type(settings)):
+        value = values[leaf.name]
+        if value != leaf.default:
+            text = ",".join(map(str, value)) if leaf.many else str(value)
+            words += [f"--{leaf.name.replace('_', '-')}", text]
+    return words
+
+
+def _values(settings: Any) -> Iterator[tuple[str, Any]]:
+    """Name and value of every leaf."""
+    for f in fields(settings):
+        value = getattr(settings, f.name)
+        if is_dataclass(value):
+            yield from _values(value)
+        else:
+            yield f.name, value
+
+
 def to_json(settings: Any) -> dict[str, Any]:
     """The settings as nested JSON objects."""
     return asdict(settings)
@@ -169,7 +191,7 @@ def _check_one(leaf: Leaf, value: Any, where: str) -> Any:
     if leaf.kind is str:
         return value
     if low is not None and high is not None and not low <= value <= high:
-        raise UsageError(f"{where}: expected {low:g} to {high:g}, got {value:g}")
+        raise UsageError(f"{where}: expected {low:g} to {high:g}, got {value}")
     return leaf.kind(value)
 
 

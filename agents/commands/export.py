@@ -32,7 +32,8 @@ def export(
         raise UsageError(
             f"exporting needs {error.name}: pip install 'relpos-env[train]'"
         ) from error
-    told = read_results(results) if results is not None else []
+    names = {run.resolve().name, name or run.resolve().name}
+    told = read_results(results, names) if results is not None else []
     path = export_policy(run, out, name=name, results=told, last=last)
     if as_json:
         from agents.policy import load_policy

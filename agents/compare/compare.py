@@ -18,7 +18,7 @@ from agents.errors import UsageError
 from relpos_env.interface.beams import MOST_BEAMS
 
 FIRST_SEED = 1000
-"""Training never uses the seeds from here on."""
+"""Of the first episode. Training draws its own at random from 2^30 numbers."""
 BATCH = 10
 """[-] Episodes that a process runs side by side."""
 

@@ -69,16 +69,6 @@ def ratio(values: F64, reference: F64) -> Interval | None:
     return _interval((values[both], reference[both]), _ratio)
 
 
-def difference(values: F64, reference: F64) -> Interval | None:
-    """Mean difference of two drivers on the same seeds; below 0 the first has less.
-
-    Args:
-        values: (episode), NaN where an episode has none; it is left out of both.
-        reference: (episode), by the same seeds.
-    """
-    return mean(values - reference)
-
-
 def _interval(samples: tuple[F64, ...], statistic: Callable[..., F64]) -> Interval:
     """The statistic of paired samples, with its interval."""
     value = float(statistic(*samples, axis=-1))

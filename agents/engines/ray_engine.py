@@ -1,8 +1,8 @@
 """Work shared out over a Ray cluster: one that is started for it on this machine, or one that runs.
 
-A call whose worker or machine is lost is made again, `MOST_TRIES` times at most; an error that the
-function itself raises is not. So results are those of the local engine, bit for bit, whatever
-happens to the workers.
+A call whose worker or machine is lost is made again, until it was made `MOST_TRIES` times; an
+error that the function itself raises is not. So results are those of the local engine, bit for
+bit, whatever happens to the workers.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def ray_engine(
     if not tasks:
         return
     jobs = min(jobs, len(tasks))
-    with _cluster(jobs, address) as ray:
+    with cluster(jobs, address) as ray:
         # Ray's own retries are off: those after a want of memory have no bound.
         call = ray.remote(num_cpus=1, max_retries=0)(_call)
         folder = os.getcwd()
@@ -97,13 +97,22 @@ def _call(folder: str, function: Callable[..., Any], task: tuple[Any, ...]) -> A
 
 
 @contextmanager
-def _cluster(jobs: int, address: str | None) -> Iterator[Any]:
-    """The module `ray`, joined to a cluster; what was started here ends here."""
+def cluster(cores: int, address: str | None) -> Iterator[Any]:
+    """The module `ray`, joined to a cluster; what was started here ends here.
+
+    Args:
+        cores: Of a cluster that is started.
+        address: Of a cluster that runs; None starts one. Where the program has called `ray.init`
+            itself, it keeps the cluster it has.
+
+    Raises:
+        UsageError: No ray, or no cluster at the address.
+    """
     ray = import_ray()
     if ray.is_initialized():
         yield ray
         return
-    start_ray(jobs, address)
+    start_ray(cores, address)
     try:
         yield ray
     finally:

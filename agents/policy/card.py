@@ -12,6 +12,7 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
+from agents.errors import UsageError
 from agents.policy.errors import PolicyError
 from agents.policy.layout import Layout
 from agents.policy.strict_json import Reader, parse_json
@@ -23,6 +24,7 @@ FORMAT = 1
 """The version of the card that is written and read."""
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 """What a policy may be called."""
+NAME_TEXT = "a name of letters, digits, '.', '-' and '_', 64 at most, a letter or digit first"
 HASH = re.compile(r"[0-9a-f]{64}")
 KEYS = (
     "format", "name", "layout", "actions", "decision_s", "onnx_sha256", "training", "results",
@@ -114,7 +116,7 @@ class Card:
         if actions.text("kind") != "continuous":
             actions.refuse("kind", f"expected 'continuous', got {actions.text('kind')!a}")
         return cls(
-            name=card.matching("name", NAME, "a name of letters, digits, '.', '-' and '_'"),
+            name=card.matching("name", NAME, NAME_TEXT),
             layout=_layout(card.part("layout", LAYOUT_KEYS, {"proximity": 0})),
             onnx_sha256=card.matching("onnx_sha256", HASH, "64 hexadecimal digits"),
             max_speed=actions.positive("max_speed_m_s"),
@@ -123,6 +125,16 @@ class Card:
             training=card.mapping("training"),
             results=tuple(card.mappings("results")),
         )
+
+
+def check_name(name: str, option: str) -> None:
+    """See that a policy may be called so, before any work is done for it.
+
+    Raises:
+        UsageError: It may not; the option is named.
+    """
+    if not NAME.fullmatch(name):
+        raise UsageError(f"{option}: expected {NAME_TEXT}, for the policy; got {name!a}")
 
 
 def _layout(part: Reader) -> Layout:

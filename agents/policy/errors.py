@@ -22,3 +22,7 @@ class PolicyError(UsageError):
         super().__init__(f"{shown}: {reason}")
         self.where = str(where)
         self.reason = reason
+
+    def __reduce__(self) -> tuple[type[PolicyError], tuple[str, str]]:
+        """For other processes: made again from both arguments, not from the message."""
+        return PolicyError, (self.where, self.reason)

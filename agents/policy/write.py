@@ -8,6 +8,8 @@ from pathlib import Path
 
 from agents.output import write_results
 from agents.policy.card import Card
+from agents.policy.errors import PolicyError
+from agents.policy.find import MOST_CARD, MOST_NETWORK
 from agents.policy.trained import check_policy
 
 
@@ -32,5 +34,11 @@ def write_policy(folder: Path, name: str, onnx_bytes: bytes, card: Card) -> Card
     card = replace(card, name=name, onnx_sha256=hashlib.sha256(onnx_bytes).hexdigest())
     text = card.to_json()
     check_policy(onnx_bytes, card, name)
+    for what, size, most in (
+        ("network", len(onnx_bytes), MOST_NETWORK),
+        ("card", len(text.encode()), MOST_CARD),
+    ):
+        if size > most:
+            raise PolicyError(name, f"the {what} has {size} bytes, expected {most} at most")
     write_results(folder, {f"{name}.onnx": onnx_bytes, f"{name}.json": text})
     return card

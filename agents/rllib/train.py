@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import platform
+import shutil
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -19,7 +20,8 @@ from ray.rllib.callbacks.callbacks import RLlibCallback
 from ray.rllib.core.rl_module.multi_rl_module import MultiRLModuleSpec
 from ray.rllib.core.rl_module.rl_module import RLModuleSpec
 
-from agents.engines.ray_engine import import_ray, start_ray
+from agents.engines.ray_engine import cluster
+from agents.errors import UsageError
 from agents.output import check_folder, check_new, write_results
 from agents.policy.layout import Layout
 from agents.rllib.config import RllibConfig
@@ -86,7 +88,7 @@ def rllib_train(
     logging.getLogger("ray.rllib").setLevel(logging.ERROR)
     layout = config.layout
     records: list[dict[str, Any]] = []
-    with _cluster(max(1, config.workers), address), _algorithm(config) as algorithm:
+    with cluster(max(1, config.workers), address), _algorithm(config) as algorithm:
         for k in range(1, config.iterations + 1):
             begun = time.perf_counter()
             found = algorithm.train()
@@ -108,9 +110,11 @@ def _save(
     """Write what there is so far over what there was; gives the file of the policy."""
     lines = "".join(json.dumps(r, allow_nan=False) + "\n" for r in records)
     write_results(folder, {LOG: lines})
-    algorithm.save_to_path((folder / CHECKPOINT).resolve())
+    _save_checkpoint(algorithm, folder)
     training = {
-        "command": "rllib",
+        "command": "relpos rllib",
+        "task": config.arguments.get("task"),
+        "scenario": config.arguments.get("scenario"),
         "config": config.record,
         "seed": config.seed,
         "frames": records[-1]["env_steps"],
@@ -118,6 +122,26 @@ def _save(
         "versions": {p: _version(p) for p in PACKAGES} | {"python": platform.python_version()},
     }
     return export_module(algorithm.get_module(MODULE), layout, folder, POLICY, training)
+
+
+def _save_checkpoint(algorithm: Any, folder: Path) -> None:
+    """Replace RLlib's checkpoint; whenever that is cut short, a whole one is left in the folder.
+
+    Raises:
+        UsageError: It cannot be written.
+    """
+    place = (folder / CHECKPOINT).resolve()
+    fresh, former = (place.with_name(f"{CHECKPOINT}.{end}") for end in ("new", "old"))
+    try:
+        shutil.rmtree(fresh, ignore_errors=True)
+        algorithm.save_to_path(fresh)
+        if place.exists():
+            shutil.rmtree(former, ignore_errors=True)
+            place.rename(former)
+        fresh.rename(place)
+        shutil.rmtree(former, ignore_errors=True)
+    except OSError as error:
+        raise UsageError(f"--out {folder}: cannot be written to ({error.strerror})") from error
 
 
 def ppo_config(config: RllibConfig) -> PPOConfig:
@@ -172,19 +196,6 @@ def ppo_config(config: RllibConfig) -> PPOConfig:
 def _one_for_all(agent: str, episode: Any, **_: Any) -> str:
     """Every car is driven by the same network."""
     return MODULE
-
-
-@contextmanager
-def _cluster(cores: int, address: str | None) -> Iterator[None]:
-    ray = import_ray()
-    if ray.is_initialized():
-        yield
-        return
-    start_ray(cores, address)
-    try:
-        yield
-    finally:
-        ray.shutdown()
 
 
 @contextmanager

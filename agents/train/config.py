@@ -7,7 +7,7 @@ from typing import Literal
 
 from agents.settings import number
 
-FORMAT = 3
+FORMAT = 4
 """Version of the run folder; another one is refused."""
 
 
@@ -100,7 +100,7 @@ class TrainConfig:
     """Updates from checkpoint to checkpoint; each leg begins with new episodes."""
     threads: int = number(2, 1, 256)
     """Threads of simulation and of learning, shared out among the runs."""
-    eval_episodes: int = number(24, 1, 10000)
+    eval_episodes: int = number(24, 1, 500)
     """Episodes after each leg that tell the best policy, shared out among the scenarios, the same
     every time."""
     choice_episodes: int = number(200, 1, 10000)

@@ -19,10 +19,10 @@ from relpos_env.config import Parts
 from relpos_env.formation import Formation
 from relpos_env.interface.observations.base import F32
 from relpos_env.timing import DECISION
-from tracking.arrays import F64
+from tracking.arrays import F64, Bool
 
 FIRST_SEED = 500
-"""Episodes of an evaluation have seeds from here on, in training and comparing never used."""
+"""Episodes of an evaluation have seeds from here on, 500 at most: comparisons begin at 1000."""
 
 
 class Evaluation:
@@ -109,25 +109,42 @@ class _Room:
         for env in range(f.n_envs):
             f.seed(env, seeding.np_random(first_seed + env)[0])
             f.begin(env)
-        error, tracking, present, contacts, rewards = [], [], [], 0.0, 0.0
-        steps = f.parts.config.max_cycles - 1
-        for _ in range(steps):
+        error, tracking, present, going = [], [], [], []
+        contacts, rewards = 0.0, 0.0
+        on = np.ones(f.n_envs, dtype=bool)
+        for _ in range(f.parts.config.max_cycles - 1):
+            going.append(on)
             f.step(*f.parts.actions.decode(drive(actor, self.pad(f.observations)), "actions"))
             error.append(f.task.error.copy())
             tracking.append(f.tracking_error())
-            present.append(f.state.present.copy())
-            contacts += float(f.loop.swarm.contacts.sum())
-            rewards += float(f.rewards.sum())
-        here, settled = np.array(present), round(SETTLE / DECISION)
-        known = np.array(tracking)[settled:]
+            present.append(f.state.present & on[:, None])
+            contacts += float(f.loop.swarm.contacts[on].sum())
+            rewards += float(f.rewards[on].sum())
+            on = on & ~f.task.done
+        alive, here = np.array(going), np.array(present)
+        scored = here & _scored(alive)[..., None]
+        known = np.array(tracking)[scored]
         return _Drive(
             rewards=rewards,
             decisions=float(here.sum()),
             contacts=contacts,
-            minutes=f.n_envs * steps * DECISION / 60.0,
-            error=np.array(error)[settled:][here[settled:]],
+            minutes=float(alive.sum()) * DECISION / 60.0,
+            error=np.array(error)[scored],
             tracking=known[np.isfinite(known)],
         )
+
+
+def _scored(alive: Bool) -> Bool:
+    """Which decisions count: from `SETTLE` on, or the last where the task was done before.
+
+    Args:
+        alive: Which were driven, (decision, env).
+    """
+    scored = alive.copy()
+    scored[: round(SETTLE / DECISION)] = False
+    early = np.flatnonzero(~scored.any(axis=0))
+    scored[alive[:, early].sum(axis=0) - 1, early] = True
+    return scored
 
 
 def drive(actor: Actor, observations: F32) -> F32:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import platform
+import shlex
 import warnings
 from collections.abc import Iterable
 from importlib.metadata import version
@@ -16,7 +17,7 @@ import torch
 from agents.errors import UsageError
 from agents.policy.card import Card
 from agents.policy.write import write_policy
-from agents.settings import to_json
+from agents.settings import as_options, to_json
 from agents.train.choice import read_choice
 from agents.train.environments import layout_of
 from agents.train.learner import make_policy
@@ -52,6 +53,7 @@ def export_policy(
     """
     chosen = None if last else read_choice(run)
     folder, which = RunFolder(run), LAST if last else BEST
+    asked = folder.config()
     if chosen is not None:
         folder, which = RunFolder(chosen.run), chosen.weights
     config = folder.config()
@@ -66,9 +68,12 @@ def export_policy(
     measured = progress.log[-1]
     policy = make_policy(config)
     restore_weights(policy, tensors)
-    layout = layout_of(config)
+    layout, name = layout_of(config), name or run.resolve().name
     training = {
+        "command": shlex.join(["relpos", "train", "--out", name, *as_options(asked)]),
         "observation": config.env.observation,
+        "task": config.env.task,
+        "scenario": config.env.scenarios[0],
         "seed": config.seed,
         "frames": measured["frames"],
         "leg": measured["leg"],
@@ -77,18 +82,20 @@ def export_policy(
         "chosen_by": None if chosen is None else chosen.measured,
         "versions": {p: version(p) for p in PACKAGES} | {"python": platform.python_version()},
     }
-    card = Card(
-        name=name or run.resolve().name, layout=layout, training=training, results=tuple(results)
-    )
+    card = Card(name=name, layout=layout, training=training, results=tuple(results))
     write_policy(out, card.name, to_onnx(Actor(policy), layout.size), card)
     return out / f"{card.name}.onnx"
 
 
-def read_results(path: Path) -> list[dict[str, Any]]:
-    """Records from a file of JSON lines.
+def read_results(path: Path, names: Iterable[str]) -> list[dict[str, Any]]:
+    """What `relpos compare` has measured of a policy: summaries, without single episodes.
+
+    Args:
+        path: Its results.jsonl.
+        names: What the policy may be called there.
 
     Raises:
-        UsageError: It cannot be read, or a line is no JSON object.
+        UsageError: It cannot be read, a line is no JSON object, or none is about the policy.
     """
     try:
         lines = path.read_text().splitlines()
@@ -103,7 +110,15 @@ def read_results(path: Path) -> list[dict[str, Any]]:
         if not isinstance(record, dict):
             raise UsageError(f"--results {path}: line {k + 1}: expected an object")
         found.append(record)
-    return found
+    # Lines of single episodes have no number of episodes.
+    summaries = [r for r in found if "episodes" in r]
+    wanted = set(names)
+    ours = [r for r in summaries if r.get("policy") in wanted]
+    if not ours:
+        drivers = ", ".join(sorted({str(r.get("policy")) for r in summaries})) or "none"
+        expected = " or ".join(sorted(wanted))
+        raise UsageError(f"--results {path}: expected lines of {expected}, got those of {drivers}")
+    return ours
 
 
 def to_onnx(actor: Actor, size: int) -> bytes:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from agents.output import write_results
+from agents.policy.card import check_name
 from agents.report.train_report import train_report
 from agents.train.choice import choose, keep_choice
 from agents.train.config import TrainConfig
@@ -47,9 +48,11 @@ def train_policy(
         progress: Called after every leg with the share done and what was measured.
 
     Raises:
-        UsageError: The folder does not fit, or cannot be written to.
+        UsageError: The folder does not fit, cannot be written to, or has a name that no policy can
+            have.
         EnvError: An environment that cannot be.
     """
+    check_name(folder.resolve().name, "--out")
     resumed = config is None
     config = RunFolder(folder).config() if config is None else config
     done = [0.0] * config.runs

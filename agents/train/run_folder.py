@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import torch
 from safetensors import SafetensorError
@@ -23,55 +23,10 @@ from agents.errors import UsageError
 from agents.output import check_new
 from agents.settings import from_json, to_json
 from agents.train.config import FORMAT, TrainConfig
+from agents.train.environments import layout_of
+from agents.train.progress import Progress
 
 CONFIG, LAST, BEST, LOG = "config.json", "last.safetensors", "best.safetensors", "legs.jsonl"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Progress:
-    """Where a run stands after a leg."""
-
-    log: list[dict[str, Any]] = field(default_factory=list)
-    """What was measured after every leg."""
-
-    @property
-    def legs(self) -> int:
-        """Finished."""
-        return len(self.log)
-
-    @property
-    def frames(self) -> int:
-        """Decisions of cars so far."""
-        return int(self.log[-1]["frames"]) if self.log else 0
-
-    @property
-    def seconds(self) -> float:
-        """Spent on training so far [s]."""
-        return float(self.log[-1]["seconds"]) if self.log else 0.0
-
-    @property
-    def best_leg(self) -> int:
-        """The leg after which the weights with the highest return were there, the first of equals.
-
-        Raises:
-            ValueError: No leg is finished.
-        """
-        return max(range(self.legs), key=lambda k: float(self.log[k]["return"]))
-
-    def after_leg(
-        self, frames: int, seconds: float, level: int | None, measured: Mapping[str, Any]
-    ) -> Progress:
-        """Where it stands a leg later.
-
-        Args:
-            frames: So far.
-            seconds: That the leg took [s].
-            level: Of the curriculum in it.
-            measured: Of the policy after it, see `agents.train.evaluation`.
-        """
-        spent = round(self.seconds + seconds, 2)
-        row = {"leg": self.legs, "frames": frames, "seconds": spent, "level": level}
-        return Progress(log=[*self.log, {**row, **measured}])
 
 
 class RunFolder:
@@ -91,14 +46,14 @@ class RunFolder:
             UsageError: The folder is not new or empty, or cannot be written to.
         """
         check_new(self.path)
+        record = {"format": FORMAT, "layout": layout_of(config).digest, "config": to_json(config)}
         try:
             self.path.mkdir(parents=True, exist_ok=True)
+            self._write(CONFIG, json.dumps(record, indent=1).encode())
         except OSError as error:
             raise UsageError(
                 f"--out {self.path}: cannot be written to ({error.strerror})"
             ) from error
-        text = json.dumps({"format": FORMAT, "config": to_json(config)}, indent=1)
-        self._write(CONFIG, text.encode())
 
     def config(self) -> TrainConfig:
         """The configuration of the run.
@@ -118,7 +73,12 @@ class RunFolder:
             raise UsageError(
                 f"{path}: a run of format {version!r}, expected {FORMAT}; train it anew"
             )
-        return from_json(TrainConfig, found.get("config"), f"{path}: config")
+        config = from_json(TrainConfig, found.get("config"), f"{path}: config")
+        if found.get("layout") != layout_of(config).digest:
+            raise UsageError(
+                f"{path}: a run on another observation layout than this version has; train it anew"
+            )
+        return config
 
     def save(self, tensors: Mapping[str, Tensor], progress: Progress, *, best: bool) -> None:
         """Keep a checkpoint, and as the best weights if they are.
@@ -127,11 +87,12 @@ class RunFolder:
             UsageError: It cannot be written; the last good one is still there.
         """
         data = save(dict(tensors), {"progress": json.dumps(asdict(progress))})
-        if best:
-            self._write(BEST, data)
-        self._write(LAST, data)
         lines = "".join(json.dumps(r, allow_nan=False) + "\n" for r in progress.log)
-        self._write(LOG, lines.encode())
+        with self.writing():
+            if best:
+                self._write(BEST, data)
+            self._write(LAST, data)
+            self._write(LOG, lines.encode())
 
     def load(self, name: str = LAST) -> tuple[dict[str, Tensor], Progress] | None:
         """Tensors and progress of a checkpoint; None where there is none yet.
@@ -147,12 +108,33 @@ class RunFolder:
             tensors = load(data)
             # The format begins with the length of a JSON header.
             header = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])
-            progress = Progress(**json.loads(header["__metadata__"]["progress"]))
+            progress = Progress.from_json(header["__metadata__"]["progress"])
         except (OSError, SafetensorError, ValueError, KeyError, TypeError) as error:
             raise UsageError(f"{path}: damaged checkpoint ({error})") from error
         return tensors, progress
 
+    @contextmanager
+    def writing(self) -> Iterator[None]:
+        """Say what to do where something of a run that has begun cannot be written.
+
+        Raises:
+            UsageError: Instead of an OSError inside.
+        """
+        try:
+            yield
+        except OSError as error:
+            kept = "the last checkpoint is kept, " if (self.path / LAST).exists() else ""
+            raise UsageError(
+                f"{error.filename or self.path}: cannot be written ({error.strerror}); {kept}"
+                f"go on with --resume {self.path}"
+            ) from error
+
     def _write(self, name: str, data: bytes) -> None:
+        """Replace a file, or leave it as it is.
+
+        Raises:
+            OSError: It cannot be written.
+        """
         path, scratch = self.path / name, self.path / f".{name}.new"
         try:
             with scratch.open("wb") as file:
@@ -162,10 +144,7 @@ class RunFolder:
             scratch.replace(path)
         except OSError as error:
             scratch.unlink(missing_ok=True)
-            raise UsageError(
-                f"{path}: cannot be written ({error.strerror}); the last checkpoint is kept, "
-                f"go on from it with --resume {self.path}"
-            ) from error
+            raise OSError(error.errno, error.strerror, str(path)) from error
 
 
 def tensors_of(policy: torch.nn.Module, optimizer: torch.optim.Optimizer) -> dict[str, Tensor]:
@@ -186,12 +165,12 @@ def restore(
     """
     restore_weights(policy, tensors)
     memory: dict[int, dict[str, Tensor]] = {}
-    for name, value in tensors.items():
-        if name.startswith("optimizer."):
-            _, k, entry = name.split(".")
-            memory.setdefault(int(k), {})[entry] = value
     groups = optimizer.state_dict()["param_groups"]
     try:
+        for name, value in tensors.items():
+            if name.startswith("optimizer."):
+                _, k, entry = name.split(".")
+                memory.setdefault(int(k), {})[entry] = value
         optimizer.load_state_dict({"state": memory, "param_groups": groups})
     except (RuntimeError, ValueError, KeyError) as error:
         raise UsageError(f"checkpoint: of another optimiser ({error})") from error

@@ -23,7 +23,8 @@ from agents.train.config import TrainConfig
 from agents.train.environments import check_environments, layout_of, make_rooms
 from agents.train.evaluation import Evaluation
 from agents.train.learner import level_of, make_model, run_leg
-from agents.train.run_folder import Progress, RunFolder, restore, tensors_of
+from agents.train.progress import Progress
+from agents.train.run_folder import RunFolder, restore, tensors_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,11 +34,6 @@ class TrainResult:
     folder: Path
     config: TrainConfig
     progress: Progress
-
-    @property
-    def best(self) -> dict[str, Any]:
-        """What was measured of the best policy."""
-        return self.progress.log[self.progress.best_leg]
 
     @property
     def records(self) -> list[dict[str, Any]]:
@@ -71,21 +67,24 @@ def train(
     tensors, state = run.load() or (None, Progress())
     torch.set_num_threads(config.threads)
     evaluation = Evaluation(every, layout_of(config), config.eval_episodes, config.threads)
-    logger = Logger(None, [TensorBoardOutputFormat(str(folder / "tensorboard"))])
+    with run.writing():
+        logger = Logger(None, [TensorBoardOutputFormat(str(folder / "tensorboard"))])
     learner: _Learner | None = None
     while state.frames < config.frames:
         began = time.perf_counter()
         level = level_of(config, state.frames)
         if learner is None or learner.level != level:
             learner = _Learner.begin(config, level, logger, tensors, state.frames, learner)
-        run_leg(learner.model, config, state.legs)
+        with run.writing():
+            run_leg(learner.model, config, state.legs)
         measured = evaluation.run(learner.model.policy)
         state = state.after_leg(
             int(learner.model.num_timesteps), time.perf_counter() - began, level, measured
         )
         tensors = tensors_of(learner.model.policy, learner.model.policy.optimizer)
         run.save(tensors, state, best=state.best_leg == state.legs - 1)
-        _note(logger, state)
+        with run.writing():
+            _note(logger, state)
         if progress is not None:
             progress(min(state.frames / config.frames, 1.0), state.log[-1])
     evaluation.close()

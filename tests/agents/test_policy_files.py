@@ -432,3 +432,17 @@ def test_both_files_are_written_or_none(tmp_path):
     assert load_policy(tmp_path / "new").card == written
     with pytest.raises(PolicyError, match="name: expected a name"):
         write_policy(tmp_path, "../escape", GOOD, card_of(GOOD))
+
+
+def test_a_refusal_reaches_other_processes_whole():
+    told = PolicyError("a\nb.onnx", "expected finite numbers, got others")
+    again = pickle.loads(pickle.dumps(told))
+    assert isinstance(again, PolicyError)
+    assert (str(again), again.where, again.reason) == (str(told), told.where, told.reason)
+
+
+def test_a_card_too_large_to_be_loaded_is_not_written(tmp_path):
+    results = ({"x": "0" * find.MOST_CARD},)
+    with pytest.raises(PolicyError, match="the card has .* bytes, expected"):
+        write_policy(tmp_path, "large", GOOD, replace(card_of(GOOD), results=results))
+    assert not any(tmp_path.iterdir())

@@ -7,18 +7,19 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 from click.testing import CliRunner
+from hypothesis import given
+from hypothesis import strategies as st
 
 from agents.cli import cli
 from agents.errors import UsageError
 from agents.policy import load_policy
 from agents.policy.layout import Layout
-from agents.settings import from_options
+from agents.settings import as_options, from_options
 from agents.train.config import TrainConfig
 from agents.train.environments import check_environments, layout_of, make_rooms, shares
 from agents.train.evaluation import Evaluation
@@ -26,7 +27,7 @@ from agents.train.export import export_policy, read_results
 from agents.train.learner import level_of, make_model, make_policy
 from agents.train.network import Actor
 from agents.train.run import train_policy
-from agents.train.run_folder import BEST, CONFIG, LAST, RunFolder, restore_weights
+from agents.train.run_folder import BEST, LAST, RunFolder, restore_weights
 from agents.train.train import train
 
 SMALL = {
@@ -287,59 +288,71 @@ def test_the_command_tells_every_leg_and_the_policy(tmp_path):
     assert {p.name for p in out.iterdir()} == {"p.onnx", "p.json"}
 
 
-def test_a_full_disk_leaves_the_last_good_checkpoint(run, tmp_path, monkeypatch):
-    folder = tmp_path / "run"
-    before = {}
-
-    def full(path, target):
-        raise OSError(28, "No space left on device")
-
-    def fill(share, row):
-        if row["leg"] == 0:
-            before.update({p.name: p.read_bytes() for p in folder.iterdir() if p.is_file()})
-            monkeypatch.setattr(Path, "replace", full)
-
-    with pytest.raises(UsageError, match="No space left on device.*--resume"):
-        train(small(), folder, progress=fill)
-    monkeypatch.undo()
-    assert before == {p.name: p.read_bytes() for p in folder.iterdir() if p.is_file()}
-    train(None, folder)
-    assert same(weights(run.folder), weights(folder))
+def test_a_name_that_no_policy_can_have_is_refused_at_once(tmp_path):
+    for name in ("my run", "_x", "x" * 65):
+        with pytest.raises(UsageError, match="--out: expected a name of letters"):
+            train_policy(small(), tmp_path / name)
+        assert not (tmp_path / name).exists()
 
 
-BAD_CONFIG = [
-    ("not json", "damaged"),
-    ("[]", "format None"),
-    ('{"format": 1, "config": {}}', "format 1, expected 3"),
-    ('{"format": 3, "config": {}}', "missing field"),
-    ('{"format": 3, "config": {"speed": 1}}', "unknown field 'speed'"),
-]
+def test_a_task_that_is_done_ends_an_episode_of_the_evaluation():
+    """Nobody is paid or blamed for what comes after it."""
+    config = small(task="rendezvous", scenarios="open", eval_episodes="4")
+    every, policy = check_environments(config), make_policy(config)
+    evaluation = Evaluation(every, layout_of(config), config.eval_episodes, 1)
+    (room,) = evaluation._rooms
+    whole = room.drive(Actor(policy).eval(), 500)
+    step = room.formation.step
+
+    def done_at_once(*actions):
+        step(*actions)
+        room.formation.task.done[:] = [True, True, False, False]
+
+    room.formation.step = done_at_once
+    cut = room.drive(Actor(policy).eval(), 500)
+    evaluation.close()
+    n_cars, steps = every[0].n_cars, every[0].config.max_cycles - 1
+    assert cut.decisions == 2 * n_cars * (steps + 1)
+    assert cut.minutes == pytest.approx(whole.minutes * (steps + 1) / (2 * steps))
+    # Two are scored by their only decision.
+    assert len(cut.error) == len(whole.error) / 2 + 2 * n_cars
 
 
-@pytest.mark.parametrize(("text", "said"), BAD_CONFIG)
-def test_runs_that_are_none_are_refused(tmp_path, text, said):
-    with pytest.raises(UsageError, match="no training run"):
-        train(None, tmp_path / "none")
-    (tmp_path / CONFIG).write_text(text)
-    with pytest.raises(UsageError, match=said):
-        train(None, tmp_path)
+@given(
+    st.fixed_dictionaries(
+        {},
+        optional={
+            "frames": st.integers(1000, 10**12).map(str),
+            "runs": st.integers(1, 64).map(str),
+            "gamma": st.floats(0, 1).map(str),
+            "log_std": st.floats(-5, 1).map(str),
+            "scenarios": st.sampled_from(["open", "cars-nlos,hall"]),
+            "levels": st.lists(st.integers(0, 4), max_size=3).map(lambda n: ",".join(map(str, n))),
+            "critic": st.sampled_from(["own", "central"]),
+            "weights": st.sampled_from(["collision=5", "collision=8,velocity=0"]),
+        },
+    )
+)
+def test_settings_as_options_are_the_same_settings(given):
+    config = from_options(TrainConfig, given)
+    words = as_options(config)
+    options = {
+        k.removeprefix("--").replace("-", "_"): v
+        for k, v in zip(words[::2], words[1::2], strict=True)
+    }
+    assert from_options(TrainConfig, options) == config
 
 
-def test_damaged_checkpoints_are_refused(run, tmp_path):
-    whole = (run.folder / LAST).read_bytes()
-    text = (run.folder / CONFIG).read_text()
-    (tmp_path / CONFIG).write_text(text)
-    for damaged in (whole[:-1], whole[: len(whole) // 2], b"", b"\x80\x04N.", os.urandom(200)):
-        (tmp_path / LAST).write_bytes(damaged)
-        with pytest.raises(UsageError, match="damaged checkpoint"):
-            train(None, tmp_path)
-    other = json.loads(text)
-    other["config"]["net"]["width"] = 16
-    other["config"]["frames"] = 5000
-    (tmp_path / CONFIG).write_text(json.dumps(other))
-    (tmp_path / LAST).write_bytes(whole)
-    with pytest.raises(UsageError, match="other networks"):
-        train(None, tmp_path)
+def test_the_card_tells_by_which_command_a_policy_was_made(policy):
+    training = load_policy(policy).card.training
+    assert (training["task"], training["scenario"]) == ("ring", "cars-nlos")
+    words = training["command"].split()
+    assert words[:4] == ["relpos", "train", "--out", "small"]
+    options = {
+        k.removeprefix("--").replace("-", "_"): v
+        for k, v in zip(words[4::2], words[5::2], strict=True)
+    }
+    assert from_options(TrainConfig, options) == small()
 
 
 def test_what_cannot_be_trained_is_refused(tmp_path):
@@ -359,4 +372,17 @@ def test_what_cannot_be_trained_is_refused(tmp_path):
         export_policy(tmp_path / "taken", tmp_path / "out")
     (tmp_path / "lines").write_text('{"a": 1}\n[]\n')
     with pytest.raises(UsageError, match="line 2"):
-        read_results(tmp_path / "lines")
+        read_results(tmp_path / "lines", ["mine"])
+
+
+def test_a_card_gets_the_summaries_of_its_own_policy_alone(tmp_path):
+    rows = [
+        {"policy": "mine", "episodes": 2, "formation_error": 0.1},
+        {"policy": "consensus", "episodes": 2, "formation_error": 0.2},
+        {"policy": "mine", "seed": 1000, "formation_error": 0.1},
+    ]
+    path = tmp_path / "results.jsonl"
+    path.write_text("".join(json.dumps(row) + "\n" for row in rows))
+    assert read_results(path, {"mine", "other"}) == rows[:1]
+    with pytest.raises(UsageError, match="expected lines of other, got those of consensus, mine"):
+        read_results(path, ["other"])
