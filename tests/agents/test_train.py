@@ -41,6 +41,12 @@ def small(**changes):
     return from_options(TrainConfig, {**SMALL, **changes})
 
 
+def from_words(words):
+    """Settings from what a command is given."""
+    names = (word.removeprefix("--").replace("-", "_") for word in words[::2])
+    return from_options(TrainConfig, dict(zip(names, words[1::2], strict=True)))
+
+
 def weights(folder, name=LAST):
     return RunFolder(folder).load(name)[0]
 

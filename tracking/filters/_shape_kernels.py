@@ -28,9 +28,12 @@ def collect(c, pair, t, distance, is_survey):
 
 
 @kernel
-def is_ready(c, s, layout, i, j):
-    """True when a pair has its first k ranges."""
-    return s.pairs[layout.pair_index[i, j]].start_n >= c.start_k
+def is_ready(c, s, layout, i, j, t):
+    """True when a pair has its first k ranges, and they are not of long ago."""
+    pair = s.pairs[layout.pair_index[i, j]]
+    if pair.start_n >= SURVEYED:
+        return True
+    return pair.start_n >= c.start_k and t - pair.start_t <= c.start_max_age
 
 
 @kernel
@@ -41,7 +44,7 @@ def start_distance(s, layout, i, j):
 
 
 @kernel
-def choose_members(c, s, layout, members):
+def choose_members(c, s, layout, members, t):
     """Nodes of which all pairs are ready, written; returns how many, 0 if too few to start."""
     n = s.nodes.shape[0]
     for first in range(n):
@@ -50,7 +53,7 @@ def choose_members(c, s, layout, members):
         for k in range(n):
             fits = k != first
             for a in range(m):
-                if fits and (members[a] == k or not is_ready(c, s, layout, members[a], k)):
+                if fits and (members[a] == k or not is_ready(c, s, layout, members[a], k, t)):
                     fits = False
             if fits:
                 members[m] = k

@@ -20,7 +20,7 @@ from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_hypothesi
 from tracking.filters.joint._linear_kernels import decouple
 from tracking.filters.joint._sample_kernels import decay
 from tracking.filters.joint._sleep_kernels import turn_all_ways
-from tracking.filters.joint._start_kernels import begin_pair
+from tracking.filters.joint._start_kernels import begin_pair, forget_fits
 
 FLAT, OPEN = 2.5, 4.0
 """Extent of a layout across itself, in standard deviations: less is flat, more is open again."""
@@ -198,6 +198,10 @@ def prune_bank(c, s):
     # The report changes only for a clear gain, or equal hypotheses would take turns.
     if not s.alive[group.best] or s.loglik[best] > s.loglik[group.best] + 2.0:
         group.best = best
+        # How well ranges fit was told by the other.
+        for p in range(s.pairs.shape[0]):
+            forget_fits(s.pairs[p])
+        group.misfit, group.fit = 1.0, 1.0
     top = s.loglik[best]
     for h in range(n_hyps):
         if s.alive[h] and h != group.best and s.loglik[h] < top - c.prune:
@@ -237,6 +241,7 @@ def remove_node(c, s, layout, i):
     """Forget a node that left."""
     node = s.nodes[i]
     node.present, node.heard = False, False
+    node.astray, node.doubted = 0.0, False
     n_present = 0
     for k in range(s.nodes.shape[0]):
         n_present += s.nodes[k].present
@@ -258,7 +263,8 @@ def remove_node(c, s, layout, i):
                     decouple(s.x, s.P, h, c.n, at + 1, 1.0)
     if n_present < 2:
         for k in range(s.nodes.shape[0]):
-            s.nodes[k].present = False
+            s.nodes[k].present, s.nodes[k].heard = False, False
+            s.nodes[k].astray, s.nodes[k].doubted = 0.0, False
         s.alive[:] = False
         s.group[0].n_alive = 0
         s.group[0].started = False
@@ -268,5 +274,5 @@ def remove_node(c, s, layout, i):
 def remove_silent(c, s, layout, t):
     """Remove the nodes that were not heard for so long that they must have left."""
     for i in range(s.nodes.shape[0]):
-        if s.nodes[i].present and t - s.nodes[i].t_heard > c.leave_after:
+        if (s.nodes[i].present or s.nodes[i].heard) and t - s.nodes[i].t_heard > c.leave_after:
             remove_node(c, s, layout, i)

@@ -6,9 +6,9 @@ Two signs are looked for, ten times a second, in nodes that range with two other
     offset   the errors of all its ranges are large and of one sign: an obstacle hides a node from
              some, a wrong calibration lengthens all of its ranges alike
 
-Such a node is doubted: its pairs are reported so, its position and velocity become uncertain,
-and an offset common to its ranges becomes possible. What it ranges then moves the node and the
-offset, and hardly the others; where the node only lost its way, it is found again.
+Such a node is doubted: its pairs are reported so, an offset common to its ranges becomes
+possible and, where it is astray, its position and velocity become uncertain. What it ranges then
+moves the node and the offset, and hardly the others; where it only lost its way, it is found again.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 
 from tracking.compiled import kernel, small_kernel
-from tracking.filters.joint._range_kernels import MIN_PROB, MOST
+from tracking.filters.joint._range_kernels import MIN_PROB
 
 RECENT = 0.02
 """[-] Weight of a range in the share of a node's ranges that do not fit."""
@@ -28,9 +28,15 @@ STAYS = 0.5
 """[-] It remains one down to this part of it."""
 HELD = 2.0
 """[s] A node is doubted until nothing has been found for so long."""
-SPEED, WANDER, JUMP = 0.7, 1.0, 0.7
-"""[m/sqrt(s), m/s/sqrt(s)] How fast the position and velocity of a doubted node, and the offset
-of its ranges [m/sqrt(s)], may become others."""
+ASTRAY, LOST = 0.6, 0.4
+"""[-] Share of a node's ranges that do not fit from which on it is astray; share of all ranges
+that do, below which the filter is lost."""
+SPEED = 0.7
+"""[m/sqrt(s), m/s/sqrt(s)] How fast position and velocity of a node that is astray may become
+others."""
+JUMP, WANDER = 0.7, 1.0
+"""[m, m/sqrt(s)] What the offset of a doubted node's ranges may be at first, and how fast it may
+become another."""
 
 
 @small_kernel
@@ -58,17 +64,15 @@ def watch_nodes(c, s, layout, t):
         elif worst < 0 or node.astray > s.nodes[worst].astray:
             worst = i
     blames = worst >= 0 and others_fit(c, s, worst, t)
-    group.lost = group.fit < MOST and not blames
+    group.lost = group.fit < LOST and not blames
     for i in range(s.nodes.shape[0]):
         node = s.nodes[i]
         if not node.present:
             continue
         n, offset = common_error(c, s, layout, i, t)
-        if n < 2:
-            continue
-        astray = i == worst and blames and node.astray > 1.0 - MOST
-        limit = c.common_error / math.sqrt(n) * (STAYS if node.doubted else 1.0)
-        if astray or offset > limit:
+        astray = i == worst and blames and node.astray > ASTRAY
+        limit = c.common_error / math.sqrt(max(n, 1)) * (STAYS if node.doubted else 1.0)
+        if n >= 2 and (astray or offset > limit):
             if not node.doubted:
                 free_offset(s, layout, i, JUMP**2)
             else:
@@ -106,7 +110,8 @@ def common_error(c, s, layout, i, t):
     """How many others node i ranges with; the least slow error of those, 0 if signs differ [m]."""
     h, n, sign, least = s.group[0].best, 0, 0.0, math.inf
     for k in range(s.nodes.shape[0]):
-        if k == i:
+        # Surveyed distances between static nodes are not of their radios.
+        if k == i or (s.nodes[i].static and s.nodes[k].static):
             continue
         p = layout.pair_index[i, k]
         if not ranges_now(c, s, p, t):

@@ -22,7 +22,6 @@ from tracking.filters.joint._motion_kernels import moves, predict
 from tracking.filters.joint._range_kernels import (
     antenna_offset,
     fuse_range,
-    fuse_survey,
     gap_evidence,
 )
 from tracking.filters.joint._rotation_kernels import carry_moves, follow_rotation
@@ -30,6 +29,7 @@ from tracking.filters.joint._sample_kernels import sum_inertial, take_state
 from tracking.filters.joint._sleep_kernels import may_move, none_moved, wake_up
 from tracking.filters.joint._start_kernels import try_join, try_start
 from tracking.filters.joint._stuck_kernels import is_stuck
+from tracking.filters.joint._survey_kernels import fuse_survey, use_surveys
 from tracking.filters.joint.state import N_PRE, JointState
 
 # Plain numbers of `Kind`: kernels do not know enums.
@@ -137,6 +137,10 @@ def hear(c, s, layout, scratch, i, j, a_i, a_j, t, distance, sight, is_survey):
     if not is_survey and is_stuck(c, s, p, t, distance):
         return
     node_i, node_j = s.nodes[i], s.nodes[j]
+    if s.group[0].started and t - s.group[0].t_check > c.leave_after:
+        # Nobody was heard: whoever speaks first has been away as long as the others.
+        settle_all(s, c.n)
+        remove_silent(c, s, layout, t)
     node_i.heard, node_j.heard = True, True
     node_i.t_heard, node_j.t_heard = t, t
     runs = node_i.present and node_j.present
@@ -150,7 +154,7 @@ def hear(c, s, layout, scratch, i, j, a_i, a_j, t, distance, sight, is_survey):
     if node_i.present and node_j.present:
         take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, sight, is_survey)
     else:
-        take_first_range(c, s, layout, i, j, p, t, distance, is_survey)
+        take_first_range(c, s, layout, scratch, i, j, p, t, distance, is_survey)
 
 
 @small_kernel
@@ -219,6 +223,8 @@ def take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, sight, is_survey
     i0, i1, i2 = antenna_offset(s.held, layout, pair.i, a_i)
     j0, j1, j2 = antenna_offset(s.held, layout, pair.j, a_j)
     levers = (i0, i1, i2, j0, j1, j2)
+    if is_survey:
+        collect(c, pair, t, distance, True)  # for when one of them comes again
     dt = max(t - pair.t_range, 0.0)
     first, end = bank_range(s)
     for h in range(first, end):
@@ -247,19 +253,20 @@ def take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, sight, is_survey
 
 
 @kernel
-def take_first_range(c, s, layout, i, j, p, t, distance, is_survey):
+def take_first_range(c, s, layout, scratch, i, j, p, t, distance, is_survey):
     """A range or survey of a pair that does not run yet, i < j."""
     collect(c, s.pairs[p], t, distance, is_survey)
     settle_all(s, c.n)
     if not s.group[0].started:
-        try_start(c, s, layout, t)
+        if try_start(c, s, layout, t):
+            for a in range(s.nodes.shape[0]):
+                use_surveys(c, s, layout, scratch, a, a)
         return
     if s.group[0].asleep and may_move(s, t):
         return
-    if not s.nodes[i].present:
-        try_join(c, s, layout, i, t)
-    if not s.nodes[j].present:
-        try_join(c, s, layout, j, t)
+    for new in (i, j):
+        if not s.nodes[new].present and try_join(c, s, layout, new, t):
+            use_surveys(c, s, layout, scratch, new, s.nodes.shape[0])
 
 
 @kernel

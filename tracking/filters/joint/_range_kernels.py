@@ -24,8 +24,6 @@ from tracking.filters.joint._sample_kernels import decay
 MIN_DISTANCE = 0.01
 """[m] Closer than this a direction has no meaning."""
 MIN_PROB = 1e-4
-MOST = 0.4
-"""[-] While fewer of the ranges fit, the filter is lost."""
 SQRT_2PI = math.sqrt(2.0 * math.pi)
 
 
@@ -279,12 +277,3 @@ def change_sight(c, s, h, p, switched):
     hidden = s.nlos[h, p]
     s.P[h, at, at] += (1.0 - stays * stays) * (c.slow_var + hidden * c.excess_var)
     s.x[h, at] = stays * s.x[h, at] + switched * hidden * c.excess
-
-
-@small_kernel
-def fuse_survey(c, s, h, p, distance, scratch):
-    """Correct hypothesis h with a surveyed distance between the origins of two nodes."""
-    none = scratch.none
-    predicted, m = range_model(c, s, h, p, none, none, scratch.idx, scratch.val)
-    variance = project(s, h, c.n, m, scratch.idx, scratch.val, scratch.w)
-    absorb(s, h, c.n, scratch.w, distance - predicted, variance + c.survey_var)

@@ -28,12 +28,12 @@ from tracking.filters.joint._sleep_kernels import none_moved, rests
 
 @allocating_kernel
 def try_start(c, s, layout, t):
-    """Start the group with the nodes whose pairs are all ready."""
+    """Start the group with the nodes whose pairs are all ready; tells whether it has."""
     n = s.nodes.shape[0]
     members = np.empty(n, np.int64)
-    m = choose_members(c, s, layout, members)
+    m = choose_members(c, s, layout, members, t)
     if m == 0:
-        return
+        return False
     X = first_shape(s, layout, members, m, c.d)
     for a in range(m):
         s.nodes[members[a]].present = True
@@ -43,7 +43,6 @@ def try_start(c, s, layout, t):
     for h in range(n_first):
         s.alive[h] = True
         s.loglik[h] = 0.0
-        s.nlos[h, :] = c.enter_rate / (c.enter_rate + c.leave_rate)
         Y = X @ layout.rotations[h].T.copy()
         s.x[h, :] = 0.0
         s.moved[h, :] = 0.0
@@ -62,7 +61,7 @@ def try_start(c, s, layout, t):
                 begin_pair(c, s, h, p)
     for p in range(s.pairs.shape[0]):
         s.pairs[p].t_range = t
-        s.pairs[p].misfit = 1.0
+        forget_fits(s.pairs[p])
     group = s.group[0]
     group.started = True
     group.flat = False
@@ -70,8 +69,9 @@ def try_start(c, s, layout, t):
     group.n_alive = n_first
     group.best = 0
     group.t, group.t_check, group.t_carrier, group.t_gauge = t, t, t, t
-    group.misfit, group.fit = 1.0, 1.0
+    group.misfit, group.fit, group.lost = 1.0, 1.0, False
     group.strain, group.strain_limit = 0.0, c.strained
+    return True
 
 
 @allocating_kernel
@@ -119,27 +119,35 @@ def begin_node(c, s, h, i, t):
 
 @kernel
 def begin_pair(c, s, h, p):
-    """Range errors that nothing is known of yet."""
+    """Range errors and sight that nothing is known of yet."""
+    s.nlos[h, p] = c.enter_rate / (c.enter_rate + c.leave_rate)
     at = s.pairs[p].at_e
     if at >= 0:
         decouple(s.x, s.P, h, c.n, at, max(c.fast_var, 1e-12))
         decouple(s.x, s.P, h, c.n, at + 1, max(c.slow_var, 1e-12))
 
 
+@kernel
+def forget_fits(pair):
+    """How well a pair's ranges fit, as if none had come yet."""
+    pair.n_ranges, pair.misfit = 0, 1.0
+    pair.residual, pair.beyond, pair.scatter = 0.0, 0.0, 0.0
+
+
 @allocating_kernel
 def try_join(c, s, layout, new, t):
-    """Take a node in once it is ready with enough of the others."""
+    """Take a node in once it is ready with enough of the others; tells whether it was."""
     n = s.nodes.shape[0]
     n_present, n_ready = 0, 0
     ready = np.empty(n, np.int64)
     for k in range(n):
         if s.nodes[k].present:
             n_present += 1
-            if is_ready(c, s, layout, new, k):
+            if is_ready(c, s, layout, new, k, t):
                 ready[n_ready] = k
                 n_ready += 1
     if n_ready < min(c.d + 1, n_present):
-        return
+        return False
     sides = np.empty((2, 3))
     known, distance = np.zeros((n_ready, 3)), np.empty(n_ready)
     was_alive = s.alive.copy()
@@ -161,7 +169,11 @@ def try_join(c, s, layout, new, t):
             target = h if side == 0 else copy_hypothesis(s, h)
             if target >= 0:
                 add_node(c, s, layout, target, new, sides[side], t)
+    for k in range(n):
+        if s.nodes[k].present:
+            s.pairs[layout.pair_index[new, k]].t_range = t
     s.nodes[new].present = True
+    return True
 
 
 @allocating_kernel
@@ -190,8 +202,4 @@ def add_node(c, s, layout, h, new, pos, t):
         if i != new and s.nodes[i].present:
             p = layout.pair_index[i, new]
             begin_pair(c, s, h, p)
-            s.nlos[h, p] = c.enter_rate / (c.enter_rate + c.leave_rate)
-            s.pairs[p].t_range = t
-            s.pairs[p].n_ranges = 0
-            s.pairs[p].misfit = 1.0
-            s.pairs[p].residual, s.pairs[p].beyond, s.pairs[p].scatter = 0.0, 0.0, 0.0
+            forget_fits(s.pairs[p])

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 
 from tracking.compiled import small_kernel
+from tracking.filters.joint._sleep_kernels import rests
 
 MANY = 5
 """[-] Equal ranges after the first that may be chance."""
@@ -44,7 +45,7 @@ def sure_speed(c, s, node, t):
     """Speed of a node in the best hypothesis [m/s]; 0 where it may stand."""
     if node.static or not node.present:
         return 0.0
-    if node.rests and node.has_state and t - node.t_moved > c.rest_after:
+    if rests(c, node, t):
         return 0.0
     h, squared = s.group[0].best, 0.0
     for k in range(c.d):

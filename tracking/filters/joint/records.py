@@ -60,7 +60,7 @@ PAIR = np.dtype(
         ("n_same", "i8"),  # ranges before it that were equal
         ("way", "f8"),  # what both ends travelled meanwhile [m]
         ("residual", "f8"),  # running mean of its innovations [m]
-        ("beyond", "f8"),  # the same without those that are far off [m]
+        ("beyond", "f8"),  # the same, single ones counting as 1 m off at most [m]
         ("scatter", "f8"),  # running mean of their distance from it [m]
         ("start_sum", "f8"),  # sum of the first ranges of a pair not started [m]
         ("start_t", "f8"),  # time of the first of them [s]
@@ -83,7 +83,7 @@ GROUP = np.dtype(
         ("t_check", "f8"),
         ("t_carrier", "f8"),
         ("t_gauge", "f8"),
-        ("misfit", "f8"),  # running mean of the NIS of ranges in the best hypothesis [-]
+        ("misfit", "f8"),  # running mean of NIS of ranges that mean anything, not of doubted nodes
         ("strain", "f8"),  # slow running mean of the misfit [-]
         ("strain_limit", "f8"),  # how much of it brings up other rotations [-]
         ("fit", "f8"),  # running share of ranges that fit [-]

@@ -57,7 +57,7 @@ def forget_mean(s):
 def try_start(c, s, layout, t):
     """Start the group with the nodes whose pairs are all ready."""
     members = np.empty(s.nodes.shape[0], np.int64)
-    m = choose_members(c, s, layout, members)
+    m = choose_members(c, s, layout, members, t)
     if m == 0:
         return
     X = first_shape(s, layout, members, m, c.d)
@@ -110,7 +110,7 @@ def try_join(c, s, layout, new, t):
     for k in range(n):
         if s.nodes[k].present:
             n_present += 1
-            if is_ready(c, s, layout, new, k):
+            if is_ready(c, s, layout, new, k, t):
                 ready[n_ready] = k
                 n_ready += 1
     if n_ready < min(c.d + 1, n_present):

@@ -1,0 +1,61 @@
+"""What was heard long ago does not count: silences of all, first ranges, doubts."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tracking import Status, Tracker
+from tracking.filters import FILTERS
+from tracking.measurements import Kind
+
+
+def ranges_of(block, *nodes):
+    """Ranges between two of the nodes, or all of one, (event)."""
+    found = block.kind[0] == Kind.RANGE
+    for node in nodes:
+        found &= (block.i[0] == node) | (block.j[0] == node)
+    return found
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_after_a_common_silence_the_group_begins_anew(name, make_group):
+    """Whoever speaks first has been away as long as the others."""
+    group = make_group(n=4, seconds=40.0)
+    b = group.block
+    silent = ranges_of(b) & (b.t[0] > 8.0) & (b.t[0] < 16.0)
+    block = b.take(~silent)
+    after = block.t[0, ranges_of(block) & (block.t[0] >= 16.0)][0]
+    t = np.array([7.9, after + 0.01, 39.9])
+    estimate = Tracker(group.constellation, filter=name).run(block, t).take(0)
+    assert np.isin(estimate.status[1], (Status.ABSENT, Status.STARTING)).all()
+    for k in (0, 2):
+        assert np.isin(estimate.status[k], (Status.OK, Status.AMBIGUOUS)).all()
+    if name == "joint":
+        assert (estimate.status[2] == Status.OK).all()
+        assert np.abs(estimate.pos_ij_w[2] - group.pairs(t)[2]).max() < 0.3
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_first_ranges_of_long_ago_place_nobody(name, make_group):
+    """A newcomer's distance to one of three is four seconds old when it ranges the others."""
+    group = make_group(n=4, seconds=12.0)
+    b = group.block
+    early = ranges_of(b, 3, 0) & (b.t[0] < 4.0)
+    late = (ranges_of(b, 3, 1) | ranges_of(b, 3, 2)) & (b.t[0] > 8.0)
+    block = b.take(~ranges_of(b, 3) | early | late)
+    status = Tracker(group.constellation, filter=name).run(block, np.array([11.9])).status[0, 0]
+    for k in range(3):
+        assert status[group.constellation.pair_index[k, 3]] == Status.STARTING
+
+
+def test_a_doubt_ends_where_a_single_other_is_left(make_group):
+    group = make_group(n=3, seconds=30.0)
+    b = group.block
+    values = b.values.copy()
+    values[0, ranges_of(b, 0) & (b.t[0] > 8.0) & (b.t[0] < 14.0), 0] += 0.8
+    block = replace(b, values=values).take(~(ranges_of(b, 0, 2) & (b.t[0] > 14.0)))
+    status = Tracker(group.constellation).run(block, np.array([13.9, 29.9])).status[0]
+    pair = group.constellation.pair_index[0, 1]
+    assert status[0, pair] == Status.DOUBTFUL
+    assert status[1, pair] == Status.OK

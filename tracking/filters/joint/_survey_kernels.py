@@ -1,0 +1,34 @@
+"""Surveyed distances: measured once, with a tape or a total station, and true for good.
+
+One that is known before both of its nodes run shapes the start, which takes it for a range; so it
+is used once more when they do. It is remembered while a node is away.
+"""
+
+from __future__ import annotations
+
+from tracking.compiled import kernel, small_kernel
+from tracking.filters._shape_kernels import SURVEYED, start_distance
+from tracking.filters.joint._linear_kernels import absorb, project, settle_all
+from tracking.filters.joint._range_kernels import range_model
+
+
+@small_kernel
+def fuse_survey(c, s, h, p, distance, scratch):
+    """Correct hypothesis h with a surveyed distance between the origins of two nodes."""
+    none = scratch.none
+    predicted, m = range_model(c, s, h, p, none, none, scratch.idx, scratch.val)
+    variance = project(s, h, c.n, m, scratch.idx, scratch.val, scratch.w)
+    absorb(s, h, c.n, scratch.w, distance - predicted, variance + c.survey_var)
+
+
+@kernel
+def use_surveys(c, s, layout, scratch, i, end):
+    """Correct with the surveyed distances of node i to those before `end` that are there."""
+    for k in range(end):
+        if k != i and s.nodes[i].present and s.nodes[k].present:
+            p = layout.pair_index[i, k]
+            if s.pairs[p].start_n >= SURVEYED:
+                for h in range(s.alive.shape[0]):
+                    if s.alive[h]:
+                        fuse_survey(c, s, h, p, start_distance(s, layout, i, k), scratch)
+    settle_all(s, c.n)
