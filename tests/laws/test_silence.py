@@ -50,12 +50,15 @@ def test_first_ranges_of_long_ago_place_nobody(name, make_group):
 
 
 def test_a_doubt_ends_where_a_single_other_is_left(make_group):
-    group = make_group(n=3, seconds=30.0)
+    """Ranges with one other say nothing of a common offset, neither for nor against."""
+    group = make_group(n=4, seconds=30.0)
     b = group.block
     values = b.values.copy()
     values[0, ranges_of(b, 0) & (b.t[0] > 8.0) & (b.t[0] < 14.0), 0] += 0.8
-    block = replace(b, values=values).take(~(ranges_of(b, 0, 2) & (b.t[0] > 14.0)))
-    status = Tracker(group.constellation).run(block, np.array([13.9, 29.9])).status[0]
+    left = ranges_of(b, 0) & ~ranges_of(b, 0, 1) & (b.t[0] > 14.0)
+    block = replace(b, values=values).take(~left)
+    t = np.array([10.0, 12.0, 13.9, *np.arange(19.0, 30.0)])
+    status = Tracker(group.constellation).run(block, t).status[0]
     pair = group.constellation.pair_index[0, 1]
-    assert status[0, pair] == Status.DOUBTFUL
-    assert status[1, pair] == Status.OK
+    assert (status[:3, pair] == Status.DOUBTFUL).all()
+    assert (status[3:, pair] != Status.DOUBTFUL).all()
