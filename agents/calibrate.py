@@ -134,7 +134,7 @@ def calibrate_ranges(log: Log, *, seed: int = 0, max_distance: float = 8.0) -> C
         calibration=Calibration(ranges=result.calibration),
         uwb=result,
         ranges=table,
-        refused={n: "too few ranges with a true distance" for n in without},
+        refused=dict.fromkeys(without, "too few ranges that agree with a true distance"),
     )
 
 

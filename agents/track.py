@@ -16,12 +16,16 @@ from tracking.arrays import F64, Bool
 from tracking.constellation import Constellation
 from tracking.estimate import Status, TeamEstimate
 from tracking.filters import DEFAULT_FILTER
+from tracking.horizon import HorizonParams
 from tracking.log import Log, read_log
+from tracking.measurements import MeasurementBlock
 from tracking.metrics import Score, score
 from tracking.tracker import Tracker, TrackerParams
 
 CSV_HZ = 20.0
 """[Hz] Rate of estimates.csv."""
+LAG = HorizonParams().delay
+"""[s] So much later is what smoothed estimates know."""
 N_CHUNKS = 50
 """A log is tracked in so many pieces, so that progress can be shown."""
 
@@ -84,6 +88,7 @@ def track_log(
     *,
     filter: str = DEFAULT_FILTER,
     skip: float = 10.0,
+    smooth: bool = False,
     params: TrackerParams | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> TrackResult:
@@ -93,12 +98,14 @@ def track_log(
         log: A log, or its folder.
         filter: One of `tracking.filters.FILTERS`.
         skip: Times until so many seconds after the first range are not scored.
+        smooth: Whether estimates know what was measured in the `LAG` after them, too; the filter
+            goes its way as without.
         params: What the tracker believes.
         progress: Called with the share done, 0 to 1.
 
     Raises:
         LogError: The folder cannot be read.
-        ConfigError: No such filter.
+        ConfigError: No such filter, or one that cannot smooth.
     """
     log = log if isinstance(log, Log) else read_log(log)
     constellation, block = log.constellation, log.block
@@ -118,7 +125,11 @@ def track_log(
         # An estimate holds every event up to its time, so both are cut at the same edge.
         next_event = int(np.searchsorted(block.t[0], edge, side="right"))
         next_out = int(np.searchsorted(t_out, edge, side="right"))
-        parts.append(tracker.run(block.take(slice(event, next_event)), t_out[out:next_out]))
+        chunk, times = slice(event, next_event), t_out[out:next_out]
+        if smooth:
+            parts.append(_smoothed(tracker, block, chunk, times))
+        else:
+            parts.append(tracker.run(block.take(chunk), times))
         event, out = next_event, next_out
         if progress is not None:
             progress((k + 1) / N_CHUNKS)
@@ -142,6 +153,22 @@ def track_log(
         skip=skip,
         realtime_factor=log.duration / max(elapsed, 1e-9),
     )
+
+
+def _smoothed(tracker: Tracker, block: MeasurementBlock, chunk: slice, t_out: F64) -> TeamEstimate:
+    """Estimates that know what was measured in the `LAG` after them; events of a chunk handled."""
+    event, found = chunk.start, []
+    for t in t_out:
+        now, later = np.searchsorted(block.t[0], [t, t + LAG], side="right")
+        tracker.step(block.take(slice(event, now)), t)
+        found.append(tracker.smooth(block.take(slice(now, later)), t))
+        event = now
+    rest = tracker.run(block.take(slice(event, chunk.stop)), np.empty(0))
+    if not found:
+        return rest
+    names = TeamEstimate.__slots__[1:]
+    stacked = (np.stack([getattr(e, n) for e in found], axis=1) for n in names)
+    return TeamEstimate(rest.constellation, *stacked)
 
 
 def pair_name(constellation: Constellation, pair: int) -> str:

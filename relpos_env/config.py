@@ -24,6 +24,13 @@ from tracking.filters import DEFAULT_FILTER, filter_builder
 from tracking.tracker import TrackerParams
 
 MOST_CARS = 20
+KINDS: dict[str, tuple[type, ...]] = {
+    "task_options": (Mapping,),
+    "params": (TrackerParams, type(None)),
+    "operator": (OperatorSimParams,),
+    "weights": (Mapping, type(None)),
+}
+"""What arguments that are no names or numbers have to be."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,6 +82,10 @@ class FormationConfig:
             history=whole_number("history", self.history, 1, 64),
             proximity=whole_number("proximity", self.proximity, 0, MOST_BEAMS),
         )
+        for name, kinds in KINDS.items():
+            if not isinstance(getattr(self, name), kinds):
+                expected = " or ".join("None" if k is type(None) else k.__name__ for k in kinds)
+                raise EnvError(f"{name}: expected {expected}, got {getattr(self, name)!r}")
         try:
             filter_builder(self.filter)
         except ConfigError as error:
@@ -102,7 +113,7 @@ class FormationConfig:
             task_options=options,
             mode=observation_mode(self.observation, n_cars, config.proximity),
             actions=action_mode(self.actions),
-            params=self.params or default_params(scenario, n_cars),
+            params=default_params(scenario, n_cars) if self.params is None else self.params,
         )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from relpos_env.interface.actions import DriveCommand
 from relpos_env.scenarios import Scenario
 from relpos_env.world_state import WorldState
-from tracking.arrays import F64
+from tracking.arrays import F64, Bool
 
 
 class LoopDrivers:
@@ -34,7 +34,9 @@ class LoopDrivers:
         wave = np.sin(2.0 * np.pi * self._frequency * state.t + self._phase)
         speed = 1.2 + 0.5 * wave[0]
         lane = 1.0 + 0.18 * wave[1]
-        wanted = self._loop_direction(state.pos_w, lane) + self._keep_apart(state.pos_w)
+        wanted = self._loop_direction(state.pos_w, lane) + self._keep_apart(
+            state.pos_w, state.present
+        )
         error = np.arctan2(wanted[:, 1], wanted[:, 0]) - state.heading + 0.25 * wave[2]
         error = (error + np.pi) % (2.0 * np.pi) - np.pi
         steering = np.clip(1.5 * error, -0.42, 0.42)
@@ -59,10 +61,10 @@ class LoopDrivers:
         direction: F64 = tangent + 2.0 * (lane[:, None] - radius) * outward
         return direction
 
-    def _keep_apart(self, pos: F64) -> F64:
-        """Away from other cars nearer than 0.9 m and walls nearer than 0.4 m, (car, 2)."""
+    def _keep_apart(self, pos: F64, present: Bool) -> F64:
+        """Away from cars in the room nearer than 0.9 m and walls nearer than 0.4 m, (car, 2)."""
         away = pos[:, None] - pos[None, :]
-        distance = np.linalg.norm(away, axis=-1) + 1e3 * np.eye(len(pos))
+        distance = np.linalg.norm(away, axis=-1) + 1e3 * (np.eye(len(pos)) + ~present)
         push = np.maximum(0.9 - distance, 0.0) / np.maximum(distance, 0.1)
         others = 2.0 * np.sum(push[..., None] * away, axis=1)
         half = 0.5 * np.array(self._scenario.room)

@@ -9,8 +9,10 @@ import numpy as np
 
 from relpos_env.bodies import Bodies
 from relpos_env.room import Room
+from relpos_env.scenarios.floor import spacing
 from relpos_env.scenarios.life import LifeEvent
 from relpos_env.scenarios.obstacle import Obstacle
+from relpos_env.scenarios.overlap import distance
 from relpos_env.sensors.radio.radio import Radio
 from relpos_env.solver import Solver, connect, disconnect
 from relpos_env.timing import SOON
@@ -92,9 +94,15 @@ class Group:
         while events and events[0].t <= t + SOON:
             event, events = events[0], events[1:]
             n = event.car
-            if event.what == "join" and self._is_taken(b, env, event):
+            if event.what == "join" and not b.present[env, n] and self._is_taken(b, env, event):
                 later = replace(event, t=event.t + WAIT)
                 events = tuple(sorted((*events, later), key=lambda each: each.t))
+                continue
+            if event.what == "leave" and not b.present[env, n]:
+                # It still waits outside, and does not come in any more.
+                waits = next((e for e in events if e.car == n and e.what == "join"), None)
+                events = tuple(e for e in events if e is not waits)
+            if not _makes_sense(event, b.present[env]):
                 continue
             if event.what == "join":
                 b.body[env, n], b.drive[env, n] = 0.0, 0.0
@@ -117,9 +125,22 @@ class Group:
     def _is_taken(self, b: Bodies, env: int, event: LifeEvent) -> bool:
         """True while a car or a box that was pushed stands where one is to come in."""
         assert event.pose is not None
-        boxes, half = b.boxes[env], b.size[env].sum()
-        away = np.abs(b.body[env, b.present[env], :2] - event.pose[:2]).max(axis=-1)
-        reach = half + np.hypot(boxes[:, 2], boxes[:, 3])
-        beside = np.hypot(boxes[:, 0] - event.pose[0], boxes[:, 1] - event.pose[1])
-        pushed = self.movable(len(boxes)) & (beside < reach)
-        return bool((away < 2.0 * half).any() or pushed.any())
+        place = np.array(event.pose[:2])
+        away = np.linalg.norm(b.body[env, b.present[env], :2] - place, axis=-1)
+        if (away < spacing(self.car)).any():
+            return True
+        boxes = b.boxes[env]
+        # Places to come in were drawn with more room than this beside the boxes.
+        reach = 0.5 * np.hypot(self.car.length, self.car.width)
+        pushed = boxes[self.movable(len(boxes))]
+        return any(distance(place, box) < reach for box in pushed)
+
+
+def _makes_sense(event: LifeEvent, present: Bool) -> bool:
+    """Whether an event can happen: others were drawn as if nobody ever had to wait outside.
+
+    Two cars at least stay.
+    """
+    if event.what == "join":
+        return not present[event.car]
+    return bool(present[event.car]) and (event.what != "leave" or int(present.sum()) > 2)

@@ -126,7 +126,7 @@ class FormationVecEnv(SharedSeats):
         f.step(*self._commands)
         rewards = f.rewards.ravel().astype(np.float32)
         over = f.terminated | f.truncated
-        dones = (was_active & over[:, None] | f.left).ravel()
+        dones = ((was_active | f.active) & over[:, None] | f.left).ravel()
         infos = [_NOTHING] * self.num_envs
         if not f.active.all():
             for seat in np.nonzero(~f.active.ravel())[0]:

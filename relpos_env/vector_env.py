@@ -137,6 +137,8 @@ class FormationVectorEnv(VectorEnv[F32, Any, Any]):
             infos["_final_info"] = over
             for env in np.nonzero(over)[0]:
                 self._begin(int(env))
+            # Those of the episodes that go on, or have just begun.
+            infos.update(self._infos())
         if self.render_mode is not None:
             for film in self._films:
                 film.add(formation)

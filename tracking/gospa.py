@@ -62,7 +62,8 @@ def labelled_gospa(
         raise ConfigError(f"cutoff: expected a length above 0, got {cutoff:g}")
     estimated = ~np.isin(estimate.status, (Status.ABSENT, Status.STARTING))
     both = estimated & is_there
-    error = np.linalg.norm(np.where(both[..., None], estimate.pos_ij_w - truth_ij_w, 0.0), axis=-1)
+    off = np.where(both[..., None], estimate.pos_ij_w - truth_ij_w, 0.0)
+    error = np.linalg.norm(off[..., : estimate.constellation.dimensions], axis=-1)
     localisation = np.sum(np.minimum(error, cutoff) ** 2, axis=-1)
     missed = np.sum(is_there & ~estimated, axis=-1)
     false = np.sum(estimated & ~is_there, axis=-1)

@@ -68,6 +68,9 @@ def evaluate(
         emit_json(result.records)
         return
     print_table(result.suite.title, report.header(result), report.rows(result))
+    targets = report.target_rows(result)
+    if targets:
+        print_table("Targets [m]", report.TARGETS, targets)
     for line in report.notes(result):
         click.echo(line)
     if out is not None:

@@ -27,6 +27,11 @@ from agents.errors import UsageError
     type=Path,
     help="A calibration.toml to correct measurements with; may be given again.",
 )
+@click.option(
+    "--smooth",
+    is_flag=True,
+    help="Estimates know what was measured in the 0.1 s after them, too; joint only.",
+)
 @click.option("--skip", default=10.0, show_default=True, help="Seconds that are not scored.")
 @click.option("--out", type=Path, help="Folder for estimates.csv and report.html.")
 @click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
@@ -34,12 +39,14 @@ def track(
     logs: tuple[Path, ...],
     filters: tuple[str, ...],
     calibrations: tuple[Path, ...],
+    smooth: bool,
     skip: float,
     out: Path | None,
     as_json: bool,
 ) -> None:
     """Track recorded runs and score them where they have truth."""
     from agents.calibrate import apply_calibrations
+    from agents.output import check_folder, write_results
     from agents.report.track_report import track_report
     from agents.track import estimates_csv, track_log
     from tracking.filters import DEFAULT_FILTER, filter_builder
@@ -50,16 +57,20 @@ def track(
     names = tuple(dict.fromkeys(filters)) or (DEFAULT_FILTER,)
     for name in names:
         filter_builder(name)
+        if smooth and name != "joint":
+            raise UsageError(f"--smooth: expected filter joint, {name} cannot look back")
+    if out is not None:
+        check_folder(out, ["report.html"])
     read = [apply_calibrations(read_log(path), calibrations) for path in logs]
     results = []
     for log in read:
         for name in names:
             label = f"{log.name}, {name}"
             with progress_bar(label, shown=log.duration > 20.0) as report:
-                results.append(track_log(log, filter=name, skip=skip, progress=report))
+                results.append(
+                    track_log(log, filter=name, skip=skip, smooth=smooth, progress=report)
+                )
     if out is not None:
-        from agents.output import write_results
-
         many = len(results) > 1
         files = {"report.html": track_report(results)}
         for k, r in enumerate(results):

@@ -19,6 +19,8 @@ DROPOUT = 10.0
 """[s] For so long the IMU of a node is silent."""
 CLOCK_OFFSET = 0.05
 """[s] So late are the IMU stamps of a node."""
+HEADING_ERROR = np.radians(5.0)
+"""[rad] By so much the magnetometer of a node is turned."""
 OUTLIER_SHARE = 0.02
 """[-] So many ranges are outliers."""
 OUTLIER_SPAN = 20.0
@@ -47,6 +49,16 @@ def clock_offset(log: Log, rng: np.random.Generator) -> Log:
     t = log.block.t.copy()
     t[0, _inertial(log.block, 0)] += CLOCK_OFFSET
     return replace(log, block=replace(log.block, t=t).sorted())
+
+
+def heading_error(log: Log, rng: np.random.Generator) -> Log:
+    """The magnetometer of the first node sits turned by `HEADING_ERROR` about its vertical axis."""
+    mag = (log.block.kind[0] == Kind.MAG) & (log.block.i[0] == 0)
+    c, s = np.cos(HEADING_ERROR), np.sin(HEADING_ERROR)
+    R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])  # noqa: N806
+    values = log.block.values.copy()
+    values[0, mag, :3] = values[0, mag, :3] @ R.T
+    return replace(log, block=replace(log.block, values=values))
 
 
 def range_outliers(log: Log, rng: np.random.Generator) -> Log:

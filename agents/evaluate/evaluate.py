@@ -12,8 +12,11 @@ from agents.engines import check_jobs, find_engine
 from agents.errors import UsageError
 from agents.evaluate.run import RunResult, run_seed
 from agents.evaluate.suites import SUITES, Case, Suite
+from agents.evaluate.targets import Outcome, outcomes
 from tracking.filters import FILTERS
 
+MEDIANS = ("rmse", "rmse_yaw", "rmse_shape", "bound", "bound_shape")
+"""Lengths that are medians over the seeds [m]."""
 SHORTEST, LONGEST = 15.0, 1800.0
 """[s] The first ten seconds are not scored; a person is simulated for half an hour at most."""
 
@@ -34,9 +37,14 @@ class CaseResult:
         return self.case.paper.get(self.filter)
 
     @property
+    def targets(self) -> list[Outcome]:
+        """What is asked of this filter here, and what is reached."""
+        figures = {name: self.median(name) for name in MEDIANS}
+        return outcomes(self.case.asked.get(self.filter, {}), figures)
+
+    @property
     def record(self) -> dict[str, Any]:
         """The figures, ready for JSON; what could not be scored is None."""
-        medians = ("rmse", "rmse_yaw", "rmse_shape", "bound", "bound_shape")
         ratios = ("ratio_bound", "ratio_shape")
         return {
             "suite": self.suite,
@@ -45,7 +53,7 @@ class CaseResult:
             "filter": self.filter,
             "nodes": self.runs[0].nodes,
             "seeds": len(self.runs),
-            **{name: self.median(name) for name in (*medians, *ratios)},
+            **{name: self.median(name) for name in (*MEDIANS, *ratios)},
             "lost_runs": sum(r.lost for r in self.runs),
             "nees": _mean(r.nees for r in self.runs),
             "nis": _mean(r.nis for r in self.runs),
@@ -53,6 +61,7 @@ class CaseResult:
             "ok_share": _mean(r.ok_share for r in self.runs),
             "us_per_round": self.median("us_per_round"),
             "paper": self.paper,
+            "targets": [target.record for target in self.targets],
         }
 
     def values(self, name: str) -> list[float]:

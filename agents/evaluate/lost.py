@@ -39,7 +39,8 @@ def lost_at(estimate: TeamEstimate, truth_ij_w: F64, has_truth: Bool, first: flo
         first: Time of the first range [s].
     """
     t = estimate.t
-    error = np.linalg.norm(estimate.pos_ij_w - truth_ij_w, axis=-1)
+    off = (estimate.pos_ij_w - truth_ij_w)[..., : estimate.constellation.dimensions]
+    error = np.linalg.norm(off, axis=-1)
     absent = np.isin(estimate.status, (Status.ABSENT, Status.STARTING))
     wrong = has_truth & (absent | (error > WRONG))
     wrong &= (t >= converged_at(estimate, first))[:, None]

@@ -46,7 +46,8 @@ def over_time(
     n_bins = max(round(seconds / BIN), 1)
     bins = np.minimum((estimate.t / BIN).astype(np.int64), n_bins - 1)
     known = has_truth & ~np.isin(estimate.status, (Status.ABSENT, Status.STARTING))
-    error = np.linalg.norm(errors_after(estimate, truth_ij_w, yaw_rad), axis=-1)
+    off = errors_after(estimate, truth_ij_w, yaw_rad)
+    error = np.linalg.norm(off[..., : estimate.constellation.dimensions], axis=-1)
     c, s = np.cos(yaw_rad), np.sin(yaw_rad)
     R_yaw = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])  # noqa: N806
     nees, has_nees = pair_nees(estimate, truth_ij_w @ R_yaw)

@@ -7,9 +7,12 @@ import json
 from agents.evaluate.evaluate import EvaluateResult
 from agents.evaluate.lost import FOR, WRONG
 from agents.evaluate.run import SKIP
+from agents.evaluate.targets import NEAR
 from agents.report import evaluate_figures as figures
 from agents.report.page import Page, metres, png
 
+TARGETS = ["case", "filter", "figure", "reached", "asked", "target", ""]
+"""Names of the columns of targets."""
 _FIGURES = [
     "rmse", "rmse_yaw", "rmse_shape", "bound", "yaw/b", "shape/b",
     "lost", "nees", "nis", "us",
@@ -59,6 +62,23 @@ def notes(result: EvaluateResult) -> list[str]:
     return lines
 
 
+def target_rows(result: EvaluateResult) -> list[list[str]]:
+    """Cells of the table of targets, one line for each."""
+    return [
+        [
+            case.case.name,
+            case.filter,
+            target.figure,
+            metres(target.reached),
+            metres(target.asked),
+            f"{metres(target.limit)} = {NEAR:.2f} x bound" if target.by_bound else "as asked",
+            "met" if target.met else "missed",
+        ]
+        for case in result.cases
+        for target in case.targets
+    ]
+
+
 def evaluate_files(result: EvaluateResult) -> dict[str, str | bytes]:
     """Everything that goes into the folder, by name."""
     drawn = figures.figures(result)
@@ -70,6 +90,14 @@ def evaluate_files(result: EvaluateResult) -> dict[str, str | bytes]:
     page.table(header(result), rows(result))
     for line in notes(result):
         page.text(line)
+    targets = target_rows(result)
+    if targets:
+        page.heading("Targets")
+        page.table(TARGETS, targets)
+        page.text(
+            f"Where the bound itself lies above what is asked, the target is {NEAR:.2f} times the "
+            f"bound. They are meant for {result.suite.seeds} seeds of {result.suite.seconds:g} s."
+        )
     page.heading("Cases")
     page.table(["case", "what is special"], [[c.name, c.about] for c in result.suite.cases])
     for name, (title, figure, caption) in drawn.items():

@@ -72,10 +72,11 @@ class ContinuousActions:
             actions = np.asarray(actions, dtype=np.float64)
         except (TypeError, ValueError) as error:
             raise EnvError(f"{where}: expected numbers, got {actions!r}") from error
-        # The sum is finite unless some number is not, or is beyond all reason.
+        # A sum that is not finite is of such numbers, or of finite ones beyond all reason.
         if not math.isfinite(actions.sum()):
-            bad = np.argwhere(~np.isfinite(actions))[0]
-            raise EnvError(f"{where}: expected finite numbers, got {actions[tuple(bad)]}")
+            bad = np.argwhere(~np.isfinite(actions))
+            if len(bad):
+                raise EnvError(f"{where}: expected finite numbers, got {actions[tuple(bad[0])]}")
         clipped = np.minimum(np.maximum(actions, -1.0), 1.0)
         return clipped[..., 0] * MAX_SPEED, clipped[..., 1] * MAX_STEERING
 

@@ -30,7 +30,7 @@ here, and its weights in `DEFAULT_WEIGHTS`."""
 
 
 def make_task(
-    name: str, n_cars: int, n_envs: int, room: tuple[float, float], **options: Any
+    name: str, n_cars: int, n_envs: int, room: tuple[float, float], /, **options: Any
 ) -> Task:
     """Look a task up and build it.
 

@@ -63,6 +63,8 @@ class Gap(Task):
         """
         super().__init__(n_cars, n_envs, ("formation", "progress", *COMMON_TERMS, "time"))
         gap = Opening(width=1.0) if gap is None else gap
+        if not isinstance(gap, Opening):
+            raise EnvError(f"gap: expected a relpos_env.scenarios.Gap, got {gap!r}")
         if abs(gap.direction) > 1e-6:
             raise EnvError(f"gap: expected one that is passed along x, got {gap.direction:g} rad")
         self._wall_x = gap.x

@@ -58,6 +58,24 @@ def test_track_prints_a_table(recording):
         assert word in done.stdout
 
 
+def test_smoothed_estimates_are_better(recording):
+    plain, smooth = (
+        json.loads(relpos("track", recording, "--json", *more).stdout)
+        for more in ([], ["--smooth"])
+    )
+    assert smooth["rmse_shape"] < plain["rmse_shape"]
+    done = relpos("track", recording, "--filter", "ekf", "--smooth")
+    assert done.returncode == 2
+    assert "--smooth: expected filter joint" in done.stderr
+
+
+def test_where_nothing_can_be_written_nothing_is_tracked(recording, tmp_path):
+    (tmp_path / "file").write_text("")
+    done = relpos("track", recording, "--out", tmp_path / "file" / "out")
+    assert done.returncode == 2
+    assert "is a file, expected a folder" in done.stderr
+
+
 def test_single_bad_measurements_are_shown(recording, tmp_path):
     import gzip
     import shutil

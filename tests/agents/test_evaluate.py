@@ -14,6 +14,7 @@ from agents.evaluate.changes import (
     CLOCK_OFFSET,
     OUTLIER_SPAN,
     clock_offset,
+    heading_error,
     imu_dropout,
     range_outliers,
     without_powers,
@@ -22,6 +23,8 @@ from agents.evaluate.evaluate import evaluate
 from agents.evaluate.lost import lost_at
 from agents.evaluate.over_time import NIS_EDGES, over_time
 from agents.evaluate.suites import SUITES, Suite
+from agents.evaluate.targets import outcomes
+from agents.report.evaluate_report import target_rows
 from agents.simulate import record, simulate
 from relpos_env.scenarios.cars import CARS_NLOS
 from tracking.constellation import Constellation, NodeConfig
@@ -65,6 +68,23 @@ def test_rows_have_all_figures(result):
         assert row["us_per_round"] > 0.0
         assert 0.0 < row["bound_shape"] < row["bound"] < 1.0
     assert [r["paper"] for r in result.records] == [0.093, 0.396, 0.102, 0.428, None, None]
+
+
+def test_targets_are_what_is_asked_or_near_the_bound():
+    figures = {"rmse_yaw": 0.08, "bound": 0.07, "rmse_shape": 0.05, "bound_shape": 0.02}
+    yaw, shape = outcomes({"rmse_yaw": 0.05, "rmse_shape": 0.03}, figures)
+    assert (yaw.limit, yaw.by_bound, yaw.met) == (pytest.approx(0.077), True, False)
+    assert (shape.limit, shape.by_bound, shape.met) == (0.03, False, False)
+    assert outcomes({"rmse_shape": 0.05}, figures)[0].met
+    (unknown,) = outcomes({"rmse_yaw": 0.05}, {"rmse_yaw": None, "bound": None})
+    assert (unknown.limit, unknown.met) == (0.05, False)
+
+
+def test_rows_tell_the_targets(result):
+    asked = [[(t["figure"], t["asked"]) for t in r["targets"]] for r in result.records]
+    assert asked == [[("rmse_shape", 0.093)], [], [("rmse_shape", 0.102)], [], [], []]
+    names = [row[:3] for row in target_rows(result)]
+    assert names == [[case, "ekf-mds", "rmse_shape"] for case in ("cars-los", "cars-nlos")]
 
 
 def test_rows_are_medians_and_sums_of_runs(result):
@@ -169,6 +189,13 @@ def test_changes_change_what_they_say(log):
     gap = np.diff(silent.t[0, (silent.kind[0] == Kind.IMU) & (silent.i[0] == 0)]).max()
     assert gap == pytest.approx(10.0, abs=0.03)
     assert log.block.n_events - silent.n_events == pytest.approx(2 * 1000, abs=4)
+
+    turned = heading_error(log, rng).block.values[0]
+    mine = (kind == Kind.MAG) & (node == 0)
+    before, after = log.block.values[0, mine], turned[mine]
+    angle = np.arctan2(after[:, 1], after[:, 0]) - np.arctan2(before[:, 1], before[:, 0])
+    np.testing.assert_allclose((np.degrees(angle) + 180.0) % 360.0 - 180.0, 5.0)
+    np.testing.assert_array_equal(turned[~mine], log.block.values[0, ~mine])
 
     late = clock_offset(log, rng).block
     assert (np.diff(late.t[0]) >= 0.0).all()

@@ -34,6 +34,12 @@ BAD_ARGUMENTS = [
     ({"max_cycles": 1.5}, "max_cycles: expected a whole number"),
     ({"history": 0}, "history: expected a whole number from 1 to 64, got 0"),
     ({"render_mode": "ansi"}, "render_mode: expected None, rgb_array or human, got 'ansi'"),
+    ({"task": "ring", "task_options": {"room": (9.0, 9.0)}}, "room: task 'ring' expected options"),
+    ({"task": "gap", "task_options": {"gap": 0.8}}, "gap: expected a relpos_env.scenarios.Gap"),
+    ({"task_options": None}, "task_options: expected Mapping, got None"),
+    ({"weights": ["collision"]}, "weights: expected Mapping or None, got"),
+    ({"params": {"a": 1}}, "params: expected TrackerParams or None, got"),
+    ({"operator": {}}, "operator: expected OperatorSimParams, got"),
     ({"frames": 3}, "frames: unknown argument, expected one of scenario, task"),
 ]
 
@@ -94,6 +100,14 @@ def test_bad_actions_are_named(change, message):
     with pytest.raises(EnvError, match=message):
         env.step(actions)
     assert np.array_equal(env.state(), before)
+
+
+def test_actions_beyond_all_reason_are_clipped():
+    envs = [parallel_env(max_cycles=5) for _ in range(2)]
+    for env, most in zip(envs, (1.0, 1e308), strict=True):
+        env.reset(seed=0)
+        env.step({a: np.full(2, most) for a in env.agents})
+    assert np.array_equal(envs[0].state(), envs[1].state())
 
 
 @pytest.mark.parametrize("action", [15, -1, 2.0, np.nan, "left"])

@@ -83,7 +83,9 @@ def test_environment_k_of_a_vector_is_the_single_one_with_the_next_seeds(n_envs,
             assert (step[2][k], step[3][k]) == (terminated, truncated)
             if terminated or truncated:
                 assert bits(infos["final_obs"][k]) == bits(observation)
-                observation, _ = single.reset()
+                for name in ("formation_error", "collisions", "active"):
+                    assert np.array_equal(infos["final_info"][name][k], info[name])
+                observation, info = single.reset()
                 episodes += 1
             assert bits(step[0][k]) == bits(observation)
             for name in ("formation_error", "collisions", "active"):

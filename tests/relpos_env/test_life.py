@@ -175,6 +175,69 @@ def test_one_controller_for_all_sees_zeros_in_the_place_of_absent_cars(life):
         assert not (env.formation.state.present[0] & ~info["active"]).any()
 
 
+def waiting(monkeypatch, *more):
+    """An environment whose new car is to come in where another stands; that one's own way."""
+
+    def draw(scenario, n_slots, seconds, rng):
+        episode = draw_episode(scenario, n_slots, seconds, rng)
+        door = tuple(episode.start[0])
+        events = [LifeEvent(t=STAND_STILL + 1.0, car=NEW, what="join", pose=door)]
+        for t, car, what in more:
+            pose = tuple(episode.start[car]) if what == "join" else None
+            events.append(LifeEvent(t=STAND_STILL + t, car=car, what=what, pose=pose))
+        present = episode.present.copy()
+        present[NEW] = False
+        return replace(episode, present=present, events=tuple(events))
+
+    monkeypatch.setattr(formation, "draw_episode", draw)
+    env = make()
+    env.reset(seed=0)
+    return env
+
+
+def drive(env, speed, steps):
+    for _ in range(steps):
+        env.step({a: np.array([speed, 0.0]) for a in env.agents})
+    return env.formation.state.present[0], env.loop.swarm.powered[0]
+
+
+def test_a_car_that_waits_outside_has_no_power(monkeypatch):
+    env = waiting(monkeypatch, (1.5, NEW, "power-off"), (2.0, NEW, "power-on"))
+    present, powered = drive(env, 0.0, 30)
+    assert not (present[NEW] or powered[NEW])
+    present, powered = drive(env, 0.5, 30)
+    assert present[NEW]
+    assert powered[NEW]
+
+
+def test_a_car_that_was_to_leave_while_it_waited_does_not_come_in(monkeypatch):
+    env = waiting(monkeypatch, (2.0, NEW, "leave"))
+    drive(env, 0.0, 30)
+    present, _ = drive(env, 0.5, 30)
+    assert not present[NEW]
+    assert env.loop.swarm._groups[0].next_event == np.inf
+
+
+def test_two_cars_stay_whoever_waits_outside(monkeypatch):
+    env = waiting(monkeypatch, (1.5, 1, "leave"), (2.0, 2, "leave"))
+    present, _ = drive(env, 0.0, 30)
+    assert present.tolist() == [True, False, True, False]
+
+
+def test_a_box_that_was_not_pushed_is_in_nobodys_way():
+    """Doors are drawn beside boxes that can be pushed, however long these are."""
+    kept = []
+    for seed in range(30):
+        env = make(scenario="rooms-9x7", n_cars=6)
+        env.reset(seed=seed)
+        group, b = env.loop.swarm._groups[0], env.loop.swarm._bodies
+        joins = [e for e in group.life if e.what == "join"]
+        b.present[0] = False
+        kept += [not group._is_taken(b, 0, event) for event in joins]
+    assert len(kept) > 20
+    assert all(kept)
+
+
 def test_a_car_waits_outside_while_another_stands_in_its_door(monkeypatch):
     def draw(scenario, n_slots, seconds, rng):
         episode = draw_episode(scenario, n_slots, seconds, rng)

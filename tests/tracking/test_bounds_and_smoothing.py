@@ -85,6 +85,21 @@ def test_smoothing_knows_more(drive):
     assert (trace[0] < trace[1]).all()
 
 
+@pytest.mark.parametrize("ahead", [0.0, 0.02, 0.05, 0.1])
+def test_a_group_that_starts_among_what_is_later_is_not_estimated_yet(drive, ahead):
+    """Of cars that drive already: all rotations would be followed from then on."""
+    moving = drive.block.take(drive.block.t[0] > 15.0)
+    tracker = Tracker(drive.constellation)
+    edges, status = np.arange(15.0, 17.0, 0.01), None
+    for t in edges:
+        event, later = np.searchsorted(moving.t[0], [t, t + ahead], side="right")
+        now = tracker.step(moving.take(slice(0, event)), t)
+        smooth = tracker.smooth(moving.take(slice(event, later)), t)
+        np.testing.assert_array_equal(smooth.status, now.status)
+        moving, status = moving.take(slice(event, None)), now.status
+    assert (status >= Status.AMBIGUOUS).all()
+
+
 def test_only_joint_looks_back(drive):
     tracker = Tracker(drive.constellation, filter="ekf")
     with pytest.raises(ConfigError, match="joint"):

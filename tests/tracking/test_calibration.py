@@ -99,6 +99,12 @@ def shaken():
     return t, imu + rng().normal(size=imu.shape)
 
 
+def dead():
+    t, imu = rests([[0, 0, 0]])
+    imu[:, 3:] = 0.0
+    return t, imu
+
+
 @pytest.mark.parametrize(
     ("data", "level", "reason"),
     [
@@ -108,6 +114,7 @@ def shaken():
         (rests([[20, 0, 0]]), True, "tilted by 19 degrees"),
         (rests([[0, 0, 0]], scale=np.full(3, 9.81)), False, "is it in m/s2"),
         (rests(SIX, scale=np.array([1.3, 1.0, 1.0])), False, "scales"),
+        (dead(), False, "0 m/s2 at rest, expected gravity"),
     ],
 )
 def test_poor_inertial_data_is_refused(data, level, reason):
@@ -251,6 +258,18 @@ def test_one_distance_gives_offsets_only():
     assert found.calibration.offset == pytest.approx({1: 0.2, 2: 0.1, 3: -0.1, 4: 0.3})
 
 
+def test_a_node_with_a_handful_of_agreeing_ranges_has_no_offset():
+    """Its ranges are behind something whose error changes all the time."""
+    data = table(slope=1.0)[0]
+    measured = data.measured.copy()
+    of_last = np.flatnonzero((data.i == 3) | (data.j == 3))
+    measured[of_last[5:]] += rng().uniform(1.0, 15.0, len(of_last) - 5)
+    spoiled = RangeTable(data.i, data.j, measured, data.true, data.known)
+    found = calibrate_uwb(spoiled, (1, 2, 3, 4), random_state=0)
+    assert found.calibration.offset == pytest.approx({1: 0.2, 2: 0.1, 3: -0.1}, abs=0.01)
+    assert not found.used[of_last].any()
+
+
 def unknown():
     data = table()[0]
     return RangeTable(data.i, data.j, data.measured, data.true, np.zeros(2000, dtype=bool))
@@ -351,6 +370,8 @@ FAULTS = [
     ("format = 1\n[ranges]\nslope = 1.0", "ranges.offset_m: expected a table"),
     ("format = 1\n[ranges.offset_m]\n1 = 0.2", "ranges.slope: expected a number"),
     ("format =", "not TOML"),
+    ("format = 1\n[ranges]\nslope = 1" + 400 * "0", "ranges.slope: expected a number"),
+    ("format = 1\n[ranges]\nslope = 1" + 5000 * "0", "not TOML"),
 ]
 
 

@@ -188,6 +188,8 @@ def test_missing_parts_are_named(folder, tmp_path):
         ('heading = "initial"', 'heading = "magnetic"', "needs magnetometer readings"),
         ("[nodes.3]", "[antennas.1]\nnode=1\noffset_m=[1e9,0,0]\n[nodes.3]", "offset_m"),
         ("[nodes.2]", "initial_heading_rad = inf\n[nodes.2]", "initial_heading_rad"),
+        ("[nodes.2]", f"initial_heading_rad = 1{400 * '0'}\n[nodes.2]", "initial_heading_rad"),
+        ("[nodes.2]", f"initial_heading_rad = 1{5000 * '0'}\n[nodes.2]", "not TOML"),
     ],
 )
 def test_faults_of_meta_are_named(folder, old, new, word):

@@ -19,7 +19,6 @@ slope = 1.003
 
 from __future__ import annotations
 
-import math
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -36,6 +35,8 @@ from tracking.calibration.calibration import (
 from tracking.errors import ConfigError
 
 FORMAT = 1
+MOST = 1e12
+"""Numbers beyond this mean nothing in any unit."""
 FIELDS = {
     "gyr_offset_rad_s": "gyr_offset",
     "acc_offset_m_s2": "acc_offset",
@@ -92,7 +93,7 @@ def parse_calibration(text: str, file: str) -> Calibration:
     """
     try:
         raw = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except ValueError as error:
         raise ConfigError(f"{file}: not TOML ({error})") from error
     try:
         return _calibration(raw)
@@ -156,8 +157,8 @@ def _id(where: str, key: str, taken: dict[int, Any]) -> int:
 
 
 def _number(where: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise ConfigError(f"{where}: expected a number, found {value!r}")
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < MOST:
+        raise ConfigError(f"{where}: expected a number, found {str(value)[:40]}")
     return float(value)
 
 

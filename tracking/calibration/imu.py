@@ -28,6 +28,8 @@ from tracking.geometry import GRAVITY
 
 MIN_REST = 1.0
 """[s] Rest that is needed; white noise of a second is far below any offset."""
+LEAST_FORCE = 1.0
+"""[m/s2] An accelerometer at rest that reads less measures nothing."""
 POSE_ANGLE = np.radians(10.0)
 """[rad] Phases closer than this are one pose."""
 MIN_POSES = 6
@@ -124,7 +126,16 @@ def _standard_error(rest: Rest, gyr: F64) -> F64:
 
 
 def _poses(rest: Rest) -> F64:
-    """Mean specific force of each pose, (pose, 3) [m/s2]; phases of one pose are averaged."""
+    """Mean specific force of each pose, (pose, 3) [m/s2]; phases of one pose are averaged.
+
+    Raises:
+        CalibrationError: No force at rest, as from an accelerometer that is dead or in free fall.
+    """
+    least = float(np.linalg.norm(rest.acc, axis=1).min())
+    if not least > LEAST_FORCE:
+        raise CalibrationError(
+            f"{least:.2g} m/s2 at rest, expected gravity: is the accelerometer alive, in m/s2?"
+        )
     sums: list[F64] = []
     weights: list[float] = []
     for acc, n in zip(rest.acc, rest.n, strict=True):

@@ -88,74 +88,110 @@ def calibrate_uwb(
         CalibrationError: No truth, too few ranges, or no common line through most of them.
     """
     p = params or UwbParams()
-    used = _usable(table, p)
+    used = _without_rare(table, table.known & (table.true <= p.max_distance) & (table.true > 0), p)
+    while True:
+        fit = _fit(table, used, len(ids), p, random_state)
+        kept = _without_rare(table, used, p, agree=fit.inlier)
+        if np.array_equal(kept, used):
+            break
+        used = kept
+    if abs(fit.slope - 1.0) > p.max_slope_error:
+        raise CalibrationError(
+            f"a slope of {fit.slope:.3f}, expected {1 - p.max_slope_error:g} to "
+            f"{1 + p.max_slope_error:g}: are ranges and truth in metres and on one clock?"
+        )
+    d, incidence = table.true[fit.inlier], fit.incidence
+    nodes = np.nonzero(incidence.any(axis=0))[0]
+    offset = {ids[n]: float(fit.offset[n]) for n in nodes}
+    both = np.zeros(len(ids))
+    both[nodes] = fit.offset[nodes]
+    corrected = (table.measured - both[table.i] - both[table.j]) / fit.slope
+    return UwbResult(
+        calibration=RangeCalibration(slope=fit.slope, offset=offset),
+        slope_fitted=fit.spread is not None,
+        slope_se=0.0 if fit.spread is None else fit.std / fit.spread,
+        separable=bool(np.linalg.matrix_rank(incidence) == len(nodes)),
+        residual_std=fit.std,
+        distance=(float(d.min()), float(d.max())),
+        used=used,
+        inlier=fit.inlier,
+        error_before=np.where(table.known, table.measured - table.true, 0.0),
+        error_after=np.where(table.known, corrected - table.true, 0.0),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Fit:
+    """A line for all pairs at once."""
+
+    slope: float
+    offset: F64
+    """(node) [m]"""
+    inlier: Bool
+    """Ranges that agree, (range)."""
+    incidence: F64
+    """The two nodes of every pair with such ranges, (pair, node) of 0 and 1."""
+    spread: float | None
+    """[m] Root of the sum of squares of what the slope was found from; None where it was not."""
+    std: float
+    """[m] Of what is left."""
+
+
+def _fit(table: RangeTable, used: Bool, n_nodes: int, p: UwbParams, random_state: int) -> _Fit:
+    """Least squares on the ranges that agree, until these are the same."""
     d, z = table.true[used], table.measured[used]
-    pair, incidence = _pairs(table.i[used], table.j[used], len(ids))
+    pair, incidence = _pairs(table.i[used], table.j[used], n_nodes)
     inlier, slope = _agree(d, z, pair, p, random_state)
-    fitted = False
+    spread: float | None = None
     for _ in range(20):
         _check(inlier, p)
         column = incidence[pair[inlier]]
         free = d[inlier] - column @ np.linalg.lstsq(column, d[inlier])[0]
-        fitted = float(free.std()) >= p.min_spread
-        if fitted:
+        if float(free.std()) >= p.min_spread:
             solution = np.linalg.lstsq(np.column_stack([d[inlier], column]), z[inlier])[0]
             slope, offset = float(solution[0]), solution[1:]
+            spread = float(np.sqrt(np.sum(free**2)))
         else:
             slope, offset = 1.0, np.linalg.lstsq(column, z[inlier] - d[inlier])[0]
+            spread = None
         residual = z - slope * d - incidence[pair] @ offset
         scale = 1.4826 * float(np.median(np.abs(residual[inlier])))
         now = np.abs(residual) <= min(max(3.5 * scale, 0.02), p.band)
         if np.array_equal(now, inlier):
             break
         inlier = now
-    if abs(slope - 1.0) > p.max_slope_error:
-        raise CalibrationError(
-            f"a slope of {slope:.3f}, expected {1 - p.max_slope_error:g} to "
-            f"{1 + p.max_slope_error:g}: are ranges and truth in metres and on one clock?"
-        )
-    present = np.unique(pair[inlier])
-    nodes = np.nonzero(np.abs(incidence[present]).any(axis=0))[0]
     everywhere = np.zeros(len(used), dtype=bool)
     everywhere[used] = inlier
-    calibration = RangeCalibration(slope=slope, offset={ids[n]: float(offset[n]) for n in nodes})
-    std = float(residual[inlier].std())
-    both = np.zeros(len(ids))
-    both[nodes] = offset[nodes]
-    corrected = (table.measured - both[table.i] - both[table.j]) / slope
-    return UwbResult(
-        calibration=calibration,
-        slope_fitted=fitted,
-        slope_se=std / float(np.sqrt(np.sum(free**2))) if fitted else 0.0,
-        separable=bool(np.linalg.matrix_rank(incidence[present]) == len(nodes)),
-        residual_std=std,
-        distance=(float(d[inlier].min()), float(d[inlier].max())),
-        used=used,
-        inlier=everywhere,
-        error_before=np.where(table.known, table.measured - table.true, 0.0),
-        error_after=np.where(table.known, corrected - table.true, 0.0),
-    )
+    present = incidence[np.unique(pair[inlier])]
+    return _Fit(slope, offset, everywhere, present, spread, float(residual[inlier].std()))
 
 
-def _usable(table: RangeTable, p: UwbParams) -> Bool:
-    """Ranges to fit, (range)."""
+def _without_rare(table: RangeTable, used: Bool, p: UwbParams, agree: Bool | None = None) -> Bool:
+    """Ranges to fit without those of nodes that have too few, of all or of those that agree."""
     if not table.known.any():
         raise CalibrationError(
             "no range has a true distance, expected truth of both nodes at the ranges' times"
         )
-    used = table.known & (table.true <= p.max_distance) & (table.true > 0.0)
     while True:
-        count = np.bincount(np.concatenate([table.i[used], table.j[used]]), minlength=1)
-        rare = np.nonzero((count > 0) & (count < p.min_per_node))[0]
+        n_used, n_agree = (
+            np.bincount(np.concatenate([table.i[some], table.j[some]]), minlength=_last(table) + 1)
+            for some in (used, used if agree is None else used & agree)
+        )
+        rare = np.nonzero((n_used > 0) & (n_agree < p.min_per_node))[0]
         if len(rare) == 0:
             break
         used = used & ~np.isin(table.i, rare) & ~np.isin(table.j, rare)
     if used.sum() < p.min_ranges:
         raise CalibrationError(
-            f"{used.sum()} ranges have a true distance up to {p.max_distance:g} m, expected at "
-            f"least {p.min_ranges}"
+            f"{used.sum()} ranges have a true distance up to {p.max_distance:g} m and are of nodes "
+            f"with {p.min_per_node} that agree, expected at least {p.min_ranges}"
         )
     return np.asarray(used)
+
+
+def _last(table: RangeTable) -> int:
+    """The greatest node, in array order."""
+    return int(max(table.i.max(initial=0), table.j.max(initial=0)))
 
 
 def _pairs(i: I64, j: I64, n_nodes: int) -> tuple[I64, F64]:

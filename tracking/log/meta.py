@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +11,8 @@ from tracking.constellation import Antenna, Constellation, NodeConfig
 from tracking.errors import ConfigError, LogError
 from tracking.log.folder import FORMAT
 
+MOST = 1e12
+"""Numbers beyond this mean nothing in any unit."""
 MAX_OFFSET = 100.0
 """[m] An antenna farther from its body's origin is a mistake of units."""
 
@@ -36,7 +37,7 @@ def read_meta(path: Path) -> Meta:
         raise LogError(f"{path.parent}: no meta.toml, expected a log folder")
     try:
         raw = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
+    except (ValueError, OSError) as error:
         raise LogError(f"meta.toml: not TOML ({error})") from error
     if type(raw.get("format")) is not int or raw["format"] != FORMAT:
         raise LogError(f"meta.toml, format: expected {FORMAT}, found {raw.get('format')!r}")
@@ -117,6 +118,6 @@ def _id(where: str, value: Any) -> int:
 
 
 def _number(where: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise LogError(f"meta.toml, {where}: expected a number, found {value!r}")
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < MOST:
+        raise LogError(f"meta.toml, {where}: expected a number, found {str(value)[:40]}")
     return float(value)

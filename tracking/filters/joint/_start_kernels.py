@@ -39,7 +39,8 @@ def try_start(c, s, layout, t):
         s.nodes[members[a]].present = True
         forget_sums(s, members[a], t)
     asleep = none_moved(c, s, t)
-    n_first = 1 if asleep else layout.rotations.shape[0]
+    # A smoother has room for one hypothesis; of what it starts nothing is reported.
+    n_first = 1 if asleep else min(layout.rotations.shape[0], s.alive.shape[0])
     for h in range(n_first):
         s.alive[h] = True
         s.loglik[h] = 0.0

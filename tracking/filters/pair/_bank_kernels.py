@@ -192,7 +192,7 @@ def remove_node(s, layout, i):
                 pair.start_n = 0
     if n_present < 2:
         for k in range(s.nodes.shape[0]):
-            s.nodes[k].present = False
+            s.nodes[k].present, s.nodes[k].heard = False, False
         s.alive[:] = False
         s.group[0].n_alive = 0
         s.group[0].started = False
@@ -202,5 +202,5 @@ def remove_node(s, layout, i):
 def remove_silent(c, s, layout, t):
     """Remove the nodes that were not heard for so long that they must have left."""
     for i in range(s.nodes.shape[0]):
-        if s.nodes[i].present and t - s.nodes[i].t_heard > c.leave_after:
+        if (s.nodes[i].present or s.nodes[i].heard) and t - s.nodes[i].t_heard > c.leave_after:
             remove_node(s, layout, i)
