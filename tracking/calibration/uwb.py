@@ -163,7 +163,8 @@ def _fit(table: RangeTable, used: Bool, n_nodes: int, p: UwbParams, random_state
     everywhere = np.zeros(len(used), dtype=bool)
     everywhere[used] = inlier
     present = incidence[np.unique(pair[inlier])]
-    return _Fit(slope, offset, everywhere, present, spread, float(residual[inlier].std()))
+    std = float(residual[inlier].std())
+    return _Fit(slope, np.asarray(offset, dtype=np.float64), everywhere, present, spread, std)
 
 
 def _without_rare(table: RangeTable, used: Bool, p: UwbParams, agree: Bool | None = None) -> Bool:
