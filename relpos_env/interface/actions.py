@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -72,11 +71,10 @@ class ContinuousActions:
             actions = np.asarray(actions, dtype=np.float64)
         except (TypeError, ValueError) as error:
             raise EnvError(f"{where}: expected numbers, got {actions!r}") from error
-        # A sum that is not finite is of such numbers, or of finite ones beyond all reason.
-        if not math.isfinite(actions.sum()):
-            bad = np.argwhere(~np.isfinite(actions))
-            if len(bad):
-                raise EnvError(f"{where}: expected finite numbers, got {actions[tuple(bad[0])]}")
+        finite = np.isfinite(actions)
+        if not finite.all():
+            bad = actions[tuple(np.argwhere(~finite)[0])]
+            raise EnvError(f"{where}: expected finite numbers, got {bad}")
         clipped = np.minimum(np.maximum(actions, -1.0), 1.0)
         return clipped[..., 0] * MAX_SPEED, clipped[..., 1] * MAX_STEERING
 

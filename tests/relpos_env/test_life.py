@@ -228,14 +228,14 @@ def test_two_cars_stay_whoever_waits_outside(monkeypatch):
 def test_a_box_that_was_not_pushed_is_in_nobodys_way():
     """Doors are drawn beside boxes that can be pushed, however long these are."""
     kept = []
-    for seed in range(30):
-        env = make(scenario="rooms-9x7", n_cars=6)
+    env = make(scenario="rooms-9x7", n_cars=6)
+    for seed in range(150):
         env.reset(seed=seed)
         group, b = env.loop.swarm._groups[0], env.loop.swarm._bodies
         joins = [e for e in group.life if e.what == "join"]
         b.present[0] = False
         kept += [not group._is_taken(b, 0, event) for event in joins]
-    assert len(kept) > 20
+    assert len(kept) > 10
     assert all(kept)
 
 
