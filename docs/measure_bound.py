@@ -41,13 +41,12 @@ def measure(name: str, seed: int) -> tuple[float, float, float, float]:
     )
     driver = policy.driver(Layout("estimate", N_CARS, 1, proximity))
     observations, _ = env.reset(seed=seed)
-    errors: list[list[float]] = []
+    errors = []
     while env.agents:
         actions = {agent: driver.act(seen) for agent, seen in observations.items()}
         observations, _, _, _, infos = env.step(actions)
-        errors.append(
-            [np.nanmean([info.get(key, np.nan) for info in infos.values()]) for key in MEASURES]
-        )
+        told = [[info[key] for info in infos.values() if key in info] for key in MEASURES]
+        errors.append([np.mean(values) if values else np.nan for values in told])
     bound = posterior_bound(env.recorded_log("drive"), matched_params(env.scenario), skip=SETTLE)
     formation, tracking = np.nanmean(errors[round(SETTLE / DECISION) :], axis=0)
     return formation, tracking, bound.rmse, math.sqrt(2.0 / math.pi) * float(bound.pair_rms.mean())
