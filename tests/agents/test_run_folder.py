@@ -7,33 +7,13 @@ from pathlib import Path
 import pytest
 import torch
 from safetensors.torch import save
+from small_runs import same, small, weights
 from stable_baselines3.common.logger import TensorBoardOutputFormat
 
 from agents.errors import UsageError
-from agents.settings import from_options
-from agents.train.config import TrainConfig
 from agents.train.export import export_policy
-from agents.train.run_folder import CONFIG, LAST, RunFolder
+from agents.train.run_folder import CONFIG, LAST
 from agents.train.train import train
-
-SMALL = {
-    "frames": "1400", "leg": "2", "envs": "3", "steps": "16", "batch": "64", "epochs": "2",
-    "eval_episodes": "2", "choice_episodes": "2", "seconds": "12", "width": "8",
-    "threads": "1", "cars": "6",
-}  # fmt: skip
-
-
-def small(**changes):
-    return from_options(TrainConfig, {**SMALL, **changes})
-
-
-def weights(folder, name=LAST):
-    return RunFolder(folder).load(name)[0]
-
-
-def same(a, b):
-    assert a.keys() == b.keys()
-    return all(torch.equal(a[k], b[k]) for k in a)
 
 
 @pytest.fixture(scope="module")

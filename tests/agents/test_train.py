@@ -14,6 +14,7 @@ import torch
 from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
+from small_runs import SMALL, same, small, weights
 
 from agents.cli import cli
 from agents.errors import UsageError
@@ -30,25 +31,11 @@ from agents.train.run import train_policy
 from agents.train.run_folder import BEST, LAST, RunFolder, restore_weights
 from agents.train.train import train
 
-SMALL = {
-    "frames": "1400", "leg": "2", "envs": "3", "steps": "16", "batch": "64", "epochs": "2",
-    "eval_episodes": "2", "choice_episodes": "2", "seconds": "12", "width": "8",
-    "threads": "1", "cars": "6",
-}  # fmt: skip
-
-
-def small(**changes):
-    return from_options(TrainConfig, {**SMALL, **changes})
-
 
 def from_words(words):
     """Settings from what a command is given."""
     names = (word.removeprefix("--").replace("-", "_") for word in words[::2])
     return from_options(TrainConfig, dict(zip(names, words[1::2], strict=True)))
-
-
-def weights(folder, name=LAST):
-    return RunFolder(folder).load(name)[0]
 
 
 @pytest.fixture(scope="module")
@@ -61,11 +48,6 @@ def run(tmp_path_factory):
 @pytest.fixture(scope="module")
 def policy(run, tmp_path_factory):
     return export_policy(run.folder, tmp_path_factory.mktemp("policies"), name="small")
-
-
-def same(a, b):
-    assert a.keys() == b.keys()
-    return all(torch.equal(a[k], b[k]) for k in a)
 
 
 def test_same_seed_same_weights(run, tmp_path):
