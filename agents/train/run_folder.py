@@ -125,7 +125,7 @@ class RunFolder:
         except OSError as error:
             kept = "the last checkpoint is kept, " if (self.path / LAST).exists() else ""
             raise UsageError(
-                f"{error.filename or self.path}: cannot be written ({error.strerror}); {kept}"
+                f"{error.filename or self.path}: cannot be written ({error.strerror or error}); {kept}"
                 f"go on with --resume {self.path}"
             ) from error
 
