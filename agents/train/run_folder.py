@@ -124,9 +124,10 @@ class RunFolder:
             yield
         except OSError as error:
             kept = "the last checkpoint is kept, " if (self.path / LAST).exists() else ""
+            why = error.strerror or error
             raise UsageError(
-                f"{error.filename or self.path}: cannot be written ({error.strerror or error}); {kept}"
-                f"go on with --resume {self.path}"
+                f"{error.filename or self.path}: cannot be written ({why}); {kept}go on with "
+                f"--resume {self.path}"
             ) from error
 
     def _write(self, name: str, data: bytes) -> None:
