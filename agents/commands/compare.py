@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from agents.commands.scenario_option import scenario_option
 from agents.console import emit_json, print_table, progress_bar
 from agents.errors import UsageError
 
@@ -33,13 +34,8 @@ WHY = "which has its own cars and task; they drive one after the other"
     show_default=True,
     help="What they see: estimate, estimate_cov, ranges, truth; may be given several times.",
 )
-@click.option(
-    "--scenario",
-    "scenarios",
-    multiple=True,
-    help="cars-los, cars-nlos, gap, hall, open, random, ring-los, ring-nlos, rooms-3x5, "
-    "rooms-5x5, rooms-9x7, swarm-nlos, warehouse, or a file *.toml; may be given several times. "
-    "By default that of the task.",
+@scenario_option(
+    "; may be given several times. By default that of the task.", "scenarios", multiple=True
 )
 @click.option(
     "--task",

@@ -7,18 +7,14 @@ from typing import Any
 
 import click
 
+from agents.commands.scenario_option import scenario_option
 from agents.commands.track import print_tracks
 from agents.console import emit_json, print_table, progress_bar
 from agents.errors import UsageError
 
 
 @click.command()
-@click.option(
-    "--scenario",
-    help="cars-los, cars-nlos, gap, hall, open, random, ring-los, ring-nlos, rooms-3x5, "
-    "rooms-5x5, rooms-9x7, swarm-nlos, warehouse, or a file *.toml; by default that of the "
-    "policy or of the task.",
-)
+@scenario_option("; by default that of the policy or of the task.")
 @click.option(
     "--task",
     help="ring, hold, travel, gap, rendezvous or follow; by default that of the policy, or ring.",

@@ -7,18 +7,13 @@ from typing import Any
 
 import click
 
+from agents.commands.scenario_option import scenario_option
 from agents.console import emit_json, print_table, progress_bar
 from agents.errors import UsageError
 
 
 @click.command("demo-hardware")
-@click.option(
-    "--scenario",
-    default="cars-nlos",
-    show_default=True,
-    help="cars-los, cars-nlos, gap, hall, open, random, ring-los, ring-nlos, rooms-3x5, "
-    "rooms-5x5, rooms-9x7, swarm-nlos, warehouse, or a file *.toml.",
-)
+@scenario_option(".", default="cars-nlos")
 @click.option(
     "--task",
     default="ring",

@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from agents.commands.scenario_option import scenario_option
 from agents.console import emit_json, print_table
 from agents.errors import UsageError
 
@@ -16,11 +17,7 @@ from agents.errors import UsageError
 @click.option(
     "--folder", type=Path, required=True, help="Gets the ports, and swarm.toml when they are ready."
 )
-@click.option(
-    "--scenario",
-    help="cars-los, cars-nlos, gap, hall, open, random, ring-los, ring-nlos, rooms-3x5, "
-    "rooms-5x5, rooms-9x7, swarm-nlos, warehouse, or a file *.toml; by default that of the task.",
-)
+@scenario_option("; by default that of the task.")
 @click.option(
     "--task",
     default="ring",

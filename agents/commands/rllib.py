@@ -9,15 +9,12 @@ from typing import Any
 
 import click
 
+from agents.commands.scenario_option import scenario_option
 from agents.errors import UsageError
 
 
 @click.command()
-@click.option(
-    "--scenario",
-    help="cars-los, cars-nlos, gap, hall, open, random, ring-los, ring-nlos, rooms-3x5, "
-    "rooms-5x5, rooms-9x7, swarm-nlos, warehouse, or a file *.toml. By default that of the task.",
-)
+@scenario_option(". By default that of the task.")
 @click.option(
     "--task",
     default="ring",

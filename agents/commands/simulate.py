@@ -7,18 +7,13 @@ from typing import Any
 
 import click
 
+from agents.commands.scenario_option import scenario_option
 from agents.console import emit_json, progress_bar
 
 
 @click.command()
 @click.argument("out", type=Path)
-@click.option(
-    "--scenario",
-    default="cars-nlos",
-    show_default=True,
-    help="cars-los, cars-nlos, gap, hall, open, random, ring-los, ring-nlos, rooms-3x5, "
-    "rooms-5x5, rooms-9x7, swarm-nlos, warehouse, or a file *.toml; human or human-mocap.",
-)
+@scenario_option("; human or human-mocap.", default="cars-nlos")
 @click.option(
     "--seconds", default=120.0, show_default=True, help="Length, 3 to 86400; people to 1800."
 )

@@ -14,7 +14,7 @@ from typing import Any
 from agents.errors import UsageError
 from agents.output import write_results
 from agents.train.config import TrainConfig
-from agents.train.environments import check_environments, layout_of
+from agents.train.environments import choice_environments, layout_of
 from agents.train.evaluation import Evaluation
 from agents.train.learner import make_policy
 from agents.train.run_folder import BEST, LAST, RunFolder, restore_weights
@@ -48,7 +48,7 @@ def choose(config: TrainConfig, runs: Sequence[Path]) -> Choice:
     Raises:
         UsageError: A run is damaged or not finished.
     """
-    every, policy = check_environments(config), make_policy(config)
+    every, policy = choice_environments(config), make_policy(config)
     evaluation = Evaluation(
         every, layout_of(config), config.choice_episodes, config.threads, first_seed=FIRST_SEED
     )

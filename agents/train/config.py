@@ -7,7 +7,7 @@ from typing import Literal
 
 from agents.settings import number
 
-FORMAT = 4
+FORMAT = 5
 """Version of the run folder; another one is refused."""
 
 
@@ -105,6 +105,9 @@ class TrainConfig:
     every time."""
     choice_episodes: int = number(200, 1, 10000)
     """Other episodes, at the end, that tell which policy is kept: the best or the last of a run."""
+    choice_scenarios: tuple[str, ...] = ()
+    """Scenarios that are not learned in, for as large a share of those episodes as others have:
+    what a policy is worth in rooms that are new to it does not show in those it learned in."""
     env: EnvSetup = field(default_factory=EnvSetup)
     net: Networks = field(default_factory=Networks)
     ppo: Ppo = field(default_factory=Ppo)

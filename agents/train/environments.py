@@ -54,35 +54,54 @@ def _weights(given: tuple[str, ...]) -> dict[str, float]:
 
 
 def check_environments(config: TrainConfig) -> tuple[Parts, ...]:
-    """See that all environments of a run can be, at every level; as the scenarios say they are.
+    """See that all environments of a run can be, at every level; those it learns in.
+
+    Returns:
+        What they are made of, as the scenarios say.
 
     Raises:
         UsageError: More cars than the policy has slots for, or no scenario at all.
         EnvError: An environment that cannot be.
     """
-    names, levels = config.env.scenarios, config.env.levels or (None,)
+    names, others = config.env.scenarios, config.choice_scenarios
     if not names:
         raise UsageError("--scenarios: expected at least one")
-    for option, given in (
-        ("envs", config.ppo.envs),
-        ("eval-episodes", config.eval_episodes),
-        ("choice-episodes", config.choice_episodes),
+    known = [name for name in others if name in names]
+    if known:
+        raise UsageError(
+            f"--choice-scenarios: expected scenarios that are not learned in, got {known[0]!r}"
+        )
+    for option, given, needed in (
+        ("envs", config.ppo.envs, len(names)),
+        ("eval-episodes", config.eval_episodes, len(names)),
+        ("choice-episodes", config.choice_episodes, len(names) + len(others)),
     ):
-        if given < len(names):
+        if given < needed:
             raise UsageError(
-                f"--{option}: expected at least {len(names)}, one for each scenario, got {given}"
+                f"--{option}: expected at least {needed}, one for each scenario, got {given}"
             )
-    every = [
-        FormationConfig(**env_arguments(config, name, level)).resolve()
-        for name in names
-        for level in levels
-    ]
-    most = max(parts.n_cars for parts in every)
+    every = [_parts(config, name, level) for name in names for level in config.env.levels]
+    learned = [_parts(config, name, None) for name in names]
+    most = max(p.n_cars for p in (*every, *learned, *choice_environments(config)))
     if most > config.env.cars:
         raise UsageError(
             f"--cars: expected at least {most}, the cars of the scenarios, got {config.env.cars}"
         )
-    return tuple(FormationConfig(**env_arguments(config, name, None)).resolve() for name in names)
+    return tuple(learned)
+
+
+def choice_environments(config: TrainConfig) -> tuple[Parts, ...]:
+    """Those that tell which policy is kept: learned in, and new to it.
+
+    Raises:
+        EnvError: An environment that cannot be.
+    """
+    names = (*config.env.scenarios, *config.choice_scenarios)
+    return tuple(_parts(config, name, None) for name in names)
+
+
+def _parts(config: TrainConfig, scenario: str, level: int | None) -> Parts:
+    return FormationConfig(**env_arguments(config, scenario, level)).resolve()
 
 
 def shares(n: int, scenarios: int) -> list[int]:

@@ -22,7 +22,13 @@ from agents.policy import load_policy
 from agents.policy.layout import Layout
 from agents.settings import as_options, from_options
 from agents.train.config import TrainConfig
-from agents.train.environments import check_environments, layout_of, make_rooms, shares
+from agents.train.environments import (
+    check_environments,
+    choice_environments,
+    layout_of,
+    make_rooms,
+    shares,
+)
 from agents.train.evaluation import Evaluation
 from agents.train.export import export_policy, read_results
 from agents.train.learner import level_of, make_model, make_policy
@@ -30,6 +36,7 @@ from agents.train.network import Actor
 from agents.train.run import train_policy
 from agents.train.run_folder import BEST, LAST, RunFolder, restore_weights
 from agents.train.train import train
+from relpos_env.errors import EnvError
 
 
 def from_words(words):
@@ -111,6 +118,21 @@ def test_every_scenario_needs_an_episode():
     both = replace(config.env, scenarios=("cars-los", "ring-los"))
     with pytest.raises(UsageError, match="--eval-episodes: expected at least 2"):
         check_environments(replace(config, env=both, eval_episodes=1))
+    with pytest.raises(UsageError, match="--choice-episodes: expected at least 3"):
+        check_environments(replace(config, choice_scenarios=("cars-los",)))
+
+
+def test_rooms_that_tell_which_policy_is_kept_are_not_learned_in():
+    config = small(scenarios="cars-los")
+    with pytest.raises(UsageError, match="--choice-scenarios: expected .* not learned in"):
+        check_environments(replace(config, choice_scenarios=("cars-los",)))
+    with pytest.raises(EnvError, match="nowhere"):
+        check_environments(replace(config, choice_scenarios=("nowhere",)))
+    with pytest.raises(UsageError, match="--cars: expected at least 8"):
+        check_environments(replace(config, choice_scenarios=("random",)))
+    both = replace(config, choice_scenarios=("hall",))
+    assert [p.n_cars for p in check_environments(both)] == [3]
+    assert [p.n_cars for p in choice_environments(both)] == [3, 5]
 
 
 @pytest.mark.slow
