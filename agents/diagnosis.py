@@ -7,10 +7,13 @@ from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from agents.hearing import Formats, Hearing, Voice, why_nothing_fits
+from hardware_bridge.live.naming import node_of
 
 if TYPE_CHECKING:
     from agents.doctor import CarLike, LinkLike
 
+TELLS_OF_OTHERS = "positions"
+"""The format whose lines name nodes by their ids beside names of `ids`."""
 MOST_DAMAGED = 0.05
 """[-] A larger share of damaged frames is a problem."""
 MOST_MISSING = 0.05
@@ -161,7 +164,7 @@ def _report(
 
 
 def _node(device: str | None, voice: Voice, link: LinkLike, seconds: float) -> NodeReport:
-    node = node_of(device, link.node, link.ids)
+    node = _node_of(device, link)
     total = voice.numbered + voice.missing
     return NodeReport(
         node=str(node) if node is not None else str(device),
@@ -174,19 +177,14 @@ def _node(device: str | None, voice: Voice, link: LinkLike, seconds: float) -> N
     )
 
 
-def node_of(device: str | None, speaker: int | None, ids: Mapping[str, int]) -> int | None:
-    """The node that a device is: by `ids`, else its decimal id; one without a name, `speaker`."""
-    if device is None:
-        return speaker
-    if device in ids:
-        return ids[device]
-    return int(device) if device.isascii() and device.isdigit() else None
+def _node_of(device: str | None, link: LinkLike) -> int | None:
+    return node_of(device, link.node, link.ids, mixed=link.format == TELLS_OF_OTHERS)
 
 
 def _label(ends: tuple[str | None, str], link: LinkLike) -> str:
     """The other end, or both where the speaker is neither."""
     names = [end for end in ends if end is not None]
-    nodes = [node_of(name, None, link.ids) for name in names]
+    nodes = [_node_of(name, link) for name in names]
     return "-".join(name if n is None else str(n) for name, n in zip(names, nodes, strict=True))
 
 
@@ -240,7 +238,7 @@ def _strangers(link: LinkLike, voices: Mapping[str | None, Voice]) -> list[str]:
     for device, voice in voices.items():
         heard[device] = None
         heard.update(dict.fromkeys(end for ends in voice.ranges for end in ends if end))
-    names = [d for d in heard if node_of(d, link.node, link.ids) is None]
+    names = [d for d in heard if _node_of(d, link) is None]
     flaws = [f'device {d} is no node: add `ids = {{ "{d}" = NODE }}`' for d in names if d]
     if None in names:
         flaws.append("the format does not say who speaks: set `node`")

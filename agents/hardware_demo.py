@@ -11,6 +11,7 @@ import os
 import signal
 import tempfile
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -26,6 +27,7 @@ from agents.demo import SETTLE
 from agents.drive import DriveResult, drive, drive_on
 from agents.emulate import EmulateOptions, emulate
 from agents.emulate.virtual import START_NS, VirtualBridge
+from agents.errors import UsageError
 from relpos_env.timing import DECISION
 from tracking.arrays import F64
 from tracking.log import Log, read_log
@@ -252,10 +254,17 @@ class _Emulation:
     def __exit__(self, *error: object) -> None:
         if self._process.pid is not None and self._process.is_alive():
             os.kill(self._process.pid, signal.SIGINT)
-        if self._pipe.poll(LONGEST_START):
-            self.start_ns, self.contacts, self.late_steps = self._pipe.recv()
+        said = None
+        with suppress(EOFError):  # it was killed
+            said = self._pipe.recv() if self._pipe.poll(LONGEST_START) else None
         self._process.join(timeout=LONGEST_START)
         self._process.close()
+        if isinstance(said, tuple):
+            self.start_ns, self.contacts, self.late_steps = said
+        elif error[0] is None:
+            # What went wrong with the drive itself is the more telling.
+            why = said if isinstance(said, Exception) else "its process was ended from outside"
+            raise UsageError(f"emulator: it failed: {why}")
 
 
 def _emulate(options: EmulateOptions, place: Path, pipe: Connection) -> None:

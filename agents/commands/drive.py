@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from contextlib import suppress
 from pathlib import Path
@@ -64,6 +65,9 @@ def drive(
         # A command late is a car that stops; without the right to hurry, the default has to do.
         with suppress(OSError, AttributeError):
             os.setpriority(os.PRIO_PROCESS, 0, -5)
+    # However it is ended from outside, cars stand and the terminal is as it was.
+    for name in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(name, signal.default_int_handler)
     with _Screen(as_json) as screen:
         result = run(
             config=config,

@@ -157,6 +157,7 @@ class _Orders:
 
         def take(what: str) -> None:
             self._quit |= what == "quit"
+            bridge.start.heed(what)
             bridge.feed.order(what)
 
         if attend is not None:

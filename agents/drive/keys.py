@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import select
 import sys
 from collections.abc import Iterator
@@ -26,16 +27,30 @@ def key_by_key() -> Iterator[None]:
     try:
         yield
     finally:
-        termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
+        with contextlib.suppress(termios.error):  # it was closed
+            termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
 
 
 def read_orders() -> list[str]:
-    """What was pressed and means something."""
-    pressed = []
+    """What was pressed since the last look, in order; a stop alone where one is among it.
+
+    The descriptor itself is read: text streams keep what they have read ahead, and no `select`
+    tells of it.
+    """
+    pressed = b""
     while sys.stdin.isatty() and select.select([sys.stdin], [], [], 0.0)[0]:
-        key = sys.stdin.read(1)
-        if not key:
+        keys = os.read(sys.stdin.fileno(), 1024)
+        if not keys:
             break
-        # Whatever else is hit in a hurry stops as well.
-        pressed.append(KEYS.get(key.lower(), "stop"))
-    return pressed
+        pressed += keys
+    return orders_of(pressed.decode(errors="replace"))
+
+
+def orders_of(pressed: str) -> list[str]:
+    """What keys that were hit together mean.
+
+    Whatever else is hit in a hurry stops as well. Nothing beside a stop counts, before it or
+    after: a hand on the keyboard means none of it, and the arrow keys are letters behind an escape.
+    """
+    orders = [KEYS.get(key.lower(), "stop") for key in pressed]
+    return ["stop"] if "stop" in orders else orders

@@ -137,6 +137,7 @@ class _Orders:
     def take(self, what: str) -> None:
         """An order."""
         self._quit |= what == "quit"
+        self._bridge.start.heed(what)
         self._bridge.feed.order(what)
 
     def show(self, env: LiveFormationEnv, watch: Watch | None) -> bool:

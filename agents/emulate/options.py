@@ -12,6 +12,7 @@ from hardware_bridge.emulator.formats import WireFormat, check_formats, wire_for
 from hardware_bridge.emulator.node import NodeParams
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.readings import ImuReading
+from hardware_bridge.wire.key import KEY_BYTES
 from relpos_env.config import FormationConfig, Parts, whole_number
 from relpos_env.errors import EnvError
 from relpos_env.scenarios import Scenario
@@ -21,7 +22,6 @@ IMU_FORMAT = "witmotion"
 """Of the second port of nodes whose own format says nothing of motion."""
 LONGEST = 86400.0
 """[s] Of an emulation."""
-KEY_BYTES = 16
 
 
 SLOW_PWM = {

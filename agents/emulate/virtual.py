@@ -61,6 +61,7 @@ class VirtualFeed:
             driver = make_driver(car.driver, car.node, car.options, car.key, 1, self._now_us)
             port = _line(rig, car_port(car.node))
             self._cars[config.slot_of(car)] = car.port.name, port, driver
+        self._dry = () if arm else tuple(config.slot_of(car) for car in config.cars)
         drivers = {slot: driver for slot, (_, _, driver) in self._cars.items()}
         names = {slot: name for slot, (name, _, _) in self._cars.items()}
         self.supervisor = Supervisor(config.safety, config.n_slots, drivers, names)
@@ -127,9 +128,9 @@ class VirtualFeed:
             self._cars[slot][1].send(self._cars[slot][2].opening())
         self._up = up
         now = self.t_ns * 1e-9
-        for slot, data in self.supervisor.tick(now, 0.0, sorted(up)).items():
+        for slot, data in self.supervisor.tick(now, 0.0, [*self._dry, *sorted(up)]).items():
             self._cars[slot][1].send(data)
-        self.supervisor.written(now)
+        self.supervisor.written(now, sorted(up))
         self._note(self.supervisor.stopped())
 
     def _tell(self, message: Message) -> None:

@@ -8,7 +8,8 @@ from typing import Any
 from tracking.constellation import Constellation
 from tracking.tables import Where
 
-MOST_ID = 65535
+MOST_ID = 65534
+"""The largest id of our own wire is that of the host."""
 
 
 def tables_of(raw: Mapping[str, Any], name: str, where: Where) -> list[tuple[str, dict[str, Any]]]:

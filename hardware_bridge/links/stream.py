@@ -60,7 +60,7 @@ class Stream:
         size = 0
         while size < MOST_AT_ONCE:
             try:
-                piece = os.read(self.fd, _PIECE)
+                piece = os.read(self.fd, min(_PIECE, MOST_AT_ONCE - size))
                 if not piece:
                     raise LinkLost("unplugged, or its other end closed (readable, but empty)")
             except (BlockingIOError, InterruptedError):

@@ -89,6 +89,8 @@ class Bridge(OpenBridge):
                     wall_ns=time.time_ns(),
                 )
                 self.recorder = Recorder(record, header)
+                # One of a start that failed is none, and would take the name of the next.
+                stack.push(lambda kind, *_: kind and Path(record).unlink(missing_ok=True))
                 stack.callback(self.recorder.close)
                 if calibration is not None:
                     text = calibration_toml(calibration)
@@ -98,8 +100,9 @@ class Bridge(OpenBridge):
                 self.recorder.add_event(start_ns, "start")
             self.supervisor: SupervisorProcess | None = None
             if drive:
-                cars = tuple((config.slot_of(car), car) for car in config.cars) if arm else ()
-                charge = Charge(config.safety, config.n_slots, cars)
+                cars = tuple((config.slot_of(car), car) for car in config.cars)
+                dry = () if arm else tuple(slot for slot, _ in cars)
+                charge = Charge(config.safety, config.n_slots, cars if arm else (), dry)
                 self.supervisor = SupervisorProcess(charge)
                 stack.callback(self.supervisor.close)
             self.feed = LiveFeed(

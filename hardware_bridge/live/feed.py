@@ -150,6 +150,7 @@ class LiveFeed:
         for t_ns, text in intake.notices:
             self.note(t_ns, text)
         intake.notices.clear()
-        if self._recorder is not None and self._recorder.failing and not self._told_of_disk:
+        lost = self._recorder.lost if self._recorder is not None else None
+        if lost is not None and not self._told_of_disk:
             self._told_of_disk = True
-            self.notices.append((self._now_ns(), f"recording fails: {self._recorder.lost}"))
+            self.notices.append((self._now_ns(), f"recording fails: {lost}"))

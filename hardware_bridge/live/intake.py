@@ -260,7 +260,9 @@ class Intake:
     ) -> None:
         """What another tracker tells, by one clock for all nodes."""
         names = (reading.i, reading.j) if isinstance(reading, PairReading) else (reading.node,)
-        found = [self._naming.index(stream, name, arrival_ns, named=True) for name in names]
+        found = [
+            self._naming.index(stream, name, arrival_ns, named=True, mixed=True) for name in names
+        ]
         nodes = tuple(node for node in found if node is not None)
         clock = stream.times.setdefault(OF_STREAM, DeviceTime(MICROSECONDS_64))
         t_ns = clock.map(reading.source.ticks, arrival_ns)

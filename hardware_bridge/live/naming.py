@@ -3,12 +3,33 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 
 from hardware_bridge.live.stream import Stream
 from tracking.constellation import Constellation
 
 MOST_STRANGERS = 32
 """Devices that are not in the configuration are told of so many times."""
+
+
+def node_of(
+    device: str | None, speaker: int | None, ids: Mapping[str, int], *, mixed: bool = False
+) -> int | None:
+    """Id of the node that a device is; None where the configuration makes it none.
+
+    Args:
+        device: As its format writes it; None is whoever speaks.
+        speaker: Id of who does, None for unknown.
+        ids: Of the link. Where it has some, whoever is not among them is a stranger.
+        mixed: Others go by the ids of nodes, too, but for those that `ids` gives to somebody.
+    """
+    if device is None:
+        return speaker
+    if device in ids:
+        return ids[device]
+    if (ids and not mixed) or not (device.isascii() and device.isdigit()):
+        return None
+    return None if int(device) in ids.values() else int(device)
 
 
 class Naming:
@@ -28,7 +49,13 @@ class Naming:
         self._strangers: set[tuple[str, str]] = set()
 
     def index(
-        self, stream: Stream, device: str | None, t_ns: int, *, named: bool = False
+        self,
+        stream: Stream,
+        device: str | None,
+        t_ns: int,
+        *,
+        named: bool = False,
+        mixed: bool = False,
     ) -> int | None:
         """Index of the node that a device is; None for strangers.
 
@@ -37,17 +64,11 @@ class Naming:
             device: As its format writes it; None is whoever speaks on this stream.
             t_ns: Now, by the host's clock [ns].
             named: Somebody else names it.
+            mixed: See `node_of`.
         """
-        if device is None:
+        node = node_of(device, stream.node, stream.ids, mixed=mixed)
+        if not named and not stream.ids and stream.node is not None:
             node = stream.node
-        elif device in stream.ids:
-            node = stream.ids[device]
-        elif stream.is_car:
-            node = None
-        elif not named and not stream.ids and stream.node is not None:
-            node = stream.node
-        else:
-            node = int(device) if device.isascii() and device.isdigit() else None
         index = None if node is None else self._group.index_of.get(node)
         if index is None:
             self._tell(stream, device or "?", t_ns)

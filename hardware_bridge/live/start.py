@@ -67,6 +67,11 @@ class Start:
         self._params = params or StartParams()
         self.attend: Callable[[], bool] | None = None
         """Called after every decision; True ends it all with KeyboardInterrupt."""
+        self._held = False
+
+    def heed(self, what: str) -> None:
+        """Take note of what a person has ordered: who has said stop arms the cars, too."""
+        self._held = what != "arm" and (self._held or what in ("stop", "disarm", "clear"))
 
     def run(self, group: LiveGroup) -> None:
         """Do what is to be done before a drive.
@@ -94,10 +99,16 @@ class Start:
                 continue
             if report.armed[slots].all():
                 return
-            if (report.well_for[slots] > config.safety.health).all() and not report.emergency:
+            well = (report.well_for[slots] > config.safety.health).all()
+            if well and not (self._held or report.emergency):
                 feed.order("arm")
         if feed.report is None:
             raise BridgeError("supervisor: no word from it")
+        if self._held:
+            raise BridgeError(
+                f"cars: not armed within {self._params.wait:g} s, since a key had stopped or "
+                "disarmed them, and none has armed them"
+            )
         slot = next(k for k in slots if not feed.report.armed[k])
         silent = not np.isfinite(group.swarm.heard()[slot])
         why = "was not heard" if silent else reason_text(int(feed.report.reason[slot]))

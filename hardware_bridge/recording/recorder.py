@@ -107,6 +107,8 @@ class Recorder:
             with self._changed:
                 self._added += 1
                 self._drop(1, f"not a record: {error}")
+                if isinstance(t_ns, int) and 0 <= t_ns < 1 << 63:
+                    self._loss = _Loss.of(self._loss, 1, t_ns)
             return
         size = len(record.payload) + OVERHEAD
         with self._changed:

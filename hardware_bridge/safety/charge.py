@@ -23,3 +23,5 @@ class Charge:
     n_cars: int
     cars: tuple[tuple[int, CarConfig], ...]
     """Slot and configuration; none in a dry run."""
+    dry: tuple[int, ...] = ()
+    """Slots of cars in a dry run: no port is opened, and the gate tells what it would allow."""

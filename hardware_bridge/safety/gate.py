@@ -22,9 +22,15 @@ from tracking.arrays import F64, I64, Bool
 NO_REASON = -1
 NOT_ARMED = -2
 EMERGENCY = -3
+HELD_UP = -4
 LONGEST = 0.1
 """[s] After a longer pause commands change by no more than after this one."""
-REASONS = {NO_REASON: "", NOT_ARMED: "not armed", EMERGENCY: "emergency stop"}
+REASONS = {
+    NO_REASON: "",
+    NOT_ARMED: "not armed",
+    EMERGENCY: "emergency stop",
+    HELD_UP: "the supervisor was held up, or the computer was suspended",
+}
 
 
 def reason_text(code: int) -> str:
@@ -78,6 +84,12 @@ class Gate:
         """Let all cars stand."""
         self.armed[:] = False
         self._held[:] = NOT_ARMED
+
+    def interrupt(self) -> None:
+        """Nobody was watching for a while: let all cars stand, and be well anew."""
+        self.armed[:] = False
+        self._held[:] = HELD_UP
+        self._well_since[:] = np.inf
 
     def arm(self, now: F64, cars: Bool) -> Bool:
         """Arm those cars of which all was well for long enough.

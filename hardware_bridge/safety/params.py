@@ -10,6 +10,9 @@ import numpy as np
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.safety.polygon import area
 
+STEEPEST = 1.5
+"""[rad] Of wheels: more are degrees."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fence:
@@ -101,5 +104,11 @@ class SafetyParams:
             raise BridgeError(f"hysteresis: expected at most 1, got {self.hysteresis:g}")
         if self.silence > 0.1:
             raise BridgeError(f"silence: expected at most 0.1 s, got {self.silence:g}")
+        if self.max_steering > STEEPEST:
+            raise BridgeError(
+                f"max_steering: expected at most {STEEPEST:g} rad, got {self.max_steering:g}"
+            )
+        if self.hardest < self.braking:
+            raise BridgeError(f"hardest: expected at least braking = {self.braking:g}")
         if self.slow > self.max_speed:
             raise BridgeError(f"slow: expected at most max_speed = {self.max_speed:g}")

@@ -114,7 +114,8 @@ def separation(m: Moment, p: SafetyParams) -> Verdict:
     """Another car is nearer than both need to stop.
 
     Of the room between two, a car may use half, or what the other cannot use at its speed if that
-    is more; of one that nobody holds to rules it may use that alone.
+    is more; of one that nobody holds to rules it may use that alone. Such a one, a person or a car
+    that is pushed, is as fast as it is seen to be, and may turn any way.
     """
     q, recent = m.picture, m.recent
     ahead = ahead_of(q)
@@ -124,15 +125,20 @@ def separation(m: Moment, p: SafetyParams) -> Verdict:
     time = p.reaction + age_of(m) + np.where(m.linked, 0.0, p.deadman)
     angle, _ = bearing(ahead[:, None, :], -towards)
     sure = (q.oriented == 1.0)[:, None, :]
-    swing, used = np.arctan(REAR / p.turning_radius), np.zeros(())
+    held = m.armed[:, None, :]
+    own = np.nan_to_num(ahead) * q.speed[..., None]
+    seen = np.hypot(*np.moveaxis(q.vel + own[:, :, None, :], -1, 0))
+    free = np.where(held, 0.0, np.maximum(seen, np.abs(q.speed)[:, None, :]))
+    used = stopping_way(free, time[:, None, :], p.braking)
+    swing = np.arctan(REAR / p.turning_radius)
     for sign, told in ((1.0, recent.forward), (-1.0, recent.backward)):
         way = stopping_way(np.maximum(sign * q.speed, told), time, p.braking)[:, None, :]
         off = angle if sign > 0.0 else np.pi - angle
         turned = np.where(sure, np.maximum(off - swing, 0.0), 0.0)
         used = np.maximum(used, gain(way, turned, p.turning_radius))
         gone = np.minimum(sign * q.speed, sign * recent.speed)[:, None, :] * -np.cos(off)
-        room = room + np.where(sure, np.maximum(gone, 0.0) ** 2, 0.0) / (2.0 * p.hardest)
-    share = np.maximum(room - used, np.where(m.armed[:, None, :], 0.5 * room, 0.0))
+        room = room + np.where(sure & held, np.maximum(gone, 0.0) ** 2, 0.0) / (2.0 * p.hardest)
+    share = np.maximum(room - used, np.where(held, 0.5 * room, 0.0))
     # Where they may be that near already, the other may be in any direction of a lens: that of the
     # error, which has the estimate in its middle, without the separation round the car.
     error, least = DIRECTION * q.sigma, p.separation

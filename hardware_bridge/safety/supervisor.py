@@ -51,6 +51,10 @@ class Supervisor:
         self._broken: dict[int, str] = {}
         self._told: dict[int, tuple[float, bool]] = {}
         """When each car was last told something, and whether it was to move."""
+        self._taken: dict[int, float] = {}
+        """When the port of each car last took what it was sent, or was lost [s]."""
+        self._sent: list[int] = []
+        """Slots that the last tick had something for."""
         self.quit = False
         """Asked to end."""
 
@@ -85,28 +89,51 @@ class Supervisor:
         self._gate.stop()
         self.quit = True
 
+    def interrupt(self) -> None:
+        """Nobody was watching for longer than cars go on by themselves: they stand by now.
+
+        Words and pictures of before may be of a time that no clock has counted.
+        """
+        self._gate.interrupt()
+        self._taken.clear()  # ports took nothing, as nothing was sent
+
     def tick(self, now: float, late: float, linked: Sequence[int]) -> dict[int, bytes]:
         """What every car is sent now.
+
+        After a pause in which cars have stopped by themselves, none moves until it is armed again.
 
         Args:
             now: [s]
             late: How late this tick is [s].
-            linked: Slots of the cars whose port is open.
+            linked: Slots of the cars whose port is open; in a dry run of all.
 
         Returns:
             Bytes by slot, for those with a car, whether its port is open or not. Of a driver that
             fails there are none: its car stops by itself, and the others are told as ever.
         """
         self._late, self._missed = max(late, self._late), self._missed + (late > LATE)
+        if now - self._now[0] > self._gate.params.deadman and np.isfinite(self._now[0]):
+            self.interrupt()
         self._linked[:] = False
-        self._linked[0, [slot for slot in linked if slot not in self._broken]] = True
+        self._linked[0, [slot for slot in linked if self._is_linked(slot, now)]] = True
+        for slot in self._drivers:
+            self._taken[slot] = self._taken.get(slot, now) if slot in linked else now
         self._now[0] = now
         out = self._gate.step(self._picture, self._now, self._word, self._heard, self._linked)
         self._output = out
-        return {
+        told = {
             slot: self._bytes(slot, out) if self._is_due(slot, now, out) else b""
             for slot in self._drivers
         }
+        self._sent = [slot for slot, data in told.items() if data]
+        return told
+
+    def _is_linked(self, slot: int, now: float) -> bool:
+        """Whether commands of an open port leave; a car that hears none has stopped by itself."""
+        if slot not in self._drivers:
+            return True
+        longest = self._gate.params.deadman + self._drivers[slot].gap
+        return slot not in self._broken and now - self._taken.get(slot, now) <= longest
 
     def _is_due(self, slot: int, now: float, out: GateOutput) -> bool:
         """Whether a controller takes a command by now; the first that stops it is always due."""
@@ -131,8 +158,18 @@ class Supervisor:
             self._broken[slot] = str(error)
             return b""
 
-    def written(self, now: float) -> None:
-        """What the last tick asked for was handed to the ports at this time [s]."""
+    def written(self, now: float, taken: Sequence[int]) -> None:
+        """What the last tick asked for was handed to the ports.
+
+        Args:
+            now: [s]
+            taken: Slots whose ports took it.
+        """
+        for slot in self._sent:
+            if slot in taken:
+                self._taken[slot] = now
+            else:
+                self._told.pop(slot, None)  # it was not
         t = float(self._picture.t[0])
         if t > self._decided:
             self._decided, self._lag = t, now - t

@@ -37,8 +37,12 @@ def supervise(charge: Charge, talk: socket.socket) -> None:
         charge: What it is responsible for.
         talk: Its end of the pair.
     """
-    # Ctrl-C in a terminal reaches both; the deciding process says what is to be done.
+    # What a terminal does to its processes, by keys or because it is closed, would reach both: the
+    # deciding process says what is to be done, or is gone.
+    with contextlib.suppress(OSError):
+        os.setsid()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
     _hurry()
     talk.setblocking(False)
     try:
@@ -47,6 +51,7 @@ def supervise(charge: Charge, talk: socket.socket) -> None:
         talk.send(pack(Ready(str(error))))
         talk.close()
         return
+    signal.signal(signal.SIGTERM, lambda *_: watch.abandon())
     try:
         with short_pauses():
             talk.send(pack(Ready()))
@@ -59,7 +64,8 @@ class _Watch:
     """The supervisor with its ports, in its process."""
 
     def __init__(self, charge: Charge, talk: socket.socket) -> None:
-        self._talk, self._n_cars = talk, charge.n_cars
+        self._talk, self._n_cars, self._dry = talk, charge.n_cars, charge.dry
+        self._deadman_ns = round(charge.params.deadman * 1e9)
         boot = time.time_ns() // 1_000_000_000  # rises from start to start, as a MAC asks for
         self._drivers = {
             slot: make_driver(car.driver, car.node, car.options, car.key, boot, _now_us)
@@ -78,6 +84,12 @@ class _Watch:
             driver.drive(0.0, 0.0)  # loads what is compiled; nothing is sent
         self._links.watch(talk.fileno())
         self._up: set[str] = set()
+        self._asleep = asleep_ns()
+        self._alone = False
+
+    def abandon(self) -> None:
+        """Let the cars stand for good, and end."""
+        self._supervisor.abandon()
 
     def run(self) -> None:
         """Tick after tick."""
@@ -115,12 +127,15 @@ class _Watch:
         for name in up - self._up:
             self._send(name, self._drivers[self._slots[name]].opening)
         self._up = up
-        sent = self._supervisor.tick(now * 1e-9, late, [self._slots[name] for name in up])
-        for name, slot in self._slots.items():
-            # Each by itself: one that fails keeps none of the others from being told.
-            if sent[slot]:
-                self._links.send(name, sent[slot])
-        self._supervisor.written(time.monotonic_ns() * 1e-9)
+        asleep = asleep_ns()
+        if asleep - self._asleep > self._deadman_ns:
+            self._supervisor.interrupt()
+        self._asleep = asleep
+        linked = [*self._dry, *(self._slots[name] for name in up)]
+        sent = self._supervisor.tick(now * 1e-9, late, linked)
+        # Each by itself: one that fails keeps none of the others from being told.
+        taken = [slot for name, slot in self._slots.items() if self._links.send(name, sent[slot])]
+        self._supervisor.written(time.monotonic_ns() * 1e-9, taken)
         said: list[Message] = [
             Notice(f"{n.link} {'up' if n.up else f'down: {n.reason}'}")
             for n in self._links.drain_notices()
@@ -149,10 +164,13 @@ class _Watch:
             except OSError:
                 data = b""
             if not data:
-                if not self._supervisor.quit:
+                if not self._alone:
+                    self._alone = True
+                    # It would be readable from here on.
                     self._links.unwatch(self._talk.fileno())
-                    self._supervisor.abandon()
-                return True
+                    if not self._supervisor.quit:
+                        self.abandon()
+                return False
             try:
                 message = unpack(data, self._n_cars)
             except ValueError as error:
@@ -170,6 +188,16 @@ class _Watch:
 
 def _now_us() -> int:
     return time.monotonic_ns() // 1000
+
+
+def asleep_ns() -> int:
+    """How long the computer was suspended since it started; 0 where no clock tells [ns].
+
+    The monotonic clock stands still meanwhile, so that no time seems to have passed.
+    """
+    if not hasattr(time, "CLOCK_BOOTTIME"):
+        return 0
+    return time.clock_gettime_ns(time.CLOCK_BOOTTIME) - time.clock_gettime_ns(time.CLOCK_MONOTONIC)
 
 
 def _hurry() -> None:

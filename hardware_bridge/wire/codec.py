@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from hardware_bridge.counts import Counts
 from hardware_bridge.wire import _codec_kernels as kernels
 from hardware_bridge.wire.definition import MOST_FRAME, MOST_ROWS
+from hardware_bridge.wire.key import KEY_BYTES
 from hardware_bridge.wire.layout import (
     COLUMN_TABLE,
     COLUMNS,
@@ -21,7 +22,6 @@ from hardware_bridge.wire.layout import (
 
 MOST_CODED = MOST_FRAME + 3
 """[bytes] Longest frame when it is stuffed, without the zero that ends it."""
-KEY_BYTES = 16
 _ROOM = MOST_FRAME + 8
 
 

@@ -161,6 +161,32 @@ def test_a_reset_arms_and_lets_cars_find_each_other():
     bridge.close()
 
 
+@pytest.mark.parametrize(("pressed", "armed"), [
+    ({1: "stop", 2: "clear"}, False), ({1: "disarm"}, False), ({1: "disarm", 2: "arm"}, True),
+])  # fmt: skip
+def test_whoever_stops_the_cars_while_they_wait_arms_them_too(pressed, armed):
+    bridge = VirtualBridge(OPTIONS, wait=2.0)
+    decisions = iter(range(1, 1000))
+
+    def attend():
+        what = pressed.get(next(decisions))
+        if what is not None:
+            bridge.start.heed(what)
+            bridge.feed.order(what)
+        return False
+
+    bridge.start.attend = attend
+    env = bridge.env()
+    if armed:
+        env.reset()
+        assert bridge.feed.report.armed.all()
+    else:
+        with pytest.raises(BridgeError, match="not armed within 2 s, since a key"):
+            env.reset()
+        assert not bridge.feed.report.armed.any()
+    bridge.close()
+
+
 def test_a_virtual_drive_is_the_same_every_time():
     def once():
         bridge = VirtualBridge(OPTIONS)

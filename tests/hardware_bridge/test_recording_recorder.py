@@ -140,6 +140,7 @@ def test_what_is_no_record_is_refused_and_the_rest_goes_on(tmp_path):
     assert recorder.dropped == 7
     recording = read_recording(tmp_path / "a.rec")
     assert frames(recording) == [7]
+    assert sum(told(recording)) == 6  # all but the one that is of no time
     *_, last = recording
     assert last.event() == {"event": "link_down", "link": "links.a", "odd": "{1}"}
 

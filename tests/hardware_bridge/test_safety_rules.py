@@ -168,6 +168,23 @@ def test_whoever_nobody_holds_to_rules_gets_all_the_room():
     assert check("separation", q, armed=armed).forward[0, 0] < 0.9 * both
 
 
+@pytest.mark.parametrize("way", [(-1.0, 0.0), (0.0, 1.0), (1.0, 0.0)])
+def test_whoever_is_no_car_of_ours_is_as_fast_as_it_is_seen_to_be(way):
+    """A person with a node has no telemetry, and may turn at the next step."""
+    armed, walking = np.array([[True, False]]), 1.4
+    stands = pair(2.0, (0.0, np.pi))
+    walks = pair(2.0, (0.0, np.pi))
+    walks.vel[0, 0, 1] = walking * np.array(way)
+    told = pair(2.0, (0.0, np.pi), (0.0, walking))
+    caps = [check("separation", q, armed=armed).forward[0, 0] for q in (stands, walks, told)]
+    assert caps[1] == pytest.approx(caps[2], abs=0.05)
+    assert caps[1] < 0.5 * caps[0]
+    # A car that drives towards one that stands sees it come nearer, and knows why.
+    drives = pair(2.0, (0.0, np.pi), (1.0, 0.0))
+    drives.vel[0, 0, 1] = -1.0, 0.0
+    assert check("separation", drives, armed=armed).forward[0, 0] == pytest.approx(caps[0])
+
+
 def test_a_lost_port_counts_as_a_longer_reaction():
     q = pair(2.2, (0.0, np.pi), (0.0, 0.8))
     linked = np.array([[True, False]])
@@ -235,6 +252,7 @@ def test_no_place_no_motion(spoil):
     ({"silence": 0.2}, "silence"), ({"slow": 2.0}, "slow"), ({"hysteresis": 1.1}, "hysteresis"),
     ({"stale_slow": 0.4}, "stale_slow"), ({"sigma_stop": 0.4}, "sigma_slow"),
     ({"max_speed": float("nan")}, "max_speed"), ({"separation": 0.0}, "separation"),
+    ({"max_steering": 24.0}, "max_steering"), ({"hardest": 1.0}, "hardest"),
 ])  # fmt: skip
 def test_limits_that_cannot_be_meant(options, message):
     with pytest.raises(BridgeError, match=f"^{message}:"):

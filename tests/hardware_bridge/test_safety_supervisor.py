@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from safety_group import TICK, picture
 
+from hardware_bridge.safety.gate import NOT_ARMED, reason_text
 from hardware_bridge.safety.messages import Decision, Notice, Order, Word
 from hardware_bridge.safety.params import SafetyParams
 from hardware_bridge.safety.supervisor import Supervisor
@@ -36,7 +37,7 @@ class Drive:
     def __init__(self):
         self.drivers = {0: Driver(), 1: Driver()}
         self.supervisor = Supervisor(SafetyParams(), 2, self.drivers, {0: "cars.1", 1: "cars.2"})
-        self.q, self.now, self.linked = picture(), 0.0, [0, 1]
+        self.q, self.now, self.linked, self.takes = picture(), 0.0, [0, 1], [0, 1]
 
     def tick(self, n=1, *, talk=True):
         for _ in range(n):
@@ -46,6 +47,7 @@ class Drive:
                 self.supervisor.take(Word(self.now, np.full(2, self.now)))
                 self.supervisor.take(Decision(self.q._replace(t=self.q.t.copy())))
             sent = self.supervisor.tick(self.now, 0.0, self.linked)
+            self.supervisor.written(self.now, self.takes)
         return sent
 
     def arm(self):
@@ -174,6 +176,64 @@ def test_a_controller_that_is_slow_to_take_commands_is_not_swamped():
     driver = Driver()
     driver.gap = 0.03
     supervisor = Supervisor(SafetyParams(), 1, {0: driver}, {0: "cars.1"})
-    sent = [bool(supervisor.tick(0.01 * k, 0.0, [0])[0]) for k in range(1, 31)]
+    sent = []
+    for k in range(1, 31):
+        sent.append(bool(supervisor.tick(0.01 * k, 0.0, [0])[0]))
+        supervisor.written(0.01 * k, [0])
     assert sent.count(True) == 10
     assert sent[0]
+
+
+def test_a_port_that_is_open_and_takes_nothing_is_a_lost_one(drive):
+    """A network that is gone for a while: the car stops by itself, and is not to drive on."""
+    drive.takes = [1]
+    assert stands(drive.tick(19)) == [False, False]
+    assert stands(drive.tick(3)) == [True, False]
+    assert "port is lost" in drive.supervisor.stopped()[0].text
+    drive.takes = [0, 1]
+    assert stands(drive.tick(200)) == [True, False]
+    assert drive.arm() == []
+    assert stands(drive.tick(5)) == [False, False]
+
+
+def test_what_a_port_did_not_take_is_said_again_at_once():
+    driver = Driver()
+    driver.gap = 0.05
+    supervisor = Supervisor(SafetyParams(), 1, {0: driver}, {0: "cars.1"})
+    for k, (takes, told) in enumerate([([], True), ([], True), ([0], True), ([0], False)]):
+        assert bool(supervisor.tick(0.01 * k, 0.0, [0])[0]) == told
+        supervisor.written(0.01 * k, takes)
+
+
+@pytest.mark.parametrize("suspended", [False, True])
+def test_after_a_pause_in_which_cars_stopped_nobody_drives_on(drive, suspended):
+    """Held up, or suspended: then no time has passed by the clock that all go by."""
+    if suspended:
+        drive.supervisor.interrupt()
+    else:
+        drive.now += 0.3
+    assert stands(drive.tick()) == [True, True]
+    assert all("held up" in n.text for n in drive.supervisor.stopped())
+    assert stands(drive.tick(30)) == [True, True]
+    assert len(drive.arm()) == 2
+    drive.tick(30)
+    assert drive.arm() == []
+    assert stands(drive.tick(5)) == [False, False]
+
+
+def test_a_dry_run_tells_what_the_gate_would_say():
+    supervisor = Supervisor(SafetyParams(), 2, {}, {})
+    q = picture(spacing=0.6)
+    for k in range(100):
+        t = 0.01 * k
+        q.t[:] = q.ranged[:] = t
+        supervisor.take(Word(t, np.full(2, t)))
+        supervisor.take(Decision(q._replace(t=q.t.copy())))
+        assert supervisor.tick(t, 0.0, [0, 1]) == {}
+    report = supervisor.report()
+    assert report.linked.all()
+    assert report.reason.tolist() == [NOT_ARMED, NOT_ARMED]
+    assert (report.cap < 1.0).all()
+    q.sigma[:] = 2.0
+    supervisor.tick(1.0, 0.0, [0, 1])
+    assert reason_text(int(supervisor.report().reason[0])).startswith("where another car is")
