@@ -90,7 +90,7 @@ class Bridge(OpenBridge):
                 )
                 self.recorder = Recorder(record, header)
                 # One of a start that failed is none, and would take the name of the next.
-                stack.push(lambda kind, *_: kind and Path(record).unlink(missing_ok=True))
+                stack.push(lambda kind, *_: _remove(record) if kind else None)
                 stack.callback(self.recorder.close)
                 if calibration is not None:
                     text = calibration_toml(calibration)
@@ -130,3 +130,7 @@ class Bridge(OpenBridge):
         trace: TracebackType | None,
     ) -> None:
         self.close()
+
+
+def _remove(path: Path | str) -> None:
+    Path(path).unlink(missing_ok=True)
