@@ -53,7 +53,9 @@ def matched_params(scenario: Scenario | HumanScenario) -> JointParams:
             accel_psd=math.hypot(imu.acc_noise, imu.vibration) * math.sqrt(DT),
             bias_std=math.hypot(imu.acc_bias, imu.acc_drift),
             bias_tau=imu.drift_tau,
-            # World yaw of VQF against the truth: 0.6 to 1.4 degrees round offsets of a degree.
+            # World yaw of VQF against the truth: 0.6 to 1.4 degrees round offsets of a degree; 6
+            # degrees before the first move, 2 about the mean of three cars ten seconds later.
+            first_heading_std=0.1,
             heading_std=0.022,
             heading_tau=8.0,
             slip=1.0 / (scenario.car.rear_cornering * GRAVITY),

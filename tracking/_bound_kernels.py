@@ -26,7 +26,7 @@ def begin(c, s, t):
         for k in range(c.d):
             s.P[0, s.nodes[i].at_p + k, s.nodes[i].at_p + k] = c.position_var
     for p in range(s.pairs.shape[0]):
-        begin_pair(c, s, 0, p)
+        begin_pair(c, s, 0, p, 0.0)
     group = s.group[0]
     group.started, group.n_alive = True, 1
     group.t, group.t_carrier, group.t_gauge = t, t, t

@@ -163,7 +163,7 @@ def watch_rotation(c, s, layout, dt):
                 s.P[h, node.at_v + k, node.at_v + k] += LOOSE_SPEED**2
     for p in range(s.pairs.shape[0]):
         if s.nodes[s.pairs[p].i].present and s.nodes[s.pairs[p].j].present:
-            begin_pair(c, s, h, p)
+            begin_pair(c, s, h, p, s.nlos[h, p])
     turn_all_ways(c, s, layout, h)
     for k in range(s.alive.shape[0]):
         if s.alive[k] and k != h:

@@ -154,7 +154,7 @@ def hear(c, s, layout, scratch, i, j, a_i, a_j, t, distance, sight, is_survey):
     if node_i.present and node_j.present:
         take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, sight, is_survey)
     else:
-        take_first_range(c, s, layout, scratch, i, j, p, t, distance, is_survey)
+        take_first_range(c, s, layout, scratch, i, j, p, t, distance, sight, is_survey)
 
 
 @small_kernel
@@ -253,9 +253,13 @@ def take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, sight, is_survey
 
 
 @kernel
-def take_first_range(c, s, layout, scratch, i, j, p, t, distance, is_survey):
+def take_first_range(c, s, layout, scratch, i, j, p, t, distance, sight, is_survey):
     """A range or survey of a pair that does not run yet, i < j."""
     collect(c, s.pairs[p], t, distance, is_survey)
+    if s.pairs[p].start_n <= 1:
+        s.pairs[p].start_sight = 0.0
+    if not is_survey:
+        s.pairs[p].start_sight += sight[0]
     settle_all(s, c.n)
     if not s.group[0].started:
         if try_start(c, s, layout, t):

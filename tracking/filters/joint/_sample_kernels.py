@@ -81,6 +81,10 @@ def take_state(c, nodes, held, pre, i, t, values, e, k):
         pre[i, 4] += half_p * (a0 - held[i, 4])
         pre[i, 5] += half_p * (a1 - held[i, 5])
         pre[i, 6] += half_p * (a2 - held[i, 6])
+        squared = a0 * a0 + a1 * a1
+        if squared > node.blow * node.blow:
+            # In terms of the noise that grows with the acceleration.
+            pre[i, 11] += (node.blow_share * dt) ** 2 * squared / node.turn_psd2
     held[i, 4], held[i, 5], held[i, 6] = a0, a1, a2
     node.cos_yaw, node.sin_yaw = cos_yaw, sin_yaw
     node.t_state = t

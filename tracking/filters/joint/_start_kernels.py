@@ -9,6 +9,8 @@ which side it is, both sides become hypotheses.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from tracking.compiled import allocating_kernel, kernel
@@ -59,7 +61,7 @@ def try_start(c, s, layout, t):
         spread_rotation(c, s, h, members, m, Y)
         for p in range(s.pairs.shape[0]):
             if s.nodes[s.pairs[p].i].present and s.nodes[s.pairs[p].j].present:
-                begin_pair(c, s, h, p)
+                begin_pair(c, s, h, p, first_sight(c, s.pairs[p]))
     for p in range(s.pairs.shape[0]):
         s.pairs[p].t_range = t
         forget_fits(s.pairs[p])
@@ -115,17 +117,26 @@ def begin_node(c, s, h, i, t):
         speed_var = c.rest_var if still else c.start_speed_var
         decouple(s.x, s.P, h, c.n, node.at_v + k, speed_var)
         decouple(s.x, s.P, h, c.n, node.at_b + k, node.bias_var)
-    decouple(s.x, s.P, h, c.n, node.at_h, node.heading_var)
+    decouple(s.x, s.P, h, c.n, node.at_h, node.first_heading_var)
 
 
 @kernel
-def begin_pair(c, s, h, p):
-    """Range errors and sight that nothing is known of yet."""
-    s.nlos[h, p] = c.enter_rate / (c.enter_rate + c.leave_rate)
+def first_sight(c, pair):
+    """Probability that the first ranges of a pair had no line of sight, by their powers."""
+    odds = c.enter_rate / c.leave_rate * math.exp(min(max(pair.start_sight, -7.0), 7.0))
+    return odds / (1.0 + odds)
+
+
+@kernel
+def begin_pair(c, s, h, p, hidden):
+    """Range errors that nothing is known of yet but how likely it is that there is no sight."""
+    s.nlos[h, p] = hidden
     at = s.pairs[p].at_e
     if at >= 0:
         decouple(s.x, s.P, h, c.n, at, max(c.fast_var, 1e-12))
-        decouple(s.x, s.P, h, c.n, at + 1, max(c.slow_var, 1e-12))
+        slow_var = c.slow_var + hidden * c.excess_var + hidden * (1.0 - hidden) * c.excess**2
+        decouple(s.x, s.P, h, c.n, at + 1, max(slow_var, 1e-12))
+        s.x[h, at + 1] = hidden * c.excess
 
 
 @kernel
@@ -202,5 +213,5 @@ def add_node(c, s, layout, h, new, pos, t):
     for i in range(n):
         if i != new and s.nodes[i].present:
             p = layout.pair_index[i, new]
-            begin_pair(c, s, h, p)
+            begin_pair(c, s, h, p, first_sight(c, s.pairs[p]))
             forget_fits(s.pairs[p])

@@ -35,6 +35,9 @@ class CarrierParams:
     """[rad] Error of a magnetic heading that changes with place and time."""
     heading_tau: float = 8.0
     """[s] How long it stays the same."""
+    first_heading_std: float | None = None
+    """[rad] The same until it has moved: what bends the field where it stands is not averaged yet;
+    None for no more than later."""
     speed_std: float = 2.0
     """[m/s] Speed of the group as a whole; keeps a group without any reference from drifting."""
     sideways_std: float | None = None
@@ -44,6 +47,11 @@ class CarrierParams:
     slip: float = 0.0
     """[s2/m] How fast that axle drifts outwards in a curve, per squared speed and yaw rate: the
     inverse of its cornering stiffness per load [1/rad] times gravity."""
+    blow: float | None = None
+    """[m/s2] More is a blow: what carries it runs into something and stops within a sample or two,
+    that may have been cut off at the end of the scale, 8 or 16 g. None for what moves by blows."""
+    blow_share: float = 0.25
+    """[-] Error of what such a sample adds to the velocity, in terms of that."""
     rests: bool = True
     """It stands still now and then, and its IMU tells."""
     carry_period: float = 0.02
@@ -64,9 +72,11 @@ CARRIERS = {
         levelled=True,
         heading_std=0.03,
         heading_tau=5.0,
+        first_heading_std=0.1,
         sideways_std=0.08,
         rear_axle=0.15,
         slip=0.018,
+        blow=70.0,
         carry_period=0.05,
     ),
     "robot": CarrierParams(accel_psd=0.07, bias_std=0.1, bias_tau=30.0, levelled=True),

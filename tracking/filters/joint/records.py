@@ -36,10 +36,13 @@ NODE = np.dtype(
         ("rests", "?"),
         ("psd2", "f8"),
         ("turn_psd2", "f8"),
+        ("blow", "f8"),  # infinite for what moves by blows
+        ("blow_share", "f8"),
         ("bias_var", "f8"),
         ("bias_tau", "f8"),
         ("heading_var", "f8"),
         ("heading_tau", "f8"),
+        ("first_heading_var", "f8"),
         ("speed_var", "f8"),
         ("sideways_var", "f8"),  # 0 for what may move sideways
         ("rear_axle", "f8"),
@@ -65,6 +68,7 @@ PAIR = np.dtype(
         ("start_sum", "f8"),  # sum of the first ranges of a pair not started [m]
         ("start_t", "f8"),  # time of the first of them [s]
         ("start_n", "i8"),  # how many
+        ("start_sight", "f8"),  # what their powers say: log-likelihood ratio of no sight
         ("n_ranges", "i8"),
         ("n_rejected", "i8"),  # ranges that hardly counted
         ("i", "i8"),  # constant: node indices, i < j

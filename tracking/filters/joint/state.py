@@ -105,15 +105,19 @@ def make_state(
         static = node.kind == "static"
         initial = constellation.heading == "initial"
         heading_std = params.initial_heading_std if initial else carrier.heading_std
+        first_heading_std = heading_std if initial else carrier.first_heading_std or heading_std
         constants = {
             "static": static,
             "levelled": carrier.levelled,
             "rests": carrier.rests,
             "psd2": carrier.accel_psd**2,
             "turn_psd2": carrier.turn_psd**2,
+            "blow": carrier.blow or np.inf,
+            "blow_share": carrier.blow_share,
             "bias_var": carrier.bias_std**2,
             "bias_tau": carrier.bias_tau,
             "heading_var": heading_std**2,
+            "first_heading_var": first_heading_std**2,
             "heading_tau": params.initial_heading_tau if initial else carrier.heading_tau,
             "speed_var": carrier.speed_std**2,
             "sideways_var": (carrier.sideways_std or 0.0) ** 2,

@@ -1,0 +1,81 @@
+"""What the joint filter believes before it knows: headings, sights, and speeds after a blow."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from agents.simulate import simulate
+from relpos_env.timing import STAND_STILL
+from tracking import Constellation, NodeConfig, Tracker
+from tracking.filters.joint._sample_kernels import take_state
+from tracking.filters.joint._start_kernels import begin_pair, first_sight
+from tracking.filters.joint.coefficients import make_coefficients
+from tracking.filters.joint.params import CARRIERS, JointParams, NlosParams
+from tracking.filters.joint.records import as_records
+from tracking.filters.joint.state import JointState, make_state
+
+
+def one_env(vehicle="car"):
+    """The coefficients and one environment of three nodes, before any measurement."""
+    nodes = tuple(NodeConfig(id=k, vehicle=vehicle) for k in (1, 2, 3))
+    constellation = Constellation(nodes=nodes, dimensions=2)
+    c = as_records(make_coefficients(constellation, JointParams()))[0]
+    batch = make_state(constellation, JointParams(), 1, 1)
+    return c, JointState._make(as_records(a[0]) if a.dtype.names else a[0] for a in batch)
+
+
+@pytest.mark.parametrize(("vehicle", "accel", "is_blow"), [
+    ("car", 60.0, False), ("car", 78.5, True), ("hand", 78.5, False),
+])  # fmt: skip
+def test_after_a_blow_the_speed_is_uncertain(vehicle, accel, is_blow):
+    c, s = one_env(vehicle)
+    values = np.zeros((1, 3, 8))
+    values[..., 0] = 1.0  # level, and pointing along x
+    values[0, 1, 4] = accel
+    for k, t in enumerate((0.0, 0.01, 0.02)):
+        take_state(c, s.nodes, s.held, s.pre, 0, t, values, 0, k)
+    carrier, node = CARRIERS[vehicle], s.nodes[0]
+    usual = node.turn_psd2 * accel**2 * 0.01
+    expected = usual + (carrier.blow_share * accel * 0.01) ** 2 * is_blow
+    assert node.turn_psd2 * s.pre[0, 11] == pytest.approx(expected)
+    # Half before and half after: what is missing of it is not known.
+    assert s.pre[0, 1] == pytest.approx(accel * 0.01)
+
+
+@given(st.floats(-30.0, 30.0))
+def test_range_errors_begin_as_those_of_both_sights(evidence):
+    """The slow error is that of a mixture, with its mean and variance."""
+    c, s = one_env()
+    pair = s.pairs[0]
+    pair.start_sight = evidence
+    hidden = first_sight(c, pair)
+    begin_pair(c, s, 0, 0, hidden)
+    at, p = pair.at_e + 1, NlosParams()
+    assert 0.0 < hidden < 1.0
+    mean = hidden * p.excess
+    squared = hidden * (p.excess**2 + p.excess_std**2)
+    assert s.nlos[0, 0] == hidden
+    assert s.x[0, at] == pytest.approx(mean)
+    assert s.P[0, at, at] == pytest.approx(c.slow_var + squared - mean**2)
+
+
+def test_without_powers_sight_is_as_likely_at_first_as_it_is_in_the_long_run():
+    c, s = one_env()
+    p = NlosParams()
+    assert first_sight(c, s.pairs[0]) == pytest.approx(p.enter_rate / (p.enter_rate + p.leave_rate))
+
+
+def test_headings_are_uncertain_until_cars_have_driven():
+    """Magnetometers are wrong by degrees where they stand, and nothing changes that at rest."""
+    log = simulate(scenario="cars-los", seconds=20.0, seed=3)
+    tracker, first = Tracker(log.constellation), CARRIERS["car"].first_heading_std
+    std = []
+    for start, end in ((0.0, STAND_STILL + 0.2), (STAND_STILL + 0.2, 19.0)):
+        t = log.block.t[0]
+        tracker.step(log.block.take((t > start) & (t <= end)), end)
+        state = tracker.save()["filter"]
+        h, at = state.group["best"][0, 0], state.nodes["at_h"][0]
+        std.append(np.sqrt(state.P[0, h, at, at]))
+    assert (std[0] > 0.9 * first).all()
+    assert (std[1] < CARRIERS["car"].heading_std + 0.01).all()
