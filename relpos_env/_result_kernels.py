@@ -16,7 +16,7 @@ class TeamResults(NamedTuple):
     reward: np.ndarray
     """Mean."""
     error: np.ndarray
-    """Formation error, mean [m]."""
+    """Formation error, mean of those in the room [m]."""
     contacts: np.ndarray
     """Begun in the step, of all cars, whether or not they take part."""
 
@@ -52,7 +52,7 @@ def judge(
         terminated[e] = done[e]
         truncated[e] = cycles[e] >= max_cycles
         team.reward[e] = team.error[e] = team.contacts[e] = 0.0
-        size = 0
+        size, here = 0, 0
         for n in range(present.shape[1]):
             total = 0.0
             for k in range(weights.shape[0]):
@@ -64,10 +64,12 @@ def judge(
             team.contacts[e] += contacts[e, n]
             if stays:
                 team.reward[e] += total
-                team.error[e] += error[e, n]
                 size += 1
+            if present[e, n]:
+                team.error[e] += error[e, n]
+                here += 1
         team.reward[e] /= max(size, 1)
-        team.error[e] /= max(size, 1)
+        team.error[e] /= max(here, 1)
         if collision_ends and team.contacts[e] > 0.0:
             terminated[e] = True
 

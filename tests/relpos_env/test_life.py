@@ -172,7 +172,10 @@ def test_one_controller_for_all_sees_zeros_in_the_place_of_absent_cars(life):
         observation, *_, info = env.step(np.tile([0.5, 0.1], 4).astype(np.float32))
         rows = observation.reshape(4, -1)
         assert np.array_equal(rows.any(axis=1), env.formation.state.present[0])
-        assert not (env.formation.state.present[0] & ~info["active"]).any()
+        present = env.formation.state.present[0]
+        assert not (present & ~info["active"]).any()
+        # Cars that are away are in no formation, and not in a perfect one.
+        assert info["formation_error"] == pytest.approx(env.formation.task.error[0, present].mean())
 
 
 def waiting(monkeypatch, *more):
