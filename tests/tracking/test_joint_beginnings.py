@@ -6,8 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from agents.simulate import simulate
+from relpos_env.matched import matched_params
+from relpos_env.scenarios import recordable
 from relpos_env.timing import STAND_STILL
-from tracking import Constellation, NodeConfig, Tracker
+from tracking import Constellation, NodeConfig, Tracker, TrackerParams
+from tracking.filters import FilterParams
 from tracking.filters.joint._sample_kernels import take_state
 from tracking.filters.joint._start_kernels import begin_pair, first_sight
 from tracking.filters.joint.coefficients import make_coefficients
@@ -35,10 +38,10 @@ def test_after_a_blow_the_speed_is_uncertain(vehicle, accel, is_blow):
     values[0, 1, 4] = accel
     for k, t in enumerate((0.0, 0.01, 0.02)):
         take_state(c, s.nodes, s.held, s.pre, 0, t, values, 0, k)
-    carrier, node = CARRIERS[vehicle], s.nodes[0]
-    usual = node.turn_psd2 * accel**2 * 0.01
+    carrier = CARRIERS[vehicle]
+    usual = carrier.turn_psd**2 * accel**2 * 0.01
     expected = usual + (carrier.blow_share * accel * 0.01) ** 2 * is_blow
-    assert node.turn_psd2 * s.pre[0, 11] == pytest.approx(expected)
+    assert carrier.turn_psd**2 * s.pre[0, 11] == pytest.approx(expected)
     # Half before and half after: what is missing of it is not known.
     assert s.pre[0, 1] == pytest.approx(accel * 0.01)
 
@@ -47,17 +50,16 @@ def test_after_a_blow_the_speed_is_uncertain(vehicle, accel, is_blow):
 def test_range_errors_begin_as_those_of_both_sights(evidence):
     """The slow error is that of a mixture, with its mean and variance."""
     c, s = one_env()
-    pair = s.pairs[0]
-    pair.start_sight = evidence
-    hidden = first_sight(c, pair)
+    s.pairs["start_sight"][0] = evidence
+    hidden = first_sight(c, s.pairs[0])
     begin_pair(c, s, 0, 0, hidden)
-    at, p = pair.at_e + 1, NlosParams()
+    at, p = s.pairs["at_e"][0] + 1, NlosParams()
     assert 0.0 < hidden < 1.0
     mean = hidden * p.excess
     squared = hidden * (p.excess**2 + p.excess_std**2)
     assert s.nlos[0, 0] == hidden
     assert s.x[0, at] == pytest.approx(mean)
-    assert s.P[0, at, at] == pytest.approx(c.slow_var + squared - mean**2)
+    assert s.P[0, at, at] == pytest.approx(c["slow_var"] + squared - mean**2)
 
 
 def test_without_powers_sight_is_as_likely_at_first_as_it_is_in_the_long_run():
@@ -69,7 +71,9 @@ def test_without_powers_sight_is_as_likely_at_first_as_it_is_in_the_long_run():
 def test_headings_are_uncertain_until_cars_have_driven():
     """Magnetometers are wrong by degrees where they stand, and nothing changes that at rest."""
     log = simulate(scenario="cars-los", seconds=20.0, seed=3)
-    tracker, first = Tracker(log.constellation), CARRIERS["car"].first_heading_std
+    joint = matched_params(recordable("cars-los"))
+    car = joint.carriers["car"]
+    tracker = Tracker(log.constellation, TrackerParams(filter=FilterParams(joint=joint)))
     std = []
     for start, end in ((0.0, STAND_STILL + 0.2), (STAND_STILL + 0.2, 19.0)):
         t = log.block.t[0]
@@ -77,5 +81,5 @@ def test_headings_are_uncertain_until_cars_have_driven():
         state = tracker.save()["filter"]
         h, at = state.group["best"][0, 0], state.nodes["at_h"][0]
         std.append(np.sqrt(state.P[0, h, at, at]))
-    assert (std[0] > 0.9 * first).all()
-    assert (std[1] < CARRIERS["car"].heading_std + 0.01).all()
+    assert (std[0] > 0.9 * car.first_heading_std).all()
+    assert (std[1] < car.heading_std + 0.01).all()
