@@ -132,6 +132,39 @@ def test_killed(garage, figures):
     best(figures, "neutral after the policy was killed", 100.0, measure)
 
 
+def test_closed_terminal(garage, figures):
+    """Its hang-up and what its keys do reach the deciding process alone."""
+
+    def measure():
+        emulation, drive = garage.driven()
+        assert os.getsid(drive.supervisor) == drive.supervisor
+        for stray in (signal.SIGHUP, signal.SIGINT):
+            os.kill(drive.supervisor, stray)
+        start = drive.signal(signal.SIGHUP)
+        time.sleep(0.8)
+        heard = emulation.first_brake(start)
+        assert drives(emulation, heard + 1, time.monotonic_ns()) == []
+        assert not running(drive.supervisor)
+        return (heard - start) / MS
+
+    best(figures, "neutral after the terminal was closed", 100.0, measure)
+
+
+def test_supervisor_told_to_end(garage, figures):
+    def measure():
+        emulation, drive = garage.driven()
+        start = time.monotonic_ns()
+        os.kill(drive.supervisor, signal.SIGTERM)
+        time.sleep(0.8)
+        heard = emulation.first_brake(start)
+        assert drives(emulation, heard + 1, time.monotonic_ns()) == []
+        assert not running(drive.supervisor)
+        drive.process.wait(10.0)
+        return (heard - start) / MS
+
+    best(figures, "neutral after the supervisor was told to end", 100.0, measure)
+
+
 def running(pid):
     """Whether a process is there and no zombie."""
     try:
