@@ -161,10 +161,10 @@ def test_a_reset_arms_and_lets_cars_find_each_other():
     bridge.close()
 
 
-@pytest.mark.parametrize(("pressed", "armed"), [
+@pytest.mark.parametrize(("pressed", "moves"), [
     ({1: "stop", 2: "clear"}, False), ({1: "disarm"}, False), ({1: "disarm", 2: "arm"}, True),
 ])  # fmt: skip
-def test_whoever_stops_the_cars_while_they_wait_arms_them_too(pressed, armed):
+def test_whoever_stops_the_cars_while_they_wait_arms_them_too(pressed, moves):
     bridge = VirtualBridge(OPTIONS, wait=2.0)
     decisions = iter(range(1, 1000))
 
@@ -177,7 +177,7 @@ def test_whoever_stops_the_cars_while_they_wait_arms_them_too(pressed, armed):
 
     bridge.start.attend = attend
     env = bridge.env()
-    if armed:
+    if moves:
         env.reset()
         assert bridge.feed.report.armed.all()
     else:
