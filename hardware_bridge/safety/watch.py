@@ -164,13 +164,14 @@ class _Watch:
             except OSError:
                 data = b""
             if not data:
-                if not self._alone:
-                    self._alone = True
-                    # It would be readable from here on.
-                    self._links.unwatch(self._talk.fileno())
-                    if not self._supervisor.quit:
-                        self.abandon()
-                return False
+                if self._alone:
+                    return decided
+                self._alone = True
+                # It would be readable from here on.
+                self._links.unwatch(self._talk.fileno())
+                if not self._supervisor.quit:
+                    self.abandon()
+                return True
             try:
                 message = unpack(data, self._n_cars)
             except ValueError as error:
