@@ -38,7 +38,7 @@ class CarrierParams:
     first_heading_std: float | None = None
     """[rad] The same until it has moved: what bends the field where it stands is not averaged yet.
     None for no more than later. With more, several rotations stay possible for longer, and groups
-    that wait until one stands out get going later or not at all."""
+    that wait until one stands out get going later."""
     speed_std: float = 2.0
     """[m/s] Speed of the group as a whole; keeps a group without any reference from drifting."""
     sideways_std: float | None = None
