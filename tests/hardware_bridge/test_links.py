@@ -18,6 +18,7 @@ from hardware_bridge.links.links import Links
 from hardware_bridge.links.ports import PortSpec
 from hardware_bridge.links.serial_port import SerialPort
 from hardware_bridge.links.stream import Stream
+from hardware_bridge.recording.format import MOST_PAYLOAD
 
 NOW = time.monotonic_ns
 
@@ -132,6 +133,26 @@ def test_sends_whole_messages_or_none(device):
         assert links.send("links.a", b"fresh")
         assert not links.wait(0.01)
         assert device.heard() == b"fresh"
+
+
+@pytest.mark.parametrize("piece", [10_000, 16_383, 1 << 14])
+def test_what_is_read_at_once_fits_a_record(monkeypatch, piece):
+    """A port that hands out odd pieces: what is heard live is in the recording too."""
+    left = 3 * MOST_PAYLOAD
+
+    def read(fd, most):
+        nonlocal left
+        given = min(piece, most, left)
+        left -= given
+        if not given:
+            raise BlockingIOError
+        return bytes(given)
+
+    monkeypatch.setattr(os, "read", read)
+    stream = Stream(0, 64)
+    sizes = [len(stream.read()) for _ in range(4)]
+    assert max(sizes) <= MOST_PAYLOAD
+    assert sum(sizes) == 3 * MOST_PAYLOAD
 
 
 @settings(max_examples=40, deadline=None)

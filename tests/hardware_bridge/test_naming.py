@@ -2,7 +2,11 @@
 
 import pytest
 
+from hardware_bridge.config.keys import node_id
+from hardware_bridge.errors import BridgeError
 from hardware_bridge.live.naming import node_of
+from hardware_bridge.wire.definition import HOST
+from tracking.tables import Where
 
 IDS = {"0": 1, "1": 2, "989C": 3}
 
@@ -15,3 +19,11 @@ IDS = {"0": 1, "1": 2, "989C": 3}
 ])  # fmt: skip
 def test_ids_of_a_link_are_all_that_counts_where_there_are_some(device, ids, mixed, node):
     assert node_of(device, 9, ids, mixed=mixed) == node
+
+
+def test_no_node_has_the_id_of_the_host():
+    """A driver that speaks to it would be told of it by a traceback."""
+    where = Where("swarm.toml", raises=BridgeError)
+    assert node_id(str(HOST - 1), where) == HOST - 1
+    with pytest.raises(BridgeError, match="expected an id from 0 to 65534"):
+        node_id(str(HOST), where)
