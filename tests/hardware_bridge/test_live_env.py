@@ -220,10 +220,14 @@ def test_commands_pass_the_gate(armed):
         env.step({agent: np.float32([1.0, 0.0]) for agent in env.agents})
         assert (np.abs(armed.feed.report.speed) <= limit + 1e-9).all()
     armed.feed.order("stop")
-    for _ in range(15):
+    moves = []
+    for _ in range(30):
         env.step({agent: np.float32([1.0, 0.0]) for agent in env.agents})
+        moves.append(np.array(armed.rig.world.motion()[0]))
     assert not armed.feed.report.armed.any()
-    assert np.abs(armed.rig.world.motion()[0]).max() < 0.05
+    np.testing.assert_array_equal(armed.feed.report.speed, 0.0)
+    # The odometer of a car that stands is off by 0.02 m/s rms: its mean over two seconds tells.
+    assert np.abs(np.mean(moves[10:], axis=0)).max() < 0.03
     armed.feed.order("clear")
     env.reset()
     assert armed.feed.report.armed.all()
