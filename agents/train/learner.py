@@ -15,6 +15,7 @@ from stable_baselines3.common.utils import set_random_seed
 from agents.train.buffer import SwarmRolloutBuffer
 from agents.train.config import TrainConfig
 from agents.train.environments import layout_of
+from agents.train.hyperbolic import Tanh
 from agents.train.network import SwarmPolicy
 from agents.train.rooms import Rooms, observation_space
 from relpos_env.formation import N_TRUTH
@@ -79,6 +80,9 @@ def network_arguments(config: TrainConfig) -> dict[str, Any]:
         },
         "n_state": N_TRUTH * config.env.cars if net.critic == "central" else 0,
         "net_arch": [net.width] * net.layers,
+        "activation_fn": Tanh,
+        # Stable-Baselines3's own, in one pass over all weights.
+        "optimizer_kwargs": {"eps": 1e-5, "fused": True},
         "log_std_init": net.log_std,
     }
 

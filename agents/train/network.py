@@ -21,6 +21,7 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from torch import Tensor, nn
 
+from agents.train.hyperbolic import Tanh
 from relpos_env.interface.observations import Field
 from relpos_env.interface.observations.base import F32
 from tracking.arrays import I64
@@ -81,10 +82,10 @@ class SwarmFeatures(BaseFeaturesExtractor):  # type: ignore[misc]
             width_in += where.places["place_pos"].shape[1]
         layers: list[nn.Module] = []
         for k in range(depth):
-            layers += [nn.Linear(width if k else width_in, width), nn.Tanh()]
+            layers += [nn.Linear(width if k else width_in, width), Tanh()]
         self.of_other = nn.Sequential(*layers)
         n_own = len(own) + (0 if where.near is None else len(where.near))
-        self.of_own = nn.Sequential(nn.Linear(n_own, width), nn.Tanh())
+        self.of_own = nn.Sequential(nn.Linear(n_own, width), Tanh())
 
     def forward(self, observations: Tensor) -> Tensor:
         """Features, (batch, feature)."""
@@ -100,12 +101,24 @@ class SwarmFeatures(BaseFeaturesExtractor):  # type: ignore[misc]
         known, wanted = seen.index_select(1, self._mask), seen.index_select(1, self._wanted)
         weight = (known + wanted).clamp(max=1.0)
         count = weight.sum(dim=1, keepdim=True)
-        mean = (self.of_other(others) * weight[:, :, None]).sum(dim=1) / count.clamp(min=1.0)
+        mean = self._sum_of(others, weight) / count.clamp(min=1.0)
         own = scaled.index_select(1, self._own)
         if self._has_beams:
             near = seen.index_select(1, self._near)
             own = torch.cat([own, (1.0 - near / CLOSE).clamp(0.0, 1.0)], dim=-1)
         return torch.cat([mean, self.of_own(own), 0.2 * count], dim=-1)
+
+    def _sum_of(self, others: Tensor, weight: Tensor) -> Tensor:
+        """Sum over the others, by their weights, of what the small network makes of each."""
+        if torch.compiler.is_exporting():
+            total: Tensor = (self.of_other(others) * weight[:, :, None]).sum(dim=1)
+            return total
+        # In rooms with fewer cars than slots, most of the others are absent: they cost nothing.
+        counts = weight.flatten().nonzero().squeeze(1)
+        made = self.of_other(others.flatten(0, 1).index_select(0, counts))
+        made = made * weight.reshape(-1, 1).index_select(0, counts)
+        total = made.new_zeros(len(weight), made.shape[1])
+        return total.index_add_(0, counts // self._n_others, made)
 
     def _by_other(self, flat: Tensor) -> Tensor:
         return flat.reshape(-1, self._n_others, flat.shape[1] // self._n_others)

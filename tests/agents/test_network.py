@@ -1,0 +1,55 @@
+"""What makes the networks fast makes them no others."""
+
+import numpy as np
+import pytest
+import torch
+
+from agents.settings import from_options
+from agents.train.config import TrainConfig
+from agents.train.environments import layout_of
+from agents.train.hyperbolic import Tanh
+from agents.train.learner import make_policy
+
+
+def test_the_tangent_is_that_of_torch():
+    x = torch.linspace(-30.0, 30.0, 20001, requires_grad=True)
+    ours, theirs = Tanh()(x), torch.tanh(x)
+    torch.testing.assert_close(ours, theirs, rtol=0.0, atol=3e-7)
+    up = torch.linspace(-1.0, 2.0, len(x))
+    slope, expected = (torch.autograd.grad(y, x, up)[0] for y in (ours, theirs))
+    torch.testing.assert_close(slope, expected, rtol=0.0, atol=2e-6)
+
+
+def test_the_tangent_has_the_slope_that_finite_differences_have():
+    x = torch.linspace(-2.0, 2.0, 41, dtype=torch.float64, requires_grad=True)
+    assert torch.autograd.gradcheck(Tanh(), (x,))
+
+
+@pytest.mark.parametrize("n_present", [0, 2, 5])
+def test_others_that_do_not_count_cost_nothing_and_change_nothing(n_present):
+    """Features and gradients are those of all others computed, and some multiplied by zero."""
+    torch.manual_seed(0)
+    config = from_options(TrainConfig, {"task": "hold", "proximity": "16"})
+    policy = make_policy(config)
+    features = policy.pi_features_extractor
+    rng = np.random.default_rng(n_present)
+    seen = rng.normal(size=(7, layout_of(config).size)).astype(np.float32)
+    present = np.arange(5) < n_present
+    for name in ("_mask", "_wanted"):
+        seen[:, getattr(features, name).numpy()] = np.where(present, rng.random((7, 5)) < 0.7, 0.0)
+    rows: list[int] = []
+    features.of_other.register_forward_hook(lambda module, given, out: rows.append(len(given[0])))
+    sparse = features(torch.from_numpy(seen))
+    weight = np.maximum(*(seen[:, getattr(features, n).numpy()] for n in ("_mask", "_wanted")))
+    assert rows == [int(weight.sum())]
+
+    def dense(others, weight):
+        return (features.of_other(others) * weight[:, :, None]).sum(dim=1)
+
+    slopes = torch.autograd.grad(sparse.square().sum(), list(features.parameters()))
+    features._sum_of = dense
+    whole = features(torch.from_numpy(seen))
+    torch.testing.assert_close(sparse, whole)
+    expected = torch.autograd.grad(whole.square().sum(), list(features.parameters()))
+    for ours, theirs in zip(slopes, expected, strict=True):
+        torch.testing.assert_close(ours, theirs, rtol=1e-4, atol=1e-4)
