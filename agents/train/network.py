@@ -73,6 +73,8 @@ class SwarmFeatures(BaseFeaturesExtractor):  # type: ignore[misc]
         self._keep("mask", where.newest["mask"])
         self._keep("wanted", where.newest["wanted"])
         self._has_places, self._has_beams = where.places is not None, where.near is not None
+        self.skips_absent = True
+        """Whether others that do not count are left out, which changes nothing but the time."""
         if where.near is not None:
             self._keep("near", where.near)
         width_in = where.others.shape[1]
@@ -110,7 +112,7 @@ class SwarmFeatures(BaseFeaturesExtractor):  # type: ignore[misc]
 
     def _sum_of(self, others: Tensor, weight: Tensor) -> Tensor:
         """Sum over the others, by their weights, of what the small network makes of each."""
-        if torch.compiler.is_exporting():
+        if torch.compiler.is_exporting() or not self.skips_absent:
             total: Tensor = (self.of_other(others) * weight[:, :, None]).sum(dim=1)
             return total
         # In rooms with fewer cars than slots, most of the others are absent: they cost nothing.

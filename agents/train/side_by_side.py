@@ -8,7 +8,9 @@ different seeds, of which the best is kept.
 from __future__ import annotations
 
 import multiprocessing
+import os
 import signal
+import threading
 from collections.abc import Callable, Sequence
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
@@ -80,12 +82,10 @@ def train_side_by_side(
 
 
 def _run(connection: Connection, config: TrainConfig, folder: Path) -> None:
-    """One run, in its process: tells every leg, then the result or what went wrong.
-
-    Where nobody listens any more, the first word ends it.
-    """
+    """One run, in its process: tells every leg, then the result or what went wrong."""
     # An interrupt from the keyboard is the business of the first process.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     begun = RunFolder(folder).exists()
     try:
         result = train(
@@ -95,7 +95,16 @@ def _run(connection: Connection, config: TrainConfig, folder: Path) -> None:
         )
     except (UsageError, EnvError) as error:
         connection.send(error)
-    except BrokenPipeError:
-        return
     else:
         connection.send(result)
+
+
+def _end_with_parent() -> None:
+    """End this process when the one that began it is gone, even killed.
+
+    It would else go on for a leg, and write into a run that somebody has taken up again.
+    """
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    wait([parent.sentinel])
+    os._exit(1)

@@ -13,11 +13,34 @@ def test_training_is_measured_beside_nothing(monkeypatch):
     monkeypatch.setattr(rows, "CASES", {"a room": ("cars-los",)})
     monkeypatch.setattr(rows, "TURNS", 1)
     shares = []
-    (row,) = rows.bench_train(updates=1, threads=1, after=2, progress=shares.append)
-    assert json.loads(json.dumps(row, allow_nan=False)) == row
-    assert row["case"] == "a room"
-    assert 0.0 < row["ratio"] < 1.0
-    assert row["value"] == pytest.approx(1e6 / row["us_per_frame"])
-    assert row["ratio"] == pytest.approx(row["value"] / row["peer_value"])
-    assert row["after_frames"] == 2 * 64 * 64 * 3
+    found = rows.bench_train(updates=1, threads=1, after=2, progress=shares.append)
+    assert json.loads(json.dumps(found, allow_nan=False)) == found
+    assert [row["peer"] for row in found] == list(rows.PEERS)
+    for row in found:
+        assert row["case"] == "a room"
+        assert row["value"] == pytest.approx(1e6 / row["us_per_frame"])
+        assert row["ratio"] == pytest.approx(row["value"] / row["peer_value"])
+        assert row["after_frames"] == 2 * 64 * 64 * 3
     assert shares == [1.0]
+
+
+def test_the_peer_computes_the_same():
+    import torch
+
+    from agents.bench.train.plain import make_plain
+    from agents.settings import from_options
+    from agents.train.config import TrainConfig
+    from agents.train.environments import make_rooms
+    from agents.train.learner import make_model
+
+    config = from_options(TrainConfig, {"scenarios": "swarm-nlos", "envs": "2", "proximity": "8"})
+    rooms = make_rooms(config, None)
+    seen = torch.from_numpy(rooms.reset())
+    fast, plain = make_model(config, rooms).policy, make_plain(make_model(config, rooms)).policy
+    torch.testing.assert_close(fast(seen, True), plain(seen, True))
+    assert any(type(module) is torch.nn.Tanh for module in plain.modules())
+    assert not any("hyperbolic" in type(module).__module__ for module in plain.modules())
+    assert {id(w) for w in plain.optimizer.param_groups[0]["params"]} == {
+        id(w) for w in plain.parameters()
+    }
+    rooms.close()

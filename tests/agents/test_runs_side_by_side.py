@@ -2,6 +2,10 @@
 
 import json
 import multiprocessing
+import subprocess
+import sys
+import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -121,6 +125,49 @@ def test_a_process_that_is_killed_is_told(tmp_path):
 
     with pytest.raises(UsageError, match="ended from outside.*--resume"):
         train_side_by_side([small(frames="20000")], [tmp_path / "a"], kill)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
+def test_runs_end_with_the_process_that_began_them(tmp_path):
+    """Killed: a run that went on would write into a folder that was taken up with --resume."""
+    code = """
+import multiprocessing, sys, threading, time
+from pathlib import Path
+from agents.settings import from_options
+from agents.train.config import TrainConfig
+from agents.train.side_by_side import train_side_by_side
+
+def tell():
+    folder = Path(sys.argv[1])
+    while not (folder / "tensorboard").exists():
+        time.sleep(0.05)
+    print(*(p.pid for p in multiprocessing.active_children()), flush=True)
+
+if __name__ == "__main__":
+    threading.Thread(target=tell, daemon=True).start()
+    config = from_options(TrainConfig, {"leg": "1000000", "envs": "3", "frames": "1000000000"})
+    train_side_by_side([config], [Path(sys.argv[1])], lambda *_: None)
+"""
+    script = tmp_path / "begin.py"
+    script.write_text(code)
+    command = [sys.executable, str(script), str(tmp_path / "run")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as first:
+        (pid,) = first.stdout.readline().split()
+        assert is_running(pid)
+        first.kill()
+    until = time.monotonic() + 20.0
+    while is_running(pid) and time.monotonic() < until:
+        time.sleep(0.05)
+    assert not is_running(pid)
+
+
+def is_running(pid):
+    """Whether there is such a process, and it has not ended."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
+    except FileNotFoundError:
+        return False
 
 
 @pytest.mark.parametrize(

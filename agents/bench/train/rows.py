@@ -14,6 +14,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from agents.bench.env.turns import best_of_turns
 from agents.bench.train.nothing import Nothing
+from agents.bench.train.plain import make_plain
 from agents.train.config import TrainConfig
 from agents.train.environments import make_rooms
 from agents.train.learner import learn, make_model, run_leg
@@ -25,6 +26,8 @@ CASES: dict[str, tuple[str, ...]] = {
     "cars-nlos, swarm-nlos": ("cars-nlos", "swarm-nlos"),
 }
 """What is trained in."""
+PEERS = ("Stable-Baselines3 in nothing", "the same learner in nothing")
+"""What learns in an environment that costs nothing."""
 
 
 def bench_train(
@@ -36,9 +39,10 @@ def bench_train(
 ) -> list[Row]:
     """Frames per second of whole training, simulation and learning together.
 
-    The peer is the same learner with the same networks, seats and batches, in an environment that
-    costs nothing: the most that Stable-Baselines3 can reach. Both learn from the observations of
-    cars that are driven, so that equally many absent cars are left out.
+    The peers learn in an environment that costs nothing, with the same networks, seats and batches:
+    Stable-Baselines3 and torch as they come, the most that these can reach, and the learner that
+    we use, whose networks take less time. All learn from the observations of cars that are driven,
+    so that equally many absent cars are left out.
 
     Args:
         updates: Of a turn.
@@ -56,25 +60,30 @@ def bench_train(
         ours = _quiet(make_model(config, rooms))
         # Compiles what is not, and puts the cars somewhere.
         run_leg(ours, replace(config, leg=after), 0)
-        peer = _quiet(make_model(config, Nothing(rooms, rooms.reset())))
-        run_leg(peer, replace(config, leg=1), 0)
-        us, peer_us = best_of_turns([_turn(ours, config), _turn(peer, config)], TURNS)
+        nothing = Nothing(rooms, rooms.reset())
+        plain = _quiet(make_plain(make_model(config, nothing)))
+        same = _quiet(make_model(config, nothing))
+        for peer in (plain, same):
+            run_leg(peer, replace(config, leg=1), 0)
+        turns = [_turn(model, config) for model in (ours, plain, same)]
+        us, *peers_us = best_of_turns(turns, TURNS)
         rooms.close()
-        rows.append(
-            {
-                "case": case,
-                "value": 1e6 / us,
-                "unit": "frames/s",
-                "peer": "an environment that costs nothing",
-                "peer_value": 1e6 / peer_us,
-                "ratio": peer_us / us,
-                "threads": threads,
-                "after_frames": after * config.ppo.steps * rooms.num_envs,
-                "us_per_frame": us,
-            }
-        )
+        for peer_name, peer_us in zip(PEERS, peers_us, strict=True):
+            rows.append(
+                {
+                    "case": case,
+                    "value": 1e6 / us,
+                    "unit": "frames/s",
+                    "peer": peer_name,
+                    "peer_value": 1e6 / peer_us,
+                    "ratio": peer_us / us,
+                    "threads": threads,
+                    "after_frames": after * config.ppo.steps * rooms.num_envs,
+                    "us_per_frame": us,
+                }
+            )
         if progress is not None:
-            progress(len(rows) / len(CASES))
+            progress(len(rows) / len(CASES) / len(PEERS))
     return rows
 
 

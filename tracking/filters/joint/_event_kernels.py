@@ -30,6 +30,7 @@ from tracking.filters.joint._sleep_kernels import may_move, none_moved, wake_up
 from tracking.filters.joint._start_kernels import try_join, try_start
 from tracking.filters.joint._stuck_kernels import is_stuck
 from tracking.filters.joint._survey_kernels import fuse_survey, use_surveys
+from tracking.filters.joint._turn_kernels import note_turn
 from tracking.filters.joint.state import N_PRE, JointState
 
 # Plain numbers of `Kind`: kernels do not know enums.
@@ -279,6 +280,7 @@ def look_at_group(c, s, layout, t):
     settle_all(s, c.n)
     remove_silent(c, s, layout, t)
     prune_bank(c, s)
+    note_turn(c, s)
     watch_mirror(c, s)
     watch_rotation(c, s, layout, t - s.group[0].t_check)
     watch_places(c, s, layout, t)

@@ -19,7 +19,9 @@ from tracking._angle_kernels import cosine_sine
 from tracking.compiled import small_kernel
 from tracking.filters.joint._linear_kernels import absorb, covariance, project
 from tracking.filters.joint._motion_kernels import time_since, way_since
+from tracking.filters.joint._rotation_kernels import follow_rotation
 from tracking.filters.joint._sample_kernels import decay
+from tracking.filters.joint._turn_kernels import UNSURE
 
 MIN_DISTANCE = 0.01
 """[m] Closer than this a direction has no meaning."""
@@ -177,6 +179,8 @@ def fuse_range(c, s, h, p, dt, distance, levers, sight, scratch):
     Returns:
         Innovation [m], NIS, and the probability that the range meant anything, 0 to 1.
     """
+    if s.group[0].turn_var > UNSURE * UNSURE:
+        follow_rotation(c, s, h)
     predicted, m = range_model(c, s, h, p, levers[:3], levers[3:], scratch.idx, scratch.val)
     nu = distance - predicted
     variance = project(s, h, c.n, m, scratch.idx, scratch.val, scratch.w)

@@ -25,16 +25,23 @@ import math
 import numpy as np
 
 from tracking.compiled import allocating_kernel, small_kernel
+from tracking.filters.joint._linear_kernels import settle
 
 ENOUGH = 0.01
 """[-] The covariance follows once the positions have moved by this share of the group's extent."""
+FALSE = 0.05
+"""[-] Or once a range would see an uncertain turn of the plane by this share of its noise."""
 MOST = 0.3
 """[-] It follows a move by at most this share at once."""
 
 
 @small_kernel
 def follow_rotation(c, s, h):
-    """Let the covariance of hypothesis h follow what measurements have moved."""
+    """Let the covariance of hypothesis h follow what measurements have moved.
+
+    That must not be late while the rotation is uncertain: each range that tells of it what it
+    cannot know turns the group, by which the next one tells more.
+    """
     present, extent2, moved2 = 0, 0.0, 0.0
     for k in range(c.d):
         mean, shift, present = 0.0, 0.0, 0
@@ -49,7 +56,9 @@ def follow_rotation(c, s, h):
                 at = s.nodes[i].at_p + k
                 extent2 += (s.x[h, at] - mean / present) ** 2
                 moved2 += (s.moved[h, at] - shift / present) ** 2
-    if present > 2 and moved2 > ENOUGH * ENOUGH * extent2:
+    false2 = moved2 * s.group[0].turn_var
+    if present > 2 and (moved2 > ENOUGH * ENOUGH * extent2 or false2 > FALSE * FALSE * c.white_var):
+        settle(s, h, c.n)
         turn_covariance(c, s, h, min(1.0, MOST * math.sqrt(extent2 / moved2)))
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from tracking.compiled import allocating_kernel, small_kernel
 from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_hypothesis
 from tracking.filters.joint._linear_kernels import decouple
+from tracking.filters.joint._turn_kernels import spread_turn
 
 SETTLE, ORIENTED = 0.5, 1.5
 """[s] The first samples of a node look like motion: its orientation is still being found. That it
@@ -65,6 +66,8 @@ def wake_up(c, s, layout):
             # Errors of headings stay as long as nobody moves.
             if was_alive[h] and node.present and not node.static:
                 decouple(s.x, s.P, h, c.n, node.at_h, node.first_heading_var)
+        if was_alive[h]:
+            spread_turn(c, s, h)
     for _ in range(s.alive.shape[0]):
         # The likelier layout first.
         original = -1

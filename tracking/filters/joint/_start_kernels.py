@@ -26,6 +26,7 @@ from tracking.filters.joint._copy_kernels import copy_hypothesis
 from tracking.filters.joint._linear_kernels import decouple
 from tracking.filters.joint._place_kernels import JOIN_SPREAD, refine
 from tracking.filters.joint._sleep_kernels import none_moved, rests
+from tracking.filters.joint._turn_kernels import read_turn
 
 
 @allocating_kernel
@@ -72,6 +73,7 @@ def try_start(c, s, layout, t):
     group.n_alive = n_first
     group.best = 0
     group.t, group.t_check, group.t_carrier, group.t_gauge = t, t, t, t
+    group.turn_var = c.rotation_var if c.d == 2 else 0.0
     group.misfit, group.fit, group.lost = 1.0, 1.0, False
     group.strain, group.strain_limit = 0.0, c.strained
     return True
@@ -190,26 +192,37 @@ def try_join(c, s, layout, new, t):
 
 @allocating_kernel
 def add_node(c, s, layout, h, new, pos, t):
-    """Put a node at a position, as uncertain as the centre of the others and its own error."""
+    """Put a node at a position: its error is that of a body with the others, and its own.
+
+    Where the others are elsewhere, or turned, it is as well: ranges to it tell neither.
+    """
     begin_node(c, s, h, new, t)
-    n = s.nodes.shape[0]
-    for k in range(c.d):
+    d, n = c.d, s.nodes.shape[0]
+    for k in range(d):
+        decouple(s.x, s.P, h, c.n, s.nodes[new].at_p + k, 0.0)
+    # What reads the errors of the node, one row a coordinate, off those of the others.
+    J, A, present = np.zeros((d, c.n)), np.zeros(c.n), 0
+    for i in range(n):
+        present += s.nodes[i].present and i != new
+    for k in range(d):
+        for i in range(n):
+            if s.nodes[i].present and i != new:
+                J[k, s.nodes[i].at_p + k] = 1.0 / present
+    if d == 2:
+        centre0, centre1 = read_turn(s, h, new, A)
+        J[0] -= (pos[1] - centre1) * A
+        J[1] += (pos[0] - centre0) * A
+    rows = J @ s.P[h]
+    own = rows @ J.T.copy()
+    for k in range(d):
         at = s.nodes[new].at_p + k
-        decouple(s.x, s.P, h, c.n, at, 0.0)
-        row, present = np.zeros(c.n), 0
-        for i in range(n):
-            if s.nodes[i].present and i != new:
-                row += s.P[h, s.nodes[i].at_p + k]
-                present += 1
-        row /= present
-        mean_var = 0.0
-        for i in range(n):
-            if s.nodes[i].present and i != new:
-                mean_var += row[s.nodes[i].at_p + k] / present
-        s.P[h, at, :] = row
-        s.P[h, :, at] = row
-        s.P[h, at, at] = mean_var + c.position_var
+        s.P[h, at, :] = rows[k]
+        s.P[h, :, at] = rows[k]
         s.x[h, at] = pos[k]
+    for k in range(d):
+        for q in range(d):
+            s.P[h, s.nodes[new].at_p + k, s.nodes[new].at_p + q] = own[k, q]
+        s.P[h, s.nodes[new].at_p + k, s.nodes[new].at_p + k] += c.position_var
     for i in range(n):
         if i != new and s.nodes[i].present:
             p = layout.pair_index[i, new]

@@ -37,8 +37,7 @@ class CarrierParams:
     """[s] How long it stays the same."""
     first_heading_std: float | None = None
     """[rad] The same until it has moved: what bends the field where it stands is not averaged yet.
-    None for no more than later. With more, several rotations stay possible for longer, and groups
-    that wait until one stands out get going later."""
+    None for no more than later."""
     speed_std: float = 2.0
     """[m/s] Speed of the group as a whole; keeps a group without any reference from drifting."""
     sideways_std: float | None = None
@@ -73,6 +72,7 @@ CARRIERS = {
         levelled=True,
         heading_std=0.03,
         heading_tau=5.0,
+        first_heading_std=0.1,
         sideways_std=0.08,
         rear_axle=0.15,
         slip=0.018,
