@@ -146,7 +146,7 @@ def tell():
 
 if __name__ == "__main__":
     threading.Thread(target=tell, daemon=True).start()
-    config = from_options(TrainConfig, {"leg": "1000000", "envs": "3", "frames": "1000000000"})
+    config = from_options(TrainConfig, {"leg": "10000", "envs": "3", "frames": "1000000000"})
     train_side_by_side([config], [Path(sys.argv[1])], lambda *_: None)
 """
     script = tmp_path / "begin.py"

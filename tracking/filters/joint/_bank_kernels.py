@@ -21,7 +21,6 @@ from tracking.filters.joint._linear_kernels import decouple
 from tracking.filters.joint._sample_kernels import decay
 from tracking.filters.joint._sleep_kernels import turn_all_ways
 from tracking.filters.joint._start_kernels import begin_pair, forget_fits
-from tracking.filters.joint._turn_kernels import spread_turn
 
 FLAT, OPEN = 2.5, 4.0
 """Extent of a layout across itself, in standard deviations: less is flat, more is open again."""
@@ -165,7 +164,6 @@ def watch_rotation(c, s, layout, dt):
     for p in range(s.pairs.shape[0]):
         if s.nodes[s.pairs[p].i].present and s.nodes[s.pairs[p].j].present:
             begin_pair(c, s, h, p, s.nlos[h, p])
-    spread_turn(c, s, h)
     turn_all_ways(c, s, layout, h)
     for k in range(s.alive.shape[0]):
         if s.alive[k] and k != h:

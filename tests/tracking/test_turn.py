@@ -1,0 +1,134 @@
+"""The turn of a group in the plane: nothing but motion tells it, neither ranges nor joins."""
+
+import numpy as np
+import pytest
+
+from agents.simulate import simulate
+from relpos_env.timing import STAND_STILL
+from tracking import Constellation, NodeConfig, Tracker
+from tracking.filters.joint._start_kernels import add_node
+from tracking.filters.joint._turn_kernels import note_turn, spread_turn
+from tracking.filters.joint.coefficients import make_coefficients
+from tracking.filters.joint.params import JointParams
+from tracking.filters.joint.records import as_records
+from tracking.filters.joint.state import JointState, make_layout, make_state
+from tracking.geometry import best_rotation
+
+N = 4
+
+
+def four(static=(), seed=0):
+    """One environment of four nodes in a plane; nothing is known too well but positions."""
+    nodes = tuple(
+        NodeConfig(id=k, vehicle="car", kind="static" if k in static else "moving")
+        for k in range(N)
+    )
+    constellation, params = Constellation(nodes=nodes, dimensions=2), JointParams()
+    c = as_records(make_coefficients(constellation, params))[0]
+    batch = make_state(constellation, params, 1, 1)
+    s = JointState._make(as_records(a[0]) if a.dtype.names else a[0] for a in batch)
+    s.nodes["present"], s.alive[0] = True, True
+    s.group["n_alive"], s.group["started"] = 1, True
+    s.x[0] = np.random.default_rng(seed).uniform(-4.0, 4.0, s.x.shape[1])
+    s.P[0] = 1e-4 * np.eye(len(s.x[0]))
+    return c, s, make_layout(constellation, params)
+
+
+def turned(s, but=(), *, velocities=True):
+    """What a turn of the group by a radian does to the states."""
+    D, moving = np.zeros(len(s.x[0])), ~s.nodes["static"]  # noqa: N806
+    everybody = np.ones(N, dtype=bool)
+    for name, of, free in (("at_p", everybody, True), ("at_v", moving, moving.all())):
+        if name == "at_v" and not velocities:
+            continue
+        at = s.nodes[name][of & ~np.isin(np.arange(N), but)]
+        value = s.x[0][at[:, None] + np.arange(2)]
+        value = value - value.mean(axis=0) * free
+        D[at], D[at + 1] = -value[:, 1], value[:, 0]
+    return D
+
+
+@pytest.mark.parametrize("static", [(), (2,)])
+def test_no_range_sees_what_is_spread(static):
+    c, s, _ = four(static)
+    before = s.P[0].copy()
+    spread_turn(c, s, 0)
+    D = turned(s)  # noqa: N806
+    np.testing.assert_allclose(s.P[0] - before, c["rotation_var"] * np.outer(D, D), atol=1e-12)
+    at = s.nodes["at_p"]
+    for i in range(N):
+        for j in range(i + 1, N):
+            H = np.zeros(len(D))  # noqa: N806
+            H[at[j] : at[j] + 2] = s.x[0, at[j] : at[j] + 2] - s.x[0, at[i] : at[i] + 2]
+            H[at[i] : at[i] + 2] = -H[at[j] : at[j] + 2]
+            assert abs(H @ D) < 1e-12
+    note_turn(c, s)
+    A = turned(s, velocities=False)  # noqa: N806
+    expected = c["rotation_var"] + 1e-4 / (A @ A)
+    assert s.group["turn_var"][0] == pytest.approx(expected)
+
+
+def test_who_joins_turns_with_the_others():
+    """Their turn is no more certain afterwards, and that of the whole group is as uncertain."""
+    c, s, layout = four()
+    new, pos = 3, np.array([5.0, -3.0, 0.0])
+    s.nodes["present"][new] = False
+    spread_turn(c, s, 0)
+    note_turn(c, s)
+    before = s.group["turn_var"][0]
+    add_node(c, s, layout, 0, new, pos, 0.0)
+    s.nodes["present"][new] = True
+    note_turn(c, s)
+    assert s.group["turn_var"][0] == pytest.approx(before, rel=0.05)
+    # A range to it, as exact as may be, tells what it is wrong by itself, and nothing of the turn.
+    at = s.nodes["at_p"]
+    for other in range(3):
+        H = np.zeros(len(s.x[0]))  # noqa: N806
+        way = s.x[0, at[new] : at[new] + 2] - s.x[0, at[other] : at[other] + 2]
+        H[at[new] : at[new] + 2] = way / np.linalg.norm(way)
+        H[at[other] : at[other] + 2] = -H[at[new] : at[new] + 2]
+        w = s.P[0] @ H
+        s.P[0] -= np.outer(w, w) / (H @ w + 1e-6)
+    note_turn(c, s)
+    assert s.group["turn_var"][0] == pytest.approx(before, rel=0.1)
+    assert np.linalg.eigvalsh(s.P[0]).min() > 0.0
+
+
+def test_a_join_is_as_uncertain_as_centre_and_turn_of_the_others_and_its_own_place():
+    c, s, layout = four(seed=2)
+    new, pos = 3, np.array([1.0, 2.0, 0.0])
+    s.nodes["present"][new] = False
+    A = np.random.default_rng(1).standard_normal(s.P[0].shape)  # noqa: N806
+    s.P[0] = A @ A.T
+    at, P = s.nodes["at_p"], s.P[0].copy()  # noqa: N806
+    N_others = turned(s, but=[new], velocities=False)  # noqa: N806
+    read = N_others / (N_others @ N_others)
+    others = np.array([s.x[0, a : a + 2] for a in at[:3]])
+    arm = pos[:2] - others.mean(axis=0)
+    J = np.outer([-arm[1], arm[0]], read)  # noqa: N806
+    for k in range(2):
+        J[k, at[:3] + k] += 1.0 / 3.0
+    add_node(c, s, layout, 0, new, pos, 0.0)
+    mine = at[new] + np.arange(2)
+    own = J @ P @ J.T + c["position_var"] * np.eye(2)
+    np.testing.assert_allclose(s.P[0][np.ix_(mine, mine)], own, rtol=1e-6)
+    theirs = np.concatenate([at[:3], at[:3] + 1])
+    np.testing.assert_allclose(s.P[0][np.ix_(mine, theirs)], (J @ P)[:, theirs], rtol=1e-6)
+
+
+def test_standing_does_not_tell_how_a_group_is_turned():
+    """Six cars, eight metres apart, joined one by one, two seconds of ranges: then they drive."""
+    log = simulate(scenario="open", seconds=5.0, seed=1)
+    tracker = Tracker(log.constellation)
+    t = log.block.t[0]
+    tracker.step(log.block.take(t <= STAND_STILL - 0.1), STAND_STILL - 0.1)
+    group = tracker.save()["filter"].group[0, 0]
+    assert group["asleep"]
+    assert np.sqrt(group["turn_var"]) > 0.05
+    until = STAND_STILL + 2.0
+    estimate = tracker.step(log.block.take((t > STAND_STILL - 0.1) & (t <= until)), until)
+    truth, _ = log.truth.pairs(log.constellation, np.array([until]))
+    R = best_rotation(estimate.pos_ij_w, truth, planar=True)[0]  # noqa: N806
+    turn = np.arctan2(R[1, 0], R[0, 0])
+    assert abs(turn) < 4.0 * np.sqrt(tracker.save()["filter"].group["turn_var"][0, 0])
+    assert abs(turn) < 0.12
