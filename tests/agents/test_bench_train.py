@@ -32,6 +32,7 @@ def test_the_peer_computes_the_same():
     from agents.train.config import TrainConfig
     from agents.train.environments import make_rooms
     from agents.train.learner import make_model
+    from agents.train.network import SwarmFeatures
 
     config = from_options(TrainConfig, {"scenarios": "swarm-nlos", "envs": "2", "proximity": "8"})
     rooms = make_rooms(config, None)
@@ -39,6 +40,10 @@ def test_the_peer_computes_the_same():
     fast, plain = make_model(config, rooms).policy, make_plain(make_model(config, rooms)).policy
     torch.testing.assert_close(fast(seen, True), plain(seen, True))
     assert any(type(module) is torch.nn.Tanh for module in plain.modules())
+    for policy, skips in ((fast, True), (plain, False)):
+        features = [m for m in policy.modules() if isinstance(m, SwarmFeatures)]
+        assert [m.skips_absent for m in features] == [skips, skips]
+        assert bool(policy.optimizer.param_groups[0]["fused"]) == skips
     assert not any("hyperbolic" in type(module).__module__ for module in plain.modules())
     assert {id(w) for w in plain.optimizer.param_groups[0]["params"]} == {
         id(w) for w in plain.parameters()

@@ -1,4 +1,4 @@
-"""The learner without what makes ours fast: Stable-Baselines3 and torch as they come."""
+"""The learner without what makes ours fast."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ CASES: dict[str, tuple[str, ...]] = {
     "cars-nlos, swarm-nlos": ("cars-nlos", "swarm-nlos"),
 }
 """What is trained in."""
-PEERS = ("Stable-Baselines3 in nothing", "the same learner in nothing")
+PEERS = ("plain learner in nothing", "our learner in nothing")
 """What learns in an environment that costs nothing."""
 
 
@@ -40,9 +40,9 @@ def bench_train(
     """Frames per second of whole training, simulation and learning together.
 
     The peers learn in an environment that costs nothing, with the same networks, seats and batches:
-    Stable-Baselines3 and torch as they come, the most that these can reach, and the learner that
-    we use, whose networks take less time. All learn from the observations of cars that are driven,
-    so that equally many absent cars are left out.
+    one without what makes ours fast (`make_plain`), so with the operations of torch and the
+    optimiser of Stable-Baselines3 as they come, and ours. All learn from the observations of cars
+    that are driven, so that equally many absent cars are left out.
 
     Args:
         updates: Of a turn.
