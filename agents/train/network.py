@@ -115,7 +115,7 @@ class SwarmFeatures(BaseFeaturesExtractor):  # type: ignore[misc]
         if torch.compiler.is_exporting() or not self.skips_absent:
             total: Tensor = (self.of_other(others) * weight[:, :, None]).sum(dim=1)
             return total
-        # In rooms with fewer cars than slots, most of the others are absent: they cost nothing.
+        # In rooms with fewer cars than slots, many of the others are absent: they cost nothing.
         counts = weight.flatten().nonzero().squeeze(1)
         made = self.of_other(others.flatten(0, 1).index_select(0, counts))
         made = made * weight.reshape(-1, 1).index_select(0, counts)

@@ -2,6 +2,8 @@
 
 import json
 import multiprocessing
+import os
+import signal
 import subprocess
 import sys
 import time
@@ -159,7 +161,10 @@ if __name__ == "__main__":
     until = time.monotonic() + 20.0
     while is_running(pid) and time.monotonic() < until:
         time.sleep(0.05)
-    assert not is_running(pid)
+    still = is_running(pid)
+    if still:
+        os.kill(int(pid), signal.SIGKILL)
+    assert not still
 
 
 def is_running(pid):

@@ -36,8 +36,8 @@ class CarrierParams:
     heading_tau: float = 8.0
     """[s] How long it stays the same."""
     first_heading_std: float | None = None
-    """[rad] The same until it has moved: what bends the field where it stands is not averaged yet.
-    None for no more than later."""
+    """[rad] The same at first, and until the group has moved: what bends the field where it stands
+    is not averaged yet. Also of one that joins or is placed anew. None for no more than later."""
     speed_std: float = 2.0
     """[m/s] Speed of the group as a whole; keeps a group without any reference from drifting."""
     sideways_std: float | None = None
