@@ -12,7 +12,7 @@ from relpos_env.timing import STAND_STILL
 from tracking import Constellation, NodeConfig, Tracker, TrackerParams
 from tracking.filters import FilterParams
 from tracking.filters.joint._sample_kernels import take_state
-from tracking.filters.joint._start_kernels import begin_pair, first_sight
+from tracking.filters.joint._start_kernels import begin_node, begin_pair, first_sight
 from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.params import CARRIERS, JointParams, NlosParams
 from tracking.filters.joint.records import as_records
@@ -83,3 +83,12 @@ def test_headings_are_uncertain_until_cars_have_driven():
         std.append(np.sqrt(state.P[0, h, at, at]))
     assert (std[0] > 0.9 * car.first_heading_std).all()
     assert (std[1] < car.heading_std + 0.01).all()
+
+
+def test_a_compass_that_has_driven_is_believed_when_its_node_comes_back():
+    c, s = one_env()
+    node = s.nodes[0]
+    for drove, var in ((0.0, "first_heading_var"), (100.0, "heading_var")):
+        node["t_first"], node["t_moved"] = 10.0, 10.0 + drove
+        begin_node(c, s, 0, 0, 200.0)
+        assert s.P[0, node["at_h"], node["at_h"]] == pytest.approx(node[var], rel=0.05)

@@ -6,6 +6,7 @@ import pytest
 from agents.simulate import simulate
 from relpos_env.timing import STAND_STILL
 from tracking import Constellation, NodeConfig, Tracker
+from tracking.filters.joint._sleep_kernels import wake_turn
 from tracking.filters.joint._start_kernels import add_node
 from tracking.filters.joint._turn_kernels import note_turn, spread_turn
 from tracking.filters.joint.coefficients import make_coefficients
@@ -17,13 +18,13 @@ from tracking.geometry import best_rotation
 N = 4
 
 
-def four(static=(), seed=0):
-    """One environment of four nodes in a plane; nothing is known too well but positions."""
+def four(static=(), seed=0, *, dimensions=2):
+    """One environment of four nodes; nothing is known too well but positions."""
     nodes = tuple(
         NodeConfig(id=k, vehicle="car", kind="static" if k in static else "moving")
         for k in range(N)
     )
-    constellation, params = Constellation(nodes=nodes, dimensions=2), JointParams()
+    constellation, params = Constellation(nodes=nodes, dimensions=dimensions), JointParams()
     c = as_records(make_coefficients(constellation, params))[0]
     batch = make_state(constellation, params, 1, 1)
     s = JointState._make(as_records(a[0]) if a.dtype.names else a[0] for a in batch)
@@ -52,7 +53,7 @@ def turned(s, but=(), *, velocities=True):
 def test_no_range_sees_what_is_spread(static):
     c, s, _ = four(static)
     before = s.P[0].copy()
-    spread_turn(c, s, 0)
+    spread_turn(c, s, 0, c["rotation_var"])
     D = turned(s)  # noqa: N806
     np.testing.assert_allclose(s.P[0] - before, c["rotation_var"] * np.outer(D, D), atol=1e-12)
     at = s.nodes["at_p"]
@@ -68,12 +69,46 @@ def test_no_range_sees_what_is_spread(static):
     assert s.group["turn_var"][0] == pytest.approx(expected)
 
 
+def test_in_space_it_is_spread_about_every_axis():
+    c, s, _ = four(dimensions=3)
+    before = s.P[0].copy()
+    spread_turn(c, s, 0, 0.1)
+    at = s.nodes["at_p"][:, None] + np.arange(3)
+    X = s.x[0][at] - s.x[0][at].mean(axis=0)  # noqa: N806
+    D = np.cross(np.eye(3)[:, None], X[None]).reshape(3, -1)  # noqa: N806
+    spread = (s.P[0] - before)[np.ix_(at.ravel(), at.ravel())]
+    np.testing.assert_allclose(spread, 0.1 * D.T @ D, atol=1e-12)
+
+
+def test_a_group_that_knows_as_little_anyway_does_not_wake_with_less():
+    c, s, _ = four()
+    for _ in range(2):
+        wake_turn(c, s, 0)
+        note_turn(c, s)
+        assert s.group["turn_var"][0] == pytest.approx(c["rotation_var"], rel=1e-9)
+
+
+def test_the_moment_that_is_smoothed_wakes_with_the_group():
+    """Its rotation is that of the others: what they learn of it later it learns as well."""
+    c, s, _ = four()
+    n, own = 2 * len(s.x[0]), len(s.x[0])
+    twice = s._replace(
+        x=np.tile(s.x, 2), P=1e-4 * np.eye(n)[None], moved=np.zeros((1, n)), waiting=s.waiting
+    )
+    c["n"] = n
+    before = twice.P[0].copy()
+    spread_turn(c, twice, 0, 0.1)
+    D = np.tile(turned(s), 2)  # noqa: N806
+    np.testing.assert_allclose(twice.P[0] - before, 0.1 * np.outer(D, D), atol=1e-12)
+    assert own == c["n_own"]
+
+
 def test_who_joins_turns_with_the_others():
     """Their turn is no more certain afterwards, and that of the whole group is as uncertain."""
     c, s, layout = four()
     new, pos = 3, np.array([5.0, -3.0, 0.0])
     s.nodes["present"][new] = False
-    spread_turn(c, s, 0)
+    spread_turn(c, s, 0, c["rotation_var"])
     note_turn(c, s)
     before = s.group["turn_var"][0]
     add_node(c, s, layout, 0, new, pos, 0.0)

@@ -57,7 +57,9 @@ def follow_rotation(c, s, h):
                 extent2 += (s.x[h, at] - mean / present) ** 2
                 moved2 += (s.moved[h, at] - shift / present) ** 2
     false2 = moved2 * s.group[0].turn_var
-    if present > 2 and (moved2 > ENOUGH * ENOUGH * extent2 or false2 > FALSE * FALSE * c.white_var):
+    if present < 3:
+        s.moved[h, :] = 0.0
+    elif moved2 > ENOUGH * ENOUGH * extent2 or false2 > FALSE * FALSE * c.white_var:
         settle(s, h, c.n)
         turn_covariance(c, s, h, min(1.0, MOST * math.sqrt(extent2 / moved2)))
 

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.compiled import allocating_kernel, small_kernel
+from tracking.compiled import allocating_kernel, kernel, small_kernel
 from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_hypothesis
 from tracking.filters.joint._linear_kernels import decouple
-from tracking.filters.joint._turn_kernels import spread_turn
+from tracking.filters.joint._rotation_kernels import turn_covariance
+from tracking.filters.joint._turn_kernels import spread_turn, turn_variance
 
 SETTLE, ORIENTED = 0.5, 1.5
 """[s] The first samples of a node look like motion: its orientation is still being found. That it
@@ -67,7 +68,7 @@ def wake_up(c, s, layout):
             if was_alive[h] and node.present and not node.static:
                 decouple(s.x, s.P, h, c.n, node.at_h, node.first_heading_var)
         if was_alive[h]:
-            spread_turn(c, s, h)
+            wake_turn(c, s, h)
     for _ in range(s.alive.shape[0]):
         # The likelier layout first.
         original = -1
@@ -78,6 +79,18 @@ def wake_up(c, s, layout):
             return
         was_alive[original] = False
         turn_all_ways(c, s, layout, original)
+
+
+@kernel
+def wake_turn(c, s, h):
+    """Make hypothesis h as uncertain of how it is turned as the gap between two that are tried.
+
+    In space it is as uncertain as the start and ranges left it (`_turn_kernels`).
+    """
+    if c.d == 2:
+        turn_covariance(c, s, h, 1.0)  # by what moved lately
+        spread_turn(c, s, h, max(c.rotation_var - turn_variance(c, s, h), 0.0))
+        s.group[0].turn_var = max(s.group[0].turn_var, c.rotation_var)
 
 
 @allocating_kernel

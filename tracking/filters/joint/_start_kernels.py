@@ -25,8 +25,9 @@ from tracking.filters.joint._carrier_kernels import CENTRE_VAR
 from tracking.filters.joint._copy_kernels import copy_hypothesis
 from tracking.filters.joint._linear_kernels import decouple
 from tracking.filters.joint._place_kernels import JOIN_SPREAD, refine
-from tracking.filters.joint._sleep_kernels import none_moved, rests
-from tracking.filters.joint._turn_kernels import read_turn
+from tracking.filters.joint._sample_kernels import decay
+from tracking.filters.joint._sleep_kernels import ORIENTED, none_moved, rests
+from tracking.filters.joint._turn_kernels import read_turn, spread_turn
 
 
 @allocating_kernel
@@ -59,7 +60,8 @@ def try_start(c, s, layout, t):
             for k in range(c.d):
                 s.x[h, at + k] = Y[a, k]
                 s.P[h, at + k, at + k] = c.position_var
-        spread_rotation(c, s, h, members, m, Y)
+        spread_centre(c, s, h, members, m)
+        spread_turn(c, s, h, c.rotation_var)
         for p in range(s.pairs.shape[0]):
             if s.nodes[s.pairs[p].i].present and s.nodes[s.pairs[p].j].present:
                 begin_pair(c, s, h, p, first_sight(c, s.pairs[p]))
@@ -79,25 +81,13 @@ def try_start(c, s, layout, t):
     return True
 
 
-@allocating_kernel
-def spread_rotation(c, s, h, members, m, Y):
-    """Add the uncertainty of the rotation, and of where the centre is, to P of hypothesis h."""
-    for axis in range(3 if c.d == 3 else 1):
-        up = 2 - axis  # z first: the only axis of the plane
-        for a in range(m):
-            g_a = np.zeros(3)
-            g_a[(up + 1) % 3], g_a[(up + 2) % 3] = -Y[a, (up + 2) % 3], Y[a, (up + 1) % 3]
-            for b in range(m):
-                g_b = np.zeros(3)
-                g_b[(up + 1) % 3], g_b[(up + 2) % 3] = -Y[b, (up + 2) % 3], Y[b, (up + 1) % 3]
-                at_a, at_b = s.nodes[members[a]].at_p, s.nodes[members[b]].at_p
-                for k in range(c.d):
-                    for q in range(c.d):
-                        s.P[h, at_a + k, at_b + q] += c.rotation_var * g_a[k] * g_b[q]
+@kernel
+def spread_centre(c, s, h, members, m):
+    """Add to P of hypothesis h that nothing is known of where the centre is."""
     for a in range(m):
         for b in range(m):
+            at_a, at_b = s.nodes[members[a]].at_p, s.nodes[members[b]].at_p
             for k in range(c.d):
-                at_a, at_b = s.nodes[members[a]].at_p, s.nodes[members[b]].at_p
                 s.P[h, at_a + k, at_b + k] += CENTRE_VAR
 
 
@@ -115,11 +105,15 @@ def begin_node(c, s, h, i, t):
     if node.static:
         return
     still = rests(c, node, t)
+    # What its compass reads where it stood when it was switched on counts less as it drives.
+    drove = max(node.t_moved - node.t_first - ORIENTED, 0.0)
+    stood = decay(drove / node.heading_tau)
+    heading_var = node.heading_var + stood * (node.first_heading_var - node.heading_var)
     for k in range(c.d):
         speed_var = c.rest_var if still else c.start_speed_var
         decouple(s.x, s.P, h, c.n, node.at_v + k, speed_var)
         decouple(s.x, s.P, h, c.n, node.at_b + k, node.bias_var)
-    decouple(s.x, s.P, h, c.n, node.at_h, node.first_heading_var)
+    decouple(s.x, s.P, h, c.n, node.at_h, heading_var)
 
 
 @kernel

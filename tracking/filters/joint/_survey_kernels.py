@@ -10,11 +10,15 @@ from tracking.compiled import kernel, small_kernel
 from tracking.filters._shape_kernels import SURVEYED, start_distance
 from tracking.filters.joint._linear_kernels import absorb, project, settle_all
 from tracking.filters.joint._range_kernels import range_model
+from tracking.filters.joint._rotation_kernels import follow_rotation
+from tracking.filters.joint._turn_kernels import UNSURE
 
 
 @small_kernel
 def fuse_survey(c, s, h, p, distance, scratch):
     """Correct hypothesis h with a surveyed distance between the origins of two nodes."""
+    if s.group[0].turn_var > UNSURE * UNSURE:
+        follow_rotation(c, s, h)
     none = scratch.none
     predicted, m = range_model(c, s, h, p, none, none, scratch.idx, scratch.val)
     variance = project(s, h, c.n, m, scratch.idx, scratch.val, scratch.w)

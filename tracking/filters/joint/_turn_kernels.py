@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.compiled import allocating_kernel
+from tracking.compiled import allocating_kernel, kernel
 
 UNSURE = 0.05
 """[rad] A turn that is less certain than this is looked after at every range."""
@@ -51,40 +51,57 @@ def read_turn(s, h, but, A):
 
 
 @allocating_kernel
+def turn_variance(c, s, h):
+    """How uncertain the turn of hypothesis h is, nothing of which waits [rad2]."""
+    A = np.zeros(c.n)
+    read_turn(s, h, -1, A)
+    return A @ (s.P[h] @ A)
+
+
+@kernel
 def note_turn(c, s):
     """Keep how uncertain the turn of the reported hypothesis is."""
     if c.d == 2:
-        A = np.zeros(c.n)
-        read_turn(s, s.group[0].best, -1, A)
-        s.group[0].turn_var = A @ (s.P[s.group[0].best] @ A)
+        s.group[0].turn_var = turn_variance(c, s, s.group[0].best)
 
 
 @allocating_kernel
-def spread_turn(c, s, h):
-    """Add the gap between two of the rotations that are tried to what is not known of h."""
-    if c.d == 3:
-        return
-    D, present, moving = np.zeros(c.n), 0, 0
-    mean, mean_v = np.zeros(2), np.zeros(2)
+def spread_turn(c, s, h, variance):
+    """Make it less certain how hypothesis h is turned, about every axis.
+
+    Args:
+        c: Coefficients.
+        s: JointState of one environment.
+        h: Hypothesis, updated; nothing of it waits.
+        variance: What is added [rad2].
+    """
+    mean, mean_v, present, moving = np.zeros(3), np.zeros(3), 0, 0
     for i in range(s.nodes.shape[0]):
         node = s.nodes[i]
         if node.present:
             present += 1
-            mean += s.x[h, node.at_p : node.at_p + 2]
+            mean[: c.d] += s.x[h, node.at_p : node.at_p + c.d]
             if not node.static:
                 moving += 1
-                mean_v += s.x[h, node.at_v : node.at_v + 2]
+                mean_v[: c.d] += s.x[h, node.at_v : node.at_v + c.d]
     mean /= max(present, 1)
     # Beside static nodes velocities are not free to shift.
     mean_v *= 1.0 / max(moving, 1) if moving == present else 0.0
-    for i in range(s.nodes.shape[0]):
-        node = s.nodes[i]
-        if node.present:
-            p, v = node.at_p, node.at_v
-            D[p], D[p + 1] = -(s.x[h, p + 1] - mean[1]), s.x[h, p] - mean[0]
-            if not node.static:
-                D[v], D[v + 1] = -(s.x[h, v + 1] - mean_v[1]), s.x[h, v] - mean_v[0]
-    for r in range(c.n):
-        for k in range(c.n):
-            s.P[h, r, k] += c.rotation_var * D[r] * D[k]
-    s.group[0].turn_var = max(s.group[0].turn_var, c.rotation_var)
+    D = np.zeros(c.n)
+    for axis in range(3 if c.d == 3 else 1):
+        u, v = (3 - axis) % 3, (4 - axis) % 3  # z first: the only axis of the plane
+        D[:] = 0.0
+        for i in range(s.nodes.shape[0]):
+            node = s.nodes[i]
+            if node.present:
+                D[node.at_p + u] = -(s.x[h, node.at_p + v] - mean[v])
+                D[node.at_p + v] = s.x[h, node.at_p + u] - mean[u]
+                if not node.static:
+                    D[node.at_v + u] = -(s.x[h, node.at_v + v] - mean_v[v])
+                    D[node.at_v + v] = s.x[h, node.at_v + u] - mean_v[u]
+        # Clones of a moment in which nobody had moved either are turned alike (`smoothing`).
+        for r in range(c.n_own, c.n):
+            D[r] = D[r - c.n_own]
+        for r in range(c.n):
+            for k in range(c.n):
+                s.P[h, r, k] += variance * D[r] * D[k]

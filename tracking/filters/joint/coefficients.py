@@ -59,7 +59,13 @@ _NUMBERS = (
     "evidence",
 )
 COEFFICIENTS = np.dtype(
-    [("d", "i8"), ("n", "i8"), ("n_motion", "i8"), *((name, "f8") for name in _NUMBERS)]
+    [
+        ("d", "i8"),
+        ("n", "i8"),
+        ("n_own", "i8"),
+        ("n_motion", "i8"),
+        *((name, "f8") for name in _NUMBERS),
+    ]
 )
 """Constants derived once from `JointParams`, under the same names; ``_var`` and ``2``: squared."""
 
@@ -95,7 +101,7 @@ def make_coefficients(constellation: Constellation, params: JointParams) -> Reco
     }
     c = np.zeros(1, dtype=COEFFICIENTS)
     c["d"] = constellation.dimensions
-    c["n"] = count_rows(constellation, params)
+    c["n"] = c["n_own"] = count_rows(constellation, params)
     c["n_motion"] = count_motion(constellation)
     for name in _NUMBERS:
         sources = [p for p in (e, v, s, params) if hasattr(p, name)]
