@@ -113,13 +113,20 @@ def shares(n: int, scenarios: int) -> list[int]:
 def make_rooms(config: TrainConfig, level: int | None) -> Rooms:
     """The environments to learn in at a level of the curriculum."""
     scenarios = config.env.scenarios
+    # Handing work to a thread costs as much as stepping a few environments: rather whole rooms.
+    whole = len(scenarios) >= config.threads
     parts = [
         FormationVecEnv(
             n,
-            threads=min(config.threads, n),
+            threads=1 if whole else min(config.threads, n),
             with_truth=config.net.critic == "central",
             **env_arguments(config, scenario, level),
         )
         for scenario, n in zip(scenarios, shares(config.ppo.envs, len(scenarios)), strict=True)
     ]
-    return Rooms(parts, layout_of(config), reward_scale=config.ppo.reward_scale)
+    return Rooms(
+        parts,
+        layout_of(config),
+        reward_scale=config.ppo.reward_scale,
+        threads=config.threads if whole else 1,
+    )

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -27,7 +29,12 @@ class Rooms(SharedSeats):
     """
 
     def __init__(
-        self, parts: Sequence[FormationVecEnv], layout: Layout, *, reward_scale: float = 1.0
+        self,
+        parts: Sequence[FormationVecEnv],
+        layout: Layout,
+        *,
+        reward_scale: float = 1.0,
+        threads: int = 1,
     ) -> None:
         """Join them.
 
@@ -35,10 +42,15 @@ class Rooms(SharedSeats):
             parts: Of one observation mode and action space; all with the truth or none.
             layout: What the policy sees.
             reward_scale: Rewards are multiplied by it [-].
+            threads: So many parts are stepped at a time.
         """
         self.parts = tuple(parts)
         self._reward_scale = np.float32(reward_scale)
         self._views = [_SeatView(layout, part) for part in self.parts]
+        self._pool = ThreadPoolExecutor(threads)
+        # As a rule: those with the most seats, and in larger rooms, which come later.
+        sizes = [(part.num_envs, k) for k, part in enumerate(self.parts)]
+        self._longest_first = [k for _, k in sorted(sizes, reverse=True)]
         self._rng = np.random.default_rng(0)
         ends = np.cumsum([p.num_envs for p in parts])
         self._seats = [slice(int(e) - p.num_envs, int(e)) for e, p in zip(ends, parts, strict=True)]
@@ -72,20 +84,25 @@ class Rooms(SharedSeats):
 
     def step_wait(self) -> tuple[F32, F32, Bool, list[dict[str, Any]]]:
         """Drive for one decision."""
-        seen, rewards, dones, infos = [], [], [], []
-        for view, part in zip(self._views, self.parts, strict=True):
-            observations, reward, done, told = part.step_wait()
-            for info in told:
-                if "terminal_observation" in info:
-                    info["terminal_observation"] = view(info["terminal_observation"])
-            seen.append(view(observations))
-            rewards.append(reward * self._reward_scale)
-            dones.append(done)
-            infos += told
-        return np.concatenate(seen), np.concatenate(rewards), np.concatenate(dones), infos
+        jobs = {k: self._pool.submit(self._step, k) for k in self._longest_first}
+        seen, rewards, dones, infos = zip(
+            *(jobs[k].result() for k in range(len(self.parts))), strict=True
+        )
+        told = list(chain.from_iterable(infos))
+        return np.concatenate(seen), np.concatenate(rewards), np.concatenate(dones), told
+
+    def _step(self, k: int) -> tuple[F32, F32, Bool, list[dict[str, Any]]]:
+        """Drive those of part k for one decision."""
+        view = self._views[k]
+        observations, reward, done, infos = self.parts[k].step_wait()
+        for info in infos:
+            if "terminal_observation" in info:
+                info["terminal_observation"] = view(info["terminal_observation"])
+        return view(observations), reward * self._reward_scale, done, infos
 
     def close(self) -> None:
         """Release the threads."""
+        self._pool.shutdown()
         for part in self.parts:
             part.close()
 
