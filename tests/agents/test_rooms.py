@@ -27,12 +27,12 @@ def test_rooms_are_the_same_on_any_number_of_threads():
     """One, as many as rooms, and more: rooms are then stepped in parts."""
     driven = []
     for threads in ("1", "2", "3"):
-        config = small(scenarios="cars-nlos,hall", threads=threads, envs="8", seconds="11")
+        config = small(scenarios="cars-nlos,hall", threads=threads, envs="8")
         rooms = make_rooms(config, None)
         rooms.seed(3)
         steps = [(rooms.reset(),)]
         rng = np.random.default_rng(0)
-        for _ in range(115):
+        for _ in range(125):
             rooms.step_async(rng.uniform(-1.0, 1.0, (rooms.num_envs, 2)).astype(np.float32))
             seen, rewards, dones, infos = rooms.step_wait()
             last = [i["terminal_observation"] for i in infos if "terminal_observation" in i]
