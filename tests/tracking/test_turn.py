@@ -6,12 +6,16 @@ import pytest
 from agents.simulate import simulate
 from relpos_env.timing import STAND_STILL
 from tracking import Constellation, NodeConfig, Tracker
+from tracking.filters.joint._linear_kernels import settle
+from tracking.filters.joint._rotation_kernels import follow_rotation
 from tracking.filters.joint._sleep_kernels import wake_turn
 from tracking.filters.joint._start_kernels import add_node
+from tracking.filters.joint._survey_kernels import fuse_survey
 from tracking.filters.joint._turn_kernels import note_turn, spread_turn
 from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.records import as_records
+from tracking.filters.joint.scratch import make_scratch
 from tracking.filters.joint.state import JointState, make_layout, make_state
 from tracking.geometry import best_rotation
 
@@ -101,6 +105,41 @@ def test_the_moment_that_is_smoothed_wakes_with_the_group():
     D = np.tile(turned(s), 2)  # noqa: N806
     np.testing.assert_allclose(twice.P[0] - before, 0.1 * np.outer(D, D), atol=1e-12)
     assert own == c["n_own"]
+
+
+def test_two_nodes_have_no_shape_that_could_turn_with_their_moves():
+    """What they were moved by would else add up, and count when a third joins."""
+    c, s, _ = four()
+    s.nodes["present"][2:] = False
+    s.moved[0] = 1.0
+    before = s.P[0].copy()
+    follow_rotation(c, s, 0)
+    assert not s.moved.any()
+    assert np.array_equal(s.P[0], before)
+
+
+def test_surveys_do_not_tell_how_a_group_is_turned():
+    """Distances that move the nodes to and fro, as the first after a start do."""
+    c, s, _ = four()
+    s.x[0, 4 * N :] = 0.0  # no range errs
+    spread_turn(c, s, 0, c["rotation_var"])
+    for node in range(N):
+        at = s.nodes["at_p"][node]
+        s.P[0][at, at], s.P[0][at + 1, at + 1] = (
+            s.P[0][at, at] + 0.06,
+            s.P[0][at + 1, at + 1] + 0.06,
+        )
+    note_turn(c, s)
+    before = s.group["turn_var"][0]
+    scratch = make_scratch(N, len(s.pairs), len(s.x[0]))
+    rng = np.random.default_rng(0)
+    for p in np.tile(np.arange(len(s.pairs)), 10):
+        i, j = (s.nodes["at_p"][s.pairs[name][p]] for name in "ij")
+        way = np.linalg.norm(s.x[0, j : j + 2] - s.x[0, i : i + 2])
+        fuse_survey(c, s, 0, p, way + rng.normal(0.0, 0.1), scratch)
+    settle(s, 0, c["n"])
+    note_turn(c, s)
+    assert s.group["turn_var"][0] > 0.5 * before
 
 
 def test_who_joins_turns_with_the_others():

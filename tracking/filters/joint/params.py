@@ -37,7 +37,7 @@ class CarrierParams:
     """[s] How long it stays the same."""
     first_heading_std: float | None = None
     """[rad] The same at first, and until the group has moved: what bends the field where it stands
-    is not averaged yet. Also of one that joins or is placed anew. None for no more than later."""
+    is not averaged yet. Also of one that joins and has not driven. None for no more than later."""
     speed_std: float = 2.0
     """[m/s] Speed of the group as a whole; keeps a group without any reference from drifting."""
     sideways_std: float | None = None
