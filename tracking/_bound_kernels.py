@@ -70,7 +70,7 @@ def run_bound(coefficients, layout, s, scratch, block, hidden, truth, t_out, out
     for k in range(t.shape[1]):
         what, now = kind[0, k], t[0, k]
         while o < t_out.shape[0] and t_out[o] < now:
-            settle(s, 0, c.n)
+            settle(s, 0)
             write_positions(s, d, n, o, out)
             o += 1
         if what == STATE:
@@ -83,7 +83,7 @@ def run_bound(coefficients, layout, s, scratch, block, hidden, truth, t_out, out
             for i in range(n):
                 if not s.nodes[i].static:
                     sum_inertial(c, s.nodes, s.held, s.pre, i, now)
-            settle(s, 0, c.n)
+            settle(s, 0)
             predict(c, s, 0, now - group.t, scratch)
             s.pre[:, :N_PRE] = 0.0
             group.t = now
@@ -101,7 +101,7 @@ def run_bound(coefficients, layout, s, scratch, block, hidden, truth, t_out, out
             i, j, a_i, a_j = j, i, a_j, a_i
         learn_range(c, s, layout, scratch, layout.pair_index[i, j], a_i, a_j, hidden[k], what)
     while o < t_out.shape[0]:
-        settle(s, 0, c.n)
+        settle(s, 0)
         write_positions(s, d, n, o, out)
         o += 1
 

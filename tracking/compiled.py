@@ -42,14 +42,6 @@ def small_kernel(function: Function) -> Function:
     return _compile(function, inline=True)
 
 
-def contracted_kernel(function: Function) -> Function:
-    """A kernel whose products are added without being rounded before, where the machine can.
-
-    That is faster where sums of products are all there is, and off by a rounding.
-    """
-    return _compile(function, contract=True)
-
-
 def bind(kernel: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
     """A kernel that is called again and again with the same arguments: arrays filled anew.
 
@@ -67,15 +59,12 @@ def bind(kernel: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
     return partial(entry, *arguments)
 
 
-def _compile(
-    function: Function, *, inline: bool = False, nrt: bool = False, contract: bool = False
-) -> Function:
+def _compile(function: Function, *, inline: bool = False, nrt: bool = False) -> Function:
     compiled = njit(
         cache=True,
         nogil=True,
         error_model="numpy",
         forceinline=inline,
-        fastmath={"contract"} if contract else False,
         _nrt=nrt,
     )(function)
     if not config.DISABLE_JIT:

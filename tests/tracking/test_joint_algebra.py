@@ -6,10 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tracking import Constellation, NodeConfig
+from tracking.arrays import aligned
 from tracking.filters._level_kernels import angle_between, direction
 from tracking.filters.joint._agreement_kernels import SAME_TURN, are_same, turn_between
 from tracking.filters.joint._copy_kernels import turn_hypothesis
-from tracking.filters.joint._linear_kernels import take_off
+from tracking.filters.joint._product_kernels import take_off, take_off_plainly
 from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.records import as_records
@@ -96,19 +97,27 @@ def test_a_hypothesis_that_is_another_one_turned_a_little_is_the_same(dimensions
     assert not are_same(c, s, 0, 1, turn_between(c, s, 0, 1))
 
 
-@pytest.mark.parametrize("n", [4, 16, 27, 30, 88, 89])
-@pytest.mark.parametrize("m", [1, 3, 4, 15, 16])
+@pytest.mark.parametrize("n", [3, 8, 20, 24, 40, 72, 96, 352])
+@pytest.mark.parametrize("m", [0, 1, 3, 15, 16])
 def test_what_is_taken_off_is_the_product(n, m):
     rng = np.random.default_rng(n + m)
     A = rng.standard_normal((n, n))
     P, W = np.stack([A @ A.T, A @ A.T]), rng.standard_normal((2, 16, n))
-    expected = P[1] - W[0, :m].T @ W[0, :m]
-    before = P[0].copy()
-    take_off(P, 1, W, 0, m, n)
-    np.testing.assert_allclose(P[1], expected, atol=1e-11)
+    twin, before, rows = P.copy(), P[0].copy(), W.copy()
+    take_off(P, 1, W, 0, m)
+    take_off_plainly(twin, 1, W, 0, m)
+    np.testing.assert_allclose(P[1], twin[1], atol=1e-10)
+    np.testing.assert_array_equal(P[1], P[1].T)  # to the last bit
     np.testing.assert_array_equal(P[0], before)
-    if n > 16:  # beyond the blocks on the diagonal, equal to the last bit
-        np.testing.assert_array_equal(P[1, 16:, :16], P[1, :16, 16:].T)
+    np.testing.assert_array_equal(W, rows)
+
+
+def test_arrays_begin_with_a_cache_line():
+    for shape in ((3,), (2, 5), (1, 7, 16)):
+        array = aligned(*shape)
+        assert array.shape == shape
+        assert array.ctypes.data % 64 == 0
+        assert not array.any()
 
 
 @given(angles)

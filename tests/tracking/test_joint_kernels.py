@@ -195,7 +195,7 @@ def test_corrections_are_the_textbook_ones(seed, n, m, corrections, room):
         assert _linear_kernels.covariance(s, 0, a, b) == pytest.approx(P[a, b], abs=1e-8)
     np.testing.assert_allclose(s.x[0], x, atol=1e-8)
     np.testing.assert_allclose(s.moved[0], moved, atol=1e-8)
-    _linear_kernels.settle_all(s, n)
+    _linear_kernels.settle_all(s)
     assert s.n_waiting[0] == 0
     np.testing.assert_allclose(s.P[0], P, atol=1e-7)
     np.testing.assert_array_equal(s.P[0], s.P[0].T)

@@ -16,6 +16,7 @@ from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.records import as_records
 from tracking.filters.joint.scratch import make_scratch
+from tracking.filters.joint.smoothing import with_clones
 from tracking.filters.joint.state import JointState, make_layout, make_state
 from tracking.geometry import best_rotation
 
@@ -95,16 +96,18 @@ def test_a_group_that_knows_as_little_anyway_does_not_wake_with_less():
 def test_the_moment_that_is_smoothed_wakes_with_the_group():
     """Its rotation is that of the others: what they learn of it later it learns as well."""
     c, s, _ = four()
-    n, own = 2 * len(s.x[0]), len(s.x[0])
-    twice = s._replace(
-        x=np.tile(s.x, 2), P=1e-4 * np.eye(n)[None], moved=np.zeros((1, n)), waiting=s.waiting
-    )
-    c["n"] = n
+    batch = JointState._make(array[None] for array in s)
+    clones, wider = with_clones(batch, np.array([c]))
+    twice, c = JointState._make(array[0] for array in clones), wider[0]
+    own, more = int(c["n_own"]), int(c["n_motion"])
+    x = twice.x[0]
+    source = [x[:own].tolist().index(value) for value in x[own : own + more]]
     before = twice.P[0].copy()
     spread_turn(c, twice, 0, 0.1)
-    D = np.tile(turned(s), 2)  # noqa: N806
+    D = np.zeros(c["n"])  # noqa: N806
+    D[:own] = turned(s)
+    D[own : own + more] = D[source]
     np.testing.assert_allclose(twice.P[0] - before, 0.1 * np.outer(D, D), atol=1e-12)
-    assert own == c["n_own"]
 
 
 def test_two_nodes_have_no_shape_that_could_turn_with_their_moves():
@@ -137,7 +140,7 @@ def test_surveys_do_not_tell_how_a_group_is_turned():
         i, j = (s.nodes["at_p"][s.pairs[name][p]] for name in "ij")
         way = np.linalg.norm(s.x[0, j : j + 2] - s.x[0, i : i + 2])
         fuse_survey(c, s, 0, p, way + rng.normal(0.0, 0.1), scratch)
-    settle(s, 0, c["n"])
+    settle(s, 0)
     note_turn(c, s)
     assert s.group["turn_var"][0] > 0.5 * before
 

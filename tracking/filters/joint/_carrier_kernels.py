@@ -118,7 +118,7 @@ def centre(c, s, h, w):
         present += s.nodes[i].present
     if present == 0:
         return
-    settle(s, h, c.n)
+    settle(s, h)
     for k in range(c.d):
         mean = 0.0
         for r in range(c.n):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from tracking.compiled import kernel
 from tracking.filters._clear_kernels import clear_estimate
-from tracking.filters.joint._linear_kernels import take_off
 from tracking.filters.joint._motion_kernels import predict
+from tracking.filters.joint._product_kernels import take_off
 from tracking.filters.joint._sample_kernels import sum_inertial
 from tracking.filters.joint.state import N_PRE, JointState
 
@@ -86,7 +86,7 @@ def look_ahead(c, s, scratch, t):
         scratch.x[0, r] = s.x[h, r]
         for k in range(c.n):
             scratch.P[0, r, k] = s.P[h, r, k]
-    take_off(scratch.P, 0, s.waiting, h, s.n_waiting[h], c.n)
+    take_off(scratch.P, 0, s.waiting, h, s.n_waiting[h])
     for i in range(n):
         for k in range(N_PRE):
             scratch.pre[i, k] = s.pre[i, k]

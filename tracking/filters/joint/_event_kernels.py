@@ -94,7 +94,7 @@ def run_events(coefficients, layout, state, scratch, block, t_out, out):
                     what == SURVEY,
                 )
             elif what == LEAVE or (what == JOIN and s.nodes[i].present):
-                settle_all(s, c.n)
+                settle_all(s)
                 remove_node(c, s, layout, i)
         while o < t_out.shape[1]:
             write_estimate(c, s, scratch, t_out[e, o], e, o, out)
@@ -128,7 +128,7 @@ def advance_all(coefficients, layout, state, scratch, t):
         s = one_env(state, e)
         if s.group[0].started:
             advance(coefficients[0], s, layout, scratch, t[e], True)
-            settle_all(s, coefficients[0].n)
+            settle_all(s)
 
 
 @small_kernel
@@ -140,7 +140,7 @@ def hear(c, s, layout, scratch, i, j, a_i, a_j, t, distance, sight, is_survey):
     node_i, node_j = s.nodes[i], s.nodes[j]
     if s.group[0].started and t - s.group[0].t_check > c.leave_after:
         # Nobody was heard: whoever speaks first has been away as long as the others.
-        settle_all(s, c.n)
+        settle_all(s)
         remove_silent(c, s, layout, t)
     node_i.heard, node_j.heard = True, True
     node_i.t_heard, node_j.t_heard = t, t
@@ -168,7 +168,7 @@ def advance(c, s, layout, scratch, t, at_once):
     """
     group = s.group[0]
     if group.asleep and not none_moved(c, s, t):
-        settle_all(s, c.n)
+        settle_all(s)
         wake_up(c, s, layout)
     carriers_due = t - group.t_carrier >= c.carrier_period
     since = t - group.t
@@ -198,7 +198,7 @@ def carry(c, s, scratch, t):
     first, end = bank_range(s)
     for h in range(first, end):
         if s.alive[h]:
-            settle(s, h, c.n)
+            settle(s, h)
             follow_rotation(c, s, h)
             carry_moves(c, s, h)
             predict(c, s, h, t - group.t, scratch)
@@ -261,7 +261,7 @@ def take_first_range(c, s, layout, scratch, i, j, p, t, distance, sight, is_surv
         s.pairs[p].start_sight = 0.0
     if not is_survey:
         s.pairs[p].start_sight += sight[0]
-    settle_all(s, c.n)
+    settle_all(s)
     if not s.group[0].started:
         if try_start(c, s, layout, t):
             for a in range(s.nodes.shape[0]):
@@ -277,7 +277,7 @@ def take_first_range(c, s, layout, scratch, i, j, p, t, distance, sight, is_surv
 @kernel
 def look_at_group(c, s, layout, t):
     """From time to time: who left, and which hypotheses are worth their time."""
-    settle_all(s, c.n)
+    settle_all(s)
     remove_silent(c, s, layout, t)
     prune_bank(c, s)
     note_turn(c, s)

@@ -13,12 +13,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from tracking.compiled import contracted_kernel, small_kernel
-
-BLOCK = 16
-"""Size of the blocks of P on whose diagonal both halves are computed."""
+from tracking.compiled import small_kernel
+from tracking.filters.joint._product_kernels import take_off
 
 
 @small_kernel
@@ -114,7 +110,7 @@ def absorb(s, h, n, w, nu, S):
                 P[h, r, c] -= w_r * w[c]
         return
     if s.n_waiting[h] == room:
-        settle(s, h, n)
+        settle(s, h)
     q = s.n_waiting[h]
     for r in range(n):
         W[h, q, r] = w[r]
@@ -122,56 +118,19 @@ def absorb(s, h, n, w, nu, S):
 
 
 @small_kernel
-def settle(s, h, n):
+def settle(s, h):
     """Take off what waits: from here on P is the covariance of hypothesis h."""
     if s.n_waiting[h] > 0:
-        take_off(s.P, h, s.waiting, h, s.n_waiting[h], n)
+        take_off(s.P, h, s.waiting, h, s.n_waiting[h])
         s.n_waiting[h] = 0
 
 
 @small_kernel
-def settle_all(s, n):
+def settle_all(s):
     """Take off what waits in every hypothesis."""
     for h in range(s.alive.shape[0]):
         if s.alive[h]:
-            settle(s, h, n)
-
-
-@contracted_kernel
-def take_off(P, h, W, g, m, n):
-    """``P[h] - W[g]^T W[g]`` of the first m rows of W, which has a multiple of 4.
-
-    Those between m and the next such multiple are lost.
-
-    Four rows of P and four of W at a time: each number that is loaded serves four sums. What is
-    left of the diagonal blocks is copied from what is right of them.
-    """
-    end = np.uint64(n)
-    for q in range(m, -(-m // 4) * 4):
-        for k in range(n):
-            W[g, q, k] = 0.0
-    for r in range(0, n, 4):
-        # Behind the last row comes the last row again.
-        s, t, u = min(r + 1, n - 1), min(r + 2, n - 1), min(r + 3, n - 1)
-        first = np.uint64(r - r % BLOCK)
-        for q in range(0, m, 4):
-            a0, a1, a2, a3 = W[g, q, r], W[g, q + 1, r], W[g, q + 2, r], W[g, q + 3, r]
-            b0, b1, b2, b3 = W[g, q, s], W[g, q + 1, s], W[g, q + 2, s], W[g, q + 3, s]
-            c0, c1, c2, c3 = W[g, q, t], W[g, q + 1, t], W[g, q + 2, t], W[g, q + 3, t]
-            d0, d1, d2, d3 = W[g, q, u], W[g, q + 1, u], W[g, q + 2, u], W[g, q + 3, u]
-            for k in range(first, end):
-                w0, w1, w2, w3 = W[g, q, k], W[g, q + 1, k], W[g, q + 2, k], W[g, q + 3, k]
-                p_r, p_s, p_t, p_u = P[h, r, k], P[h, s, k], P[h, t, k], P[h, u, k]
-                p_r, p_s, p_t, p_u = p_r - a0 * w0, p_s - b0 * w0, p_t - c0 * w0, p_u - d0 * w0
-                p_r, p_s, p_t, p_u = p_r - a1 * w1, p_s - b1 * w1, p_t - c1 * w1, p_u - d1 * w1
-                p_r, p_s, p_t, p_u = p_r - a2 * w2, p_s - b2 * w2, p_t - c2 * w2, p_u - d2 * w2
-                p_r, p_s, p_t, p_u = p_r - a3 * w3, p_s - b3 * w3, p_t - c3 * w3, p_u - d3 * w3
-                P[h, r, k], P[h, s, k], P[h, t, k], P[h, u, k] = p_r, p_s, p_t, p_u
-    for row in range(BLOCK, n, BLOCK):
-        for column in range(0, row, BLOCK):
-            for r in range(row, min(row + BLOCK, n)):
-                for k in range(np.uint64(column), np.uint64(column + BLOCK)):
-                    P[h, r, k] = P[h, k, r]
+            settle(s, h)
 
 
 @small_kernel

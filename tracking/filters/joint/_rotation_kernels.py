@@ -60,7 +60,7 @@ def follow_rotation(c, s, h):
     if present < 3:
         s.moved[h, :] = 0.0
     elif moved2 > ENOUGH * ENOUGH * extent2 or false2 > FALSE * FALSE * c.white_var:
-        settle(s, h, c.n)
+        settle(s, h)
         turn_covariance(c, s, h, min(1.0, MOST * math.sqrt(extent2 / moved2)))
 
 

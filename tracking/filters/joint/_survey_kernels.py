@@ -35,4 +35,4 @@ def use_surveys(c, s, layout, scratch, i, end):
                 for h in range(s.alive.shape[0]):
                     if s.alive[h]:
                         fuse_survey(c, s, h, p, start_distance(s, layout, i, k), scratch)
-    settle_all(s, c.n)
+    settle_all(s)

@@ -100,8 +100,8 @@ def spread_turn(c, s, h, variance):
                     D[node.at_v + u] = -(s.x[h, node.at_v + v] - mean_v[v])
                     D[node.at_v + v] = s.x[h, node.at_v + u] - mean_v[u]
         # Clones of a moment in which nobody had moved either are turned alike (`smoothing`).
-        for r in range(c.n_own, c.n):
-            D[r] = D[r - c.n_own]
+        for r in range(min(c.n_motion, c.n - c.n_own)):
+            D[c.n_own + r] = D[r]
         for r in range(c.n):
             for k in range(c.n):
                 s.P[h, r, k] += variance * D[r] * D[k]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.arrays import Bool
+from tracking.arrays import Bool, whole_lines
 from tracking.constellation import Constellation
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.records import Records
@@ -119,11 +119,11 @@ def count_states(constellation: Constellation, params: JointParams) -> int:
 
 
 def count_rows(constellation: Constellation, params: JointParams) -> int:
-    """Length of the arrays of states: up to three behind the last mean nothing.
+    """Length of the arrays of states: a few behind the last mean nothing.
 
-    Compiled code takes four numbers at a time, and what is left one by one.
+    Compiled code takes up to eight numbers at a time, and what is left one by one.
     """
-    return -(-count_states(constellation, params) // 4) * 4
+    return whole_lines(count_states(constellation, params))
 
 
 def count_motion(constellation: Constellation) -> int:

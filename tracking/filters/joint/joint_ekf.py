@@ -77,16 +77,14 @@ class JointEkf:
         advance_all(
             as_records(self._coefficients), self._layout, _records(self._state), self._scratch, t
         )
-        clones, coefficients, source = with_clones(
-            self._state, self._coefficients, self._constellation
-        )
+        clones, coefficients = with_clones(self._state, self._coefficients)
         self.restore(saved)
         scratch = make_scratch(
             self._constellation.n_nodes, self._constellation.n_pairs, int(coefficients[0]["n"])
         )
         nothing = TeamEstimate.empty(self._constellation, np.zeros((self._n_envs, 0)))
         self._pass(clones, coefficients, scratch, later, nothing)
-        return read_clones(clones, source, estimate, self._state.x.shape[2])
+        return read_clones(clones, estimate, self._state.x.shape[2])
 
     def reset(self, env: int) -> None:
         """Forget everything of one environment."""

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracking.arrays import F64, I64
+from tracking.arrays import F64, I64, aligned
 from tracking.filters.joint.state import N_PRE
 
 
@@ -45,13 +45,13 @@ def make_scratch(n_nodes: int, n_pairs: int, n_states: int) -> Scratch:
     return Scratch(
         idx=np.zeros(most, dtype=np.int64),
         val=np.zeros(most),
-        w=np.zeros(n_states),
-        scale=np.zeros(n_states),
+        w=aligned(n_states),
+        scale=aligned(n_states),
         step=np.zeros((n_nodes, 9)),
         speed=np.zeros(n_nodes),
         none=np.zeros(3),
-        x=np.zeros((1, n_states)),
-        P=np.zeros((1, n_states, n_states)),
+        x=aligned(1, n_states),
+        P=aligned(1, n_states, n_states),
         pre=np.zeros((n_nodes, N_PRE)),
         t_pre=np.zeros(n_nodes),
         nlos=np.zeros((1, n_pairs)),

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracking.arrays import F64, I64, Bool
+from tracking.arrays import F64, I64, Bool, aligned
 from tracking.constellation import Constellation
 from tracking.filters.joint.coefficients import (
     count_motion,
@@ -85,10 +85,7 @@ def make_layout(constellation: Constellation, params: JointParams) -> Layout:
 
 
 def room_to_wait(n_states: int) -> int:
-    """How many corrections may wait: none where the covariance fits the nearest cache.
-
-    A multiple of 4, as they are taken off.
-    """
+    """How many corrections may wait: none where the covariance fits the nearest cache."""
     return 16 if n_states > 48 else 0
 
 
@@ -141,7 +138,7 @@ def make_state(
             fades += 2
     held = np.zeros((n_envs, n, 7))
     held[..., 0] = 1.0
-    P = np.zeros((n_envs, n_hyps, n_states, n_states))  # noqa: N806
+    P = aligned(n_envs, n_hyps, n_states, n_states)  # noqa: N806
     P[..., np.arange(n_states), np.arange(n_states)] = 1.0
     return JointState(
         nodes=nodes,
@@ -149,11 +146,11 @@ def make_state(
         pre=np.zeros((n_envs, n, N_PRE)),
         pairs=pairs,
         group=np.zeros((n_envs, 1), dtype=GROUP),
-        x=np.zeros((n_envs, n_hyps, n_states)),
+        x=aligned(n_envs, n_hyps, n_states),
         P=P,
-        waiting=np.zeros((n_envs, n_hyps, room_to_wait(n_states), n_states)),
+        waiting=aligned(n_envs, n_hyps, room_to_wait(n_states), n_states),
         n_waiting=np.zeros((n_envs, n_hyps), dtype=np.int64),
-        moved=np.zeros((n_envs, n_hyps, n_states)),
+        moved=aligned(n_envs, n_hyps, n_states),
         nlos=np.zeros((n_envs, n_hyps, p)),
         alive=np.zeros((n_envs, n_hyps), dtype=bool),
         loglik=np.zeros((n_envs, n_hyps)),
