@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from agents.hearing import Formats, Hearing, Voice, why_nothing_fits
 from hardware_bridge.live.naming import node_of
+from hardware_bridge.live.sample_rates import PAUSE, WINDOW, is_off
 
 if TYPE_CHECKING:
     from agents.doctor import CarLike, LinkLike
@@ -82,6 +83,7 @@ def diagnose_link(
     seconds: float,
     down: str,
     losses: int,
+    imu_hz: Mapping[int, float],
 ) -> LinkReport:
     """A stream that measures.
 
@@ -92,6 +94,7 @@ def diagnose_link(
         seconds: How long [s].
         down: Why the port is not open; empty if it is.
         losses: How often the port was lost meanwhile.
+        imu_hz: How often inertial samples come, as configured, by id of the node [1/s].
     """
     report = _report(link.port.name, link.port.port, link.format, hearing, seconds, down)
     voices = hearing.voices.get(link.format, {})
@@ -104,6 +107,7 @@ def diagnose_link(
         report.problems.append(fatal)
     else:
         report.problems += _flaws(report, hearing, seconds)
+        report.problems += _wrong_rates(report, imu_hz, seconds)
         report.problems += _strangers(link, voices)
     if losses:
         report.problems.append(_lost(losses))
@@ -230,6 +234,18 @@ def _flaws(report: LinkReport, hearing: Hearing, seconds: float) -> list[str]:
         if node.boots > 1:
             flaws.append(f"node {node.node} started {node.boots} times: see its power")
     return flaws
+
+
+def _wrong_rates(report: LinkReport, imu_hz: Mapping[int, float], seconds: float) -> list[str]:
+    """Nodes whose samples come at another rate than the configured one."""
+    if seconds < WINDOW or report.gap_s > PAUSE:
+        return []  # too short to say, or there were none for a while
+    return [
+        f"node {node.node}: {node.imu_hz:.0f} inertial samples a second, configured "
+        f"{imu_hz[int(node.node)]:g}: set imu_hz, or every turn is taken for another"
+        for node in report.nodes
+        if node.known and node.imu_hz > 0.0 and is_off(node.imu_hz, imu_hz[int(node.node)])
+    ]
 
 
 def _strangers(link: LinkLike, voices: Mapping[str | None, Voice]) -> list[str]:

@@ -20,6 +20,7 @@ from hardware_bridge.links.port_list import (
 )
 from hardware_bridge.links.port_users import port_users
 from hardware_bridge.links.ports import PortSpec
+from tracking.constellation import Constellation
 
 TURN = 0.05
 """[s] Between two looks at the clock."""
@@ -63,6 +64,10 @@ class CarLike(Protocol):
 
 class ConfigLike(Protocol):
     """What is taken of a configuration."""
+
+    @property
+    def constellation(self) -> Constellation:
+        """Who is in the group."""
 
     @property
     def links(self) -> Sequence[LinkLike]:
@@ -174,6 +179,7 @@ def doctor(
             seconds=listened,
             down=reasons[link.port.name],
             losses=losses[link.port.name],
+            imu_hz={node.id: node.imu_hz for node in config.constellation.nodes},
         )
         for link in config.links
     ]

@@ -16,7 +16,7 @@ HELP = "space: emergency stop   c: clear it   a: arm   d: disarm   q: quit"
 @contextlib.contextmanager
 def key_by_key() -> Iterator[None]:
     """Let the terminal hand on every key at once, while this lasts; nothing without a terminal."""
-    if not sys.stdin.isatty():
+    if not _is_terminal():
         yield
         return
     import termios
@@ -38,7 +38,7 @@ def read_orders() -> list[str]:
     tells of it.
     """
     pressed = b""
-    while sys.stdin.isatty() and select.select([sys.stdin], [], [], 0.0)[0]:
+    while _is_terminal() and select.select([sys.stdin], [], [], 0.0)[0]:
         keys = os.read(sys.stdin.fileno(), 1024)
         if not keys:
             break
@@ -51,6 +51,14 @@ def orders_of(pressed: str) -> list[str]:
 
     Whatever else is hit in a hurry stops as well. Nothing beside a stop counts, before it or
     after: a hand on the keyboard means none of it, and the arrow keys are letters behind an escape.
+    Nothing counts after a quit.
     """
     orders = [KEYS.get(key.lower(), "stop") for key in pressed]
-    return ["stop"] if "stop" in orders else orders
+    if "stop" in orders:
+        return ["stop"]
+    return orders[: orders.index("quit") + 1] if "quit" in orders else orders
+
+
+def _is_terminal() -> bool:
+    """Whether there is one; a program can be started with its input closed."""
+    return sys.stdin is not None and sys.stdin.isatty()

@@ -42,6 +42,8 @@ def read_constellation(
     for key, table in tables_of(raw, "nodes", where):
         at = where.key("nodes").key(key)
         node = TableReader().read(_Node, table, at)
+        if node.mag_hz is not None and not node.mag_hz > 0.0:
+            raise at.key("mag_hz").error(f"expected above 0, got {node.mag_hz:g}")
         nodes.append(
             NodeConfig(
                 id=node_id(key, at),
@@ -60,7 +62,7 @@ def read_constellation(
     try:
         return Constellation(
             nodes=tuple(nodes),
-            dimensions=3 if dimensions == 3 else 2,
+            dimensions=dimensions,  # type: ignore[arg-type]  # which it checks
             heading=heading,
             antennas=tuple(antennas),
         )

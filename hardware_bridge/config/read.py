@@ -39,6 +39,7 @@ class _Head:
 class _Calibration:
     files: tuple[str, ...] = ()
     uncalibrated: bool = False
+    uncalibrated_ranges: bool = False
 
 
 def read_config(path: Path | str) -> SwarmConfig:
@@ -85,12 +86,14 @@ def parse_config(text: str, *, file: str, beside: Path, with_files: bool = True)
         _Head, {k: raw[k] for k in ("name", "dimensions", "heading") if k in raw}, where
     )
     constellation = read_constellation(raw, head.dimensions, head.heading, where)
+    calibration, uncalibrated_ranges = _calibration(raw, where, beside, with_files)
     config = SwarmConfig(
         name=head.name or Path(file).stem,
         constellation=constellation,
         links=tuple(read_links(raw, constellation, where, beside)),
         cars=tuple(read_cars(raw, constellation, where)),
-        calibration=_calibration(raw, where, beside, with_files),
+        calibration=calibration,
+        uncalibrated_ranges=uncalibrated_ranges,
         task=_task(raw, constellation, where),
         tracker=reader.read(TrackerConfig, raw.get("tracker", {}), where.key("tracker")),
         safety=reader.read(SafetyParams, raw.get("safety", {}), where.key("safety")),
@@ -102,9 +105,10 @@ def parse_config(text: str, *, file: str, beside: Path, with_files: bool = True)
 
 def _calibration(
     raw: Mapping[str, Any], where: Where, beside: Path, with_files: bool
-) -> tuple[Path, ...] | None:
+) -> tuple[tuple[Path, ...] | None, bool]:
+    """The files, and whether ranges are good without."""
     if "calibration" not in raw:
-        return None
+        return None, False
     at = where.key("calibration")
     table = TableReader().read(_Calibration, raw["calibration"], at)
     files = tuple(beside / name for name in table.files)
@@ -113,7 +117,7 @@ def _calibration(
             raise at.key("files").error(f"no file {path}: make one with `relpos calibrate`")
     if bool(files) == table.uncalibrated:
         raise at.error("expected either files, or uncalibrated = true")
-    return files
+    return files, table.uncalibrated_ranges
 
 
 def _task(raw: Mapping[str, Any], group: Constellation, where: Where) -> TaskConfig:
@@ -178,6 +182,11 @@ def _check_source(config: SwarmConfig, where: Where) -> None:
     """Positions come from links of that format, and only where they are asked for."""
     formats = {link.format for link in config.links}
     ready = config.tracker.source == "positions"
+    group = config.constellation
+    for node in group.nodes if group.heading == "initial" and not ready else ():
+        if node.kind == "moving" and node.initial_heading is None:
+            at = where.key("nodes").key(str(node.id)).key("initial_heading_rad")
+            raise at.error('missing, expected where heading = "initial": nothing else tells it')
     if ready and "positions" not in formats:
         at = where.key("tracker").key("source")
         raise at.error('"positions" needs a link with format = "positions"')

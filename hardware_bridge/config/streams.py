@@ -63,7 +63,7 @@ def read_links(
             port=PortSpec(
                 name=f"links.{key}",
                 port=_placed(link.port, beside, at),
-                baud=link.baud or entry.baud,
+                baud=_baud(link.baud, entry.baud, at),
             ),
             format=link.format,
             node=link.node,
@@ -90,11 +90,18 @@ def read_cars(raw: Mapping[str, Any], group: Constellation, where: Where) -> lis
             driver_options(car.driver, node, options, key_bytes)
         except BridgeError as error:
             raise Where(where.file, raises=BridgeError).error(str(error)) from error
-        spec = PortSpec(name=f"cars.{node}", port=car.port, baud=car.baud or entry.baud)
+        baud = _baud(car.baud, entry.baud, at)
+        spec = PortSpec(name=f"cars.{node}", port=car.port, baud=baud)
         cars.append(
             CarConfig(node=node, port=spec, driver=car.driver, options=options, key=key_bytes)
         )
     return sorted(cars, key=lambda each: group.index_of[each.node])
+
+
+def _baud(given: int | None, usual: int, where: Where) -> int:
+    if given is not None and given < 1:
+        raise where.key("baud").error(f"expected above 0, got {given}")
+    return usual if given is None else given
 
 
 def _placed(port: str, beside: Path, where: Where) -> str:

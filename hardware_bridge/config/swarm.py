@@ -91,6 +91,8 @@ class SwarmConfig:
     safety: SafetyParams
     text: str
     """The file itself, for recordings."""
+    uncalibrated_ranges: bool = False
+    """Whether ranges are good as they come, where the files hold nothing about them."""
     marks: Path | None = None
     """Keeps which signed messages are old, where any are signed; None keeps nothing."""
 

@@ -48,11 +48,16 @@ def read_line(line: str) -> list[Reading]:
     Raises:
         Damaged: It is no object, or what it says cannot be.
     """
-    # The objects hold no others; the end of a line before may be lost.
-    at = line.rfind("{")
-    if at < 0:
+    first, last = line.find("{"), line.rfind("{")
+    if first < 0:
         return []
-    said = parse(line[at:])
+    try:
+        said = parse(line[first:])
+    except Damaged:
+        # The end of the line before may be lost: then this one begins further on.
+        if first == last:
+            raise
+        said = parse(line[last:])
     if "i" in said and "j" in said:
         return pair_of(said)
     return pose_of(said) if "node" in said else []

@@ -35,7 +35,7 @@ def export_mcap(
         constellation: Who took part.
         estimate: Arrays over (time, ...).
         reference: Id of the node at the origin of the frame ``map``; default: the first.
-        offset_ns: [ns] Added to every time, `Header.utc_offset_ns` for UTC.
+        offset_ns: [ns] Added to every time, `Header.wall_ns` for UTC.
         notes: Written as metadata ``relpos``.
 
     Returns:

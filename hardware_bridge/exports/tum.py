@@ -33,7 +33,7 @@ def export_tum(
         folder: New or empty.
         estimate: Arrays over (time, ...).
         reference: Id of the node that stays at the origin; default: the first.
-        offset_ns: [ns] Added to every time, `Header.utc_offset_ns` for UTC.
+        offset_ns: [ns] Added to every time, `Header.wall_ns` for UTC.
 
     Raises:
         BridgeError: The folder is taken, no such node, or there is no estimate to write.

@@ -53,7 +53,7 @@ class Bridge(OpenBridge):
 
         Raises:
             BridgeError: A port, a calibration or the recording cannot be used, or cars are to
-                move and their ranges or sensors were never calibrated.
+                move and their ranges were never calibrated.
         """
         if arm and not config.cars:
             raise BridgeError("cars: none in the configuration, nothing can be armed")
@@ -66,8 +66,14 @@ class Bridge(OpenBridge):
         if arm:
             check_pace(config)
         calibration = load_calibration(config)
+        no_ranges = calibration is not None and calibration.ranges is None
+        if arm and measures and no_ranges and not config.uncalibrated_ranges:
+            raise BridgeError(
+                "calibration: nothing about ranges in its files; add that of `relpos calibrate "
+                "uwb`, or say uncalibrated_ranges = true if ranges are good as they come"
+            )
         self.config = config
-        self._stack = ExitStack()
+        self._stack, self._is_open = ExitStack(), False
         warm_up(config)
         with ExitStack() as stack:
             stack.enter_context(short_pauses())
@@ -89,8 +95,9 @@ class Bridge(OpenBridge):
                     wall_ns=time.time_ns(),
                 )
                 self.recorder = Recorder(record, header)
-                # One of a start that failed is none, and would take the name of the next.
-                stack.push(lambda kind, *_: _remove(record) if kind else None)
+                # One of a start that failed is none, and would take the name of the next. Once it
+                # is open, its recording stays, whatever goes wrong at the end.
+                stack.push(lambda kind, *_: _remove(record) if kind and not self._is_open else None)
                 stack.callback(self.recorder.close)
                 if calibration is not None:
                     text = calibration_toml(calibration)
@@ -114,7 +121,7 @@ class Bridge(OpenBridge):
                 marks=self.marks,
             )
             self.start = Start(self.feed, arm=arm, params=StartParams(wait=wait))
-            self._stack = stack.pop_all()
+            self._stack, self._is_open = stack.pop_all(), True
 
     def close(self) -> None:
         """Let the cars stand and close everything."""

@@ -22,7 +22,9 @@ from hardware_bridge.links.ports import Chunk
 from hardware_bridge.live.events import Events
 from hardware_bridge.live.naming import Naming
 from hardware_bridge.live.repeated import RepeatedSamples
+from hardware_bridge.live.sample_rates import SampleRates
 from hardware_bridge.live.stream import OF_A_CAR, Stream
+from hardware_bridge.live.stuck_places import StuckPlaces
 from hardware_bridge.live.told import Told
 from hardware_bridge.plausibility import Plausibility
 from hardware_bridge.readings import (
@@ -78,11 +80,18 @@ class Intake:
         """What an operator last asked of each car, with its host time [ns], by index."""
         self.voltage: dict[int, float] = {}
         """Of each node, by index [V]."""
+        self.fault: dict[tuple[str, int], int] = {}
+        """What boards and controllers last said is wrong with them, by their own numbers, 0 is
+        nothing; by link or car, and index of the node."""
         self.refused: Counter[str] = Counter()
         """Readings that were not used, by reason."""
         self.notices: list[tuple[int, str]] = []
         """Time [ns] and what the user should read; whoever takes them clears the list."""
-        self._repeated = RepeatedSamples([node.imu_hz for node in self.group.nodes])
+        rates = [node.imu_hz for node in self.group.nodes]
+        self.sample_rates = SampleRates(rates)
+        self.driving: frozenset[int] = frozenset()
+        """Who drives, by what cars say or were let do, by index; written by the caller."""
+        self._repeated, self._stuck_places = RepeatedSamples(rates), StuckPlaces()
         self._naming = Naming(self.group, self.refused, self.notices)
         open_ids, keyed_ids = Identities(), Identities(authenticated=True)
         self._identities = [open_ids, keyed_ids]
@@ -122,6 +131,14 @@ class Intake:
     def seconds(self, t_ns: int) -> float:
         """Host time as that of measurements [s]."""
         return (t_ns - self.start_ns) * NS
+
+    def wrong_rate(self, node: int) -> str:
+        """What is to be said of a node whose samples do not come as often as configured."""
+        rate, given = self.sample_rates.rate[node], self.group.nodes[node].imu_hz
+        return (
+            f"nodes.{self.group.ids[node]}.imu_hz: {given:g} configured, but {rate:.0f} samples a "
+            f"second come: every turn would be taken for {rate / given:.2g} times as much"
+        )
 
     def _stream(self, link: LinkConfig, identities: Identities) -> Stream:
         decoder = make_decoder(link.format, link.key)
@@ -186,6 +203,8 @@ class Intake:
                 if mag is not None:
                     self.events.add(t, Kind.MAG, node, mag)
                 self.events.add(t, Kind.IMU, node, (*gyr, *acc))
+                if self.sample_rates.note(node, arrival_ns):
+                    self.notices.append((arrival_ns, self.wrong_rate(node)))
                 self.sensed_ns[node] = arrival_ns
             case StateReading(q_wb=q, accel_w=accel):
                 if not self.plausibility.allows_state(reading) or self._repeats(
@@ -198,8 +217,10 @@ class Intake:
                 return self._use_range(stream, reading, node, t_ns, arrival_ns)
             case MotionReading():
                 self.motion[node] = arrival_ns, reading
-            case StatusReading(voltage=voltage) if voltage is not None:
-                self.voltage[node] = voltage
+            case StatusReading(voltage=voltage, fault=fault):
+                if voltage is not None:
+                    self.voltage[node] = voltage
+                self._note_fault(stream, node, fault, arrival_ns)
         return True
 
     def _repeats(
@@ -268,7 +289,7 @@ class Intake:
         t_ns = clock.map(reading.source.ticks, arrival_ns)
         if len(set(nodes)) < len(names):
             return
-        if reading.pos is not None and not self.plausibility.allows_place(nodes, reading.pos, t_ns):
+        if reading.pos is not None and not self._believes(reading, nodes, t_ns, arrival_ns):
             return
         t = self.seconds(t_ns)
         if isinstance(reading, PairReading):
@@ -283,10 +304,52 @@ class Intake:
         if known:
             self.heard_ns.update(dict.fromkeys(nodes, arrival_ns))
 
+    def _believes(
+        self, reading: PairReading | PoseReading, nodes: tuple[int, ...], t_ns: int, arrival_ns: int
+    ) -> bool:
+        """Whether a place can be, and its tracker does not hang."""
+        assert reading.pos is not None
+        if not self.plausibility.allows_place(nodes, reading.pos, t_ns):
+            return False
+        attitude = reading.q_wb if isinstance(reading, PoseReading) else None
+        known = nodes in self._stuck_places.stuck
+        drives = not self.driving.isdisjoint(nodes)
+        values = (*reading.pos, *(attitude or ()))
+        if not self._stuck_places.refuses(nodes, values, drives, arrival_ns):
+            return True
+        self.refused["stuck"] += 1
+        if not known:
+            who = " and ".join(str(self.group.ids[node]) for node in nodes)
+            text = f"the place of {who} stays the same while it drives: its tracker hangs"
+            self.notices.append((arrival_ns, text))
+        return False
+
+    def _note_fault(self, stream: Stream, node: int, fault: int, arrival_ns: int) -> None:
+        if fault == self.fault.get((stream.name, node), 0):
+            return
+        self.fault[stream.name, node] = fault
+        what = f"reports fault {fault}" if fault else "reports no fault any more"
+        text = f"{stream.name}: node {self.group.ids[node]} {what}"
+        self.notices.append((arrival_ns, text))
+
     def _clock(self, stream: Stream, node: int, source: Source) -> StreamTime:
-        if node not in stream.times:
-            has_time = source.ticks is not None and source.clock is not None
-            stream.times[node] = DeviceTime(source.clock) if has_time else HostTime()  # type: ignore
+        """What maps the stamps of a node: a new one where these come from another counter.
+
+        A single stamp of another counter is a damaged one, and counts as when it came.
+        """
+        clock = None if source.ticks is None else source.clock
+        if node in stream.times:
+            known = stream.clocks.get(node)
+            again = stream.other.get(node) == clock
+            stream.other[node] = None if clock == known else clock
+            if clock is None or clock == known:
+                return stream.times[node]
+            if not again:
+                return HostTime()
+        if clock is None:
+            stream.times[node] = HostTime()
+        else:
+            stream.times[node], stream.clocks[node] = DeviceTime(clock), clock
         return stream.times[node]
 
 

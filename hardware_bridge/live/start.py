@@ -99,7 +99,8 @@ class Start:
                 continue
             if report.armed[slots].all():
                 return
-            well = (report.well_for[slots] > config.safety.health).all()
+            well = bool((report.well_for[slots] > config.safety.health).all())
+            well = well and self._rates_fit(group, slots)
             if well and not (self._held or report.emergency):
                 feed.order("arm")
         if feed.report is None:
@@ -116,6 +117,21 @@ class Start:
             f"cars.{group.swarm.group.ids[slot]}: not well within {self._params.wait:g} s: {why}; "
             "see `relpos doctor`"
         )
+
+    def _rates_fit(self, group: LiveGroup, slots: list[int]) -> bool:
+        """Whether it is known that samples come as often as configured.
+
+        Raises:
+            BridgeError: Those of a car do not.
+        """
+        swarm = group.swarm
+        if swarm.config.tracker.source == "positions":
+            return True
+        rates = swarm.intake.sample_rates
+        for slot in slots:
+            if rates.is_off(slot):
+                raise BridgeError(swarm.intake.wrong_rate(slot))
+        return not any(rates.is_open(slot) for slot in slots)
 
     def _find(self, group: LiveGroup) -> None:
         """Let the cars wriggle until all know where the others are."""

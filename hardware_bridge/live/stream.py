@@ -9,6 +9,7 @@ from hardware_bridge.decoders.base import Decoder
 from hardware_bridge.identity import Identities, Verdict
 from hardware_bridge.readings import (
     AckReading,
+    DeviceClock,
     HeartbeatReading,
     MotionReading,
     Source,
@@ -33,6 +34,10 @@ class Stream:
     """Of a car's controller: nobody else speaks there."""
     times: dict[int, StreamTime] = field(default_factory=dict)
     """By node index."""
+    clocks: dict[int, DeviceClock] = field(default_factory=dict)
+    """The counter that `times` are told by, likewise; none where they are those of arrival."""
+    other: dict[int, DeviceClock | None] = field(default_factory=dict)
+    """Another counter that the last stamp was of, likewise."""
     even: dict[int, EvenTime] = field(default_factory=dict)
     """Likewise, of samples that tell no time."""
     source: Source | None = None

@@ -14,6 +14,7 @@ from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.ports import Chunk
 from hardware_bridge.live.intake import Intake
 from hardware_bridge.live.ready import ReadyPerception
+from hardware_bridge.live.stuck_places import DRIVES
 from relpos_env.interface.perception import Perception
 from relpos_env.interface.views import View
 from tracking.arrays import F64, Bool
@@ -167,6 +168,7 @@ class LiveSwarm:
     def _note_cars(self, t_ns: int) -> None:
         """What the cars are known to do, and what is asked of them."""
         view, intake = self.view, self.intake
+        driving: set[int] = set()
         for k in self._slots:
             here = k in self._here
             self._powered[0, k] = view.present[0, k] = here
@@ -176,9 +178,12 @@ class LiveSwarm:
                 speed = said.speed
                 steering = steering if said.steering is None else said.steering
             view.speed[0, k], view.steering[0, k] = speed, steering
+            if abs(speed) > DRIVES:
+                driving.add(k)
             asked = intake.trim.get(k)
             fresh = asked is not None and (t_ns - asked[0]) * 1e-9 <= SILENT
             self.trim[0, k] = asked[1] if fresh and asked is not None else 0.0
+        intake.driving = frozenset(driving)
 
 
 def load_calibration(config: SwarmConfig) -> Calibration | None:

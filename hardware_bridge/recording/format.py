@@ -81,12 +81,8 @@ class Header:
     monotonic_ns: int
     """[ns] The host's monotonic clock at the start."""
     wall_ns: int
-    """[ns] UTC since 1970 at the same moment: for people and exports, never for tracking."""
-
-    @property
-    def utc_offset_ns(self) -> int:
-        """[ns] What makes UTC of a time of this recording, as exports take it."""
-        return self.wall_ns - self.monotonic_ns
+    """[ns] UTC since 1970 at the same moment, 0 s of its measurements and estimates: for people
+    and exports, never for tracking."""
 
     def encode(self) -> bytes:
         """The payload of the header record."""

@@ -69,7 +69,8 @@ class Supervisor:
                     self._picture = picture
                     self._word[0] = max(float(picture.t[0]), self._word[0])
             case Order("arm"):
-                return self._arm()
+                # Who has asked to end it does not begin anew.
+                return [] if self.quit else self._arm()
             case Order("disarm"):
                 self._gate.disarm()
             case Order("stop"):

@@ -31,7 +31,8 @@ def car(port, node=1, driver="vesc"):
 
 
 def config(*links, cars=()):
-    return SimpleNamespace(links=links, cars=cars)
+    group = SimpleNamespace(nodes=[SimpleNamespace(id=4, imu_hz=100.0)])
+    return SimpleNamespace(links=links, cars=cars, constellation=group)
 
 
 def heard(pieces, formats=FORMATS, key=None, every_ns=10_000_000):
@@ -42,7 +43,7 @@ def heard(pieces, formats=FORMATS, key=None, every_ns=10_000_000):
     return hearing
 
 
-def diagnose(pieces, formats=FORMATS, down="", losses=0, seconds=None, **options):
+def diagnose(pieces, formats=FORMATS, down="", losses=0, seconds=None, imu_hz=100.0, **options):
     each = link(**options)
     return diagnose_link(
         each,
@@ -51,6 +52,7 @@ def diagnose(pieces, formats=FORMATS, down="", losses=0, seconds=None, **options
         seconds=seconds or 0.01 * max(1, len(pieces)),
         down=down,
         losses=losses,
+        imu_hz=dict.fromkeys(range(10), imu_hz),
     )
 
 
@@ -119,14 +121,23 @@ def test_silence_and_what_is_not_there():
 def test_damage_gaps_and_losses():
     half = [GOOD[0].replace(b"9", b"8") if k % 4 == 0 else GOOD[0] for k in range(100)]
     assert problem(half).startswith("12 % of the frames are damaged")  # one of the two lines
-    late = diagnose(GOOD[:3], seconds=4.0)
+    late = diagnose(GOOD[:3], seconds=4.0, imu_hz=0.75)
     assert late.ok  # a stream that comes seldom
     hearing = heard(GOOD)
     hearing.silent_until(5_000_000_000)
     each = link()
-    report = diagnose_link(each, hearing, FORMATS, seconds=5.0, down="", losses=2)
+    report = diagnose_link(
+        each, hearing, FORMATS, seconds=5.0, down="", losses=2, imu_hz={4: 100.0}
+    )
     assert report.problems[0].startswith("silent for 4.0 s")
     assert report.problems[1].startswith("lost 2 times while listening")
+
+
+def test_samples_of_another_rate_than_configured():
+    said = problem(GOOD, imu_hz=50.0)
+    assert said.startswith("node 1: 100 inertial samples a second, configured 50")
+    assert diagnose(GOOD, imu_hz=105.0).ok
+    assert diagnose(GOOD[:50], imu_hz=50.0).ok  # half a second does not tell
 
 
 def test_sequence_numbers_tell_what_is_missing_and_who_started_anew():

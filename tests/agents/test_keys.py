@@ -35,3 +35,13 @@ def test_keys_that_are_hit_together_are_all_heard_at_once(keyboard, keys, orders
 def test_nothing_beside_a_stop_counts():
     assert orders_of("acda q") == ["stop"]
     assert orders_of("") == []
+
+
+def test_nothing_counts_after_a_quit():
+    assert orders_of("aqa") == ["arm", "quit"]
+
+
+def test_without_any_input_no_key_is_pressed(monkeypatch):
+    monkeypatch.setattr(sys, "stdin", None)  # as where a shell has closed it
+    with key_by_key():
+        assert read_orders() == []

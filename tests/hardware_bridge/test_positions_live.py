@@ -232,3 +232,28 @@ def test_positions_are_asked_for_where_they_come():
 
 def test_all_is_loaded_before_a_drive():
     warm_up(parsed(config_text("tcp:mocap:4000", n=3)))
+
+
+def test_a_recording_stays_whatever_goes_wrong_at_the_end(tmp_path, monkeypatch):
+    """As a second Ctrl-C while everything is being closed."""
+    config, run = tmp_path / "swarm.toml", tmp_path / "run.rec"
+    config.write_text(config_text("file:mocap.jsonl"))
+    (tmp_path / "mocap.jsonl").write_bytes(lines_now())
+    bridge = Bridge(read_config(config), record=run)
+
+    def interrupted():
+        raise KeyboardInterrupt
+
+    bridge._stack.callback(interrupted)
+    bridge.feed.advance()
+    with pytest.raises(KeyboardInterrupt):
+        bridge.close()
+    assert run.stat().st_size > 0
+
+
+def test_a_line_may_hold_more_than_is_read():
+    swarm = LiveSwarm(parsed(config_text("tcp:mocap:4000")), 0)
+    more = line(node=1, pos=[1.0, 2.0, 3.0], header={"seq": 4})
+    torn = b'{"node": 2, "pos": [1.0, ' + line(node=2, pos=[4.0, 5.0, 6.0])
+    swarm.take(Chunk("links.mocap", S, more + torn))
+    assert sorted(swarm.intake.heard_ns) == [0, 1]

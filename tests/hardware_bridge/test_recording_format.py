@@ -261,7 +261,7 @@ def test_the_bytes_are_those_of_the_documentation(place):
     )
     recording = read_recording(path)
     assert recording.header.links == ("links.a",)
-    assert recording.header.utc_offset_ns == 10
+    assert recording.header.wall_ns - recording.header.monotonic_ns == 10
     assert plain(recording) == [(Kind.BYTES_IN, 0, 5, b"frame"), (Kind.TICK, 0, -7, b"")]
     assert recording.t_range_ns == (-7, 5)
     assert not recording.torn

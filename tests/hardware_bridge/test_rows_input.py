@@ -87,6 +87,9 @@ def written(tmp_path, rig, change):
     assert changed != text
     path = tmp_path / "swarm.toml"
     path.write_text(changed)
+    (tmp_path / "magnetometers.toml").write_text(
+        "format = 1\n[nodes.1]\nmag_offset_uT = [1.0, 2.0, 3.0]\n"
+    )
     return path
 
 
@@ -130,6 +133,21 @@ WRONG = {
         lambda t: t.replace("uncalibrated = true", 'files = ["gone.toml"]'), "calibration.files",
         "no file",
     ),
+    "calibration without ranges": (
+        lambda t: t.replace("uncalibrated = true", 'files = ["magnetometers.toml"]'),
+        "calibration: nothing about ranges", "uncalibrated_ranges = true",
+    ),
+    "nothing that tells headings": (
+        lambda t: t.replace('heading = "magnetic"', 'heading = "initial"'),
+        "nodes.1.initial_heading_rad: missing",
+    ),
+    "dimensions that are none": (
+        lambda t: t.replace("dimensions = 2", "dimensions = 4"), "expected 2 or 3, got 4",
+    ),
+    "a magnetometer that never measures": (
+        lambda t: t.replace("[nodes.1]", "[nodes.1]\nmag_hz = 0.0"), "nodes.1.mag_hz",
+    ),
+    "baud rate that is none": (lambda t: t.replace(N1, N1 + "\nbaud = 0", 1), "links.n1.baud"),
     "unknown format": (lambda t: t.replace(N1, 'format = "nmea"', 1), "links.n1.format"),
     "unknown driver": (lambda t: t.replace('driver = "relpos"', 'driver = "rc"'), "driver"),
     "car that cannot drive slowly": (

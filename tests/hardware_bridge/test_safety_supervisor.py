@@ -146,17 +146,25 @@ def test_pictures_that_were_overtaken_or_are_of_no_time_are_not_looked_at(drive)
     assert (drive.supervisor.report().speed > 0.0).all()
 
 
-@pytest.mark.parametrize(("order", "again"), [("stop", False), ("disarm", True), ("quit", True)])
+@pytest.mark.parametrize(("order", "again"), [("stop", False), ("disarm", True)])
 def test_orders(drive, order, again):
     drive.supervisor.take(Order(order))
     assert stands(drive.tick(100)) == [True, True]
-    assert drive.supervisor.quit == (order == "quit")
+    assert not drive.supervisor.quit
     assert (drive.arm() == []) == again
     if not again:
         drive.supervisor.take(Order("clear"))
         assert stands(drive.tick(100)) == [True, True]
         assert drive.arm() == []
     assert stands(drive.tick(5)) == [False, False]
+
+
+def test_after_quit_nothing_is_armed_again(drive):
+    drive.supervisor.take(Order("quit"))
+    assert drive.supervisor.quit
+    assert stands(drive.tick(100)) == [True, True]
+    drive.arm()
+    assert stands(drive.tick(100)) == [True, True]
 
 
 def test_unknown_orders_move_nothing_and_are_told(drive):

@@ -323,8 +323,11 @@ def test_antennas_are_turned_with_their_nodes():
 
 # Calibrations and their files
 
-number = st.floats(-50.0, 50.0)
-vector = st.tuples(number, number, number)
+
+def vectors(most):
+    return st.tuples(*[st.floats(-most, most)] * 3)
+
+
 small = st.floats(-0.2, 0.2)
 matrix = st.tuples(*[st.tuples(small, small, small)] * 3).map(
     lambda m: tuple(tuple(v + (r == c) for c, v in enumerate(row)) for r, row in enumerate(m))
@@ -332,10 +335,10 @@ matrix = st.tuples(*[st.tuples(small, small, small)] * 3).map(
 scales = st.tuples(*[st.floats(0.5, 2.0)] * 3)
 node = st.builds(
     NodeCalibration,
-    gyr_offset=st.none() | vector,
-    acc_offset=st.none() | vector,
+    gyr_offset=st.none() | vectors(1.0),
+    acc_offset=st.none() | vectors(5.0),
     acc_scale=st.none() | scales,
-    mag_offset=st.none() | vector,
+    mag_offset=st.none() | vectors(50.0),
     mag_matrix=st.none() | matrix,
 )
 ids = st.integers(0, 2**16)
@@ -343,7 +346,11 @@ calibrations = st.builds(
     Calibration,
     nodes=st.dictionaries(ids, node, max_size=4),
     ranges=st.none()
-    | st.builds(RangeCalibration, slope=st.floats(0.5, 2.0), offset=st.dictionaries(ids, number)),
+    | st.builds(
+        RangeCalibration,
+        slope=st.floats(0.5, 2.0),
+        offset=st.dictionaries(ids, st.floats(-10.0, 10.0)),
+    ),
 )
 
 
@@ -365,6 +372,10 @@ FAULTS = [
     ("format = 1\n[nodes.1]\nmag_matrix = [[0,0,0],[0,0,0],[0,0,0]]", "positive determinant"),
     ("format = 1\n[nodes.1]\nmag_matrix = [1, 1, 1]", "nodes.1.mag_matrix: expected three"),
     ("format = 1\n[nodes.1]\nacc_scale = [1, 1, 9]", "acc_scale: expected numbers from 0.5"),
+    ("format = 1\n[nodes.1]\nacc_offset_m_s2 = [500, 0, 0]", "expected numbers up to 5"),
+    ("format = 1\n[nodes.1]\ngyr_offset_rad_s = [0, 40, 0]", "expected numbers up to 1"),
+    ("format = 1\n[ranges]\nslope = 1\noffset_m = {1 = -180}", "ranges.offset_m.1: expected"),
+    ("a = " + 5000 * "[", "not TOML"),
     ("format = 1\nnodes = 3", "nodes: expected a table"),
     ("format = 1\n[ranges]\nslope = 0.0\noffset_m = {}", "ranges.slope: expected 0.5 to 2"),
     ("format = 1\n[ranges]\nslope = 1.0", "ranges.offset_m: expected a table"),

@@ -229,7 +229,7 @@ def test_round_trip_is_exact(tmp_path_factory, times, distance, number, power, m
     if mag:
         parts.append(MeasurementBlock.of_kind(Kind.MAG, t, zeros, np.full((n, 3), number)))
     log = Log(
-        name='odd "name"',
+        name='odd "name" \x7f\t',
         constellation=Constellation(
             nodes=(NodeConfig(id=4, initial_heading=number), NodeConfig(id=7)),
             dimensions=2,

@@ -47,6 +47,12 @@ FIELDS = {
 """Names in the file, with units, and in `NodeCalibration`."""
 
 
+MOST_OFFSET = {"gyr_offset_rad_s": 1.0, "acc_offset_m_s2": 5.0}
+"""Larger ones are other units, or a defect."""
+MOST_RANGE_OFFSET = 10.0
+"""[m] Likewise."""
+
+
 def calibration_toml(calibration: Calibration) -> str:
     """A calibration as text; `read_calibration` gives the same, to the last bit."""
     lines = [f"format = {FORMAT}"]
@@ -93,7 +99,7 @@ def parse_calibration(text: str, file: str) -> Calibration:
     """
     try:
         raw = tomllib.loads(text)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise ConfigError(f"{file}: not TOML ({error})") from error
     try:
         return _calibration(raw)
@@ -118,6 +124,9 @@ def _node(where: str, table: Any) -> NodeCalibration:
     for name, value in table.items():
         field = f"{where}.{name}"
         given[FIELDS[name]] = _matrix(field, value) if "matrix" in name else _vector(field, value)
+        most = MOST_OFFSET.get(name, MOST)
+        if "matrix" not in name and not all(abs(v) <= most for v in given[FIELDS[name]]):
+            raise ConfigError(f"{field}: expected numbers up to {most:g}, found {value!r}")
     if not all(0.5 <= s <= 2.0 for s in given.get("acc_scale", ())):
         raise ConfigError(
             f"{where}.acc_scale: expected numbers from 0.5 to 2, found {table['acc_scale']!r}"
@@ -132,7 +141,12 @@ def _ranges(table: dict[str, Any]) -> RangeCalibration:
         raise ConfigError(f"ranges.slope: expected 0.5 to 2, found {slope!r}")
     offset: dict[int, float] = {}
     for key, value in _table("ranges.offset_m", table.get("offset_m")).items():
-        offset[_id("ranges.offset_m", key, offset)] = _number(f"ranges.offset_m.{key}", value)
+        b = _number(f"ranges.offset_m.{key}", value)
+        if abs(b) > MOST_RANGE_OFFSET:
+            raise ConfigError(
+                f"ranges.offset_m.{key}: expected up to {MOST_RANGE_OFFSET:g} m, found {value!r}"
+            )
+        offset[_id("ranges.offset_m", key, offset)] = b
     return RangeCalibration(slope=slope, offset=offset)
 
 

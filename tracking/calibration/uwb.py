@@ -41,6 +41,9 @@ class UwbParams:
     """[-] Share of ranges that must agree."""
     max_slope_error: float = 0.1
     """[-] A slope farther from 1 is a mistake of units or of the truth."""
+    max_offset: float = 1.0
+    """[m] A larger offset is a delay that the radio was never told, or a mistake of the truth. Few
+    places of few nodes fit any mistake exactly, so that the residuals do not tell."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +106,12 @@ def calibrate_uwb(
     d, incidence = table.true[fit.inlier], fit.incidence
     nodes = np.nonzero(incidence.any(axis=0))[0]
     offset = {ids[n]: float(fit.offset[n]) for n in nodes}
+    for node, b in offset.items():
+        if abs(b) > p.max_offset:
+            raise CalibrationError(
+                f"node {node}: an offset of {b:.2f} m, expected within {p.max_offset:g} m: are the "
+                "true places right, and is the antenna delay of its radio set?"
+            )
     both = np.zeros(len(ids))
     both[nodes] = fit.offset[nodes]
     corrected = (table.measured - both[table.i] - both[table.j]) / fit.slope

@@ -37,7 +37,7 @@ def read_meta(path: Path) -> Meta:
         raise LogError(f"{path.parent}: no meta.toml, expected a log folder")
     try:
         raw = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError, RecursionError) as error:
         raise LogError(f"meta.toml: not TOML ({error})") from error
     if type(raw.get("format")) is not int or raw["format"] != FORMAT:
         raise LogError(f"meta.toml, format: expected {FORMAT}, found {raw.get('format')!r}")

@@ -96,7 +96,7 @@ def _meta(log: Log) -> str:
 
 def _quoted(text: str) -> str:
     escaped = text.replace("\\", "\\\\").replace('"', '\\"')
-    return '"' + "".join(ch if ch >= " " else f"\\u{ord(ch):04x}" for ch in escaped) + '"'
+    return '"' + "".join(ch if " " <= ch != "\x7f" else f"\\u{ord(ch):04x}" for ch in escaped) + '"'
 
 
 def _tables(log: Log) -> Iterable[tuple[str, Sequence[str], list[list[object]]]]:

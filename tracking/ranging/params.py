@@ -50,8 +50,11 @@ class SessionParams:
                 raise ConfigError(f"{name}: expected above 0 and at most 5, got {value}")
         for name in ("listen", "idle", "first_check", "check", "mute"):
             low, high = getattr(self, name)
-            if not 0.0 < low <= high <= 1e4:
-                raise ConfigError(f"{name}: expected 0 < low <= high, got {low}, {high}")
+            most = 1e4 if "check" in name else 5.0  # the others are ends of waits, told by stamps
+            if not 0.0 < low <= high <= most:
+                raise ConfigError(
+                    f"{name}: expected 0 < low <= high <= {most:g}, got {low}, {high}"
+                )
         if self.drop_after < 1:
             raise ConfigError(f"drop_after: expected at least 1, got {self.drop_after}")
         if not isinstance(self.antenna_delay, int):

@@ -212,6 +212,12 @@ def test_ids_out_of_range(id):
         Session(id, SessionParams(), boot=1)
 
 
+@pytest.mark.parametrize("name", ["listen", "idle", "mute", "takeover", "watchdog"])
+def test_no_wait_is_longer_than_stamps_tell_apart(name):
+    with pytest.raises(ConfigError, match=name):
+        SessionParams(**{name: 10.0 if name in ("takeover", "watchdog") else (10.0, 10.0)})
+
+
 def test_muted_by_its_own_id_it_comes_back():
     alone = Alone(id=3)
     alone.wait(0.5)
