@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from agents.child import end_with_parent
 from agents.compare.contender import Contender, find_entry
 from agents.compare.episode import run_episodes
 from agents.compare.setting import Setting
@@ -62,21 +63,28 @@ class HardwareDemoResult:
     @property
     def summary(self) -> dict[str, Any]:
         """The figures."""
-        late = self.t >= SETTLE
-        error = float(np.nanmean(self.error[late])) if late.any() else None
-        twin = float(np.nanmean(self.simulated[round(SETTLE / DECISION) :]))
+        error = _settled(self.error[self.t >= SETTLE], self.error)
+        twin = _settled(self.simulated[round(SETTLE / DECISION) :], self.simulated)
         return {
             **self.drive.summary,
             "result": "hardware-demo",
             "seed": self.seed,
             "formation_error": error,
             "simulated_error": twin,
-            "ratio": None if error is None else error / twin,
+            "ratio": None if error is None or twin is None else error / twin,
             "contacts": self.contacts,
             "simulated_contacts": self.simulated_contacts,
             "late_steps": self.late_steps,
             "virtual": self.virtual,
         }
+
+
+def _settled(late: F64, every: F64) -> float | None:
+    """Mean of what came after settling; at the end where a drive was over before; None for none."""
+    late = late[np.isfinite(late)]
+    if len(late) == 0:
+        late = every[np.isfinite(every)][-1:]
+    return float(late.mean()) if len(late) else None
 
 
 def error_ratio(results: Sequence[HardwareDemoResult]) -> Interval | None:
@@ -90,7 +98,7 @@ def error_ratio(results: Sequence[HardwareDemoResult]) -> Interval | None:
     """
     rows = [result.summary for result in results]
     ours = np.array([row["formation_error"] for row in rows], dtype=np.float64)
-    return ratio(ours, np.array([row["simulated_error"] for row in rows]))
+    return ratio(ours, np.array([row["simulated_error"] for row in rows], np.float64))
 
 
 def hardware_demo(
@@ -269,6 +277,7 @@ class _Emulation:
 
 def _emulate(options: EmulateOptions, place: Path, pipe: Connection) -> None:
     """What that process does, until it is interrupted."""
+    end_with_parent()
     try:
         result = emulate(
             folder=place,

@@ -10,11 +10,11 @@ from numba.extending import intrinsic
 
 from tracking.compiled import kernel, small_kernel
 
-BOX_FRICTION = 0.4
-"""[-] Of a movable box on the floor."""
-GRAVITY = 9.81
 REST = 1e-4
 """[m/s, rad/s] A box that is slower stands."""
+LASTS = 3
+"""[-] Steps for which the solver remembers a contact that is gone; what comes back then is not
+new."""
 
 
 def _call(returns, *arguments):
@@ -52,7 +52,7 @@ def solve(bodies, solver, e, dt):
         dt: [s]
     """
     calls = solver.calls[e]
-    put_bodies(bodies, solver, e, dt)
+    put_bodies(bodies, solver, e)
     calls.put_num = 0
     call_each(calls.each_body, calls.space, calls.put, calls.put_data)
     call_step(calls.step, calls.space, dt)
@@ -62,12 +62,13 @@ def solve(bodies, solver, e, dt):
     calls.met_num = 0
     call_each(calls.each_contact, calls.space, calls.tell, calls.met_data)
     count_contacts(bodies, solver, e, calls.met_num // solver.met.shape[2])
+    calls.fresh = 0
     calls.ready += 1
     calls.moves += 1
 
 
 @small_kernel
-def put_bodies(bodies, solver, e, dt):
+def put_bodies(bodies, solver, e):
     """Where everything is and what pushes it, in the order of the space."""
     rows = solver.bodies
     row = 0
@@ -79,28 +80,15 @@ def put_bodies(bodies, solver, e, dt):
                 rows[e, row, 6 + k] = bodies.wrench[e, n, k]
             row += 1
     for b in range(bodies.box_body.shape[1]):
-        if solver.boxes[e, b, 0] > 0.0:
+        if solver.movable[e, b]:
             for k in range(6):
                 rows[e, row, k] = bodies.box_body[e, b, k]
-            push_by_floor(bodies, solver, e, b, dt, row)
+            for k in range(6, 9):
+                rows[e, row, k] = 0.0
             row += 1
     # The room itself is a body, behind the others.
     for k in range(rows.shape[2]):
         rows[e, row, k] = 0.0
-
-
-@small_kernel
-def push_by_floor(bodies, solver, e, b, dt, row):
-    """Friction of the floor on a box, no more than what stops it."""
-    body, rows = bodies.box_body, solver.bodies
-    mass, inertia, arm = solver.boxes[e, b, 0], solver.boxes[e, b, 1], solver.boxes[e, b, 2]
-    grip = BOX_FRICTION * mass * GRAVITY
-    speed, spin = math.hypot(body[e, b, 3], body[e, b, 4]), abs(body[e, b, 5])
-    against = min(mass / dt, grip / speed) if speed > 0.0 else 0.0
-    rows[e, row, 6] = -against * body[e, b, 3]
-    rows[e, row, 7] = -against * body[e, b, 4]
-    against = min(inertia / dt, grip * arm / spin) if spin > 0.0 else 0.0
-    rows[e, row, 8] = -against * body[e, b, 5]
 
 
 @small_kernel
@@ -114,7 +102,7 @@ def take_bodies(bodies, solver, e):
                 bodies.body[e, n, k] = rows[e, row, k]
             row += 1
     for b in range(bodies.box_body.shape[1]):
-        if solver.boxes[e, b, 0] > 0.0:
+        if solver.movable[e, b]:
             body = bodies.box_body
             stands = True
             for k in range(6):
@@ -130,10 +118,28 @@ def take_bodies(bodies, solver, e):
 
 @small_kernel
 def count_contacts(bodies, solver, e, n_met):
-    """Add the contacts that are new to those that the cars began."""
+    """Add the contacts that are new to those that the cars began.
+
+    To a fresh space all are: of these, what touched just before does not count again. A car that
+    touches two things that are no cars, one of them anew, in that very step goes for one that
+    touches on.
+    """
+    n_cars, tick, fresh = bodies.contacts.shape[1], bodies.tick[e], solver.calls[e].fresh
     for k in range(n_met):
-        if solver.met[e, k, 2] != 0:
-            for n in range(bodies.contacts.shape[1]):
-                number = solver.car_ids[e, n]
-                if number != 0 and number in (solver.met[e, k, 0], solver.met[e, k, 1]):
+        first = find_car(solver, e, n_cars, solver.met[e, k, 0])
+        second = find_car(solver, e, n_cars, solver.met[e, k, 1])
+        for n, other in ((first, second), (second, first)):
+            if n < n_cars:
+                known = fresh and tick - bodies.touched[e, n, other] <= LASTS
+                if solver.met[e, k, 2] != 0 and not known:
                     bodies.contacts[e, n] += 1.0
+                bodies.touched[e, n, other] = tick
+
+
+@small_kernel
+def find_car(solver, e, n_cars, number):
+    """Which car a body of the solver is; `n_cars` for what is none."""
+    for n in range(n_cars):
+        if solver.car_ids[e, n] != 0 and solver.car_ids[e, n] == number:
+            return n
+    return n_cars

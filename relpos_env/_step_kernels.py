@@ -114,7 +114,7 @@ def run_steps(
 
 @small_kernel
 def push_cars(bodies, speed, steering, dt, e):
-    """Forces on the cars; their velocities are kept where accelerations will be."""
+    """Forces on the cars; velocities are kept where accelerations will be, likewise headings."""
     for n in range(bodies.body.shape[1]):
         if bodies.present[e, n]:
             drive_car(
@@ -123,18 +123,20 @@ def push_cars(bodies, speed, steering, dt, e):
             )  # fmt: skip
         bodies.accel[e, n, 0] = bodies.body[e, n, 3]
         bodies.accel[e, n, 1] = bodies.body[e, n, 4]
+        bodies.turn[e, n] = bodies.body[e, n, 2]
 
 
 @small_kernel
 def sense(bodies, sensors, radio, scenes, dt, events, e):
     """All that the nodes of an environment measure in a step, after it."""
-    body, drive, accel = bodies.body, bodies.drive, bodies.accel
+    body, drive, accel, turn = bodies.body, bodies.drive, bodies.accel, bodies.turn
     tick, step = bodies.tick[e], bodies.done[e]
     t = tick * dt
     k = events.used[e]
     for n in range(body.shape[1]):
         accel[e, n, 0] = (body[e, n, 3] - accel[e, n, 0]) / dt
         accel[e, n, 1] = (body[e, n, 4] - accel[e, n, 1]) / dt
+        turn[e, n] = (body[e, n, 2] - turn[e, n]) / dt
         heading, roll, pitch = body[e, n, 2], drive[e, n, ROLL], drive[e, n, PITCH]
         events.pose[e, step, n, 0] = body[e, n, 0]
         events.pose[e, step, n, 1] = body[e, n, 1]
@@ -150,8 +152,7 @@ def sense(bodies, sensors, radio, scenes, dt, events, e):
         forward = c * accel[e, n, 0] + s * accel[e, n, 1]
         left = c * accel[e, n, 1] - s * accel[e, n, 0]
         truth = felt_on_car(
-            body[e, n, 5], forward, left, roll, pitch, drive[e, n, ROLL_RATE],
-            drive[e, n, PITCH_RATE],
+            turn[e, n], forward, left, roll, pitch, drive[e, n, ROLL_RATE], drive[e, n, PITCH_RATE],
         )  # fmt: skip
         velocity = c * body[e, n, 3] + s * body[e, n, 4]
         at = (body[e, n, 0], body[e, n, 1])

@@ -15,6 +15,8 @@ from relpos_env.vehicle import CAR, car_record
 Array = NDArray[Any]
 NOWHERE = 1e6
 """[m]"""
+LONG_AGO = -(1 << 40)
+"""[-] A step that never was."""
 
 
 class Bodies(NamedTuple):
@@ -28,12 +30,17 @@ class Bodies(NamedTuple):
     """Force x, y [N] and torque [N m], (env, car, 3)."""
     accel: Array
     """Mean acceleration over the last step, world frame, (env, car, 2) [m/s2]."""
+    turn: Array
+    """Mean yaw rate over the last step, (env, car) [rad/s]."""
     present: Array
     """The car is in the room, (env, car)."""
     powered: Array
     """Its tracker has power, (env, car)."""
     contacts: Array
     """Contacts that each car began in this decision, (env, car)."""
+    touched: Array
+    """Step in which each car last touched another, or at the end what is no car,
+    (env, car, car + 1)."""
     cars: Array
     """CAR, (env)."""
     size: Array
@@ -62,9 +69,11 @@ def make_bodies(n_envs: int, n_cars: int, n_boxes: int) -> Bodies:
         drive=np.zeros((e, n, N_DRIVE)),
         wrench=np.zeros((e, n, 3)),
         accel=np.zeros((e, n, 2)),
+        turn=np.zeros((e, n)),
         present=np.zeros((e, n), dtype=bool),
         powered=np.zeros((e, n), dtype=bool),
         contacts=np.zeros((e, n)),
+        touched=np.full((e, n, n + 1), LONG_AGO, dtype=np.int64),
         cars=np.zeros(e, dtype=CAR),
         size=np.zeros((e, 2)),
         room=np.zeros((e, 2)),
@@ -86,8 +95,9 @@ def place_bodies(b: Bodies, env: int, episode: Episode, room: tuple[float, float
         episode: What it is made of.
         room: Width and depth [m].
     """
-    for array in (b.body, b.drive, b.wrench, b.accel, b.contacts, b.boxes, b.box_body):
+    for array in (b.body, b.drive, b.wrench, b.accel, b.turn, b.contacts, b.boxes, b.box_body):
         array[env] = 0.0
+    b.touched[env] = LONG_AGO
     # A place that no box has taken must be in nobody's way.
     b.boxes[env, :, :2] = NOWHERE
     b.body[env, :, :3] = episode.start

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import pymunk
@@ -9,13 +10,16 @@ import pymunk
 from relpos_env.scenarios.obstacle import Obstacle
 from relpos_env.vehicle import CarParams
 from tracking.arrays import I64
+from tracking.geometry import GRAVITY
 
 N_WALLS = 4
 FRICTION, ELASTICITY = 0.3, 0.2
-"""[-] Between any two bodies."""
+"""[-] Between any two bodies. The solver multiplies what the two shapes have."""
+BOX_FRICTION = 0.4
+"""[-] Of a movable box on the floor."""
 BOX_DENSITY = 8.0
 """[kg/m2] Of a movable box, over its floor area: cardboard with little in it. The motor of a car
-keeps one of up to 0.4 m moving; a larger one needs a run-up."""
+moves one of up to 0.4 m; what is larger yields to a blow only."""
 
 
 class Room:
@@ -50,20 +54,30 @@ class Room:
             self.car_ids[n] = body.id
             space.add(body)
             self._add(pymunk.Poly.create_box(body, (car.length, car.width), radius=0.01))
-        self.movable: dict[int, tuple[float, float, float]] = {}
-        """Number of a box that can be pushed to its mass [kg], inertia [kg m2] and mean radius
-        [m]."""
+        self.movable: list[int] = []
+        """Numbers of the boxes that can be pushed."""
         for k, box in enumerate(boxes):
             if box.movable:
-                mass = BOX_DENSITY * box.width * box.height
-                inertia = mass * (box.width**2 + box.height**2) / 12.0
-                self.movable[k] = (mass, inertia, 0.25 * (box.width + box.height))
-                body = pymunk.Body(mass, inertia)
-                space.add(body)
-                self._add(pymunk.Poly.create_box(body, (box.width, box.height)))
+                self.movable.append(k)
+                self._add_movable(box)
             else:
                 self._add(pymunk.Poly(space.static_body, [tuple(c) for c in box.corners()]))
 
+    def _add_movable(self, box: Obstacle) -> None:
+        mass = BOX_DENSITY * box.width * box.height
+        body = pymunk.Body(mass, mass * (box.width**2 + box.height**2) / 12.0)
+        self.space.add(body)
+        self._add(pymunk.Poly.create_box(body, (box.width, box.height)))
+        # The floor holds it in place by up to so much, and turns nothing back: joints that yield.
+        # As forces against the speed of the last step it would let every push creep.
+        grip, floor = BOX_FRICTION * mass * GRAVITY, self.space.static_body
+        stand = pymunk.PivotJoint(floor, body, (0.0, 0.0), (0.0, 0.0))
+        turn = pymunk.GearJoint(floor, body, 0.0, 1.0)
+        stand.max_force, turn.max_force = grip, grip * 0.25 * (box.width + box.height)
+        for joint in (stand, turn):
+            joint.max_bias = 0.0
+            self.space.add(joint)
+
     def _add(self, shape: pymunk.Shape) -> None:
-        shape.friction, shape.elasticity = FRICTION, ELASTICITY
+        shape.friction, shape.elasticity = math.sqrt(FRICTION), math.sqrt(ELASTICITY)
         self.space.add(shape)

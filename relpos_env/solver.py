@@ -19,7 +19,7 @@ from pymunk._chipmunk_cffi import ffi, lib
 from pymunk.batch import ArbiterFields, BodyFields
 
 from relpos_env.room import N_WALLS, Room
-from tracking.arrays import F64, I64
+from tracking.arrays import F64, I64, Bool
 
 N_STATE, N_INPUT, N_TOUCH = 6, 9, 3
 """Numbers of a body that is read, of one that is written, and of a contact."""
@@ -34,7 +34,8 @@ _WAYS = ("put", "got", "met")
 SOLVER = np.dtype(
     [
         ("ready", "i8"),  # the step that the space can make next; -1 for none
-        ("moves", "i8"),  # steps that it has made
+        ("moves", "i8"),  # steps that were made, by whichever space
+        ("fresh", "i8"),  # 1: the space has made none
         ("space", "u8"),
         # Addresses of functions.
         ("step", "u8"),
@@ -67,9 +68,8 @@ class Solver(NamedTuple):
     """The two bodies of a contact, and whether it is new, (env, contact, N_TOUCH)."""
     car_ids: I64
     """The solver's number of each car, 0 for those that it does not have, (env, car)."""
-    boxes: F64
-    """Mass [kg], inertia [kg m2] and mean radius [m] of boxes, zeros for those that stand fast,
-    (env, box, 3)."""
+    movable: Bool
+    """Boxes that can be pushed, (env, box)."""
 
 
 def make_solver(n_envs: int, n_cars: int, n_boxes: int) -> Solver:
@@ -83,7 +83,7 @@ def make_solver(n_envs: int, n_cars: int, n_boxes: int) -> Solver:
         moved=np.zeros((n_envs, n_bodies + 2, N_STATE)),
         met=np.zeros((n_envs, n_met, N_TOUCH), dtype=np.int64),
         car_ids=np.zeros((n_envs, n_cars), dtype=np.int64),
-        boxes=np.zeros((n_envs, n_boxes, 3)),
+        movable=np.zeros((n_envs, n_boxes), dtype=bool),
     )
     solver.calls["ready"] = -1
     return solver
@@ -99,7 +99,7 @@ def connect(solver: Solver, env: int, room: Room, tick: int) -> None:
         tick: The step that is to be made first.
     """
     calls = solver.calls[env]
-    calls["ready"], calls["space"] = tick, _address(room.space._space)
+    calls["ready"], calls["space"], calls["fresh"] = tick, _address(room.space._space), 1
     for name, function in _FUNCTIONS.items():
         calls[name] = function
     start = solver.calls.ctypes.data + env * solver.calls.strides[0]
@@ -109,9 +109,8 @@ def connect(solver: Solver, env: int, room: Room, tick: int) -> None:
     solver.car_ids[env] = 0
     for car, number in room.car_ids.items():
         solver.car_ids[env, car] = number
-    solver.boxes[env] = 0.0
-    for box, numbers in room.movable.items():
-        solver.boxes[env, box] = numbers
+    solver.movable[env] = False
+    solver.movable[env, room.movable] = True
 
 
 def disconnect(solver: Solver, env: int) -> None:

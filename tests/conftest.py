@@ -30,6 +30,14 @@ def data() -> Path:
     return folder
 
 
+@pytest.fixture(scope="session", autouse=True)
+def logs_of_stable_baselines(tmp_path_factory):
+    """It makes a folder for every learner that is given no logger."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SB3_LOGDIR", str(tmp_path_factory.mktemp("sb3")))
+        yield
+
+
 class Group:
     """Nodes on circles of their own, with exact measurements and the truth."""
 

@@ -47,7 +47,7 @@ def demo(
     """Cars keep a formation on estimated relative positions; writes report.html."""
     from agents.demo import SETTLE
     from agents.demo import demo as run
-    from agents.output import write_results
+    from agents.output import check_folder, write_results
     from agents.report.demo_report import demo_report
     from agents.report.page import metres
 
@@ -61,6 +61,7 @@ def demo(
         raise UsageError(f"--proximity: expected 0 to 32, got {names['proximity']}")
     if names["policy"] is not None and names["controller"] is not None:
         raise UsageError("--policy: expected either a policy or a --controller, got both")
+    check_folder(out, ["report.html"])
     with progress_bar(f"{names['task'] or names['policy'] or 'ring'}, seed {seed}") as report:
         result = run(seconds=seconds, seed=seed, cars=cars, progress=report, **names)
     write_results(out, {"report.html": demo_report(result)})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 from typing import Any
 
@@ -74,6 +75,7 @@ def demo_hardware(
     if not 1 <= drives <= 1000:
         raise UsageError(f"--drives: expected 1 to 1000, got {drives}")
     check_folder(out, ["report.html"])
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # nothing is left behind
     plan = FaultPlan() if faults is None else read_faults(faults)
     results = []
     for each in range(seed, seed + drives):

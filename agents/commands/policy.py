@@ -46,7 +46,10 @@ def show(wanted: str, as_json: bool) -> None:
     if as_json:
         emit_json([json.loads(card.to_json())])
         return
-    print_table(f"Policy {card.name}", ["", "value"], _facts(card))
+    click.echo(f"Policy {card.name}\n")
+    for key, value in _facts(card):
+        click.echo(f"  {key}: {value}")
+    click.echo()
     rows = [
         [f"{r['first']} to {r['last']}", r["name"], r["unit"], f"{r['low']:g} to {r['high']:g}"]
         for r in card.layout.index

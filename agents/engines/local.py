@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import multiprocessing
-import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 
+from agents.child import follow_parent
 from agents.engines.base import Result
 from agents.errors import UsageError
 
@@ -28,7 +28,7 @@ def local(
         return
     # New processes, since a forked one would share the threads of compiled libraries.
     spawn = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(jobs, mp_context=spawn, initializer=_leave_interrupts)
+    pool = ProcessPoolExecutor(jobs, mp_context=spawn, initializer=follow_parent)
     try:
         waiting = {pool.submit(function, *task): n for n, task in enumerate(tasks)}
         for future in as_completed(waiting):
@@ -40,8 +40,3 @@ def local(
         ) from error
     finally:
         pool.shutdown(cancel_futures=True)
-
-
-def _leave_interrupts() -> None:
-    """An interrupt from the keyboard is the business of the first process."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)

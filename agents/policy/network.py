@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import os
 from functools import cache
 from typing import NamedTuple
 
-import onnxruntime
+# It would else tell its maker about this machine, and leave an identifier in the home folder.
+os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
 
-from agents.policy.errors import PolicyError
-from agents.policy.graph import check_graph
-from relpos_env.interface.observations.base import F32
+import onnxruntime  # noqa: E402
+
+from agents.policy.errors import PolicyError  # noqa: E402
+from agents.policy.graph import check_graph  # noqa: E402
+from relpos_env.interface.observations.base import F32  # noqa: E402
 
 INPUT, OUTPUT = "observations", "actions"
 N_ACTIONS = 2

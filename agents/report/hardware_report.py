@@ -36,8 +36,10 @@ def demo_rows(results: Sequence[HardwareDemoResult]) -> list[list[str]]:
             ]
         )
     if len(results) > 1:
-        ours = float(np.nanmean([r.summary["formation_error"] for r in results]))
-        theirs = float(np.mean([r.summary["simulated_error"] for r in results]))
+        ours, theirs = (
+            float(np.nanmean(np.array([r.summary[key] for r in results], dtype=np.float64)))
+            for key in ("formation_error", "simulated_error")
+        )
         found = error_ratio(results)
         ends = "" if found is None or found.ends is None else "{:.2f} to {:.2f}".format(*found.ends)
         rows.append(["mean", metres(ours), metres(theirs), f"{ours / theirs:.2f}", "", ""])

@@ -7,6 +7,7 @@ from typing import Literal
 
 from agents.settings import number
 
+MOST_SEED = 2147483647
 FORMAT = 5
 """Version of the run folder; another one is refused."""
 
@@ -94,7 +95,7 @@ class TrainConfig:
     runs: int = number(1, 1, 64)
     """Runs side by side, with seeds from `seed` on, each in a process of its own; the best policy
     of them is kept."""
-    seed: int = number(0, 0, 2147483647)
+    seed: int = number(0, 0, MOST_SEED)
     """Same seed, same weights, bit for bit on one machine with equal versions and threads."""
     leg: int = number(40, 1, 10000)
     """Updates from checkpoint to checkpoint; each leg begins with new episodes."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from agents.errors import UsageError
 from agents.policy.layout import Layout
-from agents.train.config import TrainConfig
+from agents.train.config import MOST_SEED, TrainConfig
 from agents.train.rooms import Rooms
 from relpos_env.config import FormationConfig, Parts
 from relpos_env.sb3_vec_env import FormationVecEnv
@@ -63,6 +63,11 @@ def check_environments(config: TrainConfig) -> tuple[Parts, ...]:
         UsageError: More cars than the policy has slots for, or no scenario at all.
         EnvError: An environment that cannot be.
     """
+    if config.seed + config.runs - 1 > MOST_SEED:
+        raise UsageError(
+            f"--seed: expected at most {MOST_SEED - config.runs + 1} with {config.runs} runs, "
+            f"got {config.seed}"
+        )
     names, others = config.env.scenarios, config.choice_scenarios
     if not names:
         raise UsageError("--scenarios: expected at least one")

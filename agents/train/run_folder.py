@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
 
@@ -45,6 +45,9 @@ class RunFolder:
         Raises:
             UsageError: The folder is not new or empty, or cannot be written to.
         """
+        # A kill in this very moment has left no more than a part of its first file.
+        with suppress(OSError):
+            self._beside(CONFIG).unlink()
         check_new(self.path)
         record = {"format": FORMAT, "layout": layout_of(config).digest, "config": to_json(config)}
         try:
@@ -130,13 +133,17 @@ class RunFolder:
                 f"--resume {self.path}"
             ) from error
 
+    def _beside(self, name: str) -> Path:
+        """Where a file is written before it is moved in place."""
+        return self.path / f".{name}.new"
+
     def _write(self, name: str, data: bytes) -> None:
         """Replace a file, or leave it as it is.
 
         Raises:
             OSError: It cannot be written.
         """
-        path, scratch = self.path / name, self.path / f".{name}.new"
+        path, scratch = self.path / name, self._beside(name)
         try:
             with scratch.open("wb") as file:
                 file.write(data)

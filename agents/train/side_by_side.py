@@ -8,14 +8,13 @@ different seeds, of which the best is kept.
 from __future__ import annotations
 
 import multiprocessing
-import os
-import signal
-import threading
+import traceback
 from collections.abc import Callable, Sequence
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any
 
+from agents.child import follow_parent
 from agents.errors import UsageError
 from agents.train.config import TrainConfig
 from agents.train.run_folder import RunFolder
@@ -83,9 +82,7 @@ def train_side_by_side(
 
 def _run(connection: Connection, config: TrainConfig, folder: Path) -> None:
     """One run, in its process: tells every leg, then the result or what went wrong."""
-    # An interrupt from the keyboard is the business of the first process.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    follow_parent()
     begun = RunFolder(folder).exists()
     try:
         result = train(
@@ -95,16 +92,9 @@ def _run(connection: Connection, config: TrainConfig, folder: Path) -> None:
         )
     except (UsageError, EnvError) as error:
         connection.send(error)
+    except Exception as error:
+        # Whatever else it is may not be one that can be sent; where it began is told here.
+        traceback.print_exc()
+        connection.send(UsageError(f"{folder}: {type(error).__name__}: {error}"))
     else:
         connection.send(result)
-
-
-def _end_with_parent() -> None:
-    """End this process when the one that began it is gone, even killed.
-
-    It would else go on for a leg, and write into a run that somebody has taken up again.
-    """
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-    wait([parent.sentinel])
-    os._exit(1)

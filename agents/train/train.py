@@ -19,6 +19,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
 from torch import Tensor
 
+from agents.errors import UsageError
 from agents.train.config import TrainConfig
 from agents.train.environments import check_environments, layout_of, make_rooms
 from agents.train.evaluation import Evaluation
@@ -76,7 +77,16 @@ def train(
         if learner is None or learner.level != level:
             learner = _Learner.begin(config, level, logger, tensors, state.frames, learner)
         with run.writing():
-            run_leg(learner.model, config, state.legs)
+            try:
+                run_leg(learner.model, config, state.legs)
+            except ValueError as error:
+                # torch refuses distributions of what is no number.
+                if all(bool(p.isfinite().all()) for p in learner.model.policy.parameters()):
+                    raise
+                raise UsageError(
+                    f"{folder}: diverged in leg {state.legs + 1}, its weights are no numbers any "
+                    "more: expected a smaller --learning-rate or --entropy"
+                ) from error
         measured = evaluation.run(learner.model.policy)
         state = state.after_leg(
             int(learner.model.num_timesteps), time.perf_counter() - began, level, measured

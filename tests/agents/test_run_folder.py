@@ -12,7 +12,7 @@ from stable_baselines3.common.logger import TensorBoardOutputFormat
 
 from agents.errors import UsageError
 from agents.train.export import export_policy
-from agents.train.run_folder import CONFIG, LAST
+from agents.train.run_folder import CONFIG, LAST, RunFolder
 from agents.train.train import train
 
 
@@ -58,6 +58,17 @@ def test_runs_that_are_none_are_refused(tmp_path, text, said):
     (tmp_path / CONFIG).write_text(text)
     with pytest.raises(UsageError, match=said):
         train(None, tmp_path)
+
+
+def test_what_a_kill_left_of_the_first_file_is_in_nobodys_way(tmp_path):
+    (tmp_path / f".{CONFIG}.new").write_text("{")
+    RunFolder(tmp_path).create(small())
+    assert RunFolder(tmp_path).config() == small()
+
+
+def test_weights_that_are_no_numbers_any_more_are_told(tmp_path):
+    with pytest.raises(UsageError, match=r"diverged in leg \d.*--learning-rate"):
+        train(small(learning_rate="1", entropy="1", epochs="20"), tmp_path / "run")
 
 
 def test_a_run_on_another_observation_layout_is_refused(run, tmp_path):

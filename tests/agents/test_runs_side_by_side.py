@@ -188,6 +188,12 @@ def test_a_damaged_choice_is_refused(tmp_path, text):
     assert read_choice(tmp_path / "none") is None
 
 
+def test_seeds_of_all_runs_are_looked_at_first(tmp_path):
+    with pytest.raises(UsageError, match="--seed: expected at most 2147483646 with 2 runs"):
+        train_policy(small(runs="2", seed="2147483647"), tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
 def test_what_cannot_be_chosen_is_refused_before_any_training(tmp_path):
     with pytest.raises(UsageError, match="--choice-episodes: expected at least 2"):
         train_policy(small(runs="2", choice_episodes="1"), tmp_path / "run")

@@ -8,7 +8,7 @@ import pytest
 from pymunk.batch import BodyFields, Buffer, get_space_bodies, set_space_bodies
 
 from relpos_env import solver as solver_module
-from relpos_env._contact_kernels import BOX_FRICTION, GRAVITY, REST, solve
+from relpos_env._contact_kernels import REST, solve
 from relpos_env.bodies import make_bodies, place_bodies
 from relpos_env.group import Group
 from relpos_env.room import Room
@@ -46,20 +46,11 @@ class Plain:
                 self.contacts[car] += shape.body is not None and shape.body.id == number
 
     def step(self, body, wrench, box_body):
-        movable = list(self.room.movable)
+        movable = self.room.movable
         rows = np.zeros((len(CARS) + len(movable) + 1, 9))
         rows[: len(CARS)] = np.hstack([body[CARS], wrench[CARS]])
         for row, box in zip(rows[len(CARS) :], movable, strict=False):
             row[:6] = box_body[box]
-            mass, inertia, arm = self.room.movable[box]
-            grip = BOX_FRICTION * mass * GRAVITY
-            speed, spin = np.hypot(*row[3:5]), abs(row[5])
-            if speed > 0.0:
-                row[6:8] = -min(mass / DT, grip / speed) * row[3:5]
-            if spin > 1e-300:
-                row[8] = -min(inertia / DT, grip * arm / spin) * row[5]
-            elif spin > 0.0:
-                row[8] = -inertia / DT * row[5]
         self.inbox.set_float_buf(rows)
         set_space_bodies(self.room.space, INPUT, self.inbox)
         self.room.space.step(DT)
