@@ -70,7 +70,9 @@ def simulate(
         chosen = chosen.with_cars(cars)
     log = record(chosen, seconds=seconds, seed=seed, progress=progress)
     if channel is not None or antenna_delay is not None:
-        place = f"channel {channel or 'of the scenario'}, antenna delays {antenna_delay or 0:g} m"
+        place = f"channel {channel or 'of the scenario'}"
+        if antenna_delay is not None:
+            place += f", antenna delays {antenna_delay:g} m"
         log = replace(log, source=f"{log.source}, {place}")
     if out is not None:
         write_log(out, log)

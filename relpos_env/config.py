@@ -29,6 +29,9 @@ KINDS: dict[str, tuple[type, ...]] = {
     "params": (TrackerParams, type(None)),
     "operator": (OperatorSimParams,),
     "weights": (Mapping, type(None)),
+    "end_on_collision": (bool,),
+    "filter": (str,),
+    "task": (str,),
 }
 """What arguments that are no names or numbers have to be."""
 
@@ -99,7 +102,7 @@ class FormationConfig:
             scenario = scenario.at_level(whole_number("level", self.level, 0, 4))
         n_cars = self.n_cars
         if n_cars is None:
-            n_cars = max(scenario.n_cars, *(scenario.randomisation.n_cars or (0,)))
+            n_cars = scenario.most_cars
         else:
             n_cars = whole_number("n_cars", n_cars, 2, MOST_CARS)
             scenario = scenario.with_cars(n_cars)

@@ -20,6 +20,7 @@ from relpos_env.loop import TrackedSwarm
 from relpos_env.recording import Recording
 from relpos_env.render.film import Film, check_render_mode
 from relpos_env.scenarios import Scenario
+from relpos_env.tasks.options import flag
 from tracking.arrays import F64
 from tracking.log import Log
 
@@ -51,7 +52,7 @@ class FormationEnv(CarsEnv):
         check_render_mode(render_mode)
         self.render_mode = render_mode
         self._parts = parts = configure(arguments)
-        self._record = record
+        self._record = flag("record", record)
         self._formation = Formation(parts)
         history = parts.config.history
         super().__init__(

@@ -10,7 +10,7 @@ from relpos_env.errors import EnvError
 Entry = TypeVar("Entry")
 
 
-def look_up(registry: Mapping[str, Entry], name: str, argument: str) -> Entry:
+def look_up(registry: Mapping[str, Entry], name: object, argument: str) -> Entry:
     """The entry of a name.
 
     Args:
@@ -21,6 +21,6 @@ def look_up(registry: Mapping[str, Entry], name: str, argument: str) -> Entry:
     Raises:
         EnvError: No entry of that name.
     """
-    if name not in registry:
+    if not isinstance(name, str) or name not in registry:
         raise EnvError(f"{argument}: expected one of {', '.join(registry)}, got {name!r}")
     return registry[name]

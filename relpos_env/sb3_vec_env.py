@@ -16,10 +16,8 @@ from relpos_env.interface.observations import space_of
 from relpos_env.interface.observations.base import F32
 from relpos_env.render.film import Film, check_render_mode
 from relpos_env.sb3_seats import SharedSeats
+from relpos_env.tasks.options import flag
 from tracking.arrays import F64, Bool
-
-_NOTHING: dict[str, Any] = {}
-_IDLE: dict[str, Any] = {"active": False}
 
 
 class FormationVecEnv(SharedSeats):
@@ -29,7 +27,8 @@ class FormationVecEnv(SharedSeats):
     environment is over or its car leaves for good; what it saw last is then in
     ``infos[seat]["terminal_observation"]``, and ``TimeLimit.truncated`` says whether it only
     ended. The seat of a car that is not there sees zeros and gets no reward, and its info has
-    ``active`` False.
+    ``active`` False; it is done when its car leaves and not again before one sits there, so
+    whoever counts steps from done to done counts those of empty seats with the next episode.
     """
 
     def __init__(
@@ -62,7 +61,7 @@ class FormationVecEnv(SharedSeats):
         self._commands: tuple[F64, F64] | None = None
         self._next_seeds: list[int | None] = [None] * n_envs
         self._begun = False
-        self.with_truth = with_truth
+        self.with_truth = flag("with_truth", with_truth)
         space = space_of(self._parts.mode.fields, self._parts.config.history)
         if with_truth:
             more = np.full(N_TRUTH * self.n_cars, np.inf, np.float32)
@@ -75,7 +74,7 @@ class FormationVecEnv(SharedSeats):
         return self.formation.active.ravel()
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
-        """Seed all environments, from the next reset on; None lets chance decide."""
+        """Seed all environments, from the next reset on; None leaves their generators alone."""
         if seed is not None:
             n = self.formation.n_envs
             self._next_seeds = [int(seed) + k for k in range(n)]
@@ -98,7 +97,7 @@ class FormationVecEnv(SharedSeats):
             self.formation.begin(env)
         self._next_seeds = [None] * self.formation.n_envs
         self._begun = True
-        self.reset_infos = [_NOTHING] * self.num_envs
+        self.reset_infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         self._film.forget()
         self._show()
         return self._observations()
@@ -127,10 +126,10 @@ class FormationVecEnv(SharedSeats):
         rewards = f.rewards.ravel().astype(np.float32)
         over = f.terminated | f.truncated
         dones = ((was_active | f.active) & over[:, None] | f.left).ravel()
-        infos = [_NOTHING] * self.num_envs
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         if not f.active.all():
             for seat in np.nonzero(~f.active.ravel())[0]:
-                infos[seat] = _IDLE
+                infos[seat] = {"active": False}
         if dones.any():
             last, ended = self._observations(), np.repeat(f.terminated, self.n_cars)
             for seat in np.nonzero(dones)[0]:

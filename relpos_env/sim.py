@@ -30,7 +30,7 @@ class Simulation:
             rng: A child of it is for whoever drives: `driver_rng`.
             seconds: Length of the episode.
         """
-        n = max(scenario.n_cars, *(scenario.randomisation.n_cars or (0,)))
+        n = scenario.most_cars
         self.scenario = scenario
         self.swarm = Swarm(scenario, n, n_steps=round(DECISION / DT))
         episode, group, self.driver_rng = rng.spawn(3)

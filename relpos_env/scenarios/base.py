@@ -65,6 +65,12 @@ class Scenario:
         check_scenario(self)
 
     @property
+    def most_cars(self) -> int:
+        """So many cars can be there at a time."""
+        drawn = self.randomisation.n_cars
+        return self.n_cars if drawn is None else drawn[1]
+
+    @property
     def max_boxes(self) -> int:
         """So many obstacles an episode can have."""
         return len(self.obstacles) + self.randomisation.obstacles[1]

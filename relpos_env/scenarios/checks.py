@@ -53,6 +53,8 @@ def _check_room(s: Scenario) -> None:
     for axis, side in zip(s.ring, s.room, strict=True):
         if not 0.0 < axis < 0.5 * side:
             raise EnvError(f"ring: expected above 0 and below {0.5 * side:g} m, got {axis}")
+    if not isinstance(s.obstacles, tuple):
+        raise EnvError(f"obstacles: expected a tuple of them, got {s.obstacles!r}")
     if len(s.obstacles) > MOST_OBSTACLES:
         raise EnvError(f"obstacles: expected at most {MOST_OBSTACLES}, got {len(s.obstacles)}")
     for k, o in enumerate(s.obstacles):

@@ -12,7 +12,9 @@ formation: that must come from the cars' own estimates.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from numbers import Real
 from typing import Protocol
 
 import numpy as np
@@ -48,14 +50,18 @@ class OperatorSimParams:
     def __post_init__(self) -> None:
         for name in ("gain", "reaction", "position_std", "max_trim"):
             value = getattr(self, name)
-            if not (np.isfinite(value) and value >= 0.0):
+            if not (_is_number(value) and value >= 0.0):
                 raise EnvError(f"operator {name}: expected at least 0, finite, got {value!r}")
         for name in ("position_time", "max_speed"):
             value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0.0):
+            if not (_is_number(value) and value > 0.0):
                 raise EnvError(f"operator {name}: expected more than 0, finite, got {value!r}")
         if self.reaction > 5.0:
             raise EnvError(f"operator reaction: expected at most 5 s, got {self.reaction:g}")
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
 
 
 class Seen(Protocol):

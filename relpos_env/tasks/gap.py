@@ -76,10 +76,12 @@ class Gap(Task):
             self._way: F64 = np.array([(x - APPROACH, y), (x + APPROACH, y), middle])
         else:
             self._way = points("waypoints", waypoints, 2)
-            if np.any(np.abs(self._way) > half - MARGIN) or self._way[-1, 0] < behind + MARGIN:
+            before = gap.x - 0.5 * gap.thickness - MARGIN
+            inside = np.all(np.abs(self._way) <= half - MARGIN)
+            if not inside or self._way[0, 0] > before or self._way[-1, 0] < behind + MARGIN:
                 raise EnvError(
-                    "waypoints: expected points in the room, the last one behind the wall, "
-                    f"at least {MARGIN} m from walls"
+                    "waypoints: expected points in the room, the first one before the wall and "
+                    f"the last one behind it, at least {MARGIN} m from walls"
                 )
         end = self._way[-1]
         free = np.array([min(half[0] - end[0], end[0] - behind), half[1] - abs(end[1])]) - MARGIN

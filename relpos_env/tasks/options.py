@@ -37,6 +37,17 @@ def finite(name: str, value: float) -> float:
     return _number(name, value, "a finite number", low=-np.inf, strict=False)
 
 
+def flag(name: str, value: bool) -> bool:
+    """The value, if it is True or False.
+
+    Raises:
+        EnvError: It is not.
+    """
+    if not isinstance(value, bool):
+        raise EnvError(f"{name}: expected True or False, got {value!r}")
+    return value
+
+
 def car_count(n_cars: int) -> int:
     """The number of slots for cars, 2 to 20.
 

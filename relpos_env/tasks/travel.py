@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from relpos_env.tasks.curves import make_curve
 from relpos_env.tasks.moving import MARGIN, Motion, MovingFormation
-from relpos_env.tasks.options import finite, half_room, not_negative, positive
+from relpos_env.tasks.options import finite, flag, half_room, not_negative, positive
 from relpos_env.tasks.shapes import Formation
 from tracking.arrays import F64
 
@@ -45,7 +45,9 @@ def travel(
     Raises:
         EnvError: An option is out of range, or there is no room.
     """
-    heading = finite("heading", heading)
+    heading, closed, turning = (
+        finite("heading", heading), flag("closed", closed), flag("turning", turning)
+    )  # fmt: skip
     formation = Formation(shape, n_cars, spacing)
     half = half_room(room, MARGIN)
     # At most half of the room is for the formation, the rest for the path.

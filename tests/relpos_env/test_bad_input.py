@@ -1,5 +1,7 @@
 """What cannot be is refused with the name of the argument and what is allowed."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,9 @@ from relpos_env.config import FormationConfig
 from relpos_env.errors import EnvError
 from relpos_env.formation_v0 import parallel_env
 from relpos_env.gym_env import FormationGymEnv
+from relpos_env.sb3_vec_env import FormationVecEnv
 from relpos_env.scenarios import SCENARIOS
+from relpos_env.sensors.operator import OperatorSimParams
 from relpos_env.vector_env import FormationVectorEnv
 
 BAD_ARGUMENTS = [
@@ -40,6 +44,16 @@ BAD_ARGUMENTS = [
     ({"weights": ["collision"]}, "weights: expected Mapping or None, got"),
     ({"params": {"a": 1}}, "params: expected TrackerParams or None, got"),
     ({"operator": {}}, "operator: expected OperatorSimParams, got"),
+    ({"end_on_collision": "no"}, "end_on_collision: expected bool, got 'no'"),
+    ({"task": ["ring"]}, "task: expected str, got"),
+    ({"observation": ["estimate"]}, "observation: expected one of estimate"),
+    ({"filter": ["joint"]}, "filter: expected str, got"),
+    ({"task": "travel", "task_options": {"closed": "no"}}, "closed: expected True or False"),
+    ({"task": "travel", "task_options": {"turning": 1}}, "turning: expected True or False"),
+    (
+        {"task": "gap", "task_options": {"waypoints": [[3, 0], [3, 1]]}},
+        "waypoints: .* the first one before the wall",
+    ),
     ({"frames": 3}, "frames: unknown argument, expected one of scenario, task"),
 ]
 
@@ -228,3 +242,31 @@ def test_seats_are_checked():
         env.step(np.zeros((3, 2)))
     with pytest.raises(EnvError, match="actions: expected finite"):
         env.step(np.full((6, 2), np.inf))
+
+
+def test_flags_and_numbers_that_are_none_are_named():
+    with pytest.raises(EnvError, match="record: expected True or False"):
+        parallel_env(record="no")
+    with pytest.raises(EnvError, match="with_truth: expected True or False"):
+        FormationVecEnv(with_truth="no")
+    with pytest.raises(EnvError, match="operator gain: expected at least 0, finite, got None"):
+        OperatorSimParams(gain=None)
+    with pytest.raises(EnvError, match="obstacles: expected a tuple"):
+        replace(SCENARIOS["rooms-5x5"], obstacles=[])
+
+
+def test_slots_are_for_as_many_cars_as_can_be_there():
+    drawn = replace(SCENARIOS["open"].randomisation, n_cars=(2, 3))
+    scenario = replace(SCENARIOS["open"], randomisation=drawn)
+    assert FormationConfig(scenario=scenario).resolve().n_cars == 3
+    assert FormationConfig(scenario="open").resolve().n_cars == SCENARIOS["open"].n_cars
+
+
+def test_what_is_written_into_an_info_stays_there():
+    env = FormationVecEnv(n_envs=1, max_cycles=5)
+    env.reset()
+    for _ in range(2):
+        *_, infos = env.step(np.zeros((env.num_envs, 2), np.float32))
+        assert all("mine" not in info for info in infos)
+        infos[0]["mine"] = 1
+    assert all("mine" not in info for info in env.reset_infos)
