@@ -14,6 +14,7 @@ from tracking.filters import DEFAULT_FILTER, FILTERS
 Row = dict[str, Any]
 CARS, PEOPLE = Workload(3, 2, "round"), Workload(6, 3, "round")
 """The cars and the body trackers of the paper: three nodes in a plane, six in space."""
+SIX_CARS = Workload(6, 2, "round")
 BODY_HOUR = "1 h of 6 nodes 3D, with VQF"
 
 
@@ -39,6 +40,7 @@ def bench_tracker(
     rows: list[Row] = []
     jobs: list[Callable[[], list[Row]]] = [
         lambda: _rounds(CARS, rounds, filterpy, gtsam),
+        lambda: _rounds(SIX_CARS, rounds, filterpy, gtsam),
         lambda: _rounds(PEOPLE, rounds, filterpy, gtsam),
         lambda: _message(20, rounds, filterpy),
         lambda: _message(50, rounds, filterpy),
