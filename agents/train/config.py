@@ -8,6 +8,7 @@ from typing import Literal
 from agents.settings import number
 
 MOST_SEED = 2147483647
+"""Seeds have 31 bits."""
 FORMAT = 5
 """Version of the run folder; another one is refused."""
 

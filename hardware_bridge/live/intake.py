@@ -12,7 +12,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from hardware_bridge.clocks import DeviceTime, EvenTime, HostTime, StreamTime
+from hardware_bridge.clocks import EvenTime
 from hardware_bridge.config.swarm import CarConfig, LinkConfig, SwarmConfig
 from hardware_bridge.decoders import make_decoder
 from hardware_bridge.drivers import make_driver
@@ -21,14 +21,12 @@ from hardware_bridge.identity.verdict import Mark
 from hardware_bridge.links.ports import Chunk
 from hardware_bridge.live.events import Events
 from hardware_bridge.live.naming import Naming
+from hardware_bridge.live.other_tracker import OtherTracker
 from hardware_bridge.live.repeated import RepeatedSamples
 from hardware_bridge.live.sample_rates import SampleRates
 from hardware_bridge.live.stream import OF_A_CAR, Stream
-from hardware_bridge.live.stuck_places import StuckPlaces
-from hardware_bridge.live.told import Told
 from hardware_bridge.plausibility import Plausibility
 from hardware_bridge.readings import (
-    MICROSECONDS_64,
     NOBODY,
     ImuReading,
     MotionReading,
@@ -43,12 +41,11 @@ from hardware_bridge.readings import (
 )
 from tracking.constellation import Constellation
 from tracking.errors import ConfigError
-from tracking.estimate import Status
 from tracking.measurements import Kind
 
 NS = 1e-9
-OF_STREAM = NO_NODE = -1
-"""In place of a node, where one clock stamps all; in place of an id, of an operator without."""
+NO_NODE = -1
+"""In place of an id, of an operator without."""
 
 
 class Intake:
@@ -67,7 +64,6 @@ class Intake:
         self.group = config.constellation
         self.start_ns = start_ns
         self.events = Events()
-        self.told = Told()
         self.plausibility = Plausibility()
         self.heard_ns: dict[int, int] = {}
         """Host time at which each node was last heard, by index."""
@@ -89,10 +85,11 @@ class Intake:
         """Time [ns] and what the user should read; whoever takes them clears the list."""
         rates = [node.imu_hz for node in self.group.nodes]
         self.sample_rates = SampleRates(rates)
-        self.driving: frozenset[int] = frozenset()
-        """Who drives, by what cars say or were let do, by index; written by the caller."""
-        self._repeated, self._stuck_places = RepeatedSamples(rates), StuckPlaces()
+        self._repeated = RepeatedSamples(rates)
         self._naming = Naming(self.group, self.refused, self.notices)
+        self.other = OtherTracker(
+            start_ns, self.group.ids, self._naming, self.plausibility, self.refused, self.notices
+        )
         open_ids, keyed_ids = Identities(), Identities(authenticated=True)
         self._identities = [open_ids, keyed_ids]
         self._signed = {"links": keyed_ids}
@@ -163,7 +160,11 @@ class Intake:
             self._take_trim(stream, reading, arrival_ns)
             return
         if isinstance(reading, PairReading | PoseReading):
-            self._take_told(stream, reading, arrival_ns)
+            nodes = self.other.take(stream, reading, arrival_ns)
+            if nodes and isinstance(reading, PoseReading) and reading.speed is not None:
+                moves = MotionReading(reading.source, speed=reading.speed)
+                self.motion[nodes[0]] = arrival_ns, moves
+            self.heard_ns.update(dict.fromkeys(nodes, arrival_ns))
             return
         node = self._naming.index(stream, source.device, arrival_ns)
         if node is None:
@@ -183,7 +184,7 @@ class Intake:
         if not verdict.accepted:
             self.refused[verdict.value] += 1
             return
-        clock = self._clock(stream, node, source)
+        clock = stream.clock(node, source)
         if verdict is Verdict.REBOOT:
             clock.restart()
         stream.t_ns = clock.map(source.ticks, arrival_ns)
@@ -276,54 +277,6 @@ class Intake:
         if node is not None and np.isfinite(x) and np.isfinite(y):
             self.trim[node] = arrival_ns, (x, y)
 
-    def _take_told(
-        self, stream: Stream, reading: PairReading | PoseReading, arrival_ns: int
-    ) -> None:
-        """What another tracker tells, by one clock for all nodes."""
-        names = (reading.i, reading.j) if isinstance(reading, PairReading) else (reading.node,)
-        found = [
-            self._naming.index(stream, name, arrival_ns, named=True, mixed=True) for name in names
-        ]
-        nodes = tuple(node for node in found if node is not None)
-        clock = stream.times.setdefault(OF_STREAM, DeviceTime(MICROSECONDS_64))
-        t_ns = clock.map(reading.source.ticks, arrival_ns)
-        if len(set(nodes)) < len(names):
-            return
-        if reading.pos is not None and not self._believes(reading, nodes, t_ns, arrival_ns):
-            return
-        t = self.seconds(t_ns)
-        if isinstance(reading, PairReading):
-            self.told.add_pair(t, nodes, reading)
-            known = reading.status not in (Status.LOST, Status.ABSENT)
-        else:
-            self.told.add_pose(t, nodes[0], reading)
-            known = True
-            if reading.speed is not None:
-                moves = MotionReading(reading.source, speed=reading.speed)
-                self.motion[nodes[0]] = arrival_ns, moves
-        if known:
-            self.heard_ns.update(dict.fromkeys(nodes, arrival_ns))
-
-    def _believes(
-        self, reading: PairReading | PoseReading, nodes: tuple[int, ...], t_ns: int, arrival_ns: int
-    ) -> bool:
-        """Whether a place can be, and its tracker does not hang."""
-        assert reading.pos is not None
-        if not self.plausibility.allows_place(nodes, reading.pos, t_ns):
-            return False
-        attitude = reading.q_wb if isinstance(reading, PoseReading) else None
-        known = nodes in self._stuck_places.stuck
-        drives = not self.driving.isdisjoint(nodes)
-        values = (*reading.pos, *(attitude or ()))
-        if not self._stuck_places.refuses(nodes, values, drives, arrival_ns):
-            return True
-        self.refused["stuck"] += 1
-        if not known:
-            who = " and ".join(str(self.group.ids[node]) for node in nodes)
-            text = f"the place of {who} stays the same while it drives: its tracker hangs"
-            self.notices.append((arrival_ns, text))
-        return False
-
     def _note_fault(self, stream: Stream, node: int, fault: int, arrival_ns: int) -> None:
         if fault == self.fault.get((stream.name, node), 0):
             return
@@ -331,26 +284,6 @@ class Intake:
         what = f"reports fault {fault}" if fault else "reports no fault any more"
         text = f"{stream.name}: node {self.group.ids[node]} {what}"
         self.notices.append((arrival_ns, text))
-
-    def _clock(self, stream: Stream, node: int, source: Source) -> StreamTime:
-        """What maps the stamps of a node: a new one where these come from another counter.
-
-        A single stamp of another counter is a damaged one, and counts as when it came.
-        """
-        clock = None if source.ticks is None else source.clock
-        if node in stream.times:
-            known = stream.clocks.get(node)
-            again = stream.other.get(node) == clock
-            stream.other[node] = None if clock == known else clock
-            if clock is None or clock == known:
-                return stream.times[node]
-            if not again:
-                return HostTime()
-        if clock is None:
-            stream.times[node] = HostTime()
-        else:
-            stream.times[node], stream.clocks[node] = DeviceTime(clock), clock
-        return stream.times[node]
 
 
 def _only_antenna(group: Constellation, node: int) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from hardware_bridge.clocks import EvenTime, StreamTime
+from hardware_bridge.clocks import DeviceTime, EvenTime, HostTime, StreamTime
 from hardware_bridge.decoders.base import Decoder
 from hardware_bridge.identity import Identities, Verdict
 from hardware_bridge.readings import (
@@ -44,3 +44,23 @@ class Stream:
     """Of the last reading: those of one message share it, and are taken or refused together."""
     verdict: Verdict = Verdict.UNNUMBERED
     t_ns: int = 0
+
+    def clock(self, node: int, source: Source) -> StreamTime:
+        """What maps the stamps of a node, by its index: a new one where they change their counter.
+
+        A single stamp of another counter is a damaged one, and counts as when it came.
+        """
+        counter = None if source.ticks is None else source.clock
+        if node in self.times:
+            known = self.clocks.get(node)
+            again = self.other.get(node) == counter
+            self.other[node] = None if counter == known else counter
+            if counter is None or counter == known:
+                return self.times[node]
+            if not again:
+                return HostTime()
+        if counter is None:
+            self.times[node] = HostTime()
+        else:
+            self.times[node], self.clocks[node] = DeviceTime(counter), counter
+        return self.times[node]

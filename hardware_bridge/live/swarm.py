@@ -135,7 +135,7 @@ class LiveSwarm:
     def _make_perception(self) -> Perception | ReadyPerception:
         tracker, group = self.config.tracker, self.group
         if tracker.source == "positions":
-            told = self.intake.told
+            told = self.intake.other.told
             return ReadyPerception(group, tracker.positions, told, self._block, self._powered)
         params = TrackerParams(horizon=HorizonParams(delay=tracker.delay))
         return Perception(
@@ -183,7 +183,7 @@ class LiveSwarm:
             asked = intake.trim.get(k)
             fresh = asked is not None and (t_ns - asked[0]) * 1e-9 <= SILENT
             self.trim[0, k] = asked[1] if fresh and asked is not None else 0.0
-        intake.driving = frozenset(driving)
+        intake.other.driving = frozenset(driving)
 
 
 def load_calibration(config: SwarmConfig) -> Calibration | None:

@@ -81,7 +81,7 @@ def drive(config, say):
 def lines_now():
     t = NOW() // 1000
     return (
-        line(time=t, node=1, pos=[1.0, 1.0], yaw=0.0, speed=0.25)
+        line(time=t, node=1, pos=[1.0, 1.0], yaw=0.0, speed=0.15)
         + line(time=t, node=2, pos=[3.0, 2.0], yaw=np.pi / 2)
         + line(time=t, node=99, pos=[0.0, 0.0])
     )
@@ -90,7 +90,7 @@ def lines_now():
 def check_standing(swarm, observations):
     assert observations[0, :3] == pytest.approx((1.0, 2.0, 1.0), abs=1e-3)
     assert observations[1, :3] == pytest.approx((1.0, -1.0, 2.0), abs=1e-3)
-    assert swarm.view.speed[0, 0] == 0.25
+    assert swarm.view.speed[0, 0] == 0.15
     assert swarm.view.heading[0] == pytest.approx((0.0, np.pi / 2))
     texts = [text for _, text in swarm.intake.notices]
     assert texts == ["links.mocap: device 99 is no node of the configuration; name it in its ids"]

@@ -16,7 +16,16 @@ from numba.extending import intrinsic
 
 from tracking.compiled import kernel
 
-LANES = 8 if llvmlite.binding.get_host_cpu_features().get("avx512f") else 4
+
+def _wide_registers():
+    """Whether registers of this machine hold eight numbers."""
+    try:
+        return bool(llvmlite.binding.get_host_cpu_features().get("avx512f"))
+    except RuntimeError:  # not told here
+        return False
+
+
+LANES = 8 if _wide_registers() else 4
 """Numbers of a vector: so many that the squares below, twice as wide as high, fit in registers."""
 WIDE = 2
 """Vectors side by side in a square of P: enough sums at a time to hide how long each takes."""
