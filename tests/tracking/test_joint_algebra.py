@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numba import config, njit
 
 from tracking import Constellation, NodeConfig
 from tracking.arrays import aligned
 from tracking.filters._level_kernels import angle_between, direction
+from tracking.filters.joint import _product_kernels
 from tracking.filters.joint._agreement_kernels import SAME_TURN, are_same, turn_between
 from tracking.filters.joint._copy_kernels import turn_hypothesis
 from tracking.filters.joint._product_kernels import take_off, take_off_plainly
@@ -110,6 +112,22 @@ def test_what_is_taken_off_is_the_product(n, m):
     np.testing.assert_array_equal(P[1], P[1].T)  # to the last bit
     np.testing.assert_array_equal(P[0], before)
     np.testing.assert_array_equal(W, rows)
+
+
+@pytest.mark.skipif(config.DISABLE_JIT, reason="the plain loops are all there is")
+@pytest.mark.parametrize("lanes", [2, 4, 8])
+def test_registers_of_any_width_give_the_same(monkeypatch, lanes):
+    monkeypatch.setattr(_product_kernels, "LANES", lanes)
+    anew = njit(take_off.py_func)  # kept nowhere
+    rng = np.random.default_rng(lanes)
+    for n in (8, 40):
+        A = rng.standard_normal((n, n))
+        P, W = (A @ A.T)[None], rng.standard_normal((1, 8, n))
+        twin = P.copy()
+        anew(P, 0, W, 0, 7)
+        take_off_plainly(twin, 0, W, 0, 7)
+        np.testing.assert_allclose(P, twin, atol=1e-10)
+        np.testing.assert_array_equal(P[0], P[0].T)
 
 
 def test_arrays_begin_with_a_cache_line():

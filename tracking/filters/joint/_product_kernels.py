@@ -31,8 +31,6 @@ WIDE = 2
 """Vectors side by side in a square of P: enough sums at a time to hide how long each takes."""
 
 _DOUBLE, _INT = ir.DoubleType(), ir.IntType(64)
-_VECTOR = ir.VectorType(_DOUBLE, LANES)
-_PLACES = ir.VectorType(ir.IntType(32), LANES)
 # Products may be added without being rounded before, where the machine can.
 _CONTRACT = ("contract",)
 
@@ -55,7 +53,9 @@ def _take_off(context, P, h, W, g, m):
         P, h, W, g, m = arguments
         states, n = _matrix(target, builder, signature.args[0], P, h)
         rows, _ = _matrix(target, builder, signature.args[2], W, g)
-        sums = [[cgutils.alloca_once(builder, _VECTOR) for _ in range(WIDE)] for _ in range(LANES)]
+        sums = [
+            [cgutils.alloca_once(builder, _vector()) for _ in range(WIDE)] for _ in range(LANES)
+        ]
 
         def square(row, column, wide):
             """Take off LANES rows of P, wide vectors of each; the other half follows."""
@@ -111,6 +111,15 @@ Args:
 """
 
 
+def _vector():
+    return ir.VectorType(_DOUBLE, LANES)
+
+
+def _places(numbers):
+    """Which of two vectors' numbers make a third."""
+    return ir.Constant(ir.VectorType(ir.IntType(32), LANES), numbers)
+
+
 def _matrix(target, builder, kind, array, index):
     """Where a matrix of an array begins, and how long its rows are."""
     a = target.make_array(kind)(target, builder, array)
@@ -126,20 +135,20 @@ def _row(builder, matrix, row, below, length):
 
 def _load(builder, row, at):
     """A vector, from any address."""
-    address = builder.bitcast(builder.gep(row, [at]), _VECTOR.as_pointer())
+    address = builder.bitcast(builder.gep(row, [at]), _vector().as_pointer())
     return builder.load(address, align=8)
 
 
 def _store(builder, vector, row, at):
-    address = builder.bitcast(builder.gep(row, [at]), _VECTOR.as_pointer())
+    address = builder.bitcast(builder.gep(row, [at]), _vector().as_pointer())
     builder.store(vector, address, align=8)
 
 
 def _spread(builder, row, at):
     """A vector of one number."""
-    nothing = ir.Constant(_VECTOR, ir.Undefined)
+    nothing = ir.Constant(_vector(), ir.Undefined)
     first = builder.insert_element(nothing, builder.load(builder.gep(row, [at])), _INT(0))
-    return builder.shuffle_vector(first, nothing, ir.Constant(_PLACES, [0] * LANES))
+    return builder.shuffle_vector(first, nothing, _places([0] * LANES))
 
 
 def _transpose(builder, block):
@@ -151,7 +160,7 @@ def _transpose(builder, block):
                 upper, lower = block[i], block[i + half]
                 left = [LANES + k - half if k & half else k for k in range(LANES)]
                 right = [LANES + k if k & half else k + half for k in range(LANES)]
-                block[i] = builder.shuffle_vector(upper, lower, ir.Constant(_PLACES, left))
-                block[i + half] = builder.shuffle_vector(upper, lower, ir.Constant(_PLACES, right))
+                block[i] = builder.shuffle_vector(upper, lower, _places(left))
+                block[i + half] = builder.shuffle_vector(upper, lower, _places(right))
         half //= 2
     return block
