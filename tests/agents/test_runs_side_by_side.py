@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import torch
 from click.testing import CliRunner
+from processes import is_running
 
 from agents.cli import cli
 from agents.errors import UsageError
@@ -165,14 +166,6 @@ if __name__ == "__main__":
     if still:
         os.kill(int(pid), signal.SIGKILL)
     assert not still
-
-
-def is_running(pid):
-    """Whether there is such a process, and it has not ended."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
-    except FileNotFoundError:
-        return False
 
 
 @pytest.mark.parametrize(
