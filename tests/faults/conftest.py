@@ -2,12 +2,15 @@
 
 from dataclasses import replace
 from functools import cached_property
+from unittest.mock import patch
 
 import numpy as np
 import pytest
 
 from agents.simulate import simulate
-from tracking import Status, Tracker
+from relpos_env.matched import matched_params
+from relpos_env.scenarios import recordable
+from tracking import Status, Tracker, bounds
 from tracking.geometry import best_rotation
 from tracking.measurements import Kind, MeasurementBlock
 
@@ -130,6 +133,7 @@ class Faults:
     """Recordings, of four cars if nothing is said, their clean runs, and runs with a fault."""
 
     def __init__(self, scenario="cars-nlos", cars=4, seeds=SEEDS):
+        self.scenario = scenario
         self.logs = [simulate(scenario=scenario, cars=cars, seconds=60.0, seed=s) for s in seeds]
         self.clean = Run(self.logs, lambda edit: edit.block)
 
@@ -137,10 +141,38 @@ class Faults:
         """All recordings through the tracker, each spoilt by `fault(edit)`."""
         return Run(self.logs, fault)
 
-    def assert_others_as_before(self, run, begin=BEGIN, end=END, allowance=0.0):
-        """Pairs without the bad car keep their accuracy: 10 %, and an allowance [m]."""
-        allowed = 1.1 * self.clean.shape_error(begin, end) + allowance
+    def assert_others_as_before(self, run, begin=BEGIN, end=END, allowance=0.0, lost=None):
+        """Pairs without the bad car keep their accuracy: 10 %, and an allowance [m].
+
+        Where a fault takes measurements away, `lost(edit)` says which. What these told of the
+        others is not known without them, to no tracker.
+        """
+        growth = 1.0 if lost is None else self.growth(lost, begin, end)
+        allowed = 1.1 * growth * self.clean.shape_error(begin, end) + allowance
         assert run.shape_error(begin, end) < allowed
+
+    def growth(self, lost, begin, end):
+        """Bound of the others' shape without some measurements over that with all, median run.
+
+        Of a silent radio of four cars 1.08 for three seconds and 1.13 for ten.
+        """
+
+        def of_the_others(constellation, t, cov, pos, known):
+            known = known.copy()
+            known[:, BAD] = False
+            return summarise(constellation, t, cov, pos, known)
+
+        summarise = bounds._summarise
+        params, ratios = matched_params(recordable(self.scenario)), []
+        for log in self.logs[:12]:
+            rows = lost(Edit(log.block))
+            is_range = log.block.kind[0] == Kind.RANGE
+            less = replace(log, block=log.block.take(~rows), nlos=log.nlos[~rows[is_range]])
+            with patch.object(bounds, "_summarise", of_the_others):
+                whole, part = (bounds.posterior_bound(each, params) for each in (log, less))
+            kept = (whole.t >= begin) & (whole.t < end)
+            ratios.append(rms(part.shape_rms[kept, None]) / rms(whole.shape_rms[kept, None]))
+        return float(np.median(ratios))
 
     @cached_property
     def silent(self):
@@ -150,7 +182,7 @@ class Faults:
     def assert_others_as_without(self, run):
         """Pairs without the bad car keep the accuracy that they have if it is silent: 10 %.
 
-        That it is silent costs them 8 to 9 % themselves, of four cars.
+        That it is silent costs them 8 to 13 % themselves, of four cars: see `growth`.
         """
         assert run.shape_error(BEGIN, END) < 1.1 * self.silent.shape_error(BEGIN, END)
 

@@ -15,11 +15,15 @@ RANGE = [0]
 
 def test_a_silent_radio_loses_its_pairs_and_no_others(faults):
     """Three seconds without ranges: not ok after the first, ok again one second after the last."""
-    run = faults.run(lambda edit: edit.without(edit.ranges(BEGIN, BEGIN + 3.0)))
+
+    def silent(edit):
+        return edit.ranges(BEGIN, BEGIN + 3.0)
+
+    run = faults.run(lambda edit: edit.without(silent(edit)))
     assert run.ok_share(BEGIN + 1.2, BEGIN + 3.0) == 0.0
     assert run.ok_share(BEGIN + 4.0, END) == 1.0
     assert run.error(BEGIN, BEGIN + 3.0) < 0.3
-    faults.assert_others_as_before(run, BEGIN, BEGIN + 3.0)
+    faults.assert_others_as_before(run, BEGIN, BEGIN + 3.0, lost=silent)
     faults.assert_as_good(run, BEGIN + 4.0)
 
 
@@ -141,7 +145,7 @@ def test_ranges_that_stick_are_not_heard(faults):
     run = faults.run(stuck)
     assert run.ok_share(BEGIN + 2.0, END) < 0.05
     assert run.error(BEGIN, END) < 0.25
-    faults.assert_others_as_before(run)
+    faults.assert_others_as_before(run, lost=lambda edit: edit.ranges())
     faults.assert_as_good(run, END + 3.0)
 
 
