@@ -13,8 +13,9 @@ from tracking.arrays import I64
 from tracking.geometry import GRAVITY
 
 N_WALLS = 4
-FRICTION, ELASTICITY = 0.3, 0.2
-"""[-] Between any two bodies. The solver multiplies what the two shapes have."""
+FRICTION, ELASTICITY = 0.09, 0.04
+"""[-] Between any two bodies; the solver multiplies what the two shapes have. Little: cars slide
+along what they touch. At 0.3 and 0.2 they catch on it and are thrown back."""
 BOX_FRICTION = 0.4
 """[-] Of a movable box on the floor."""
 BOX_DENSITY = 8.0
