@@ -91,7 +91,7 @@ def test_moves_and_contacts_are_those_of_pymunk_bit_for_bit(seed):
         np.testing.assert_array_equal(bodies.body[1], body, err_msg=f"step {k}")
         np.testing.assert_array_equal(bodies.box_body[1], box_body, err_msg=f"step {k}")
         np.testing.assert_array_equal(bodies.contacts[1], plain.contacts, err_msg=f"step {k}")
-    assert plain.contacts[CARS].min() > 2
+    assert plain.contacts[CARS].min() > 1
     assert plain.contacts[2] == 0
     assert solver.calls["moves"].tolist() == [0, 400, 0]
     assert solver.calls["ready"].tolist() == [-1, 400, -1]
