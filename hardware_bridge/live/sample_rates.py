@@ -10,11 +10,13 @@ from collections.abc import Sequence
 
 WINDOW = 1.0
 """[s] Over which samples are counted."""
+BACKLOG = 0.5
+"""[s] What comes at first is not counted: a port hands on at once what it has kept."""
 PAUSE = 0.5
 """[s] After a longer one they are counted anew."""
-OFF = 0.1
-"""[-] A rate that differs by more is another one. Samples that come in bunches, and single ones
-that are lost, are within it."""
+OFF = 0.3
+"""[-] A rate that differs by more is another one. What comes in bunches, or is lost, is within it;
+rates that somebody has mistaken differ by a factor of two."""
 
 
 def is_off(rate: float, configured: float) -> bool:
@@ -33,8 +35,9 @@ class SampleRates:
         """
         self._configured = configured
         self._counted: dict[int, tuple[int, int, int]] = {}
+        self._doubted: set[int] = set()
         self.rate: dict[int, float] = {}
-        """Of the last whole window [1/s]."""
+        """Of the last whole window [1/s]; a wrong one only after the second in a row."""
 
     def note(self, node: int, t_ns: int) -> bool:
         """Count a sample; whether it ends a window that was the first of a wrong rate.
@@ -43,15 +46,22 @@ class SampleRates:
             node: Whose, by index.
             t_ns: When it came, by the host's clock [ns].
         """
-        first_ns, last_ns, n = self._counted.get(node, (t_ns, t_ns, 0))
+        begins = t_ns + round(BACKLOG * 1e9)
+        first_ns, last_ns, n = self._counted.get(node, (begins, t_ns, 0))
         if t_ns - last_ns > PAUSE * 1e9:
-            first_ns, n = t_ns, 0
+            first_ns, n = begins, 0
         if t_ns - first_ns < WINDOW * 1e9:
-            self._counted[node] = first_ns, t_ns, n + 1
+            self._counted[node] = first_ns, t_ns, n + (t_ns >= first_ns)
             return False
-        was_off = node in self.rate and self.is_off(node)
-        self.rate[node] = n / ((t_ns - first_ns) * 1e-9)
+        rate = n / ((t_ns - first_ns) * 1e-9)
         self._counted[node] = t_ns, t_ns, 1
+        if is_off(rate, self._configured[node]) and node not in self._doubted:
+            self._doubted.add(node)
+            return False
+        was_off = self.is_off(node)
+        self.rate[node] = rate
+        if not self.is_off(node):
+            self._doubted.discard(node)
         return self.is_off(node) and not was_off
 
     def is_off(self, node: int) -> bool:
