@@ -13,7 +13,7 @@ from agents.blindfold import Blindfold
 from agents.cli import cli
 from agents.demo import demo
 from agents.errors import UsageError
-from agents.policy import Layout, PolicyError, find, shipped_names, write_policy
+from agents.policy import Layout, PolicyError, find, load_policy, shipped_names, write_policy
 from relpos_env.errors import EnvError
 
 
@@ -35,6 +35,13 @@ def test_a_card_is_shown(tmp_path):
         assert words in shown.output
     record = json.loads(run("policy", "show", path, "--json").output)
     assert record == json.loads(path.with_suffix(".json").read_text())
+
+
+def test_a_card_is_shown_whole():
+    training = load_policy("hold-beams").card.training
+    shown = run("policy", "show", "hold-beams").output
+    assert training["command"] in shown
+    assert "\u2026" not in shown
 
 
 def test_shipped_ones_are_listed(tmp_path, monkeypatch):

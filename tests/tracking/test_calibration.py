@@ -270,6 +270,15 @@ def test_a_node_with_a_handful_of_agreeing_ranges_has_no_offset():
     assert not found.used[of_last].any()
 
 
+@pytest.mark.parametrize("b", [-1.4, 1.4])
+def test_offsets_that_no_antenna_has_are_refused(b):
+    """Marks of two boards that were mixed up fit three boards exactly."""
+    with pytest.raises(
+        CalibrationError, match=r"node 9: an offset of -?1\.40 m, expected within 1"
+    ):
+        calibrate_uwb(table(offset=(0.2, 0.1, b, 0.3))[0], (7, 8, 9, 11), random_state=0)
+
+
 def unknown():
     data = table()[0]
     return RangeTable(data.i, data.j, data.measured, data.true, np.zeros(2000, dtype=bool))

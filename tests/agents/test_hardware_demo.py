@@ -1,0 +1,23 @@
+"""What a drive through the bridge is scored by, and commands that look first."""
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from agents.cli import cli
+from agents.hardware_demo import _settled
+
+
+def test_a_drive_that_was_over_early_is_scored_by_its_end():
+    nothing, every = np.zeros(0), np.array([0.9, 0.4, 0.2, np.nan])
+    assert _settled(np.array([0.1, np.nan, 0.3]), every) == pytest.approx(0.2)
+    assert _settled(nothing, every) == 0.2
+    assert _settled(np.array([np.nan]), every) == 0.2
+    assert _settled(nothing, np.array([np.nan])) is None
+
+
+def test_demo_looks_at_its_folder_before_it_drives(tmp_path, monkeypatch):
+    monkeypatch.setattr("agents.demo.demo", lambda **_: pytest.fail("it drove"))
+    (tmp_path / "file").write_text("")
+    done = CliRunner().invoke(cli, ["demo", "--out", str(tmp_path / "file")])
+    assert "is a file, expected a folder" in str(done.exception)
