@@ -120,8 +120,8 @@ def learn_range(c, s, layout, scratch, p, a_i, a_j, is_hidden, what):
             change_sight(c, s, 0, p, 1.0)
         variance = c.white_var + s.nlos[0, p] * c.excess_white_var
     _, m = range_model(c, s, 0, p, (i0, i1, i2), (j0, j1, j2), scratch.idx, scratch.val)
-    S = project(s, 0, c.n, m, scratch.idx, scratch.val, scratch.w) + variance
-    absorb(s, 0, c.n, scratch.w, 0.0, S)
+    S = project(s, 0, m, scratch) + variance
+    absorb(s, 0, scratch.w, 0.0, S)
 
 
 @small_kernel

@@ -9,10 +9,13 @@ from numba import config, njit
 from tracking import Constellation, NodeConfig
 from tracking.arrays import aligned
 from tracking.filters._level_kernels import angle_between, direction
-from tracking.filters.joint import _product_kernels
+from tracking.filters.joint import _vector_kernels
 from tracking.filters.joint._agreement_kernels import SAME_TURN, are_same, turn_between
 from tracking.filters.joint._copy_kernels import turn_hypothesis
+from tracking.filters.joint._flatness_kernels import least_axis
+from tracking.filters.joint._mirror_kernels import mirror, mirror_plainly
 from tracking.filters.joint._product_kernels import take_off, take_off_plainly
+from tracking.filters.joint._projection_kernels import sum_rows, sum_rows_plainly
 from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.records import as_records
@@ -114,10 +117,40 @@ def test_what_is_taken_off_is_the_product(n, m):
     np.testing.assert_array_equal(W, rows)
 
 
+def rows_to_sum(n, m, q, seed):
+    """What `sum_rows` takes: random matrices, rows and weights, and a place for the sum."""
+    rng = np.random.default_rng(seed)
+    idx = rng.integers(0, n, size=16)
+    val, share = rng.standard_normal(16), rng.standard_normal(16)
+    P, W = rng.standard_normal((2, n, n)), rng.standard_normal((2, 16, n))
+    return P, 1, idx, val, m, W, share, q, np.full(n, np.nan)
+
+
+@pytest.mark.parametrize("n", [3, 8, 16, 20, 40, 48, 49, 72, 96, 352])
+@pytest.mark.parametrize(("m", "q"), [(1, 0), (4, 3), (8, 16), (16, 1)])
+def test_rows_are_summed(n, m, q):
+    arguments, twin = rows_to_sum(n, m, q, n), np.zeros(n)
+    before = [np.copy(a) for a in arguments]
+    sum_rows(*arguments)
+    sum_rows_plainly(*arguments[:-1], twin)
+    np.testing.assert_allclose(arguments[-1], twin, atol=1e-12 * m * (1 + q))
+    for a, b in zip(arguments[:-1], before[:-1], strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize(("n", "rows"), [(3, 2), (8, 8), (20, 9), (40, 24), (96, 36), (352, 200)])
+def test_one_half_is_the_mirror_image_of_the_other(n, rows):
+    P = np.random.default_rng(n).standard_normal((2, n, n))
+    twin = P.copy()
+    mirror(P, 1, rows)
+    mirror_plainly(twin, 1, rows)
+    np.testing.assert_array_equal(P, twin)
+
+
 @pytest.mark.skipif(config.DISABLE_JIT, reason="the plain loops are all there is")
 @pytest.mark.parametrize("lanes", [2, 4, 8])
 def test_registers_of_any_width_give_the_same(monkeypatch, lanes):
-    monkeypatch.setattr(_product_kernels, "LANES", lanes)
+    monkeypatch.setattr(_vector_kernels, "LANES", lanes)
     anew = njit(take_off.py_func)  # kept nowhere
     rng = np.random.default_rng(lanes)
     for n in (8, 40):
@@ -128,6 +161,41 @@ def test_registers_of_any_width_give_the_same(monkeypatch, lanes):
         take_off_plainly(twin, 0, W, 0, 7)
         np.testing.assert_allclose(P, twin, atol=1e-10)
         np.testing.assert_array_equal(P[0], P[0].T)
+    anew = njit(sum_rows.py_func)
+    for n in (24, 56):
+        arguments, summed = rows_to_sum(n, 8, 5, n), np.zeros(n)
+        anew(*arguments)
+        sum_rows_plainly(*arguments[:-1], summed)
+        np.testing.assert_allclose(arguments[-1], summed, atol=1e-12)
+    anew = njit(mirror.py_func)
+    P = rng.standard_normal((1, 20, 20))
+    twin = P.copy()
+    anew(P, 0, 13)
+    mirror_plainly(twin, 0, 13)
+    np.testing.assert_array_equal(P, twin)
+
+
+@given(st.integers(0, 2**31), st.sampled_from([2, 3]), st.sampled_from([1, 2, 3, 6]))
+def test_the_least_axis_is_the_librarys(seed, d, n):
+    rng = np.random.default_rng(seed)
+    points = rng.standard_normal((n, d)) * rng.choice([1e-3, 1.0, 30.0], size=d)
+    scatter = np.zeros((3, 3))
+    scatter[:d, :d] = points.T @ points
+    least, axis = least_axis(tuple(scatter[np.triu_indices(3)]), d)
+    eigenvalues = np.linalg.eigvalsh(scatter[:d, :d])
+    top = eigenvalues[-1]
+    assert least == pytest.approx(max(eigenvalues[0], 0.0), abs=1e-7 * top)
+    assert np.linalg.norm(axis) == pytest.approx(1.0)
+    # Across it the points reach as far as across the best: where two are alike, either will do.
+    assert axis @ scatter @ axis == pytest.approx(eigenvalues[0], abs=1e-6 * top)
+
+
+@pytest.mark.parametrize("scatter", [np.zeros((3, 3)), np.eye(3), np.diag([0.0, 0.0, 2.0])])
+def test_the_least_axis_of_what_has_none(scatter):
+    least, axis = least_axis(tuple(scatter[np.triu_indices(3)]), 3)
+    assert least == pytest.approx(scatter[0, 0], abs=1e-12)
+    assert np.array(axis) @ scatter @ axis == pytest.approx(least, abs=1e-12)
+    assert np.linalg.norm(axis) == pytest.approx(1.0)
 
 
 def test_arrays_begin_with_a_cache_line():

@@ -169,7 +169,7 @@ def holding(x, P, room):  # noqa: N803
 @settings(max_examples=30, deadline=None, suppress_health_check=list(HealthCheck))
 @given(
     seed=st.integers(0, 2**31),
-    n=st.integers(2, 40),
+    n=st.integers(2, 60),
     m=st.integers(1, 6),
     corrections=st.integers(1, 12),
     room=st.sampled_from([0, 4, 8, 16]),
@@ -178,16 +178,18 @@ def test_corrections_are_the_textbook_ones(seed, n, m, corrections, room):
     """Also while they wait: whatever is asked of the covariance knows of them."""
     rng = np.random.default_rng(seed)
     A = rng.standard_normal((n, n))
-    P, x, w = A @ A.T + 0.1 * np.eye(n), rng.standard_normal(n), np.zeros(n)
+    P, x = A @ A.T + 0.1 * np.eye(n), rng.standard_normal(n)
+    scratch = make_scratch(3, 3, n)._replace(share=np.zeros(16))
     s, moved, nu, R = holding(x, P, room), np.zeros(n), 0.7, 0.3
     for _ in range(corrections):
-        idx = rng.permutation(n)[: min(m, n)].astype(np.int64)
-        val, H = rng.standard_normal(len(idx)), np.zeros(n)
-        H[idx] = val
+        idx, H = rng.permutation(n)[: min(m, n)], np.zeros(n)
+        H[idx] = rng.standard_normal(len(idx))
+        scratch.idx[: len(idx)], scratch.val[: len(idx)] = idx, H[idx]
         K = P @ H / (H @ P @ H + R)
-        variance = _linear_kernels.project(s, 0, n, len(idx), idx, val, w)
+        variance = _linear_kernels.project(s, 0, len(idx), scratch)
         assert variance == pytest.approx(H @ P @ H, abs=1e-8)
-        _linear_kernels.absorb(s, 0, n, w, nu, variance + R)
+        np.testing.assert_allclose(scratch.w, P @ H, atol=1e-7)
+        _linear_kernels.absorb(s, 0, scratch.w, nu, variance + R)
         x, moved = x + K * nu, moved + K * nu
         left = np.eye(n) - np.outer(K, H)
         P = left @ P @ left.T + R * np.outer(K, K)  # Joseph

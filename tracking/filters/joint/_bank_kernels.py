@@ -17,6 +17,7 @@ from tracking.compiled import allocating_kernel, kernel
 from tracking.filters._shape_kernels import SURVEYED
 from tracking.filters.joint._agreement_kernels import are_same, turn_between
 from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_hypothesis
+from tracking.filters.joint._flatness_kernels import flatness, least_axis, scatter_of
 from tracking.filters.joint._linear_kernels import decouple
 from tracking.filters.joint._sample_kernels import decay
 from tracking.filters.joint._sleep_kernels import turn_all_ways
@@ -36,87 +37,6 @@ LOST_SPEED = 0.7
 
 
 @allocating_kernel
-def centred(c, s, h):
-    """Positions and velocities round their means in hypothesis h, (2, node, d), and how many.
-
-    Velocities are those of the moving nodes. Rows of nodes that are not there are 0.
-    """
-    n, d = s.nodes.shape[0], c.d
-    out = np.zeros((2, n, d))
-    present, moving = 0, 0
-    for i in range(n):
-        node = s.nodes[i]
-        if node.present:
-            present += 1
-            out[0, i] = s.x[h, node.at_p : node.at_p + d]
-            if not node.static:
-                moving += 1
-                out[1, i] = s.x[h, node.at_v : node.at_v + d]
-    for k in range(d):
-        mean_p = np.sum(out[0, :, k]) / max(present, 1)
-        mean_v = np.sum(out[1, :, k]) / max(moving, 1) if moving == present else 0.0
-        for i in range(n):
-            if s.nodes[i].present:
-                out[0, i, k] -= mean_p
-                if not s.nodes[i].static:
-                    out[1, i, k] -= mean_v
-    return out, present
-
-
-@allocating_kernel
-def flatness(c, s, h):
-    """Extent of the layout across itself over its standard deviation; large for few nodes."""
-    n, d = s.nodes.shape[0], c.d
-    mean, present = np.zeros(3), 0
-    for i in range(n):
-        if s.nodes[i].present:
-            present += 1
-            for k in range(d):
-                mean[k] += s.x[h, s.nodes[i].at_p + k]
-    if present <= d:
-        return np.inf
-    mean /= present
-    scatter = np.zeros((d, d))
-    for i in range(n):
-        if s.nodes[i].present:
-            at = s.nodes[i].at_p
-            for k in range(d):
-                for q in range(d):
-                    scatter[k, q] += (s.x[h, at + k] - mean[k]) * (s.x[h, at + q] - mean[q])
-    squared, across = least_axis(scatter)
-    # (e^T P e) of the positions along it, less that of their mean
-    own, total = 0.0, 0.0
-    for i in range(n):
-        if not s.nodes[i].present:
-            continue
-        for j in range(n):
-            if not s.nodes[j].present:
-                continue
-            for k in range(d):
-                for q in range(d):
-                    P_kq = s.P[h, s.nodes[i].at_p + k, s.nodes[j].at_p + q]
-                    part = across[k] * across[q] * P_kq
-                    total += part
-                    if i == j:
-                        own += part
-    return np.sqrt(squared / max(own - total / present, 1e-12))
-
-
-@allocating_kernel
-def least_axis(scatter):
-    """The least eigenvalue of a symmetric 2x2 or 3x3 matrix, at least 0, and its direction."""
-    if scatter.shape[0] == 3:
-        eigenvalues, E = np.linalg.eigh(scatter)
-        return max(eigenvalues[0], 0.0), E[:, 0].copy()
-    # In the plane without a library, which takes longer for it than all else here.
-    a, b, c = scatter[0, 0], scatter[0, 1], scatter[1, 1]
-    angle = 0.5 * np.arctan2(2.0 * b, a - c)  # of the greatest
-    across = np.array([-np.sin(angle), np.cos(angle)])
-    least = 0.5 * (a + c) - np.hypot(0.5 * (a - c), b)
-    return max(least, 0.0), across
-
-
-@allocating_kernel
 def add_mirror_image(c, s):
     """Make the mirror image of the reported hypothesis one, if the bank has room.
 
@@ -126,10 +46,9 @@ def add_mirror_image(c, s):
     target = copy_hypothesis(s, h)
     if target < 0:
         return
-    out, _ = centred(c, s, h)
-    pos = out[0].copy()
-    _, across = least_axis(pos.T.copy() @ pos)
     M = np.eye(d)
+    scatter, _ = scatter_of(c, s, h)
+    _, across = least_axis(scatter, d)
     for r in range(d):
         for k in range(d):
             M[r, k] -= 2.0 * across[r] * across[k]

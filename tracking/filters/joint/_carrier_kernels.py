@@ -45,12 +45,12 @@ def apply_carriers(c, s, h, t, dt, scratch):
 @small_kernel
 def judge(c, s, h, nu, m, variance, scratch):
     """Correct with a constraint, and let it speak for or against the hypothesis."""
-    S = project(s, h, c.n, m, scratch.idx, scratch.val, scratch.w) + variance
+    S = project(s, h, m, scratch) + variance
     if s.group[0].n_alive > 1:
         s.loglik[h] -= 0.5 * (min(nu * nu / S, c.max_nis) + math.log(S))
     if nu * nu > 25.0 * S:
         S = nu * nu / 25.0  # a jolt or a skid: it counts for less
-    absorb(s, h, c.n, scratch.w, nu, S)
+    absorb(s, h, scratch.w, nu, S)
 
 
 @small_kernel
@@ -101,8 +101,8 @@ def hold_speed(c, s, h, dt, scratch):
                 scratch.idx[a], scratch.val[a] = at, 1.0 / m
                 mean += s.x[h, at] / m
                 a += 1
-        S = project(s, h, c.n, m, scratch.idx, scratch.val, scratch.w) + variance
-        absorb(s, h, c.n, scratch.w, -mean, S)
+        S = project(s, h, m, scratch) + variance
+        absorb(s, h, scratch.w, -mean, S)
 
 
 @small_kernel

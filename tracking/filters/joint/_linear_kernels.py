@@ -15,68 +15,36 @@ import math
 
 from tracking.compiled import small_kernel
 from tracking.filters.joint._product_kernels import take_off
+from tracking.filters.joint._projection_kernels import sum_rows
 
 
 @small_kernel
-def project(s, h, n, m, idx, val, w):
-    """Write ``w = P H`` of hypothesis h; returns ``H P H^T``.
+def project(s, h, m, scratch):
+    """Write ``w = P H`` of hypothesis h to the scratch; returns ``H P H^T``.
 
     Args:
         s: JointState of one environment.
         h: Hypothesis.
-        n: Number of states.
         m: Number of non-zero derivatives.
-        idx: Their states.
-        val: The derivatives.
-        w: Written, (state).
+        scratch: Room; `idx` and `val` hold their states and them.
     """
-    P, W = s.P, s.waiting
-    sum_rows(P, h, n, m, idx, val, w)
-    n_waiting = s.n_waiting[h]
-    for q in range(0, n_waiting - n_waiting % 4, 4):
-        v0, v1, v2, v3 = 0.0, 0.0, 0.0, 0.0
+    idx, val, w, share, W = scratch.idx, scratch.val, scratch.w, scratch.share, s.waiting
+    # Eight at a time, since each sum takes as long as all eight; rows beyond count for nothing.
+    for q in range(0, s.n_waiting[h], 8):
+        v0, v1, v2, v3, v4, v5, v6, v7 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for k in range(m):
             v, at = val[k], idx[k]
             v0, v1 = v0 + v * W[h, q, at], v1 + v * W[h, q + 1, at]
             v2, v3 = v2 + v * W[h, q + 2, at], v3 + v * W[h, q + 3, at]
-        for r in range(n):
-            first = v0 * W[h, q, r] + v1 * W[h, q + 1, r]
-            w[r] -= first + (v2 * W[h, q + 2, r] + v3 * W[h, q + 3, r])
-    for q in range(n_waiting - n_waiting % 4, n_waiting):
-        v = 0.0
-        for k in range(m):
-            v += val[k] * W[h, q, idx[k]]
-        for r in range(n):
-            w[r] -= v * W[h, q, r]
+            v4, v5 = v4 + v * W[h, q + 4, at], v5 + v * W[h, q + 5, at]
+            v6, v7 = v6 + v * W[h, q + 6, at], v7 + v * W[h, q + 7, at]
+        share[q], share[q + 1], share[q + 2], share[q + 3] = v0, v1, v2, v3
+        share[q + 4], share[q + 5], share[q + 6], share[q + 7] = v4, v5, v6, v7
+    sum_rows(s.P, h, idx, val, m, W, share, s.n_waiting[h], w)
     variance = 0.0
     for k in range(m):
         variance += val[k] * w[idx[k]]
     return max(variance, 0.0)
-
-
-@small_kernel
-def sum_rows(P, h, n, m, idx, val, w):
-    """Write ``w = P[h] H``, several rows at a time: each number of w is stored less often."""
-    k = 1
-    if m >= 4:
-        i0, i1, i2, i3 = idx[0], idx[1], idx[2], idx[3]
-        v0, v1, v2, v3 = val[0], val[1], val[2], val[3]
-        for r in range(n):
-            w[r] = (v0 * P[h, i0, r] + v1 * P[h, i1, r]) + (v2 * P[h, i2, r] + v3 * P[h, i3, r])
-        k = 4
-    else:
-        i0, v0 = idx[0], val[0]
-        for r in range(n):
-            w[r] = v0 * P[h, i0, r]
-    while k + 1 < m:
-        i0, i1, v0, v1 = idx[k], idx[k + 1], val[k], val[k + 1]
-        for r in range(n):
-            w[r] += v0 * P[h, i0, r] + v1 * P[h, i1, r]
-        k += 2
-    if k < m:
-        i0, v0 = idx[k], val[k]
-        for r in range(n):
-            w[r] += v0 * P[h, i0, r]
 
 
 @small_kernel
@@ -89,32 +57,33 @@ def covariance(s, h, a, b):
 
 
 @small_kernel
-def absorb(s, h, n, w, nu, S):
+def absorb(s, h, w, nu, S):
     """Correct hypothesis h with an innovation nu of variance S; w is ``P H``, overwritten.
 
     What the states are moved by is added to `moved`.
     """
     x, P, W, moved = s.x, s.P, s.waiting, s.moved
-    gain = nu / S
+    n, room = P.shape[2], W.shape[1]
+    gain, scale = nu / S, 1.0 / math.sqrt(S)
+    if room > 0:
+        if s.n_waiting[h] == room:
+            settle(s, h)
+        q = s.n_waiting[h]
+        for r in range(n):
+            w_r = w[r]
+            x[h, r] += w_r * gain
+            moved[h, r] += w_r * gain
+            W[h, q, r] = w_r * scale
+        s.n_waiting[h] = q + 1
+        return
     for r in range(n):
         x[h, r] += w[r] * gain
         moved[h, r] += w[r] * gain
-    scale = 1.0 / math.sqrt(S)
-    for r in range(n):
         w[r] *= scale
-    room = W.shape[1]
-    if room == 0:
-        for r in range(n):
-            w_r = w[r]
-            for c in range(n):
-                P[h, r, c] -= w_r * w[c]
-        return
-    if s.n_waiting[h] == room:
-        settle(s, h)
-    q = s.n_waiting[h]
     for r in range(n):
-        W[h, q, r] = w[r]
-    s.n_waiting[h] = q + 1
+        w_r = w[r]
+        for c in range(n):
+            P[h, r, c] -= w_r * w[c]
 
 
 @small_kernel

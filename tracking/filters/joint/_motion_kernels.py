@@ -18,6 +18,7 @@ import numpy as np
 
 from tracking._angle_kernels import cosine_sine
 from tracking.compiled import small_kernel
+from tracking.filters.joint._mirror_kernels import mirror
 from tracking.filters.joint._sample_kernels import decay, is_aided
 
 
@@ -162,7 +163,7 @@ def moves(node):
 def move_columns(d, node, P, h, i, w):
     """``F P F^T``, the rows done: the columns of position and velocity of node i.
 
-    Down to the diagonal: `fade` copies what is left of it.
+    Down to the diagonal: `fade` mirrors what is right of it.
     """
     p, v, b, y = node.at_p, node.at_v, node.at_b, node.at_h
     T, pc, ps, vc, vs = w[i, 0], w[i, 1], w[i, 2], w[i, 3], w[i, 4]
@@ -183,19 +184,15 @@ def move_columns(d, node, P, h, i, w):
 @small_kernel
 def fade(P, h, n_motion, n, scale):
     """What decays, right of positions and velocities and below; then left of the diagonal."""
-    for r in range(n_motion):
-        for k in range(r):
-            P[h, r, k] = P[h, k, r]
     end = np.uint64(n)  # unsigned: no index from the end
     for r in range(n_motion):
         for k in range(np.uint64(n_motion), end):
             P[h, r, k] *= scale[k]
     for r in range(np.uint64(n_motion), end):
         s = scale[r]
-        for k in range(n_motion):
-            P[h, r, k] = P[h, k, r]
         for k in range(np.uint64(n_motion), end):
             P[h, r, k] *= s * scale[k]
+    mirror(P, h, n_motion)
 
 
 @small_kernel

@@ -26,6 +26,8 @@ from tracking.filters.joint._turn_kernels import UNSURE
 MIN_DISTANCE = 0.01
 """[m] Closer than this a direction has no meaning."""
 MIN_PROB = 1e-4
+NEGLIGIBLE, MOST_BENT = 1e-3, 0.2
+"""[-, m] Share of the noise that is not worth working out; the most a range is thought bent."""
 SQRT_2PI = math.sqrt(2.0 * math.pi)
 
 
@@ -37,6 +39,8 @@ def antenna_offset(held, layout, n, antenna):
         layout.antenna_b[antenna, 1],
         layout.antenna_b[antenna, 2],
     )
+    if o0 == 0.0 and o1 == 0.0 and o2 == 0.0:
+        return 0.0, 0.0, 0.0
     w, x, y, z = held[n, 0], held[n, 1], held[n, 2], held[n, 3]
     # o + 2 w (u x o) + 2 u x (u x o), with u the vector part
     c0, c1, c2 = y * o2 - z * o1, z * o0 - x * o2, x * o1 - y * o0
@@ -121,26 +125,31 @@ def range_model(c, s, h, p, lever_i, lever_j, idx, val):
 
 
 @small_kernel
-def bend(c, s, h, p, val):
-    """What the straight line misses: how much longer the range is on average than predicted [m].
+def bend_variance(c, s, h, p, val):
+    """What the straight line misses, as noise of the range [m2].
 
-    To second order ``tr(P_across) / (2 d)``, with P_across the covariance of the relative
-    position across the line of sight.
+    A range is longer than predicted by ``tr(P_across) / (2 d)`` on average, to second order, with
+    P_across the covariance of the relative position across the line of sight.
     """
     node_i, node_j = s.nodes[s.pairs[p].i], s.nodes[s.pairs[p].j]
-    trace, along, squared = 0.0, 0.0, 0.0
+    trace, squared = 0.0, 0.0
     for a in range(c.d):
-        u_a = val[2 + a] if a < 2 else val[5]
         i_a, j_a = node_i.at_p + a, node_j.at_p + a
         r = s.x[h, j_a] - s.x[h, i_a]
         squared += r * r
+        trace += s.P[h, i_a, i_a] + s.P[h, j_a, j_a] - 2.0 * s.P[h, i_a, j_a]
+    gain = 0.5 * c.bend_gain / math.sqrt(squared + 0.01)
+    if (gain * trace) ** 2 < NEGLIGIBLE * c.white_var:
+        return 0.0  # and less by what waits
+    along = 0.0
+    for a in range(c.d):
+        u_a = val[2 + a] if a < 2 else val[5]
+        i_a, j_a = node_i.at_p + a, node_j.at_p + a
         for b in range(a, c.d):
             u_b = val[2 + b] if b < 2 else val[5]
             i_b, j_b = node_i.at_p + b, node_j.at_p + b
             P_ab = s.P[h, i_a, i_b] + s.P[h, j_a, j_b] - s.P[h, i_a, j_b] - s.P[h, j_a, i_b]
             along += u_a * P_ab * u_b * (1.0 if a == b else 2.0)
-            if a == b:
-                trace += P_ab
     for q in range(s.n_waiting[h]):
         part = 0.0
         for a in range(c.d):
@@ -148,7 +157,7 @@ def bend(c, s, h, p, val):
             part += off * (val[2 + a] if a < 2 else val[5])
             trace -= off * off
         along -= part * part
-    return 0.5 * max(trace - along, 0.0) / math.sqrt(squared + 0.01)
+    return min(gain * max(trace - along, 0.0), MOST_BENT) ** 2
 
 
 @small_kernel
@@ -183,7 +192,7 @@ def fuse_range(c, s, h, p, dt, distance, levers, sight, scratch):
         follow_rotation(c, s, h)
     predicted, m = range_model(c, s, h, p, levers[:3], levers[3:], scratch.idx, scratch.val)
     nu = distance - predicted
-    variance = project(s, h, c.n, m, scratch.idx, scratch.val, scratch.w)
+    variance = project(s, h, m, scratch)
     S = variance + c.white_var
     switched, sane, likelihood = judge_sight(c, s, h, p, dt, nu, variance, sight, scratch.w)
     if s.group[0].n_alive > 1:
@@ -194,9 +203,9 @@ def fuse_range(c, s, h, p, dt, distance, levers, sight, scratch):
         change_sight(c, s, h, p, switched)
         predicted, m = range_model(c, s, h, p, levers[:3], levers[3:], scratch.idx, scratch.val)
         nu = distance - predicted
-        variance = project(s, h, c.n, m, scratch.idx, scratch.val, scratch.w)
-    bent = min(c.bend_gain * bend(c, s, h, p, scratch.val), 0.2)
-    R = c.white_var + bent * bent + s.nlos[h, p] * c.excess_white_var
+        variance = project(s, h, m, scratch)
+    R = c.white_var + bend_variance(c, s, h, p, scratch.val)
+    R += s.nlos[h, p] * c.excess_white_var
     # A pair whose ranges have long contradicted all else is believed less and less; where most
     # contradict the filter, it is the filter that is wrong.
     doubt = s.pairs[p].misfit / (0.7 * c.doubt)
@@ -204,7 +213,7 @@ def fuse_range(c, s, h, p, dt, distance, levers, sight, scratch):
     if doubt > 1.0 and not s.group[0].lost:
         trust /= doubt * doubt * doubt * doubt
     if trust > 1e-3:
-        absorb(s, h, c.n, scratch.w, nu, variance + R / trust)
+        absorb(s, h, scratch.w, nu, variance + R / trust)
     return before, nis, sane
 
 

@@ -21,8 +21,8 @@ def fuse_survey(c, s, h, p, distance, scratch):
         follow_rotation(c, s, h)
     none = scratch.none
     predicted, m = range_model(c, s, h, p, none, none, scratch.idx, scratch.val)
-    variance = project(s, h, c.n, m, scratch.idx, scratch.val, scratch.w)
-    absorb(s, h, c.n, scratch.w, distance - predicted, variance + c.survey_var)
+    variance = project(s, h, m, scratch)
+    absorb(s, h, scratch.w, distance - predicted, variance + c.survey_var)
 
 
 @kernel

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracking.arrays import F64, I64, aligned
-from tracking.filters.joint.state import N_PRE
+from tracking.filters.joint.state import N_PRE, room_to_wait
 
 
 class Scratch(NamedTuple):
@@ -19,6 +19,8 @@ class Scratch(NamedTuple):
     """Derivatives by them."""
     w: F64
     """(state)"""
+    share: F64
+    """Of each correction that waits in a measurement, (correction)."""
     scale: F64
     """(state)"""
     step: F64
@@ -46,6 +48,7 @@ def make_scratch(n_nodes: int, n_pairs: int, n_states: int) -> Scratch:
         idx=np.zeros(most, dtype=np.int64),
         val=np.zeros(most),
         w=aligned(n_states),
+        share=np.zeros(room_to_wait(n_states)),
         scale=aligned(n_states),
         step=np.zeros((n_nodes, 9)),
         speed=np.zeros(n_nodes),

@@ -1,0 +1,117 @@
+"""How flat a layout is: its extent across the line or plane that it is nearest to.
+
+Looked at ten times a second in every group, so the few numbers are worked out by hand: a library
+takes longer for them than all else that is looked at then.
+
+References:
+    [1] Smith, Eigenvalues of a symmetric 3x3 matrix, Comm. ACM 4 (1961) 168.
+"""
+
+from __future__ import annotations
+
+import math
+
+from tracking.compiled import kernel
+
+
+@kernel
+def flatness(c, s, h):
+    """Extent of the layout across itself over its standard deviation; infinite for few nodes."""
+    d = c.d
+    scatter, present = scatter_of(c, s, h)
+    if present <= d:
+        return math.inf
+    squared, across = least_axis(scatter, d)
+    # (e^T P e) of the positions along it, less that of their mean
+    own, total = 0.0, 0.0
+    for i in range(s.nodes.shape[0]):
+        if not s.nodes[i].present:
+            continue
+        for j in range(s.nodes.shape[0]):
+            if not s.nodes[j].present:
+                continue
+            for k in range(d):
+                for q in range(d):
+                    P_kq = s.P[h, s.nodes[i].at_p + k, s.nodes[j].at_p + q]
+                    part = across[k] * across[q] * P_kq
+                    total += part
+                    if i == j:
+                        own += part
+    return math.sqrt(squared / max(own - total / present, 1e-12))
+
+
+@kernel
+def scatter_of(c, s, h):
+    """``sum x x^T`` of the positions from their mean, xx, xy, xz, yy, yz, zz, and how many.
+
+    The height of a plane is 0.
+    """
+    m0, m1, m2, present = 0.0, 0.0, 0.0, 0
+    for i in range(s.nodes.shape[0]):
+        if s.nodes[i].present:
+            at = s.nodes[i].at_p
+            present += 1
+            m0 += s.x[h, at]
+            m1 += s.x[h, at + 1]
+            m2 += s.x[h, at + 2] if c.d == 3 else 0.0
+    share = 1.0 / max(present, 1)
+    m0, m1, m2 = share * m0, share * m1, share * m2
+    xx, xy, xz, yy, yz, zz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(s.nodes.shape[0]):
+        if s.nodes[i].present:
+            at = s.nodes[i].at_p
+            x, y = s.x[h, at] - m0, s.x[h, at + 1] - m1
+            z = s.x[h, at + 2] - m2 if c.d == 3 else 0.0
+            xx, xy, xz = xx + x * x, xy + x * y, xz + x * z
+            yy, yz, zz = yy + y * y, yz + y * z, zz + z * z
+    return (xx, xy, xz, yy, yz, zz), present
+
+
+@kernel
+def least_axis(scatter, d):
+    """The least eigenvalue of a symmetric matrix, at least 0, and its direction, three numbers.
+
+    Args:
+        scatter: xx, xy, xz, yy, yz, zz.
+        d: 2 for the upper left four of them only, or 3.
+    """
+    xx, xy, xz, yy, yz, zz = scatter
+    if d == 2:
+        angle = 0.5 * math.atan2(2.0 * xy, xx - yy)  # of the greatest
+        least = 0.5 * (xx + yy) - math.hypot(0.5 * (xx - yy), xy)
+        return max(least, 0.0), (-math.sin(angle), math.cos(angle), 0.0)
+    # The roots of the characteristic polynomial by the cosine of a third of an angle [1].
+    mean = (xx + yy + zz) / 3.0
+    a, b, e = xx - mean, yy - mean, zz - mean
+    spread = math.sqrt((a * a + b * b + e * e + 2.0 * (xy * xy + xz * xz + yz * yz)) / 6.0)
+    if spread <= 1e-15 * mean:
+        return max(mean, 0.0), (0.0, 0.0, 1.0)
+    det = a * (b * e - yz * yz) - xy * (xy * e - yz * xz) + xz * (xy * yz - b * xz)
+    third = math.acos(min(max(0.5 * det / spread**3, -1.0), 1.0)) / 3.0
+    least = mean + 2.0 * spread * math.cos(third + 2.0 * math.pi / 3.0)
+    return max(least, 0.0), null_axis(xx - least, xy, xz, yy - least, yz, zz - least)
+
+
+@kernel
+def null_axis(xx, xy, xz, yy, yz, zz):
+    """A unit vector that a singular symmetric matrix takes to 0: across its rows."""
+    n0, n1, n2, most = 0.0, 0.0, 1.0, 0.0
+    rows = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+    largest, size = rows[0], 0.0
+    for k in range(3):
+        a, b = rows[k], rows[(k + 1) % 3]
+        c0, c1, c2 = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+        squared = c0 * c0 + c1 * c1 + c2 * c2
+        if squared > most:
+            n0, n1, n2, most = c0, c1, c2, squared
+        squared = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
+        if squared > size:
+            largest, size = a, squared
+    if most <= 1e-20 * size * size:
+        # All rows point one way: anything across it.
+        if abs(largest[0]) < max(abs(largest[1]), abs(largest[2])):
+            n0, n1, n2 = 0.0, largest[2], -largest[1]
+        else:
+            n0, n1, n2 = largest[1], -largest[0], 0.0
+    length = math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
+    return n0 / length, n1 / length, n2 / length
