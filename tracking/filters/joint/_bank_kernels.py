@@ -20,7 +20,7 @@ from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_hypothesi
 from tracking.filters.joint._flatness_kernels import flatness, least_axis, scatter_of
 from tracking.filters.joint._linear_kernels import decouple
 from tracking.filters.joint._sample_kernels import decay
-from tracking.filters.joint._sleep_kernels import turn_all_ways
+from tracking.filters.joint._sleep_kernels import TIE, turn_all_ways
 from tracking.filters.joint._start_kernels import begin_pair, forget_fits
 
 FLAT, OPEN = 2.5, 4.0
@@ -110,6 +110,9 @@ def prune_bank(c, s):
     if group.n_alive < 2:
         return
     n_hyps = s.alive.shape[0]
+    if not group.asleep and group.t < group.t_patient - TIE:
+        for h in range(n_hyps):
+            s.loglik[h] = 0.0
     best = -1
     for h in range(n_hyps):
         if s.alive[h] and (best < 0 or s.loglik[h] > s.loglik[best]):
@@ -172,6 +175,7 @@ def remove_node(c, s, layout, i):
     for h in range(s.alive.shape[0]):
         if s.alive[h]:
             for r in range(node.at_p, node.at_p + (c.d if node.static else 2 * c.d)):
+                s.moved[h, r] = 0.0
                 decouple(s.x, s.P, h, c.n, r, 1.0)
             for r in range(node.at_b, node.at_b + (0 if node.static else c.d + 1)):
                 decouple(s.x, s.P, h, c.n, r, 1.0)

@@ -20,6 +20,7 @@ def copy_hypothesis(s, h):
             s.n_waiting[free] = s.n_waiting[h]
             s.moved[free] = s.moved[h]
             s.nlos[free] = s.nlos[h]
+            s.stays[free] = s.stays[h]
             s.group[0].n_alive += 1
             return free
     return -1

@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 
 from tracking.compiled import kernel, small_kernel
-from tracking.filters.joint._range_kernels import MIN_PROB
+from tracking.filters.joint._sight_kernels import MIN_PROB
 
 RECENT = 0.02
 """[-] Weight of a range in the share of a node's ranges that do not fit."""

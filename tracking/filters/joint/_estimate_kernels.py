@@ -95,7 +95,7 @@ def look_ahead(c, s, scratch, t):
             sum_inertial(c, s.nodes, s.held, scratch.pre, i, t)
     if t > s.group[0].t:
         for p in range(s.pairs.shape[0]):
-            scratch.nlos[0, p] = s.nlos[h, p]
+            scratch.nlos[0, p], scratch.stays[0, p] = s.nlos[h, p], s.stays[h, p]
         ahead = JointState(
             s.nodes,
             s.held,
@@ -108,6 +108,7 @@ def look_ahead(c, s, scratch, t):
             s.n_waiting,
             s.moved,
             scratch.nlos,
+            scratch.stays,
             s.alive,
             s.loglik,
         )

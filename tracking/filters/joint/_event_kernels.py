@@ -19,13 +19,10 @@ from tracking.filters.joint._estimate_kernels import write_estimate
 from tracking.filters.joint._linear_kernels import settle, settle_all
 from tracking.filters.joint._misplaced_kernels import watch_places
 from tracking.filters.joint._motion_kernels import moves, predict
-from tracking.filters.joint._range_kernels import (
-    antenna_offset,
-    fuse_range,
-    gap_evidence,
-)
+from tracking.filters.joint._range_kernels import antenna_offset, fuse_range
 from tracking.filters.joint._rotation_kernels import carry_moves, follow_rotation
 from tracking.filters.joint._sample_kernels import sum_inertial, take_state
+from tracking.filters.joint._sight_kernels import gap_evidence
 from tracking.filters.joint._sleep_kernels import may_move, none_moved, wake_up
 from tracking.filters.joint._start_kernels import try_join, try_start
 from tracking.filters.joint._stuck_kernels import is_stuck
@@ -116,6 +113,7 @@ def one_env(state, e):
         state.n_waiting[e],
         state.moved[e],
         state.nlos[e],
+        state.stays[e],
         state.alive[e],
         state.loglik[e],
     )
@@ -202,6 +200,7 @@ def carry(c, s, scratch, t):
             follow_rotation(c, s, h)
             carry_moves(c, s, h)
             predict(c, s, h, t - group.t, scratch)
+            s.stays[h, :] = 1.0
     for i in range(s.nodes.shape[0]):
         for k in range(N_PRE):
             s.pre[i, k] = 0.0

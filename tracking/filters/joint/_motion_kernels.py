@@ -19,7 +19,7 @@ import numpy as np
 from tracking._angle_kernels import cosine_sine
 from tracking.compiled import small_kernel
 from tracking.filters.joint._mirror_kernels import mirror
-from tracking.filters.joint._sample_kernels import decay, is_aided
+from tracking.filters.joint._sample_kernels import decay
 
 
 @small_kernel
@@ -51,6 +51,7 @@ def predict(c, s, h, step, scratch):
         scale[at] = decay(way / c.fast_length)
         hidden = s.nlos[h, p]
         scale[at + 1] = decay(way * ((1.0 - hidden) / c.slow_length + hidden / c.excess_length))
+        scale[at + 1] *= s.stays[h, p]
         x[h, at] *= scale[at]
         x[h, at + 1] *= scale[at + 1]
         x[h, at + 1] += (1.0 - scale[at + 1]) * hidden * c.excess
@@ -66,7 +67,7 @@ def predict(c, s, h, step, scratch):
             add_noise(c, nodes[i], s.pre, P, h, i, scale, step)
     for p in range(pairs.shape[0]):
         at = pairs[p].at_e
-        if at >= 0 and scale[at] < 1.0:
+        if at >= 0:
             slow_var = c.slow_var + s.nlos[h, p] * c.excess_var
             P[h, at, at] += (1.0 - scale[at] * scale[at]) * c.fast_var
             P[h, at + 1, at + 1] += (1.0 - scale[at + 1] * scale[at + 1]) * slow_var
@@ -205,9 +206,7 @@ def add_noise(c, node, pre, P, h, i, scale, step):
         return
     v, b, y = node.at_v, node.at_b, node.at_h
     T = pre[i, 0]
-    q = c.unaided_psd2 * T
-    if is_aided(c, node, node.t_pre):
-        q = node.psd2 * T + node.turn_psd2 * pre[i, 11]
+    q = node.psd2 * T + node.turn_psd2 * pre[i, 11]
     for k in range(c.d):
         P[h, p + k, p + k] += q * T * T / 3.0
         P[h, p + k, v + k] += 0.5 * q * T

@@ -1,14 +1,12 @@
-"""A range: its model, whether it was line of sight, and the correction.
+"""A range: its model and the correction.
 
     z = |p_j + l_j - p_i - l_i| + fast + slow + noise
 
 with the antenna offsets l turned by the nodes' orientations and heading errors, and p where the
 nodes are by now: the states may be a little older (`_event_kernels.advance`). Behind an
-obstacle an excess is added. Which it was is judged by Bayes' rule, from the residual, from the
-gap between received and first-path power where it is reported, and from what it was before
-(a Markov chain of two states for every pair and hypothesis). The correction is that of both
-cases by their probabilities: information adds up, so a range that is surely hidden hardly
-counts. A few ranges mean nothing; one that fits neither case counts for nothing.
+obstacle an excess is added (`_sight_kernels`). The correction is that of both cases by their
+probabilities: information adds up, so a range that is surely hidden hardly counts. A few ranges
+mean nothing; one that fits neither case counts for nothing.
 """
 
 from __future__ import annotations
@@ -17,18 +15,18 @@ import math
 
 from tracking._angle_kernels import cosine_sine
 from tracking.compiled import small_kernel
-from tracking.filters.joint._linear_kernels import absorb, covariance, project
+from tracking.filters.joint._linear_kernels import absorb, project
 from tracking.filters.joint._motion_kernels import time_since, way_since
 from tracking.filters.joint._rotation_kernels import follow_rotation
-from tracking.filters.joint._sample_kernels import decay
+from tracking.filters.joint._sight_kernels import change_sight, judge_sight
 from tracking.filters.joint._turn_kernels import UNSURE
 
 MIN_DISTANCE = 0.01
 """[m] Closer than this a direction has no meaning."""
-MIN_PROB = 1e-4
 NEGLIGIBLE, MOST_BENT = 1e-3, 0.2
 """[-, m] Share of the noise that is not worth working out; the most a range is thought bent."""
-SQRT_2PI = math.sqrt(2.0 * math.pi)
+AT_ONCE = 0.1
+"""[-] A sight that may have changed with a smaller probability is forgotten with the next step."""
 
 
 @small_kernel
@@ -131,42 +129,38 @@ def bend_variance(c, s, h, p, val):
     A range is longer than predicted by ``tr(P_across) / (2 d)`` on average, to second order, with
     P_across the covariance of the relative position across the line of sight.
     """
-    node_i, node_j = s.nodes[s.pairs[p].i], s.nodes[s.pairs[p].j]
-    trace, squared = 0.0, 0.0
-    for a in range(c.d):
-        i_a, j_a = node_i.at_p + a, node_j.at_p + a
-        r = s.x[h, j_a] - s.x[h, i_a]
-        squared += r * r
-        trace += s.P[h, i_a, i_a] + s.P[h, j_a, j_a] - 2.0 * s.P[h, i_a, j_a]
-    gain = 0.5 * c.bend_gain / math.sqrt(squared + 0.01)
+    i, j, W = s.nodes[s.pairs[p].i].at_p, s.nodes[s.pairs[p].j].at_p, s.waiting
+    r0, r1, r2 = s.x[h, j] - s.x[h, i], s.x[h, j + 1] - s.x[h, i + 1], 0.0
+    trace = apart(s.P, h, i, j, 0, 0) + apart(s.P, h, i, j, 1, 1)
+    if c.d == 3:
+        r2 = s.x[h, j + 2] - s.x[h, i + 2]
+        trace += apart(s.P, h, i, j, 2, 2)
+    gain = 0.5 * c.bend_gain / math.sqrt(r0 * r0 + r1 * r1 + r2 * r2 + 0.01)
     if (gain * trace) ** 2 < NEGLIGIBLE * c.white_var:
         return 0.0  # and less by what waits
-    along = 0.0
-    for a in range(c.d):
-        u_a = val[2 + a] if a < 2 else val[5]
-        i_a, j_a = node_i.at_p + a, node_j.at_p + a
-        for b in range(a, c.d):
-            u_b = val[2 + b] if b < 2 else val[5]
-            i_b, j_b = node_i.at_p + b, node_j.at_p + b
-            P_ab = s.P[h, i_a, i_b] + s.P[h, j_a, j_b] - s.P[h, i_a, j_b] - s.P[h, j_a, i_b]
-            along += u_a * P_ab * u_b * (1.0 if a == b else 2.0)
+    u0, u1, u2 = val[2], val[3], val[5] if c.d == 3 else 0.0
+    along = u0 * u0 * apart(s.P, h, i, j, 0, 0) + u1 * u1 * apart(s.P, h, i, j, 1, 1)
+    along += 2.0 * u0 * u1 * apart(s.P, h, i, j, 0, 1)
+    if c.d == 3:
+        across = u0 * apart(s.P, h, i, j, 0, 2) + u1 * apart(s.P, h, i, j, 1, 2)
+        along += u2 * (2.0 * across + u2 * apart(s.P, h, i, j, 2, 2))
+    # Sums of their own for each axis: none waits for another.
+    t0, t1, t2 = 0.0, 0.0, 0.0
     for q in range(s.n_waiting[h]):
-        part = 0.0
-        for a in range(c.d):
-            off = s.waiting[h, q, node_j.at_p + a] - s.waiting[h, q, node_i.at_p + a]
-            part += off * (val[2 + a] if a < 2 else val[5])
-            trace -= off * off
+        off0, off1, off2 = W[h, q, j] - W[h, q, i], W[h, q, j + 1] - W[h, q, i + 1], 0.0
+        if c.d == 3:
+            off2 = W[h, q, j + 2] - W[h, q, i + 2]
+        t0, t1, t2 = t0 + off0 * off0, t1 + off1 * off1, t2 + off2 * off2
+        part = u0 * off0 + u1 * off1 + u2 * off2
         along -= part * part
+    trace -= t0 + t1 + t2
     return min(gain * max(trace - along, 0.0), MOST_BENT) ** 2
 
 
 @small_kernel
-def gap_evidence(c, gap):
-    """Log-likelihood ratio of no sight against sight, of a power gap [dB]."""
-    los = max(gap - c.gap_los, 0.0) / c.gap_los_std
-    nlos = min(gap - c.gap_nlos, 0.0) / c.gap_nlos_std
-    ratio = 0.5 * (los * los - nlos * nlos) - math.log(c.gap_nlos_std / c.gap_los_std)
-    return min(max(c.gap_weight * ratio, -4.0), 4.0)
+def apart(P, h, i, j, a, b):
+    """Covariance of components a and b of the position at j relative to that at i."""
+    return P[h, i + a, i + b] + P[h, j + a, j + b] - P[h, i + a, j + b] - P[h, j + a, i + b]
 
 
 @small_kernel
@@ -199,7 +193,9 @@ def fuse_range(c, s, h, p, dt, distance, levers, sight, scratch):
         loglik = math.log(likelihood)
         s.loglik[h] += c.evidence * max(loglik, -0.5 * (c.max_nis + math.log(S)))
     before, nis = nu, nu * nu / S
-    if switched > 0.01 and s.pairs[p].at_e >= 0:
+    if switched < AT_ONCE or s.pairs[p].at_e < 0:
+        s.stays[h, p] *= 1.0 - switched
+    else:
         change_sight(c, s, h, p, switched)
         predicted, m = range_model(c, s, h, p, levers[:3], levers[3:], scratch.idx, scratch.val)
         nu = distance - predicted
@@ -215,78 +211,3 @@ def fuse_range(c, s, h, p, dt, distance, levers, sight, scratch):
     if trust > 1e-3:
         absorb(s, h, scratch.w, nu, variance + R / trust)
     return before, nis, sane
-
-
-@small_kernel
-def judge_sight(c, s, h, p, dt, nu, variance, sight, w):
-    """Bayes' rule over what the sight was and is; updates the pair's NLOS probability.
-
-    The slow error holds the excess while there is no sight. So in sight before and after, or
-    in neither, the range is predicted as it is; entering adds an excess, leaving takes the
-    slow error away.
-
-    Args:
-        c: Coefficients.
-        s: JointState of one environment.
-        h: Hypothesis.
-        p: Pair.
-        dt: Time since the pair's last range [s].
-        nu: Innovation [m].
-        variance: Of the prediction [m2].
-        sight: As of `fuse_range`.
-        w: ``P H``.
-
-    Returns:
-        Probability that the sight changed; that the range meant anything; likelihood.
-    """
-    at = s.pairs[p].at_e + 1
-    before = s.nlos[h, p]
-    evidence, leave_rate = sight
-    enter, leave = 1.0 - decay(c.enter_rate * dt), 1.0 - decay(leave_rate * dt)
-    S = variance + c.white_var
-    off = nu - c.excess
-    S_enter = S + c.excess_var
-    nu_leave, S_leave = nu, S
-    if at > 0:
-        nu_leave = nu + s.x[h, at]
-        S_leave += max(covariance(s, h, at, at) - 2.0 * w[at], -0.9 * variance) + c.slow_var
-    hidden = math.exp(evidence)
-    stays = math.exp(-0.5 * nu * nu / S) / math.sqrt(S)
-    los_los = (1.0 - before) * (1.0 - enter) * stays
-    los_nlos = (1.0 - before) * enter * math.exp(-0.5 * off * off / S_enter) / math.sqrt(S_enter)
-    nlos_los = before * leave * math.exp(-0.5 * nu_leave * nu_leave / S_leave) / math.sqrt(S_leave)
-    nlos_nlos = before * (1.0 - leave) * stays
-    if at <= 0:
-        # Without a state for the excess, no sight is a range that is worse.
-        nlos_nlos = (
-            before * (1.0 - leave) * math.exp(-0.5 * off * off / S_enter) / math.sqrt(S_enter)
-        )
-    los_nlos *= hidden
-    nlos_nlos *= hidden
-    wild = SQRT_2PI * c.outlier_prob / c.outlier_span
-    total = los_los + los_nlos + nlos_los + nlos_nlos
-    s.nlos[h, p] = min(max((los_nlos + nlos_nlos) / max(total, 1e-300), MIN_PROB), 1.0 - MIN_PROB)
-    if total < 1e-300:
-        s.nlos[h, p] = before
-        return 0.0, 0.0, wild
-    # The power says nothing about where the nodes are: it is no evidence for a hypothesis.
-    norm = 1.0 + (s.nlos[h, p]) * (hidden - 1.0) if hidden > 1.0 else 1.0
-    switched = (los_nlos + nlos_los) / total
-    return switched, total / (total + wild), total / norm + wild
-
-
-@small_kernel
-def change_sight(c, s, h, p, switched):
-    """Forget the slow error of a pair by the probability that its sight changed."""
-    at = s.pairs[p].at_e + 1
-    if at <= 0:
-        return
-    stays = 1.0 - switched
-    for r in range(c.n):
-        s.P[h, at, r] *= stays
-        s.P[h, r, at] *= stays
-    for q in range(s.n_waiting[h]):
-        s.waiting[h, q, at] *= stays
-    hidden = s.nlos[h, p]
-    s.P[h, at, at] += (1.0 - stays * stays) * (c.slow_var + hidden * c.excess_var)
-    s.x[h, at] = stays * s.x[h, at] + switched * hidden * c.excess

@@ -39,6 +39,9 @@ def sum_inertial(c, nodes, held, pre, i, t):
         pre[i, 11] += dt * a * a
         pre[i, 4 + k] += dt * pre[i, 1 + k] + half * a
         pre[i, 1 + k] += dt * a
+    if not aided:
+        # In terms of the noise that grows with the acceleration: it stays when samples come again.
+        pre[i, 11] += dt * c.unaided_psd2 / node.turn_psd2
     cos_b, sin_b = (1.0, 0.0) if aided else (0.0, 0.0)
     if node.levelled and aided:
         cos_b, sin_b = node.cos_yaw, node.sin_yaw

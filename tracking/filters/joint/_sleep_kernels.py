@@ -18,6 +18,11 @@ from tracking.filters.joint._turn_kernels import spread_turn, turn_variance
 SETTLE, ORIENTED = 0.5, 1.5
 """[s] The first samples of a node look like motion: its orientation is still being found. That it
 turns means nothing for longer; but nobody starts without being shaken."""
+PATIENCE, STOOD = 4.0, 1.0
+"""[s] A group on wheels that starts while it moves, and has not stood first, knows nothing of its
+velocities: for so long wheels speak against the right rotation as well."""
+TIE = 1e-6
+"""[s] Times that differ by less are equal, whatever the clock began with."""
 
 
 @small_kernel
@@ -59,7 +64,10 @@ def wake_up(c, s, layout):
     Where a node that joined may be on two sides there are two layouts; the bank has room for a
     few rotations of the second.
     """
-    s.group[0].asleep = False
+    group = s.group[0]
+    group.asleep = False
+    if group.t > group.t_patient - PATIENCE + STOOD + TIE:
+        group.t_patient = group.t
     was_alive = s.alive.copy()
     for h in range(s.alive.shape[0]):
         for i in range(s.nodes.shape[0]):

@@ -26,7 +26,7 @@ from tracking.filters.joint._copy_kernels import copy_hypothesis
 from tracking.filters.joint._linear_kernels import decouple
 from tracking.filters.joint._place_kernels import JOIN_SPREAD, refine
 from tracking.filters.joint._sample_kernels import decay
-from tracking.filters.joint._sleep_kernels import ORIENTED, none_moved, rests
+from tracking.filters.joint._sleep_kernels import ORIENTED, PATIENCE, none_moved, rests
 from tracking.filters.joint._turn_kernels import read_turn, spread_turn
 
 
@@ -75,6 +75,10 @@ def try_start(c, s, layout, t):
     group.n_alive = n_first
     group.best = 0
     group.t, group.t_check, group.t_carrier, group.t_gauge = t, t, t, t
+    group.t_patient = t
+    for a in range(m):
+        if s.nodes[members[a]].sideways_var > 0.0:
+            group.t_patient = t + PATIENCE
     group.turn_var = c.rotation_var if c.d == 2 else 0.0
     group.misfit, group.fit, group.lost = 1.0, 1.0, False
     group.strain, group.strain_limit = 0.0, c.strained
@@ -126,7 +130,7 @@ def first_sight(c, pair):
 @kernel
 def begin_pair(c, s, h, p, hidden):
     """Range errors that nothing is known of yet but how likely it is that there is no sight."""
-    s.nlos[h, p] = hidden
+    s.nlos[h, p], s.stays[h, p] = hidden, 1.0
     at = s.pairs[p].at_e
     if at >= 0:
         decouple(s.x, s.P, h, c.n, at, max(c.fast_var, 1e-12))

@@ -8,10 +8,11 @@ from tracking.errors import ConfigError
 
 
 def _expect_positive(params: object, *but: str) -> None:
-    """Every float is above 0, but for those named."""
+    """Every number is above 0, but for those named."""
     for f in fields(params):  # type: ignore[arg-type]
         value = getattr(params, f.name)
-        if isinstance(value, float) and f.name not in but and not 0.0 < value < float("inf"):
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if number and f.name not in but and not 0.0 < value < float("inf"):
             raise ConfigError(f"{f.name}: expected a number above 0, got {value}")
 
 

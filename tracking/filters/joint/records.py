@@ -87,6 +87,7 @@ GROUP = np.dtype(
         ("t_check", "f8"),
         ("t_carrier", "f8"),
         ("t_gauge", "f8"),
+        ("t_patient", "f8"),  # until when nothing speaks for or against a hypothesis [s]
         ("turn_var", "f8"),  # of the turn of a group in the plane, lately; 0 in space [rad2]
         ("misfit", "f8"),  # running mean of NIS of ranges that mean anything, not of doubted nodes
         ("strain", "f8"),  # slow running mean of the misfit [-]

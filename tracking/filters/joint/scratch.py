@@ -39,6 +39,8 @@ class Scratch(NamedTuple):
     """(node) [s]"""
     nlos: F64
     """(1, pair)"""
+    stays: F64
+    """(1, pair)"""
 
 
 def make_scratch(n_nodes: int, n_pairs: int, n_states: int) -> Scratch:
@@ -58,4 +60,5 @@ def make_scratch(n_nodes: int, n_pairs: int, n_states: int) -> Scratch:
         pre=np.zeros((n_nodes, N_PRE)),
         t_pre=np.zeros(n_nodes),
         nlos=np.zeros((1, n_pairs)),
+        stays=np.zeros((1, n_pairs)),
     )

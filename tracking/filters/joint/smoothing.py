@@ -53,6 +53,7 @@ def with_clones(state: JointState, coefficients: Records) -> tuple[JointState, R
         n_waiting=np.zeros((len(envs), 1), dtype=np.int64),
         moved=aligned(len(envs), 1, width),
         nlos=state.nlos[envs, best][:, None].copy(),
+        stays=state.stays[envs, best][:, None].copy(),
         alive=state.alive[envs, best][:, None].copy(),
         loglik=np.zeros((len(envs), 1)),
     )

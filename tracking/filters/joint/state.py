@@ -61,6 +61,9 @@ class JointState(NamedTuple):
     """How far measurements moved the states since P last followed, (env, hyp, state)."""
     nlos: F64
     """Probability that a pair has no line of sight, (env, hyp, pair)."""
+    stays: F64
+    """How much of the slow range error of a pair is still what it was at the states' time; the
+    rest is forgotten when they are carried on, (env, hyp, pair)."""
     alive: Bool
     """True for hypotheses still considered, (env, hyp)."""
     loglik: F64
@@ -152,6 +155,7 @@ def make_state(
         n_waiting=np.zeros((n_envs, n_hyps), dtype=np.int64),
         moved=aligned(n_envs, n_hyps, n_states),
         nlos=np.zeros((n_envs, n_hyps, p)),
+        stays=np.ones((n_envs, n_hyps, p)),
         alive=np.zeros((n_envs, n_hyps), dtype=bool),
         loglik=np.zeros((n_envs, n_hyps)),
     )

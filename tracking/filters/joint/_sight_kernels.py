@@ -1,0 +1,101 @@
+"""Whether the ends of a range see each other, and what follows from that for its slow error.
+
+It is judged by Bayes' rule, from the residual, from the gap between received and first-path power
+where it is reported, and from what it was before: a Markov chain of two states for every pair and
+hypothesis.
+"""
+
+from __future__ import annotations
+
+import math
+
+from tracking.compiled import small_kernel
+from tracking.filters.joint._linear_kernels import covariance
+from tracking.filters.joint._sample_kernels import decay
+
+MIN_PROB = 1e-4
+SQRT_2PI = math.sqrt(2.0 * math.pi)
+
+
+@small_kernel
+def gap_evidence(c, gap):
+    """Log-likelihood ratio of no sight against sight, of a power gap [dB]."""
+    los = max(gap - c.gap_los, 0.0) / c.gap_los_std
+    nlos = min(gap - c.gap_nlos, 0.0) / c.gap_nlos_std
+    ratio = 0.5 * (los * los - nlos * nlos) - math.log(c.gap_nlos_std / c.gap_los_std)
+    return min(max(c.gap_weight * ratio, -4.0), 4.0)
+
+
+@small_kernel
+def judge_sight(c, s, h, p, dt, nu, variance, sight, w):
+    """Bayes' rule over what the sight was and is; updates the pair's NLOS probability.
+
+    The slow error holds the excess while there is no sight. So in sight before and after, or
+    in neither, the range is predicted as it is; entering adds an excess, leaving takes the
+    slow error away.
+
+    Args:
+        c: Coefficients.
+        s: JointState of one environment.
+        h: Hypothesis.
+        p: Pair.
+        dt: Time since the pair's last range [s].
+        nu: Innovation [m].
+        variance: Of the prediction [m2].
+        sight: As of `fuse_range`.
+        w: ``P H``.
+
+    Returns:
+        Probability that the sight changed; that the range meant anything; likelihood.
+    """
+    at = s.pairs[p].at_e + 1
+    before = s.nlos[h, p]
+    evidence, leave_rate = sight
+    enter, leave = 1.0 - decay(c.enter_rate * dt), 1.0 - decay(leave_rate * dt)
+    S = variance + c.white_var
+    off = nu - c.excess
+    S_enter = S + c.excess_var
+    nu_leave, S_leave = nu, S
+    if at > 0:
+        nu_leave = nu + s.x[h, at]
+        S_leave += max(covariance(s, h, at, at) - 2.0 * w[at], -0.9 * variance) + c.slow_var
+    hidden = math.exp(evidence)
+    stays = math.exp(-0.5 * nu * nu / S) / math.sqrt(S)
+    los_los = (1.0 - before) * (1.0 - enter) * stays
+    los_nlos = (1.0 - before) * enter * math.exp(-0.5 * off * off / S_enter) / math.sqrt(S_enter)
+    nlos_los = before * leave * math.exp(-0.5 * nu_leave * nu_leave / S_leave) / math.sqrt(S_leave)
+    nlos_nlos = before * (1.0 - leave) * stays
+    if at <= 0:
+        # Without a state for the excess, no sight is a range that is worse.
+        nlos_nlos = (
+            before * (1.0 - leave) * math.exp(-0.5 * off * off / S_enter) / math.sqrt(S_enter)
+        )
+    los_nlos *= hidden
+    nlos_nlos *= hidden
+    wild = SQRT_2PI * c.outlier_prob / c.outlier_span
+    total = los_los + los_nlos + nlos_los + nlos_nlos
+    s.nlos[h, p] = min(max((los_nlos + nlos_nlos) / max(total, 1e-300), MIN_PROB), 1.0 - MIN_PROB)
+    if total < 1e-300:
+        s.nlos[h, p] = before
+        return 0.0, 0.0, wild
+    # The power says nothing about where the nodes are: it is no evidence for a hypothesis.
+    norm = 1.0 + (s.nlos[h, p]) * (hidden - 1.0) if hidden > 1.0 else 1.0
+    switched = (los_nlos + nlos_los) / total
+    return switched, total / (total + wild), total / norm + wild
+
+
+@small_kernel
+def change_sight(c, s, h, p, switched):
+    """Forget the slow error of a pair by the probability that its sight changed."""
+    at = s.pairs[p].at_e + 1
+    if at <= 0:
+        return
+    stays = 1.0 - switched
+    for r in range(c.n):
+        s.P[h, at, r] *= stays
+        s.P[h, r, at] *= stays
+    for q in range(s.n_waiting[h]):
+        s.waiting[h, q, at] *= stays
+    hidden = s.nlos[h, p]
+    s.P[h, at, at] += (1.0 - stays * stays) * (c.slow_var + hidden * c.excess_var)
+    s.x[h, at] = stays * s.x[h, at] + switched * hidden * c.excess
