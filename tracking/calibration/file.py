@@ -37,6 +37,8 @@ from tracking.errors import ConfigError
 FORMAT = 1
 MOST = 1e12
 """Numbers beyond this mean nothing in any unit."""
+MOST_DIGITS = 18
+"""Of an id."""
 FIELDS = {
     "gyr_offset_rad_s": "gyr_offset",
     "acc_offset_m_s2": "acc_offset",
@@ -163,8 +165,8 @@ def _table(where: str, value: Any) -> dict[str, Any]:
 
 
 def _id(where: str, key: str, taken: dict[int, Any]) -> int:
-    if not (key.isascii() and key.isdigit()):
-        raise ConfigError(f"{where}.{key}: expected a node id")
+    if not (key.isascii() and key.isdigit() and len(key) <= MOST_DIGITS):
+        raise ConfigError(f"{where}.{key[:40]}: expected a node id")
     if int(key) in taken:
         raise ConfigError(f"{where}.{key}: node {int(key)} given twice, expected once")
     return int(key)

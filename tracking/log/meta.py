@@ -13,6 +13,8 @@ from tracking.log.folder import FORMAT
 
 MOST = 1e12
 """Numbers beyond this mean nothing in any unit."""
+MOST_DIGITS = 18
+"""Of an id."""
 MAX_OFFSET = 100.0
 """[m] An antenna farther from its body's origin is a mistake of units."""
 
@@ -110,11 +112,11 @@ def _table(where: str, value: Any) -> dict[str, Any]:
 
 def _id(where: str, value: Any) -> int:
     text = value.strip() if isinstance(value, str) else value
-    if isinstance(text, str) and text.isascii() and text.isdigit():
+    if isinstance(text, str) and text.isascii() and text.isdigit() and len(text) <= MOST_DIGITS:
         return int(text)
     if isinstance(text, int) and not isinstance(text, bool) and text >= 0:
         return text
-    raise LogError(f"meta.toml, {where}: expected an integer id, found {value!r}")
+    raise LogError(f"meta.toml, {where}: expected an integer id, found {str(value)[:40]!r}")
 
 
 def _number(where: str, value: Any) -> float:

@@ -7,7 +7,6 @@ and counted.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +15,7 @@ from tracking.arrays import F64, I64, Bool
 from tracking.constellation import Constellation
 from tracking.errors import ConfigError, LogError
 from tracking.log.folder import ACC, GYR, MAG, POWERS, QUAT, Log
+from tracking.log.inertial import check_inertial, with_rates
 from tracking.log.meta import read_meta
 from tracking.log.table import Table, find_table
 from tracking.log.truth import Truth
@@ -31,6 +31,8 @@ MAX_POSITION = 1e5
 """[m] Farther from its origin no true position makes sense."""
 MAX_MAG = 5000.0
 """[uT] A hundred times the field of the earth."""
+MOST_ID = 2.0**53
+"""Beyond this not every id is a number of its own."""
 
 
 def read_log(folder: Path | str) -> Log:
@@ -53,7 +55,7 @@ def read_log(folder: Path | str) -> Log:
     block = MeasurementBlock.concatenate(blocks)
     order = np.lexsort((block.j[0], block.i[0], block.kind[0], block.t[0]))
     is_range = block.kind[0][order] == Kind.RANGE
-    _check_inertial(block, constellation)
+    check_inertial(block, constellation)
     if nlos is not None:
         all_labels = np.zeros(block.n_events, dtype=bool)
         all_labels[: len(nlos)] = nlos
@@ -62,7 +64,7 @@ def read_log(folder: Path | str) -> Log:
         name=meta.name,
         source=meta.source,
         licence=meta.licence,
-        constellation=_with_rates(constellation, block),
+        constellation=with_rates(constellation, block),
         block=block.take(order),
         truth=_read_truth(folder, constellation, skipped),
         nlos=nlos,
@@ -137,7 +139,7 @@ def _antennas(table: Table, constellation: Constellation, i: I64, j: I64) -> tup
         if column in table:
             ids, filled = table.numbers((column,))
         odd = np.nonzero(
-            filled[:, 0] & ~(np.isfinite(ids[:, 0]) & (np.trunc(ids[:, 0]) == ids[:, 0]))
+            filled[:, 0] & ~((np.abs(ids[:, 0]) < MOST_ID) & (np.trunc(ids[:, 0]) == ids[:, 0]))
         )[0]
         if len(odd):
             raise LogError(
@@ -241,41 +243,3 @@ def _within(values: F64, filled: Bool, limits: F64) -> Bool:
     with np.errstate(invalid="ignore"):
         ok = filled & np.isfinite(values) & (np.abs(values) <= limits)
     return np.asarray(ok.all(axis=1))
-
-
-def _check_inertial(block: MeasurementBlock, constellation: Constellation) -> None:
-    """See that inertial samples can be used: on the ranges' clock, and with a heading."""
-    kind, t = block.kind[0], block.t[0]
-    inertial = np.isin(kind, (Kind.IMU, Kind.STATE))
-    if not inertial.any():
-        return
-    ranges = t[kind == Kind.RANGE]
-    start, end = t[inertial].min(), t[inertial].max()
-    if start > ranges.max() or end < ranges.min():
-        raise LogError(
-            f"imu.csv, t_s: samples from {start:g} to {end:g} s, ranges from {ranges.min():g} to "
-            f"{ranges.max():g} s; expected one clock"
-        )
-    if constellation.heading == "magnetic" and not np.isin(kind, (Kind.MAG, Kind.STATE)).any():
-        raise LogError(
-            "meta.toml, heading: 'magnetic' needs magnetometer readings and there are none, "
-            "expected 'initial'"
-        )
-
-
-def _with_rates(constellation: Constellation, block: MeasurementBlock) -> Constellation:
-    """The constellation with the sensor rates that the recording shows."""
-    nodes = []
-    for n, config in enumerate(constellation.nodes):
-        mine = block.i[0] == n
-        imu_hz = _rate(block.t[0, mine & (block.kind[0] == Kind.IMU)]) or config.imu_hz
-        mag_hz = _rate(block.t[0, mine & (block.kind[0] == Kind.MAG)])
-        nodes.append(replace(config, imu_hz=imu_hz, mag_hz=None if mag_hz == imu_hz else mag_hz))
-    return replace(constellation, nodes=tuple(nodes))
-
-
-def _rate(t: F64) -> float | None:
-    """Nominal rate of a sensor from its times, rounded to 0.01 Hz."""
-    dt = np.diff(t)
-    dt = dt[dt > 0.0]
-    return round(float(1.0 / np.median(dt)), 2) if len(dt) >= 2 else None

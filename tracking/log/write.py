@@ -27,8 +27,8 @@ def write_log(folder: Path | str, log: Log) -> Path:
         LogError: The target exists and is not an empty folder, or holds an event that a log
             has no place for.
     """
-    folder = Path(folder)
-    check_target(folder)
+    check_target(Path(folder))
+    folder = Path(folder).resolve()  # `.` has no name, and a link is none to move a folder to
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         scratch = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))

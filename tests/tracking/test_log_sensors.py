@@ -1,0 +1,114 @@
+"""What inertial samples of a log must be, and what is said of those that cannot be used."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tracking import Constellation, NodeConfig
+from tracking.errors import ConfigError, LogError
+from tracking.log import Log, notes_on, read_log, write_log
+from tracking.log.inertial import with_rates
+from tracking.measurements import Kind, MeasurementBlock
+
+SECONDS = 4.0
+
+
+def samples(kind, t, node, width):
+    """Measurements of one sensor."""
+    values = np.zeros((len(t), width))
+    values[:, 0] = np.linspace(20.0, 21.0, len(t))
+    return MeasurementBlock.of_kind(kind, t, np.full(len(t), node), values)
+
+
+def log_of(imu, mag=(), *, heading="magnetic", headings=(None, None)):
+    """Two nodes that range, with (node, times) of samples."""
+    t = np.arange(0.0, SECONDS, 0.05)
+    zeros, ones = np.zeros(len(t), dtype=np.int64), np.ones(len(t), dtype=np.int64)
+    ranges = MeasurementBlock.of_kind(
+        Kind.RANGE, t, zeros, np.full((len(t), 1), 2.0), j=ones, antennas=(zeros, ones)
+    )
+    parts = [samples(Kind.IMU, at, node, 6) for node, at in imu]
+    parts += [samples(Kind.MAG, at, node, 3) for node, at in mag]
+    nodes = tuple(NodeConfig(id=k + 1, initial_heading=h) for k, h in enumerate(headings))
+    group = Constellation(nodes=nodes, dimensions=2, heading=heading)
+    return Log(
+        name="small",
+        constellation=group,
+        block=MeasurementBlock.concatenate([ranges, *parts]).sorted(),
+    )
+
+
+@pytest.mark.parametrize("hz", [50.0, 60.0, 100.0, 119.0, 300.0])
+@pytest.mark.parametrize("lost", [0.0, 0.2])
+def test_times_that_are_rounded_do_not_change_the_rate(hz, lost):
+    rng = np.random.default_rng(int(hz))
+    t = np.floor(1e3 * np.arange(0.0, 60.0, 1.0 / hz)) / 1e3
+    log = log_of([(0, t[rng.random(len(t)) >= lost])], heading="initial")
+    rates = with_rates(log.constellation, log.block)
+    assert rates.nodes[0].imu_hz == pytest.approx(hz, rel=2e-3)
+
+
+def test_samples_that_come_all_at_once_are_refused(tmp_path):
+    t = np.repeat(np.arange(0.0, SECONDS, 0.05), 5)
+    write_log(tmp_path / "log", log_of([(0, t)], heading="initial"))
+    with pytest.raises(LogError, match=r"imu\.csv.*, t_s: 80 % of the samples of node 1"):
+        read_log(tmp_path / "log")
+
+
+@pytest.mark.parametrize("scale", [(1.0, 1.7e9), (1000.0, 0.0)])
+def test_a_magnetometer_on_another_clock_is_refused(tmp_path, scale):
+    t = np.arange(0.0, SECONDS, 0.01)
+    mag = scale[0] * t[::2] + scale[1]
+    write_log(tmp_path / "log", log_of([(0, t)], [(0, mag)]))
+    with pytest.raises(LogError, match=r"mag\.csv, t_s: .*expected one clock"):
+        read_log(tmp_path / "log")
+
+
+def test_what_cannot_be_used_is_said():
+    t = np.arange(0.0, SECONDS, 0.01)
+    assert notes_on(log_of([(0, t), (1, t)], [(0, t), (1, t)])) == []
+    assert notes_on(log_of([(0, t)], heading="initial", headings=(0.3, None))) == []
+    [note] = notes_on(log_of([(0, t), (1, t)], [(0, t)]))
+    assert note.startswith("node 2: no magnetometer")
+    [note] = notes_on(log_of([(0, t), (1, t)], heading="initial"))
+    assert note.startswith("nodes 1, 2: no initial_heading_rad")
+
+
+def test_a_log_is_written_where_one_stands(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    log = log_of([(0, np.arange(0.0, SECONDS, 0.01))], heading="initial")
+    write_log(".", log)
+    assert read_log(tmp_path).n_ranges == log.n_ranges
+
+
+def test_ids_that_no_number_holds_are_refused(tmp_path):
+    folder = write_log(tmp_path / "log", log_of([(0, np.arange(0.0, 1.0, 0.01))]))
+    meta = folder / "meta.toml"
+    meta.write_text(meta.read_text().replace("[nodes.1]", f"[nodes.{'1' * 5000}]"))
+    with pytest.raises(LogError, match="expected an integer id"):
+        read_log(folder)
+
+
+def tracker_input(**changes):
+    """A block of two environments, and what is changed in it."""
+    one = log_of([]).block
+    two = MeasurementBlock(**{n: np.concatenate([getattr(one, n)] * 2) for n in one.__slots__})
+    return replace(two, **changes) if changes else two
+
+
+def test_a_tracker_looks_at_what_it_is_given():
+    from tracking import Tracker
+
+    group = log_of([]).constellation
+    two = tracker_input()
+    Tracker(group, n_envs=2).run(two, np.array([5.0, 6.0]))
+    with pytest.raises(ConfigError, match="1 environments, got 2"):
+        Tracker(group).run(two, np.array([5.0]))
+    with pytest.raises(ConfigError, match="nodes 0 to 1"):
+        Tracker(group, n_envs=2).run(replace(two, j=two.j + 1), np.array([5.0]))
+    with pytest.raises(ConfigError, match="order of time"):
+        Tracker(group, n_envs=2).run(replace(two, t=-two.t), np.array([5.0]))
+    for wrong in ([6.0, 5.0], [np.nan, 5.0]):
+        with pytest.raises(ConfigError, match="do not go back"):
+            Tracker(group, n_envs=2).run(two, np.array(wrong))

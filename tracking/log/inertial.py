@@ -1,0 +1,91 @@
+"""What inertial samples need to be of use: one clock, times of their own, a heading, a rate."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tracking.arrays import F64
+from tracking.constellation import Constellation
+from tracking.errors import LogError
+from tracking.measurements import Kind, MeasurementBlock
+
+MOST_AT_ONCE = 0.4
+"""[-] Share of samples that may have the time of the one before."""
+FEW = 20
+"""[-] Of fewer samples nothing is said."""
+TOGETHER = 0.5
+"""[-] Share of magnetometer readings that are taken while the IMU runs, at least."""
+LONG_GAP = 10.0
+"""[-] Periods: what is longer tells nothing about a rate."""
+
+
+def check_inertial(block: MeasurementBlock, constellation: Constellation) -> None:
+    """See that inertial samples can be used: on the ranges' clock, and with a heading."""
+    kind, t = block.kind[0], block.t[0]
+    inertial = np.isin(kind, (Kind.IMU, Kind.STATE))
+    if not inertial.any():
+        return
+    ranges = t[kind == Kind.RANGE]
+    start, end = t[inertial].min(), t[inertial].max()
+    if start > ranges.max() or end < ranges.min():
+        raise LogError(
+            f"imu.csv, t_s: samples from {start:g} to {end:g} s, ranges from {ranges.min():g} to "
+            f"{ranges.max():g} s; expected one clock"
+        )
+    for what, file in ((Kind.IMU, "imu.csv"), (Kind.MAG, "mag.csv")):
+        _check_times(block, constellation, what, file)
+    mag = t[kind == Kind.MAG]
+    if len(mag) and np.mean((mag >= start) & (mag <= end)) < TOGETHER:
+        raise LogError(
+            f"mag.csv, t_s: readings from {mag.min():g} to {mag.max():g} s, imu.csv from {start:g} "
+            f"to {end:g} s; expected one clock"
+        )
+    if constellation.heading == "magnetic" and not np.isin(kind, (Kind.MAG, Kind.STATE)).any():
+        raise LogError(
+            "meta.toml, heading: 'magnetic' needs magnetometer readings and there are none, "
+            "expected 'initial'"
+        )
+
+
+def _check_times(
+    block: MeasurementBlock, constellation: Constellation, kind: Kind, file: str
+) -> None:
+    """See that samples come one after the other: a packet's all at once tell no turn."""
+    for n in range(constellation.n_nodes):
+        t = block.t[0, (block.kind[0] == kind) & (block.i[0] == n)]
+        if len(t) >= FEW and np.mean(np.diff(t) <= 0.0) > MOST_AT_ONCE:
+            raise LogError(
+                f"{file}, t_s: {100 * np.mean(np.diff(t) <= 0.0):.0f} % of the samples of node "
+                f"{constellation.ids[n]} have the time of the one before; expected when each was "
+                "taken"
+            )
+
+
+def with_rates(constellation: Constellation, block: MeasurementBlock) -> Constellation:
+    """The constellation with the sensor rates that the recording shows."""
+    nodes = []
+    for n, config in enumerate(constellation.nodes):
+        mine = block.i[0] == n
+        imu_hz = _rate(block.t[0, mine & (block.kind[0] == Kind.IMU)]) or config.imu_hz
+        mag_hz = _rate(block.t[0, mine & (block.kind[0] == Kind.MAG)])
+        nodes.append(replace(config, imu_hz=imu_hz, mag_hz=None if mag_hz == imu_hz else mag_hz))
+    return replace(constellation, nodes=tuple(nodes))
+
+
+def _rate(t: F64) -> float | None:
+    """Nominal rate of a sensor from its times, rounded to 0.01 Hz; samples may be missing.
+
+    Times are often rounded to a millisecond: what is between two is wrong, what is between many
+    is not. So each step is counted as the whole number of periods that it must be.
+    """
+    dt = np.diff(t)
+    dt = dt[dt > 0.0]
+    if len(dt) < 2:
+        return None
+    period = float(np.median(dt))
+    dt = dt[dt < LONG_GAP * period]
+    for _ in range(3):
+        period = float(dt.sum() / np.maximum(np.round(dt / period), 1.0).sum())
+    return round(1.0 / period, 2)
