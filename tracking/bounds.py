@@ -70,7 +70,7 @@ def posterior_bound(
         skip: Times until so many seconds after the first range do not count.
 
     Raises:
-        LogError: The log has no truth.
+        LogError: The log has no truth, or no ranges.
     """
     if len(log.truth.t) == 0:
         raise LogError("truth: expected a log with truth, a bound is taken along the true motion")
@@ -82,6 +82,8 @@ def posterior_bound(
         hidden[is_range] = log.nlos
     keep = block.valid[0]
     block, hidden = block.env(0), hidden[keep]
+    if not is_range.any():
+        raise LogError("ranges: expected some, without them nothing bounds the error")
     first = float(block.t[0][block.kind[0] == Kind.RANGE][0])
     last = min(float(block.t[0, -1]), float(log.truth.t.max()))
     t_out = np.arange(first + skip, last, 1.0 / RATE)

@@ -49,8 +49,8 @@ class Constellation:
     """The nodes of a group and the plane or space they move in.
 
     Arrays over nodes follow `nodes`; arrays over pairs follow `pairs`, all i < j in
-    lexicographic order; arrays over antennas follow `antenna_node`, where every node without
-    an antenna of its own has one at the origin of its body.
+    lexicographic order; arrays over antennas follow the nodes that they sit on, where every node
+    without an antenna of its own has one at the origin of its body.
     """
 
     nodes: tuple[NodeConfig, ...]

@@ -10,6 +10,7 @@ import numpy as np
 
 from tracking.arrays import F64, I64, Bool
 from tracking.constellation import Constellation
+from tracking.errors import ConfigError
 from tracking.geometry import quat_conjugate, quat_multiply, quat_to_matrix
 
 
@@ -52,7 +53,7 @@ class TeamEstimate:
     has_orientation: Bool
     """True where `q_wb` came from measurements, (..., node)."""
     age: F64
-    """Time since the last accepted range, (..., pair) [s]; 0 before the first."""
+    """Time since the last range, (..., pair) [s]; 0 before the first."""
     nis: F64
     """Normalised innovation squared of the last range, (..., pair) [-]."""
     nlos_prob: F64
@@ -111,7 +112,13 @@ class TeamEstimate:
         return np.sqrt(np.diagonal(self.cov, axis1=-2, axis2=-1)[..., :3])
 
     def between(self, i: int, j: int) -> tuple[F64, F64]:
-        """Position and velocity of node j relative to node i in the world frame, each (..., 3)."""
+        """Position and velocity of node j relative to node i in the world frame, each (..., 3).
+
+        Raises:
+            ConfigError: They are one.
+        """
+        if i == j:
+            raise ConfigError(f"between: expected two different nodes, got {i} twice")
         pair = self.constellation.pair_index[i, j]
         sign = 1.0 if i < j else -1.0
         return sign * self.pos_ij_w[..., pair, :], sign * self.vel_ij_w[..., pair, :]

@@ -49,11 +49,11 @@ class Score:
     """(pair) [m]"""
     n_scored: int
     """Relative positions that went into the figures."""
-    coverage: float
+    coverage: float | None
     """[-] Share of the relative positions with truth that had an estimate; the rest is not
-    scored."""
-    ok_share: float
-    """[-] Share of those with truth whose status was ok."""
+    scored. None where there is no truth."""
+    ok_share: float | None
+    """[-] Share of those with truth whose status was ok; likewise."""
 
 
 def score(estimate: TeamEstimate, truth_ij_w: F64, has_truth: Bool, skip_until: float) -> Score:
@@ -70,15 +70,16 @@ def score(estimate: TeamEstimate, truth_ij_w: F64, has_truth: Bool, skip_until: 
     moving = ~constellation.is_static[constellation.pairs].all(axis=1)
     wanted = has_truth & moving & (estimate.t >= skip_until)[:, None]
     scored = wanted & ~np.isin(estimate.status, (Status.ABSENT, Status.STARTING))
-    n_wanted = max(int(wanted.sum()), 1)
-    coverage = float(scored.sum()) / n_wanted
-    ok_share = float((wanted & estimate.ok).sum()) / n_wanted
+    coverage = ok_share = None
+    if wanted.any():
+        coverage = float(scored.sum() / wanted.sum())
+        ok_share = float((wanted & estimate.ok).sum() / wanted.sum())
     rows = scored.any(axis=1)
     x, truth, scored = estimate.pos_ij_w[rows], truth_ij_w[rows], scored[rows]
     n_pairs = constellation.n_pairs
     if not scored.any():
         nothing = np.full(n_pairs, np.nan)
-        return Score(None, None, None, None, None, nothing, nothing, nothing, 0, 0.0, 0.0)
+        return Score(None, None, None, None, None, nothing, nothing, nothing, 0, coverage, ok_share)
     x = np.where(scored[..., None], x, 0.0)
     truth = np.where(scored[..., None], truth, 0.0)
     if planar:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from tracking.filters import DEFAULT_FILTER, filter_builder
 from tracking.filters.joint import JointEkf
 from tracking.filters.params import FilterParams
 from tracking.horizon import HorizonParams
-from tracking.measurements import MeasurementBlock
+from tracking.measurements import Kind, MeasurementBlock
 from tracking.orientation import Orientation, OrientationParams
 
 
@@ -75,14 +75,20 @@ class Tracker:
         """Handle a block and report at several times.
 
         Args:
-            block: Events in order, none earlier than those handled before.
+            block: Events in order, none earlier than those handled before. What is no number, or
+                a range of a node with itself, is passed over.
             t_out: Ascending times, (time) or (env, time) [s]. An estimate holds every event
                 up to its time.
 
         Returns:
             Estimates, arrays over (env, time, ...).
+
+        Raises:
+            ConfigError: The block has other environments or nodes, or times go back.
         """
         t_out = np.atleast_2d(np.asarray(t_out, dtype=np.float64))
+        block = _usable(block)
+        _check(block, t_out, self.n_envs, self.constellation.n_nodes)
         t_out = np.broadcast_to(t_out, (self.n_envs, t_out.shape[1]))
         return self._filter.run(self._orientation.step(block), t_out)
 
@@ -154,3 +160,26 @@ class Tracker:
     def n_rejected(self) -> F64:
         """Ranges refused as outliers, (env)."""
         return self._filter.n_rejected()
+
+
+def _usable(block: MeasurementBlock) -> MeasurementBlock:
+    """The block without measurements that cannot be."""
+    between = np.isin(block.kind, (Kind.RANGE, Kind.SURVEY))
+    finite = np.isfinite(block.values)
+    whole = finite.all(axis=-1) | (between & ~block.has_power & finite[..., 0])
+    valid = block.valid & whole & np.isfinite(block.t) & ~(between & (block.i == block.j))
+    return block if np.array_equal(valid, block.valid) else replace(block, valid=valid)
+
+
+def _check(block: MeasurementBlock, t_out: F64, n_envs: int, n_nodes: int) -> None:
+    """See that kernels, which look at nothing of this, can take a block."""
+    if len(block.t) != n_envs:
+        raise ConfigError(f"block: expected {n_envs} environments, got {len(block.t)}")
+    wrong = block.valid & ((block.i < 0) | (block.i >= n_nodes) | (block.j >= n_nodes))
+    if wrong.any():
+        raise ConfigError(f"block: expected nodes 0 to {n_nodes - 1}, got another")
+    t = np.where(block.valid, block.t, -np.inf)
+    if np.any(block.valid[:, 1:] & (t[:, 1:] < np.maximum.accumulate(t, axis=1)[:, :-1])):
+        raise ConfigError("block: expected events in order of time, see `MeasurementBlock.sorted`")
+    if np.isnan(t_out).any() or np.any(np.diff(t_out, axis=1) < 0.0):
+        raise ConfigError("t_out: expected times that do not go back")
