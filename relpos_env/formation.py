@@ -104,7 +104,7 @@ class Formation:
         self.loop.begin(env, episode, rng.spawn(1)[0], watch)
         here = slice(env, env + 1)
         seed = np.array([rng.integers(1 << 62)], dtype=np.uint64)
-        self.task.reset(self.state, here)
+        self.task.reset(self.state, here, self.loop.swarm.boxes)
         self.operator.reset(seed, here)
         self.cycles[env] = 0
         self.active[env] = False

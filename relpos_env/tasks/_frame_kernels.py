@@ -18,6 +18,7 @@ from relpos_env.tasks._score_kernels import (
     changed,
     common_terms,
     formation_error,
+    place_term,
     targets_from_goals,
     velocity_term,
 )
@@ -86,7 +87,8 @@ def update_frame(
             (env, car, 3).
         curve: As in `frame_state`.
         motion: As in `frame_state`.
-        limits: Lookahead of the plan [s], tolerance at the end [m], scale of the error [m].
+        limits: Lookahead of the plan [s], tolerance at the end [m], scale of the error [m], and
+            of the place of the group [m], 0 for a formation that is led by its velocity.
         target: (env, car, other, 2) [m], written.
         plan: (env, car, 2) [m/s], written.
         goal: (env, car, 2) [m], written.
@@ -97,7 +99,7 @@ def update_frame(
     Returns:
         How many environments have other cars than were given places; those are left alone.
     """
-    lookahead, tolerance, error_scale = limits
+    lookahead, tolerance, error_scale, place_scale = limits
     ends = rewards.shape[2] > 4 and motion[2] > 0.0 and motion[3] == 0.0
     n_changed = 0
     for env in range(start, stop):
@@ -116,10 +118,13 @@ def update_frame(
             o_x, o_y, told = places[env, k, 0], places[env, k, 1], places[env, k, 2]
             goal[env, k, 0] = x + c * o_x - s * o_y
             goal[env, k, 1] = y + s * o_x + c * o_y
-            plan_x = told * (v_x - turn * (s_a * o_x + c_a * o_y))
-            plan_y = told * (v_y + turn * (c_a * o_x - s_a * o_y))
-            plan[env, k, 0], plan[env, k, 1] = plan_x, plan_y
-            velocity_term(env, k, vel, plan, rewards)
+            wanted_x = v_x - turn * (s_a * o_x + c_a * o_y)
+            wanted_y = v_y + turn * (c_a * o_x - s_a * o_y)
+            plan[env, k, 0], plan[env, k, 1] = told * wanted_x, told * wanted_y
+            # Who is not told is paid for going along all the same.
+            velocity_term(env, k, vel, wanted_x, wanted_y, rewards)
+        if place_scale > 0.0:
+            place_term(env, pos, present, goal, place_scale, rewards)
         targets_from_goals(env, present, goal, target)
         formation_error(env, pos, present, target, error)
         arrived = ends and frame[env, 2] + motion[0] * t[env] >= motion[2]

@@ -67,7 +67,7 @@ def update_ring(
             s += speed * lookahead
             point = curve_point(curve, length, s - length * math.floor(s / length))
             plan[env, k, 0], plan[env, k, 1] = speed * point[2], speed * point[3]
-            velocity_term(env, k, vel, plan, rewards)
+            velocity_term(env, k, vel, plan[env, k, 0], plan[env, k, 1], rewards)
         targets_from_goals(env, present, goal, target)
         formation_error(env, pos, present, target, error)
         common_terms(env, accel, present, collided, error, error_scale, False, rewards)

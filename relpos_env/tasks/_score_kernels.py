@@ -79,10 +79,24 @@ def all_within(env, pos, present, goal, tolerance):
 
 
 @small_kernel
-def velocity_term(env, k, vel, plan, rewards):
-    """The second reward term of cars that follow a plan, of one car."""
-    off = math.hypot(vel[env, k, 0] - plan[env, k, 0], vel[env, k, 1] - plan[env, k, 1])
+def velocity_term(env, k, vel, wanted_x, wanted_y, rewards):
+    """The second reward term of cars that follow a plan, of one car and its velocity there."""
+    off = math.hypot(vel[env, k, 0] - wanted_x, vel[env, k, 1] - wanted_y)
     rewards[env, k, 1] = math.exp(-off / VELOCITY_SCALE)
+
+
+@small_kernel
+def place_term(env, pos, present, goal, scale, rewards):
+    """The second reward term of a group that is to stand somewhere, the same for all its cars."""
+    x, y, n = 0.0, 0.0, 0
+    for k in range(present.shape[1]):
+        if present[env, k]:
+            x += pos[env, k, 0] - goal[env, k, 0]
+            y += pos[env, k, 1] - goal[env, k, 1]
+            n += 1
+    for k in range(present.shape[1]):
+        if present[env, k]:
+            rewards[env, k, 1] = math.exp(-math.hypot(x, y) / (n * scale))
 
 
 @small_kernel

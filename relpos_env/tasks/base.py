@@ -19,6 +19,8 @@ from tracking.arrays import F64, I64, Bool
 COMMON_TERMS = ("collision", "effort")
 """Reward terms of every task after its first two, `formation` and one of its own."""
 
+NO_BOXES: F64 = np.zeros((0, 6))
+
 
 class Truth(Protocol):
     """What a task reads of the world, arrays over (env, car)."""
@@ -76,16 +78,21 @@ class Task(ABC):
         self.done: Bool = np.zeros(n_envs, dtype=bool)
         """True where the task is accomplished, (env)."""
         self._seated: Bool = np.zeros((n_envs, n_cars), dtype=bool)
+        self._boxes: list[F64] = [NO_BOXES] * n_envs
+        """What stood in each room at the start."""
 
-    def reset(self, state: Truth, envs: slice) -> None:
+    def reset(self, state: Truth, envs: slice, boxes: F64 | None = None) -> None:
         """Begin an episode from where the cars stand; `update` with t = 0 then fills the arrays.
 
         Args:
             state: The truth, of all environments.
             envs: Which begin, contiguous.
+            boxes: What stands in the rooms: centre, half width and depth [m], cosine, sine,
+                (env, box, 6), of all environments; None where nobody knows.
         """
         start, stop = self._range(envs)
         for env in range(start, stop):
+            self._boxes[env] = NO_BOXES if boxes is None else boxes[env].copy()
             present = state.present[env]
             self._seat(env, present)
             if present.any():

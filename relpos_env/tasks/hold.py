@@ -22,6 +22,8 @@ def hold(
 ) -> MovingFormation:
     """A formation that stands where the group stood at the start, or as near as the room allows.
 
+    No place is nearer to an obstacle than 0.3 m, where that can be.
+
     Args:
         n_cars: Slots for cars, 2 to 20.
         n_envs: Environments.

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from relpos_env.tasks._frame_kernels import frame_now, update_frame
+from relpos_env.tasks.anchor import free_anchor
 from relpos_env.tasks.assignment import assign
 from relpos_env.tasks.base import COMMON_TERMS, Task, Truth
 from relpos_env.tasks.curves import Curve
@@ -15,6 +16,8 @@ from tracking.arrays import F64, I64, Bool
 
 ERROR_SCALE = 0.5
 """[m] Formation error at which the formation term is exp(-1)."""
+PLACE_SCALE = 1.0
+"""[m] Distance of the group's middle from its goals' at which the place term is exp(-1)."""
 TOLERANCE = 0.4
 """[m] As near to its place at the end a car has arrived: about its length."""
 MARGIN = 0.3
@@ -38,8 +41,8 @@ class Motion:
     lookahead: float = 0.0
     """[s] The plan is the velocity of the goal so much later, which covers the cars' lag."""
     half: tuple[float, float] | None = None
-    """[m] The frame is put where the group stands, so far from the room's middle at most; None
-    for a frame that is put by its curve alone."""
+    """[m] The frame stands where the group did, or near it where no place is in an obstacle, so
+    far from the room's middle at most; None for a frame that is put by its curve alone."""
 
 
 class MovingFormation(Task):
@@ -67,7 +70,9 @@ class MovingFormation(Task):
         """
         ends = motion.curve.length > 0.0 and not motion.curve.closed
         time = ("time",) if ends else ()
-        super().__init__(n_cars, n_envs, ("formation", "velocity", *COMMON_TERMS, *time))
+        self._stands = motion.half is not None
+        own = "place" if self._stands else "velocity"
+        super().__init__(n_cars, n_envs, ("formation", own, *COMMON_TERMS, *time))
         self._formation, self._motion = formation, motion
         self._led, self._all_told = led, all_told
         self._frame, self._places = np.zeros((n_envs, 4)), np.zeros((n_envs, n_cars, 3))
@@ -79,7 +84,8 @@ class MovingFormation(Task):
             float(curve.closed),
             float(motion.turning),
         )
-        self._limits = (float(motion.lookahead), TOLERANCE, ERROR_SCALE)
+        place_scale = PLACE_SCALE if self._stands else 0.0
+        self._limits = (float(motion.lookahead), TOLERANCE, ERROR_SCALE, place_scale)
         self._now = np.zeros(7)
 
     def begin(self, env: int, pos: F64, cars: I64) -> None:
@@ -87,8 +93,8 @@ class MovingFormation(Task):
         motion = self._motion
         middle = pos[cars].mean(axis=0)
         anchor, arc = np.zeros(2), 0.0
-        if motion.half is not None:
-            anchor = np.clip(middle, -np.array(motion.half), motion.half)
+        if self._stands:
+            anchor = self._free_anchor(env, middle, len(cars))
         elif motion.curve.length > 0.0 and motion.curve.closed:
             arc = float(motion.curve.nearest(pos[cars[0]] if self._led else middle))
         heading = 0.0 if motion.turning else motion.heading
@@ -96,7 +102,12 @@ class MovingFormation(Task):
         self._give(env, pos, cars, 0.0)
 
     def change(self, env: int, pos: F64, cars: I64, before: Bool, t: float) -> None:
-        """Give out places for those who are present now; the frame goes on as it did."""
+        """Give out places for those who are present now; the frame goes on as it did.
+
+        One that stands makes way where the places of so many would be in an obstacle.
+        """
+        if self._stands:
+            self._frame[env, :2] = self._free_anchor(env, self._frame[env, :2], len(cars))
         self._give(env, pos, cars, t)
 
     def compute(self, state: Truth, t: F64, collided: F64, start: int, stop: int) -> int:
@@ -124,6 +135,13 @@ class MovingFormation(Task):
             self.done,
         )
         return n_changed
+
+    def _free_anchor(self, env: int, wanted: F64, n: int) -> F64:
+        """Where a formation of n cars can stand, nearest to where it is wanted, (2) [m]."""
+        assert self._motion.half is not None
+        c, s = np.cos(self._motion.heading), np.sin(self._motion.heading)
+        places = self._formation.places(n) @ np.array([[c, s], [-s, c]])
+        return free_anchor(wanted, np.array(self._motion.half), places, self._boxes[env])
 
     def _give(self, env: int, pos: F64, cars: I64, t: float) -> None:
         frame_now(env, t, self._frame, self._motion.curve.pieces, self._constants, self._now)

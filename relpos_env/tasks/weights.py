@@ -19,7 +19,7 @@ _ENDING = {"formation": 0.5, "progress": 1.0, "collision": 1.0, "effort": 0.05, 
 DEFAULT_WEIGHTS: Mapping[str, Mapping[str, float]] = MappingProxyType(
     {
         "ring": {"formation": 1.0, "velocity": 0.0, "collision": 1.0, "effort": 0.0},
-        "hold": _MOVING,
+        "hold": {"formation": 1.0, "place": 0.3, "collision": 1.0, "effort": 0.05},
         "travel": {**_MOVING, "time": 1.2},
         "follow": {**_MOVING, "time": 1.2},
         "gap": _ENDING,

@@ -220,3 +220,20 @@ def test_who_joins_before_the_wall_queues_and_who_joins_behind_it_does_not():
     update(task, state, 40.0)
     assert task.done[0]
     assert np.all(task.goal_w[0, :, 0] > 0.0)
+
+
+def test_followers_are_paid_for_going_along_told_or_not():
+    rewards = []
+    for told in ("all", "leader"):
+        state = rooms(1, 3, seed=4)
+        task = make_task("follow", 3, 1, ROOM, told=told)
+        task.reset(state, ALL)
+        goals = []
+        for t in (2.0, 2.3, 2.31):  # the plan is that of 0.3 s later
+            update(task, state, t)
+            goals.append(task.goal_w.copy())
+        state.vel_w = (goals[2] - goals[1]) / 0.01
+        update(task, state, 2.0)
+        rewards.append(task.rewards[0, :, task.terms.index("velocity")])
+    np.testing.assert_allclose(rewards[0], rewards[1])
+    assert rewards[1].min() > 0.95
