@@ -323,7 +323,7 @@ def test_a_task_that_is_done_ends_an_episode_of_the_evaluation():
             "scenarios": st.sampled_from(["open", "cars-nlos,hall"]),
             "levels": st.lists(st.integers(0, 4), max_size=3).map(lambda n: ",".join(map(str, n))),
             "critic": st.sampled_from(["own", "central"]),
-            "weights": st.sampled_from(["collision=5", "collision=8,velocity=0"]),
+            "weights": st.sampled_from(["collision=5", "collision=8,place=0"]),
         },
     )
 )

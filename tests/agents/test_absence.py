@@ -1,0 +1,59 @@
+"""What is learned of a car that goes: nothing from what its zeros would be worth."""
+
+import numpy as np
+import pytest
+import torch
+from gymnasium.spaces import Box
+from stable_baselines3.common.buffers import RolloutBuffer
+
+from agents.train.buffer import SwarmRolloutBuffer
+
+STEPS, SEATS = 12, 3
+SPACE = Box(-np.inf, np.inf, (2,), np.float32)
+
+
+def filled(kind, zeros_worth, *, away=(), left=None):
+    """A buffer in which seat 0 is away for some steps, and gone for good after one.
+
+    Args:
+        kind: Of buffer.
+        zeros_worth: What the critic says of nothing.
+        away: Steps at which seat 0 is not there.
+        left: The step that it left at.
+    """
+    rng = np.random.default_rng(3)
+    buffer = kind(STEPS, SPACE, SPACE, device="cpu", gae_lambda=0.95, gamma=0.99, n_envs=SEATS)
+    starts = np.zeros(SEATS)
+    for step in range(STEPS):
+        obs = rng.standard_normal((SEATS, 2)).astype(np.float32)
+        value, reward = torch.tensor(rng.standard_normal(SEATS)), rng.standard_normal(SEATS)
+        gone = step in away or (left is not None and step > left)
+        if gone:
+            obs[0], value[0], reward[0] = 0.0, zeros_worth, 0.0
+        if step == left:
+            reward[0] += 0.99 * zeros_worth  # what Stable-Baselines3 adds where it ends
+        action = rng.standard_normal((SEATS, 2))
+        buffer.add(obs, action, reward, starts, value, torch.zeros(SEATS))
+        starts = np.array([float(step == left), 0.0, 0.0])
+    last = torch.tensor([[zeros_worth if gone else 0.3], [0.4], [0.5]])
+    buffer.compute_returns_and_advantage(last, np.zeros(SEATS))
+    return buffer
+
+
+@pytest.mark.parametrize("case", [{"away": range(5, 9)}, {"left": 6}])
+def test_what_nothing_is_worth_does_not_matter(case):
+    low, high = (filled(SwarmRolloutBuffer, worth, **case) for worth in (-1000.0, 1000.0))
+    present = low.observations.any(axis=2)
+    np.testing.assert_array_equal(low.advantages[present], high.advantages[present])
+    np.testing.assert_array_equal(low.returns[present], high.returns[present])
+    last = np.flatnonzero(~present[:, 0])[0] - 1
+    assert low.advantages[last, 0] == 0.0
+    # With Stable-Baselines3's own, it does.
+    low, high = (filled(RolloutBuffer, worth, **case) for worth in (-1000.0, 1000.0))
+    assert np.abs(low.advantages - high.advantages)[present].max() > 100.0
+
+
+def test_where_nobody_goes_it_is_the_librarys():
+    ours, theirs = filled(SwarmRolloutBuffer, 0.0), filled(RolloutBuffer, 0.0)
+    np.testing.assert_allclose(ours.advantages, theirs.advantages, atol=1e-6)
+    np.testing.assert_allclose(ours.returns, theirs.returns, atol=1e-6)
