@@ -52,6 +52,11 @@ class Driven:
         return self._group.task.error
 
     @property
+    def place_error(self) -> F64:
+        """Nobody knows."""
+        return self._unknown[:, 0]
+
+    @property
     def tracking_error(self) -> F64:
         """Nobody knows."""
         return self._unknown

@@ -31,6 +31,9 @@ class EpisodeResult:
     """Whether it ended because the task was accomplished."""
     formation_error: float
     """[m] As the task says, mean over present cars and the scored time."""
+    place_error: float
+    """[m] Distance of the group's middle from where the task wants it, mean over the scored time;
+    NaN where the task gives no places."""
     tracking_error: float
     """[m] Error of the relative positions that cars could use, mean over cars and scored time."""
     collisions_per_min: float
@@ -72,6 +75,10 @@ class Running(Protocol):
         """Formation error, (env, car) [m]."""
 
     @property
+    def place_error(self) -> F64:
+        """Distance of the group's middle from that of its goals, (env) [m]."""
+
+    @property
     def tracking_error(self) -> F64:
         """Of the relative positions that cars could use, (env, car) [m]."""
 
@@ -109,7 +116,9 @@ class Meter:
         """Which still go on, (env)."""
         self._cycles = np.zeros(e, dtype=np.int64)
         self._done = np.zeros(e, dtype=bool)
-        self._error, self._tracking, self._worst = np.full((3, e, running.cycles), np.nan)
+        self._error, self._place, self._tracking, self._worst = np.full(
+            (4, e, running.cycles), np.nan
+        )
         self._contacts, self._work, self._car_time = np.zeros((3, e))
 
     def read(self) -> None:
@@ -119,12 +128,13 @@ class Meter:
         work = _work(self._speed, speed, *self._car)
         # A car that came in or was taken out in between was not driven there.
         driven = present & self._present
-        tracking = r.tracking_error
+        tracking, place = r.tracking_error, r.place_error
         for e in np.flatnonzero(self.going).tolist():
             k, here = int(self._cycles[e]), present[e]
             if here.any():
                 theirs = error[e, here]
                 self._error[e, k], self._worst[e, k] = theirs.mean(), theirs.max()
+                self._place[e, k] = place[e]
             known = np.isfinite(tracking[e])
             if known.any():
                 self._tracking[e, k] = tracking[e, known].mean()
@@ -154,6 +164,7 @@ class Meter:
             seconds=seconds,
             done=bool(self._done[env]),
             formation_error=_mean(self._error[env, scored]),
+            place_error=_mean(self._place[env, scored]),
             tracking_error=_mean(self._tracking[env, scored]),
             collisions_per_min=60.0 * self._contacts[env] / seconds,
             time_in_formation=_mean((worst < IN_FORMATION)[np.isfinite(worst)]),

@@ -62,6 +62,17 @@ class Simulated:
         return self.formation.task.error
 
     @property
+    def place_error(self) -> F64:
+        """By the truth, (env) [m]; NaN where nobody is present or has a place."""
+        f, present = self.formation, self.formation.state.present
+        count = (present & f.task.has_target.any(axis=-1)).sum(axis=-1)
+        off = np.where(present[..., None], f.state.pos_w - f.task.goal_w, 0.0).sum(axis=1)
+        place: F64 = np.where(count > 0, np.linalg.norm(off, axis=-1), np.nan) / np.maximum(
+            count, 1
+        )
+        return place
+
+    @property
     def tracking_error(self) -> F64:
         """Of the relative positions that cars could use, (env, car) [m]."""
         return self.formation.tracking_error()

@@ -24,6 +24,7 @@ COLOURS = (
 """Of the contenders, in order."""
 LABELS = {
     "formation_error": "formation error [m]",
+    "place_error": "distance from the goals [m]",
     "tracking_error": "tracking error [m]",
     "collisions_per_min": "contacts [1/min]",
     "time_in_formation": f"time below {IN_FORMATION:g} m [%]",

@@ -15,8 +15,8 @@ from agents.report.page import Page, metres, png
 
 _TO = "\N{NO-BREAK SPACE}to\N{NO-BREAK SPACE}"
 HEADER = (
-    "driver", "trained on", "sees", "error [m]", "95 %", "tracking", "hits/min", "formed %",
-    "J/min", "ratio", "95 %",
+    "driver", "trained on", "sees", "error [m]", "95 %", "place", "tracking", "hits/min",
+    "formed %", "J/min", "ratio", "95 %",
 )  # fmt: skip
 """Names of the columns."""
 
@@ -34,6 +34,7 @@ def _cells(record: dict[str, Any]) -> list[str]:
         sees(record["observation"], record["proximity"]),
         metres(record["formation_error"]),
         _ends(record["ci95"]),
+        metres(record["place_error"]),
         metres(record["tracking_error"]),
         _number(record["collisions_per_min"], 2),
         _number(None if share is None else 100.0 * share, 1),
@@ -43,7 +44,7 @@ def _cells(record: dict[str, Any]) -> list[str]:
     ]
 
 
-SHORT_HEADER = ("driver", "error", "95 %", "track", "hits", "formed", "ratio", "95 %")
+SHORT_HEADER = ("driver", "error", "95 %", "place", "track", "hits", "formed", "ratio", "95 %")
 """Names of the columns of `short_rows`."""
 _LONGEST = 36
 """[-] Letters of a driver in a terminal, so that no figure is cut."""
@@ -57,7 +58,7 @@ def short_rows(result: CompareResult, scenario: str) -> list[list[str]]:
         name, room = row.contender.called, _LONGEST - len(shown)
         if len(name) > room:
             name = f"{name[: room - 3]}..."
-        numbers = [cell.replace(_TO, "-") for cell in (*cells[3:8], *cells[9:])]
+        numbers = [cell.replace(_TO, "-") for cell in (*cells[3:9], *cells[10:])]
         lines.append([name + shown, *numbers])
     return lines
 
@@ -81,6 +82,7 @@ def notes(result: CompareResult) -> list[str]:
         "means with 95 % intervals.",
         f"Errors [m] and the time formed (every car's error below {IN_FORMATION:g} m) count from "
         f"{setting.settle:g} s on; {whole} from the start.",
+        "place: how far the middle of the group is from where the task wants it [m].",
         f"ratio: formation error over that of {references}, {alike}.",
     ]
     if result.errors_from == "estimates":
