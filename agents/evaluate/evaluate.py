@@ -57,6 +57,7 @@ class CaseResult:
             "lost_runs": sum(r.lost for r in self.runs),
             "nees": _mean(r.nees for r in self.runs),
             "nis": _mean(r.nis for r in self.runs),
+            "gospa": self.median("gospa"),
             "coverage": _mean(r.coverage for r in self.runs),
             "ok_share": _mean(r.ok_share for r in self.runs),
             "us_per_round": self.median("us_per_round"),

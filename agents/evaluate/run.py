@@ -13,6 +13,8 @@ from agents.evaluate.over_time import OverTime, over_time
 from agents.evaluate.suites import Case
 from relpos_env.matched import matched_params
 from tracking.bounds import Bound, posterior_bound
+from tracking.geometry import quat_from_yaw, rotate
+from tracking.gospa import labelled_gospa
 from tracking.log import Log
 from tracking.measurements import Kind
 from tracking.metrics import score
@@ -47,9 +49,11 @@ class RunResult:
     """[-]"""
     nis: float | None
     """[-]"""
-    coverage: float
+    gospa: float | None
+    """[m] Labelled GOSPA after one constant yaw: errors, and pairs that are missed or not there."""
+    coverage: float | None
     """[-] Share of the scored time with an estimate."""
-    ok_share: float
+    ok_share: float | None
     """[-] Share of the scored time with status ok."""
     converged_s: float
     """[s] From the first range until all pairs were ok, at most 10."""
@@ -97,7 +101,8 @@ def run(case: Case, log: Log, filter: str, seed: int, bound: Bound | None) -> Ru
         log: Its log, with truth.
         filter: One of `tracking.filters.FILTERS`.
         seed: That of the log.
-        bound: The least possible errors of the log, None for unknown.
+        bound: The least possible errors of the log; None where cars come and go, which it does
+            not know.
     """
     constellation, block = log.constellation, log.block
     first, last = log.t_range
@@ -114,6 +119,8 @@ def run(case: Case, log: Log, filter: str, seed: int, bound: Bound | None) -> Ru
 
     truth, has_truth = log.truth.pairs(constellation, t)
     s = score(estimate, truth, has_truth, first + SKIP)
+    turned = rotate(quat_from_yaw(-np.radians(s.yaw_deg or 0.0)), truth)
+    gospa = labelled_gospa(estimate, turned, has_truth).total[t >= first + SKIP]
     end = float(log.truth.t.max())
     n_rounds = block.count(Kind.RANGE) / constellation.n_pairs
     return RunResult(
@@ -129,6 +136,7 @@ def run(case: Case, log: Log, filter: str, seed: int, bound: Bound | None) -> Ru
         bound_shape=None if bound is None else _number(bound.rmse_shape),
         nees=_number(s.nees),
         nis=_number(float(tracker.mean_nis()[0])),
+        gospa=_number(np.sqrt(np.mean(gospa**2))) if len(gospa) else None,
         coverage=s.coverage,
         ok_share=s.ok_share,
         converged_s=converged_at(estimate, first) - first,
@@ -150,7 +158,8 @@ def run_seed(case: Case, seed: int, filters: tuple[str, ...], seconds: float) ->
         seconds: Length of the run.
     """
     log = case.log(seed, seconds)
-    bound = posterior_bound(log, matched_params(case.scenario), skip=SKIP)
+    stays = log.truth.pairs(log.constellation, log.truth.times())[1].all()
+    bound = posterior_bound(log, matched_params(case.scenario), skip=SKIP) if stays else None
     return [run(case, log, name, seed, bound) for name in filters]
 
 

@@ -18,6 +18,7 @@ from agents.simulate import record
 from relpos_env.scenarios import HumanScenario, Scenario
 from relpos_env.scenarios.cars import CARS_LOS, CARS_NLOS
 from relpos_env.scenarios.people import HUMAN
+from relpos_env.scenarios.randomisation import Randomisation
 from relpos_env.sensors.imu import ImuSimParams
 from relpos_env.sensors.radio.channel import CALIBRATED, INDOOR, ChannelParams
 from tracking.log import Log
@@ -163,6 +164,11 @@ ROBUSTNESS = (
         scenario=replace(
             CARS_NLOS, mag=replace(CARS_NLOS.mag, disturbance=3.0 * CARS_NLOS.mag.disturbance)
         ),
+    ),
+    Case(
+        name="come-and-go",
+        about="a car is taken out every 15 s in the mean, for 5 to 20 s",
+        scenario=replace(CARS_NLOS, randomisation=Randomisation(leave_rate=(4.0, 4.0))),
     ),
     Case(
         name="range-outliers",

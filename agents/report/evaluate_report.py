@@ -15,7 +15,7 @@ TARGETS = ["case", "filter", "figure", "reached", "asked", "target", ""]
 """Names of the columns of targets."""
 _FIGURES = [
     "rmse", "rmse_yaw", "rmse_shape", "bound", "yaw/b", "shape/b",
-    "lost", "nees", "nis", "us",
+    "gospa", "lost", "nees", "nis", "us",
 ]  # fmt: skip
 
 
@@ -40,7 +40,9 @@ def rows(result: EvaluateResult) -> list[list[str]]:
         name = r["case"] if r["case"] != before else ""
         before = r["case"]
         head = [name, r["filter"], *([metres(r["paper"])] if has_paper(result) else [])]
-        cells.append([*head, *lengths, *ratios, *rest, f"{r['us_per_round']:.0f}"])
+        cells.append(
+            [*head, *lengths, *ratios, metres(r["gospa"]), *rest, f"{r['us_per_round']:.0f}"]
+        )
     return cells
 
 
@@ -51,6 +53,7 @@ def notes(result: EvaluateResult) -> list[str]:
         "range. Errors [m], the bound and the ratios to it are medians over the seeds.",
         f"lost: a pair was off by more than {WRONG:g} m for more than {FOR:g} s in one go. "
         "nees and nis are means, 1 is right.",
+        "gospa: errors, pairs without an estimate, and pairs that are not there, all in one [m].",
         "us: time of the tracker for a ranging round [us]; compare it only at --jobs 1 on an "
         "idle machine.",
     ]

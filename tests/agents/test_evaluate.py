@@ -35,7 +35,7 @@ RELPOS = Path(sys.executable).with_name("relpos")
 KEYS = {
     "suite", "scenario", "filter", "seeds", "rmse", "rmse_yaw", "rmse_shape", "bound",
     "bound_shape", "ratio_bound", "ratio_shape", "lost_runs", "nees", "nis", "us_per_round",
-    "paper",
+    "paper", "gospa",
 }  # fmt: skip
 
 
@@ -66,6 +66,7 @@ def test_rows_have_all_figures(result):
         assert set(row) >= KEYS
         assert row["seeds"] == 2
         assert row["us_per_round"] > 0.0
+        assert row["gospa"] > row["rmse_yaw"]
         assert 0.0 < row["bound_shape"] < row["bound"] < 1.0
     assert [r["paper"] for r in result.records] == [0.093, 0.396, 0.102, 0.428, None, None]
 
@@ -95,6 +96,16 @@ def test_rows_are_medians_and_sums_of_runs(result):
     assert row["ratio_bound"] == pytest.approx(np.mean(ratios))
     assert row["lost_runs"] == sum(r.lost_s is not None for r in case.runs)
     assert len(result.run_records) == 3 * 2 * 2
+
+
+def test_cars_that_come_and_go_are_scored_by_gospa():
+    case = next(c for c in SUITES["robustness"].cases if c.name == "come-and-go")
+    suite = Suite(name="small", title="Small", cases=(case,), seeds=3, seconds=60.0)
+    [row] = evaluate(suite=suite, filters=("joint",)).records
+    assert row["bound"] is None
+    # Somebody who left is there for a while, and somebody who comes is not at once: half a square
+    # metre each, and at most three pairs.
+    assert row["rmse"] < row["gospa"] < np.sqrt(1.5)
 
 
 def test_figures_do_not_depend_on_the_number_of_jobs(result):
