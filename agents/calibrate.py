@@ -44,6 +44,8 @@ class CalibrateResult:
     """What the UWB calibration was made from."""
     refused: Mapping[int, str] = field(default_factory=dict)
     """Why a node was not calibrated, by node id."""
+    sensor: str
+    """`imu`, `mag` or `uwb`."""
 
     @property
     def summary(self) -> list[dict[str, Any]]:
@@ -61,7 +63,10 @@ class CalibrateResult:
             records += [
                 {**head, "sensor": "uwb", "node": n, "offset_m": b} for n, b in offset.items()
             ]
-        return records + [{**head, "node": n, "refused": why} for n, why in self.refused.items()]
+        return records + [
+            {**head, "sensor": self.sensor, "node": n, "refused": why}
+            for n, why in self.refused.items()
+        ]
 
 
 def calibrate_imus(log: Log, *, level: bool = False, gravity: float = GRAVITY) -> CalibrateResult:
@@ -84,7 +89,7 @@ def calibrate_imus(log: Log, *, level: bool = False, gravity: float = GRAVITY) -
     found, refused = _each_node(log, Kind.IMU, one)
     nodes = {n: r.calibration for n, r in found.items()}
     return CalibrateResult(
-        log=log, calibration=Calibration(nodes=nodes), imu=found, refused=refused
+        log=log, sensor="imu", calibration=Calibration(nodes=nodes), imu=found, refused=refused
     )
 
 
@@ -106,7 +111,7 @@ def calibrate_magnetometers(log: Log, *, seed: int = 0) -> CalibrateResult:
     found, refused = _each_node(log, Kind.MAG, one)
     nodes = {n: r.calibration for n, r in found.items()}
     return CalibrateResult(
-        log=log, calibration=Calibration(nodes=nodes), mag=found, refused=refused
+        log=log, sensor="mag", calibration=Calibration(nodes=nodes), mag=found, refused=refused
     )
 
 
@@ -131,6 +136,7 @@ def calibrate_ranges(log: Log, *, seed: int = 0, max_distance: float = 8.0) -> C
     without = sorted(ranging - set(result.calibration.offset))
     return CalibrateResult(
         log=log,
+        sensor="uwb",
         calibration=Calibration(ranges=result.calibration),
         uwb=result,
         ranges=table,

@@ -10,6 +10,9 @@ from typing import Any
 
 import click
 
+WIDEST = 10_000
+"""[-] Letters of a line."""
+
 
 def emit_json(records: Iterable[Mapping[str, Any]]) -> None:
     """One JSON object a line."""
@@ -47,5 +50,7 @@ def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]
         table.add_column(escape(name), justify="left" if k == 0 else "right", no_wrap=True)
     for row in rows:
         table.add_row(*(escape(cell) for cell in row))
-    width = None if sys.stdout.isatty() else 120
-    Console(width=width).print(table)
+    console = Console(width=None if sys.stdout.isatty() else 120)
+    # Figures that are cut off are worth nothing: a narrow window breaks the lines instead.
+    console.width = max(console.width, Console(width=WIDEST).measure(table).maximum)
+    console.print(table)

@@ -76,4 +76,6 @@ def _check_free(folder: Path, name: str) -> None:
         if parent.exists():
             if not parent.is_dir():
                 raise UsageError(f"--out {folder}: {parent} is a file, expected a folder")
+            # What may be done there is known for sure once it is done.
+            tempfile.TemporaryDirectory(prefix=".writing-", dir=parent).cleanup()
             return

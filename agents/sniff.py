@@ -86,6 +86,7 @@ def sniff(
     if baud is None:
         baud = formats[format].baud if format is not None else USUAL_BAUD
     spec = PortSpec(name="port", port=port, baud=baud)
+    Hearing.get_ready(formats)
     hearing = Hearing(formats, key)
     chooser = _Chooser(hearing, format, show)
     with Links([spec], now_ns) as links:

@@ -17,7 +17,7 @@ from tracking.constellation import Constellation
 from tracking.estimate import Status, TeamEstimate
 from tracking.filters import DEFAULT_FILTER
 from tracking.horizon import HorizonParams
-from tracking.log import Log, read_log
+from tracking.log import Log, notes_on, read_log
 from tracking.measurements import MeasurementBlock
 from tracking.metrics import Score, score
 from tracking.tracker import Tracker, TrackerParams
@@ -78,6 +78,7 @@ class TrackResult:
             "realtime_factor": _number(self.realtime_factor),
             "coverage": s.coverage,
             "ok_share": s.ok_share,
+            "notes": list(notes_on(self.log)),
             "rejected": self.n_rejected,
             "skipped": sum(self.log.skipped.values()),
         }

@@ -109,7 +109,7 @@ def replay(
 def print_replay(result: ReplayResult) -> None:
     """Counts, the last estimates, and errors where there is truth."""
     from agents.live.text import pair_header, pair_rows
-    from agents.report.page import metres
+    from agents.report.page import metres, percent
 
     print_streams(result.streams)
     title = f"Estimates after {result.seconds:.1f} s"
@@ -131,7 +131,7 @@ def print_replay(result: ReplayResult) -> None:
         text = ", ".join(f"{n} {metres(v)} m" for n, v in zip(names, figures, strict=True))
         click.echo(
             f"against the truth, {result.scored.offset:+.3f} s later: {text}, "
-            f"status ok {100 * score.ok_share:.0f} % of the time"
+            f"status ok {percent(score.ok_share)} of the time"
         )
 
 

@@ -50,7 +50,7 @@ def track(
     from agents.report.track_report import track_report
     from agents.track import estimates_csv, track_log
     from tracking.filters import DEFAULT_FILTER, filter_builder
-    from tracking.log import read_log
+    from tracking.log import notes_on, read_log
 
     if not 0.0 <= skip < float("inf"):
         raise UsageError(f"--skip: expected 0 or more seconds, got {skip:g}")
@@ -62,6 +62,8 @@ def track(
     if out is not None:
         check_folder(out, ["report.html"])
     read = [apply_calibrations(read_log(path), calibrations) for path in logs]
+    for line in [f"{log.name}: {note}" for log in read for note in notes_on(log)]:
+        click.echo(line, err=True)
     results = []
     for log in read:
         for name in names:
@@ -87,7 +89,7 @@ def track(
 
 def print_tracks(results: Sequence[Any]) -> None:
     """Errors over all pairs and for each of them."""
-    from agents.report.page import metres
+    from agents.report.page import metres, percent
     from agents.track import pair_name
 
     rows = []
@@ -107,7 +109,7 @@ def print_tracks(results: Sequence[Any]) -> None:
         click.echo(
             f"{r.log.name}, {r.filter}: {r.log.n_ranges} ranges in {r.log.duration:.0f} s, "
             f"{r.n_rejected} refused as outliers, bad rows skipped: {skipped}, "
-            f"status ok {100 * r.score.ok_share:.0f} % of the scored time, "
+            f"status ok {percent(r.score.ok_share)} of the scored time, "
             f"{r.realtime_factor:.0f} times faster than real time"
         )
         if r.score.rmse is None:

@@ -58,7 +58,7 @@ class Monitor:
         intake = self.swarm.intake
         return {
             "measurements": dict(self.rates.totals),
-            "refused": dict(sorted(intake.refused.items())),
+            "refused": dict(sorted((intake.refused + intake.plausibility.refused).items())),
             "late_measurements": self.swarm.n_late,
         }
 

@@ -59,6 +59,8 @@ class ReplayResult:
     """Time [s] and what the user was told then."""
     lost: tuple[tuple[float, int, str], ...]
     """Where the recorder had to drop records: time [s], how many, why."""
+    stopped: bool
+    """Whether somebody ended the replay before the recording did."""
     realtime_factor: float
     """[-] Recorded time over the time that the replay took."""
     scored: Scored | None = None
@@ -72,7 +74,7 @@ class ReplayResult:
     def flaws(self) -> list[str]:
         """Why this is not all that happened, in words."""
         r = self.recording
-        flaws = []
+        flaws = [f"the replay was stopped after {self.seconds:.1f} s"] if self.stopped else []
         if r.torn:
             flaws.append("it ends within a record: the process or the machine was ended")
         if r.damaged:
@@ -98,6 +100,7 @@ class ReplayResult:
             "torn": r.torn,
             "damaged": r.damaged,
             "missing": r.missing,
+            "stopped": self.stopped,
             "dropped": sum(n for _, n, _ in self.lost),
             **self.counts,
             "notices": len(self.notices),

@@ -16,6 +16,9 @@ from hardware_bridge.live.replay import ReplayFeed
 from hardware_bridge.recording import Kind, Recording, read_recording
 from tracking.log import Log, read_log
 
+SLOWEST, FASTEST = 1e-3, 1e6
+"""[-] Of real time."""
+
 
 def replay(
     recording: Recording | Path | str,
@@ -51,8 +54,8 @@ def replay(
         LogError: The truth cannot be read.
         UsageError: A number that makes no sense, or a truth that does not fit.
     """
-    if speed is not None and not 0.0 < speed < float("inf"):
-        raise UsageError(f"speed: expected a number above 0, got {speed:g}")
+    if speed is not None and not SLOWEST <= speed <= FASTEST:
+        raise UsageError(f"speed: expected {SLOWEST:g} to {FASTEST:g}, got {speed:g}")
     read = recording if isinstance(recording, Recording) else read_recording(recording)
     pace = None if speed is None else _Pace(speed, read.header.monotonic_ns, clock, sleep)
     feed = ReplayFeed(read, pace, filter=filter)
@@ -63,7 +66,7 @@ def replay(
     keep = keep or log is not None
     monitor = Monitor(feed.swarm, estimates=keep, measurements=keep)
     started = clock()
-    notices = _run(feed, monitor, watch)
+    notices, stopped = _run(feed, monitor, watch)
     elapsed = 1e-9 * (clock() - started)
     if not monitor.decisions:
         raise BridgeError(f"{read.path}: has no decision, so there is nothing to replay")
@@ -84,13 +87,16 @@ def replay(
         streams=tuple(monitor.streams),
         notices=tuple(notices),
         lost=_lost(read),
+        stopped=stopped,
         realtime_factor=last.t / max(elapsed, 1e-9),
         scored=scored,
     )
 
 
-def _run(feed: ReplayFeed, monitor: Monitor, watch: Watch | None) -> list[tuple[float, str]]:
-    """Go through all decisions; the notices, times in seconds since the start."""
+def _run(
+    feed: ReplayFeed, monitor: Monitor, watch: Watch | None
+) -> tuple[list[tuple[float, str]], bool]:
+    """Go through all decisions; the notices, times in seconds since the start; ended before?"""
     intake = feed.swarm.intake
     notices: list[tuple[float, str]] = []
     try:
@@ -101,10 +107,10 @@ def _run(feed: ReplayFeed, monitor: Monitor, watch: Watch | None) -> list[tuple[
             feed.notices.clear()
             notices += new
             if watch is not None and watch(monitor, new) is False:
-                break
+                return notices, True
     except KeyboardInterrupt:
-        pass
-    return notices
+        return notices, True
+    return notices, False
 
 
 def _lost(recording: Recording) -> tuple[tuple[float, int, str], ...]:

@@ -21,7 +21,7 @@ COLOURS = ("tab:blue", "tab:red", "tab:green", "tab:orange", "tab:purple", "tab:
 
 
 def demo_rows(results: Sequence[HardwareDemoResult]) -> list[list[str]]:
-    """One row a drive, as `HEADER`, and one for the mean."""
+    """One row a drive, as `HEADER`, and one for the mean of those that have both errors."""
     rows = []
     for result in results:
         s = result.summary
@@ -36,13 +36,14 @@ def demo_rows(results: Sequence[HardwareDemoResult]) -> list[list[str]]:
             ]
         )
     if len(results) > 1:
-        ours, theirs = (
-            float(np.nanmean(np.array([r.summary[key] for r in results], dtype=np.float64)))
-            for key in ("formation_error", "simulated_error")
-        )
+        keys = ("formation_error", "simulated_error")
+        both = [[r.summary[key] for key in keys] for r in results]
+        both = [row for row in both if None not in row]
+        ours, theirs = np.mean(both, axis=0) if both else (None, None)
         found = error_ratio(results)
+        ratio = "-" if found is None else f"{found.value:.2f}"
         ends = "" if found is None or found.ends is None else "{:.2f} to {:.2f}".format(*found.ends)
-        rows.append(["mean", metres(ours), metres(theirs), f"{ours / theirs:.2f}", "", ""])
+        rows.append(["mean", metres(ours), metres(theirs), ratio, "", ""])
         rows.append(["95 %", "", "", ends, "", ""])
     return rows
 

@@ -86,6 +86,11 @@ def png(figure: Figure) -> bytes:
     return raw.getvalue()
 
 
+def percent(share: float | None) -> str:
+    """A share for a table or a sentence, or a dash."""
+    return "-" if share is None else f"{100.0 * share:.0f} %"
+
+
 def metres(value: float | None) -> str:
     """A length for a table, or a dash."""
     return "-" if value is None or value != value else f"{value:.3f}"

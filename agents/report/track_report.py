@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from agents.report.page import Page, metres
+from agents.report.page import Page, metres, percent
 from agents.track import TrackResult, pair_name
 from tracking.estimate import Status
+from tracking.log import notes_on
 from tracking.measurements import Kind
 from tracking.metrics import errors_after
 
@@ -49,10 +50,12 @@ def _add_result(page: Page, r: TrackResult) -> None:
     page.text(
         f"{log.constellation.n_nodes} nodes, {log.duration:.0f} s, {log.n_ranges} ranges, of "
         f"which {r.n_rejected} were refused as outliers; {sum(log.skipped.values())} bad rows "
-        f"skipped. Scored from {r.skip:g} s after the first range; there was an estimate for "
-        f"{100 * r.score.coverage:.0f} % of that time, with status ok for "
-        f"{100 * r.score.ok_share:.0f} %."
+        f"skipped. Scored from {r.skip:g} s after the first range; of what has truth then, there "
+        f"was an estimate for {percent(r.score.coverage)}, with status ok for "
+        f"{percent(r.score.ok_share)}."
     )
+    for note in notes_on(log):
+        page.text(f"Note: {note}.")
     constellation = log.constellation
     rows = []
     for p in range(constellation.n_pairs):
@@ -62,6 +65,9 @@ def _add_result(page: Page, r: TrackResult) -> None:
     if rows:
         page.table(["pair", "rmse", "rmse_yaw", "rmse_shape"], rows)
     pairs = _pairs_to_draw(r)
+    if not pairs:
+        page.text("No pair has a moving node, so there is nothing to draw.")
+        return
     page.figure(_trajectories(r, pairs), "Relative trajectories from above, seen from node i.")
     page.figure(
         _errors(r, pairs),

@@ -22,8 +22,10 @@ MEMORY = "512MiB"
 class Viewer:
     """An open view; a context."""
 
-    def __init__(self, rr: ModuleType, stream: Any, url: str | None) -> None:
-        self._rr, self._stream = rr, stream
+    def __init__(
+        self, rr: ModuleType, stream: Any, url: str | None, file: Path | None = None
+    ) -> None:
+        self._rr, self._stream, self._file = rr, stream, file
         self._styled = False
         self.url = url
         """Where a browser finds it; None for a file."""
@@ -71,6 +73,8 @@ class Viewer:
         trace: TracebackType | None,
     ) -> None:
         self.close()
+        if error is not None and not self._styled and self._file is not None:
+            self._file.unlink(missing_ok=True)  # nothing came that could be shown
 
 
 def open_viewer(name: str, file: Path | None = None, *, browse: bool = True) -> Viewer:
@@ -99,7 +103,7 @@ def open_viewer(name: str, file: Path | None = None, *, browse: bool = True) -> 
     try:
         if file is not None:
             stream.save(file, default_blueprint=layout())
-            return Viewer(rr, stream, None)
+            return Viewer(rr, stream, None, file)
         server = stream.serve_grpc(default_blueprint=layout(), server_memory_limit=MEMORY)
         rr.serve_web_viewer(open_browser=browse, connect_to=server)
     except Exception as error:

@@ -82,6 +82,47 @@ def test_where_nothing_can_be_written_nothing_is_tracked(recording, tmp_path):
     assert "is a file, expected a folder" in done.stderr
 
 
+def test_a_folder_that_may_not_be_written_to_is_found_first(monkeypatch, tmp_path):
+    import tempfile
+
+    from agents.errors import UsageError
+    from agents.output import check_folder
+
+    def refuse(*args, **kwargs):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(tempfile, "mkdtemp", refuse)
+    with pytest.raises(UsageError, match="cannot be written to"):
+        check_folder(tmp_path / "new", ["report.html"])
+
+
+def test_no_figure_is_cut_off(capsys, monkeypatch):
+    from agents.console import print_table
+
+    monkeypatch.setenv("COLUMNS", "80")
+    cells = [f"figure-{k}-of-a-long-row" for k in range(12)]
+    print_table("Title", [f"column {k}" for k in range(12)], [cells])
+    told = capsys.readouterr().out
+    assert all(cell in told for cell in cells)
+
+
+def test_a_log_that_cannot_be_scored(tmp_path):
+    """Static nodes only, no truth, no inertial samples: nothing to draw, and nothing is claimed."""
+    (tmp_path / "meta.toml").write_text(
+        'format = 1\nname = "still"\ndimensions = 3\n'
+        + "".join(f'[nodes.{n}]\nkind = "static"\n' for n in range(1, 5))
+    )
+    rows = [f"{0.1 * k},{1 + k % 3},4,{2.0 + 0.01 * (k % 7)}" for k in range(200)]
+    (tmp_path / "ranges.csv").write_text("t_s,node_i,node_j,range_m\n" + "\n".join(rows) + "\n")
+    done = relpos("track", tmp_path, "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    assert "status ok - of the scored time" in done.stdout
+    assert "nothing to draw" in (tmp_path / "out" / "report.html").read_text()
+    told = json.loads(relpos("track", tmp_path, "--json").stdout)
+    assert told["coverage"] is None
+    assert told["ok_share"] is None
+
+
 def test_single_bad_measurements_are_shown(recording, tmp_path):
     import gzip
     import shutil

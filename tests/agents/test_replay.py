@@ -124,6 +124,17 @@ def test_at_speed_it_takes_its_time_and_gives_the_same(run):
     assert len(timed.t_ns) == 50
     same_bits(timed.estimate, run.estimate, 50)
     assert timed.realtime_factor == pytest.approx(2.0, rel=0.05)
+    assert timed.summary["stopped"]
+    assert timed.flaws == ["the replay was stopped after 5.0 s"]
+
+
+def test_one_that_is_interrupted_says_so(run, tmp_path):
+    def watch(monitor, notices):
+        if monitor.decisions > 20:
+            raise KeyboardInterrupt
+
+    assert replay(run.path, watch=watch).flaws
+    assert not replay(run.path).summary["stopped"]
 
 
 def test_flaws_are_told(run, tmp_path):
@@ -153,8 +164,9 @@ def test_what_cannot_be_replayed(run, tmp_path):
     Recorder(tmp_path / "empty.rec", read_recording(run.path).header).close()
     with pytest.raises(BridgeError, match="no decision"):
         replay(tmp_path / "empty.rec")
-    with pytest.raises(UsageError, match="speed"):
-        replay(run.path, speed=0.0)
+    for speed in (0.0, 1e-300, float("inf")):
+        with pytest.raises(UsageError, match="speed"):
+            replay(run.path, speed=speed)
 
 
 def test_the_command_line(run, tmp_path):

@@ -1,6 +1,7 @@
 """Readings of one port as they come, and which format they are."""
 
 import json
+import time
 
 import pytest
 from click.testing import CliRunner
@@ -41,6 +42,32 @@ def test_shows_every_reading_once_the_format_is_known(talker):
     asked = sniff(talker.path, format="beta", seconds=0.3, formats=FORMATS)
     assert asked.format == "beta"
     assert asked.readings > 0
+
+
+class SlowAtFirst:
+    """A format whose first decoding takes longer than one listens."""
+
+    def __init__(self, each, seconds):
+        self._each, self._wait = each, [seconds]
+
+    def __getattr__(self, name):
+        return getattr(self._each, name)
+
+    def build(self, key):
+        decoder = self._each.build(key)
+        feed = decoder.feed
+
+        def slow(data):
+            time.sleep(self._wait.pop() if self._wait else 0.0)
+            return feed(data)
+
+        decoder.feed = slow
+        return decoder
+
+
+def test_what_is_compiled_first_does_not_count_as_listening(talker):
+    formats = {name: SlowAtFirst(each, 0.7) for name, each in FORMATS.items()}
+    assert sniff(talker.path, seconds=0.5, formats=formats).readings >= ENOUGH_FRAMES
 
 
 def test_another_format_than_asked_for(talker):

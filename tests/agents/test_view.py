@@ -90,3 +90,7 @@ def test_what_cannot_be_opened(tmp_path, monkeypatch):
     pytest.importorskip("rerun")
     with pytest.raises(UsageError, match=r"\.rrd"):
         open_viewer("none", tmp_path / "a.mp4")
+    # What fails before anything could be shown leaves nothing that would be in the way.
+    with pytest.raises(RuntimeError), open_viewer("none", tmp_path / "a.rrd"):
+        raise RuntimeError
+    assert not (tmp_path / "a.rrd").exists()
