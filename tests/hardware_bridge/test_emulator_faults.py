@@ -4,7 +4,7 @@ import tomllib
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from hardware_bridge.emulator.fault_plan import Fault, FaultPlan, parse_faults, read_faults
@@ -151,6 +151,7 @@ VALUES = st.recursive(
 )  # fmt: skip
 
 
+@settings(suppress_health_check=[HealthCheck.too_slow])
 @given(st.dictionaries(KEYS, VALUES, max_size=3))
 def test_whatever_a_file_says_it_is_a_plan_or_an_error_of_one_line(table):
     told = ""
