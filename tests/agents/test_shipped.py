@@ -31,7 +31,7 @@ def config_of(card):
 
 
 def test_there_are_some():
-    assert {"ring", "hold", "hold-beams"} <= set(shipped_names())
+    assert {"ring", "hold", "hold-beams", "hold-place"} <= set(shipped_names())
 
 
 @pytest.mark.parametrize("name", shipped_names())

@@ -1,12 +1,10 @@
 """What inertial samples of a log must be, and what is said of those that cannot be used."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from tracking import Constellation, NodeConfig
-from tracking.errors import ConfigError, LogError
+from tracking.errors import LogError
 from tracking.log import Log, notes_on, read_log, write_log
 from tracking.log.inertial import with_rates
 from tracking.measurements import Kind, MeasurementBlock
@@ -88,27 +86,3 @@ def test_ids_that_no_number_holds_are_refused(tmp_path):
     meta.write_text(meta.read_text().replace("[nodes.1]", f"[nodes.{'1' * 5000}]"))
     with pytest.raises(LogError, match="expected an integer id"):
         read_log(folder)
-
-
-def tracker_input(**changes):
-    """A block of two environments, and what is changed in it."""
-    one = log_of([]).block
-    two = MeasurementBlock(**{n: np.concatenate([getattr(one, n)] * 2) for n in one.__slots__})
-    return replace(two, **changes) if changes else two
-
-
-def test_a_tracker_looks_at_what_it_is_given():
-    from tracking import Tracker
-
-    group = log_of([]).constellation
-    two = tracker_input()
-    Tracker(group, n_envs=2).run(two, np.array([5.0, 6.0]))
-    with pytest.raises(ConfigError, match="1 environments, got 2"):
-        Tracker(group).run(two, np.array([5.0]))
-    with pytest.raises(ConfigError, match="nodes 0 to 1"):
-        Tracker(group, n_envs=2).run(replace(two, j=two.j + 1), np.array([5.0]))
-    with pytest.raises(ConfigError, match="order of time"):
-        Tracker(group, n_envs=2).run(replace(two, t=-two.t), np.array([5.0]))
-    for wrong in ([6.0, 5.0], [np.nan, 5.0]):
-        with pytest.raises(ConfigError, match="do not go back"):
-            Tracker(group, n_envs=2).run(two, np.array(wrong))
