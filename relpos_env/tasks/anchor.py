@@ -29,14 +29,21 @@ def free_anchor(wanted: F64, half: F64, places: F64, boxes: F64) -> F64:
     """
     boxes = boxes[boxes[:, 2] > 0.0]
     wanted = np.clip(wanted, -half, half)
+    if _clearance(wanted[None], places, boxes)[0] >= CLEAR:
+        return wanted  # as nearly always in large rooms, where there is much to try
     axes = [np.linspace(-h, h, 2 * int(np.ceil(h / STEP)) + 1) for h in half]
-    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
-    tried = np.concatenate([wanted[None], grid])
-    clear = np.full(len(tried), np.inf)
-    for box in boxes:
-        clear = np.minimum(clear, distance(tried[:, None] + places, box).min(axis=1))
+    tried = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+    clear = _clearance(tried, places, boxes)
     free = np.flatnonzero(clear >= CLEAR)
     if not len(free):
         free = np.array([np.argmax(clear)])
     nearest: F64 = tried[free[np.argmin(np.linalg.norm(tried[free] - wanted, axis=1))]]
     return nearest
+
+
+def _clearance(anchors: F64, places: F64, boxes: F64) -> F64:
+    """How far the place nearest to a box is from it, (anchor) [m]; infinite without boxes."""
+    clear = np.full(len(anchors), np.inf)
+    for box in boxes:
+        clear = np.minimum(clear, distance(anchors[:, None] + places, box).min(axis=1))
+    return clear
