@@ -16,6 +16,8 @@ N_WALLS = 4
 FRICTION, ELASTICITY = 0.09, 0.04
 """[-] Between any two bodies; the solver multiplies what the two shapes have. Little: cars slide
 along what they touch. At 0.3 and 0.2 they catch on it and are thrown back."""
+CAR_RADIUS, WALL_RADIUS = 0.01, 0.02
+"""[m] Their edges are rounded, and stand out by so much; those of boxes are sharp."""
 BOX_FRICTION = 0.4
 """[-] Of a movable box on the floor."""
 BOX_DENSITY = 8.0
@@ -46,7 +48,8 @@ class Room:
         w, d = 0.5 * size[0], 0.5 * size[1]
         corners = [(-w, -d), (w, -d), (w, d), (-w, d)]
         for k in range(N_WALLS):
-            wall = pymunk.Segment(space.static_body, corners[k], corners[(k + 1) % N_WALLS], 0.02)
+            a, b = corners[k], corners[(k + 1) % N_WALLS]
+            wall = pymunk.Segment(space.static_body, a, b, WALL_RADIUS)
             self._add(wall)
         self.car_ids: dict[int, int] = {}
         """Number of a car to that of its body."""
@@ -54,7 +57,7 @@ class Room:
             body = pymunk.Body(car.mass, car.inertia)
             self.car_ids[n] = body.id
             space.add(body)
-            self._add(pymunk.Poly.create_box(body, (car.length, car.width), radius=0.01))
+            self._add(pymunk.Poly.create_box(body, (car.length, car.width), CAR_RADIUS))
         self.movable: list[int] = []
         """Numbers of the boxes that can be pushed."""
         for k, box in enumerate(boxes):

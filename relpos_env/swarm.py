@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from relpos_env._clearance_kernels import read_clearances
 from relpos_env._step_kernels import begin_decision, run_steps
 from relpos_env._vehicle_kernels import STEERING
 from relpos_env.bodies import Bodies, make_bodies, place_bodies
@@ -79,6 +80,7 @@ class Swarm:
         """Last readings, (env, car) [m/s]."""
         self.proximity: F64 = np.zeros((e, n, proximity))
         """Last readings of the distance sensors, (env, car, beam) [m]; 0 of absent cars."""
+        self._clearance: F64 = np.zeros((e, n))
         self._radio = Radio(scenario.radio.for_nodes(n), n, [0] * e, DT)
         self._scene = Scene(
             np.zeros((e, n, 3)), np.zeros((e, n, 3)), self._bodies.boxes, np.zeros((e, 0, 7))
@@ -139,6 +141,7 @@ class Swarm:
         part._bodies = Bodies._make(a[envs] for a in self._bodies)
         part._sensors = Sensors._make(a[envs] for a in self._sensors)
         part.odometer, part.proximity = self.odometer[envs], self.proximity[envs]
+        part._clearance = self._clearance[envs]
         part._radio = self._radio.part(envs)
         part._scene = Scene._make(a[envs] for a in self._scene)
         part._groups = self._groups[envs]
@@ -171,6 +174,7 @@ class Swarm:
             self._radio.switch_on(env, n, boot=int(group.boots.integers(256)))
         # Last, so that all other draws are what they are without beams.
         self._sensors.proximity_seed[env] = rng.integers(1 << 62)
+        self._read_clearances()
         self._look_ahead(env)
 
     def step(self, speed: F64, steering: F64) -> MeasurementBlock:
@@ -195,6 +199,7 @@ class Swarm:
             for env in self._waiting[:n_waiting].tolist():
                 self._groups[env].open_room(self._bodies, self._solver, env)
         self._read_odometers()
+        self._read_clearances()
         if self.proximity.shape[-1]:
             self._read_proximity()
         return self.block
@@ -217,7 +222,7 @@ class Swarm:
     def __getstate__(self) -> dict[str, Any]:
         """What is put together by `_bind` stays behind, and the solver with its addresses."""
         bound = {"_begin_decision", "_run_steps", "_read_odometers", "_read_proximity"}
-        bound |= {"block", "state", "_solver"}
+        bound |= {"_read_clearances", "block", "state", "_solver"}
         return {k: v for k, v in self.__dict__.items() if k not in bound}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -256,6 +261,10 @@ class Swarm:
             beam_directions(self.proximity.shape[-1]), bodies.body, bodies.present, bodies.size,
             bodies.room, bodies.boxes, self.proximity,
         )  # fmt: skip
+        self._read_clearances = bind(
+            read_clearances, bodies.body, bodies.present, bodies.size, bodies.room, bodies.boxes,
+            self._clearance,
+        )  # fmt: skip
         self.block = MeasurementBlock(*self.events[:9])
         """What the last step measured; shares memory."""
         b = self._bodies
@@ -267,6 +276,7 @@ class Swarm:
             heading=b.body[..., 2],
             yaw_rate=b.body[..., 5],
             steering=b.drive[..., STEERING],
+            clearance=self._clearance,
             present=b.present,
         )
         """The truth now; shares memory."""

@@ -27,6 +27,9 @@ class WorldState:
     """(env, car) [rad/s]"""
     steering: F64
     """(env, car) [rad]"""
+    clearance: F64
+    """Way between the car's body and the wall, box or car nearest to it, (env, car) [m]: 0 at a
+    touch, at most 0.5."""
     present: Bool
     """The car is in the room, (env, car)."""
 

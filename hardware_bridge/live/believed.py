@@ -25,6 +25,8 @@ class Believed:
         """[m/s] By odometer and heading."""
         self.accel_w: F64 = np.zeros((*shape, 2))
         """[m/s2] From one decision to the next."""
+        self.clearance: F64 = np.full(shape, np.inf)
+        """[m] Infinite: nobody knows what stands beside them."""
         self.present: Bool = np.zeros(shape, dtype=bool)
         self.known: Bool = np.zeros(shape, dtype=bool)
         """Whose place is known relative to the others'."""

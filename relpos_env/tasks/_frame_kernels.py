@@ -67,7 +67,7 @@ def frame_now(env, t, frame, curve, motion, out):
 
 @kernel
 def update_frame(
-    start, stop, pos, vel, accel, present, t, collided, seated, frame, places, curve, motion,
+    start, stop, pos, vel, accel, clear, present, t, collided, seated, frame, places, curve, motion,
     limits, target, plan, goal, error, rewards, done,
 ):  # fmt: skip
     """Goals, plan, error, rewards and ending of the environments from start to stop.
@@ -78,6 +78,7 @@ def update_frame(
         pos: (env, car, 2) [m].
         vel: (env, car, 2) [m/s].
         accel: (env, car, 2) [m/s2].
+        clear: Way to what is nearest, (env, car) [m].
         present: (env, car).
         t: (env) [s].
         collided: (env, car).
@@ -100,7 +101,7 @@ def update_frame(
         How many environments have other cars than were given places; those are left alone.
     """
     lookahead, tolerance, error_scale, place_scale = limits
-    ends = rewards.shape[2] > 4 and motion[2] > 0.0 and motion[3] == 0.0
+    ends = rewards.shape[2] > 5 and motion[2] > 0.0 and motion[3] == 0.0
     n_changed = 0
     for env in range(start, stop):
         if changed(env, present, seated):
@@ -129,5 +130,5 @@ def update_frame(
         formation_error(env, pos, present, target, error)
         arrived = ends and frame[env, 2] + motion[0] * t[env] >= motion[2]
         done[env] = arrived and all_within(env, pos, present, goal, tolerance)
-        common_terms(env, accel, present, collided, error, error_scale, done[env], rewards)
+        common_terms(env, accel, clear, present, collided, error, error_scale, done[env], rewards)
     return n_changed

@@ -23,7 +23,7 @@ PROGRESS_SCALE = 1.0
 
 @kernel
 def update_gap(
-    start, stop, pos, accel, present, t, collided, seated, route, lag, limits, target, plan,
+    start, stop, pos, accel, clear, present, t, collided, seated, route, lag, limits, target, plan,
     goal, error, rewards, done,
 ):  # fmt: skip
     """Goals, plan, error, rewards and ending of the environments from start to stop.
@@ -33,6 +33,7 @@ def update_gap(
         stop: One behind the last.
         pos: (env, car, 2) [m].
         accel: (env, car, 2) [m/s2].
+        clear: Way to what is nearest, (env, car) [m].
         present: (env, car).
         t: (env) [s].
         collided: (env, car).
@@ -86,5 +87,5 @@ def update_gap(
         targets_from_goals(env, present, goal, target)
         formation_error(env, pos, present, target, error)
         done[env] = arrived and all_within(env, pos, present, goal, tolerance)
-        common_terms(env, accel, present, collided, error, error_scale, done[env], rewards)
+        common_terms(env, accel, clear, present, collided, error, error_scale, done[env], rewards)
     return n_changed

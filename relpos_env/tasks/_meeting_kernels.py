@@ -13,7 +13,7 @@ CLOSING_SPEED = 1.0
 
 @kernel
 def update_meeting(
-    start, stop, pos, vel, accel, present, t, collided, seated, place, since, limits, goal,
+    start, stop, pos, vel, accel, clear, present, t, collided, seated, place, since, limits, goal,
     error, rewards, done,
 ):  # fmt: skip
     """Goals, error, rewards and ending of the environments from start to stop.
@@ -26,6 +26,7 @@ def update_meeting(
         pos: (env, car, 2) [m].
         vel: (env, car, 2) [m/s].
         accel: (env, car, 2) [m/s2].
+        clear: Way to what is nearest, (env, car) [m].
         present: (env, car).
         t: (env) [s].
         collided: (env, car).
@@ -72,5 +73,5 @@ def update_meeting(
                 rewards[env, k, 1] = min(max(closing / (distance * CLOSING_SPEED), -1.0), 1.0)
         since[env] = min(since[env], t[env]) if together else math.inf
         done[env] = together and t[env] - since[env] >= stay - 1e-9
-        common_terms(env, accel, present, collided, error, error_scale, done[env], rewards)
+        common_terms(env, accel, clear, present, collided, error, error_scale, done[env], rewards)
     return n_changed

@@ -21,8 +21,8 @@ from tracking.compiled import kernel
 
 @kernel
 def update_ring(
-    start, stop, pos, vel, accel, present, t, collided, seated, arc, curve, motion, target, plan,
-    goal, error, rewards,
+    start, stop, pos, vel, accel, clear, present, t, collided, seated, arc, curve, motion, target,
+    plan, goal, error, rewards,
 ):  # fmt: skip
     """Goals, plan, error and rewards of the environments from start to stop.
 
@@ -32,6 +32,7 @@ def update_ring(
         pos: (env, car, 2) [m].
         vel: (env, car, 2) [m/s].
         accel: (env, car, 2) [m/s2].
+        clear: Way to what is nearest, (env, car) [m].
         present: (env, car).
         t: (env) [s].
         collided: (env, car).
@@ -70,5 +71,5 @@ def update_ring(
             velocity_term(env, k, vel, plan[env, k, 0], plan[env, k, 1], rewards)
         targets_from_goals(env, present, goal, target)
         formation_error(env, pos, present, target, error)
-        common_terms(env, accel, present, collided, error, error_scale, False, rewards)
+        common_terms(env, accel, clear, present, collided, error, error_scale, False, rewards)
     return n_changed

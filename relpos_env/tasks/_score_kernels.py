@@ -8,6 +8,8 @@ from tracking.compiled import small_kernel
 
 HARD_ACCEL = 5.0
 """[m/s2] Acceleration whose effort is 1; harder counts no more."""
+NEAR = 0.15
+"""[m] Way to what is nearest below which nearness counts."""
 VELOCITY_SCALE = 0.5
 """[m/s] Difference from the planned velocity at which the velocity term is exp(-1)."""
 
@@ -100,19 +102,20 @@ def place_term(env, pos, present, goal, scale, rewards):
 
 
 @small_kernel
-def common_terms(env, accel, present, collided, error, error_scale, done, rewards):
+def common_terms(env, accel, clear, present, collided, error, error_scale, done, rewards):
     """The reward terms that all tasks have; the second, the task's own, must be there before.
 
     Args:
         env: Environment.
         accel: (env, car, 2) [m/s2].
+        clear: Way to what is nearest, (env, car) [m].
         present: (env, car).
         collided: Contacts begun, (env, car).
         error: (env, car) [m].
         error_scale: Error at which the formation term is exp(-1) [m].
         done: Whether this environment is through.
-        rewards: (env, car, term), written: formation, (own), collision, effort, and time if
-            the task has that term; all 0 of an absent car.
+        rewards: (env, car, term), written: formation, (own), collision, effort, nearness, and
+            time if the task has that term; all 0 of an absent car.
     """
     n_terms = rewards.shape[2]
     for k in range(present.shape[1]):
@@ -124,5 +127,7 @@ def common_terms(env, accel, present, collided, error, error_scale, done, reward
         rewards[env, k, 0] = math.exp(-error[env, k] / error_scale)
         rewards[env, k, 2] = -collided[env, k]
         rewards[env, k, 3] = -min(1.0, square / (HARD_ACCEL * HARD_ACCEL))
-        if n_terms > 4:
-            rewards[env, k, 4] = 0.0 if done else -1.0
+        short = max(1.0 - clear[env, k] / NEAR, 0.0)
+        rewards[env, k, 4] = -short * short
+        if n_terms > 5:
+            rewards[env, k, 5] = 0.0 if done else -1.0

@@ -16,7 +16,7 @@ from relpos_env.errors import EnvError
 from relpos_env.tasks.options import car_count
 from tracking.arrays import F64, I64, Bool
 
-COMMON_TERMS = ("collision", "effort")
+COMMON_TERMS = ("collision", "effort", "nearness")
 """Reward terms of every task after its first two, `formation` and one of its own."""
 
 NO_BOXES: F64 = np.zeros((0, 6))
@@ -36,6 +36,10 @@ class Truth(Protocol):
     @property
     def accel_w(self) -> F64:
         """Acceleration, (env, car, 2) [m/s2]."""
+
+    @property
+    def clearance(self) -> F64:
+        """Way to what is nearest to the car's body, (env, car) [m]; infinite where nobody knows."""
 
     @property
     def present(self) -> Bool:

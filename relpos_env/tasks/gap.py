@@ -134,6 +134,7 @@ class Gap(Task):
             stop,
             state.pos_w,
             state.accel_w,
+            state.clearance,
             state.present,
             t,
             collided,

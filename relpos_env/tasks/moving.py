@@ -118,6 +118,7 @@ class MovingFormation(Task):
             state.pos_w,
             state.vel_w,
             state.accel_w,
+            state.clearance,
             state.present,
             t,
             collided,

@@ -79,6 +79,7 @@ class Rendezvous(Task):
             state.pos_w,
             state.vel_w,
             state.accel_w,
+            state.clearance,
             state.present,
             t,
             collided,

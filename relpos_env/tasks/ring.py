@@ -79,7 +79,8 @@ class Ring(Task):
     def compute(self, state: Truth, t: F64, collided: F64, start: int, stop: int) -> int:
         """One compiled call."""
         n_changed: int = update_ring(
-            start, stop, state.pos_w, state.vel_w, state.accel_w, state.present, t, collided,
+            start, stop, state.pos_w, state.vel_w, state.accel_w, state.clearance,
+            state.present, t, collided,
             self._seated, self._arc, self._curve.pieces, self._motion, self.target, self.plan,
             self.goal_w, self.error, self.rewards,
         )  # fmt: skip

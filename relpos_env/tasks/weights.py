@@ -12,14 +12,21 @@ from relpos_env.registry import look_up
 from relpos_env.tasks.options import finite
 from tracking.arrays import F64
 
-_MOVING = {"formation": 1.0, "velocity": 0.2, "collision": 1.0, "effort": 0.05}
+_CARE = {"collision": 1.0, "effort": 0.05, "nearness": 0.5}
+_MOVING = {"formation": 1.0, "velocity": 0.2, **_CARE}
 # Every step costs more than a perfect one earns, so that being through is best.
-_ENDING = {"formation": 0.5, "progress": 1.0, "collision": 1.0, "effort": 0.05, "time": 1.5}
+_ENDING = {"formation": 0.5, "progress": 1.0, **_CARE, "time": 1.5}
 
 DEFAULT_WEIGHTS: Mapping[str, Mapping[str, float]] = MappingProxyType(
     {
-        "ring": {"formation": 1.0, "velocity": 0.0, "collision": 1.0, "effort": 0.0},
-        "hold": {"formation": 1.0, "place": 0.3, "collision": 1.0, "effort": 0.05},
+        "ring": {
+            "formation": 1.0,
+            "velocity": 0.0,
+            "collision": 1.0,
+            "effort": 0.0,
+            "nearness": 0.0,
+        },
+        "hold": {"formation": 1.0, "place": 0.3, **_CARE},
         "travel": {**_MOVING, "time": 1.2},
         "follow": {**_MOVING, "time": 1.2},
         "gap": _ENDING,

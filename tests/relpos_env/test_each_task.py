@@ -22,6 +22,7 @@ def rooms(n_envs, n_cars, seed=0, absent=0.0):
         pos_w=rng.uniform(-3.0, 3.0, (n_envs, n_cars, 2)),
         vel_w=vel,
         accel_w=accel,
+        clearance=rng.uniform(0.0, 0.5, (n_envs, n_cars)),
         present=rng.uniform(size=(n_envs, n_cars)) >= absent,
     )
 

@@ -13,7 +13,15 @@ def move_everything(formation):
     state, task = formation.state, formation.task
     rng = np.random.default_rng(0)
     truths = (state.pos_w, state.vel_w, state.accel_w, state.heading, state.yaw_rate)
-    for truth in (*truths, state.steering, task.error, task.rewards, task.goal_w, task.plan):
+    for truth in (
+        *truths,
+        state.steering,
+        state.clearance,
+        task.error,
+        task.rewards,
+        task.goal_w,
+        task.plan,
+    ):
         truth += rng.uniform(0.3, 0.7, truth.shape)
     formation.loop.swarm.boxes[..., :2] += 0.5
     formation.loop.swarm.contacts[:] += 1.0

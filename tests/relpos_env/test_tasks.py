@@ -33,6 +33,7 @@ class Rooms:
     pos_w: np.ndarray
     vel_w: np.ndarray
     accel_w: np.ndarray
+    clearance: np.ndarray
     present: np.ndarray
 
 
@@ -41,7 +42,8 @@ def rooms(n_envs, n_cars, seed=0, absent=0.0):
     pos = rng.uniform(-3.0, 3.0, (n_envs, n_cars, 2))
     vel, accel = rng.normal(size=(2, n_envs, n_cars, 2))
     present = rng.uniform(size=(n_envs, n_cars)) >= absent
-    return Rooms(pos, vel, accel, present)
+    clearance = rng.uniform(0.0, 0.5, (n_envs, n_cars))
+    return Rooms(pos, vel, accel, clearance, present)
 
 
 def update(task, state, t, collided=None):
@@ -212,6 +214,8 @@ def test_every_term_is_finite_and_within_its_bounds(name, n_cars, seed, absent, 
         assert np.all((own >= -1.0) & (own <= 1.0))
         assert np.array_equal(term["collision"], np.where(state.present, -collided, 0.0))
         assert np.all((term["effort"] >= -1.0) & (term["effort"] <= 0.0))
+        short = np.maximum(1.0 - state.clearance / 0.15, 0.0)
+        np.testing.assert_allclose(term["nearness"], -(short**2) * state.present, atol=1e-12)
         assert np.all(np.isin(term.get("time", 0.0), [-1.0, 0.0]))
         for array in arrays(task).values():
             assert np.isfinite(array).all()
