@@ -10,6 +10,9 @@ HARD_ACCEL = 5.0
 """[m/s2] Acceleration whose effort is 1; harder counts no more."""
 NEAR = 0.15
 """[m] Way to what is nearest below which nearness counts."""
+FAR = 4.0
+"""[-] Half of the formation term falls off over so many times the scale: there is something to be
+had by coming nearer even where a car is metres from its place."""
 VELOCITY_SCALE = 0.5
 """[m/s] Difference from the planned velocity at which the velocity term is exp(-1)."""
 
@@ -112,7 +115,7 @@ def common_terms(env, accel, clear, present, collided, error, error_scale, done,
         present: (env, car).
         collided: Contacts begun, (env, car).
         error: (env, car) [m].
-        error_scale: Error at which the formation term is exp(-1) [m].
+        error_scale: Error over which half of the formation term falls off to exp(-1) [m].
         done: Whether this environment is through.
         rewards: (env, car, term), written: formation, (own), collision, effort, nearness, and
             time if the task has that term; all 0 of an absent car.
@@ -124,7 +127,8 @@ def common_terms(env, accel, clear, present, collided, error, error_scale, done,
                 rewards[env, k, term] = 0.0
             continue
         square = accel[env, k, 0] ** 2 + accel[env, k, 1] ** 2
-        rewards[env, k, 0] = math.exp(-error[env, k] / error_scale)
+        off = error[env, k] / error_scale
+        rewards[env, k, 0] = 0.5 * math.exp(-off) + 0.5 * math.exp(-off / FAR)
         rewards[env, k, 2] = -collided[env, k]
         rewards[env, k, 3] = -min(1.0, square / (HARD_ACCEL * HARD_ACCEL))
         short = max(1.0 - clear[env, k] / NEAR, 0.0)

@@ -15,7 +15,7 @@ from relpos_env.tasks.shapes import Formation
 from tracking.arrays import F64, I64, Bool
 
 ERROR_SCALE = 0.5
-"""[m] Formation error at which the formation term is exp(-1)."""
+"""[m] Formation error over which half of the formation term falls off to exp(-1)."""
 PLACE_SCALE = 1.0
 """[m] Distance of the group's middle from its goals' at which the place term is exp(-1)."""
 TOLERANCE = 0.4
