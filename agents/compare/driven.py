@@ -67,6 +67,11 @@ class Driven:
         return self._unknown
 
     @property
+    def clearance(self) -> F64:
+        """Nobody knows."""
+        return self._unknown
+
+    @property
     def done(self) -> Bool:
         """Whether the task is accomplished, as the cars believe, (1)."""
         return self._group.task.done

@@ -38,6 +38,9 @@ class EpisodeResult:
     """[m] Error of the relative positions that cars could use, mean over cars and scored time."""
     collisions_per_min: float
     """[1/min] Contacts begun, summed over the cars, over the whole episode."""
+    contact_time: float
+    """[-] Share of the cars' time in which they touch something, over the whole episode: contacts
+    begun do not tell who presses on."""
     time_in_formation: float
     """[-] Share of the scored time in which every present car's error is below `IN_FORMATION`."""
     energy: float
@@ -87,6 +90,10 @@ class Running(Protocol):
         """That cars began in the last decision, (env, car) [-]."""
 
     @property
+    def clearance(self) -> F64:
+        """Way between a car and what is nearest to it, 0 at a touch, (env, car) [m]."""
+
+    @property
     def done(self) -> Bool:
         """Whether the task is accomplished, (env)."""
 
@@ -119,12 +126,14 @@ class Meter:
         self._error, self._place, self._tracking, self._worst = np.full(
             (4, e, running.cycles), np.nan
         )
-        self._contacts, self._work, self._car_time = np.zeros((3, e))
+        self._contacts, self._touching, self._here = np.zeros((3, e))
+        self._work, self._car_time = np.zeros((2, e))
 
     def read(self) -> None:
         """Take down what the last decision led to."""
         r = self._running
         present, speed, error, contacts = r.present, r.speed, r.error, r.contacts
+        touching = np.where(np.isnan(r.clearance), np.nan, r.clearance == 0.0)
         work = _work(self._speed, speed, *self._car)
         # A car that came in or was taken out in between was not driven there.
         driven = present & self._present
@@ -139,6 +148,8 @@ class Meter:
             if known.any():
                 self._tracking[e, k] = tracking[e, known].mean()
             self._contacts[e] += contacts[e].sum()
+            self._touching[e] += touching[e, here].sum()
+            self._here[e] += here.sum()
             self._work[e] += work[e, driven[e]].sum()
             self._car_time[e] += DECISION * driven[e].sum()
         self._cycles += self.going
@@ -167,6 +178,7 @@ class Meter:
             place_error=_mean(self._place[env, scored]),
             tracking_error=_mean(self._tracking[env, scored]),
             collisions_per_min=60.0 * self._contacts[env] / seconds,
+            contact_time=self._touching[env] / max(self._here[env], 1.0),
             time_in_formation=_mean((worst < IN_FORMATION)[np.isfinite(worst)]),
             energy=60.0 * self._work[env] / max(self._car_time[env], DECISION),
             error=self._error[env, :n].copy(),

@@ -15,7 +15,7 @@ from agents.compare.statistics import Interval, mean, ratio
 from tracking.arrays import F64
 
 FIGURES = (
-    "formation_error", "place_error", "tracking_error", "collisions_per_min",
+    "formation_error", "place_error", "tracking_error", "collisions_per_min", "contact_time",
     "time_in_formation", "energy",
 )  # fmt: skip
 """What is measured in every episode, see `agents.compare.meter.EpisodeResult`."""

@@ -83,6 +83,11 @@ class Simulated:
         return self.formation.loop.swarm.contacts
 
     @property
+    def clearance(self) -> F64:
+        """By the truth, (env, car) [m]."""
+        return self.formation.state.clearance
+
+    @property
     def done(self) -> Bool:
         """Whether the task is accomplished, (env)."""
         return self.formation.task.done

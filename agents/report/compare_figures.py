@@ -27,6 +27,7 @@ LABELS = {
     "place_error": "distance from the goals [m]",
     "tracking_error": "tracking error [m]",
     "collisions_per_min": "contacts [1/min]",
+    "contact_time": "time in contact [%]",
     "time_in_formation": f"time below {IN_FORMATION:g} m [%]",
     "energy": "energy [J/min]",
 }
@@ -95,7 +96,7 @@ def _bars(result: CompareResult) -> Figure:
     for line, scenario in zip(axes, scenarios, strict=True):
         rows = result.of(scenario)
         for ax, name in zip(line, measured, strict=True):
-            scale = 100.0 if name == "time_in_formation" else 1.0
+            scale = 100.0 if LABELS[name].endswith("[%]") else 1.0
             for y, row in enumerate(rows):
                 bar = name != "energy"
                 _bar(ax, y, row.means[name], scale, colours[row.contender.label], bar=bar)

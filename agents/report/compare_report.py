@@ -16,7 +16,7 @@ from agents.report.page import Page, metres, png
 _TO = "\N{NO-BREAK SPACE}to\N{NO-BREAK SPACE}"
 HEADER = (
     "driver", "trained on", "sees", "error [m]", "95 %", "place", "tracking", "hits/min",
-    "formed %", "J/min", "ratio", "95 %",
+    "touch %", "formed %", "J/min", "ratio", "95 %",
 )  # fmt: skip
 """Names of the columns."""
 
@@ -27,7 +27,7 @@ def rows(result: CompareResult, scenario: str) -> list[list[str]]:
 
 
 def _cells(record: dict[str, Any]) -> list[str]:
-    share = record["time_in_formation"]
+    share, touch = record["time_in_formation"], record["contact_time"]
     return [
         record["policy"],
         record["trained_on"] or "-",
@@ -37,6 +37,7 @@ def _cells(record: dict[str, Any]) -> list[str]:
         metres(record["place_error"]),
         metres(record["tracking_error"]),
         _number(record["collisions_per_min"], 2),
+        _number(None if touch is None else 100.0 * touch, 2),
         _number(None if share is None else 100.0 * share, 1),
         _number(record["energy"], 1),
         _number(record["ratio"], 3),
@@ -51,14 +52,15 @@ _LONGEST = 36
 
 
 def short_rows(result: CompareResult, scenario: str) -> list[list[str]]:
-    """Cells of the table of one scenario, for a terminal: without the energy."""
+    """Cells of the table of one scenario, for a terminal: without energy and time in contact."""
     lines = []
     for row, cells in zip(result.of(scenario), rows(result, scenario), strict=True):
         shown = f" on {row.contender.sees}"
         name, room = row.contender.called, _LONGEST - len(shown)
         if len(name) > room:
             name = f"{name[: room - 3]}..."
-        numbers = [cell.replace(_TO, "-") for cell in (*cells[3:9], *cells[10:])]
+        kept = (*cells[3:8], cells[9], *cells[11:])
+        numbers = [cell.replace(_TO, "-") for cell in kept]
         lines.append([name + shown, *numbers])
     return lines
 

@@ -16,8 +16,9 @@ from agents.compare.compare import compare
 from agents.compare.contender import Contender, ControllerEntry, find_entry, line_up
 from agents.compare.episode import run_episodes
 from agents.compare.film import median_films
-from agents.compare.meter import IN_FORMATION
+from agents.compare.meter import IN_FORMATION, Meter
 from agents.compare.setting import Setting
+from agents.compare.simulated import Simulated
 from agents.controllers import CONTROLLERS, Consensus
 from agents.errors import UsageError
 from agents.report.animation import player_markup
@@ -40,7 +41,8 @@ ON_ESTIMATE = Contender("consensus", "estimate")
 SHORT = Setting(scenario="cars-nlos", seconds=4.0, settle=2.0)
 KEYS = {
     "policy", "trained_on", "observation", "scenario", "episodes", "formation_error", "ci95",
-    "collisions_per_min", "tracking_error", "time_in_formation", "energy", "seconds",
+    "collisions_per_min", "tracking_error", "contact_time",
+    "time_in_formation", "energy", "seconds",
     "done_share", "cars", "task", "level",
 }  # fmt: skip
 
@@ -79,12 +81,13 @@ def test_figures_are_those_of_the_environment():
     envs = FormationVecEnv(scenario="cars-nlos", max_cycles=40)
     envs.seed(1002)
     seen, controller = envs.reset(), Consensus(parts.mode.fields)
-    error, tracking, contacts = [], [], 0.0
+    error, tracking, contacts, touching = [], [], 0.0, []
     for _ in range(39):  # the 40th step begins the next episode
         seen = envs.step(np.array([controller.act(o) for o in seen]))[0]
         error.append(envs.formation.task.error[0].mean())
         tracking.append(envs.formation.tracking_error()[0])
         contacts += envs.formation.loop.swarm.contacts[0].sum()
+        touching.append(envs.formation.state.clearance[0] == 0.0)
     np.testing.assert_allclose(episode.error[:39], error)
     assert episode.seconds == 4.0
     assert not episode.done
@@ -93,6 +96,7 @@ def test_figures_are_those_of_the_environment():
     expected = np.nanmean(tracking[20:], axis=1).mean()
     assert episode.tracking_error == pytest.approx(expected, rel=0.05)
     assert episode.collisions_per_min == pytest.approx(60.0 * contacts / 4.0)
+    assert episode.contact_time == pytest.approx(np.mean(touching), abs=0.03)
 
 
 def test_time_in_formation_is_that_of_the_worst_car():
@@ -283,3 +287,19 @@ def test_faults_end_in_one_line_and_write_nothing(args, message, tmp_path, monke
     assert message in shown.err
     assert shown.out == ""
     assert list(tmp_path.iterdir()) == []
+
+
+def test_time_in_contact_tells_who_presses_on():
+    """One contact, and cars that drive on against what they touched."""
+    parts = SHORT.parts("estimate", 1)
+    running = Simulated(parts, [1000, 1001])
+    meter = Meter(running)
+    touching = []
+    for _ in range(running.cycles):
+        running.step(np.full((2, parts.n_cars, 2), (0.5, 0.0), np.float32))
+        meter.read()
+        touching.append(running.clearance == 0.0)
+    found = [meter.result(env, 0, 10).contact_time for env in range(2)]
+    np.testing.assert_allclose(found, np.mean(touching, axis=(0, 2)))
+    assert min(found) > 0.05
+    running.close()

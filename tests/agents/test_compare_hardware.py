@@ -81,6 +81,7 @@ def test_records_say_that_nobody_knows_the_truth(result):
         assert record["errors_from"] == "estimates"
         assert record["tracking_error"] is None
         assert record["collisions_per_min"] is None
+        assert record["contact_time"] is None
         assert record["formation_error"] > 0.0
         assert record["energy"] > 0.0
         assert record["scenario"] == "emulated cars-nlos"
