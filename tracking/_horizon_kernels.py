@@ -18,8 +18,11 @@ N_COLUMNS = 16
 
 @small_kernel
 def is_before(s, e, a, b):
-    """Whether the event in slot a is handled before that in slot b: time, kind, nodes."""
-    for column in range(TIME, NODE_J + 1):
+    """Whether the event in slot a is handled before that in slot b: time, kind, nodes.
+
+    Of those that are alike in these, antennas and values say, so that no order of arrival does.
+    """
+    for column in range(TIME, HAS_POWER):
         if s.slots[e, a, column] != s.slots[e, b, column]:
             return s.slots[e, a, column] < s.slots[e, b, column]
     return False
@@ -27,9 +30,9 @@ def is_before(s, e, a, b):
 
 @small_kernel
 def is_same(s, e, a, b):
-    """Whether two events that neither comes before the other are one measurement."""
+    """Whether two events are one measurement."""
     same = True
-    for column in range(ANTENNA_I, HAS_POWER):
+    for column in range(TIME, HAS_POWER):
         same = same and s.slots[e, a, column] == s.slots[e, b, column]
     return same
 
@@ -55,11 +58,8 @@ def enqueue(s, e, slot):
     place = end
     while place > s.head[e] and is_before(s, e, slot, s.order[e, (place - 1) & mask]):
         place -= 1
-    other = place - 1
-    while other >= s.head[e] and not is_before(s, e, s.order[e, other & mask], slot):
-        if is_same(s, e, slot, s.order[e, other & mask]):
-            return False
-        other -= 1
+    if place > s.head[e] and is_same(s, e, slot, s.order[e, (place - 1) & mask]):
+        return False
     for at in range(end, place, -1):
         s.order[e, at & mask] = s.order[e, (at - 1) & mask]
     s.order[e, place & mask] = slot

@@ -87,7 +87,9 @@ class Horizon:
 
     def __init__(self, params: HorizonParams, n_envs: int = 1) -> None:
         self._params = params
-        self._n_envs, self._is_part = n_envs, False
+        self._n_envs = n_envs
+        self._whole: tuple[Horizon, HorizonState] | None = None
+        """Of a part: whose it is, and the memory that it shared."""
         self.state = make_state(n_envs)
         """What waits, arrays over (env, ...)."""
 
@@ -128,8 +130,9 @@ class Horizon:
 
         Raises:
             ConfigError: More measurements are due than `out` has columns; they still wait. Or
-                this is a part, and they do not fit.
+                this is a part, and they do not fit, or the whole has made room since.
         """
+        self._check_memory(self.state)
         until = np.broadcast_to(np.asarray(now, dtype=np.float64), (self._n_envs,))
         if block.n_events > LONG_BLOCK:
             block = block.sorted()
@@ -147,7 +150,8 @@ class Horizon:
             out: Written by every call.
 
         Returns:
-            What does a step; it raises ConfigError if there is not room enough (`reserve`).
+            What does a step; it raises ConfigError if there is not room enough, or if room was
+            made since (`reserve`).
         """
         state, until, delay = self.state, np.empty_like(now), self._params.delay
         take = bind(take_in, state, block.arrays)
@@ -155,6 +159,7 @@ class Horizon:
         give = bind(hand_on, state, until, True, out.arrays)
 
         def step() -> None:
+            self._check_memory(state)
             np.subtract(now, delay, until)
             if take() or count() > out.n_events:
                 raise ConfigError(
@@ -182,18 +187,29 @@ class Horizon:
         """Some of the environments; shares their memory. There is as much room as there is now."""
         part = copy.copy(self)
         part.state = self.state.of(envs)
-        part._n_envs, part._is_part = len(part.state.head), True
+        part._n_envs, part._whole = len(part.state.head), (self, self.state)
         return part
 
     def flush(self) -> MeasurementBlock:
-        """Hand on all that is left, at the end of a stream."""
-        return self._release(np.full(self._n_envs, np.inf), None)
+        """Hand on all that is left, at the end of a stream; it may go on after that."""
+        self._check_memory(self.state)
+        before = self.state.released.copy()
+        out = self._release(np.full(self._n_envs, np.inf), None)
+        last = np.where(out.valid, out.t, -np.inf).max(axis=1, initial=-np.inf)
+        np.maximum(before, last, out=self.state.released)
+        return out
 
     def reset(self, env: int) -> None:
         """Forget what one environment still held."""
         state = self.state
         state.n_waiting[env] = state.n_late[env] = state.n_doubled[env] = 0
         state.released[env] = -np.inf
+
+    def _check_memory(self, state: HorizonState) -> None:
+        """Nobody goes on with arrays that others no longer read."""
+        whole, shared = self._whole or (self, state)
+        if self.state is not state or whole.state is not shared:
+            raise ConfigError("horizon: room was made since; bind it, or take its part, again")
 
     @property
     def _room(self) -> int:
@@ -206,7 +222,7 @@ class Horizon:
         needed = int(self.state.n_waiting.max(initial=0)) + n_events
         if needed <= old:
             return
-        if self._is_part:
+        if self._whole is not None:
             raise ConfigError(f"horizon: a part has room for {old} measurements, needs {needed}")
         n_slots = 1 << (needed - 1).bit_length()
         grown = make_state(self._n_envs, n_slots)

@@ -44,7 +44,7 @@ class Twin:
                 self.n_doubled += 1
             else:
                 self.held.append(event)
-        self.held.sort(key=lambda event: tuple(float(x) for x in event[:4]))
+        self.held.sort(key=self.what)
         until = now - DELAY
         due = [event for event in self.held if event[0] <= until]
         self.held = self.held[len(due) :]
@@ -93,6 +93,51 @@ def test_a_long_block_is_as_good_as_its_pieces():
     a, b = whole.flush(), parts.flush()
     for name in NAMES:
         np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=st.integers(0, 2**31))
+def test_no_order_of_arrival_shows(seed):
+    """Whether it is a block at once, its events in another order, or one block sorted."""
+    rng = np.random.default_rng(seed)
+    block = random_block(rng, 1, 40, 1.0)
+    shuffled = block.take(rng.permutation(40))
+    a, b = Horizon(HorizonParams()), Horizon(HorizonParams())
+    a.step(block, 0.2)
+    for k in range(40):
+        b.step(shuffled.take(slice(k, k + 1)), 0.2)
+    one, other = a.flush(), b.flush()
+    power = [k for k, name in enumerate(NAMES) if name == "has_power"]
+    for name in (n for k, n in enumerate(NAMES) if k not in power):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
+        x, y = getattr(block.sorted(), name), getattr(shuffled.sorted(), name)
+        valid = block.sorted().valid
+        np.testing.assert_array_equal(x[valid], y[valid], err_msg=name)
+
+
+def test_what_is_bound_or_a_part_says_so_when_room_was_made():
+    horizon = Horizon(HorizonParams(delay=DELAY), 2)
+    block, due = MeasurementBlock.empty(2, 4), MeasurementBlock.empty(2, 200)
+    step, part = horizon.bind(block, np.zeros(2), due), horizon.part(slice(0, 1))
+    step()
+    part.step(MeasurementBlock.empty(), 0.0)
+    horizon.reserve(500)
+    for use in (step, lambda: part.step(MeasurementBlock.empty(), 0.0), part.flush):
+        with pytest.raises(ConfigError, match="room was made"):
+            use()
+
+
+def test_a_stream_may_go_on_after_a_flush():
+    horizon = Horizon(HorizonParams(delay=DELAY))
+    block = random_block(np.random.default_rng(0), 1, 30, 1.0)
+    horizon.step(block, 0.0)
+    last = horizon.flush().t[0].max()
+    assert horizon.t[0] == last
+    later = block.take(slice(0, 1))
+    later.t[:], later.valid[:] = last + 0.1, True
+    horizon.step(later, 0.0)
+    assert horizon.flush().count(int(later.kind[0, 0])) == 1
+    assert horizon.n_late[0] == 0
 
 
 def test_a_slice_of_environments_is_those_alone():
