@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from tracking.filters.joint._place_kernels import (
     SHORT,
     best_place,
+    best_sides,
     mirror_image,
     sum_of_misfits,
 )
@@ -76,3 +77,37 @@ def test_others_in_line_leave_both_sides():
     found = np.array([0.5, -0.2, 0.0])
     assert best_place(2, known, distance, found) < 1e-6
     np.testing.assert_allclose(np.abs(found), np.abs(pos), atol=1e-4)
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    d=st.sampled_from([2, 3]),
+    more=st.integers(0, 2),
+    wide=st.floats(0.5, 3.0),
+)
+@settings(max_examples=150, deadline=None)
+def test_others_close_together_leave_two_sides_and_one_is_right(seed, d, more, wide):
+    """As many others as the space has dimensions, or more, however close to each other."""
+    rng = np.random.default_rng(seed)
+    known, pos, sides = np.zeros((d + more, 3)), np.zeros(3), np.zeros((2, 3))
+    extent = 0.0
+    while extent < 0.12:
+        known[:, :d] = rng.uniform(-0.5, 0.5, (d + more, d)) * wide
+        axes = np.linalg.svd(known[:, :d] - known[:, :d].mean(0), compute_uv=False)
+        extent = axes[d - 2] / np.sqrt(d + more)
+    pos[:d] = rng.normal(size=d)
+    pos *= rng.uniform(1.0, 5.0) / np.linalg.norm(pos)
+    distance = np.linalg.norm(known - pos, axis=1)
+    n_sides = best_sides(d, 0.15, known, distance, sides)
+    off = np.linalg.norm(sides[:n_sides] - pos, axis=1)
+    assert off.min() < 0.3
+    fits = [sum_of_misfits(known, distance, side) for side in sides[:n_sides]]
+    assert fits == sorted(fits)
+    assert fits[0] < 0.05
+
+
+def test_others_that_span_the_room_leave_one_side():
+    known, pos, distance = layout(3, 2)
+    sides = np.zeros((2, 3))
+    assert best_sides(2, 0.15, known, distance, sides) == 1
+    np.testing.assert_allclose(sides[0], pos, atol=1e-4)

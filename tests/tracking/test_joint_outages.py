@@ -59,3 +59,47 @@ def test_after_a_silence_the_filter_knows_that_it_knows_less(drives):
     np.testing.assert_allclose(after, silent, rtol=0.05)
     found, error = followed(logs, cut, np.array([BEGIN + gap + 2.0]))
     assert np.sqrt(np.mean(error**2)) < 0.25
+
+
+def wrong_and_ok(logs, cut, since):
+    """In how many drives some pair is ok and off by a metre for over half a second."""
+    found, error = followed(logs, cut, np.arange(since, END - 0.5, 0.1))
+    wrong = ((found.status == Status.OK) & (error > 1.0)).any(axis=-1)
+    return (wrong.sum(axis=1) > 5).sum(), found, error
+
+
+def test_a_group_that_heard_nothing_for_seconds_begins_anew(drives):
+    """Its cars went their own ways: a filter that goes on comes out mirrored or turned."""
+    logs, blocks = drives
+    back = BEGIN + 2.0
+    cut = [b.take((b.t[0] <= BEGIN) | (b.t[0] > back)) for b in blocks]
+    n_wrong, found, error = wrong_and_ok(logs, cut, back)
+    assert n_wrong <= 1
+    assert not (found.status[:, 3] == Status.OK).any()
+    assert (found.status[:, -1] == Status.OK).mean() > 0.8
+    assert np.median(error[:, -1]) < 0.15
+
+
+def test_a_car_that_was_not_heard_for_seconds_joins_anew(drives):
+    """The others go on as they are, and it is soon among them again."""
+    logs, blocks = drives
+    back = BEGIN + 3.0
+    cut = []
+    for b in blocks:
+        its = (b.i[0] == 0) | ((b.kind[0] == Kind.RANGE) & (b.j[0] == 0))
+        cut.append(b.take((b.t[0] <= BEGIN) | (b.t[0] > back) | ~its))
+    n_wrong, _, error = wrong_and_ok(logs, cut, back)
+    assert n_wrong <= 1
+    its_pairs = [0 in pair for pair in logs[0].constellation.pairs]
+    assert np.median(error[:, 20][:, its_pairs]) < 0.2
+    assert np.sqrt(np.mean(error[:, :, np.logical_not(its_pairs)] ** 2)) < 0.25
+
+
+def test_ranges_alone_that_are_missed_are_bridged_by_inertia(drives):
+    logs, blocks = drives
+    back = BEGIN + 2.0
+    kept = [(b.kind[0] != Kind.RANGE) | (b.t[0] <= BEGIN) | (b.t[0] > back) for b in blocks]
+    cut = [b.take(k) for b, k in zip(blocks, kept, strict=True)]
+    found, error = followed(logs, cut, np.array([back + 0.5, back + 1.0]))
+    assert (found.status[:, 1] == Status.OK).mean() > 0.8
+    assert np.median(error[:, 0]) < 0.25

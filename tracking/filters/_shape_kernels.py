@@ -8,6 +8,8 @@ from tracking.compiled import allocating_kernel, kernel
 
 SURVEYED = 1_000_000
 """So many ranges a surveyed distance counts as."""
+MIN_EXTENT = 0.1
+"""[m] Along an axis of which others extend less, the errors of ranges are all that they tell."""
 
 
 @kernel
@@ -78,37 +80,67 @@ def place(d, min_spread, merge_distance, known, distance, sides):
     Returns:
         1 if the known nodes span the space, 2 if they are too flat to tell the side.
     """
-    m = known.shape[0]
+    _, _, extent, _ = main_axes(d, known)
+    flat = extent[d - 1] <= min_spread
+    height = place_across(d, known, distance, d - 1 if flat else d, sides)
+    return 2 if flat and height >= merge_distance else 1
+
+
+@allocating_kernel
+def main_axes(d, known):
+    """Centre of positions, what they are from it, extent along their main axes, and the axes.
+
+    Extents are root mean squares [m], the longest first; axes are rows.
+    """
     centre = np.zeros(d)
-    for a in range(m):
-        centre += known[a, :d] / m
+    for a in range(known.shape[0]):
+        centre += known[a, :d] / known.shape[0]
     A = known[:, :d].copy() - centre
-    _, S, Vt = np.linalg.svd(A.T.copy() @ A)
-    spanned = 0
-    for k in range(d):
-        if np.sqrt(S[k] / m) > min_spread:
-            spanned += 1
+    _, S, axes = np.linalg.svd(A.T.copy() @ A)
+    return centre, A, np.sqrt(S / known.shape[0]), axes
+
+
+@allocating_kernel
+def place_across(d, known, distance, axis, sides):
+    """Where a node is by least squares of squared distances, with one axis of the others left open.
+
+    On both sides along it, so far away that the distances are right in the mean.
+
+    Args:
+        d: 2 or 3.
+        known: Positions, (known, 3) [m].
+        distance: Distances to them, (known) [m].
+        axis: Which of their main axes is open, the longest first; d for none. Others along which
+            they hardly extend say nothing either.
+        sides: The places, (2, 3), written.
+
+    Returns:
+        How far from the others the places are along that axis [m].
+    """
+    m = known.shape[0]
+    centre, A, extent, axes = main_axes(d, known)
     # |p|^2 - 2 a.p + |a|^2 = d^2: its differences from the mean are linear in p.
     b = np.zeros(m)
     for a in range(m):
         b[a] = 0.5 * (np.sum(A[a] * A[a]) - distance[a] ** 2)
     b -= np.mean(b)
     p = np.zeros(d)
-    for k in range(spanned):
-        along = Vt[k].copy()
-        p += along * (np.sum((A @ along) * b) / S[k])
-    sides[:, :] = 0.0
+    for k in range(d):
+        if k != axis and extent[k] > MIN_EXTENT:
+            along = axes[k].copy()
+            p += along * (np.sum((A @ along) * b) / (m * extent[k] ** 2))
     height2 = 0.0
     for a in range(m):
         height2 += (distance[a] ** 2 - np.sum((p - A[a]) ** 2)) / m
-    height = np.sqrt(max(height2, 0.0)) if spanned < d else 0.0
+    height = np.sqrt(max(height2, 0.0)) if axis < d else 0.0
+    sides[:, :] = 0.0
     for side in range(2):
         up = height if side == 0 else -height
         for k in range(d):
             sides[side, k] = centre[k] + p[k]
-            if spanned < d:
-                sides[side, k] += up * Vt[spanned, k]
-    return 1 if spanned == d or height < merge_distance else 2
+            if axis < d:
+                sides[side, k] += up * axes[axis, k]
+    return height
 
 
 @allocating_kernel

@@ -1,9 +1,9 @@
 """Where a node is, by its distances to others that are known: the place that fits best.
 
-Least squares of squared distances need no first guess (`_shape_kernels.place`), but are far off
-where the others are nearly in line; from there the distances themselves are fitted. Obstacles
-only lengthen ranges, so a distance that is too short says more than one that is too long, and
-none more than a little.
+Least squares of squared distances need no first guess (`_shape_kernels.place_across`), but are far
+off where the others are nearly in line, or close together; from there, with each of their axes left
+open in turn, the distances themselves are fitted. Obstacles only lengthen ranges, so a distance
+that is too short says more than one that is too long, and none more than a little.
 """
 
 from __future__ import annotations
@@ -11,11 +11,14 @@ from __future__ import annotations
 import numpy as np
 
 from tracking.compiled import allocating_kernel, kernel, small_kernel
-from tracking.filters._shape_kernels import place
+from tracking.filters._shape_kernels import main_axes, place_across
 
 JOIN_SPREAD = 0.75
 """[m] Others that extend less than this along an axis leave the side of a node open: along it, an
 error of a range counts several times."""
+WORSE = 9.0
+"""[-] A second side that the distances say so much more against is none: three standard deviations
+of a single one."""
 SHORT, LONG = 0.12, 0.3
 """[m] Scales of ranges shorter and longer than they should be."""
 MOST = 16.0
@@ -49,13 +52,13 @@ def sum_of_misfits(known, distance, pos):
 def best_place(d, known, distance, pos):
     """Replace a position by the one that the distances say least against; returns what they say.
 
-    Looked for from where least squares put it, on both sides of the others, from where it is, and
-    from the mirror image of that.
+    Looked for from where least squares put it, on both sides of the others along each of their
+    axes, from where it is, and from the mirror image of that.
     """
-    first = np.zeros((4, 3))
-    place(d, JOIN_SPREAD, 0.0, known, distance, first[:2])
-    first[2] = mirror_image(d, known, pos)
-    first[3] = pos
+    first = np.zeros((2 * d + 4, 3))
+    first_places(d, known, distance, first[: 2 * d + 2])
+    first[2 * d + 2] = mirror_image(d, known, pos)
+    first[2 * d + 3] = pos
     least = np.inf
     for a in range(first.shape[0]):
         total = refine(d, known, distance, first[a])
@@ -63,6 +66,52 @@ def best_place(d, known, distance, pos):
             least = total
             pos[:] = first[a]
     return least
+
+
+@allocating_kernel
+def best_sides(d, merge_distance, known, distance, sides):
+    """The place that distances say least against, and a second if they leave the side open.
+
+    Args:
+        d: 2 or 3.
+        merge_distance: Places that are nearer to each other are one [m].
+        known: Positions of others, (other, 3) [m].
+        distance: Distances to them, (other) [m].
+        sides: Places, the better one first, (2, 3), written.
+
+    Returns:
+        How many places there are, 1 or 2.
+    """
+    places = np.zeros((2 * d + 2, 3))
+    first_places(d, known, distance, places)
+    said = np.empty(len(places))
+    for a in range(len(places)):
+        said[a] = refine(d, known, distance, places[a])
+    order = np.argsort(said)
+    sides[0] = sides[1] = places[order[0]]
+    _, _, extent, _ = main_axes(d, known)
+    if extent[d - 1] > JOIN_SPREAD:
+        return 1
+    for a in order[1:]:
+        apart = np.sum((places[a] - sides[0]) ** 2) >= merge_distance**2
+        if apart and said[a] < said[order[0]] + WORSE:
+            sides[1] = places[a]
+            return 2
+    return 1
+
+
+@allocating_kernel
+def first_places(d, known, distance, places):
+    """Where least squares put a node with each axis of the others left open, and with none.
+
+    Args:
+        d: 2 or 3.
+        known: Positions of others, (other, 3) [m].
+        distance: Distances to them, (other) [m].
+        places: (2 d + 2, 3) [m], written.
+    """
+    for axis in range(d + 1):
+        place_across(d, known, distance, axis, places[2 * axis : 2 * axis + 2])
 
 
 @allocating_kernel

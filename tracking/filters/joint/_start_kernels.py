@@ -18,13 +18,12 @@ from tracking.filters._shape_kernels import (
     choose_members,
     first_shape,
     is_ready,
-    place,
     start_distance,
 )
 from tracking.filters.joint._carrier_kernels import CENTRE_VAR
 from tracking.filters.joint._copy_kernels import copy_hypothesis
 from tracking.filters.joint._linear_kernels import decouple
-from tracking.filters.joint._place_kernels import JOIN_SPREAD, refine
+from tracking.filters.joint._place_kernels import best_sides
 from tracking.filters.joint._sample_kernels import decay
 from tracking.filters.joint._sleep_kernels import ORIENTED, PATIENCE, none_moved, rests
 from tracking.filters.joint._turn_kernels import read_turn, spread_turn
@@ -164,7 +163,8 @@ def try_join(c, s, layout, new, t):
     known, distance = np.zeros((n_ready, 3)), np.empty(n_ready)
     was_alive = s.alive.copy()
     forget_sums(s, new, t)
-    for h in range(s.alive.shape[0]):
+    # The likeliest first: there may not be room for the second sides of all.
+    for h in np.argsort(-s.loglik):
         if not was_alive[h]:
             continue
         for a in range(n_ready):
@@ -172,11 +172,7 @@ def try_join(c, s, layout, new, t):
             for k in range(c.d):
                 known[a, k] = s.x[h, at + k]
             distance[a] = start_distance(s, layout, new, ready[a])
-        n_sides = place(c.d, JOIN_SPREAD, c.merge_distance, known, distance, sides)
-        for side in range(n_sides):
-            refine(c.d, known, distance, sides[side])
-        if np.sum((sides[1] - sides[0]) ** 2) < c.merge_distance**2:
-            n_sides = 1
+        n_sides = best_sides(c.d, c.merge_distance, known, distance, sides)
         for side in range(n_sides):
             target = h if side == 0 else copy_hypothesis(s, h)
             if target >= 0:
