@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 from agents.errors import UsageError
 from agents.policy.layout import Layout
 from relpos_env.config import configure
+from relpos_env.scenarios import Scenario
 
 RANGES: dict[str, tuple[int, int]] = {
     "iterations": (1, 1_000_000),
@@ -75,5 +77,11 @@ class RllibConfig:
 
     @property
     def record(self) -> dict[str, Any]:
-        """All of it, ready for JSON."""
-        return asdict(self)
+        """All of it, ready for JSON; of a scenario its file or name."""
+        told = dict(self.arguments)
+        scenario = told.get("scenario")
+        if isinstance(scenario, Scenario):
+            told["scenario"] = scenario.name
+        elif isinstance(scenario, Path):
+            told["scenario"] = str(scenario)
+        return asdict(replace(self, arguments=told))

@@ -114,7 +114,7 @@ def _save(
     training = {
         "command": "relpos rllib",
         "task": config.arguments.get("task"),
-        "scenario": config.arguments.get("scenario"),
+        "scenario": config.record["arguments"].get("scenario"),
         "config": config.record,
         "seed": config.seed,
         "frames": records[-1]["env_steps"],

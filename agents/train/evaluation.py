@@ -53,10 +53,12 @@ class Evaluation:
         ]
 
     def run(self, policy: SwarmPolicy) -> dict[str, Any]:
-        """Mean return of a decision, errors from `SETTLE` on [m], and contacts.
+        """Mean reward of a decision, errors from `SETTLE` on [m], and contacts.
 
-        Means are over cars and times, so scenarios with more cars count for more. The tracking
-        error is None where nobody could use any estimate.
+        Means are over cars and times, so scenarios with more cars count for more. An episode that
+        ends early earns nothing for the rest of its time, and costs nothing: where time is paid
+        for, to be through is better than to hover. The tracking error is None where nobody could
+        use any estimate.
         """
         actor = Actor(policy).eval()
         first, drives = self._first_seed, []
@@ -88,6 +90,7 @@ class _Drive:
     rewards: float
     """Of all cars and decisions together."""
     decisions: float
+    """Of all cars, those after an early end counted."""
     contacts: float
     minutes: float
     error: F64
@@ -110,7 +113,7 @@ class _Room:
             f.seed(env, seeding.np_random(first_seed + env)[0])
             f.begin(env)
         error, tracking, present, going = [], [], [], []
-        contacts, rewards = 0.0, 0.0
+        contacts, rewards, decisions = 0.0, 0.0, 0.0
         on = np.ones(f.n_envs, dtype=bool)
         for _ in range(f.parts.config.max_cycles - 1):
             going.append(on)
@@ -118,6 +121,7 @@ class _Room:
             error.append(f.task.error.copy())
             tracking.append(f.tracking_error())
             present.append(f.state.present & on[:, None])
+            decisions += float(f.state.present.sum())
             contacts += float(f.loop.swarm.contacts[on].sum())
             rewards += float(f.rewards[on].sum())
             on = on & ~f.task.done
@@ -126,7 +130,7 @@ class _Room:
         known = np.array(tracking)[scored]
         return _Drive(
             rewards=rewards,
-            decisions=float(here.sum()),
+            decisions=decisions,
             contacts=contacts,
             minutes=float(alive.sum()) * DECISION / 60.0,
             error=np.array(error)[scored],

@@ -3,6 +3,7 @@
 import json
 import pickle
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,7 +31,7 @@ from agents.rllib.env import OWN_SEEDS, FormationMultiAgentEnv, SeededEnv
 from agents.rllib.train import MODULE, ppo_config, rllib_train
 from relpos_env import formation
 from relpos_env.parallel_env import FormationEnv
-from relpos_env.scenarios import draw_episode
+from relpos_env.scenarios import SCENARIOS, draw_episode
 from relpos_env.scenarios.life import LifeEvent
 from relpos_env.timing import STAND_STILL
 
@@ -236,6 +237,19 @@ def test_numbers_out_of_range_and_actions_that_it_cannot_learn_are_refused():
         RllibConfig(workers=5000)
     with pytest.raises(UsageError, match="actions: expected 'continuous', got 'discrete'"):
         _ = RllibConfig(arguments={"actions": "discrete"}).layout
+
+
+@pytest.mark.parametrize(
+    ("wanted", "told"),
+    [
+        (Path("rooms/mine.toml"), str(Path("rooms/mine.toml"))),
+        (SCENARIOS["cars-nlos"], "cars-nlos"),
+        ("cars-los", "cars-los"),
+    ],
+)
+def test_what_is_recorded_of_a_scenario_is_text(wanted, told):
+    record = RllibConfig(arguments={"scenario": wanted, "task": "hold"}).record
+    assert json.loads(json.dumps(record))["arguments"] == {"scenario": told, "task": "hold"}
 
 
 def test_the_configuration_goes_to_other_machines():

@@ -62,3 +62,21 @@ def test_a_doubt_ends_where_a_single_other_is_left(make_group):
     pair = group.constellation.pair_index[0, 1]
     assert (status[:3, pair] == Status.DOUBTFUL).all()
     assert (status[3:, pair] != Status.DOUBTFUL).all()
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_who_was_heard_and_never_started_is_absent_again(name, make_group):
+    """Two of three range a few times: too few to start, and then nobody speaks."""
+    group = make_group(n=3, seconds=20.0)
+    b = group.block
+    few = ranges_of(b, 0, 1) & (b.t[0] < 0.2)
+    block = b.take(~ranges_of(b) | few)
+    t = np.array([0.3, 4.0, 6.0, 19.0])
+    status = Tracker(group.constellation, filter=name).run(block, t).status[0]
+    pair = group.constellation.pair_index[0, 1]
+    assert status[:, pair].tolist() == [
+        Status.STARTING,
+        Status.STARTING,
+        Status.ABSENT,
+        Status.ABSENT,
+    ]

@@ -1,8 +1,14 @@
-"""Estimates of one instant as nothing is known: zeros, absent, no orientation."""
+"""Estimates of one instant as nothing is known: zeros, absent, no orientation; and who is heard."""
 
 from __future__ import annotations
 
 from tracking.compiled import small_kernel
+
+
+@small_kernel
+def is_heard(c, node, t):
+    """True for a node that took part in a range lately: who did long ago has left."""
+    return node.heard and t - node.t_heard <= c.leave_after
 
 
 @small_kernel

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from tracking.compiled import kernel, small_kernel
-from tracking.filters._clear_kernels import clear_estimate
+from tracking.filters._clear_kernels import clear_estimate, is_heard
 from tracking.filters.joint._motion_kernels import predict
 from tracking.filters.joint._product_kernels import take_off
 from tracking.filters.joint._sample_kernels import sum_inertial
@@ -41,7 +41,8 @@ def write_estimate(c, s, scratch, t, e, o, out):
         node_i, node_j = s.nodes[pair.i], s.nodes[pair.j]
         nis[e, o, p] = pair.nis
         if not (node_i.present and node_j.present):
-            status[e, o, p] = STARTING if node_i.heard and node_j.heard else ABSENT
+            both = is_heard(c, node_i, t) and is_heard(c, node_j, t)
+            status[e, o, p] = STARTING if both else ABSENT
             continue
         nlos[e, o, p] = s.nlos[h, p]
         age[e, o, p] = t - pair.t_range

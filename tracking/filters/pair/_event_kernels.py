@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracking.compiled import allocating_kernel, kernel, small_kernel
-from tracking.filters._clear_kernels import clear_estimate
+from tracking.filters._clear_kernels import clear_estimate, is_heard
 from tracking.filters._level_kernels import direction, level
 from tracking.filters._shape_kernels import collect
 from tracking.filters.pair._bank_kernels import (
@@ -219,7 +219,8 @@ def write_estimate(c, s, t, e, o, out):
         node_i, node_j = s.nodes[pair.i], s.nodes[pair.j]
         nis[e, o, p] = pair.nis
         if not (node_i.present and node_j.present):
-            status[e, o, p] = STARTING if node_i.heard and node_j.heard else ABSENT
+            both = is_heard(c, node_i, t) and is_heard(c, node_j, t)
+            status[e, o, p] = STARTING if both else ABSENT
             continue
         x[0, 0] = s.x[p, h, :6]
         P[0, 0] = s.P[p, h, :6, :6]
