@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from relpos_env.tasks._score_kernels import TIME
 from tracking.compiled import kernel
 
 
@@ -35,7 +36,7 @@ def judge(
         to_come: Cars that will come in, (env, car).
         contacts: Begun in the step, (env, car).
         error: Formation errors, (env, car) [m].
-        terms: Reward terms, (env, car, term).
+        terms: Reward terms, (env, car, term); that of time is updated where a contact is the end.
         weights: (term)
         done: The task is accomplished, (env).
         cycles: Steps of the episode, (env).
@@ -53,7 +54,14 @@ def judge(
         truncated[e] = cycles[e] >= max_cycles
         team.reward[e] = team.error[e] = team.contacts[e] = 0.0
         size, here = 0, 0
+        hit = False
         for n in range(present.shape[1]):
+            hit = hit or contacts[e, n] > 0.0
+        # Who runs into something is not through: it pays for the time that was left.
+        unpaid = max(max_cycles - cycles[e], 0) if collision_ends and hit and not done[e] else 0
+        for n in range(present.shape[1]):
+            if present[e, n] and weights.shape[0] > TIME:
+                terms[e, n, TIME] -= unpaid
             total = 0.0
             for k in range(weights.shape[0]):
                 total += weights[k] * terms[e, n, k]
@@ -70,7 +78,7 @@ def judge(
                 here += 1
         team.reward[e] /= max(size, 1)
         team.error[e] /= max(here, 1)
-        if collision_ends and team.contacts[e] > 0.0:
+        if collision_ends and hit:
             terminated[e] = True
 
 

@@ -14,6 +14,7 @@ import math
 
 from relpos_env.tasks._curve_kernels import curve_point
 from relpos_env.tasks._score_kernels import (
+    TIME,
     all_within,
     changed,
     common_terms,
@@ -101,7 +102,7 @@ def update_frame(
         How many environments have other cars than were given places; those are left alone.
     """
     lookahead, tolerance, error_scale, place_scale = limits
-    ends = rewards.shape[2] > 5 and motion[2] > 0.0 and motion[3] == 0.0
+    ends = rewards.shape[2] > TIME and motion[2] > 0.0 and motion[3] == 0.0
     n_changed = 0
     for env in range(start, stop):
         if changed(env, present, seated):

@@ -8,6 +8,8 @@ from tracking.compiled import small_kernel
 
 HARD_ACCEL = 5.0
 """[m/s2] Acceleration whose effort is 1; harder counts no more."""
+TIME = 5
+"""Number of the term that tasks with an end have."""
 NEAR = 0.15
 """[m] Way to what is nearest below which nearness counts."""
 FAR = 4.0
@@ -133,5 +135,5 @@ def common_terms(env, accel, clear, present, collided, error, error_scale, done,
         rewards[env, k, 3] = -min(1.0, square / (HARD_ACCEL * HARD_ACCEL))
         short = max(1.0 - clear[env, k] / NEAR, 0.0)
         rewards[env, k, 4] = -short * short
-        if n_terms > 5:
-            rewards[env, k, 5] = 0.0 if done else -1.0
+        if n_terms > TIME:
+            rewards[env, k, TIME] = 0.0 if done else -1.0

@@ -81,3 +81,18 @@ def test_a_car_that_presses_on_a_wall_has_no_room_and_is_told_so_at_every_decisi
         assert np.array_equal(nearness == -1.0, clear == 0.0)
         pressing += int((clear == 0.0).any())
     assert pressing == 10
+
+
+def test_to_crash_is_not_the_cheapest_end():
+    """Where time is paid for, a contact that ends the episode costs what was left of it."""
+    arguments = {"task": "gap", "max_cycles": 150, "end_on_collision": True}
+    env = parallel_env(**arguments)
+    env.reset(seed=3)
+    paid, steps = 0.0, 0
+    while env.agents:
+        _, _, ends, _, infos = env.step({a: np.array([1.0, 0.3], np.float32) for a in env.agents})
+        paid += infos["car_0"]["rewards"]["time"]
+        steps += 1
+    assert any(ends.values())
+    assert steps < 150
+    assert paid == -150.0
