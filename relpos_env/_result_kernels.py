@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from relpos_env.tasks._score_kernels import TIME
 from tracking.compiled import kernel
 
 
@@ -25,7 +24,7 @@ class TeamResults(NamedTuple):
 @kernel
 def judge(
     first, end, present, to_come, contacts, error, terms, weights, done, cycles, max_cycles,
-    collision_ends, rewards, team, active, left, terminated, truncated,
+    collision_ends, time, rewards, team, active, left, terminated, truncated,
 ):  # fmt: skip
     """Sum rewards up, and note who left and which episodes are over.
 
@@ -42,6 +41,7 @@ def judge(
         cycles: Steps of the episode, (env).
         max_cycles: After so many it is over.
         collision_ends: Whether a contact ends it.
+        time: Number of the term of that name, -1 if the task has none.
         rewards: (env, car), written.
         team: TeamResults, written.
         active: Cars that take part, (env, car), updated.
@@ -60,8 +60,8 @@ def judge(
         # Who runs into something is not through: it pays for the time that was left.
         unpaid = max(max_cycles - cycles[e], 0) if collision_ends and hit and not done[e] else 0
         for n in range(present.shape[1]):
-            if present[e, n] and weights.shape[0] > TIME:
-                terms[e, n, TIME] -= unpaid
+            if present[e, n] and time >= 0:
+                terms[e, n, time] -= unpaid
             total = 0.0
             for k in range(weights.shape[0]):
                 total += weights[k] * terms[e, n, k]

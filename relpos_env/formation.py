@@ -232,6 +232,7 @@ class Formation:
         self._verdict = (
             self.state.present, swarm.to_come, swarm.contacts, self.task.error, self.task.rewards,
             self.weights, self.task.done, self.cycles, config.max_cycles, config.end_on_collision,
+            self.task.terms.index("time") if "time" in self.task.terms else -1,
             self.rewards, self.team, self.active, self.left, self.terminated, self.truncated,
         )  # fmt: skip
         self._judge_all = bind(judge, 0, self.n_envs, *self._verdict)

@@ -49,8 +49,7 @@ class TeamEstimate:
     cov: F64
     """Covariance of position and velocity, (..., pair, 6, 6); zero across a plane."""
     q_wb: F64
-    """Orientation of each node, (..., node, 4); from `joint` with the error of its heading, as far
-    as that is known, taken off."""
+    """Orientation of each node, (..., node, 4)."""
     has_orientation: Bool
     """True where `q_wb` came from measurements, (..., node)."""
     age: F64

@@ -96,6 +96,7 @@ class Horizon:
     @property
     def waiting(self) -> MeasurementBlock:
         """Measurements that came and were not handed on yet, in order, as a copy."""
+        self._check_memory(self.state)
         out = MeasurementBlock.empty(self._n_envs, int(self.state.n_waiting.max(initial=0)))
         hand_on(self.state, np.full(self._n_envs, np.inf), False, out.arrays)
         return out
@@ -103,6 +104,7 @@ class Horizon:
     @property
     def t(self) -> F64:
         """Time up to which measurements were handed on, (env) [s]."""
+        self._check_memory(self.state)
         return self.state.released.copy()
 
     @property
@@ -187,7 +189,7 @@ class Horizon:
         """Some of the environments; shares their memory. There is as much room as there is now."""
         part = copy.copy(self)
         part.state = self.state.of(envs)
-        part._n_envs, part._whole = len(part.state.head), (self, self.state)
+        part._n_envs, part._whole = len(part.state.head), self._whole or (self, self.state)
         return part
 
     def flush(self) -> MeasurementBlock:
@@ -201,6 +203,7 @@ class Horizon:
 
     def reset(self, env: int) -> None:
         """Forget what one environment still held."""
+        self._check_memory(self.state)
         state = self.state
         state.n_waiting[env] = state.n_late[env] = state.n_doubled[env] = 0
         state.released[env] = -np.inf

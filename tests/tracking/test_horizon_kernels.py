@@ -119,10 +119,20 @@ def test_what_is_bound_or_a_part_says_so_when_room_was_made():
     horizon = Horizon(HorizonParams(delay=DELAY), 2)
     block, due = MeasurementBlock.empty(2, 4), MeasurementBlock.empty(2, 200)
     step, part = horizon.bind(block, np.zeros(2), due), horizon.part(slice(0, 1))
+    inner = horizon.part(slice(0, 2)).part(slice(1, 2))
     step()
     part.step(MeasurementBlock.empty(), 0.0)
     horizon.reserve(500)
-    for use in (step, lambda: part.step(MeasurementBlock.empty(), 0.0), part.flush):
+    uses = (
+        step,
+        part.flush,
+        lambda: part.step(MeasurementBlock.empty(), 0.0),
+        lambda: inner.step(MeasurementBlock.empty(), 0.0),
+        lambda: inner.reset(0),
+        lambda: inner.waiting,
+        lambda: part.t,
+    )
+    for use in uses:
         with pytest.raises(ConfigError, match="room was made"):
             use()
 

@@ -103,3 +103,49 @@ def test_ranges_alone_that_are_missed_are_bridged_by_inertia(drives):
     found, error = followed(logs, cut, np.array([back + 0.5, back + 1.0]))
     assert (found.status[:, 1] == Status.OK).mean() > 0.8
     assert np.median(error[:, 0]) < 0.25
+
+
+def test_those_who_come_back_begin_anew_without_those_who_do_not(make_group):
+    """Two of five stay silent: they are not waited for."""
+    group = make_group(n=5, seconds=13.0)
+    b = group.block
+    ranges = b.kind[0] == Kind.RANGE
+    away = (b.i[0] >= 3) | (ranges & (b.j[0] >= 3))
+    block = b.take((b.t[0] <= 8.0) | ((b.t[0] > 10.0) & ~away))
+    status = Tracker(group.constellation).run(block, np.array([7.9, 10.6, 12.0])).status[0]
+    index = group.constellation.pair_index
+    back = [index[0, 1], index[0, 2], index[1, 2]]
+    assert (status[0] == Status.OK).all()
+    assert np.isin(status[1:, back], (Status.AMBIGUOUS, Status.OK)).all()
+    assert (status[1:, index[3, 4]] == Status.ABSENT).all()
+
+
+@pytest.mark.parametrize("n", [2, 3])
+def test_who_stands_is_where_it_was(make_group, n):
+    """A group at rest knows its distances, not how it is turned: a gap in the ranges costs none."""
+
+    class Standing(make_group):
+        def pos(self, t):
+            angle = 2.0 * np.pi * np.arange(len(self.rate)) / len(self.rate) + 0.3
+            pos = np.zeros((*np.shape(t), len(self.rate), 3))
+            pos[..., 0], pos[..., 1] = 5.0 * np.cos(angle), 5.0 * np.sin(angle)
+            return pos
+
+    group = Standing(n=n, seconds=7.0)
+    b = group.block
+    its = (b.kind[0] == Kind.RANGE) & ((b.i[0] == 0) | (b.j[0] == 0))
+    block = b.take(~(its & (b.t[0] > 5.0) & (b.t[0] < 5.6)))
+    status = Tracker(group.constellation).run(block, np.array([4.9, 5.65, 5.8, 6.5])).status[0]
+    assert not np.isin(status, (Status.ABSENT, Status.STARTING)).any()
+
+
+def test_a_look_ahead_past_a_silence_keeps_the_past(make_group):
+    group = make_group(n=3, seconds=12.0)
+    b, now = group.block, 9.55
+    block = b.take((b.t[0] <= 8.0) | (b.t[0] > 9.6))
+    tracker = Tracker(group.constellation)
+    before = tracker.step(block.take(block.t[0] <= now), now)
+    later = block.take((block.t[0] > now) & (block.t[0] <= now + 0.5))
+    smoothed = tracker.smooth(later, now + 0.5)
+    assert np.linalg.norm(before.pos_ij_w[0], axis=-1).min() > 0.1
+    assert np.linalg.norm(smoothed.pos_ij_w[0], axis=-1).min() > 0.1

@@ -1,14 +1,8 @@
-"""The report: relative positions, velocities and covariances of the best hypothesis.
-
-Orientations are those that the nodes tell, turned by what the filter knows of their headings'
-errors: where a node drove says which way it looks.
-"""
+"""The report: relative positions, velocities and covariances of the best hypothesis."""
 
 from __future__ import annotations
 
-import math
-
-from tracking.compiled import kernel, small_kernel
+from tracking.compiled import kernel
 from tracking.filters._clear_kernels import clear_estimate, is_heard
 from tracking.filters.joint._motion_kernels import predict
 from tracking.filters.joint._product_kernels import take_off
@@ -32,9 +26,6 @@ def write_estimate(c, s, scratch, t, e, o, out):
             q_wb[e, o, i, k] = s.held[i, k]
     if group.started:
         look_ahead(c, s, scratch, t)
-        for i in range(n):
-            if s.nodes[i].present and not s.nodes[i].static:
-                turn_heading(q_wb[e, o, i], scratch.x[0, s.nodes[i].at_h])
     x, P = scratch.x[0], scratch.P[0]
     for p in range(s.pairs.shape[0]):
         pair = s.pairs[p]
@@ -71,14 +62,6 @@ def write_estimate(c, s, scratch, t, e, o, out):
             status[e, o, p] = DOUBTFUL
         else:
             status[e, o, p] = OK
-
-
-@small_kernel
-def turn_heading(q, psi):
-    """Turn an orientation about the vertical of the world by an angle [rad], q (4) updated."""
-    c, s = math.cos(0.5 * psi), math.sin(0.5 * psi)
-    w, x, y, z = q[0], q[1], q[2], q[3]
-    q[0], q[1], q[2], q[3] = c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w
 
 
 @kernel

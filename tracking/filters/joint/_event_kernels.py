@@ -23,7 +23,7 @@ from tracking.filters.joint._range_kernels import antenna_offset, fuse_range
 from tracking.filters.joint._rotation_kernels import carry_moves, follow_rotation
 from tracking.filters.joint._sample_kernels import sum_inertial, take_state
 from tracking.filters.joint._sight_kernels import gap_evidence
-from tracking.filters.joint._silence_kernels import SILENCE, has_faded
+from tracking.filters.joint._silence_kernels import remove_faded, was_silent
 from tracking.filters.joint._sleep_kernels import may_move, none_moved, wake_up
 from tracking.filters.joint._start_kernels import try_join, try_start
 from tracking.filters.joint._stuck_kernels import is_stuck
@@ -141,12 +141,10 @@ def hear(c, s, layout, scratch, i, j, a_i, a_j, t, distance, sight, is_survey):
         # Nobody was heard: whoever speaks first has been away as long as the others.
         settle_all(s)
         remove_silent(c, s, layout, t)
-    for k in (i, j):
-        if s.group[0].started and t - s.nodes[k].t_heard > SILENCE and s.nodes[k].present:
-            advance(c, s, layout, scratch, t, True)
-            settle_all(s)
-            if has_faded(c, s, k, t):
-                remove_node(c, s, layout, k)
+    if s.group[0].started and (was_silent(c, node_i, t) or was_silent(c, node_j, t)):
+        advance(c, s, layout, scratch, t, True)
+        settle_all(s)
+        remove_faded(c, s, layout, t)
     node_i.heard, node_j.heard = True, True
     node_i.t_heard, node_j.t_heard = t, t
     runs = node_i.present and node_j.present

@@ -89,12 +89,15 @@ def best_sides(d, merge_distance, known, distance, sides):
         said[a] = refine(d, known, distance, places[a])
     order = np.argsort(said)
     sides[0] = sides[1] = places[order[0]]
-    _, _, extent, _ = main_axes(d, known)
+    centre, _, extent, axes = main_axes(d, known)
     if extent[d - 1] > JOIN_SPREAD:
         return 1
+    across = axes[d - 1].copy()
+    side = np.sum((sides[0, :d] - centre) * across)
     for a in order[1:]:
         apart = np.sum((places[a] - sides[0]) ** 2) >= merge_distance**2
-        if apart and said[a] < said[order[0]] + WORSE:
+        beyond = np.sum((places[a, :d] - centre) * across) * side < 0.0
+        if apart and beyond and said[a] < said[order[0]] + WORSE:
             sides[1] = places[a]
             return 2
     return 1

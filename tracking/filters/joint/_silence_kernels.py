@@ -4,33 +4,61 @@ A second without ranges or samples leaves a moving node a metre from where it is
 seconds several. Ranges to a place that is as wrong as it is far bend too much for a filter that
 takes them for straight: it comes out mirrored, or turned, and is sure of it. So such a node
 joins anew as it is heard again, and a group of such nodes begins anew.
+
+How uncertain it is shows in its distances, which no turn of the whole group changes.
 """
 
 from __future__ import annotations
 
-from tracking.compiled import kernel
+import numpy as np
 
-SILENCE = 0.5
-"""[s] Who was heard since is where it was believed to be."""
+from tracking.compiled import allocating_kernel, kernel, small_kernel
+from tracking.filters.joint._bank_kernels import remove_node
+
+
+@small_kernel
+def was_silent(c, node, t):
+    """True for a node of the group that moves and was not heard lately."""
+    return node.present and not node.static and t - node.t_heard > c.silent_after
+
+
+@allocating_kernel
+def remove_faded(c, s, layout, t):
+    """Remove all nodes that were silent and may be anywhere, as one of them is heard again.
+
+    Those that stay away would keep the others from beginning anew. The states are those of time
+    t, and nothing of them waits. A smoother looks no farther ahead than a silence lasts: what
+    it holds of the past would go with the group.
+    """
+    if c.n > c.n_own:
+        return
+    faded = np.zeros(s.nodes.shape[0], np.bool_)  # of all, before the first is gone
+    for i in range(s.nodes.shape[0]):
+        faded[i] = was_silent(c, s.nodes[i], t) and has_faded(c, s, i)
+    for i in range(s.nodes.shape[0]):
+        if faded[i] and s.nodes[i].present:
+            remove_node(c, s, layout, i)
 
 
 @kernel
-def has_faded(c, s, i, t):
-    """True if node i was silent and its place is uncertain relative to every other.
+def has_faded(c, s, i):
+    """True if the distances of node i to all others are as uncertain as no ok pair may be.
 
-    As uncertain as no pair may be that is ok, in the reported hypothesis, of which nothing waits
-    and which was carried to t.
+    In the reported hypothesis.
     """
-    node, h = s.nodes[i], s.group[0].best
-    if not node.present or node.static or t - node.t_heard <= SILENCE:
-        return False
+    h, at = s.group[0].best, s.nodes[i].at_p
     for k in range(s.nodes.shape[0]):
         if k == i or not s.nodes[k].present:
             continue
-        worst = 0.0
+        other = s.nodes[k].at_p
+        squared, along = 1e-12, 0.0
         for a in range(c.d):
-            at, other = node.at_p + a, s.nodes[k].at_p + a
-            worst = max(worst, s.P[h, at, at] + s.P[h, other, other] - 2.0 * s.P[h, at, other])
-        if worst <= c.ok_var:
+            off = s.x[h, other + a] - s.x[h, at + a]
+            squared += off * off
+            for b in range(c.d):
+                across = s.P[h, at + a, other + b] + s.P[h, other + a, at + b]
+                apart = s.P[h, at + a, at + b] + s.P[h, other + a, other + b] - across
+                along += off * (s.x[h, other + b] - s.x[h, at + b]) * apart
+        if along <= c.ok_var * squared:
             return False
     return True

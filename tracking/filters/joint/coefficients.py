@@ -51,6 +51,7 @@ _NUMBERS = (
     "rest_var",
     "carry_period",
     "carrier_period",
+    "silent_after",
     "lost_after",
     "leave_after",
     "ok_var",

@@ -223,6 +223,9 @@ class JointParams:
     """[m/s] Speed of a node at rest."""
     carrier_period: float = 0.05
     """[s] Time between two uses of what is known about the carriers."""
+    silent_after: float = 0.5
+    """[s] A node not heard for so long joins anew, if its distances to all others are less certain
+    than `ok_std` by now. More than the time between two ranges of a node."""
     lost_after: float = 1.0
     """[s] A pair without a range for so long is lost."""
     leave_after: float = 5.0
