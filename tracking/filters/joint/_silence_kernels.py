@@ -15,6 +15,10 @@ import numpy as np
 from tracking.compiled import allocating_kernel, kernel, small_kernel
 from tracking.filters.joint._bank_kernels import remove_node
 
+FADED = 0.5
+"""[-] Share of the variance of a pair that is not ok from which on a distance is open: by then the
+line of sight may be turned by a third of a right angle at 2 m."""
+
 
 @small_kernel
 def was_silent(c, node, t):
@@ -42,10 +46,7 @@ def remove_faded(c, s, layout, t):
 
 @kernel
 def has_faded(c, s, i):
-    """True if the distances of node i to all others are as uncertain as no ok pair may be.
-
-    In the reported hypothesis.
-    """
+    """True if the distances of node i to all others are open, in the reported hypothesis."""
     h, at = s.group[0].best, s.nodes[i].at_p
     for k in range(s.nodes.shape[0]):
         if k == i or not s.nodes[k].present:
@@ -59,6 +60,6 @@ def has_faded(c, s, i):
                 across = s.P[h, at + a, other + b] + s.P[h, other + a, at + b]
                 apart = s.P[h, at + a, at + b] + s.P[h, other + a, other + b] - across
                 along += off * (s.x[h, other + b] - s.x[h, at + b]) * apart
-        if along <= c.ok_var * squared:
+        if along <= FADED * c.ok_var * squared:
             return False
     return True

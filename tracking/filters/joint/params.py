@@ -225,7 +225,7 @@ class JointParams:
     """[s] Time between two uses of what is known about the carriers."""
     silent_after: float = 0.5
     """[s] A node not heard for so long joins anew, if its distances to all others are less certain
-    than `ok_std` by now. More than the time between two ranges of a node."""
+    than 0.7 `ok_std` by now. More than the time between two ranges of a node."""
     lost_after: float = 1.0
     """[s] A pair without a range for so long is lost."""
     leave_after: float = 5.0
