@@ -88,7 +88,7 @@ def _bars(result: CompareResult) -> Figure:
     colours, scenarios, measured = _colours(result), result.scenarios, _measured(result)
     counts = [len(result.of(s)) for s in scenarios]
     height = sum(0.34 * n + 0.9 for n in counts) + 0.2
-    figure = Figure(figsize=(12, height), layout="constrained")
+    figure = Figure(figsize=(3.0 + 2.0 * len(measured), height), layout="constrained")
     axes = figure.subplots(
         len(scenarios), len(measured), squeeze=False, sharey="row",
         height_ratios=[n + 0.6 for n in counts],
@@ -96,7 +96,7 @@ def _bars(result: CompareResult) -> Figure:
     for line, scenario in zip(axes, scenarios, strict=True):
         rows = result.of(scenario)
         for ax, name in zip(line, measured, strict=True):
-            scale = 100.0 if LABELS[name].endswith("[%]") else 1.0
+            scale = _scale(name)
             for y, row in enumerate(rows):
                 bar = name != "energy"
                 _bar(ax, y, row.means[name], scale, colours[row.contender.label], bar=bar)
@@ -104,7 +104,7 @@ def _bars(result: CompareResult) -> Figure:
             ax.grid(alpha=0.3, axis="x")
             ax.set_ylim(len(rows) - 0.4, -0.6)
             ax.tick_params(axis="y", length=0)
-            ax.locator_params(axis="x", nbins=4)
+            ax.locator_params(axis="x", nbins=3)
         line[0].set_yticks(range(len(rows)), [r.contender.label for r in rows])
         line[0].set_title(scenario, fontsize=10, loc="left", fontweight="bold")
     for ax, name in zip(axes[-1], measured, strict=True):
@@ -133,7 +133,12 @@ def _limits(name: str, found: Sequence[Interval | None]) -> tuple[float, float]:
     if name == "energy":
         margin = 0.15 * (high - low) + 0.01 * high + 1e-3
         return low - margin, high + margin
-    return 0.0, 1.08 * high or 1.0
+    return 0.0, 1.08 * _scale(name) * high or 1.0
+
+
+def _scale(name: str) -> float:
+    """Shares are drawn in percent."""
+    return 100.0 if LABELS[name].endswith("[%]") else 1.0
 
 
 def _panels(result: CompareResult, width: float, height: float) -> tuple[Figure, list[Axes]]:

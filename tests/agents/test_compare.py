@@ -19,9 +19,11 @@ from agents.compare.film import median_films
 from agents.compare.meter import IN_FORMATION, Meter
 from agents.compare.setting import Setting
 from agents.compare.simulated import Simulated
+from agents.compare.statistics import Interval
 from agents.controllers import CONTROLLERS, Consensus
 from agents.errors import UsageError
 from agents.report.animation import player_markup
+from agents.report.compare_figures import _limits
 from agents.report.compare_report import (
     HEADER,
     SHORT_HEADER,
@@ -303,3 +305,11 @@ def test_time_in_contact_tells_who_presses_on():
     np.testing.assert_allclose(found, np.mean(touching, axis=(0, 2)))
     assert min(found) > 0.05
     running.close()
+
+
+def test_no_bar_is_cut_off():
+    """Shares are drawn in percent, and so are the ends of their axes."""
+    found = [Interval(0.004, 0.002, 0.01)]
+    for name in ("contact_time", "time_in_formation"):
+        assert _limits(name, found)[1] >= 100.0 * 0.01
+    assert _limits("formation_error", found)[1] < 0.02
