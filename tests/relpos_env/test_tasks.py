@@ -214,6 +214,9 @@ def test_every_term_is_finite_and_within_its_bounds(name, n_cars, seed, absent, 
         assert np.all((own >= -1.0) & (own <= 1.0))
         assert np.array_equal(term["collision"], np.where(state.present, -collided, 0.0))
         assert np.all((term["effort"] >= -1.0) & (term["effort"] <= 0.0))
+        near, far = np.exp(-task.error / 0.5), np.exp(-task.error / 2.0)
+        formation = 0.5 * (near + far) * state.present
+        np.testing.assert_allclose(term["formation"], formation, atol=1e-12)
         short = np.maximum(1.0 - state.clearance / 0.15, 0.0)
         np.testing.assert_allclose(term["nearness"], -(short**2) * state.present, atol=1e-12)
         assert np.all(np.isin(term.get("time", 0.0), [-1.0, 0.0]))

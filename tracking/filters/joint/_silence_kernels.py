@@ -17,7 +17,7 @@ from tracking.filters.joint._bank_kernels import remove_node
 
 FADED = 0.5
 """[-] Share of the variance of a pair that is not ok from which on a distance is open: by then the
-line of sight may be turned by a third of a right angle at 2 m."""
+line of sight at 2 m may be off by 20 degrees."""
 
 
 @small_kernel
