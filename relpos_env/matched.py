@@ -2,8 +2,9 @@
 
 Filters and worlds have parameters of different types on purpose. This is the one place that
 translates. Noise of sensors follows from their parameters; what the orientation stage makes of
-them (heading and slow acceleration errors) was measured on simulated runs, as written beside
-the numbers.
+them (heading and slow acceleration errors), how tyres slip beyond what the filter knows and how
+often sight is lost were measured on simulated runs, as written beside the numbers
+(`docs/measure_world.py`).
 """
 
 from __future__ import annotations
@@ -28,12 +29,23 @@ from tracking.ranging.timestamps import SPEED_OF_LIGHT
 
 STAMPS = 0.61
 """[-] White noise of a range over that of its three receive stamps' worth of way."""
+ENTER_RATE, LEAVE_RATE = 0.15, 0.33
+"""[1/s] How often a pair of cars loses sight of each other behind the box of `cars-nlos`, and how
+often it gets it back; taken for other rooms with obstacles and for bodies, too."""
+NEVER = 1e-9
+"""[1/s] or [-] What does not happen; the filter takes logarithms of it."""
+SIDEWAYS = 0.05
+"""[m/s] Slip of rear axles that the filter does not foresee, as white noise 20 times a second. It
+lasts, so that a drive's mean weighs more than its standard deviation: what is white and has the
+same mean over 8 s is 0.048 m/s."""
 
 
 def matched_params(scenario: Scenario | HumanScenario) -> JointParams:
     """Parameters of the joint filter that are those of a scenario."""
     channel, imu = scenario.radio.channel, scenario.imu
     mean, std = excess_moments(channel)
+    hidden = can_hide(scenario)
+    gap_los_std, gap_nlos_std = (math.hypot(x, channel.gap_noise) for x in channel.gap_place)
     white = STAMPS * channel.stamp_std * SPEED_OF_LIGHT
     carriers = dict(CARRIERS)
     if isinstance(scenario, HumanScenario):
@@ -59,6 +71,7 @@ def matched_params(scenario: Scenario | HumanScenario) -> JointParams:
             heading_std=0.022,
             heading_tau=8.0,
             slip=1.0 / (scenario.car.rear_cornering * GRAVITY),
+            sideways_std=SIDEWAYS,
         )
     return JointParams(
         carriers=carriers,
@@ -70,16 +83,30 @@ def matched_params(scenario: Scenario | HumanScenario) -> JointParams:
             slow_length=channel.slow_length,
         ),
         nlos=NlosParams(
+            enter_rate=ENTER_RATE if hidden else NEVER,
+            leave_rate=LEAVE_RATE,
+            leave_rate_with_power=LEAVE_RATE,
             excess=max(mean, 1e-3),
             excess_std=max(std, 1e-3),
             excess_length=channel.excess_length,
             white_std=1e-3,
             gap_los=channel.gap,
+            gap_los_std=max(gap_los_std, 0.1),
             gap_nlos=channel.gap + max(channel.gap_nlos, 0.1),
+            gap_nlos_std=max(gap_nlos_std, 0.1),
+            # Simulated radios lose ranges; none of those that come means nothing.
+            outlier_prob=NEVER,
         ),
         # The NIS is 1 where noise is what it is believed to be.
         start=JointStartParams(strained=2.0),
     )
+
+
+def can_hide(scenario: Scenario | HumanScenario) -> bool:
+    """Whether something may stand between two nodes: obstacles, those of episodes, bodies."""
+    if isinstance(scenario, HumanScenario):
+        return True
+    return bool(scenario.obstacles) or scenario.randomisation.obstacles[1] > 0
 
 
 def excess_moments(channel: ChannelParams) -> tuple[float, float]:
