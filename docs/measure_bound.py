@@ -3,7 +3,7 @@
 Places are relative positions. Whoever drives by what the tracker measures cannot put another car
 nearer to its place than the spread of where it may be: formation errors are bounded by the
 posterior Cramer-Rao bound of the relative positions (`tracking.bounds`), along the drives that
-are measured. That is a root mean square; the mean length of a Gaussian is at least sqrt(2 / pi) of
+are measured, in the task that the policy was trained for. That is a root mean square; the mean length of a Gaussian is at least sqrt(2 / pi) of
 it, where it lies on a line. What beams tell of walls is not in it.
 
 Run `python docs/measure_bound.py [POLICY] [EPISODES]`; some seconds an episode. Seeds from 1000,
@@ -23,7 +23,7 @@ from relpos_env.matched import matched_params
 from relpos_env.timing import DECISION
 from tracking.bounds import posterior_bound
 
-SCENARIO, TASK, N_CARS = "cars-nlos", "hold", 3
+SCENARIO, N_CARS = "cars-nlos", 3
 SECONDS, SETTLE = 60.0, 10.0
 MEASURES = "formation_error", "tracking_error"
 
@@ -34,7 +34,7 @@ def measure(name: str, seed: int) -> tuple[float, float, float, float]:
     proximity = policy.card.layout.proximity
     env = formation_v0.parallel_env(
         scenario=SCENARIO,
-        task=TASK,
+        task=policy.card.training["task"],
         observation="estimate",
         proximity=proximity,
         record=True,

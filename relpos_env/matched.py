@@ -29,7 +29,7 @@ from tracking.ranging.timestamps import SPEED_OF_LIGHT
 
 STAMPS = 0.61
 """[-] White noise of a range over that of its three receive stamps' worth of way."""
-ENTER_RATE, LEAVE_RATE = 0.15, 0.33
+ENTER_RATE, LEAVE_RATE = 0.15, 0.3
 """[1/s] How often a pair of cars loses sight of each other behind the box of `cars-nlos`, and how
 often it gets it back; taken for other rooms with obstacles and for bodies, too."""
 NEVER = 1e-9
@@ -37,7 +37,7 @@ NEVER = 1e-9
 SIDEWAYS = 0.05
 """[m/s] Slip of rear axles that the filter does not foresee, as white noise 20 times a second. It
 lasts, so that a drive's mean weighs more than its standard deviation: what is white and has the
-same mean over 8 s is 0.048 m/s."""
+same mean over 8 s is 0.046 m/s."""
 
 
 def matched_params(scenario: Scenario | HumanScenario) -> JointParams:
