@@ -154,7 +154,7 @@ class Faults:
     def growth(self, lost, begin, end):
         """Bound of the others' shape without some measurements over that with all, median run.
 
-        Of a silent radio of four cars 1.08 for three seconds and 1.13 for ten.
+        Of a silent radio of four cars 1.07 for three seconds and 1.12 for ten.
         """
 
         def of_the_others(constellation, t, cov, pos, known):
@@ -182,7 +182,7 @@ class Faults:
     def assert_others_as_without(self, run):
         """Pairs without the bad car keep the accuracy that they have if it is silent: 10 %.
 
-        That it is silent costs them 8 to 13 % themselves, of four cars: see `growth`.
+        That it is silent costs them 7 to 12 % themselves, of four cars: see `growth`.
         """
         assert run.shape_error(BEGIN, END) < 1.1 * self.silent.shape_error(BEGIN, END)
 
