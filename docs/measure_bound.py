@@ -3,8 +3,9 @@
 Places are relative positions. Whoever drives by what the tracker measures cannot put another car
 nearer to its place than the spread of where it may be: formation errors are bounded by the
 posterior Cramer-Rao bound of the relative positions (`tracking.bounds`), along the drives that
-are measured, in the task that the policy was trained for. That is a root mean square; the mean length of a Gaussian is at least sqrt(2 / pi) of
-it, where it lies on a line. What beams tell of walls is not in it.
+are measured, in the task that the policy was trained for. That is a root mean square; the mean
+length of a Gaussian is at least sqrt(2 / pi) of it, where it lies on a line. What beams tell of
+walls is not in it.
 
 Run `python docs/measure_bound.py [POLICY] [EPISODES]`; some seconds an episode. Seeds from 1000,
 60 s each.
