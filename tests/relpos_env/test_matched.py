@@ -1,27 +1,31 @@
 """What a filter is told of the simulated world, beside that world."""
 
+import runpy
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from agents.simulate import simulate
-from relpos_env.matched import ENTER_RATE, LEAVE_RATE, NEVER, can_hide, matched_params
+from relpos_env.matched import (
+    ENTER_RATE,
+    LEAVE_RATE,
+    NEVER,
+    SIDEWAYS,
+    can_hide,
+    matched_params,
+)
 from relpos_env.scenarios import recordable
 from relpos_env.sensors.radio.channel import EXACT
-from tracking.measurements import Kind
+
+MEASURES = runpy.run_path(str(Path(__file__).parents[2] / "docs" / "measure_world.py"))
 
 
 @pytest.fixture(scope="module")
-def gaps():
-    """Power gap [dB] of ranges, and whether they were hidden, of four drives of cars-nlos."""
-    out = []
-    for seed in range(400, 404):
-        log = simulate(scenario="cars-nlos", seconds=60.0, seed=seed)
-        row = log.block.kind[0] == Kind.RANGE
-        values = log.block.values[0, row]
-        out.append(np.stack([values[:, 1] - values[:, 2], log.nlos], axis=1))
-    return np.concatenate(out).T
+def drives():
+    """Eight drives of cars-nlos."""
+    return [simulate(scenario="cars-nlos", seconds=60.0, seed=seed) for seed in range(400, 408)]
 
 
 @pytest.mark.parametrize(("name", "hides"), [
@@ -41,12 +45,28 @@ def test_obstacles_that_are_drawn_for_episodes_hide_as_well():
     assert can_hide(replace(scenario, randomisation=drawn))
 
 
-def test_power_gaps_scatter_as_much_as_they_are_said_to(gaps):
-    gap, hidden = gaps
+def test_power_gaps_scatter_as_much_as_they_are_said_to(drives):
+    gap, clear = np.concatenate([MEASURES["sight"](log)[1] for log in drives]).T
     nlos = matched_params(recordable("cars-nlos")).nlos
-    # Gaps of a drive are alike: four drives have tens of independent ones.
-    assert gap[hidden == 0].std() == pytest.approx(nlos.gap_los_std, rel=0.25)
-    assert gap[hidden == 1].std() == pytest.approx(nlos.gap_nlos_std, rel=0.25)
+    # Gaps of a drive are alike: eight drives have tens of independent ones.
+    assert gap[clear == 1].std() == pytest.approx(nlos.gap_los_std, rel=0.25)
+    assert gap[clear == 0].std() == pytest.approx(nlos.gap_nlos_std, rel=0.25)
+
+
+def test_sight_is_lost_and_found_as_often_as_is_said(drives):
+    seen, hidden, lost, found = sum(MEASURES["sight"](log)[0] for log in drives)
+    # 150 changes each way, many of them of the same drive.
+    assert lost / seen == pytest.approx(ENTER_RATE, rel=0.4)
+    assert found / hidden == pytest.approx(LEAVE_RATE, rel=0.4)
+
+
+def test_tyres_slip_as_far_in_eight_seconds_as_white_noise_would(drives):
+    joint = matched_params(recordable("cars-nlos"))
+    slip = joint.carriers["car"].slip
+    means = np.concatenate([MEASURES["slips"](log, slip)[-1] for log in drives])
+    n = MEASURES["SPANS"][-1] / MEASURES["PERIOD"]
+    assert joint.carriers["car"].sideways_std == SIDEWAYS
+    assert np.sqrt(np.mean(means**2) * n) == pytest.approx(SIDEWAYS, rel=0.4)
 
 
 def test_an_exact_channel_still_has_parameters():
