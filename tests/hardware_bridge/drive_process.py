@@ -7,6 +7,7 @@ Orders come as JSON lines on stdin: {"order": "arm"}, {"hang": SECONDS}, {"disk"
 
 import json
 import resource
+import signal
 import sys
 import threading
 import time
@@ -109,4 +110,6 @@ def main(config, options):
 
 
 if __name__ == "__main__":
+    # Tests that were started with nohup would hand on that a hang-up is ignored.
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
     main(sys.argv[1], json.loads(sys.argv[2]))
