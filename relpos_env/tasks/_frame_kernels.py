@@ -14,13 +14,13 @@ import math
 
 from relpos_env.tasks._curve_kernels import curve_point
 from relpos_env.tasks._score_kernels import (
-    TIME,
     all_within,
     changed,
     common_terms,
     formation_error,
     place_term,
     targets_from_goals,
+    time_term,
     velocity_term,
 )
 from tracking.compiled import kernel, small_kernel
@@ -102,7 +102,7 @@ def update_frame(
         How many environments have other cars than were given places; those are left alone.
     """
     lookahead, tolerance, error_scale, place_scale = limits
-    ends = rewards.shape[2] > TIME and motion[2] > 0.0 and motion[3] == 0.0
+    ends = motion[2] > 0.0 and motion[3] == 0.0
     n_changed = 0
     for env in range(start, stop):
         if changed(env, present, seated):
@@ -131,5 +131,7 @@ def update_frame(
         formation_error(env, pos, present, target, error)
         arrived = ends and frame[env, 2] + motion[0] * t[env] >= motion[2]
         done[env] = arrived and all_within(env, pos, present, goal, tolerance)
-        common_terms(env, accel, clear, present, collided, error, error_scale, done[env], rewards)
+        common_terms(env, accel, clear, present, collided, error, error_scale, rewards)
+        if ends:
+            time_term(env, present, done[env], rewards)
     return n_changed

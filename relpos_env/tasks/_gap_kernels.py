@@ -14,6 +14,7 @@ from relpos_env.tasks._score_kernels import (
     common_terms,
     formation_error,
     targets_from_goals,
+    time_term,
 )
 from tracking.compiled import kernel
 
@@ -87,5 +88,6 @@ def update_gap(
         targets_from_goals(env, present, goal, target)
         formation_error(env, pos, present, target, error)
         done[env] = arrived and all_within(env, pos, present, goal, tolerance)
-        common_terms(env, accel, clear, present, collided, error, error_scale, done[env], rewards)
+        common_terms(env, accel, clear, present, collided, error, error_scale, rewards)
+        time_term(env, present, done[env], rewards)
     return n_changed

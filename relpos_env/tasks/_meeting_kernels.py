@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from relpos_env.tasks._score_kernels import changed, common_terms
+from relpos_env.tasks._score_kernels import changed, common_terms, time_term
 from tracking.compiled import kernel
 
 CLOSING_SPEED = 1.0
@@ -73,5 +73,6 @@ def update_meeting(
                 rewards[env, k, 1] = min(max(closing / (distance * CLOSING_SPEED), -1.0), 1.0)
         since[env] = min(since[env], t[env]) if together else math.inf
         done[env] = together and t[env] - since[env] >= stay - 1e-9
-        common_terms(env, accel, clear, present, collided, error, error_scale, done[env], rewards)
+        common_terms(env, accel, clear, present, collided, error, error_scale, rewards)
+        time_term(env, present, done[env], rewards)
     return n_changed

@@ -71,5 +71,5 @@ def update_ring(
             velocity_term(env, k, vel, plan[env, k, 0], plan[env, k, 1], rewards)
         targets_from_goals(env, present, goal, target)
         formation_error(env, pos, present, target, error)
-        common_terms(env, accel, clear, present, collided, error, error_scale, False, rewards)
+        common_terms(env, accel, clear, present, collided, error, error_scale, rewards)
     return n_changed

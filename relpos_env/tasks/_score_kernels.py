@@ -107,7 +107,7 @@ def place_term(env, pos, present, goal, scale, rewards):
 
 
 @small_kernel
-def common_terms(env, accel, clear, present, collided, error, error_scale, done, rewards):
+def common_terms(env, accel, clear, present, collided, error, error_scale, rewards):
     """The reward terms that all tasks have; the second, the task's own, must be there before.
 
     Args:
@@ -118,9 +118,8 @@ def common_terms(env, accel, clear, present, collided, error, error_scale, done,
         collided: Contacts begun, (env, car).
         error: (env, car) [m].
         error_scale: Error over which half of the formation term falls off to exp(-1) [m].
-        done: Whether this environment is through.
-        rewards: (env, car, term), written: formation, (own), collision, effort, nearness, and
-            time if the task has that term; all 0 of an absent car.
+        rewards: (env, car, term), written: formation, (own), collision, effort, nearness; all
+            terms of an absent car are 0.
     """
     n_terms = rewards.shape[2]
     for k in range(present.shape[1]):
@@ -135,5 +134,11 @@ def common_terms(env, accel, clear, present, collided, error, error_scale, done,
         rewards[env, k, 3] = -min(1.0, square / (HARD_ACCEL * HARD_ACCEL))
         short = max(1.0 - clear[env, k] / NEAR, 0.0)
         rewards[env, k, 4] = -short * short
-        if n_terms > TIME:
+
+
+@small_kernel
+def time_term(env, present, done, rewards):
+    """The last reward term of tasks with an end: what a step costs until all is done."""
+    for k in range(present.shape[1]):
+        if present[env, k]:
             rewards[env, k, TIME] = 0.0 if done else -1.0

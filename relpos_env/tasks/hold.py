@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from relpos_env.tasks.curves import Curve
-from relpos_env.tasks.moving import MARGIN, Motion, MovingFormation
+from relpos_env.tasks.moving import MARGIN, Motion, MovingFormation, Stand
 from relpos_env.tasks.options import finite, half_room
 from relpos_env.tasks.shapes import Formation
 from tracking.arrays import F64
@@ -39,5 +39,6 @@ def hold(
     formation = Formation(shape, n_cars, spacing)
     half = half_room(room, MARGIN)
     free = half - formation.fit(half, heading)
-    motion = Motion(curve=Curve.point(), heading=heading, half=(float(free[0]), float(free[1])))
+    stand = Stand(half=(float(free[0]), float(free[1])), room=(0.5 * room[0], 0.5 * room[1]))
+    motion = Motion(curve=Curve.point(), heading=heading, stand=stand)
     return MovingFormation(n_cars, n_envs, formation, motion)

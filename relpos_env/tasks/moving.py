@@ -12,6 +12,7 @@ from relpos_env.tasks.assignment import assign
 from relpos_env.tasks.base import COMMON_TERMS, Task, Truth
 from relpos_env.tasks.curves import Curve
 from relpos_env.tasks.shapes import Formation
+from relpos_env.tasks.ways import Ways
 from tracking.arrays import F64, I64, Bool
 
 ERROR_SCALE = 0.5
@@ -20,8 +21,20 @@ PLACE_SCALE = 1.0
 """[m] Distance of the group's middle from its goals' at which the place term is exp(-1)."""
 TOLERANCE = 0.4
 """[m] As near to its place at the end a car has arrived: about its length."""
+PROGRESS = 5
+"""Number of the term of that name, which formations that stand have."""
 MARGIN = 0.3
 """[m] From the walls of the room to the places nearest to them."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stand:
+    """A frame stands where the group did, or near it where no place is in an obstacle."""
+
+    half: tuple[float, float]
+    """[m] So far from the room's middle at most."""
+    room: tuple[float, float]
+    """[m] Half the width and depth of the room."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,9 +53,8 @@ class Motion:
     """[rad] Of the frame at the start, if it does not turn with the curve."""
     lookahead: float = 0.0
     """[s] The plan is the velocity of the goal so much later, which covers the cars' lag."""
-    half: tuple[float, float] | None = None
-    """[m] The frame stands where the group did, or near it where no place is in an obstacle, so
-    far from the room's middle at most; None for a frame that is put by its curve alone."""
+    stand: Stand | None = None
+    """Where the frame may stand; None for one that is put by its curve alone."""
 
 
 class MovingFormation(Task):
@@ -69,10 +81,12 @@ class MovingFormation(Task):
             all_told: The plan is for all; else for the first present car alone.
         """
         ends = motion.curve.length > 0.0 and not motion.curve.closed
-        time = ("time",) if ends else ()
-        self._stands = motion.half is not None
-        own = "place" if self._stands else "velocity"
-        super().__init__(n_cars, n_envs, ("formation", own, *COMMON_TERMS, *time))
+        self._ways = None if motion.stand is None else Ways(n_cars, n_envs, motion.stand.room)
+        if motion.stand is not None:
+            terms = ("formation", "place", *COMMON_TERMS, "progress")
+        else:
+            terms = ("formation", "velocity", *COMMON_TERMS, *(("time",) if ends else ()))
+        super().__init__(n_cars, n_envs, terms)
         self._formation, self._motion = formation, motion
         self._led, self._all_told = led, all_told
         self._frame, self._places = np.zeros((n_envs, 4)), np.zeros((n_envs, n_cars, 3))
@@ -84,7 +98,7 @@ class MovingFormation(Task):
             float(curve.closed),
             float(motion.turning),
         )
-        place_scale = PLACE_SCALE if self._stands else 0.0
+        place_scale = 0.0 if motion.stand is None else PLACE_SCALE
         self._limits = (float(motion.lookahead), TOLERANCE, ERROR_SCALE, place_scale)
         self._now = np.zeros(7)
 
@@ -93,7 +107,8 @@ class MovingFormation(Task):
         motion = self._motion
         middle = pos[cars].mean(axis=0)
         anchor, arc = np.zeros(2), 0.0
-        if self._stands:
+        if self._ways is not None:
+            self._ways.lay(env, self._boxes[env])
             anchor = self._free_anchor(env, middle, len(cars))
         elif motion.curve.length > 0.0 and motion.curve.closed:
             arc = float(motion.curve.nearest(pos[cars[0]] if self._led else middle))
@@ -106,9 +121,17 @@ class MovingFormation(Task):
 
         One that stands makes way where the places of so many would be in an obstacle.
         """
-        if self._stands:
+        if self._motion.stand is not None:
             self._frame[env, :2] = self._free_anchor(env, self._frame[env, :2], len(cars))
         self._give(env, pos, cars, t)
+
+    def update(self, state: Truth, t: F64, collided: F64, envs: slice) -> None:
+        """Write all arrays for now; cars that gather are also told how far they came."""
+        super().update(state, t, collided, envs)
+        if self._ways is not None:
+            start, stop = self._range(envs)
+            self._ways.follow(state.pos_w, state.present, self.goal_w, start, stop)
+            self.rewards[start:stop, :, PROGRESS] = self._ways.progress[start:stop]
 
     def compute(self, state: Truth, t: F64, collided: F64, start: int, stop: int) -> int:
         """One compiled call."""
@@ -139,10 +162,10 @@ class MovingFormation(Task):
 
     def _free_anchor(self, env: int, wanted: F64, n: int) -> F64:
         """Where a formation of n cars can stand, nearest to where it is wanted, (2) [m]."""
-        assert self._motion.half is not None
+        assert self._motion.stand is not None
         c, s = np.cos(self._motion.heading), np.sin(self._motion.heading)
         places = self._formation.places(n) @ np.array([[c, s], [-s, c]])
-        return free_anchor(wanted, np.array(self._motion.half), places, self._boxes[env])
+        return free_anchor(wanted, np.array(self._motion.stand.half), places, self._boxes[env])
 
     def _give(self, env: int, pos: F64, cars: I64, t: float) -> None:
         frame_now(env, t, self._frame, self._motion.curve.pieces, self._constants, self._now)

@@ -26,7 +26,7 @@ DEFAULT_WEIGHTS: Mapping[str, Mapping[str, float]] = MappingProxyType(
             "effort": 0.0,
             "nearness": 0.0,
         },
-        "hold": {"formation": 1.0, "place": 0.3, **_CARE},
+        "hold": {"formation": 1.0, "place": 0.3, **_CARE, "progress": 5.0},
         "travel": {**_MOVING, "time": 1.2},
         "follow": {**_MOVING, "time": 1.2},
         "gap": _ENDING,

@@ -1,0 +1,171 @@
+"""Ways round what stands in a room, and how far cars come along them, compiled.
+
+A shortest way round boxes bends at their corners only, so it is one through the graph of the
+corners that see each other [1]; here corners stand out by what a car needs to drive round them.
+
+References:
+    [1] Lozano-Perez and Wesley, Commun. ACM 22(10) (1979), 560-570.
+"""
+
+from __future__ import annotations
+
+import math
+
+from tracking.compiled import kernel, small_kernel
+
+CORNER = 0.3
+"""[m] Corners of boxes are passed so far out, along both sides: as far as places are, see
+`anchor.CLEAR`."""
+CLEAR = 0.12
+"""[m] A way comes no nearer to a box: half the width of a car, and a little."""
+WALL = 0.2
+"""[m] Nor a corner of it to a wall: half the length of a car."""
+
+
+@small_kernel
+def crosses(x_a, y_a, x_b, y_b, boxes):
+    """True if the line from a to b comes nearer than `CLEAR` to a box.
+
+    One that a or b is nearer to than that must not be crossed itself: who stands at a box may
+    leave it.
+    """
+    for k in range(boxes.shape[0]):
+        if boxes[k, 2] == 0.0:
+            continue
+        c, s = boxes[k, 4], boxes[k, 5]
+        d_x, d_y = x_a - boxes[k, 0], y_a - boxes[k, 1]
+        u_a, v_a = c * d_x + s * d_y, c * d_y - s * d_x
+        d_x, d_y = x_b - boxes[k, 0], y_b - boxes[k, 1]
+        u_b, v_b = c * d_x + s * d_y, c * d_y - s * d_x
+        half_u, half_v = boxes[k, 2] + CLEAR, boxes[k, 3] + CLEAR
+        if (abs(u_a) < half_u and abs(v_a) < half_v) or (abs(u_b) < half_u and abs(v_b) < half_v):
+            half_u, half_v = boxes[k, 2], boxes[k, 3]
+        low_u, high_u = stretch_within(u_a, u_b, half_u)
+        low_v, high_v = stretch_within(v_a, v_b, half_v)
+        if min(high_u, high_v) - max(low_u, low_v) > 1e-9:
+            return True
+    return False
+
+
+@small_kernel
+def stretch_within(a, b, half):
+    """Between which shares of the way from a to b, of 0 to 1, a number is within -half to half."""
+    if a == b:
+        return (0.0, 1.0) if abs(a) < half else (1.0, 0.0)
+    one, other = (-half - a) / (b - a), (half - a) / (b - a)
+    return max(min(one, other), 0.0), min(max(one, other), 1.0)
+
+
+@kernel
+def lay_ways(boxes, half_x, half_y, corner, between):
+    """Corners at which a car can be, and the shortest ways between them.
+
+    Args:
+        boxes: Centre, half width and depth [m], cosine, sine, (box, 6).
+        half_x: Half the width of the room [m].
+        half_y: Half its depth [m].
+        corner: (corner, 2) [m], written.
+        between: (corner, corner) [m], written; infinite where there is no way.
+
+    Returns:
+        How many corners there are.
+    """
+    n = 0
+    for k in range(boxes.shape[0]):
+        if boxes[k, 2] == 0.0:
+            continue
+        for side in range(4):
+            u = (boxes[k, 2] + CORNER) * (1.0 if side < 2 else -1.0)
+            v = (boxes[k, 3] + CORNER) * (1.0 if side % 2 == 0 else -1.0)
+            x = boxes[k, 0] + boxes[k, 4] * u - boxes[k, 5] * v
+            y = boxes[k, 1] + boxes[k, 5] * u + boxes[k, 4] * v
+            if abs(x) > half_x - WALL or abs(y) > half_y - WALL or is_taken(x, y, boxes):
+                continue
+            corner[n, 0], corner[n, 1] = x, y
+            n += 1
+    for i in range(n):
+        between[i, i] = 0.0
+        for j in range(i):
+            x_i, y_i, x_j, y_j = corner[i, 0], corner[i, 1], corner[j, 0], corner[j, 1]
+            seen = not crosses(x_i, y_i, x_j, y_j, boxes)
+            between[i, j] = math.hypot(x_i - x_j, y_i - y_j) if seen else math.inf
+            between[j, i] = between[i, j]
+    for k in range(n):
+        for i in range(n):
+            for j in range(n):
+                between[i, j] = min(between[i, j], between[i, k] + between[k, j])
+    return n
+
+
+@small_kernel
+def is_taken(x, y, boxes):
+    """True if a point is nearer than `CLEAR` to a box, along its sides."""
+    n_near = 0
+    for k in range(boxes.shape[0]):
+        d_x, d_y = x - boxes[k, 0], y - boxes[k, 1]
+        u = abs(boxes[k, 4] * d_x + boxes[k, 5] * d_y)
+        v = abs(boxes[k, 4] * d_y - boxes[k, 5] * d_x)
+        n_near += boxes[k, 2] > 0.0 and u < boxes[k, 2] + CLEAR and v < boxes[k, 3] + CLEAR
+    return n_near > 0
+
+
+@kernel
+def follow_ways(start, stop, pos, present, goal, boxes, map_, memory, progress):
+    """How much nearer every car has come to its goal, along the shortest way there.
+
+    Args:
+        start: First environment.
+        stop: One behind the last.
+        pos: (env, car, 2) [m].
+        present: (env, car).
+        goal: (env, car, 2) [m].
+        boxes: (env, box, 6).
+        map_: How many corners, (env); corners, (env, corner, 2) [m]; ways between them,
+            (env, corner, corner) [m].
+        memory: Goals before, (env, car, 2) [m], NaN for none; ways to them from each corner,
+            (env, car, corner) [m], and from the car, (env, car) [m]; updated.
+        progress: (env, car) [m], written; 0 of a car whose goal is new or cannot be reached.
+    """
+    n_corners, corner, between = map_
+    before, onward, last = memory
+    for e in range(start, stop):
+        here, n = boxes[e], n_corners[e]
+        for k in range(pos.shape[1]):
+            progress[e, k] = 0.0
+            if not present[e, k]:
+                before[e, k, 0] = math.nan
+                continue
+            x, y, to_x, to_y = pos[e, k, 0], pos[e, k, 1], goal[e, k, 0], goal[e, k, 1]
+            is_new = before[e, k, 0] != to_x or before[e, k, 1] != to_y
+            if is_new:
+                before[e, k, 0], before[e, k, 1] = to_x, to_y
+                ways_to(to_x, to_y, here, n, corner[e], between[e], onward[e, k])
+            way = math.inf
+            if not crosses(x, y, to_x, to_y, here):
+                way = math.hypot(to_x - x, to_y - y)
+            else:
+                for j in range(n):
+                    u, v = corner[e, j, 0], corner[e, j, 1]
+                    whole = math.hypot(u - x, v - y) + onward[e, k, j]
+                    if whole < way and not crosses(x, y, u, v, here):
+                        way = whole
+            if way == math.inf:
+                # From a corner too tight for a way it is as far as it was; or there is none yet.
+                if is_new:
+                    before[e, k, 0] = math.nan
+                continue
+            if not is_new:
+                progress[e, k] = last[e, k] - way
+            last[e, k] = way
+
+
+@small_kernel
+def ways_to(x, y, boxes, n, corner, between, onward):
+    """Shortest ways from each of n corners to a point, into onward (corner) [m]."""
+    for i in range(n):
+        onward[i] = math.inf
+    for j in range(n):
+        if not crosses(corner[j, 0], corner[j, 1], x, y, boxes):
+            leg = math.hypot(x - corner[j, 0], y - corner[j, 1])
+            for i in range(n):
+                onward[i] = min(onward[i], between[i, j] + leg)

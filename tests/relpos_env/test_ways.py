@@ -1,0 +1,189 @@
+"""Ways round what stands in a room: the shortest there are, and what is paid for going along."""
+
+import numpy as np
+import pytest
+from scipy.sparse.csgraph import shortest_path
+
+from relpos_env.config import FormationConfig
+from relpos_env.formation import Formation
+from relpos_env.tasks._way_kernels import CLEAR, CORNER, WALL
+from relpos_env.tasks.ways import Ways
+
+HALF = (3.0, 2.5)
+WALL_ACROSS = np.array([[0.0, 0.0, 0.1, 1.0, 1.0, 0.0]])
+EVERYBODY = np.ones((1, 1), dtype=bool)
+
+
+def some_boxes(rng, n):
+    angle = rng.uniform(0.0, np.pi, n)
+    size = rng.uniform(0.1, 0.5, (n, 2))
+    turn = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return np.hstack([rng.uniform(-1.0, 1.0, (n, 2)) * [2.2, 1.7], size, turn])
+
+
+def within(points, box, margin):
+    """Which of the points are nearer to a box than that, along its sides."""
+    d = points - box[:2]
+    u, v = box[4] * d[:, 0] + box[5] * d[:, 1], box[4] * d[:, 1] - box[5] * d[:, 0]
+    return (np.abs(u) < box[2] + margin) & (np.abs(v) < box[3] + margin)
+
+
+def sees(a, b, boxes):
+    """Whether points along the line from a to b, 2 mm apart, are clear of the boxes."""
+    line = np.linspace(a, b, 2 + int(np.linalg.norm(b - a) / 0.002))
+    ends = line[[0, -1]]
+    margins = [0.0 if within(ends, box, CLEAR).any() else CLEAR for box in boxes]
+    return not any(within(line, box, m).any() for box, m in zip(boxes, margins, strict=True))
+
+
+def way_twin(start, goal, boxes):
+    """Length of the shortest way, from a graph of everything that can be seen."""
+    points = [start, goal]
+    for box in boxes:
+        turn = np.array([[box[4], box[5]], [-box[5], box[4]]])
+        for sign in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
+            corner = box[:2] + (np.array(sign) * (box[2:4] + CORNER)) @ turn
+            room = np.array(HALF) - WALL
+            if (np.abs(corner) <= room).all() and not any(
+                within(corner[None], other, CLEAR)[0] for other in boxes
+            ):
+                points.append(corner)
+    graph = np.zeros((len(points), len(points)))
+    for i, a in enumerate(points):
+        for j, b in enumerate(points[:i]):
+            graph[i, j] = np.linalg.norm(a - b) if sees(a, b, boxes) else 0.0
+    return shortest_path(graph, directed=False, indices=0)[1]
+
+
+def followed(boxes, goal, track):
+    """Progress of a single car along a track, (point)."""
+    ways = Ways(1, 1, HALF)
+    ways.lay(0, boxes)
+    gained = []
+    for point in track:
+        ways.follow(np.array([[point]]), EVERYBODY, np.array([[goal]]), 0, 1)
+        gained.append(ways.progress[0, 0])
+    return np.array(gained)
+
+
+def test_without_boxes_the_way_is_straight():
+    track = np.random.default_rng(0).uniform(-2.0, 2.0, (50, 2))
+    goal = np.array([0.5, -1.0])
+    distance = np.linalg.norm(track - goal, axis=1)
+    gained = followed(np.zeros((0, 6)), goal, track)
+    np.testing.assert_allclose(gained, [0.0, *(distance[:-1] - distance[1:])], atol=1e-12)
+    # Boxes of no size are not there.
+    np.testing.assert_array_equal(followed(np.zeros((3, 6)), goal, track), gained)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_ways_are_those_of_a_graph_of_all_that_is_seen(seed):
+    rng = np.random.default_rng(seed)
+    boxes = some_boxes(rng, 4)
+    goal = rng.uniform(-2.0, 2.0, 2)
+    track = rng.uniform(-2.0, 2.0, (12, 2))
+    ways = np.array([way_twin(point, goal, boxes) for point in track])
+    track, ways = track[np.isfinite(ways)], ways[np.isfinite(ways)]
+    gained = followed(boxes, goal, track)
+    np.testing.assert_allclose(gained[1:], ways[:-1] - ways[1:], atol=1e-9)
+    assert (ways >= np.linalg.norm(track - goal, axis=1) - 1e-12).all()
+
+
+def test_the_seeds_above_have_ways_that_bend():
+    bent = 0
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        boxes, goal = some_boxes(rng, 4), rng.uniform(-2.0, 2.0, 2)
+        bent += sum(not sees(p, goal, boxes) for p in rng.uniform(-2.0, 2.0, (12, 2)))
+    assert bent > 30
+
+
+def test_behind_a_wall_it_pays_to_leave_the_straight_line():
+    """From before the wall to its end: further off as the crow flies, nearer along the way."""
+    goal, start, corner = np.array([0.8, 0.0]), np.array([-0.5, 0.1]), np.array([-0.4, 1.3])
+    track = np.linspace(start, corner, 20)
+    gained = followed(WALL_ACROSS, goal, track)
+    assert (gained[1:] > 0.0).all()
+    assert np.linalg.norm(corner - goal) > np.linalg.norm(start - goal)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_is_gained_is_lost_on_the_way_back(seed):
+    rng = np.random.default_rng(seed)
+    boxes, goal = some_boxes(rng, 3), rng.uniform(-2.0, 2.0, 2)
+    there = np.cumsum(rng.normal(0.0, 0.1, (200, 2)), axis=0)
+    gained = followed(boxes, goal, [*there, *there[::-1]])
+    assert np.abs(gained).sum() > 1.0
+    assert gained.sum() == pytest.approx(0.0, abs=1e-9)
+
+
+def test_new_goals_absent_cars_and_places_out_of_reach_bring_nothing():
+    across = np.array([[0.0, 0.0, 0.1, 2.5, 1.0, 0.0]])  # from wall to wall
+    track = np.linspace([-2.0, 0.0], [-1.0, 0.5], 10)
+    assert not followed(across, np.array([1.0, 0.0]), track).any()
+    ways = Ways(2, 1, HALF)
+    ways.lay(0, WALL_ACROSS)
+    pos, goal = np.array([[[-1.0, 0.0], [-1.0, 0.0]]]), np.array([[[1.0, 0.0], [1.0, 0.0]]])
+    both, one = np.array([[True, True]]), np.array([[True, False]])
+    ways.follow(pos, both, goal, 0, 1)
+    ways.follow(pos + [0.0, 0.3], one, goal, 0, 1)
+    assert ways.progress[0, 0] > 0.0
+    assert ways.progress[0, 1] == 0.0
+    ways.follow(pos, both, goal, 0, 1)  # the second is back: it begins anew
+    assert ways.progress[0, 0] < 0.0
+    assert ways.progress[0, 1] == 0.0
+    ways.follow(pos + [0.0, 0.3], both, goal + [0.1, 0.0], 0, 1)
+    assert not ways.progress.any()
+
+
+def test_rooms_do_not_know_of_each_other():
+    """Also where one gets more boxes than there was room for."""
+    rng = np.random.default_rng(3)
+    layouts = [some_boxes(rng, n) for n in (2, 5, 3)]
+    goal = rng.uniform(-2.0, 2.0, (3, 1, 2))
+    tracks = rng.uniform(-2.0, 2.0, (6, 3, 1, 2))
+    together = Ways(1, 3, HALF)
+    present = np.ones((3, 1), dtype=bool)
+    together.lay(0, layouts[0])
+    together.follow(tracks[0], present, goal, 0, 1)
+    for env in (1, 2):
+        together.lay(env, layouts[env])
+        together.follow(tracks[0], present, goal, env, env + 1)
+    gained = []
+    for pos in tracks[1:]:
+        together.follow(pos, present, goal, 0, 3)
+        gained.append(together.progress[:, 0].copy())
+    for env, boxes in enumerate(layouts):
+        alone = followed(boxes, goal[env, 0], tracks[:, env, 0])
+        np.testing.assert_array_equal(np.array(gained)[:, env], alone[1:])
+
+
+def test_cars_that_gather_are_paid_for_it():
+    """The term of `hold` is what the cars came nearer, also where cars come and go."""
+    parts = FormationConfig(scenario="swarm-nlos", task="hold", max_cycles=300).resolve()
+    formation = Formation(parts, 2)
+    for env in range(2):
+        formation.seed(env, np.random.default_rng(env))
+        formation.begin(env)
+    task = formation.task
+    column = task.terms.index("progress")
+    assert not task.rewards[..., column].any()
+    twins = [Ways(parts.n_cars, 1, tuple(0.5 * np.array(parts.scenario.room))) for _ in range(2)]
+    gained = np.zeros(2)
+    rng = np.random.default_rng(0)
+    state = formation.state
+    for env, ways in enumerate(twins):
+        ways.lay(0, formation.loop.swarm.boxes[env])
+        here = slice(env, env + 1)
+        ways.follow(state.pos_w[here], state.present[here], task.goal_w[here], 0, 1)
+    for _ in range(150):
+        formation.step(
+            rng.uniform(-1, 1, (2, parts.n_cars)), rng.uniform(-0.4, 0.4, (2, parts.n_cars))
+        )
+        for env, ways in enumerate(twins):
+            here = slice(env, env + 1)
+            ways.follow(state.pos_w[here], state.present[here], task.goal_w[here], 0, 1)
+            np.testing.assert_array_equal(task.rewards[env, :, column], ways.progress[0])
+            gained[env] += np.abs(ways.progress).sum()
+    assert (gained > 1.0).all()
+    formation.close()
