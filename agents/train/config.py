@@ -9,7 +9,7 @@ from agents.settings import number
 
 MOST_SEED = 2147483647
 """Seeds have 31 bits."""
-FORMAT = 6
+FORMAT = 7
 """Version of the run folder; another one is refused."""
 
 
