@@ -138,7 +138,14 @@ def common_terms(env, accel, clear, present, collided, error, error_scale, rewar
 
 @small_kernel
 def time_term(env, present, done, rewards):
-    """The last reward term of tasks with an end: what a step costs until all is done."""
+    """The last reward term of tasks with an end: what a step costs until all is done.
+
+    Args:
+        env: Environment.
+        present: (env, car).
+        done: Whether this environment is through.
+        rewards: (env, car, term), written.
+    """
     for k in range(present.shape[1]):
         if present[env, k]:
             rewards[env, k, TIME] = 0.0 if done else -1.0

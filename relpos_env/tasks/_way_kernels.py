@@ -13,22 +13,17 @@ import math
 
 from tracking.compiled import kernel, small_kernel
 
-CORNER = 0.3
-"""[m] Corners of boxes are passed so far out, along both sides: as far as places are, see
-`anchor.CLEAR`."""
-CLEAR = 0.12
-"""[m] A way comes no nearer to a box: half the width of a car, and a little."""
-WALL = 0.2
-"""[m] Nor a corner of it to a wall: half the length of a car."""
+BERTH = 0.12
+"""[m] A way comes no nearer to a box or a wall, along their sides: half the width of a car, and a
+little. Cars may."""
+CORNER = 0.13
+"""[m] Corners of boxes are passed so far out, along both sides: hardly further, so that a way does
+not become another where it is seen past a corner."""
 
 
 @small_kernel
 def crosses(x_a, y_a, x_b, y_b, boxes):
-    """True if the line from a to b comes nearer than `CLEAR` to a box.
-
-    One that a or b is nearer to than that must not be crossed itself: who stands at a box may
-    leave it.
-    """
+    """True if the line from a to b comes nearer than `BERTH` to a box, or than a or b is to it."""
     for k in range(boxes.shape[0]):
         if boxes[k, 2] == 0.0:
             continue
@@ -37,9 +32,11 @@ def crosses(x_a, y_a, x_b, y_b, boxes):
         u_a, v_a = c * d_x + s * d_y, c * d_y - s * d_x
         d_x, d_y = x_b - boxes[k, 0], y_b - boxes[k, 1]
         u_b, v_b = c * d_x + s * d_y, c * d_y - s * d_x
-        half_u, half_v = boxes[k, 2] + CLEAR, boxes[k, 3] + CLEAR
-        if (abs(u_a) < half_u and abs(v_a) < half_v) or (abs(u_b) < half_u and abs(v_b) < half_v):
-            half_u, half_v = boxes[k, 2], boxes[k, 3]
+        # Who stands at a box may leave it: with a smaller berth there, not all at once with none.
+        from_a = max(abs(u_a) - boxes[k, 2], abs(v_a) - boxes[k, 3])
+        from_b = max(abs(u_b) - boxes[k, 2], abs(v_b) - boxes[k, 3])
+        berth = max(min(from_a, from_b, BERTH), 0.0)
+        half_u, half_v = boxes[k, 2] + berth, boxes[k, 3] + berth
         low_u, high_u = stretch_within(u_a, u_b, half_u)
         low_v, high_v = stretch_within(v_a, v_b, half_v)
         if min(high_u, high_v) - max(low_u, low_v) > 1e-9:
@@ -79,7 +76,7 @@ def lay_ways(boxes, half_x, half_y, corner, between):
             v = (boxes[k, 3] + CORNER) * (1.0 if side % 2 == 0 else -1.0)
             x = boxes[k, 0] + boxes[k, 4] * u - boxes[k, 5] * v
             y = boxes[k, 1] + boxes[k, 5] * u + boxes[k, 4] * v
-            if abs(x) > half_x - WALL or abs(y) > half_y - WALL or is_taken(x, y, boxes):
+            if abs(x) > half_x - BERTH or abs(y) > half_y - BERTH or is_taken(x, y, boxes):
                 continue
             corner[n, 0], corner[n, 1] = x, y
             n += 1
@@ -99,18 +96,18 @@ def lay_ways(boxes, half_x, half_y, corner, between):
 
 @small_kernel
 def is_taken(x, y, boxes):
-    """True if a point is nearer than `CLEAR` to a box, along its sides."""
+    """True if a point is nearer than `BERTH` to a box, along its sides."""
     n_near = 0
     for k in range(boxes.shape[0]):
         d_x, d_y = x - boxes[k, 0], y - boxes[k, 1]
         u = abs(boxes[k, 4] * d_x + boxes[k, 5] * d_y)
         v = abs(boxes[k, 4] * d_y - boxes[k, 5] * d_x)
-        n_near += boxes[k, 2] > 0.0 and u < boxes[k, 2] + CLEAR and v < boxes[k, 3] + CLEAR
+        n_near += boxes[k, 2] > 0.0 and u < boxes[k, 2] + BERTH and v < boxes[k, 3] + BERTH
     return n_near > 0
 
 
 @kernel
-def follow_ways(start, stop, pos, present, goal, boxes, map_, memory, progress):
+def follow_ways(start, stop, pos, present, goal, boxes, graph, memory, progress):
     """How much nearer every car has come to its goal, along the shortest way there.
 
     Args:
@@ -120,13 +117,13 @@ def follow_ways(start, stop, pos, present, goal, boxes, map_, memory, progress):
         present: (env, car).
         goal: (env, car, 2) [m].
         boxes: (env, box, 6).
-        map_: How many corners, (env); corners, (env, corner, 2) [m]; ways between them,
+        graph: How many corners, (env); corners, (env, corner, 2) [m]; ways between them,
             (env, corner, corner) [m].
         memory: Goals before, (env, car, 2) [m], NaN for none; ways to them from each corner,
             (env, car, corner) [m], and from the car, (env, car) [m]; updated.
         progress: (env, car) [m], written; 0 of a car whose goal is new or cannot be reached.
     """
-    n_corners, corner, between = map_
+    n_corners, corner, between = graph
     before, onward, last = memory
     for e in range(start, stop):
         here, n = boxes[e], n_corners[e]
@@ -150,7 +147,8 @@ def follow_ways(start, stop, pos, present, goal, boxes, map_, memory, progress):
                     if whole < way and not crosses(x, y, u, v, here):
                         way = whole
             if way == math.inf:
-                # From a corner too tight for a way it is as far as it was; or there is none yet.
+                # From a niche that no way leads out of it is as far as it was before; a car that
+                # begins in one has no way yet.
                 if is_new:
                     before[e, k, 0] = math.nan
                 continue

@@ -2,7 +2,7 @@
 
 All environments of a batch do the same task, each with cars of its own; a task says how a car
 gets a place (`begin`, `change`, rare, numpy) and how things follow from the time (`compute`,
-every step, one compiled call).
+every step, one compiled call). What has to be known of the step before is done in `update`.
 """
 
 from __future__ import annotations

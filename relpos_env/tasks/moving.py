@@ -21,8 +21,6 @@ PLACE_SCALE = 1.0
 """[m] Distance of the group's middle from its goals' at which the place term is exp(-1)."""
 TOLERANCE = 0.4
 """[m] As near to its place at the end a car has arrived: about its length."""
-PROGRESS = 5
-"""Number of the term of that name, which formations that stand have."""
 MARGIN = 0.3
 """[m] From the walls of the room to the places nearest to them."""
 
@@ -56,6 +54,10 @@ class Motion:
     stand: Stand | None = None
     """Where the frame may stand; None for one that is put by its curve alone."""
 
+    def __post_init__(self) -> None:
+        if self.stand is not None and self.curve.length > 0.0:
+            raise ValueError("stand: expected none of a frame that follows a curve")
+
 
 class MovingFormation(Task):
     """Cars with places in a moving frame."""
@@ -80,12 +82,13 @@ class MovingFormation(Task):
             led: The first present car has the first place.
             all_told: The plan is for all; else for the first present car alone.
         """
-        ends = motion.curve.length > 0.0 and not motion.curve.closed
-        self._ways = None if motion.stand is None else Ways(n_cars, n_envs, motion.stand.room)
-        if motion.stand is not None:
+        self._stand, self._ways = motion.stand, None
+        if self._stand is not None:
             terms = ("formation", "place", *COMMON_TERMS, "progress")
+            self._ways = Ways(n_cars, n_envs, self._stand.room)
         else:
-            terms = ("formation", "velocity", *COMMON_TERMS, *(("time",) if ends else ()))
+            ends = motion.curve.length > 0.0 and not motion.curve.closed
+            terms = ("formation", "velocity", *COMMON_TERMS, *(["time"] if ends else []))
         super().__init__(n_cars, n_envs, terms)
         self._formation, self._motion = formation, motion
         self._led, self._all_told = led, all_told
@@ -98,7 +101,7 @@ class MovingFormation(Task):
             float(curve.closed),
             float(motion.turning),
         )
-        place_scale = 0.0 if motion.stand is None else PLACE_SCALE
+        place_scale = 0.0 if self._stand is None else PLACE_SCALE
         self._limits = (float(motion.lookahead), TOLERANCE, ERROR_SCALE, place_scale)
         self._now = np.zeros(7)
 
@@ -109,7 +112,8 @@ class MovingFormation(Task):
         anchor, arc = np.zeros(2), 0.0
         if self._ways is not None:
             self._ways.lay(env, self._boxes[env])
-            anchor = self._free_anchor(env, middle, len(cars))
+        if self._stand is not None:
+            anchor = self._free_anchor(self._stand, env, middle, len(cars))
         elif motion.curve.length > 0.0 and motion.curve.closed:
             arc = float(motion.curve.nearest(pos[cars[0]] if self._led else middle))
         heading = 0.0 if motion.turning else motion.heading
@@ -121,17 +125,22 @@ class MovingFormation(Task):
 
         One that stands makes way where the places of so many would be in an obstacle.
         """
-        if self._motion.stand is not None:
-            self._frame[env, :2] = self._free_anchor(env, self._frame[env, :2], len(cars))
+        if self._stand is not None:
+            wanted = self._frame[env, :2]
+            self._frame[env, :2] = self._free_anchor(self._stand, env, wanted, len(cars))
         self._give(env, pos, cars, t)
 
     def update(self, state: Truth, t: F64, collided: F64, envs: slice) -> None:
-        """Write all arrays for now; cars that gather are also told how far they came."""
+        """Write all arrays for now; cars that gather are paid for coming nearer since before.
+
+        Not in `compute`, which is called twice where cars come or go.
+        """
         super().update(state, t, collided, envs)
         if self._ways is not None:
             start, stop = self._range(envs)
             self._ways.follow(state.pos_w, state.present, self.goal_w, start, stop)
-            self.rewards[start:stop, :, PROGRESS] = self._ways.progress[start:stop]
+            progress = self.rewards[..., self.terms.index("progress")]
+            progress[start:stop] = self._ways.progress[start:stop]
 
     def compute(self, state: Truth, t: F64, collided: F64, start: int, stop: int) -> int:
         """One compiled call."""
@@ -160,12 +169,11 @@ class MovingFormation(Task):
         )
         return n_changed
 
-    def _free_anchor(self, env: int, wanted: F64, n: int) -> F64:
+    def _free_anchor(self, stand: Stand, env: int, wanted: F64, n: int) -> F64:
         """Where a formation of n cars can stand, nearest to where it is wanted, (2) [m]."""
-        assert self._motion.stand is not None
         c, s = np.cos(self._motion.heading), np.sin(self._motion.heading)
         places = self._formation.places(n) @ np.array([[c, s], [-s, c]])
-        return free_anchor(wanted, np.array(self._motion.stand.half), places, self._boxes[env])
+        return free_anchor(wanted, np.array(stand.half), places, self._boxes[env])
 
     def _give(self, env: int, pos: F64, cars: I64, t: float) -> None:
         frame_now(env, t, self._frame, self._motion.curve.pieces, self._constants, self._now)

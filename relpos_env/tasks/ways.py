@@ -1,7 +1,8 @@
 """How far cars come along the shortest ways to their places, round what stands in the room.
 
-What a car gains by coming nearer it loses by going away again, so paying for it changes how fast a
-policy is found and not which one is best: it is the change of a potential [1].
+What a car gains by coming nearer it loses by going away again: it is the change of a potential, by
+which nothing is to be had in circles [1]. It is not discounted, as that theorem asks. To a learner
+who discounts by gamma it is a price of 1 - gamma times the way in every step, besides.
 
 References:
     [1] Ng, Harada and Russell, Policy invariance under reward transformations, ICML (1999).
@@ -54,7 +55,8 @@ class Ways:
     def follow(self, pos: F64, present: Bool, goal: F64, start: int, stop: int) -> None:
         """Write `progress` of the environments from start to stop.
 
-        It is 0 where the goal is another than before, and where no way leads to it.
+        It is 0 where the goal is another than before, and where no way leads to it; where there is
+        none for a while, what came of that while comes after it.
 
         Args:
             pos: (env, car, 2) [m].
@@ -74,8 +76,8 @@ class Ways:
         self._boxes = np.pad(self._boxes, ((0, 0), (0, more), (0, 0)))
         corner, between = np.zeros((n_envs, n, 2)), np.zeros((n_envs, n, n))
         onward = np.zeros((n_envs, n_cars, n))
-        if more < n_boxes:
-            old = n - 4 * more
+        old = n - 4 * more
+        if old > 0:
             corner[:, :old], between[:, :old, :old] = self._corner, self._between
             onward[..., :old] = self._onward
         self._corner: F64 = corner
