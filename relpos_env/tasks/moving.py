@@ -83,6 +83,7 @@ class MovingFormation(Task):
             all_told: The plan is for all; else for the first present car alone.
         """
         self._stand, self._ways = motion.stand, None
+        terms: tuple[str, ...]
         if self._stand is not None:
             terms = ("formation", "place", *COMMON_TERMS, "progress")
             self._ways = Ways(n_cars, n_envs, self._stand.room)

@@ -1,12 +1,15 @@
 """Ways round what stands in a room: the shortest there are, and what is paid for going along."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.sparse.csgraph import shortest_path
 
 from relpos_env.config import FormationConfig
 from relpos_env.formation import Formation
-from relpos_env.tasks._way_kernels import CLEAR, CORNER, WALL
+from relpos_env.tasks import make_task
+from relpos_env.tasks._way_kernels import BERTH, CORNER
 from relpos_env.tasks.ways import Ways
 
 HALF = (3.0, 2.5)
@@ -21,19 +24,21 @@ def some_boxes(rng, n):
     return np.hstack([rng.uniform(-1.0, 1.0, (n, 2)) * [2.2, 1.7], size, turn])
 
 
-def within(points, box, margin):
-    """Which of the points are nearer to a box than that, along its sides."""
+def gaps(points, box):
+    """How far points are from a box, along that of its sides where they are further."""
     d = points - box[:2]
     u, v = box[4] * d[:, 0] + box[5] * d[:, 1], box[4] * d[:, 1] - box[5] * d[:, 0]
-    return (np.abs(u) < box[2] + margin) & (np.abs(v) < box[3] + margin)
+    return np.maximum(np.abs(u) - box[2], np.abs(v) - box[3])
 
 
 def sees(a, b, boxes):
-    """Whether points along the line from a to b, 2 mm apart, are clear of the boxes."""
+    """Whether points along the line from a to b, 2 mm apart, are as clear of boxes as its ends."""
     line = np.linspace(a, b, 2 + int(np.linalg.norm(b - a) / 0.002))
-    ends = line[[0, -1]]
-    margins = [0.0 if within(ends, box, CLEAR).any() else CLEAR for box in boxes]
-    return not any(within(line, box, m).any() for box, m in zip(boxes, margins, strict=True))
+    for box in boxes:
+        gap = gaps(line, box)
+        if gap.min() < np.clip(min(gap[0], gap[-1]), 0.0, BERTH) - 1e-12:
+            return False
+    return True
 
 
 def way_twin(start, goal, boxes):
@@ -43,10 +48,8 @@ def way_twin(start, goal, boxes):
         turn = np.array([[box[4], box[5]], [-box[5], box[4]]])
         for sign in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
             corner = box[:2] + (np.array(sign) * (box[2:4] + CORNER)) @ turn
-            room = np.array(HALF) - WALL
-            if (np.abs(corner) <= room).all() and not any(
-                within(corner[None], other, CLEAR)[0] for other in boxes
-            ):
+            inside = (np.abs(corner) <= np.array(HALF) - BERTH).all()
+            if inside and all(gaps(corner[None], other)[0] >= BERTH for other in boxes):
                 points.append(corner)
     graph = np.zeros((len(points), len(points)))
     for i, a in enumerate(points):
@@ -98,9 +101,37 @@ def test_the_seeds_above_have_ways_that_bend():
     assert bent > 30
 
 
+@pytest.mark.parametrize("x", [-0.25, -0.6, -1.5])
+def test_by_a_small_step_the_way_gets_no_more_than_that_shorter(x):
+    """Past the end of a wall and past its berth, and where a slot is nearly too narrow."""
+    for goal in ([0.8, 0.0], [0.3, 0.9], [0.12, -0.4]):
+        track = np.stack([np.full(201, x), np.linspace(-2.0, 2.0, 201)], axis=1)
+        gained = followed(WALL_ACROSS, np.array(goal), track)
+        assert np.abs(gained).max() < 0.021
+        assert np.abs(gained).max() > 0.01
+    for slot in (0.25, 0.3, 0.4):
+        beside = np.array([[0.0, s * (1.0 + 0.5 * slot), 0.1, 1.0, 1.0, 0.0] for s in (1, -1)])
+        gained = followed(beside, np.array([0.8, 0.0]), track)
+        assert np.abs(gained).max() < 0.05
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_no_way_leads_between_a_box_and_a_wall_that_it_nearly_touches(axis):
+    """The way round the other end, also where this one is nearer."""
+    half = np.array(HALF)
+    goal, start, box = np.zeros(2), np.zeros(2), np.array([0.0, 0.0, 0.1, 0.1, 1.0, 0.0])
+    box[axis], box[2 + axis] = half[axis] - 1.2, 1.0  # 0.2 m from the wall
+    goal[axis] = start[axis] = half[axis] - 0.5
+    goal[1 - axis], start[1 - axis] = 0.6, -0.6
+    apart = start.copy()
+    apart[axis] -= 1.0
+    gained = followed(box[None], goal, [start, apart])
+    assert gained[1] > 0.9
+
+
 def test_behind_a_wall_it_pays_to_leave_the_straight_line():
     """From before the wall to its end: further off as the crow flies, nearer along the way."""
-    goal, start, corner = np.array([0.8, 0.0]), np.array([-0.5, 0.1]), np.array([-0.4, 1.3])
+    goal, start, corner = np.array([0.8, 0.0]), np.array([-0.5, 0.1]), np.array([-0.23, 1.13])
     track = np.linspace(start, corner, 20)
     gained = followed(WALL_ACROSS, goal, track)
     assert (gained[1:] > 0.0).all()
@@ -129,23 +160,51 @@ def test_new_goals_absent_cars_and_places_out_of_reach_bring_nothing():
     ways.follow(pos + [0.0, 0.3], one, goal, 0, 1)
     assert ways.progress[0, 0] > 0.0
     assert ways.progress[0, 1] == 0.0
-    ways.follow(pos, both, goal, 0, 1)  # the second is back: it begins anew
+    ways.follow(pos - [0.0, 0.2], both, goal, 0, 1)  # the second is back: it begins anew
     assert ways.progress[0, 0] < 0.0
     assert ways.progress[0, 1] == 0.0
-    ways.follow(pos + [0.0, 0.3], both, goal + [0.1, 0.0], 0, 1)
+    for other in ([0.1, 0.0], [0.0, 0.1]):
+        ways.follow(pos + [0.0, 0.3], both, goal + other, 0, 1)
+        assert not ways.progress.any()
+        ways.follow(pos, both, goal, 0, 1)
+        assert not ways.progress.any()
+    ways.lay(0, WALL_ACROSS)  # another episode, with the same goals
+    ways.follow(pos + [0.0, 0.3], both, goal, 0, 1)
     assert not ways.progress.any()
 
 
+def test_nothing_is_gained_where_no_way_leads_out():
+    """Into a pen and out of it again: the difference is paid when the car is out."""
+    pen = np.array(
+        [[*middle, *half, 1.0, 0.0] for middle, half in (
+            ([-1.0, 0.6], [0.6, 0.1]), ([-1.0, -0.6], [0.6, 0.1]),
+            ([-1.6, 0.0], [0.1, 0.6]), ([-0.4, 0.0], [0.1, 0.6]),
+        )]
+    )  # fmt: skip
+    goal, before, after = np.array([1.0, 0.0]), np.array([0.0, 0.0]), np.array([-2.0, 1.0])
+    inside = np.array([-1.0, 0.1])
+    gained = followed(pen, goal, [before, inside, inside + 0.1, after])
+    assert not gained[:3].any()
+    assert gained[3] == pytest.approx(way_twin(before, goal, pen) - way_twin(after, goal, pen))
+    assert not followed(pen, goal, [inside, before])[:2].any()
+
+
 def test_rooms_do_not_know_of_each_other():
-    """Also where one gets more boxes than there was room for."""
-    rng = np.random.default_rng(3)
+    """Also where one gets more boxes than there was room for, or fewer than before."""
+    rng = np.random.default_rng(8)
     layouts = [some_boxes(rng, n) for n in (2, 5, 3)]
     goal = rng.uniform(-2.0, 2.0, (3, 1, 2))
-    tracks = rng.uniform(-2.0, 2.0, (6, 3, 1, 2))
+    tracks = rng.uniform(-2.0, 2.0, (12, 3, 1, 2))
+    for env, boxes in enumerate(layouts):
+        points, to = tracks[:, env, 0], goal[env, 0]
+        ways = np.array([way_twin(p, to, boxes) for p in points])
+        assert np.isfinite(ways).sum() >= 10
+        assert sum(not sees(p, to, boxes) for p in points) >= 2
     together = Ways(1, 3, HALF)
     present = np.ones((3, 1), dtype=bool)
     together.lay(0, layouts[0])
     together.follow(tracks[0], present, goal, 0, 1)
+    together.lay(2, layouts[1])
     for env in (1, 2):
         together.lay(env, layouts[env])
         together.follow(tracks[0], present, goal, env, env + 1)
@@ -187,3 +246,26 @@ def test_cars_that_gather_are_paid_for_it():
             gained[env] += np.abs(ways.progress).sum()
     assert (gained > 1.0).all()
     formation.close()
+
+
+def test_an_update_of_some_rooms_takes_nothing_from_others():
+    rng = np.random.default_rng(5)
+    pos = rng.uniform(-2.0, 2.0, (2, 3, 2))
+    present, nothing = np.ones((2, 3), dtype=bool), np.zeros((2, 3))
+
+    def truth(at):
+        still = np.zeros((2, 3, 2))
+        return SimpleNamespace(
+            pos_w=at, vel_w=still, accel_w=still, clearance=nothing + 1.0, present=present
+        )
+
+    task, twin = (make_task("hold", 3, 2, (9.0, 8.0)) for _ in range(2))
+    for one in (task, twin):
+        one.reset(truth(pos), slice(None))
+        one.update(truth(pos), np.zeros(2), nothing, slice(None))
+    moved = truth(pos + 0.2)
+    task.update(moved, np.zeros(2), nothing, slice(0, 1))
+    task.update(moved, np.zeros(2), nothing, slice(1, 2))
+    twin.update(moved, np.zeros(2), nothing, slice(None))
+    assert np.abs(twin.rewards[..., 5]).min() > 0.0
+    np.testing.assert_array_equal(task.rewards, twin.rewards)
