@@ -208,13 +208,17 @@ def test_rooms_do_not_know_of_each_other():
     for env in (1, 2):
         together.lay(env, layouts[env])
         together.follow(tracks[0], present, goal, env, env + 1)
-    gained = []
-    for pos in tracks[1:]:
-        together.follow(pos, present, goal, 0, 3)
-        gained.append(together.progress[:, 0].copy())
+    others = rng.uniform(-2.0, 2.0, (3, 1, 2))
+    gained = np.zeros((2, len(tracks), 3))
+    for k, to in enumerate((goal, others)):
+        for n, pos in enumerate(tracks):
+            together.follow(pos, present, to, 0, 3)
+            gained[k, n] = together.progress[:, 0]
     for env, boxes in enumerate(layouts):
-        alone = followed(boxes, goal[env, 0], tracks[:, env, 0])
-        np.testing.assert_array_equal(np.array(gained)[:, env], alone[1:])
+        for k, to in enumerate((goal, others)):
+            alone = followed(boxes, to[env, 0], tracks[:, env, 0])
+            np.testing.assert_array_equal(gained[k, :, env], alone)
+            assert np.abs(alone).sum() > 1.0
 
 
 def test_cars_that_gather_are_paid_for_it():
