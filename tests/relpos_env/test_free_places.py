@@ -7,6 +7,8 @@ from agents.compare.simulated import Simulated
 from relpos_env.config import FormationConfig
 from relpos_env.scenarios.overlap import distance
 from relpos_env.tasks.anchor import CLEAR, STEP, free_anchor
+from relpos_env.tasks.curves import make_curve
+from relpos_env.tasks.moving import Motion, Stand
 
 SQUARE = 0.5 * np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]])
 BOX = np.array([[0.5, 0.5, 0.2, 0.2, 1.0, 0.0]])
@@ -64,3 +66,10 @@ def test_no_place_of_a_standing_formation_is_in_an_obstacle(scenario):
     expected = np.where(formation.state.present, np.exp(-place)[:, None], 0.0)
     np.testing.assert_allclose(term, expected)
     running.close()
+
+
+def test_a_frame_that_follows_a_curve_does_not_stand():
+    curve = make_curve("loop", True, np.array([3.0, 3.0]), np.array([0.5, 0.5]))
+    stand = Stand(half=(1.0, 1.0), room=(3.0, 3.0))
+    with pytest.raises(ValueError, match="stand: expected none"):
+        Motion(curve=curve, stand=stand)
