@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 
+from relpos_env.sensors.radio._occlusion_kernels import crosses_box
 from tracking.compiled import kernel, small_kernel
 
 BERTH = 0.12
@@ -19,6 +20,8 @@ little. Cars may."""
 CORNER = 0.13
 """[m] Corners of boxes are passed so far out, along both sides: hardly further, so that a way does
 not become another where it is seen past a corner."""
+HAIR = 1e-9
+"""[m] Who stands as near to a box as a line may pass does not cross it."""
 
 
 @small_kernel
@@ -27,30 +30,18 @@ def crosses(x_a, y_a, x_b, y_b, boxes):
     for k in range(boxes.shape[0]):
         if boxes[k, 2] == 0.0:
             continue
-        c, s = boxes[k, 4], boxes[k, 5]
-        d_x, d_y = x_a - boxes[k, 0], y_a - boxes[k, 1]
-        u_a, v_a = c * d_x + s * d_y, c * d_y - s * d_x
-        d_x, d_y = x_b - boxes[k, 0], y_b - boxes[k, 1]
-        u_b, v_b = c * d_x + s * d_y, c * d_y - s * d_x
         # Who stands at a box may leave it: with a smaller berth there, not all at once with none.
-        from_a = max(abs(u_a) - boxes[k, 2], abs(v_a) - boxes[k, 3])
-        from_b = max(abs(u_b) - boxes[k, 2], abs(v_b) - boxes[k, 3])
-        berth = max(min(from_a, from_b, BERTH), 0.0)
-        half_u, half_v = boxes[k, 2] + berth, boxes[k, 3] + berth
-        low_u, high_u = stretch_within(u_a, u_b, half_u)
-        low_v, high_v = stretch_within(v_a, v_b, half_v)
-        if min(high_u, high_v) - max(low_u, low_v) > 1e-9:
+        berth = min(gap(x_a, y_a, boxes[k]), gap(x_b, y_b, boxes[k]), BERTH)
+        if crosses_box(x_a, y_a, x_b, y_b, boxes[k], max(berth, 0.0) - HAIR):
             return True
     return False
 
 
 @small_kernel
-def stretch_within(a, b, half):
-    """Between which shares of the way from a to b, of 0 to 1, a number is within -half to half."""
-    if a == b:
-        return (0.0, 1.0) if abs(a) < half else (1.0, 0.0)
-    one, other = (-half - a) / (b - a), (half - a) / (b - a)
-    return max(min(one, other), 0.0), min(max(one, other), 1.0)
+def gap(x, y, box):
+    """How far a point is from a box, along that of its sides where it is further [m]."""
+    d_x, d_y, c, s = x - box[0], y - box[1], box[4], box[5]
+    return max(abs(c * d_x + s * d_y) - box[2], abs(c * d_y - s * d_x) - box[3])
 
 
 @kernel
@@ -99,10 +90,7 @@ def is_taken(x, y, boxes):
     """True if a point is nearer than `BERTH` to a box, along its sides."""
     n_near = 0
     for k in range(boxes.shape[0]):
-        d_x, d_y = x - boxes[k, 0], y - boxes[k, 1]
-        u = abs(boxes[k, 4] * d_x + boxes[k, 5] * d_y)
-        v = abs(boxes[k, 4] * d_y - boxes[k, 5] * d_x)
-        n_near += boxes[k, 2] > 0.0 and u < boxes[k, 2] + BERTH and v < boxes[k, 3] + BERTH
+        n_near += boxes[k, 2] > 0.0 and gap(x, y, boxes[k]) < BERTH
     return n_near > 0
 
 

@@ -308,7 +308,7 @@ def test_boxes_hide_what_points_along_the_line_say(a, b, centre, width, depth, a
     # How far each point is outside the box along the axis where it is farthest.
     outside = np.maximum(np.abs(points @ [c, s]) - width, np.abs(points @ [-s, c]) - depth).min()
     spacing = 0.001 * np.linalg.norm(np.subtract(b, a)[:2])
-    hidden = crosses_box(a[0], a[1], b[0], b[1], box)
+    hidden = crosses_box(a[0], a[1], b[0], b[1], box, 0.0)
     if outside < -1e-9:
         assert hidden
     if outside > 0.5 * spacing + 1e-9:

@@ -8,7 +8,7 @@ from tracking.compiled import kernel, small_kernel
 
 
 @small_kernel
-def crosses_box(ax, ay, bx, by, box):
+def crosses_box(ax, ay, bx, by, box, berth):
     """Whether the line from a to b in the plane passes through a box.
 
     Args:
@@ -17,10 +17,11 @@ def crosses_box(ax, ay, bx, by, box):
         bx: Its other end [m].
         by: Likewise.
         box: Centre x y [m], half width, half depth [m], cosine and sine of its angle.
+        berth: How much larger the box is taken on all sides [m].
     """
     x, y, dx, dy = ax - box[0], ay - box[1], bx - ax, by - ay
     # Most boxes are nowhere near: how far the line passes their centre, times its length.
-    across, half2 = x * dy - y * dx, box[2] * box[2] + box[3] * box[3]
+    across, half2 = x * dy - y * dx, (box[2] + berth) ** 2 + (box[3] + berth) ** 2
     if across * across > half2 * (dx * dx + dy * dy):
         return False
     c, s = box[4], box[5]
@@ -30,7 +31,7 @@ def crosses_box(ax, ay, bx, by, box):
             start, step = c * x + s * y, c * dx + s * dy
         else:
             start, step = c * y - s * x, c * dy - s * dx
-        half = box[2 + axis]
+        half = box[2 + axis] + berth
         if abs(step) < 1e-12:
             if abs(start) > half:
                 return False
@@ -86,5 +87,5 @@ def pairs_cross_boxes(pos, boxes, sight):
         for b in range(pos.shape[0]):
             sight[a, b] = True
             for k in range(boxes.shape[0]):
-                if crosses_box(pos[a, 0], pos[a, 1], pos[b, 0], pos[b, 1], boxes[k]):
+                if crosses_box(pos[a, 0], pos[a, 1], pos[b, 0], pos[b, 1], boxes[k], 0.0):
                     sight[a, b] = False

@@ -100,7 +100,7 @@ def receive(
         return False
     nlos = False
     for k in range(boxes.shape[0]):
-        if crosses_box(ax, ay, bx, by, boxes[k]):
+        if crosses_box(ax, ay, bx, by, boxes[k], 0.0):
             nlos = True
             break
     for k in range(capsules.shape[0]):
