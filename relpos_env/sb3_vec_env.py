@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from relpos_env.interface.observations import space_of
 from relpos_env.interface.observations.base import F32
 from relpos_env.render.film import Film, check_render_mode
 from relpos_env.sb3_seats import SharedSeats
+from relpos_env.tasks import reward_weights
 from relpos_env.tasks.options import flag
 from tracking.arrays import F64, Bool
 
@@ -88,6 +89,18 @@ class FormationVecEnv(SharedSeats):
         """
         cycles = self.formation.cycles
         cycles[:] = rng.integers(0, self._parts.config.max_cycles, len(cycles))
+
+    def reweigh(self, weights: Mapping[str, float]) -> None:
+        """Let reward terms count by other weights from the next step on.
+
+        Args:
+            weights: By term; those that are not named count as the task has it.
+
+        Raises:
+            EnvError: No term of that name, or a weight that is not finite.
+        """
+        terms = self.formation.task.terms
+        self.formation.weights[:] = reward_weights(self._parts.config.task, terms, weights)
 
     def reset(self) -> F32:
         """Begin an episode in every environment; observations, (seat, size)."""

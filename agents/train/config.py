@@ -9,7 +9,7 @@ from agents.settings import number
 
 MOST_SEED = 2147483647
 """Seeds have 31 bits."""
-FORMAT = 7
+FORMAT = 8
 """Version of the run folder; another one is refused."""
 
 
@@ -37,6 +37,10 @@ class EnvSetup:
     """[s] Length of an episode."""
     weights: tuple[str, ...] = ("collision=5",)
     """Weights of reward terms that differ from the task's own, TERM=WEIGHT."""
+    final_weights: tuple[str, ...] = ()
+    """Weights that differ from those in the end, TERM=WEIGHT: they go there while a quarter to half
+    of the run is done. Policies are judged by these. What helps to find out how to drive need not
+    be what driving is for, and care may cost more once there is something to lose."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,7 +13,11 @@ from agents.train.config import MOST_SEED, TrainConfig
 from agents.train.rooms import Rooms
 from relpos_env.config import FormationConfig, Parts
 from relpos_env.sb3_vec_env import FormationVecEnv
+from relpos_env.tasks import DEFAULT_WEIGHTS
 from relpos_env.timing import DECISION
+
+CHANGE = (0.25, 0.5)
+"""[-] Shares of the run between which weights of reward terms go to their final values."""
 
 
 def layout_of(config: TrainConfig) -> Layout:
@@ -22,8 +26,17 @@ def layout_of(config: TrainConfig) -> Layout:
     return Layout(env.observation, env.cars, env.history, env.proximity)
 
 
-def env_arguments(config: TrainConfig, scenario: str, level: int | None) -> dict[str, Any]:
-    """Arguments of the environments of one scenario, with as many slots as it has cars."""
+def env_arguments(
+    config: TrainConfig, scenario: str, level: int | None, done: float = 1.0
+) -> dict[str, Any]:
+    """Arguments of the environments of one scenario, with as many slots as it has cars.
+
+    Args:
+        config: Of the run.
+        scenario: Name or TOML file.
+        level: Of the curriculum; None for what the scenario says.
+        done: Share of the run, on which the weights of reward terms depend.
+    """
     env = config.env
     return {
         "scenario": Path(scenario) if scenario.endswith(".toml") else scenario,
@@ -31,13 +44,30 @@ def env_arguments(config: TrainConfig, scenario: str, level: int | None) -> dict
         "level": level,
         "observation": env.observation,
         "history": env.history,
-        "weights": _weights(env.weights),
+        "weights": weights_of(config, done),
         "proximity": env.proximity,
         "max_cycles": round(env.seconds / DECISION),
     }
 
 
-def _weights(given: tuple[str, ...]) -> dict[str, float]:
+def weights_of(config: TrainConfig, done: float) -> dict[str, float]:
+    """Weights of reward terms by name when such a share of the run is done.
+
+    Raises:
+        UsageError: One is not TERM=WEIGHT.
+    """
+    env = config.env
+    first, final = _weights("weights", env.weights), _weights("final-weights", env.final_weights)
+    known = DEFAULT_WEIGHTS.get(env.task, {})
+    gone = min(max((done - CHANGE[0]) / (CHANGE[1] - CHANGE[0]), 0.0), 1.0)
+    moving = {
+        term: (1.0 - gone) * first.get(term, known.get(term, 0.0)) + gone * weight
+        for term, weight in final.items()
+    }
+    return first | moving
+
+
+def _weights(option: str, given: tuple[str, ...]) -> dict[str, float]:
     """Weights by term.
 
     Raises:
@@ -49,7 +79,7 @@ def _weights(given: tuple[str, ...]) -> dict[str, float]:
         try:
             weights[term] = float(weight)
         except ValueError as error:
-            raise UsageError(f"--weights: expected TERM=WEIGHT,..., got {text!r}") from error
+            raise UsageError(f"--{option}: expected TERM=WEIGHT,..., got {text!r}") from error
     return weights
 
 
@@ -125,7 +155,7 @@ def make_rooms(config: TrainConfig, level: int | None) -> Rooms:
             n,
             threads=1 if whole else min(config.threads, n),
             with_truth=config.net.critic == "central",
-            **env_arguments(config, scenario, level),
+            **env_arguments(config, scenario, level, done=0.0),
         )
         for scenario, n in zip(scenarios, shares(config.ppo.envs, len(scenarios)), strict=True)
     ]

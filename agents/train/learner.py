@@ -14,7 +14,7 @@ from stable_baselines3.common.utils import set_random_seed
 
 from agents.train.buffer import SwarmRolloutBuffer
 from agents.train.config import TrainConfig
-from agents.train.environments import layout_of
+from agents.train.environments import layout_of, weights_of
 from agents.train.hyperbolic import Tanh
 from agents.train.network import SwarmPolicy
 from agents.train.rooms import Rooms, observation_space
@@ -107,7 +107,9 @@ def run_leg(model: PPO, config: TrainConfig, leg: int) -> None:
 def learn(model: PPO, config: TrainConfig) -> None:
     """Learn for the updates of a leg, from where the episodes are."""
     frames = config.leg * config.ppo.steps * model.n_envs
-    callbacks = [_Threads(config.threads), _Noise(config)]
+    callbacks: list[BaseCallback] = [_Threads(config.threads), _Noise(config)]
+    if config.env.final_weights:
+        callbacks.append(_Weights(config))
     model.learn(frames, callbacks, reset_num_timesteps=False, log_interval=config.leg)
 
 
@@ -152,6 +154,21 @@ class _Noise(BaseCallback):  # type: ignore[misc]
             with torch.no_grad():
                 most = net.log_std + fallen * (net.final_log_std - net.log_std)
                 self.model.policy.log_std.clamp_(max=most)
+
+    def _on_step(self) -> bool:
+        return True
+
+
+class _Weights(BaseCallback):  # type: ignore[misc]
+    """Takes the weights of reward terms to their final values along the run."""
+
+    def __init__(self, config: TrainConfig) -> None:
+        super().__init__()
+        self._config = config
+
+    def _on_rollout_start(self) -> None:
+        done = share_done(self._config, self.model.num_timesteps)
+        self.model.env.reweigh(weights_of(self._config, done))
 
     def _on_step(self) -> bool:
         return True

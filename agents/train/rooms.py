@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import chain
@@ -68,6 +68,11 @@ class Rooms(SharedSeats):
             for part in self.parts:
                 part.seed(int(self._rng.integers(1 << 30)))
         return [seed] * self.num_envs
+
+    def reweigh(self, weights: Mapping[str, float]) -> None:
+        """Let reward terms count by these weights from the next step on, others by the task's."""
+        for part in self.parts:
+            part.reweigh(weights)
 
     def reset(self) -> F32:
         """Begin episodes everywhere; observations, (seat, size)."""

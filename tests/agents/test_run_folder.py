@@ -45,9 +45,9 @@ def test_a_full_disk_leaves_the_last_good_checkpoint(run, tmp_path, monkeypatch)
 BAD_CONFIG = [
     ("not json", "damaged"),
     ("[]", "format None"),
-    ('{"format": 6, "config": {}}', "format 6, expected 7"),
-    ('{"format": 7, "config": {}}', "missing field"),
-    ('{"format": 7, "config": {"speed": 1}}', "unknown field 'speed'"),
+    ('{"format": 7, "config": {}}', "format 7, expected 8"),
+    ('{"format": 8, "config": {}}', "missing field"),
+    ('{"format": 8, "config": {"speed": 1}}', "unknown field 'speed'"),
 ]
 
 

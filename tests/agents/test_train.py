@@ -28,6 +28,7 @@ from agents.train.environments import (
     layout_of,
     make_rooms,
     shares,
+    weights_of,
 )
 from agents.train.evaluation import Evaluation
 from agents.train.export import export_policy, read_results
@@ -89,6 +90,45 @@ def test_the_noise_of_actions_falls_to_what_is_asked(run, tmp_path):
     free = weights(tmp_path / "left")["policy.log_std"]
     assert (weights(run.folder)["policy.log_std"] < -2.2).all()
     assert (free > -1.1).all()
+
+
+def test_weights_of_rewards_go_to_their_final_values_along_the_run(tmp_path):
+    config = small(
+        task="hold", weights="collision=8", final_weights="progress=0,collision=12", levels=""
+    )
+    assert weights_of(config, 0.0) == {"collision": 8.0, "progress": 5.0}
+    assert weights_of(config, 0.375) == pytest.approx({"collision": 10.0, "progress": 2.5})
+    assert weights_of(config, 1.0) == {"collision": 12.0, "progress": 0.0}
+    # Policies are judged by the last, wherever they are.
+    assert dict(check_environments(config)[0].config.weights) == weights_of(config, 1.0)
+    whole = train(config, tmp_path / "whole")
+    seen = []
+
+    class Stop(Exception):
+        pass
+
+    def stop(share, row):
+        seen.append(share)
+        raise Stop
+
+    with pytest.raises(Stop):
+        train(config, tmp_path / "run", progress=stop)
+    train(None, tmp_path / "run")
+    assert same(weights(whole.folder), weights(tmp_path / "run"))
+    train(small(task="hold", weights="collision=8", levels=""), tmp_path / "fixed")
+    assert not same(weights(whole.folder), weights(tmp_path / "fixed"))
+
+
+def test_rewards_count_by_the_weights_of_the_moment():
+    rooms = make_rooms(small(weights="collision=8", final_weights="collision=12"), None)
+    rooms.reset()
+    term = rooms.parts[0].formation.task.terms.index("collision")
+    assert all(part.formation.weights[term] == 8.0 for part in rooms.parts)
+    rooms.reweigh({"collision": 11.0})
+    assert all(part.formation.weights[term] == 11.0 for part in rooms.parts)
+    with pytest.raises(EnvError, match="joy"):
+        rooms.reweigh({"joy": 1.0})
+    rooms.close()
 
 
 def test_the_best_policy_is_best_in_all_scenarios_together():
@@ -325,6 +365,7 @@ def test_a_task_that_is_done_ends_an_episode_of_the_evaluation():
             "levels": st.lists(st.integers(0, 4), max_size=3).map(lambda n: ",".join(map(str, n))),
             "critic": st.sampled_from(["own", "central"]),
             "weights": st.sampled_from(["collision=5", "collision=8,place=0"]),
+            "final_weights": st.sampled_from(["", "collision=12"]),
         },
     )
 )
