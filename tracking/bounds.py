@@ -75,7 +75,8 @@ def posterior_bound(
     if len(log.truth.t) == 0:
         raise LogError("truth: expected a log with truth, a bound is taken along the true motion")
     constellation, d = log.constellation, log.constellation.dimensions
-    block = Orientation(constellation, orientation or OrientationParams()).step(log.block)
+    params_q = orientation or OrientationParams()
+    block = Orientation(constellation, params_q, follows_bias=True).step(log.block)
     is_range = block.kind[0] == Kind.RANGE
     hidden = np.zeros(block.n_events, dtype=bool)
     if log.nlos is not None:

@@ -13,6 +13,7 @@ from tracking.errors import ConfigError
 
 VEHICLES = ("car", "human", "drone", "hand", "robot", "none")
 WHEELED = ("car", "robot")
+CARRIED = ("hand", "drone", "none")
 """Vehicles that stay level and accelerate for seconds on end."""
 
 

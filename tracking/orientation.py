@@ -55,9 +55,14 @@ class Orientation:
     """
 
     def __init__(
-        self, constellation: Constellation, params: OrientationParams, n_envs: int = 1
+        self,
+        constellation: Constellation,
+        params: OrientationParams,
+        n_envs: int = 1,
+        *,
+        follows_bias: bool = False,
     ) -> None:
-        self.coefficients = make_coefficients(constellation, params)
+        self.coefficients = make_coefficients(constellation, params, follows_bias=follows_bias)
         """Constants of the kernels."""
         self.state = make_state(n_envs, constellation.n_nodes)
         """Everything that evolves, arrays over (env, node, ...)."""

@@ -21,7 +21,7 @@ from tracking._orientation_kernels import N_NODE, forget
 from tracking._rest_kernels import N_REST, REST_TAU
 from tracking._vqf_kernels import N_TILT
 from tracking.arrays import F64, Bool
-from tracking.constellation import WHEELED, Constellation
+from tracking.constellation import CARRIED, WHEELED, Constellation
 from tracking.geometry import GRAVITY
 
 
@@ -31,9 +31,10 @@ class OrientationParams:
 
     tau_acc: float = 3.0
     """[s] VQF's accelerometer time constant. Longer trusts the gyroscope more. VQF default."""
-    tau_acc_wheeled: float = 30.0
-    """[s] The same on cars and robots, which accelerate sideways for seconds in every turn: a
-    short time constant takes that for tilt and turns the acceleration by tens of degrees."""
+    tau_acc_curves: float = 30.0
+    """[s] The same on what accelerates sideways for seconds in every curve: cars and robots, and
+    for filters that follow slow errors drones and what is carried in a hand. A short time constant
+    takes that for tilt, and so it is missing in the acceleration."""
     tau_mag: float = 9.0
     """[s] VQF's magnetometer time constant. VQF default."""
     max_gap: float = 0.5
@@ -120,9 +121,14 @@ def make_state(n_envs: int, n_nodes: int) -> OrientationState:
 
 
 def make_coefficients(
-    constellation: Constellation, params: OrientationParams
+    constellation: Constellation, params: OrientationParams, *, follows_bias: bool = False
 ) -> OrientationCoefficients:
     """Derive the constants of the kernels.
+
+    Args:
+        constellation: The nodes.
+        params: What is believed.
+        follows_bias: As of `Filter.follows_bias`.
 
     The noises of the gyroscope's bias are the defaults of VQF: a drift of 0.1 deg/s in 100 s,
     and steady states of 0.1 deg/s in motion and 0.03 deg/s at rest.
@@ -130,8 +136,9 @@ def make_coefficients(
     nodes = constellation.nodes
     dt = np.array([1.0 / node.imu_hz for node in nodes])
     mag_dt = np.array([1.0 / (node.mag_hz or node.imu_hz) for node in nodes])
+    curved = WHEELED + (CARRIED if follows_bias else ())
     tau_acc = [
-        params.tau_acc_wheeled if node.vehicle in WHEELED else params.tau_acc for node in nodes
+        params.tau_acc_curves if node.vehicle in curved else params.tau_acc for node in nodes
     ]
     drift_var = 10.0**2 * dt / 100.0
     motion_var = 10.0**4 / drift_var + 10.0**2

@@ -53,8 +53,10 @@ class Tracker:
         params = params or TrackerParams()
         self.constellation = constellation
         self.n_envs = n_envs
-        self._orientation = Orientation(constellation, params.orientation, n_envs)
         self._filter = filter_builder(filter)(constellation, params.filter, n_envs)
+        self._orientation = Orientation(
+            constellation, params.orientation, n_envs, follows_bias=self._filter.follows_bias
+        )
 
     def step(self, block: MeasurementBlock, t: F64 | float) -> TeamEstimate:
         """Handle a block and report at one time.

@@ -19,6 +19,10 @@ class Filter(Protocol):
     uninterrupted.
     """
 
+    follows_bias: bool
+    """True if slow errors of the accelerations are among its states: tilts may then err for long,
+    and need not be corrected by what is gravity only in the mean."""
+
     def run(self, block: MeasurementBlock, t_out: F64) -> TeamEstimate:
         """Handle the events and report at the given times.
 

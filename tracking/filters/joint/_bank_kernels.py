@@ -19,6 +19,7 @@ from tracking.filters.joint._agreement_kernels import are_same, turn_between
 from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_hypothesis
 from tracking.filters.joint._flatness_kernels import flatness, least_axis, scatter_of
 from tracking.filters.joint._linear_kernels import decouple
+from tracking.filters.joint._open_kernels import doubt_turn
 from tracking.filters.joint._sample_kernels import decay
 from tracking.filters.joint._sleep_kernels import TIE, turn_all_ways
 from tracking.filters.joint._start_kernels import begin_pair, forget_fits
@@ -61,7 +62,8 @@ def watch_rotation(c, s, layout, dt):
     group = s.group[0]
     group.strain += (1.0 - decay(dt / STRAIN_TAU)) * (group.misfit - group.strain)
     group.strain_limit += (1.0 - decay(dt / LIMIT_TAU)) * (c.strained - group.strain_limit)
-    if group.n_alive != 1 or group.asleep or group.strain < group.strain_limit:
+    watched = group.n_alive == 1 and not (group.asleep or group.open)
+    if not watched or group.strain < group.strain_limit:
         return
     n_doubted = 0
     for i in range(s.nodes.shape[0]):
@@ -70,10 +72,13 @@ def watch_rotation(c, s, layout, dt):
     if n_doubted == 1:
         return
     h = group.best
-    if flatness(c, s, h) == np.inf:
+    if flatness(c, s, h, True) == np.inf:
         return
     group.strain_limit = RAISED * max(group.strain, group.strain_limit)
     group.strain = 0.0
+    if c.d == 3:
+        doubt_turn(c, s, h)
+        return
     for i in range(s.nodes.shape[0]):
         node = s.nodes[i]
         if node.present and not node.static:
@@ -93,11 +98,11 @@ def watch_rotation(c, s, layout, dt):
 def watch_mirror(c, s):
     """Bring the mirror image up where it can no longer be excluded."""
     group = s.group[0]
-    if group.n_alive != 1 or group.asleep:
+    if group.n_alive != 1 or group.asleep or group.open:
         return
-    ratio = flatness(c, s, group.best)
+    ratio = flatness(c, s, group.best, True)
     if ratio < FLAT:
-        group.flat = True
+        group.flat = group.flat or flatness(c, s, group.best, False) < FLAT
     elif group.flat and ratio > OPEN:
         group.flat = False
         add_mirror_image(c, s)
@@ -176,21 +181,21 @@ def remove_node(c, s, layout, i):
         if s.alive[h]:
             for r in range(node.at_p, node.at_p + (c.d if node.static else 2 * c.d)):
                 s.moved[h, r] = 0.0
-                decouple(s.x, s.P, h, c.n, r, 1.0)
+                decouple(s, h, c.n, r, 1.0)
             for r in range(node.at_b, node.at_b + (0 if node.static else c.d + 1)):
-                decouple(s.x, s.P, h, c.n, r, 1.0)
+                decouple(s, h, c.n, r, 1.0)
             for k in range(s.nodes.shape[0]):
                 at = s.pairs[layout.pair_index[i, k]].at_e if k != i else -1
                 if at >= 0:
-                    decouple(s.x, s.P, h, c.n, at, 1.0)
-                    decouple(s.x, s.P, h, c.n, at + 1, 1.0)
+                    decouple(s, h, c.n, at, 1.0)
+                    decouple(s, h, c.n, at + 1, 1.0)
     if n_present < 2:
         for k in range(s.nodes.shape[0]):
             s.nodes[k].present, s.nodes[k].heard = False, False
             s.nodes[k].astray, s.nodes[k].doubted = 0.0, False
         s.alive[:] = False
         s.group[0].n_alive = 0
-        s.group[0].started = False
+        s.group[0].started, s.group[0].open = False, False
 
 
 @kernel

@@ -11,6 +11,7 @@ import math
 
 from tracking.compiled import small_kernel
 from tracking.filters.joint._linear_kernels import absorb, project, settle, symmetrise
+from tracking.filters.joint._open_kernels import tell_turn, turn_gradient
 from tracking.filters.joint._sleep_kernels import rests
 
 CENTRE_VAR = 1.0
@@ -36,6 +37,8 @@ def apply_carriers(c, s, h, t, dt, scratch):
         if rests(c, node, t):
             for k in range(c.d):
                 scratch.idx[0], scratch.val[0] = node.at_v + k, 1.0
+                if s.group[0].open:
+                    scratch.direct[:] = 0.0
                 judge(c, s, h, -s.x[h, node.at_v + k], 1, c.rest_var, scratch)
         elif node.sideways_var > 0.0:
             hold_on_wheels(c, s, h, i, scratch)
@@ -46,6 +49,9 @@ def apply_carriers(c, s, h, t, dt, scratch):
 def judge(c, s, h, nu, m, variance, scratch):
     """Correct with a constraint, and let it speak for or against the hypothesis."""
     S = project(s, h, m, scratch) + variance
+    if s.group[0].open:
+        turn_gradient(s, h, m, scratch)
+        tell_turn(s, h, scratch, nu, max(S, nu * nu / 25.0))
     if s.group[0].n_alive > 1:
         s.loglik[h] -= 0.5 * (min(nu * nu / S, c.max_nis) + math.log(S))
     if nu * nu > 25.0 * S:
@@ -73,10 +79,23 @@ def hold_on_wheels(c, s, h, i, scratch):
     val[0], val[1] = -sin_y + gain * cos_y, cos_y + gain * sin_y
     val[2] = -forward + gain * sideways
     nu = node.rear_axle * node.yaw_rate - outwards * forward - sideways
+    if s.group[0].open:
+        note_direct(s, h, node.at_v, val[0], val[1], 0.0, scratch)
     judge(c, s, h, nu, 3, node.sideways_var, scratch)
     if c.d == 3:
         idx[0], val[0] = node.at_v + 2, 1.0
+        if s.group[0].open:
+            note_direct(s, h, node.at_v, 0.0, 0.0, 1.0, scratch)
         judge(c, s, h, -s.x[h, node.at_v + 2], 1, node.sideways_var, scratch)
+
+
+@small_kernel
+def note_direct(s, h, at, g0, g1, g2, scratch):
+    """Derivatives by the turn M of ``g . M^T v``, a velocity of the world, with v held."""
+    for r in range(3):
+        v = s.x[h, at + r]
+        scratch.direct[3 * r], scratch.direct[3 * r + 1] = g0 * v, g1 * v
+        scratch.direct[3 * r + 2] = g2 * v
 
 
 @small_kernel
@@ -102,6 +121,10 @@ def hold_speed(c, s, h, dt, scratch):
                 mean += s.x[h, at] / m
                 a += 1
         S = project(s, h, m, scratch) + variance
+        if s.group[0].open:
+            scratch.direct[:] = 0.0
+            turn_gradient(s, h, m, scratch)
+            tell_turn(s, h, scratch, -mean, S)
         absorb(s, h, scratch.w, -mean, S)
 
 

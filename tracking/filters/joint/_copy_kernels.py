@@ -21,6 +21,10 @@ def copy_hypothesis(s, h):
             s.moved[free] = s.moved[h]
             s.nlos[free] = s.nlos[h]
             s.stays[free] = s.stays[h]
+            s.slope[free] = s.slope[h]
+            s.score[free] = s.score[h]
+            s.information[free] = s.information[h]
+            s.spread[free] = s.spread[h]
             s.group[0].n_alive += 1
             return free
     return -1

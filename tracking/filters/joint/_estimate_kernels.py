@@ -52,7 +52,7 @@ def write_estimate(c, s, scratch, t, e, o, out):
                 cov[e, o, p, q, r] = v
             if a < d:
                 worst = max(worst, cov[e, o, p, a, a])
-        if group.n_alive > 1 or group.asleep:
+        if group.n_alive > 1 or group.asleep or (group.open and not group.held):
             status[e, o, p] = AMBIGUOUS
         elif node_i.static and node_j.static:
             status[e, o, p] = OK
@@ -112,6 +112,10 @@ def look_ahead(c, s, scratch, t):
             scratch.stays,
             s.alive,
             s.loglik,
+            s.slope,
+            s.score,
+            s.information,
+            s.spread,
         )
         predict(c, ahead, 0, t - s.group[0].t, scratch)
     for i in range(n):

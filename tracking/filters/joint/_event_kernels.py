@@ -19,6 +19,7 @@ from tracking.filters.joint._estimate_kernels import write_estimate
 from tracking.filters.joint._linear_kernels import settle, settle_all
 from tracking.filters.joint._misplaced_kernels import watch_places
 from tracking.filters.joint._motion_kernels import moves, predict
+from tracking.filters.joint._open_kernels import carry_slope, watch_turns
 from tracking.filters.joint._range_kernels import antenna_offset, fuse_range
 from tracking.filters.joint._rotation_kernels import carry_moves, follow_rotation
 from tracking.filters.joint._sample_kernels import sum_inertial, take_state
@@ -117,6 +118,10 @@ def one_env(state, e):
         state.stays[e],
         state.alive[e],
         state.loglik[e],
+        state.slope[e],
+        state.score[e],
+        state.information[e],
+        state.spread[e],
     )
 
 
@@ -153,7 +158,7 @@ def hear(c, s, layout, scratch, i, j, a_i, a_j, t, distance, sight, is_survey):
         for k in (i, j):
             if moves(s.nodes[k]):
                 sum_inertial(c, s.nodes, s.held, s.pre, k, t)
-        if t - s.group[0].t_check >= c.check_period:
+        if t - s.group[0].t_check + SAME >= c.check_period:
             look_at_group(c, s, layout, t)
     if node_i.present and node_j.present:
         take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, sight, is_survey)
@@ -173,7 +178,7 @@ def advance(c, s, layout, scratch, t, at_once):
     if group.asleep and not none_moved(c, s, t):
         settle_all(s)
         wake_up(c, s, layout)
-    carriers_due = t - group.t_carrier >= c.carrier_period
+    carriers_due = t - group.t_carrier + SAME >= c.carrier_period
     since = t - group.t
     if since > SAME and (at_once or carriers_due or since + SAME >= c.carry_period):
         carry(c, s, scratch, t)
@@ -183,7 +188,7 @@ def advance(c, s, layout, scratch, t, at_once):
             if s.alive[h]:
                 apply_carriers(c, s, h, t, t - group.t_carrier, scratch)
         group.t_carrier = t
-    if t - group.t_gauge >= GAUGE_PERIOD:
+    if t - group.t_gauge + SAME >= GAUGE_PERIOD:
         first, end = bank_range(s)
         for h in range(first, end):
             if s.alive[h]:
@@ -205,6 +210,8 @@ def carry(c, s, scratch, t):
             follow_rotation(c, s, h)
             carry_moves(c, s, h)
             predict(c, s, h, t - group.t, scratch)
+            if group.open:
+                carry_slope(c, s, h, scratch)
             s.stays[h, :] = 1.0
     for i in range(s.nodes.shape[0]):
         for k in range(N_PRE):
@@ -283,6 +290,8 @@ def look_at_group(c, s, layout, t):
     """From time to time: who left, and which hypotheses are worth their time."""
     settle_all(s)
     remove_silent(c, s, layout, t)
+    if s.group[0].open:
+        watch_turns(c, s, layout)
     prune_bank(c, s)
     note_turn(c, s)
     watch_mirror(c, s)

@@ -11,12 +11,20 @@ from __future__ import annotations
 
 import math
 
-from tracking.compiled import kernel
+from tracking.compiled import kernel, small_kernel
 
 
 @kernel
-def flatness(c, s, h):
-    """Extent of the layout across itself over its standard deviation; infinite for few nodes."""
+def flatness(c, s, h, turns):
+    """Extent of the layout across itself over its standard deviation; infinite for few nodes.
+
+    Args:
+        c: Coefficients.
+        s: JointState of one environment.
+        h: Hypothesis, nothing of which waits.
+        turns: Whether an error that is a turn of the whole group counts. In space it may be large,
+            and makes the layout no flatter.
+    """
     d = c.d
     scatter, present = scatter_of(c, s, h)
     if present <= d:
@@ -30,14 +38,72 @@ def flatness(c, s, h):
         for j in range(s.nodes.shape[0]):
             if not s.nodes[j].present:
                 continue
-            for k in range(d):
-                for q in range(d):
-                    P_kq = s.P[h, s.nodes[i].at_p + k, s.nodes[j].at_p + q]
-                    part = across[k] * across[q] * P_kq
-                    total += part
-                    if i == j:
-                        own += part
-    return math.sqrt(squared / max(own - total / present, 1e-12))
+            part = covariance_across(s, h, i, j, across, d)
+            total += part
+            if i == j:
+                own += part
+    variance = own - total / present
+    if d == 3 and not turns:
+        variance -= turn_across(c, s, h, scatter, across)
+    return math.sqrt(squared / max(variance, 1e-12))
+
+
+@small_kernel
+def covariance_across(s, h, i, j, across, d):
+    """Covariance of the positions of nodes i and j along one direction."""
+    part = 0.0
+    for k in range(d):
+        for q in range(d):
+            P_kq = s.P[h, s.nodes[i].at_p + k, s.nodes[j].at_p + q]
+            part += across[k] * across[q] * P_kq
+    return part
+
+
+@kernel
+def turn_across(c, s, h, scatter, across):
+    """The part of the variance across a layout that is linear in where a node is along it."""
+    xx, xy, xz, yy, yz, zz = scatter
+    a0, a1, a2 = null_axis(across[0] ** 2, across[0] * across[1], across[0] * across[2],
+        across[1] ** 2, across[1] * across[2], across[2] ** 2)  # fmt: skip
+    b0, b1, b2 = (
+        across[1] * a2 - across[2] * a1,
+        across[2] * a0 - across[0] * a2,
+        across[0] * a1 - across[1] * a0,
+    )
+    x, y, z = xx * a0 + xy * a1 + xz * a2, xy * a0 + yy * a1 + yz * a2, xz * a0 + yz * a1 + zz * a2
+    aa, ab = a0 * x + a1 * y + a2 * z, b0 * x + b1 * y + b2 * z
+    bb = xx + yy + zz - aa - across_itself(scatter, across)
+    det = aa * bb - ab * ab
+    if det <= 1e-9 * (aa + bb) * (aa + bb):
+        return 0.0
+    m0, m1, m2, present = 0.0, 0.0, 0.0, 0
+    for i in range(s.nodes.shape[0]):
+        if s.nodes[i].present:
+            at = s.nodes[i].at_p
+            m0, m1, m2 = m0 + s.x[h, at], m1 + s.x[h, at + 1], m2 + s.x[h, at + 2]
+            present += 1
+    total = 0.0
+    for i in range(s.nodes.shape[0]):
+        for j in range(s.nodes.shape[0]):
+            if s.nodes[i].present and s.nodes[j].present:
+                p, q = s.nodes[i].at_p, s.nodes[j].at_p
+                x, y, z = s.x[h, p] - m0 / present, s.x[h, p + 1] - m1 / present, s.x[h, p + 2]
+                z -= m2 / present
+                u_i, v_i = a0 * x + a1 * y + a2 * z, b0 * x + b1 * y + b2 * z
+                x, y, z = s.x[h, q] - m0 / present, s.x[h, q + 1] - m1 / present, s.x[h, q + 2]
+                z -= m2 / present
+                u_j, v_j = a0 * x + a1 * y + a2 * z, b0 * x + b1 * y + b2 * z
+                alike = u_i * (bb * u_j - ab * v_j) + v_i * (aa * v_j - ab * u_j)
+                total += alike / det * covariance_across(s, h, i, j, across, 3)
+    return total
+
+
+@small_kernel
+def across_itself(scatter, e):
+    """``e^T S e`` of a symmetric matrix."""
+    xx, xy, xz, yy, yz, zz = scatter
+    mixed = e[0] * e[1] * xy + e[0] * e[2] * xz + e[1] * e[2] * yz
+    return e[0] ** 2 * xx + e[1] ** 2 * yy + e[2] ** 2 * zz + 2.0 * mixed
 
 
 @kernel

@@ -103,13 +103,15 @@ def settle_all(s):
 
 
 @small_kernel
-def decouple(x, P, h, n, at, variance):
+def decouple(s, h, n, at, variance):
     """Forget what is known about one state: value 0, the given variance, no correlation."""
     for r in range(n):
-        P[h, at, r] = 0.0
-        P[h, r, at] = 0.0
-    P[h, at, at] = variance
-    x[h, at] = 0.0
+        s.P[h, at, r] = 0.0
+        s.P[h, r, at] = 0.0
+    s.P[h, at, at] = variance
+    s.x[h, at] = 0.0
+    for k in range(s.slope.shape[1]):
+        s.slope[h, k, at] = 0.0
 
 
 @small_kernel

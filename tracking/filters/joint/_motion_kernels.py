@@ -104,9 +104,11 @@ def move_mean(c, node, pre, x, h, i, scale, w, speed):
         squared += x[h, v + 2] ** 2
     speed[i] = math.sqrt(squared)
     keep = decay(T / node.bias_tau)
+    scale[b], scale[b + 1] = keep, keep
+    if d == 3:
+        scale[b + 2] = decay(T / node.rise_bias_tau)
     for k in range(d):
-        scale[b + k] = keep
-        x[h, b + k] *= keep
+        x[h, b + k] *= scale[b + k]
     scale[y] = decay(T / node.heading_tau)
     x[h, y] *= scale[y]
 
@@ -212,5 +214,6 @@ def add_noise(c, node, pre, P, h, i, scale, step):
         P[h, p + k, v + k] += 0.5 * q * T
         P[h, v + k, p + k] += 0.5 * q * T
         P[h, v + k, v + k] += q
-        P[h, b + k, b + k] += (1.0 - scale[b + k] * scale[b + k]) * node.bias_var
+        bias_var = node.bias_var if k < 2 else node.rise_bias_var
+        P[h, b + k, b + k] += (1.0 - scale[b + k] * scale[b + k]) * bias_var
     P[h, y, y] += (1.0 - scale[y] * scale[y]) * node.heading_var

@@ -17,6 +17,7 @@ from tracking._angle_kernels import cosine_sine
 from tracking.compiled import small_kernel
 from tracking.filters.joint._linear_kernels import absorb, project
 from tracking.filters.joint._motion_kernels import time_since, way_since
+from tracking.filters.joint._open_kernels import tell_turn, turn_gradient
 from tracking.filters.joint._rotation_kernels import follow_rotation
 from tracking.filters.joint._sight_kernels import change_sight, judge_sight
 from tracking.filters.joint._turn_kernels import UNSURE
@@ -123,6 +124,15 @@ def range_model(c, s, h, p, lever_i, lever_j, idx, val):
 
 
 @small_kernel
+def note_levers(levers, scratch):
+    """Derivatives of a range by the turn, the positions held: only its antennas turn with M."""
+    u, direct = scratch.val, scratch.direct
+    for k in range(3):
+        lever = levers[3 + k] - levers[k]
+        direct[k], direct[3 + k], direct[6 + k] = u[2] * lever, u[3] * lever, u[5] * lever
+
+
+@small_kernel
 def bend_variance(c, s, h, p, val):
     """What the straight line misses, as noise of the range [m2].
 
@@ -187,8 +197,13 @@ def fuse_range(c, s, h, p, dt, distance, levers, sight, scratch):
     predicted, m = range_model(c, s, h, p, levers[:3], levers[3:], scratch.idx, scratch.val)
     nu = distance - predicted
     variance = project(s, h, m, scratch)
-    S = variance + c.white_var
-    switched, sane, likelihood = judge_sight(c, s, h, p, dt, nu, variance, sight, scratch.w)
+    open_var = 0.0
+    if s.group[0].open:
+        note_levers(levers, scratch)
+        open_var = turn_gradient(s, h, m, scratch)
+    S = variance + open_var + c.white_var
+    expected = variance + open_var
+    switched, sane, likelihood = judge_sight(c, s, h, p, dt, nu, expected, sight, scratch.w)
     if s.group[0].n_alive > 1:
         loglik = math.log(likelihood)
         s.loglik[h] += c.evidence * max(loglik, -0.5 * (c.max_nis + math.log(S)))
@@ -200,6 +215,8 @@ def fuse_range(c, s, h, p, dt, distance, levers, sight, scratch):
         predicted, m = range_model(c, s, h, p, levers[:3], levers[3:], scratch.idx, scratch.val)
         nu = distance - predicted
         variance = project(s, h, m, scratch)
+        if s.group[0].open:
+            turn_gradient(s, h, m, scratch)
     R = c.white_var + bend_variance(c, s, h, p, scratch.val)
     R += s.nlos[h, p] * c.excess_white_var
     # A pair whose ranges have long contradicted all else is believed less and less; where most
@@ -209,5 +226,7 @@ def fuse_range(c, s, h, p, dt, distance, levers, sight, scratch):
     if doubt > 1.0 and not s.group[0].lost:
         trust /= doubt * doubt * doubt * doubt
     if trust > 1e-3:
+        if s.group[0].open:
+            tell_turn(s, h, scratch, nu, variance + R / trust)
         absorb(s, h, scratch.w, nu, variance + R / trust)
     return before, nis, sane

@@ -96,6 +96,8 @@ def change_sight(c, s, h, p, switched):
         s.P[h, r, at] *= stays
     for q in range(s.n_waiting[h]):
         s.waiting[h, q, at] *= stays
+    for k in range(s.slope.shape[1]):
+        s.slope[h, k, at] *= stays
     hidden = s.nlos[h, p]
     s.P[h, at, at] += (1.0 - stays * stays) * (c.slow_var + hidden * c.excess_var)
     s.x[h, at] = stays * s.x[h, at] + switched * hidden * c.excess

@@ -12,6 +12,7 @@ import numpy as np
 from tracking.compiled import allocating_kernel, kernel, small_kernel
 from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_hypothesis
 from tracking.filters.joint._linear_kernels import decouple
+from tracking.filters.joint._open_kernels import open_frame
 from tracking.filters.joint._rotation_kernels import turn_covariance
 from tracking.filters.joint._turn_kernels import spread_turn, turn_variance
 
@@ -59,10 +60,10 @@ def may_move(s, t):
 
 @allocating_kernel
 def wake_up(c, s, layout):
-    """Follow all rotations and mirror images from now on.
+    """Follow all rotations and mirror images from now on, in space by one filter for all.
 
-    Where a node that joined may be on two sides there are two layouts; the bank has room for a
-    few rotations of the second.
+    Where a node that joined may be on two sides there are two layouts; in the plane the bank has
+    room for a few rotations of the second.
     """
     group = s.group[0]
     group.asleep = False
@@ -74,9 +75,14 @@ def wake_up(c, s, layout):
             node = s.nodes[i]
             # Errors of headings stay as long as nobody moves.
             if was_alive[h] and node.present and not node.static:
-                decouple(s.x, s.P, h, c.n, node.at_h, node.first_heading_var)
+                decouple(s, h, c.n, node.at_h, node.first_heading_var)
         if was_alive[h]:
             wake_turn(c, s, h)
+    if c.d == 3:
+        for h in range(s.alive.shape[0]):
+            if s.alive[h]:
+                open_frame(c, s, h)
+        return
     for _ in range(s.alive.shape[0]):
         # The likelier layout first.
         original = -1
@@ -103,7 +109,7 @@ def wake_turn(c, s, h):
 
 @allocating_kernel
 def turn_all_ways(c, s, layout, original):
-    """Follow a hypothesis in all other rotations and mirrored, while the bank has room."""
+    """Follow a hypothesis of the plane in all other rotations and mirrored, if there is room."""
     d = c.d
     first = layout.rotations[0, :d, :d].copy()
     for r in range(1, layout.rotations.shape[0]):

@@ -23,6 +23,7 @@ from tracking.filters._shape_kernels import (
 from tracking.filters.joint._carrier_kernels import CENTRE_VAR
 from tracking.filters.joint._copy_kernels import copy_hypothesis
 from tracking.filters.joint._linear_kernels import decouple
+from tracking.filters.joint._open_kernels import open_frame
 from tracking.filters.joint._place_kernels import best_sides
 from tracking.filters.joint._sample_kernels import decay
 from tracking.filters.joint._sleep_kernels import ORIENTED, PATIENCE, none_moved, rests
@@ -43,7 +44,7 @@ def try_start(c, s, layout, t):
         forget_sums(s, members[a], t)
     asleep = none_moved(c, s, t)
     # A smoother has room for one hypothesis; of what it starts nothing is reported.
-    n_first = 1 if asleep else min(layout.rotations.shape[0], s.alive.shape[0])
+    n_first = 1 if asleep or c.d == 3 else min(layout.rotations.shape[0], s.alive.shape[0])
     for h in range(n_first):
         s.alive[h] = True
         s.loglik[h] = 0.0
@@ -70,7 +71,9 @@ def try_start(c, s, layout, t):
     group = s.group[0]
     group.started = True
     group.flat = False
-    group.asleep = asleep
+    group.asleep, group.open = asleep, False
+    if c.d == 3 and not asleep:
+        open_frame(c, s, 0)
     group.n_alive = n_first
     group.best = 0
     group.t, group.t_check, group.t_carrier, group.t_gauge = t, t, t, t
@@ -114,9 +117,9 @@ def begin_node(c, s, h, i, t):
     heading_var = node.heading_var + stood * (node.first_heading_var - node.heading_var)
     for k in range(c.d):
         speed_var = c.rest_var if still else c.start_speed_var
-        decouple(s.x, s.P, h, c.n, node.at_v + k, speed_var)
-        decouple(s.x, s.P, h, c.n, node.at_b + k, node.bias_var)
-    decouple(s.x, s.P, h, c.n, node.at_h, heading_var)
+        decouple(s, h, c.n, node.at_v + k, speed_var)
+        decouple(s, h, c.n, node.at_b + k, node.bias_var if k < 2 else node.rise_bias_var)
+    decouple(s, h, c.n, node.at_h, heading_var)
 
 
 @kernel
@@ -132,9 +135,9 @@ def begin_pair(c, s, h, p, hidden):
     s.nlos[h, p], s.stays[h, p] = hidden, 1.0
     at = s.pairs[p].at_e
     if at >= 0:
-        decouple(s.x, s.P, h, c.n, at, max(c.fast_var, 1e-12))
+        decouple(s, h, c.n, at, max(c.fast_var, 1e-12))
         slow_var = c.slow_var + hidden * c.excess_var + hidden * (1.0 - hidden) * c.excess**2
-        decouple(s.x, s.P, h, c.n, at + 1, max(slow_var, 1e-12))
+        decouple(s, h, c.n, at + 1, max(slow_var, 1e-12))
         s.x[h, at + 1] = hidden * c.excess
 
 
@@ -193,7 +196,7 @@ def add_node(c, s, layout, h, new, pos, t):
     begin_node(c, s, h, new, t)
     d, n = c.d, s.nodes.shape[0]
     for k in range(d):
-        decouple(s.x, s.P, h, c.n, s.nodes[new].at_p + k, 0.0)
+        decouple(s, h, c.n, s.nodes[new].at_p + k, 0.0)
     # What reads the errors of the node, one row a coordinate, off those of the others.
     J, A, present = np.zeros((d, c.n)), np.zeros(c.n), 0
     for i in range(n):
@@ -213,6 +216,8 @@ def add_node(c, s, layout, h, new, pos, t):
         s.P[h, at, :] = rows[k]
         s.P[h, :, at] = rows[k]
         s.x[h, at] = pos[k]
+        for q in range(s.slope.shape[1]):
+            s.slope[h, q, at] = np.sum(J[k] * s.slope[h, q])
     for k in range(d):
         for q in range(d):
             s.P[h, s.nodes[new].at_p + k, s.nodes[new].at_p + q] = own[k, q]

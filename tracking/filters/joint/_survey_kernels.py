@@ -9,6 +9,7 @@ from __future__ import annotations
 from tracking.compiled import kernel, small_kernel
 from tracking.filters._shape_kernels import SURVEYED, start_distance
 from tracking.filters.joint._linear_kernels import absorb, project, settle_all
+from tracking.filters.joint._open_kernels import tell_turn, turn_gradient
 from tracking.filters.joint._range_kernels import range_model
 from tracking.filters.joint._rotation_kernels import follow_rotation
 from tracking.filters.joint._turn_kernels import UNSURE
@@ -22,6 +23,10 @@ def fuse_survey(c, s, h, p, distance, scratch):
     none = scratch.none
     predicted, m = range_model(c, s, h, p, none, none, scratch.idx, scratch.val)
     variance = project(s, h, m, scratch)
+    if s.group[0].open:
+        scratch.direct[:] = 0.0
+        turn_gradient(s, h, m, scratch)
+        tell_turn(s, h, scratch, distance - predicted, variance + c.survey_var)
     absorb(s, h, scratch.w, distance - predicted, variance + c.survey_var)
 
 

@@ -41,6 +41,7 @@ _NUMBERS = (
     "check_period",
     "strained",
     "head_start",
+    "height_var",
     "unaided_psd2",
     "unaided_after",
     "static_drift2",
@@ -88,6 +89,7 @@ def make_coefficients(constellation: Constellation, params: JointParams) -> Reco
         # Errors that last and have no state make successive ranges say the same thing.
         "evidence": 1.0 if has_states else 0.1,
         "excess_white_var": v.white_std**2 if has_states else v.repeats * v.excess_std**2,
+        "height_var": s.height_std**2,
         "start_k": s.k,
         "start_max_age": s.max_age,
         "rotation_var": (0.4 if constellation.dimensions == 3 else 2.4 / s.rotations_2d) ** 2,

@@ -36,6 +36,8 @@ from tracking.measurements import MeasurementBlock
 class JointEkf:
     """One filter per group over a batch of groups; see the module."""
 
+    follows_bias = True
+
     def __init__(self, constellation: Constellation, params: JointParams, n_envs: int = 1) -> None:
         self._constellation, self._params, self._n_envs = constellation, params, n_envs
         self._coefficients = make_coefficients(constellation, params)
@@ -152,9 +154,9 @@ class JointEkf:
         )
 
     def _fresh(self, n_envs: int) -> JointState:
-        # Room for the mirror images of nodes that join while all rotations are still possible.
-        n_rotations = len(self._layout.rotations)
-        n_hyps = 2 * n_rotations if self._constellation.dimensions == 3 else n_rotations + 8
+        # Room for the mirror images of nodes that join while all rotations are still possible; in
+        # space one stands for all of them.
+        n_hyps = 32 if self._constellation.dimensions == 3 else len(self._layout.rotations) + 8
         return make_state(self._constellation, self._params, n_envs, n_hyps)
 
 

@@ -20,15 +20,20 @@ def _expect_positive(params: object, *but: str) -> None:
 class CarrierParams:
     """What is known about a node from what carries it."""
 
-    accel_psd: float = 0.15
+    accel_psd: float = 0.1
     """[m/s2/sqrt(Hz)] White noise of the acceleration: sensor, vibration, tilt jitter."""
     turn_psd: float = 0.015
     """[rad/sqrt(Hz)] Error of the orientation while it moves, times the acceleration: limbs are
     off by a degree or two for a fraction of a second, with accelerations of several g."""
-    bias_std: float = 0.15
+    bias_std: float = 0.3
     """[m/s2] Slow error of the acceleration, mostly gravity seen through a wrong tilt."""
-    bias_tau: float = 3.0
+    bias_tau: float = 30.0
     """[s] How long it stays the same."""
+    rise_bias_std: float = 0.1
+    """[m/s2] The same along the vertical, where a wrong tilt shows by its square only: the offset
+    of the accelerometer, less what is learned of it at rest."""
+    rise_bias_tau: float = 100.0
+    """[s] How long that stays the same."""
     levelled: bool = False
     """The body stays level: the acceleration is taken in the plane of the body, free of tilt
     errors, and its slow error turns with the body."""
@@ -86,6 +91,8 @@ CARRIERS = {
         accel_psd=0.1,
         bias_std=0.03,
         bias_tau=5.0,
+        rise_bias_std=0.03,
+        rise_bias_tau=5.0,
         heading_std=0.02,
         heading_tau=30.0,
     ),
@@ -185,6 +192,9 @@ class JointStartParams:
     """[-] Slow mean of the NIS of ranges from which on it is doubted how the layout is turned. It
     is 0.4 where all is well, as a range is believed less than its noise alone would allow, and up
     to 1.0 in recordings of sensors that are known less well."""
+    height_std: float = 0.65
+    """[m] How much fixed nodes differ in height from each other, where nothing tells how the group
+    is turned: people put them into rooms, which are wider than they are high."""
     head_start: float = 10.0
     """[-] Log-likelihood by which other rotations have to make up for being looked at so late."""
 

@@ -40,6 +40,8 @@ NODE = np.dtype(
         ("blow_share", "f8"),
         ("bias_var", "f8"),
         ("bias_tau", "f8"),
+        ("rise_bias_var", "f8"),
+        ("rise_bias_tau", "f8"),
         ("heading_var", "f8"),
         ("heading_tau", "f8"),
         ("first_heading_var", "f8"),
@@ -79,6 +81,8 @@ PAIR = np.dtype(
 GROUP = np.dtype(
     [
         ("started", "?"),
+        ("open", "?"),  # in space: nothing has told yet how it is turned
+        ("held", "?"),  # open, but reported as it is until another turn is likelier
         ("asleep", "?"),  # nothing has moved yet, and one rotation stands for all
         ("flat", "?"),  # the layout was too flat to tell its mirror image
         ("n_alive", "i8"),

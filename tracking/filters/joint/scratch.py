@@ -41,6 +41,10 @@ class Scratch(NamedTuple):
     """(1, pair)"""
     stays: F64
     """(1, pair)"""
+    gradient: F64
+    """Of an innovation by the turn of an open group, (9)."""
+    direct: F64
+    """Of a prediction by it, the states held, (9)."""
 
 
 def make_scratch(n_nodes: int, n_pairs: int, n_states: int) -> Scratch:
@@ -61,4 +65,6 @@ def make_scratch(n_nodes: int, n_pairs: int, n_states: int) -> Scratch:
         t_pre=np.zeros(n_nodes),
         nlos=np.zeros((1, n_pairs)),
         stays=np.zeros((1, n_pairs)),
+        gradient=np.zeros(9),
+        direct=np.zeros(9),
     )

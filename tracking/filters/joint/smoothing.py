@@ -39,6 +39,7 @@ def with_clones(state: JointState, coefficients: Records) -> tuple[JointState, R
     width = whole_lines(len(every))
     group = state.group.copy()
     group["best"], group["n_alive"] = 0, np.minimum(group["n_alive"], 1)
+    group["open"] = False  # the reported turn is taken as it is
     wider = coefficients.copy()
     wider["n"] = width
     clones = JointState(
@@ -56,6 +57,10 @@ def with_clones(state: JointState, coefficients: Records) -> tuple[JointState, R
         stays=state.stays[envs, best][:, None].copy(),
         alive=state.alive[envs, best][:, None].copy(),
         loglik=np.zeros((len(envs), 1)),
+        slope=np.zeros((len(envs), 1, 0, width)),
+        score=np.zeros((len(envs), 1, 0)),
+        information=np.zeros((len(envs), 1, 0, 0)),
+        spread=np.zeros((len(envs), 1, 0, 0)),
     )
     used = len(every)
     clones.x[:, 0, :used] = state.x[envs, best][:, every]

@@ -68,6 +68,15 @@ class JointState(NamedTuple):
     """True for hypotheses still considered, (env, hyp)."""
     loglik: F64
     """Log-likelihood of the measurements, (env, hyp)."""
+    slope: F64
+    """In space, while it is open how the group is turned (`_open_kernels`): derivatives of the
+    states by the elements of the turn, (env, hyp, 9, state); the next three as well."""
+    score: F64
+    """Derivatives of the log-likelihood by them, (env, hyp, 9)."""
+    information: F64
+    """Its negative second derivatives, (env, hyp, 9, 9)."""
+    spread: F64
+    """How uncertain the elements are, each by itself, (env, hyp, 9, 9)."""
 
 
 class Layout(NamedTuple):
@@ -90,6 +99,11 @@ def make_layout(constellation: Constellation, params: JointParams) -> Layout:
 def room_to_wait(n_states: int) -> int:
     """How many corrections may wait: none where the covariance fits the nearest cache."""
     return 16 if n_states > 48 else 0
+
+
+def open_elements(dimensions: int) -> int:
+    """Elements of the turn of a group: in the plane a bank of turns is followed instead."""
+    return 9 if dimensions == 3 else 0
 
 
 def make_state(
@@ -116,6 +130,8 @@ def make_state(
             "blow_share": carrier.blow_share,
             "bias_var": carrier.bias_std**2,
             "bias_tau": carrier.bias_tau,
+            "rise_bias_var": carrier.rise_bias_std**2,
+            "rise_bias_tau": carrier.rise_bias_tau,
             "heading_var": heading_std**2,
             "first_heading_var": first_heading_std**2,
             "heading_tau": params.initial_heading_tau if initial else carrier.heading_tau,
@@ -158,4 +174,8 @@ def make_state(
         stays=np.ones((n_envs, n_hyps, p)),
         alive=np.zeros((n_envs, n_hyps), dtype=bool),
         loglik=np.zeros((n_envs, n_hyps)),
+        slope=np.zeros((n_envs, n_hyps, open_elements(d), n_states)),
+        score=np.zeros((n_envs, n_hyps, open_elements(d))),
+        information=np.zeros((n_envs, n_hyps, open_elements(d), open_elements(d))),
+        spread=np.zeros((n_envs, n_hyps, open_elements(d), open_elements(d))),
     )

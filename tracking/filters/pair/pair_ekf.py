@@ -40,6 +40,8 @@ from tracking.measurements import MeasurementBlock
 class PairEkf:
     """Pair filters over a batch of groups; see the module for the equations."""
 
+    follows_bias = False
+
     def __init__(
         self,
         constellation: Constellation,

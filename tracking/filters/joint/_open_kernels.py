@@ -1,0 +1,266 @@
+"""A group in space of which nothing tells yet how it is turned: all turns at once, linearly.
+
+Ranges give the layout of a group in some frame, which is the world's turned or mirrored by an
+orthogonal matrix M. What is measured in the world, accelerations first of all, enters that
+frame as ``M a``: linear in the nine elements of M. So with M known, what the filter does is
+linear in M as well, as far as it is linear at all: its states are ``x + sum_k slope_k (M - 1)_k``,
+its gains do not depend on M, and innovations are ``nu + g . (M - 1)``. One filter thus gives the
+likelihood of every M, which is Gaussian in its elements,
+
+    log L(M) = score . (M - 1) - (M - 1) . information (M - 1) / 2,
+
+among them all rotations and mirror images, which `_peak_kernels` looks through. The frame is
+turned time and again so that the likeliest is M = 1: what is reported is the likeliest turn.
+It is the estimate of a constant by the sensitivities of a Kalman filter to it [1], and to look
+for a rotation among all matrices first is an old way to find one without a first guess [2].
+
+Once only turns are left each of which is known to a few degrees, they become hypotheses.
+
+References:
+    [1] Friedland, Treatment of bias in recursive filtering, IEEE Trans. Automatic Control 14
+        (1969) 359.
+    [2] Wahba, A least squares estimate of satellite attitude, SIAM Review 7 (1965) 409.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tracking._angle_kernels import cosine_sine
+from tracking.compiled import allocating_kernel, kernel, small_kernel
+from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_part
+from tracking.filters.joint._motion_kernels import moves
+from tracking.filters.joint._peak_kernels import (
+    climb,
+    find_peaks,
+    inverse,
+    is_near,
+    least_curvature,
+)
+
+LOOSE = 3.0
+"""[-] Each element of M has a variance of a third, over all rotations."""
+CLEAR = 1.0
+"""[-] By so much another turn has to be likelier (log-likelihood) before it is reported."""
+KNOWN = 0.2
+"""[rad] Turns that are known so well are left to filters that are linear about each of them."""
+
+
+@allocating_kernel
+def open_frame(c, s, h):
+    """Take back what is known of the turn of hypothesis h, nothing of which waits.
+
+    But that fixed nodes differ less in height than in width, where people put them.
+    """
+    s.slope[h], s.score[h], s.information[h] = 0.0, 0.0, 0.0
+    mean, m = np.zeros(3), 0
+    for i in range(s.nodes.shape[0]):
+        if s.nodes[i].present and s.nodes[i].static:
+            at = s.nodes[i].at_p
+            mean += s.x[h, at : at + 3]
+            m += 1
+    mean /= max(m, 1)
+    for i in range(s.nodes.shape[0]):
+        if s.nodes[i].present and s.nodes[i].static:
+            out = s.x[h, s.nodes[i].at_p : s.nodes[i].at_p + 3] - mean
+            for r in range(3):
+                s.score[h, 3 * r + 2] -= out[r] * out[2] / c.height_var
+                for q in range(3):
+                    s.information[h, 3 * r + 2, 3 * q + 2] += out[r] * out[q] / c.height_var
+    note_spread(s, h)
+    s.group[0].open, s.group[0].held = True, False
+
+
+@allocating_kernel
+def note_spread(s, h):
+    """Work out how uncertain the elements of the turn are."""
+    s.spread[h] = np.linalg.inv(s.information[h] + LOOSE * np.eye(9))
+
+
+@kernel
+def carry_slope(c, s, h, scratch):
+    """Carry the slopes over the step that `predict` has just made, and from which `scratch` is."""
+    first, last = c.n_motion, c.n
+    for k in range(9):
+        row, column = k // 3, k % 3
+        z = s.slope[h, k]
+        for i in range(s.nodes.shape[0]):
+            node = s.nodes[i]
+            if not moves(node):
+                continue
+            p, v, b, w, pre = node.at_p, node.at_v, node.at_b, scratch.step[i], s.pre[i]
+            T, b0, b1, b2, psi = w[0], z[b], z[b + 1], z[b + 2], z[node.at_h]
+            z[p] += T * z[v] - w[1] * b0 + w[2] * b1 + w[5] * psi
+            z[p + 1] += T * z[v + 1] - w[2] * b0 - w[1] * b1 + w[6] * psi
+            z[p + 2] += T * z[v + 2] - 0.5 * T * T * b2
+            z[v] += -w[3] * b0 + w[4] * b1 + w[7] * psi
+            z[v + 1] += -w[4] * b0 - w[3] * b1 + w[8] * psi
+            z[v + 2] -= T * b2
+            cos_r, sin_r = cosine_sine(s.x[h, node.at_h])
+            dv, dp = pre[3], pre[6]
+            if column == 0:
+                dv, dp = cos_r * pre[1] - sin_r * pre[2], cos_r * pre[4] - sin_r * pre[5]
+            elif column == 1:
+                dv, dp = sin_r * pre[1] + cos_r * pre[2], sin_r * pre[4] + cos_r * pre[5]
+            z[p + row] += dp
+            z[v + row] += dv
+        for r in range(first, last):
+            z[r] *= scratch.scale[r]
+
+
+@small_kernel
+def turn_gradient(s, h, m, scratch):
+    """Write the derivatives of an innovation by the turn; returns the variance they add.
+
+    Args:
+        s: JointState of one environment, open.
+        h: Hypothesis.
+        m: Number of derivatives by states.
+        scratch: Room; `idx` and `val` hold states and derivatives of what is predicted, `direct`
+            its derivatives by the turn with the states held; `gradient` is written.
+    """
+    g = scratch.gradient
+    for k in range(9):
+        g[k] = -scratch.direct[k]
+        for a in range(m):
+            g[k] -= scratch.val[a] * s.slope[h, k, scratch.idx[a]]
+    variance = 0.0
+    for k in range(9):
+        for q in range(9):
+            variance += g[k] * s.spread[h, k, q] * g[q]
+    return variance
+
+
+@small_kernel
+def tell_turn(s, h, scratch, nu, S):
+    """Let an innovation of variance S, about to be absorbed, tell of the turn.
+
+    Args:
+        s: JointState of one environment, open.
+        h: Hypothesis.
+        scratch: `w` is ``P H``, `gradient` as of `turn_gradient`.
+        nu: The innovation.
+        S: Its variance, the turn known.
+    """
+    g, w = scratch.gradient, scratch.w
+    for k in range(9):
+        share = g[k] / S
+        s.score[h, k] -= share * nu
+        for q in range(9):
+            s.information[h, k, q] += share * g[q]
+        for r in range(s.slope.shape[2]):
+            s.slope[h, k, r] += w[r] * share
+
+
+@allocating_kernel
+def doubt_turn(c, s, h):
+    """Look for other turns of hypothesis h, the only one; until one is likelier it stays as it is.
+
+    It has a head start, of which a mirror image feels all.
+    """
+    open_frame(c, s, h)
+    for k in range(9):
+        s.information[h, k, k] += 0.5 * c.head_start
+    note_spread(s, h)
+    s.group[0].held = True
+
+
+@allocating_kernel
+def watch_turns(c, s, layout):
+    """Turn the frames so that the likeliest turn is none; go on with hypotheses once it is time."""
+    group, was_alive = s.group[0], s.alive.copy()
+    known, H = True, np.zeros((3, 3))
+    for h in range(s.alive.shape[0]):
+        if not was_alive[h]:
+            continue
+        R = np.eye(3)
+        value = climb(s.information[h], s.score[h], R, H)
+        turns, values = find_peaks(s.information[h], s.score[h], layout.rotations)
+        if values[0] > value + CLEAR:
+            R[:] = turns[0]
+            value = values[0]
+        if group.held:
+            if value < CLEAR or is_near(R, np.eye(3)):
+                if len(values) < 2 or values[1] < -c.prune:
+                    group.open = False
+                return
+            group.held = False
+        for a in range(len(values)):
+            if values[a] > values[0] - c.prune:
+                climb(s.information[h], s.score[h], turns[a], H)
+                known = known and least_curvature(H) > KNOWN**-2
+        turn_frame(c, s, h, R)
+        note_spread(s, h)
+    if known:
+        close_frames(c, s, layout)
+
+
+@allocating_kernel
+def turn_frame(c, s, h, R):
+    """Turn the frame of hypothesis h so that the turn R becomes none."""
+    d = np.zeros(9)
+    for k in range(9):
+        d[k] = R[k // 3, k % 3] - (1.0 if k % 4 == 0 else 0.0)
+    change = s.information[h] @ d
+    s.loglik[h] += np.sum(d * s.score[h]) - 0.5 * np.sum(d * change)
+    # M = R M': derivatives by the elements of the one from those by the other.
+    E = np.zeros((9, 9))
+    for k in range(3):
+        for r in range(3):
+            for q in range(3):
+                E[3 * k + q, 3 * r + q] = R[k, r]
+    s.score[h] = E.T.copy() @ (s.score[h] - change)
+    s.information[h] = E.T.copy() @ (s.information[h] @ E)
+    for r in range(c.n):
+        for k in range(9):
+            s.x[h, r] += d[k] * s.slope[h, k, r]
+    s.slope[h] = E.T.copy() @ s.slope[h]
+    none, back = np.zeros(3), R.T.copy()
+    for i in range(s.nodes.shape[0]):
+        node = s.nodes[i]
+        if not node.present:
+            continue
+        for at in (node.at_p, node.at_v, -1 if node.levelled else node.at_b):
+            if at >= 0:
+                turn_part(s, c.n, h, at, none, back)
+                s.slope[h, :, at : at + 3] = s.slope[h, :, at : at + 3].copy() @ R
+    s.moved[h, :] = 0.0
+
+
+@allocating_kernel
+def close_frames(c, s, layout):
+    """Make a hypothesis of every turn that may be, the likeliest of each layout first."""
+    s.group[0].open = False
+    was_alive = s.alive.copy()
+    for h in range(s.alive.shape[0]):
+        if not was_alive[h]:
+            continue
+        turns, values = find_peaks(s.information[h], s.score[h], layout.rotations)
+        for a in range(len(values) - 1, -1, -1):
+            if a > 0 and values[a] < values[0] - c.prune:
+                continue
+            target = copy_hypothesis(s, h) if a > 0 else h
+            if target >= 0:
+                turn_frame(c, s, target, turns[a])
+                spread_frame(c, s, target)
+
+
+@allocating_kernel
+def spread_frame(c, s, h):
+    """Add to P what is not known of the turn, which is the likeliest: none."""
+    H = np.zeros((3, 3))
+    climb(s.information[h], s.score[h], np.eye(3), H)
+    J, cov = np.zeros((3, c.n)), np.zeros((3, 3))
+    s.loglik[h] += 0.5 * np.log(inverse(H, cov))
+    for a in range(3):
+        u, v = (a + 1) % 3, (a + 2) % 3
+        # M = 1 + [a], and the world is that of M^T.
+        J[a] = s.slope[h, 3 * v + u] - s.slope[h, 3 * u + v]
+        for i in range(s.nodes.shape[0]):
+            node = s.nodes[i]
+            if node.present:
+                for at in (node.at_p, node.at_v, -1 if node.levelled else node.at_b):
+                    if at >= 0:
+                        J[a, at + u] += s.x[h, at + v]
+                        J[a, at + v] -= s.x[h, at + u]
+    s.P[h] += J.T.copy() @ (cov @ J)
