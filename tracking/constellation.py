@@ -13,8 +13,9 @@ from tracking.errors import ConfigError
 
 VEHICLES = ("car", "human", "drone", "hand", "robot", "none")
 WHEELED = ("car", "robot")
-CARRIED = ("hand", "drone", "none")
 """Vehicles that stay level and accelerate for seconds on end."""
+CARRIED = ("hand", "drone", "none")
+"""Vehicles that tilt, and accelerate for seconds."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

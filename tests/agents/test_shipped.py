@@ -66,10 +66,6 @@ def test_they_keep_their_formation(name):
     [
         *(("ring", "ring", "ring-nlos", n) for n in (3, 4, 5, 6)),
         ("hold-beams", "hold", "ring-nlos", 3),
-        pytest.param(
-            *("hold-beams", "hold", "ring-nlos", 4),
-            marks=pytest.mark.xfail(strict=True, reason="a car waits before the wall: 0.42 m"),
-        ),
         *(("hold-beams", "hold", "hall", n) for n in (4, 6)),
     ],
 )

@@ -235,3 +235,34 @@ def test_a_group_in_space_finds_how_it_is_turned(make_group, seed):
     assert ok[-1].all()
     assert error[-1].max() < 0.1
     assert t[ok.all(axis=1)][0] < 15.0
+
+
+def test_smoothing_over_the_first_move_of_a_group_takes_the_turn_as_it_is(make_group):
+    """The states of a moment, put into the vector twice, have no slopes."""
+    group = make_group(n=5, dimensions=3, seconds=6.0)
+    block = group.block
+    values = block.values.copy()
+    still = (block.kind == Kind.STATE) & (block.t < 3.0)
+    values[still, 4:7] = 0.0
+    block = type(block)(
+        **{f: values if f == "values" else getattr(block, f) for f in block.__slots__}
+    )
+    tracker = Tracker(group.constellation)
+    cut, end = np.searchsorted(block.t[0], [2.95, 3.25])
+    tracker.step(block.take(slice(0, int(cut))), 2.95)
+    before = tracker.save()["filter"]
+    later = block.take(slice(int(cut), int(end)))
+    smoothed = tracker.smooth(later, 2.95)
+    assert np.isfinite(smoothed.pos_ij_w).all()
+    for name, old, new in zip(JointState._fields, before, tracker.save()["filter"], strict=True):
+        np.testing.assert_array_equal(old, new, err_msg=name)
+
+
+@pytest.mark.parametrize("n", [2, 3])
+def test_groups_of_three_are_followed_one_turn_each(make_group, n):
+    group = make_group(n=n, dimensions=3, seconds=4.0)
+    tracker = Tracker(group.constellation)
+    tracker.step(group.block, group.t[-1])
+    state = tracker.save()["filter"]
+    assert not state.group["open"].any()
+    assert state.alive.sum() > 1

@@ -19,7 +19,7 @@ from tracking.filters.joint._agreement_kernels import are_same, turn_between
 from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_hypothesis
 from tracking.filters.joint._flatness_kernels import flatness, least_axis, scatter_of
 from tracking.filters.joint._linear_kernels import decouple
-from tracking.filters.joint._open_kernels import doubt_turn
+from tracking.filters.joint._open_kernels import can_open, doubt_turn
 from tracking.filters.joint._sample_kernels import decay
 from tracking.filters.joint._sleep_kernels import TIE, turn_all_ways
 from tracking.filters.joint._start_kernels import begin_pair, forget_fits
@@ -76,7 +76,7 @@ def watch_rotation(c, s, layout, dt):
         return
     group.strain_limit = RAISED * max(group.strain, group.strain_limit)
     group.strain = 0.0
-    if c.d == 3:
+    if can_open(c, s):
         doubt_turn(c, s, h)
         return
     for i in range(s.nodes.shape[0]):

@@ -40,10 +40,24 @@ from tracking.filters.joint._peak_kernels import (
 
 LOOSE = 3.0
 """[-] Each element of M has a variance of a third, over all rotations."""
+TIE = 1e-6
+"""[s] Times that differ by less are equal, whatever the clock began with."""
 CLEAR = 1.0
 """[-] By so much another turn has to be likelier (log-likelihood) before it is reported."""
 KNOWN = 0.2
 """[rad] Turns that are known so well are left to filters that are linear about each of them."""
+LONG = 20.0
+"""[s] After so long without a likelier turn it is kept."""
+
+
+@small_kernel
+def can_open(c, s):
+    """True for groups in space of more than three nodes: too little holds a layout of three.
+
+    Those that start are few at first, the others join at once. A smoother, which has no slopes,
+    takes the turn as it is.
+    """
+    return s.slope.shape[1] > 0 and s.nodes.shape[0] > c.d
 
 
 @allocating_kernel
@@ -68,7 +82,7 @@ def open_frame(c, s, h):
                 for q in range(3):
                     s.information[h, 3 * r + 2, 3 * q + 2] += out[r] * out[q] / c.height_var
     note_spread(s, h)
-    s.group[0].open, s.group[0].held = True, False
+    s.group[0].open, s.group[0].held, s.group[0].t_open = True, False, s.group[0].t
 
 
 @allocating_kernel
@@ -97,11 +111,16 @@ def carry_slope(c, s, h, scratch):
             z[v + 1] += -w[4] * b0 - w[3] * b1 + w[8] * psi
             z[v + 2] -= T * b2
             cos_r, sin_r = cosine_sine(s.x[h, node.at_h])
+            bias0, bias1 = 0.0, 0.0
+            if node.levelled:  # measured in the body, which M turns as well
+                bias0, bias1 = s.x[h, b], s.x[h, b + 1]
             dv, dp = pre[3], pre[6]
             if column == 0:
-                dv, dp = cos_r * pre[1] - sin_r * pre[2], cos_r * pre[4] - sin_r * pre[5]
+                dv = cos_r * pre[1] - sin_r * pre[2] - w[3] * bias0 + w[4] * bias1
+                dp = cos_r * pre[4] - sin_r * pre[5] - w[1] * bias0 + w[2] * bias1
             elif column == 1:
-                dv, dp = sin_r * pre[1] + cos_r * pre[2], sin_r * pre[4] + cos_r * pre[5]
+                dv = sin_r * pre[1] + cos_r * pre[2] - w[4] * bias0 - w[3] * bias1
+                dp = sin_r * pre[4] + cos_r * pre[5] - w[2] * bias0 - w[1] * bias1
             z[p + row] += dp
             z[v + row] += dv
         for r in range(first, last):
@@ -169,6 +188,14 @@ def doubt_turn(c, s, h):
 def watch_turns(c, s, layout):
     """Turn the frames so that the likeliest turn is none; go on with hypotheses once it is time."""
     group, was_alive = s.group[0], s.alive.copy()
+    if group.t < group.t_patient - TIE:
+        # Nothing counts yet for or against any.
+        for h in range(s.alive.shape[0]):
+            if was_alive[h]:
+                open_frame(c, s, h)
+        return
+    if group.held and group.n_alive > 1:
+        group.held = False
     known, H = True, np.zeros((3, 3))
     for h in range(s.alive.shape[0]):
         if not was_alive[h]:
@@ -180,8 +207,12 @@ def watch_turns(c, s, layout):
             R[:] = turns[0]
             value = values[0]
         if group.held:
-            if value < CLEAR or is_near(R, np.eye(3)):
-                if len(values) < 2 or values[1] < -c.prune:
+            near = is_near(R, np.eye(3))
+            if value < CLEAR or near:
+                rivals = len(values) > 1 and values[1] > values[0] - c.prune
+                if not rivals or group.t - group.t_open > LONG:
+                    if near:
+                        turn_frame(c, s, h, R)
                     group.open = False
                 return
             group.held = False
@@ -250,6 +281,9 @@ def spread_frame(c, s, h):
     """Add to P what is not known of the turn, which is the likeliest: none."""
     H = np.zeros((3, 3))
     climb(s.information[h], s.score[h], np.eye(3), H)
+    least = least_curvature(H)
+    for a in range(3):
+        H[a, a] += max(KNOWN**-2 - least, 0.0)
     J, cov = np.zeros((3, c.n)), np.zeros((3, 3))
     s.loglik[h] += 0.5 * np.log(inverse(H, cov))
     for a in range(3):

@@ -42,6 +42,7 @@ def climb(information, score, R, H):
             for a in range(3):
                 held[a, a] += damping * (abs(H[0, 0]) + abs(H[1, 1]) + abs(H[2, 2]) + 1e-9)
             positive = inverse(held, step) > 0.0 and held[0, 0] > 0.0
+            positive = positive and held[0, 0] * held[1, 1] > held[0, 1] * held[0, 1]
             move = step @ w
             length = math.sqrt(np.sum(move * move))
             if positive and length < 1.0:

@@ -12,7 +12,7 @@ import numpy as np
 from tracking.compiled import allocating_kernel, kernel, small_kernel
 from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_hypothesis
 from tracking.filters.joint._linear_kernels import decouple
-from tracking.filters.joint._open_kernels import open_frame
+from tracking.filters.joint._open_kernels import TIE, can_open, open_frame
 from tracking.filters.joint._rotation_kernels import turn_covariance
 from tracking.filters.joint._turn_kernels import spread_turn, turn_variance
 
@@ -22,8 +22,6 @@ turns means nothing for longer; but nobody starts without being shaken."""
 PATIENCE, STOOD = 4.0, 1.0
 """[s] A group on wheels that starts while it moves, and has not stood first, knows nothing of its
 velocities: for so long wheels speak against the right rotation as well."""
-TIE = 1e-6
-"""[s] Times that differ by less are equal, whatever the clock began with."""
 
 
 @small_kernel
@@ -78,7 +76,7 @@ def wake_up(c, s, layout):
                 decouple(s, h, c.n, node.at_h, node.first_heading_var)
         if was_alive[h]:
             wake_turn(c, s, h)
-    if c.d == 3:
+    if can_open(c, s):
         for h in range(s.alive.shape[0]):
             if s.alive[h]:
                 open_frame(c, s, h)
@@ -109,7 +107,7 @@ def wake_turn(c, s, h):
 
 @allocating_kernel
 def turn_all_ways(c, s, layout, original):
-    """Follow a hypothesis of the plane in all other rotations and mirrored, if there is room."""
+    """Follow a hypothesis in all other rotations and mirrored, while the bank has room."""
     d = c.d
     first = layout.rotations[0, :d, :d].copy()
     for r in range(1, layout.rotations.shape[0]):

@@ -23,7 +23,7 @@ from tracking.filters._shape_kernels import (
 from tracking.filters.joint._carrier_kernels import CENTRE_VAR
 from tracking.filters.joint._copy_kernels import copy_hypothesis
 from tracking.filters.joint._linear_kernels import decouple
-from tracking.filters.joint._open_kernels import open_frame
+from tracking.filters.joint._open_kernels import can_open, open_frame
 from tracking.filters.joint._place_kernels import best_sides
 from tracking.filters.joint._sample_kernels import decay
 from tracking.filters.joint._sleep_kernels import ORIENTED, PATIENCE, none_moved, rests
@@ -44,7 +44,8 @@ def try_start(c, s, layout, t):
         forget_sums(s, members[a], t)
     asleep = none_moved(c, s, t)
     # A smoother has room for one hypothesis; of what it starts nothing is reported.
-    n_first = 1 if asleep or c.d == 3 else min(layout.rotations.shape[0], s.alive.shape[0])
+    opens = can_open(c, s) and not asleep
+    n_first = 1 if asleep or opens else min(layout.rotations.shape[0], s.alive.shape[0])
     for h in range(n_first):
         s.alive[h] = True
         s.loglik[h] = 0.0
@@ -72,7 +73,7 @@ def try_start(c, s, layout, t):
     group.started = True
     group.flat = False
     group.asleep, group.open = asleep, False
-    if c.d == 3 and not asleep:
+    if opens:
         open_frame(c, s, 0)
     group.n_alive = n_first
     group.best = 0

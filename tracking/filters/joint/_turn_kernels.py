@@ -5,9 +5,7 @@ to nodes at rest do not make it more certain, nor does a node that joins. What a
 all the same, by derivatives that are a little out of date, leaves it degrees off when the group
 begins to move.
 
-In space rotations are as uncertain as starts and ranges leave them: those tried are up to 63
-degrees from the right one, and filters that may turn so far settle later, and sometimes on a wrong
-one.
+In space one filter stands for all turns until they are known (`_open_kernels`).
 """
 
 from __future__ import annotations

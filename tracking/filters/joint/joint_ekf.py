@@ -154,9 +154,9 @@ class JointEkf:
         )
 
     def _fresh(self, n_envs: int) -> JointState:
-        # Room for the mirror images of nodes that join while all rotations are still possible; in
-        # space one stands for all of them.
-        n_hyps = 32 if self._constellation.dimensions == 3 else len(self._layout.rotations) + 8
+        # Room for the mirror images of nodes that join while all rotations are still possible.
+        n_rotations = len(self._layout.rotations)
+        n_hyps = 2 * n_rotations if self._constellation.dimensions == 3 else n_rotations + 8
         return make_state(self._constellation, self._params, n_envs, n_hyps)
 
 

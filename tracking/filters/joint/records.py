@@ -88,6 +88,7 @@ GROUP = np.dtype(
         ("n_alive", "i8"),
         ("best", "i8"),
         ("t", "f8"),  # time of the states [s]
+        ("t_open", "f8"),  # since when other turns are looked for [s]
         ("t_check", "f8"),
         ("t_carrier", "f8"),
         ("t_gauge", "f8"),
