@@ -207,12 +207,10 @@ def watch_turns(c, s, layout):
             R[:] = turns[0]
             value = values[0]
         if group.held:
-            near = is_near(R, np.eye(3))
-            if value < CLEAR or near:
+            # One that is near is what these seconds tell; the filter knows it better from before.
+            if value < CLEAR or is_near(R, np.eye(3)):
                 rivals = len(values) > 1 and values[1] > values[0] - c.prune
                 if not rivals or group.t - group.t_open > LONG:
-                    if near:
-                        turn_frame(c, s, h, R)
                     group.open = False
                 return
             group.held = False
