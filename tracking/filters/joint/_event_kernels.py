@@ -78,20 +78,8 @@ def run_events(coefficients, layout, state, scratch, block, t_out, out):
                 if has_power[e, k]:
                     gap = values[e, k, 1] - values[e, k, 2]
                     sight = (gap_evidence(c, gap), c.leave_rate_with_power)
-                hear(
-                    c,
-                    s,
-                    layout,
-                    scratch,
-                    i,
-                    j,
-                    a_i,
-                    a_j,
-                    t[e, k],
-                    values[e, k, 0],
-                    sight,
-                    what == SURVEY,
-                )
+                is_survey, now, distance = what == SURVEY, t[e, k], values[e, k, 0]
+                hear(c, s, layout, scratch, i, j, a_i, a_j, now, distance, sight, is_survey)
             elif what == LEAVE or (what == JOIN and s.nodes[i].present):
                 settle_all(s)
                 remove_node(c, s, layout, i)
