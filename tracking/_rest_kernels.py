@@ -14,9 +14,7 @@ from tracking.compiled import small_kernel
 REST_TAU = 0.5
 """[s] Time constant of both low passes."""
 REST_AFTER = 1.5
-"""[s] So long the readings must stay near."""
-MAX_GYR_CHANGE = math.radians(2.0)
-"""[rad/s] How near, of the gyroscope."""
+"""[s] So long the readings must stay near, the gyroscope's by `OrientationParams.rest_rate`."""
 MAX_ACC_CHANGE = 0.5
 """[m/s2] How near, of the accelerometer."""
 MAX_BIAS = math.radians(2.0)
@@ -36,7 +34,7 @@ def watch_gyroscope(rest, c, e, n, count, gx, gy, gz):
     mx, my, mz = rest[e, n, GYR], rest[e, n, GYR + 1], rest[e, n, GYR + 2]
     dx, dy, dz = gx - mx, gy - my, gz - mz
     turns = max(abs(mx), abs(my), abs(mz)) > MAX_BIAS
-    if turns or dx * dx + dy * dy + dz * dz >= MAX_GYR_CHANGE * MAX_GYR_CHANGE:
+    if turns or dx * dx + dy * dy + dz * dz >= c.rest_rate[n] * c.rest_rate[n]:
         rest[e, n, REST_T] = rest[e, n, RESTING] = 0.0
 
 

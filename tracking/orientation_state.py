@@ -37,6 +37,10 @@ class OrientationParams:
     takes that for tilt, and so it is missing in the acceleration."""
     tau_mag: float = 9.0
     """[s] VQF's magnetometer time constant. VQF default."""
+    rest_rate: float = math.radians(4.0)
+    """[rad/s] A gyroscope that reads within this of its own low pass for 1.5 s, as the accelerometer
+    does within 0.5 m/s2, is at rest. VQF's 2 deg/s are passed by noise alone in the gyroscopes of
+    `isas_walk1`, 0.5 to 0.8 deg/s along each axis, so that their bias was never learned."""
     max_gap: float = 0.5
     """[s] Missing samples up to here are filled by interpolation, so that the gyroscope is
     integrated over them. After a longer silence the orientation is found anew, where there is a
@@ -67,6 +71,8 @@ class OrientationCoefficients(NamedTuple):
     """Time constant behind it, (node) [s]."""
     reference_gain: F64
     """Share by which a reading moves what is known of the field, (node)."""
+    rest_rate: F64
+    """`OrientationParams.rest_rate`, (node) [rad/s]."""
     drift_var: F64
     """What the variance of a gyroscope's bias gains per sample, (node) [(0.01 deg/s)^2]."""
     rest_var: F64
@@ -152,6 +158,7 @@ def make_coefficients(
         mag_gain=1.0 - np.exp(-mag_dt / params.tau_mag),
         tau_mag=np.full(len(nodes), params.tau_mag),
         reference_gain=1.0 - np.exp(-mag_dt / REFERENCE_TAU),
+        rest_rate=np.full(len(nodes), params.rest_rate),
         drift_var=drift_var,
         rest_var=3.0**4 / drift_var + 3.0**2,
         motion_var=motion_var,

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import config, njit
+from scipy.spatial.transform import Rotation
 
 from tracking import Constellation, NodeConfig
 from tracking.arrays import aligned
@@ -68,20 +69,20 @@ def test_a_turned_hypothesis_is_turned_as_a_whole(dimensions, kinds, mirrored):
 @pytest.mark.parametrize("kinds", [("moving",) * 3, ("moving", "static", "moving")])
 def test_hypotheses_are_the_same_where_they_agree_about_the_centre(dimensions, kinds):
     c, s = bank(dimensions, kinds, seed=3)
-    moving = ~s.nodes["static"]
+    moving, none = ~s.nodes["static"], np.eye(dimensions)
     s.x[1] = s.x[0]
     for k in range(dimensions):  # all of the group elsewhere, and faster if it is free
         s.x[1, s.nodes["at_p"] + k] += 5.0
         s.x[1, s.nodes["at_v"][moving] + k] += 3.0 * moving.all()
-    assert are_same(c, s, 0, 1, 0.0)
+    assert are_same(c, s, 0, 1, none)
     limit = c["merge_distance"]
     at = s.nodes["at_v"][0]
     # One of n moves: it is off by (n - 1) / n of that from the mean, or by all beside static ones.
     share = 2.0 / 3.0 if moving.all() else 1.0
     s.x[1, at] += 0.95 * limit / share
-    assert are_same(c, s, 0, 1, 0.0)
+    assert are_same(c, s, 0, 1, none)
     s.x[1, at] += 0.1 * limit / share
-    assert not are_same(c, s, 0, 1, 0.0)
+    assert not are_same(c, s, 0, 1, none)
 
 
 @pytest.mark.parametrize("dimensions", [2, 3])
@@ -93,13 +94,36 @@ def test_a_hypothesis_that_is_another_one_turned_a_little_is_the_same(dimensions
     M = np.eye(dimensions)
     M[:2, :2] = [[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]
     turn_hypothesis(c, s, 1, M)
-    assert not are_same(c, s, 0, 1, 0.0)
-    found = turn_between(c, s, 0, 1)
+    none, found = np.eye(dimensions), np.eye(dimensions)
+    assert not are_same(c, s, 0, 1, none)
+    turn_between(c, s, 0, 1, found)
     assert are_same(c, s, 0, 1, found) == (abs(turn) < SAME_TURN)
-    assert found == (pytest.approx(-turn) if abs(turn) < SAME_TURN else 0.0)
+    np.testing.assert_allclose(found, M.T if abs(turn) < SAME_TURN else none, atol=1e-12)
     M[1] *= -1.0  # and its mirror image is not
     turn_hypothesis(c, s, 1, M)
-    assert not are_same(c, s, 0, 1, turn_between(c, s, 0, 1))
+    found[:] = none
+    turn_between(c, s, 0, 1, found)
+    assert not are_same(c, s, 0, 1, found)
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 2**31))
+def test_while_every_turn_is_open_layouts_are_the_same_whose_shapes_are(seed):
+    rng = np.random.default_rng(seed)
+    c, s = bank(3, ("moving", "static", "moving", "moving", "static"), seed=3)
+    s.x[1] = s.x[0]
+    M = Rotation.random(random_state=rng).as_matrix() * rng.choice([-1.0, 1.0])
+    turn_hypothesis(c, s, 1, M)
+    found = np.eye(3)
+    turn_between(c, s, 0, 1, found)
+    assert are_same(c, s, 0, 1, found) == (np.trace(M) > 1.0 + 2.0 * np.cos(SAME_TURN))
+    s.group["open"] = True
+    turn_between(c, s, 0, 1, found)
+    assert are_same(c, s, 0, 1, found)
+    np.testing.assert_allclose(found, M.T, atol=1e-9)
+    s.x[1, s.nodes["at_p"][2]] += 2.0
+    turn_between(c, s, 0, 1, found)
+    assert not are_same(c, s, 0, 1, found)
 
 
 @pytest.mark.parametrize("n", [3, 8, 20, 24, 40, 72, 96, 352])

@@ -80,9 +80,14 @@ def run(samples, field, hz, params, every=1):
     return [*(a[0, 0] for a in out), resting[0, 0]]
 
 
+def of_the_library(params):
+    rest = {"restThGyr": np.degrees(params.rest_rate)}
+    return {"tauAcc": params.tau_acc, "tauMag": params.tau_mag, **rest}
+
+
 def assert_same(samples, field, hz, params):
     found = run(samples, field, hz, params)
-    twin = VQF(1.0 / hz, tauAcc=params.tau_acc, tauMag=params.tau_mag)
+    twin = VQF(1.0 / hz, **of_the_library(params))
     gyr, acc = (np.ascontiguousarray(samples[:, k : k + 3]) for k in (0, 3))
     expected = twin.updateBatch(gyr, acc, np.ascontiguousarray(field))
     for name, value in zip(("quat6D", "quat9D", "bias"), found[:3], strict=True):
@@ -114,7 +119,8 @@ def test_it_is_the_library_with_a_slower_magnetometer(every):
     rng = np.random.default_rng(9)
     samples, field = turning(rng, 3000, 0.01)
     found = run(samples, field, 100.0, OrientationParams(), every)
-    twin, expected = VQF(0.01, -1.0, 0.01 * every), []
+    twin = VQF(0.01, -1.0, 0.01 * every, **of_the_library(OrientationParams()))
+    expected = []
     for k in range(len(samples)):
         twin.update(samples[k, :3].copy(), samples[k, 3:].copy())
         if k % every == 0:

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 
-from tracking.compiled import kernel, small_kernel
+import numpy as np
+
+from tracking.compiled import allocating_kernel, kernel, small_kernel
+from tracking.filters.joint._open_kernels import can_open
 
 SAME_TURN = 0.15
 """[rad] Hypotheses that differ by a smaller turn of the group only are one. The rotations that are
@@ -22,10 +25,9 @@ def are_same(c, s, a, b, turn):
         c: Coefficients.
         s: JointState of one environment.
         a: Hypothesis.
-        b: Another, turned about the vertical before it is compared,
-        turn: by so much [rad].
+        b: Another, turned before it is compared,
+        turn: by this, orthogonal, (d, d).
     """
-    cos_t, sin_t = math.cos(turn), math.sin(turn)
     way, pace = centre_of(c, s, b, False), centre_of(c, s, b, True)
     way_a, pace_a = centre_of(c, s, a, False), centre_of(c, s, a, True)
     for i in range(s.nodes.shape[0]):
@@ -36,34 +38,42 @@ def are_same(c, s, a, b, turn):
         for at, of_b, of_a in ((node.at_p, way, way_a), (node.at_v, pace, pace_a)):
             if at < 0:
                 continue
-            b0, b1 = s.x[b, at] - of_b[0], s.x[b, at + 1] - of_b[1]
-            squared += (s.x[a, at] - of_a[0] - cos_t * b0 + sin_t * b1) ** 2
-            squared += (s.x[a, at + 1] - of_a[1] - sin_t * b0 - cos_t * b1) ** 2
-            if c.d == 3:
-                squared += (s.x[a, at + 2] - of_a[2] - s.x[b, at + 2] + of_b[2]) ** 2
+            for r in range(c.d):
+                off = s.x[a, at + r] - of_a[r]
+                for k in range(c.d):
+                    off -= turn[r, k] * (s.x[b, at + k] - of_b[k])
+                squared += off * off
         if squared > c.merge_distance**2:
             return False
     return True
 
 
-@kernel
-def turn_between(c, s, a, b):
-    """By how much b is to be turned about the vertical to be nearest to a [rad]; 0 where it is far.
+@allocating_kernel
+def turn_between(c, s, a, b, turn):
+    """Write how b is to be turned to be nearest to a, (d, d); leaves what is written if far.
 
     Each rotation that was tried stands for those near it. Two of them that have come nearer than
-    `SAME_TURN` are one, and nobody should wait until a drive tells which is better.
+    `SAME_TURN` are one, and nobody should wait until a drive tells which is better. While each
+    stands for all turns and mirror images, in space, it may be any of them. By Procrustes.
     """
     way_a, way_b = centre_of(c, s, a, False), centre_of(c, s, b, False)
-    dot, cross = 0.0, 0.0
+    scatter = np.zeros((c.d, c.d))
     for i in range(s.nodes.shape[0]):
         if s.nodes[i].present:
             at = s.nodes[i].at_p
-            a0, a1 = s.x[a, at] - way_a[0], s.x[a, at + 1] - way_a[1]
-            b0, b1 = s.x[b, at] - way_b[0], s.x[b, at + 1] - way_b[1]
-            dot += a0 * b0 + a1 * b1
-            cross += b0 * a1 - b1 * a0
-    turn = math.atan2(cross, dot)
-    return turn if abs(turn) < SAME_TURN else 0.0
+            for r in range(c.d):
+                for k in range(c.d):
+                    scatter[r, k] += (s.x[a, at + r] - way_a[r]) * (s.x[b, at + k] - way_b[k])
+    u, _, v = np.linalg.svd(scatter)
+    if can_open(c, s) and (s.group[0].asleep or s.group[0].open):
+        turn[:] = u @ v
+        return
+    if np.linalg.det(u) * np.linalg.det(v) < 0.0:
+        u[:, c.d - 1] *= -1.0
+    nearest = u @ v
+    # The trace is 2 cos in the plane, 1 + 2 cos in space.
+    if np.trace(nearest) > (c.d - 2) + 2.0 * math.cos(SAME_TURN):
+        turn[:] = nearest
 
 
 @small_kernel

@@ -108,7 +108,7 @@ def watch_mirror(c, s):
         add_mirror_image(c, s)
 
 
-@kernel
+@allocating_kernel
 def prune_bank(c, s):
     """Drop hypotheses that are unlikely or the same as a better one; choose the best."""
     group = s.group[0]
@@ -133,16 +133,16 @@ def prune_bank(c, s):
     for h in range(n_hyps):
         if s.alive[h] and h != group.best and s.loglik[h] < top - c.prune:
             s.alive[h] = False
+    turn = np.eye(c.d)
     for a in range(n_hyps):
         for b in range(n_hyps):
-            if (
-                a != b
-                and s.alive[a]
-                and s.alive[b]
-                and b != group.best
-                and (s.loglik[a] >= s.loglik[b] or a == group.best)
-                and are_same(c, s, a, b, turn_between(c, s, a, b) if a == group.best else 0.0)
-            ):
+            better = s.loglik[a] >= s.loglik[b] or a == group.best
+            if a == b or b == group.best or not (s.alive[a] and s.alive[b] and better):
+                continue
+            turn[:] = np.eye(c.d)
+            if a == group.best:
+                turn_between(c, s, a, b, turn)
+            if are_same(c, s, a, b, turn):
                 s.alive[b] = False
     group.n_alive = 0
     for h in range(n_hyps):
