@@ -25,16 +25,22 @@ from tracking.constellation import CARRIED, WHEELED, Constellation
 from tracking.geometry import GRAVITY
 
 
+VQF_TAU_ACC = 3.0
+"""[s] VQF's accelerometer time constant."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OrientationParams:
     """What the orientation stage believes."""
 
-    tau_acc: float = 3.0
+    tau_acc: float = VQF_TAU_ACC
     """[s] VQF's accelerometer time constant. Longer trusts the gyroscope more. VQF default."""
     tau_acc_curves: float = 30.0
-    """[s] The same on what accelerates sideways for seconds in every curve: cars and robots, and
-    for filters that follow slow errors drones and what is carried in a hand. A short time constant
-    takes that for tilt, and so it is missing in the acceleration."""
+    """[s] The same on what accelerates sideways for seconds in every curve: cars and robots. A short
+    time constant takes that for tilt, and so it is missing in the acceleration."""
+    tau_acc_turned: float = 10.0
+    """[s] The same on drones and on what is carried in a hand, for filters that follow slow errors.
+    They are turned about, and their tilt is as good as what is known of the gyroscope's bias."""
     tau_mag: float = 9.0
     """[s] VQF's magnetometer time constant. VQF default."""
     rest_rate: float = math.radians(4.0)
@@ -137,17 +143,21 @@ def make_coefficients(
         follows_bias: As of `Filter.follows_bias`.
 
     The noises of the gyroscope's bias are the defaults of VQF: a drift of 0.1 deg/s in 100 s,
-    and steady states of 0.1 deg/s in motion and 0.03 deg/s at rest.
+    and steady states of 0.1 deg/s in motion and 0.03 deg/s at rest. In motion a bias is told by
+    corrections of the tilt, which come later the longer the time constant of the accelerometer
+    is. What follows them as fast all the same swings, by tilts of 5 to 10 degrees at 30 s: so the
+    variance of what they tell is in proportion to the square of that time constant.
     """
     nodes = constellation.nodes
     dt = np.array([1.0 / node.imu_hz for node in nodes])
     mag_dt = np.array([1.0 / (node.mag_hz or node.imu_hz) for node in nodes])
-    curved = WHEELED + (CARRIED if follows_bias else ())
-    tau_acc = [
-        params.tau_acc_curves if node.vehicle in curved else params.tau_acc for node in nodes
-    ]
+    tau_by_vehicle = dict.fromkeys(WHEELED, params.tau_acc_curves)
+    if follows_bias:
+        tau_by_vehicle |= dict.fromkeys(CARRIED, params.tau_acc_turned)
+    tau_acc = np.array([tau_by_vehicle.get(node.vehicle, params.tau_acc) for node in nodes])
     drift_var = 10.0**2 * dt / 100.0
-    motion_var = 10.0**4 / drift_var + 10.0**2
+    motion_sigma2 = 10.0**2 * tau_acc / VQF_TAU_ACC
+    motion_var = motion_sigma2**2 / drift_var + motion_sigma2
     return OrientationCoefficients(
         dt=dt,
         rate=np.array([node.imu_hz for node in nodes], dtype=np.float64),

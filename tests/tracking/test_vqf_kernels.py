@@ -81,8 +81,13 @@ def run(samples, field, hz, params, every=1):
 
 
 def of_the_library(params):
-    rest = {"restThGyr": np.degrees(params.rest_rate)}
-    return {"tauAcc": params.tau_acc, "tauMag": params.tau_mag, **rest}
+    """Arguments of the twin; what is told of a bias in motion comes later with a longer tau_acc."""
+    return {
+        "tauAcc": params.tau_acc,
+        "tauMag": params.tau_mag,
+        "restThGyr": np.degrees(params.rest_rate),
+        "biasSigmaMotion": 0.1 * np.sqrt(params.tau_acc / 3.0),
+    }
 
 
 def assert_same(samples, field, hz, params):

@@ -182,7 +182,7 @@ def remove_node(c, s, layout, i):
             for r in range(node.at_p, node.at_p + (c.d if node.static else 2 * c.d)):
                 s.moved[h, r] = 0.0
                 decouple(s, h, c.n, r, 1.0)
-            for r in range(node.at_b, node.at_b + (0 if node.static else c.d + 1)):
+            for r in range(node.at_b, node.at_b if node.static else node.at_h + 1):
                 decouple(s, h, c.n, r, 1.0)
             for k in range(s.nodes.shape[0]):
                 at = s.pairs[layout.pair_index[i, k]].at_e if k != i else -1

@@ -80,8 +80,11 @@ def move_mean(c, node, pre, x, h, i, scale, w, speed):
     p, v, b, y = node.at_p, node.at_v, node.at_b, node.at_h
     psi = x[h, y]
     cos_r, sin_r = cosine_sine(psi)
-    dv0, dv1 = cos_r * pre[i, 1] - sin_r * pre[i, 2], sin_r * pre[i, 1] + cos_r * pre[i, 2]
-    dp0, dp1 = cos_r * pre[i, 4] - sin_r * pre[i, 5], sin_r * pre[i, 4] + cos_r * pre[i, 5]
+    if node.at_o >= 0:
+        turn_offset(node, pre, i, cos_r, sin_r, scale, w)
+    dv0, dv1, dv2, dp0, dp1, dp2 = measured_motion(node, pre, x, h, i)
+    dv0, dv1 = cos_r * dv0 - sin_r * dv1, sin_r * dv0 + cos_r * dv1
+    dp0, dp1 = cos_r * dp0 - sin_r * dp1, sin_r * dp0 + cos_r * dp1
     if not node.levelled:
         cos_r, sin_r = 1.0, 0.0
     vc, vs = cos_r * pre[i, 7] - sin_r * pre[i, 8], sin_r * pre[i, 7] + cos_r * pre[i, 8]
@@ -99,18 +102,46 @@ def move_mean(c, node, pre, x, h, i, scale, w, speed):
     x[h, v + 1] += dv1 - bv1
     squared = x[h, v] ** 2 + x[h, v + 1] ** 2
     if d == 3:
-        x[h, p + 2] += T * x[h, v + 2] + pre[i, 6] - 0.5 * T * T * x[h, b + 2]
-        x[h, v + 2] += pre[i, 3] - T * x[h, b + 2]
+        x[h, p + 2] += T * x[h, v + 2] + dp2 - 0.5 * T * T * x[h, b + 2]
+        x[h, v + 2] += dv2 - T * x[h, b + 2]
         squared += x[h, v + 2] ** 2
     speed[i] = math.sqrt(squared)
     keep = decay(T / node.bias_tau)
     scale[b], scale[b + 1] = keep, keep
     if d == 3:
         scale[b + 2] = decay(T / node.rise_bias_tau)
-    for k in range(d):
-        x[h, b + k] *= scale[b + k]
+    for k in range(b, y):
+        x[h, k] *= scale[k]
     scale[y] = decay(T / node.heading_tau)
     x[h, y] *= scale[y]
+
+
+@small_kernel
+def turn_offset(node, pre, i, cos_r, sin_r, scale, w):
+    """Write to row i of w what an offset adds to velocity and way, and how much of it stays."""
+    for at in (12, 21):
+        for k in range(3):
+            w[i, at - 3 + k] = cos_r * pre[i, at + k] - sin_r * pre[i, at + 3 + k]
+            w[i, at + k] = sin_r * pre[i, at + k] + cos_r * pre[i, at + 3 + k]
+            w[i, at + 3 + k] = pre[i, at + 6 + k]
+    for k in range(3):
+        scale[node.at_o + k] = decay(pre[i, 0] / node.offset_tau)
+
+
+@small_kernel
+def measured_motion(node, pre, x, h, i):
+    """What the samples of node i add to velocity and way, as measured, its offset taken off."""
+    dv0, dv1, dv2 = pre[i, 1], pre[i, 2], pre[i, 3]
+    dp0, dp1, dp2 = pre[i, 4], pre[i, 5], pre[i, 6]
+    if node.at_o >= 0:
+        o0, o1, o2 = x[h, node.at_o], x[h, node.at_o + 1], x[h, node.at_o + 2]
+        dv0 -= pre[i, 12] * o0 + pre[i, 13] * o1 + pre[i, 14] * o2
+        dv1 -= pre[i, 15] * o0 + pre[i, 16] * o1 + pre[i, 17] * o2
+        dv2 -= pre[i, 18] * o0 + pre[i, 19] * o1 + pre[i, 20] * o2
+        dp0 -= pre[i, 21] * o0 + pre[i, 22] * o1 + pre[i, 23] * o2
+        dp1 -= pre[i, 24] * o0 + pre[i, 25] * o1 + pre[i, 26] * o2
+        dp2 -= pre[i, 27] * o0 + pre[i, 28] * o1 + pre[i, 29] * o2
+    return dv0, dv1, dv2, dp0, dp1, dp2
 
 
 @small_kernel
@@ -126,14 +157,15 @@ def way_since(c, s, h, i):
     psi = x[h, node.at_h]
     cos_r, sin_r = cosine_sine(psi)
     b0, b1 = x[h, node.at_b], x[h, node.at_b + 1]
-    dp0, dp1, bp0, bp1 = pre[i, 4], pre[i, 5], pre[i, 9], pre[i, 10]
+    _, _, _, dp0, dp1, dp2 = measured_motion(node, pre, x, h, i)
+    bp0, bp1 = pre[i, 9], pre[i, 10]
     way0, way1, way2 = cos_r * dp0 - sin_r * dp1, sin_r * dp0 + cos_r * dp1, 0.0
     if node.levelled:
         bp0, bp1 = cos_r * bp0 - sin_r * bp1, sin_r * bp0 + cos_r * bp1
     way0 += T * x[h, node.at_v] - (bp0 * b0 - bp1 * b1)
     way1 += T * x[h, node.at_v + 1] - (bp1 * b0 + bp0 * b1)
     if c.d == 3:
-        way2 = T * x[h, node.at_v + 2] + pre[i, 6] - 0.5 * T * T * x[h, node.at_b + 2]
+        way2 = T * x[h, node.at_v + 2] + dp2 - 0.5 * T * T * x[h, node.at_b + 2]
     return way0, way1, way2
 
 
@@ -154,6 +186,14 @@ def move_rows(d, n, node, P, h, i, w):
         for k in range(n):
             P[h, p + 2, k] += T * P[h, v + 2, k] - half * P[h, b + 2, k]
             P[h, v + 2, k] -= T * P[h, b + 2, k]
+    if node.at_o >= 0:
+        for k in range(n):
+            o0, o1, o2 = P[h, node.at_o, k], P[h, node.at_o + 1, k], P[h, node.at_o + 2, k]
+            for r in range(3):
+                at = 9 + 3 * r
+                P[h, v + r, k] -= w[i, at] * o0 + w[i, at + 1] * o1 + w[i, at + 2] * o2
+                at = 18 + 3 * r
+                P[h, p + r, k] -= w[i, at] * o0 + w[i, at + 1] * o1 + w[i, at + 2] * o2
 
 
 @small_kernel
@@ -182,6 +222,14 @@ def move_columns(d, node, P, h, i, w):
         if d == 3:
             P[h, r, p + 2] += T * P[h, r, v + 2] - half * P[h, r, b + 2]
             P[h, r, v + 2] -= T * P[h, r, b + 2]
+    if node.at_o >= 0:
+        for r in range(v + d):
+            o0, o1, o2 = P[h, r, node.at_o], P[h, r, node.at_o + 1], P[h, r, node.at_o + 2]
+            for k in range(3):
+                at = 9 + 3 * k
+                P[h, r, v + k] -= w[i, at] * o0 + w[i, at + 1] * o1 + w[i, at + 2] * o2
+                at = 18 + 3 * k
+                P[h, r, p + k] -= w[i, at] * o0 + w[i, at + 1] * o1 + w[i, at + 2] * o2
 
 
 @small_kernel
@@ -196,6 +244,12 @@ def fade(P, h, n_motion, n, scale):
         for k in range(np.uint64(n_motion), end):
             P[h, r, k] *= s * scale[k]
     mirror(P, h, n_motion)
+
+
+@small_kernel
+def unsettled_var(node, age):
+    """Variance of the bias that comes from an orientation of that age [s], which is new."""
+    return node.unsettled2 / (max(age, 1.0) * max(age, 1.0))
 
 
 @small_kernel
@@ -216,4 +270,10 @@ def add_noise(c, node, pre, P, h, i, scale, step):
         P[h, v + k, v + k] += q
         bias_var = node.bias_var if k < 2 else node.rise_bias_var
         P[h, b + k, b + k] += (1.0 - scale[b + k] * scale[b + k]) * bias_var
+    if node.unsettled2 > 0.0:
+        age = max(node.t_pre - node.t_first, 1.0)
+        for k in range(2):
+            P[h, b + k, b + k] += 2.0 * T / age * unsettled_var(node, age)
+    for k in range(node.at_o, node.at_o + (3 if node.at_o >= 0 else 0)):
+        P[h, k, k] += (1.0 - scale[k] * scale[k]) * node.offset_var
     P[h, y, y] += (1.0 - scale[y] * scale[y]) * node.heading_var

@@ -29,7 +29,7 @@ import numpy as np
 from tracking._angle_kernels import cosine_sine
 from tracking.compiled import allocating_kernel, kernel, small_kernel
 from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_part
-from tracking.filters.joint._motion_kernels import moves
+from tracking.filters.joint._motion_kernels import measured_motion, moves
 from tracking.filters.joint._peak_kernels import (
     climb,
     find_peaks,
@@ -102,7 +102,7 @@ def carry_slope(c, s, h, scratch):
             node = s.nodes[i]
             if not moves(node):
                 continue
-            p, v, b, w, pre = node.at_p, node.at_v, node.at_b, scratch.step[i], s.pre[i]
+            p, v, b, w = node.at_p, node.at_v, node.at_b, scratch.step[i]
             T, b0, b1, b2, psi = w[0], z[b], z[b + 1], z[b + 2], z[node.at_h]
             z[p] += T * z[v] - w[1] * b0 + w[2] * b1 + w[5] * psi
             z[p + 1] += T * z[v + 1] - w[2] * b0 - w[1] * b1 + w[6] * psi
@@ -110,17 +110,23 @@ def carry_slope(c, s, h, scratch):
             z[v] += -w[3] * b0 + w[4] * b1 + w[7] * psi
             z[v + 1] += -w[4] * b0 - w[3] * b1 + w[8] * psi
             z[v + 2] -= T * b2
+            if node.at_o >= 0:
+                for r in range(3):
+                    for q in range(3):
+                        z[v + r] -= w[9 + 3 * r + q] * z[node.at_o + q]
+                        z[p + r] -= w[18 + 3 * r + q] * z[node.at_o + q]
+            dv0, dv1, dv2, dp0, dp1, dp2 = measured_motion(node, s.pre, s.x, h, i)
             cos_r, sin_r = cosine_sine(s.x[h, node.at_h])
             bias0, bias1 = 0.0, 0.0
             if node.levelled:  # measured in the body, which M turns as well
                 bias0, bias1 = s.x[h, b], s.x[h, b + 1]
-            dv, dp = pre[3], pre[6]
+            dv, dp = dv2, dp2
             if column == 0:
-                dv = cos_r * pre[1] - sin_r * pre[2] - w[3] * bias0 + w[4] * bias1
-                dp = cos_r * pre[4] - sin_r * pre[5] - w[1] * bias0 + w[2] * bias1
+                dv = cos_r * dv0 - sin_r * dv1 - w[3] * bias0 + w[4] * bias1
+                dp = cos_r * dp0 - sin_r * dp1 - w[1] * bias0 + w[2] * bias1
             elif column == 1:
-                dv = sin_r * pre[1] + cos_r * pre[2] - w[4] * bias0 - w[3] * bias1
-                dp = sin_r * pre[4] + cos_r * pre[5] - w[2] * bias0 - w[1] * bias1
+                dv = sin_r * dv0 + cos_r * dv1 - w[4] * bias0 - w[3] * bias1
+                dp = sin_r * dp0 + cos_r * dp1 - w[2] * bias0 - w[1] * bias1
             z[p + row] += dp
             z[v + row] += dv
         for r in range(first, last):

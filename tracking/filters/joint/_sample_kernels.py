@@ -49,7 +49,24 @@ def sum_inertial(c, nodes, held, pre, i, t):
     pre[i, 10] += dt * pre[i, 8] + half * sin_b
     pre[i, 7] += dt * cos_b
     pre[i, 8] += dt * sin_b
+    if node.at_o >= 0:
+        sum_orientation(held, pre, i, dt, 1.0 if aided else 0.0)
     pre[i, 0] += dt
+
+
+@small_kernel
+def sum_orientation(held, pre, i, dt, share):
+    """Add how node i was turned: that is what an offset of its accelerometer does."""
+    w, x, y, z = held[i, 0], held[i, 1], held[i, 2], held[i, 3]
+    rotation = (
+        1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y),
+        2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x),
+        2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y),
+    )  # fmt: skip
+    for k in range(9):
+        once = share * dt * rotation[k]
+        pre[i, 21 + k] += dt * pre[i, 12 + k] + 0.5 * dt * once
+        pre[i, 12 + k] += once
 
 
 @small_kernel

@@ -23,6 +23,7 @@ from tracking.filters._shape_kernels import (
 from tracking.filters.joint._carrier_kernels import CENTRE_VAR
 from tracking.filters.joint._copy_kernels import copy_hypothesis
 from tracking.filters.joint._linear_kernels import decouple
+from tracking.filters.joint._motion_kernels import unsettled_var
 from tracking.filters.joint._open_kernels import can_open, open_frame
 from tracking.filters.joint._place_kernels import best_sides
 from tracking.filters.joint._sample_kernels import decay
@@ -119,7 +120,12 @@ def begin_node(c, s, h, i, t):
     for k in range(c.d):
         speed_var = c.rest_var if still else c.start_speed_var
         decouple(s, h, c.n, node.at_v + k, speed_var)
-        decouple(s, h, c.n, node.at_b + k, node.bias_var if k < 2 else node.rise_bias_var)
+        bias_var = node.bias_var if k < 2 else node.rise_bias_var
+        if k < 2 and not still:
+            bias_var += unsettled_var(node, t - node.t_first)
+        decouple(s, h, c.n, node.at_b + k, bias_var)
+    for k in range(node.at_o, node.at_o + (3 if node.at_o >= 0 else 0)):
+        decouple(s, h, c.n, k, node.offset_var)
     decouple(s, h, c.n, node.at_h, heading_var)
 
 

@@ -116,6 +116,7 @@ def count_states(constellation: Constellation, params: JointParams) -> int:
     """How many states there are."""
     d = constellation.dimensions
     n = count_motion(constellation) + (d + 1) * int((~constellation.is_static).sum())
+    n += 3 * sum(has_offset(constellation, params, k) for k in range(constellation.n_nodes))
     if has_range_errors(constellation, params):
         n += 2 * int(moving_pairs(constellation).sum())
     return n
@@ -138,6 +139,13 @@ def count_motion(constellation: Constellation) -> int:
 def moving_pairs(constellation: Constellation) -> Bool:
     """True for pairs with a node that moves: those that are ranged, (pair)."""
     return np.asarray(~constellation.is_static[constellation.pairs].all(axis=1))
+
+
+def has_offset(constellation: Constellation, params: JointParams, node: int) -> bool:
+    """True if the offset of a node's accelerometer has states: in space, in what is turned about."""
+    config = constellation.nodes[node]
+    moves = config.kind != "static" and constellation.dimensions == 3
+    return moves and params.carriers[config.vehicle].offset_std is not None
 
 
 def has_range_errors(constellation: Constellation, params: JointParams) -> bool:

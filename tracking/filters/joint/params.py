@@ -34,6 +34,15 @@ class CarrierParams:
     of the accelerometer, less what is learned of it at rest."""
     rise_bias_tau: float = 100.0
     """[s] How long that stays the same."""
+    unsettled_speed: float = 0.0
+    """[m/s] How fast it may move while its orientation is still being found. The tilt of VQF is
+    at first off by the mean acceleration since its first sample, which over a time t is a change
+    of velocity over t."""
+    offset_std: float | None = None
+    """[m/s2] Offset of the accelerometer in the body, in space: a state of its own where the body is
+    turned about, since it turns with it, which `bias_std` does not. None for none."""
+    offset_tau: float = 1000.0
+    """[s] How long that stays the same."""
     levelled: bool = False
     """The body stays level: the acceleration is taken in the plane of the body, free of tilt
     errors, and its slow error turns with the body."""
@@ -65,10 +74,10 @@ class CarrierParams:
     do with its older state, without the noise of the time since."""
 
     def __post_init__(self) -> None:
-        _expect_positive(self, "rear_axle", "slip")
+        _expect_positive(self, "rear_axle", "slip", "unsettled_speed")
 
 
-BODY = CarrierParams()
+BODY = CarrierParams(accel_psd=0.05, unsettled_speed=1.0, offset_std=0.2)
 CARRIERS = {
     "car": CarrierParams(
         accel_psd=0.045,
@@ -97,8 +106,8 @@ CARRIERS = {
         heading_tau=30.0,
     ),
     "hand": BODY,
-    "drone": replace(BODY, speed_std=10.0, rests=False),
-    "none": replace(BODY, speed_std=10.0, rests=False),
+    "drone": replace(BODY, accel_psd=0.1, speed_std=10.0, rests=False),
+    "none": replace(BODY, accel_psd=0.1, speed_std=10.0, rests=False),
 }
 """By `NodeConfig.vehicle`."""
 
@@ -192,7 +201,7 @@ class JointStartParams:
     """[-] Slow mean of the NIS of ranges from which on it is doubted how the layout is turned. It
     is 0.4 where all is well, as a range is believed less than its noise alone would allow, and up
     to 1.0 in recordings of sensors that are known less well."""
-    height_std: float = 0.65
+    height_std: float = 1.0
     """[m] How much fixed nodes differ in height from each other, where nothing tells how the group
     is turned: people put them into rooms, which are wider than they are high."""
     head_start: float = 10.0

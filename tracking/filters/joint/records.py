@@ -42,6 +42,9 @@ NODE = np.dtype(
         ("bias_tau", "f8"),
         ("rise_bias_var", "f8"),
         ("rise_bias_tau", "f8"),
+        ("unsettled2", "f8"),
+        ("offset_var", "f8"),
+        ("offset_tau", "f8"),
         ("heading_var", "f8"),
         ("heading_tau", "f8"),
         ("first_heading_var", "f8"),
@@ -52,6 +55,7 @@ NODE = np.dtype(
         ("at_p", "i8"),  # first state of its position
         ("at_v", "i8"),  # of its velocity; -1 for static nodes, like the next two
         ("at_b", "i8"),
+        ("at_o", "i8"),  # of the offset of its accelerometer; -1 for none
         ("at_h", "i8"),
     ]
 )

@@ -3,7 +3,8 @@
 One state vector holds all nodes of a group, in one world frame:
 
     node           position (d) [m]; velocity (d) [m/s] of those that move
-    moving node    acceleration bias (d) [m/s2], heading error [rad]
+    moving node    acceleration bias (d) [m/s2]; in space, where it is turned about, offset of its
+                   accelerometer, body frame (3) [m/s2]; heading error [rad]
     pair           fast and slow part of its range error [m], in small groups
 
 in this order: what moves of all nodes, then what only fades. ``d`` is 2 or 3. The states of nodes
@@ -22,6 +23,7 @@ from tracking.constellation import Constellation
 from tracking.filters.joint.coefficients import (
     count_motion,
     count_rows,
+    has_offset,
     has_range_errors,
     moving_pairs,
 )
@@ -29,7 +31,7 @@ from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.records import GROUP, NODE, PAIR, Records
 from tracking.filters.rotations import starting_rotations
 
-N_PRE = 12
+N_PRE = 30
 """Columns of `JointState.pre`."""
 
 
@@ -44,7 +46,8 @@ class JointState(NamedTuple):
     pre: F64
     """Sums over inertial samples since the states' time, (env, node, N_PRE): time [s]; velocity
     and way that they add [m/s, m]; cosine and sine that turn a bias, summed once and twice;
-    square of the acceleration [m2/s3]."""
+    square of the acceleration [m2/s3]; the orientation, row by row, summed once and twice, of nodes
+    whose accelerometer has an offset."""
     pairs: Records
     """PAIR, (env, pair)."""
     group: Records
@@ -117,7 +120,7 @@ def make_state(
     for k, node in enumerate(constellation.nodes):
         carrier = params.carriers[node.vehicle]
         static = node.kind == "static"
-        initial = constellation.heading == "initial"
+        initial, offset = constellation.heading == "initial", has_offset(constellation, params, k)
         heading_std = params.initial_heading_std if initial else carrier.heading_std
         first_heading_std = heading_std if initial else carrier.first_heading_std or heading_std
         constants = {
@@ -132,6 +135,9 @@ def make_state(
             "bias_tau": carrier.bias_tau,
             "rise_bias_var": carrier.rise_bias_std**2,
             "rise_bias_tau": carrier.rise_bias_tau,
+            "unsettled2": carrier.unsettled_speed**2,
+            "offset_var": (carrier.offset_std or 0.0) ** 2,
+            "offset_tau": carrier.offset_tau,
             "heading_var": heading_std**2,
             "first_heading_var": first_heading_std**2,
             "heading_tau": params.initial_heading_tau if initial else carrier.heading_tau,
@@ -142,12 +148,13 @@ def make_state(
             "at_p": at,
             "at_v": -1 if static else at + d,
             "at_b": -1 if static else fades,
-            "at_h": -1 if static else fades + d,
+            "at_o": fades + d if offset else -1,
+            "at_h": -1 if static else fades + d + 3 * offset,
         }
         for name, value in constants.items():
             nodes[name][:, k] = value
         at += d if static else 2 * d
-        fades += 0 if static else d + 1
+        fades += 0 if static else d + 3 * offset + 1
     pairs = np.zeros((n_envs, p), dtype=PAIR)
     pairs["i"], pairs["j"] = constellation.pairs.T
     pairs["at_e"] = -1
