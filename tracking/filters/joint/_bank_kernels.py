@@ -74,11 +74,12 @@ def watch_rotation(c, s, layout, dt):
     h = group.best
     if flatness(c, s, h, True) == np.inf:
         return
-    group.strain_limit = RAISED * max(group.strain, group.strain_limit)
-    group.strain = 0.0
     if can_open(c, s):
+        group.strain = 0.0
         doubt_turn(c, s, h)
         return
+    group.strain_limit = RAISED * max(group.strain, group.strain_limit)
+    group.strain = 0.0
     for i in range(s.nodes.shape[0]):
         node = s.nodes[i]
         if node.present and not node.static:
