@@ -6,6 +6,8 @@ is used once more when they do. It is remembered while a node is away.
 
 from __future__ import annotations
 
+import math
+
 from tracking.compiled import kernel, small_kernel
 from tracking.filters._shape_kernels import SURVEYED, start_distance
 from tracking.filters.joint._linear_kernels import absorb, project, settle_all
@@ -17,7 +19,11 @@ from tracking.filters.joint._turn_kernels import UNSURE
 
 @small_kernel
 def fuse_survey(c, s, h, p, distance, scratch):
-    """Correct hypothesis h with a surveyed distance between the origins of two nodes."""
+    """Correct hypothesis h with a surveyed distance between the origins of two nodes.
+
+    A hypothesis that puts a newcomer on the wrong side of the others is told so by the next of
+    them, long before anybody moves.
+    """
     if s.group[0].turn_var > UNSURE * UNSURE:
         follow_rotation(c, s, h)
     none = scratch.none
@@ -27,7 +33,10 @@ def fuse_survey(c, s, h, p, distance, scratch):
         scratch.direct[:] = 0.0
         turn_gradient(s, h, m, scratch)
         tell_turn(s, h, scratch, distance - predicted, variance + c.survey_var)
-    absorb(s, h, scratch.w, distance - predicted, variance + c.survey_var)
+    nu, S = distance - predicted, variance + c.survey_var
+    if s.group[0].n_alive > 1:
+        s.loglik[h] -= 0.5 * (min(nu * nu / S, c.max_nis) + math.log(S))
+    absorb(s, h, scratch.w, nu, S)
 
 
 @kernel
