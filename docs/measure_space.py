@@ -1,7 +1,7 @@
 """How a tracker does in space from nothing but raw sensors: hands beside fixed nodes, and drones.
 
-For `docs/tracker.md`; the runs are those of `space_runs.py`. Nothing of them is in a log, so filters
-can be compared on hundreds before a recording is looked at.
+For `docs/tracker.md`; the runs are those of `space_runs.py`. Nothing of them is in a log, so
+filters can be compared on hundreds before a recording is looked at.
 
 Run `python docs/measure_space.py hand|drones [RUNS] [FIRST SEED] [FILTER]`.
 """

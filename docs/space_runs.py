@@ -1,7 +1,8 @@
 """Simulated runs in space with raw sensors: a hand beside fixed nodes, and a swarm of drones.
 
 For `measure_space.py`: half of the runs begin at rest, the others in mid-walk or mid-flight; rooms
-are of 5 m, sensors cheap or good, ranges err by 3 to 10 cm that last and now and then have no sight.
+are of 5 m, sensors cheap or good, ranges err by 3 to 10 cm that last, and a tenth of them has no
+sight.
 """
 
 from __future__ import annotations

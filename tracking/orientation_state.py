@@ -24,7 +24,6 @@ from tracking.arrays import F64, Bool
 from tracking.constellation import CARRIED, WHEELED, Constellation
 from tracking.geometry import GRAVITY
 
-
 VQF_TAU_ACC = 3.0
 """[s] VQF's accelerometer time constant."""
 
@@ -36,17 +35,17 @@ class OrientationParams:
     tau_acc: float = VQF_TAU_ACC
     """[s] VQF's accelerometer time constant. Longer trusts the gyroscope more. VQF default."""
     tau_acc_curves: float = 30.0
-    """[s] The same on what accelerates sideways for seconds in every curve: cars and robots. A short
-    time constant takes that for tilt, and so it is missing in the acceleration."""
+    """[s] The same on what accelerates sideways for seconds in every curve: cars and robots. A
+    short time constant takes that for tilt, and so it is missing in the acceleration."""
     tau_acc_turned: float = 10.0
     """[s] The same on drones and on what is carried in a hand, for filters that follow slow errors.
     They are turned about, and their tilt is as good as what is known of the gyroscope's bias."""
     tau_mag: float = 9.0
     """[s] VQF's magnetometer time constant. VQF default."""
     rest_rate: float = math.radians(4.0)
-    """[rad/s] A gyroscope that reads within this of its own low pass for 1.5 s, as the accelerometer
-    does within 0.5 m/s2, is at rest. VQF's 2 deg/s are passed by noise alone in the gyroscopes of
-    `isas_walk1`, 0.5 to 0.8 deg/s along each axis, so that their bias was never learned."""
+    """[rad/s] A gyroscope that reads within this of its own low pass for 1.5 s, as the
+    accelerometer does within 0.5 m/s2, is at rest. VQF's 2 deg/s are passed by the noise alone of
+    `isas_walk1`, 0.5 to 0.8 deg/s along each axis, so that its bias was never learned."""
     max_gap: float = 0.5
     """[s] Missing samples up to here are filled by interpolation, so that the gyroscope is
     integrated over them. After a longer silence the orientation is found anew, where there is a

@@ -46,6 +46,22 @@ def test_after_a_blow_the_speed_is_uncertain(vehicle, accel, is_blow):
     assert s.pre[0, 1] == pytest.approx(accel * 0.01)
 
 
+@pytest.mark.parametrize("at_rest", [True, False])
+def test_a_tilt_that_is_being_found_leaves_the_bias_uncertain(at_rest):
+    """Off by the mean acceleration since the first sample, but for what stood all the time."""
+    c, s = one_env("drone" if not at_rest else "hand")
+    s.alive[:], s.nodes["present"] = True, True
+    s.nodes["has_state"], s.nodes["t_state"] = True, 4.0
+    s.nodes["t_moved"] = 0.0 if at_rest else 4.0
+    carrier = CARRIERS["hand"]
+    for t_first, age in ((0.0, 4.0), (-96.0, 100.0)):
+        s.nodes["t_first"] = t_first
+        begin_node(c, s, 0, 0, 4.0)
+        at = s.nodes["at_b"][0]
+        unsettled = 0.0 if at_rest else carrier.unsettled_speed / age
+        assert s.P[0, at, at] == pytest.approx(carrier.bias_std**2 + unsettled**2)
+
+
 @given(st.floats(-30.0, 30.0))
 def test_range_errors_begin_as_those_of_both_sights(evidence):
     """The slow error is that of a mixture, with its mean and variance."""

@@ -62,7 +62,7 @@ def carry(c, s, scratch, x, P, t=0.05):  # noqa: N803
     return s.x[0].copy(), s.P[0].copy()
 
 
-@pytest.mark.parametrize("vehicle", ["car", "human"])
+@pytest.mark.parametrize("vehicle", ["car", "human", "hand"])
 @pytest.mark.parametrize("dimensions", [2, 3])
 @pytest.mark.parametrize("static", [(), (3,)])
 def test_prediction_is_that_of_its_own_derivatives(dimensions, vehicle, static):
@@ -114,7 +114,7 @@ def test_range_has_its_own_derivatives(dimensions, seed, since, atol):
         assert written[k] == pytest.approx((values[0] - values[1]) / 2e-6, abs=atol)
 
 
-@pytest.mark.parametrize("vehicle", ["car", "human"])
+@pytest.mark.parametrize("vehicle", ["car", "human", "hand"])
 @pytest.mark.parametrize("dimensions", [2, 3])
 def test_a_range_is_the_same_before_and_after_carrying(dimensions, vehicle):
     c, s, scratch, layout = running(dimensions, vehicle)

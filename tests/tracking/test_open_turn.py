@@ -158,6 +158,34 @@ def test_one_filter_gives_the_states_and_likelihoods_of_all_turns(static):
         assert told == pytest.approx(total - reached, abs=1e-6)
 
 
+@pytest.mark.parametrize("vehicle", ["human", "hand", "car"])
+def test_slopes_are_carried_as_errors_of_the_states_are(vehicle):
+    """With no acceleration, of which a turn would make another."""
+    c, s, scratch, _ = open_group(vehicle)
+    c["fast_length"] = c["slow_length"] = c["excess_length"] = 1e12
+    s.held[:, 4:] = 0.0
+    for name in ("at_b", "at_o"):
+        for at in s.nodes[name][s.nodes[name] >= 0]:
+            s.x[0, at : at + 3] = 0.0
+    x0, h = s.x[0].copy(), 1e-6
+    s.slope[0] = np.random.default_rng(3).standard_normal(s.slope[0].shape)
+    for z in s.slope[0].copy():
+        reached = []
+        for step in (h, -h):
+            s.x[0], s.pre[:] = x0 + step * z, 0.0
+            for i in range(3):
+                s.nodes["t_pre"][i] = 0.0
+                sum_inertial(c, s.nodes, s.held, s.pre, i, 0.05)
+            _motion_kernels.predict(c, s, 0, 0.05, scratch)
+            reached.append(s.x[0].copy())
+        expected = (reached[0] - reached[1]) / (2.0 * h)
+        s.x[0], before = x0, s.slope[0].copy()
+        s.slope[0, 0] = z
+        _open_kernels.carry_slope(c, s, 0, scratch)
+        np.testing.assert_allclose(s.slope[0, 0], expected, atol=1e-6)
+        s.slope[0] = before
+
+
 @pytest.mark.parametrize("vehicle", ["human", "hand"])
 def test_turning_the_frame_back_changes_nothing(vehicle):
     c, s, scratch, _ = open_group(vehicle)

@@ -188,3 +188,19 @@ def test_lost_samples_are_bridged():
     gapped = states(Orientation(c, OrientationParams()).step(whole.take(keep)))
     difference = yaw_of(full[-1, :4]) - yaw_of(gapped[-1, :4])
     assert abs(np.angle(np.exp(1j * difference))) < 0.01
+
+
+def test_a_noisy_gyroscope_is_seen_to_rest():
+    """Its bias and the length of gravity are learned: otherwise its tilt runs away."""
+    rng, n = np.random.default_rng(3), 800
+    bias, force = np.radians([0.5, -0.6, 0.4]), np.array([0.2, -0.3, GRAVITY + 0.1])
+    gyr = bias + np.radians(0.7) * rng.standard_normal((n, 3))
+    imu = np.concatenate([gyr, force + 0.03 * rng.standard_normal((n, 3))], axis=1)
+    t, node = np.arange(1, n + 1) / 100.0, np.zeros(n, dtype=np.int64)
+    block = MeasurementBlock.of_kind(Kind.IMU, t, node, imu)
+    for rest_rate, most in ((OrientationParams().rest_rate, 0.05), (np.radians(2.0), np.inf)):
+        stage = Orientation(constellation("initial"), OrientationParams(rest_rate=rest_rate))
+        out = states(stage.step(block))
+        accel = np.abs(out[-200:, 4:].mean(axis=0))
+        assert (accel < most).all()
+        assert np.isfinite(most) or accel.max() > 0.05  # VQF's own limit does not see it

@@ -96,6 +96,7 @@ def move_mean(c, node, pre, x, h, i, scale, w, speed):
     share = 1.0 if node.levelled else 0.0
     w[i, 5], w[i, 6] = -(dp1 - share * bp1), dp0 - share * bp0
     w[i, 7], w[i, 8] = -(dv1 - share * bv1), dv0 - share * bv0
+    w[i, 27], w[i, 28] = dv2, dp2
     x[h, p] += T * x[h, v] + dp0 - bp0
     x[h, p + 1] += T * x[h, v + 1] + dp1 - bp1
     x[h, v] += dv0 - bv0

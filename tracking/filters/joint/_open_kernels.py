@@ -26,10 +26,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking._angle_kernels import cosine_sine
 from tracking.compiled import allocating_kernel, kernel, small_kernel
 from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_part
-from tracking.filters.joint._motion_kernels import measured_motion, moves
+from tracking.filters.joint._motion_kernels import moves
 from tracking.filters.joint._peak_kernels import (
     climb,
     find_peaks,
@@ -110,25 +109,12 @@ def carry_slope(c, s, h, scratch):
             z[v] += -w[3] * b0 + w[4] * b1 + w[7] * psi
             z[v + 1] += -w[4] * b0 - w[3] * b1 + w[8] * psi
             z[v + 2] -= T * b2
-            if node.at_o >= 0:
-                for r in range(3):
-                    for q in range(3):
-                        z[v + r] -= w[9 + 3 * r + q] * z[node.at_o + q]
-                        z[p + r] -= w[18 + 3 * r + q] * z[node.at_o + q]
-            dv0, dv1, dv2, dp0, dp1, dp2 = measured_motion(node, s.pre, s.x, h, i)
-            cos_r, sin_r = cosine_sine(s.x[h, node.at_h])
-            bias0, bias1 = 0.0, 0.0
-            if node.levelled:  # measured in the body, which M turns as well
-                bias0, bias1 = s.x[h, b], s.x[h, b + 1]
-            dv, dp = dv2, dp2
-            if column == 0:
-                dv = cos_r * dv0 - sin_r * dv1 - w[3] * bias0 + w[4] * bias1
-                dp = cos_r * dp0 - sin_r * dp1 - w[1] * bias0 + w[2] * bias1
-            elif column == 1:
-                dv = sin_r * dv0 + cos_r * dv1 - w[4] * bias0 - w[3] * bias1
-                dp = sin_r * dp0 + cos_r * dp1 - w[2] * bias0 - w[1] * bias1
-            z[p + row] += dp
-            z[v + row] += dv
+            for e in range(9 if node.at_o >= 0 else 0):
+                z[v + e // 3] -= w[9 + e] * z[node.at_o + e % 3]
+                z[p + e // 3] -= w[18 + e] * z[node.at_o + e % 3]
+            # A turn by the heading error is one of M as well.
+            z[p + row] += (w[6], -w[5], w[28])[column]
+            z[v + row] += (w[8], -w[7], w[27])[column]
         for r in range(first, last):
             z[r] *= scratch.scale[r]
 

@@ -39,8 +39,8 @@ class CarrierParams:
     at first off by the mean acceleration since its first sample, which over a time t is a change
     of velocity over t."""
     offset_std: float | None = None
-    """[m/s2] Offset of the accelerometer in the body, in space: a state of its own where the body is
-    turned about, since it turns with it, which `bias_std` does not. None for none."""
+    """[m/s2] Offset of the accelerometer in the body, in space: a state of its own where the body
+    is turned about, since it turns with it, which `bias_std` does not. None for none."""
     offset_tau: float = 1000.0
     """[s] How long that stays the same."""
     levelled: bool = False
