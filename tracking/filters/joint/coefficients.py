@@ -142,7 +142,7 @@ def moving_pairs(constellation: Constellation) -> Bool:
 
 
 def has_offset(constellation: Constellation, params: JointParams, node: int) -> bool:
-    """True if the offset of a node's accelerometer has states: in space, where it is turned about."""
+    """True if the offset of a node's accelerometer has states: in space, where it turns about."""
     config = constellation.nodes[node]
     moves = config.kind != "static" and constellation.dimensions == 3
     return moves and params.carriers[config.vehicle].offset_std is not None
