@@ -6,8 +6,6 @@ is used once more when they do. It is remembered while a node is away.
 
 from __future__ import annotations
 
-import math
-
 from tracking.compiled import kernel, small_kernel
 from tracking.filters._shape_kernels import SURVEYED, start_distance
 from tracking.filters.joint._linear_kernels import absorb, project, settle_all
@@ -15,6 +13,9 @@ from tracking.filters.joint._open_kernels import tell_turn, turn_gradient
 from tracking.filters.joint._range_kernels import range_model
 from tracking.filters.joint._rotation_kernels import follow_rotation
 from tracking.filters.joint._turn_kernels import UNSURE
+
+CONTRADICTS = 6.6
+"""[-] NIS of one in a hundred. The same distance again is no news: only what contradicts counts."""
 
 
 @small_kernel
@@ -34,8 +35,9 @@ def fuse_survey(c, s, h, p, distance, scratch):
         turn_gradient(s, h, m, scratch)
         tell_turn(s, h, scratch, distance - predicted, variance + c.survey_var)
     nu, S = distance - predicted, variance + c.survey_var
-    if s.group[0].n_alive > 1:
-        s.loglik[h] -= 0.5 * (min(nu * nu / S, c.max_nis) + math.log(S))
+    nis = nu * nu / S
+    if s.group[0].n_alive > 1 and nis > CONTRADICTS:
+        s.loglik[h] -= 0.5 * min(nis, c.max_nis)
     absorb(s, h, scratch.w, nu, S)
 
 
