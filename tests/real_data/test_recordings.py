@@ -47,7 +47,7 @@ def test_one_filter_over_all_nodes_follows_a_hand_among_reflections(results):
     assert found.ok_share >= 0.95
 
 
-@pytest.mark.xfail(strict=True, reason="it takes 12 s to find the heading: 0.154 m from 10 s on")
+@pytest.mark.xfail(strict=True, reason="it takes 12 s to find the heading: 0.164 m from 10 s on")
 def test_it_does_so_from_ten_seconds_on(results):
     assert results["inrol_env1", "joint"].score.rmse_yaw <= 0.15
 
@@ -56,8 +56,8 @@ def test_once_it_is_found_how_the_group_is_turned_it_is_so_for_good(data):
     found = track_log(data / "logs" / "inrol_env1", skip=20.0).score
     assert found.rmse_yaw <= 0.15
     walk = track_log(data / "logs" / "isas_walk1", skip=20.0).score
-    assert walk.rmse_yaw <= 0.45
-    assert walk.rmse_shape <= 0.15
+    assert walk.rmse_yaw <= 0.35
+    assert walk.rmse_shape <= 0.13
 
 
 def test_gross_outliers_are_refused(results):
