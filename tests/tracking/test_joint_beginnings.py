@@ -52,14 +52,25 @@ def test_a_tilt_that_is_being_found_leaves_the_bias_uncertain(at_rest):
     c, s = one_env("drone" if not at_rest else "hand")
     s.alive[:], s.nodes["present"] = True, True
     s.nodes["has_state"], s.nodes["t_state"] = True, 4.0
-    s.nodes["t_moved"] = 0.0 if at_rest else 4.0
+    s.nodes["t_moved"] = s.nodes["t_first"] = 0.0 if at_rest else 4.0
     carrier = CARRIERS["hand"]
-    for t_first, age in ((0.0, 4.0), (-96.0, 100.0)):
-        s.nodes["t_first"] = t_first
+    for t_oriented, age in ((0.0, 4.0), (-96.0, 100.0)):
+        s.nodes["t_oriented"] = t_oriented
         begin_node(c, s, 0, 0, 4.0)
         at = s.nodes["at_b"][0]
         unsettled = 0.0 if at_rest else carrier.unsettled_speed / age
         assert s.P[0, at, at] == pytest.approx(carrier.bias_std**2 + unsettled**2)
+
+
+@pytest.mark.parametrize(("gap", "anew"), [(0.01, False), (0.4, False), (0.6, True)])
+def test_an_orientation_goes_on_over_gaps_that_are_filled(gap, anew):
+    """What VQF goes on from is as old as it was, though the group has to see who moves anew."""
+    c, s = one_env("hand")
+    values = np.zeros((1, 2, 8))
+    values[..., 0] = 1.0
+    for k, t in enumerate((7.0, 7.0 + gap)):
+        take_state(c, s.nodes, s.held, s.pre, 0, t, values, 0, k)
+    assert s.nodes["t_oriented"][0] == (7.0 + gap if anew else 7.0)
 
 
 @given(st.floats(-30.0, 30.0))

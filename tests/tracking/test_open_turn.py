@@ -8,7 +8,13 @@ from scipy.spatial.transform import Rotation
 from test_joint_kernels import running
 
 from tracking import Status, Tracker
-from tracking.filters.joint import _carrier_kernels, _motion_kernels, _open_kernels, _peak_kernels
+from tracking.filters.joint import (
+    _carrier_kernels,
+    _motion_kernels,
+    _open_kernels,
+    _peak_kernels,
+    _survey_kernels,
+)
 from tracking.filters.joint._flatness_kernels import flatness
 from tracking.filters.joint._sample_kernels import sum_inertial
 from tracking.filters.joint.coefficients import make_coefficients
@@ -156,6 +162,22 @@ def test_one_filter_gives_the_states_and_likelihoods_of_all_turns(static):
         np.testing.assert_allclose(s.P[0], other.P[0], atol=1e-9)
         told = log_likelihood(s.information[0], s.score[0], turn)
         assert told == pytest.approx(total - reached, abs=1e-6)
+
+
+@pytest.mark.parametrize("from_turn", [True, False])
+def test_a_survey_counts_against_a_layout_by_what_no_turn_explains(from_turn):
+    """Of two fixed nodes that an unknown turn puts elsewhere, a distance says nothing yet."""
+    c, s, scratch, _ = open_group(static=(2, 3))
+    at = s.nodes["at_p"]
+    pair = int(np.nonzero((s.pairs["i"] == 1) & (s.pairs["j"] == 2))[0][0])
+    s.P[0] = 1e-4 * np.eye(s.x.shape[1])
+    s.x[0, at[1] : at[1] + 3], s.x[0, at[2] : at[2] + 3] = 0.0, [2.0, 0.0, 0.0]
+    s.group["n_alive"] = 2
+    s.slope[0], s.spread[0] = 0.0, np.eye(9)
+    s.slope[0, :, at[2]] = 1.0 if from_turn else 0.0
+    before = s.loglik[0]
+    _survey_kernels.fuse_survey(c, s, 0, pair, 3.0, scratch)
+    assert s.loglik[0] == (before if from_turn else pytest.approx(before - 0.5 * c["max_nis"]))
 
 
 @pytest.mark.parametrize("vehicle", ["human", "hand", "car"])

@@ -272,7 +272,7 @@ def add_noise(c, node, pre, P, h, i, scale, step):
         bias_var = node.bias_var if k < 2 else node.rise_bias_var
         P[h, b + k, b + k] += (1.0 - scale[b + k] * scale[b + k]) * bias_var
     if node.unsettled2 > 0.0:
-        age = max(node.t_pre - node.t_first, 1.0)
+        age = max(node.t_pre - node.t_oriented, 1.0)
         for k in range(2):
             P[h, b + k, b + k] += 2.0 * T / age * unsettled_var(node, age)
     for k in range(node.at_o, node.at_o + (3 if node.at_o >= 0 else 0)):

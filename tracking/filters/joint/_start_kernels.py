@@ -122,7 +122,7 @@ def begin_node(c, s, h, i, t):
         decouple(s, h, c.n, node.at_v + k, speed_var)
         bias_var = node.bias_var if k < 2 else node.rise_bias_var
         if k < 2 and not still:
-            bias_var += unsettled_var(node, t - node.t_first)
+            bias_var += unsettled_var(node, t - node.t_oriented)
         decouple(s, h, c.n, node.at_b + k, bias_var)
     for k in range(node.at_o, node.at_o + (3 if node.at_o >= 0 else 0)):
         decouple(s, h, c.n, k, node.offset_var)

@@ -29,13 +29,13 @@ def fuse_survey(c, s, h, p, distance, scratch):
         follow_rotation(c, s, h)
     none = scratch.none
     predicted, m = range_model(c, s, h, p, none, none, scratch.idx, scratch.val)
-    variance = project(s, h, m, scratch)
+    variance, open_var = project(s, h, m, scratch), 0.0
     if s.group[0].open:
         scratch.direct[:] = 0.0
-        turn_gradient(s, h, m, scratch)
+        open_var = turn_gradient(s, h, m, scratch)
         tell_turn(s, h, scratch, distance - predicted, variance + c.survey_var)
     nu, S = distance - predicted, variance + c.survey_var
-    nis = nu * nu / S
+    nis = nu * nu / (S + open_var)
     if s.group[0].n_alive > 1 and nis > CONTRADICTS:
         s.loglik[h] -= 0.5 * min(nis, c.max_nis)
     absorb(s, h, scratch.w, nu, S)

@@ -44,6 +44,7 @@ _NUMBERS = (
     "height_var",
     "unaided_psd2",
     "unaided_after",
+    "anew_after",
     "static_drift2",
     "survey_var",
     "rest_accel",

@@ -226,6 +226,9 @@ class JointParams:
     """[s] How long they keep it."""
     unaided_accel_psd: float = 1.5
     """[m/s2/sqrt(Hz)] Acceleration of a moving node whose IMU is not heard."""
+    anew_after: float = 0.5
+    """[s] After a longer silence of its IMU the orientation of a node is a new one: shorter gaps
+    are filled (`OrientationParams.max_gap`)."""
     unaided_after: float = 0.3
     """[s] A node whose IMU was silent for so long is unaided."""
     static_drift: float = 1e-4

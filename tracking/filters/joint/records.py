@@ -22,6 +22,7 @@ NODE = np.dtype(
         ("accel_var", "f8"),  # running mean square of accel about its mean [m2/s4]
         ("turning", "f8"),  # running mean of the angular rate [rad/s]
         ("t_first", "f8"),  # its first sample, or the first after a long silence [s]
+        ("t_oriented", "f8"),  # since when its orientation goes on without a break [s]
         ("t_moved", "f8"),  # last time it was not at rest [s]
         ("t_shaken", "f8"),  # last time its acceleration told so [s]
         ("cut_off", "?"),  # its last acceleration was at the end of the sensor's scale
