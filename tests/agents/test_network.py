@@ -7,13 +7,13 @@ import torch
 from agents.settings import from_options
 from agents.train.config import TrainConfig
 from agents.train.environments import layout_of
-from agents.train.hyperbolic import Tanh
+from agents.train.hyperbolic import FromLogistic, is_fast
 from agents.train.learner import make_policy
 
 
 def test_the_tangent_is_that_of_torch():
     x = torch.linspace(-30.0, 30.0, 20001, requires_grad=True)
-    ours, theirs = Tanh()(x), torch.tanh(x)
+    ours, theirs = FromLogistic()(x), torch.tanh(x)
     torch.testing.assert_close(ours, theirs, rtol=0.0, atol=3e-7)
     up = torch.linspace(-1.0, 2.0, len(x))
     slope, expected = (torch.autograd.grad(y, x, up)[0] for y in (ours, theirs))
@@ -22,7 +22,21 @@ def test_the_tangent_is_that_of_torch():
 
 def test_the_tangent_has_the_slope_that_finite_differences_have():
     x = torch.linspace(-2.0, 2.0, 41, dtype=torch.float64, requires_grad=True)
-    assert torch.autograd.gradcheck(Tanh(), (x,))
+    assert torch.autograd.gradcheck(FromLogistic(), (x,))
+
+
+@pytest.mark.parametrize(
+    ("processor", "features", "mkl", "fast"),
+    [
+        ("sapphirerapids", {"avx512f": True}, True, True),
+        ("haswell", {"avx512f": False}, True, False),
+        ("znver4", {"avx512f": True}, True, False),
+        ("generic", {}, True, False),
+        ("apple-m1", {}, False, True),
+    ],
+)
+def test_the_tangent_of_torch_is_used_where_it_is_fast(processor, features, mkl, fast):
+    assert is_fast(processor, features, mkl=mkl) == fast
 
 
 @pytest.mark.parametrize("n_present", [0, 2, 5])

@@ -6,7 +6,7 @@ import torch
 from stable_baselines3 import PPO
 from torch import nn
 
-from agents.train.hyperbolic import Tanh
+from agents.train.hyperbolic import FromLogistic
 from agents.train.network import SwarmFeatures
 
 
@@ -21,7 +21,7 @@ def make_plain(model: PPO) -> PPO:
         if isinstance(module, SwarmFeatures):
             module.skips_absent = False
         for name, child in module.named_children():
-            if isinstance(child, Tanh):
+            if isinstance(child, FromLogistic):
                 setattr(module, name, nn.Tanh())
     rate = policy.optimizer.param_groups[0]["lr"]
     policy.optimizer = torch.optim.Adam(policy.parameters(), lr=rate, eps=1e-5)
