@@ -65,7 +65,7 @@ def _is_fast_here() -> bool:
     except RuntimeError:  # not told here
         features = {}
     name = llvmlite.binding.get_host_cpu_name()
-    return is_fast(name, features, mkl=torch.backends.mkl.is_available())
+    return is_fast(name, features, mkl=torch.backends.mkl.is_available())  # type: ignore[no-untyped-call]
 
 
 Tanh: type[nn.Module] = nn.Tanh if _is_fast_here() else FromLogistic
