@@ -25,6 +25,12 @@ def test_the_tangent_has_the_slope_that_finite_differences_have():
     assert torch.autograd.gradcheck(FromLogistic(), (x,))
 
 
+def test_an_exported_network_has_the_plain_tangent():
+    graph = torch.export.export(FromLogistic(), (torch.zeros(2, 3),)).graph
+    called = [node.target for node in graph.nodes if node.op == "call_function"]
+    assert called == [torch.ops.aten.tanh.default]
+
+
 @pytest.mark.parametrize(
     ("processor", "features", "mkl", "fast"),
     [
