@@ -138,6 +138,11 @@ class Constellation:
         return tuple(table)
 
     @cached_property
+    def antenna_node(self) -> I64:
+        """Node index of each antenna, (antenna)."""
+        return np.array([self.index_of[a.node] for a in self.all_antennas], dtype=np.int64)
+
+    @cached_property
     def antenna_offset_b(self) -> F64:
         """Antenna positions in their node's body frame, (antenna, 3) [m]."""
         return np.array([a.offset_b for a in self.all_antennas], dtype=np.float64)

@@ -60,7 +60,7 @@ class MeasurementBlock:
     j: I64
     """Other node index of a range, (env, event); equal to `i` for the other kinds."""
     antenna_i: I64
-    """Antenna index of node i, (env, event)."""
+    """Antenna index of node i in `Constellation.all_antennas`, (env, event)."""
     antenna_j: I64
     """Antenna index of node j, (env, event)."""
     values: F64
@@ -136,7 +136,8 @@ class MeasurementBlock:
             i: Node indices, (event).
             values: The columns that `kind` uses, (event, columns).
             j: Other node indices, for ranges.
-            antennas: Antenna indices of i and j, for ranges.
+            antennas: Antenna indices of i and j, for ranges. They count the antennas of all nodes,
+                so they are i and j, as assumed here, where every node has one.
             has_power: True where a range came with its powers.
         """
         block = cls.empty(1, len(t))
@@ -144,8 +145,8 @@ class MeasurementBlock:
         block.kind[0] = kind
         block.i[0] = i
         block.j[0] = i if j is None else j
-        if antennas is not None:
-            block.antenna_i[0], block.antenna_j[0] = antennas
+        if kind is Kind.RANGE:
+            block.antenna_i[0], block.antenna_j[0] = antennas or (block.i[0], block.j[0])
         block.values[0, :, : values.shape[1]] = values
         if has_power is not None:
             block.has_power[0] = has_power

@@ -90,7 +90,7 @@ class Tracker:
         """
         t_out = np.atleast_2d(np.asarray(t_out, dtype=np.float64))
         block = _usable(block)
-        _check(block, t_out, self.n_envs, self.constellation.n_nodes)
+        _check(block, t_out, self.n_envs, self.constellation)
         t_out = np.broadcast_to(t_out, (self.n_envs, t_out.shape[1]))
         return self._filter.run(self._orientation.step(block), t_out)
 
@@ -173,13 +173,20 @@ def _usable(block: MeasurementBlock) -> MeasurementBlock:
     return block if np.array_equal(valid, block.valid) else replace(block, valid=valid)
 
 
-def _check(block: MeasurementBlock, t_out: F64, n_envs: int, n_nodes: int) -> None:
+def _check(block: MeasurementBlock, t_out: F64, n_envs: int, group: Constellation) -> None:
     """See that kernels, which look at nothing of this, can take a block."""
     if len(block.t) != n_envs:
         raise ConfigError(f"block: expected {n_envs} environments, got {len(block.t)}")
-    wrong = block.valid & ((block.i < 0) | (block.i >= n_nodes) | (block.j >= n_nodes))
+    n = group.n_nodes
+    wrong = block.valid & ((block.i < 0) | (block.i >= n) | (block.j < 0) | (block.j >= n))
     if wrong.any():
-        raise ConfigError(f"block: expected nodes 0 to {n_nodes - 1}, got another")
+        raise ConfigError(f"block: expected nodes 0 to {n - 1}, got another")
+    ranges = block.valid & (block.kind == Kind.RANGE)
+    owner = group.antenna_node
+    for antenna, node in ((block.antenna_i, block.i), (block.antenna_j, block.j)):
+        known = (antenna >= 0) & (antenna < len(owner))
+        if np.any(ranges & ~(known & (owner.take(antenna, mode="clip") == node))):
+            raise ConfigError("block: expected antennas of the nodes of a range, got another's")
     t = np.where(block.valid, block.t, -np.inf)
     if np.any(block.valid[:, 1:] & (t[:, 1:] < np.maximum.accumulate(t, axis=1)[:, :-1])):
         raise ConfigError("block: expected events in order of time, see `MeasurementBlock.sorted`")

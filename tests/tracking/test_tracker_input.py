@@ -20,7 +20,7 @@ def ranges():
     i, j = (np.tile(c, len(T)) for c in GROUP.pairs.T)
     distance = np.linalg.norm(pos[j] - pos[i], axis=1)[:, None]
     t = np.repeat(T, GROUP.n_pairs)
-    return MeasurementBlock.of_kind(Kind.RANGE, t, i, distance, j=j, antennas=(i, j))
+    return MeasurementBlock.of_kind(Kind.RANGE, t, i, distance, j=j)
 
 
 def twice(block):
@@ -35,6 +35,9 @@ def test_what_cannot_be_meant_is_refused():
         Tracker(GROUP).run(two, np.array([5.0]))
     with pytest.raises(ConfigError, match="nodes 0 to 3"):
         Tracker(GROUP, n_envs=2).run(replace(two, j=two.j + 1), np.array([5.0]))
+    for foreign in (two.antenna_i + 1, two.antenna_i - 1, two.antenna_i + 9):
+        with pytest.raises(ConfigError, match="antennas of the nodes"):
+            Tracker(GROUP, n_envs=2).run(replace(two, antenna_i=foreign), np.array([5.0]))
     with pytest.raises(ConfigError, match="order of time"):
         Tracker(GROUP, n_envs=2).run(replace(two, t=-two.t), np.array([5.0]))
     for wrong in ([6.0, 5.0], [np.nan, 5.0]):
