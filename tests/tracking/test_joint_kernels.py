@@ -231,3 +231,28 @@ def test_the_covariance_of_a_rotation_follows_the_estimate(dimensions):
     assert left < 0.02 * moved
     np.testing.assert_allclose(s.P[0], s.P[0].T, atol=1e-12)
     assert not s.moved.any()
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_a_group_that_is_turned_back_and_forth_keeps_its_shape(dimensions):
+    """Every correction moves along tangents, which alone would be a stretch of 80 % in the end."""
+    c, s, scratch, _ = running(dimensions, "human")
+    rng, d = np.random.default_rng(4), dimensions
+    at_p, at_v = (s.nodes[k][:, None] + np.arange(d) for k in ("at_p", "at_v"))
+
+    def lengths():
+        x, v = s.x[0, at_p], s.x[0, at_v]
+        between = np.linalg.norm(x[:, None] - x, axis=-1)
+        return np.concatenate([between.ravel(), np.linalg.norm(v, axis=1)])
+
+    before, centre = lengths(), s.x[0, at_p].mean(axis=0)
+    for _ in range(30):
+        w = rng.uniform(-0.2, 0.2, 3) * ([0.0, 0.0, 1.0] if d == 2 else 1.0)
+        for at, about in ((at_p, s.x[0, at_p].mean(axis=0)), (at_v, np.zeros(d))):
+            arm = np.zeros((len(at), 3))
+            arm[:, :d] = s.x[0, at] - about
+            s.moved[0, at] = np.cross(w, arm)[:, :d]
+        s.x[0] += s.moved[0]
+        _rotation_kernels.turn_covariance(c, s, 0, 1.0)
+    np.testing.assert_allclose(lengths(), before, rtol=5e-3)
+    np.testing.assert_allclose(s.x[0, at_p].mean(axis=0), centre, atol=1e-12)

@@ -1,4 +1,4 @@
-"""The rotation of the whole group: what the covariance says of it follows the estimate.
+"""The rotation of the whole group: corrections go round, and the covariance follows them.
 
 No range tells how the group is turned as a whole. At every estimate p the derivatives of the
 ranges are blind to one direction per axis, ``axis x p``. But the estimate moves from one range
@@ -11,6 +11,11 @@ velocities and positions turned by one radian, and a the best rotation of the po
 When measurements move the estimate, N becomes N + G, a and r stay: ``P <- T P T^T`` with
 ``T = I + G A^T`` and A the functional that reads a from e. It is invariance under rotations,
 kept by the filter of section 4 of [2], in the states that are used here anyway.
+
+A correction is linear: it moves every node straight ahead along its tangent, which is a rotation
+and a stretch of ``1 - cos``. Corrections back and forth stretch again and again, and what is known
+of a shape (distances that were surveyed) does not undo it, since it is used up. So what is a
+rotation in a move is made one; velocities turn with the positions.
 
 References:
     [1] Huang, Mourikis, Roumeliotis, Observability-based rules for designing consistent EKF
@@ -26,6 +31,7 @@ import numpy as np
 
 from tracking.compiled import allocating_kernel, small_kernel
 from tracking.filters.joint._linear_kernels import settle
+from tracking.filters.joint._peak_kernels import turned_by
 
 ENOUGH = 0.01
 """[-] The covariance follows once the positions have moved by this share of the group's extent."""
@@ -76,11 +82,14 @@ def carry_moves(c, s, h):
 
 @allocating_kernel
 def turn_covariance(c, s, h, share):
-    """``P <- T P T^T`` for the given share of what was moved."""
+    """Make rotations of what was moved, and ``P <- T P T^T`` for the given share of it."""
     n, axes = c.n, 3 if c.d == 3 else 1
-    N, G = np.zeros((axes, n)), np.zeros((axes, n))
-    turned(c, s, h, N, G)
+    N, G, mean, shift = np.zeros((axes, n)), np.zeros((axes, n)), np.zeros(3), np.zeros(3)
+    find_centre(c, s, h, mean, shift)
+    turned_positions(s, h, mean, N)
     A = best_rotation(N)
+    bend_move(c, s, h, mean, A)
+    turned_moves(s, h, shift, G)
     B = np.zeros((axes, n))
     for r in range(n):
         for a in range(axes):
@@ -131,18 +140,10 @@ def best_rotation(N):
     return inverse @ N
 
 
-@allocating_kernel
-def turned(c, s, h, N, G):
-    """The positions before the move, turned about the centre, and the move, turned as well.
-
-    Args:
-        c: Coefficients.
-        s: JointState of one environment.
-        h: Hypothesis.
-        N: Positions turned by one radian about each axis, z first, (axis, state), written.
-        G: Moves of positions and velocities turned likewise, (axis, state), written.
-    """
-    mean, shift, present = np.zeros(3), np.zeros(3), 0
+@small_kernel
+def find_centre(c, s, h, mean, shift):
+    """Write the centre of the positions before the move, and the move of it, three numbers each."""
+    present = 0
     for i in range(s.nodes.shape[0]):
         if s.nodes[i].present:
             present += 1
@@ -150,6 +151,17 @@ def turned(c, s, h, N, G):
                 at = s.nodes[i].at_p + k
                 mean[k] += s.x[h, at] - s.moved[h, at]
                 shift[k] += s.moved[h, at]
+    for k in range(c.d):
+        mean[k] /= max(present, 1)
+        shift[k] /= max(present, 1)
+
+
+@small_kernel
+def turned_positions(s, h, mean, N):
+    """Write the positions before the move, turned by a radian about each axis through the centre.
+
+    N is (axis, state); z comes first.
+    """
     for i in range(s.nodes.shape[0]):
         node = s.nodes[i]
         if not node.present:
@@ -157,10 +169,55 @@ def turned(c, s, h, N, G):
         for a in range(N.shape[0]):
             u, v = (3 - a) % 3, (4 - a) % 3
             at_u, at_v = node.at_p + u, node.at_p + v
-            N[a, at_u] = -(s.x[h, at_v] - s.moved[h, at_v] - mean[v] / present)
-            N[a, at_v] = s.x[h, at_u] - s.moved[h, at_u] - mean[u] / present
-            G[a, at_u] = -(s.moved[h, at_v] - shift[v] / present)
-            G[a, at_v] = s.moved[h, at_u] - shift[u] / present
+            N[a, at_u] = -(s.x[h, at_v] - s.moved[h, at_v] - mean[v])
+            N[a, at_v] = s.x[h, at_u] - s.moved[h, at_u] - mean[u]
+
+
+@small_kernel
+def turned_moves(s, h, shift, G):
+    """Write the moves of positions and velocities, turned likewise, (axis, state)."""
+    for i in range(s.nodes.shape[0]):
+        node = s.nodes[i]
+        if not node.present:
+            continue
+        for a in range(G.shape[0]):
+            u, v = (3 - a) % 3, (4 - a) % 3
+            G[a, node.at_p + u] = -(s.moved[h, node.at_p + v] - shift[v])
+            G[a, node.at_p + v] = s.moved[h, node.at_p + u] - shift[u]
             if not node.static:
                 G[a, node.at_v + u] = -s.moved[h, node.at_v + v]
                 G[a, node.at_v + v] = s.moved[h, node.at_v + u]
+
+
+@allocating_kernel
+def bend_move(c, s, h, mean, A):
+    """Let what is a rotation of the group in a move go round the centre instead of straight ahead.
+
+    Args:
+        c: Coefficients.
+        s: JointState of one environment; `x` and `moved` are updated.
+        h: Hypothesis.
+        mean: The centre before the move.
+        A: What reads the rotation off a move, (axis, state).
+    """
+    w = np.zeros(3)
+    for a in range(A.shape[0]):
+        w[2 - a] = np.sum(A[a] * s.moved[h])
+    aside = turned_by(w)  # R - 1 - [w]
+    for a in range(3):
+        u, v = (a + 1) % 3, (a + 2) % 3
+        aside[a, a] -= 1.0
+        aside[u, v] += w[a]
+        aside[v, u] -= w[a]
+    arm = np.zeros(3)
+    for i in range(s.nodes.shape[0]):
+        node = s.nodes[i]
+        for at, is_position in ((node.at_p, True), (node.at_v, False)):
+            if not node.present or at < 0:
+                continue
+            for k in range(c.d):
+                arm[k] = s.x[h, at + k] - s.moved[h, at + k] - (mean[k] if is_position else 0.0)
+            for k in range(c.d):
+                change = np.sum(aside[k] * arm)
+                s.x[h, at + k] += change
+                s.moved[h, at + k] += change
