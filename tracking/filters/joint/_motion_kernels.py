@@ -5,9 +5,10 @@ that turns with the body by ``B``, ``Bv = int B``, ``Bp = int int B`` (`_sample_
 
     p += T v + R dp - R Bp b,    v += R dv - R Bv b,    R = rotation by the heading error
 
-exactly, for every hypothesis at once; the samples themselves cost next to nothing. Bias,
-heading error and range errors decay towards zero (first-order Markov): the first two with
-time, the last with the way of both ends, so that they stay while nobody moves.
+exactly, for every hypothesis at once; the samples themselves cost next to nothing. What is turned
+about in space is in `_turned_kernels`. Bias, heading error and range errors decay towards zero
+(first-order Markov): the first two with time, the last with the way of both ends, so that they
+stay while nobody moves.
 """
 
 from __future__ import annotations
@@ -20,6 +21,13 @@ from tracking._angle_kernels import cosine_sine
 from tracking.compiled import small_kernel
 from tracking.filters.joint._mirror_kernels import mirror
 from tracking.filters.joint._sample_kernels import decay
+from tracking.filters.joint._turned_kernels import (
+    PER_GRAVITY,
+    measured_motion,
+    turn_columns,
+    turn_offset,
+    turn_rows,
+)
 
 
 @small_kernel
@@ -81,7 +89,7 @@ def move_mean(c, node, pre, x, h, i, scale, w, speed):
     psi = x[h, y]
     cos_r, sin_r = cosine_sine(psi)
     if node.at_o >= 0:
-        turn_offset(node, pre, i, cos_r, sin_r, scale, w)
+        turn_offset(node, pre, x, h, i, cos_r, sin_r, scale, w)
     dv0, dv1, dv2, dp0, dp1, dp2 = measured_motion(node, pre, x, h, i)
     dv0, dv1 = cos_r * dv0 - sin_r * dv1, sin_r * dv0 + cos_r * dv1
     dp0, dp1 = cos_r * dp0 - sin_r * dp1, sin_r * dp0 + cos_r * dp1
@@ -89,6 +97,8 @@ def move_mean(c, node, pre, x, h, i, scale, w, speed):
         cos_r, sin_r = 1.0, 0.0
     vc, vs = cos_r * pre[i, 7] - sin_r * pre[i, 8], sin_r * pre[i, 7] + cos_r * pre[i, 8]
     pc, ps = cos_r * pre[i, 9] - sin_r * pre[i, 10], sin_r * pre[i, 9] + cos_r * pre[i, 10]
+    if node.at_o >= 0:
+        vc, pc = vc + PER_GRAVITY * dv2, pc + PER_GRAVITY * dp2
     b0, b1 = x[h, b], x[h, b + 1]
     bv0, bv1 = vc * b0 - vs * b1, vs * b0 + vc * b1
     bp0, bp1 = pc * b0 - ps * b1, ps * b0 + pc * b1
@@ -97,6 +107,7 @@ def move_mean(c, node, pre, x, h, i, scale, w, speed):
     w[i, 5], w[i, 6] = -(dp1 - share * bp1), dp0 - share * bp0
     w[i, 7], w[i, 8] = -(dv1 - share * bv1), dv0 - share * bv0
     w[i, 27], w[i, 28] = dv2, dp2
+    w[i, 29], w[i, 30] = -dv1 * b0 + dv0 * b1, -dp1 * b0 + dp0 * b1
     x[h, p] += T * x[h, v] + dp0 - bp0
     x[h, p + 1] += T * x[h, v + 1] + dp1 - bp1
     x[h, v] += dv0 - bv0
@@ -105,6 +116,9 @@ def move_mean(c, node, pre, x, h, i, scale, w, speed):
     if d == 3:
         x[h, p + 2] += T * x[h, v + 2] + dp2 - 0.5 * T * T * x[h, b + 2]
         x[h, v + 2] += dv2 - T * x[h, b + 2]
+        if node.at_o >= 0:
+            x[h, p + 2] += PER_GRAVITY * (dp0 * b0 + dp1 * b1)
+            x[h, v + 2] += PER_GRAVITY * (dv0 * b0 + dv1 * b1)
         squared += x[h, v + 2] ** 2
     speed[i] = math.sqrt(squared)
     keep = decay(T / node.bias_tau)
@@ -115,34 +129,6 @@ def move_mean(c, node, pre, x, h, i, scale, w, speed):
         x[h, k] *= scale[k]
     scale[y] = decay(T / node.heading_tau)
     x[h, y] *= scale[y]
-
-
-@small_kernel
-def turn_offset(node, pre, i, cos_r, sin_r, scale, w):
-    """Write to row i of w what an offset adds to velocity and way, and how much of it stays."""
-    for at in (12, 21):
-        for k in range(3):
-            w[i, at - 3 + k] = cos_r * pre[i, at + k] - sin_r * pre[i, at + 3 + k]
-            w[i, at + k] = sin_r * pre[i, at + k] + cos_r * pre[i, at + 3 + k]
-            w[i, at + 3 + k] = pre[i, at + 6 + k]
-    for k in range(3):
-        scale[node.at_o + k] = decay(pre[i, 0] / node.offset_tau)
-
-
-@small_kernel
-def measured_motion(node, pre, x, h, i):
-    """What the samples of node i add to velocity and way, as measured, its offset taken off."""
-    dv0, dv1, dv2 = pre[i, 1], pre[i, 2], pre[i, 3]
-    dp0, dp1, dp2 = pre[i, 4], pre[i, 5], pre[i, 6]
-    if node.at_o >= 0:
-        o0, o1, o2 = x[h, node.at_o], x[h, node.at_o + 1], x[h, node.at_o + 2]
-        dv0 -= pre[i, 12] * o0 + pre[i, 13] * o1 + pre[i, 14] * o2
-        dv1 -= pre[i, 15] * o0 + pre[i, 16] * o1 + pre[i, 17] * o2
-        dv2 -= pre[i, 18] * o0 + pre[i, 19] * o1 + pre[i, 20] * o2
-        dp0 -= pre[i, 21] * o0 + pre[i, 22] * o1 + pre[i, 23] * o2
-        dp1 -= pre[i, 24] * o0 + pre[i, 25] * o1 + pre[i, 26] * o2
-        dp2 -= pre[i, 27] * o0 + pre[i, 28] * o1 + pre[i, 29] * o2
-    return dv0, dv1, dv2, dp0, dp1, dp2
 
 
 @small_kernel
@@ -163,10 +149,13 @@ def way_since(c, s, h, i):
     way0, way1, way2 = cos_r * dp0 - sin_r * dp1, sin_r * dp0 + cos_r * dp1, 0.0
     if node.levelled:
         bp0, bp1 = cos_r * bp0 - sin_r * bp1, sin_r * bp0 + cos_r * bp1
+    if node.at_o >= 0:
+        way2 = PER_GRAVITY * (way0 * b0 + way1 * b1)
+        bp0 += PER_GRAVITY * dp2
     way0 += T * x[h, node.at_v] - (bp0 * b0 - bp1 * b1)
     way1 += T * x[h, node.at_v + 1] - (bp1 * b0 + bp0 * b1)
     if c.d == 3:
-        way2 = T * x[h, node.at_v + 2] + dp2 - 0.5 * T * T * x[h, node.at_b + 2]
+        way2 += T * x[h, node.at_v + 2] + dp2 - 0.5 * T * T * x[h, node.at_b + 2]
     return way0, way1, way2
 
 
@@ -188,13 +177,7 @@ def move_rows(d, n, node, P, h, i, w):
             P[h, p + 2, k] += T * P[h, v + 2, k] - half * P[h, b + 2, k]
             P[h, v + 2, k] -= T * P[h, b + 2, k]
     if node.at_o >= 0:
-        for k in range(n):
-            o0, o1, o2 = P[h, node.at_o, k], P[h, node.at_o + 1, k], P[h, node.at_o + 2, k]
-            for r in range(3):
-                at = 9 + 3 * r
-                P[h, v + r, k] -= w[i, at] * o0 + w[i, at + 1] * o1 + w[i, at + 2] * o2
-                at = 18 + 3 * r
-                P[h, p + r, k] -= w[i, at] * o0 + w[i, at + 1] * o1 + w[i, at + 2] * o2
+        turn_rows(n, node, P, h, i, w)
 
 
 @small_kernel
@@ -224,13 +207,7 @@ def move_columns(d, node, P, h, i, w):
             P[h, r, p + 2] += T * P[h, r, v + 2] - half * P[h, r, b + 2]
             P[h, r, v + 2] -= T * P[h, r, b + 2]
     if node.at_o >= 0:
-        for r in range(v + d):
-            o0, o1, o2 = P[h, r, node.at_o], P[h, r, node.at_o + 1], P[h, r, node.at_o + 2]
-            for k in range(3):
-                at = 9 + 3 * k
-                P[h, r, v + k] -= w[i, at] * o0 + w[i, at + 1] * o1 + w[i, at + 2] * o2
-                at = 18 + 3 * k
-                P[h, r, p + k] -= w[i, at] * o0 + w[i, at + 1] * o1 + w[i, at + 2] * o2
+        turn_columns(node, P, h, i, w)
 
 
 @small_kernel

@@ -36,6 +36,7 @@ from tracking.filters.joint._peak_kernels import (
     is_near,
     least_curvature,
 )
+from tracking.filters.joint._turned_kernels import tilt_to_rise
 
 LOOSE = 3.0
 """[-] Each element of M has a variance of a third, over all rotations."""
@@ -109,6 +110,10 @@ def carry_slope(c, s, h, scratch):
             z[v] += -w[3] * b0 + w[4] * b1 + w[7] * psi
             z[v + 1] += -w[4] * b0 - w[3] * b1 + w[8] * psi
             z[v + 2] -= T * b2
+            if node.at_o >= 0:
+                pb0, pb1, py, vb0, vb1, vy = tilt_to_rise(scratch.step, i)
+                z[p + 2] += pb0 * b0 + pb1 * b1 + py * psi
+                z[v + 2] += vb0 * b0 + vb1 * b1 + vy * psi
             for e in range(9 if node.at_o >= 0 else 0):
                 z[v + e // 3] -= w[9 + e] * z[node.at_o + e % 3]
                 z[p + e // 3] -= w[18 + e] * z[node.at_o + e % 3]
