@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from tracking import Constellation, NodeConfig
 from tracking.filters.joint import (
@@ -19,6 +20,7 @@ from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.records import as_records
 from tracking.filters.joint.scratch import make_scratch
 from tracking.filters.joint.state import JointState, make_layout, make_state
+from tracking.geometry import GRAVITY
 
 
 def running(dimensions, vehicle="car", seed=0, static=()):
@@ -201,6 +203,24 @@ def test_corrections_are_the_textbook_ones(seed, n, m, corrections, room):
     assert s.n_waiting[0] == 0
     np.testing.assert_allclose(s.P[0], P, atol=1e-7)
     np.testing.assert_array_equal(s.P[0], s.P[0].T)
+
+
+def test_a_body_that_leans_for_good_is_followed_as_if_it_did_not():
+    """Its bias is what it reads of gravity by leaning; 0.02 rad make 0.2 m/s2."""
+    c, s, scratch, _ = running(3, "hand")
+    n, t, lean = s.x.shape[1], 0.2, np.array([0.02, -0.015, 0.0])
+    accel, gravity = np.array([3.0, -2.0, 1.5]), np.array([0.0, 0.0, GRAVITY])
+    x, p, v, b = np.zeros(n), s.nodes["at_p"][0], s.nodes["at_v"][0], s.nodes["at_b"][0]
+    s.held[:, 4:] = 0.0
+    s.held[0, 4:] = Rotation.from_rotvec(lean).apply(accel + gravity) - gravity
+    off, _ = carry(c, s, scratch, x, np.eye(n), t)
+    x[b : b + 3] = np.cross(lean, gravity)
+    true, _ = carry(c, s, scratch, x, np.eye(n), t)
+    way, speed = 0.5 * t * t * accel, t * accel
+    assert np.abs(off[v : v + 3] - speed).max() > 0.03
+    # What is left is of second order in the lean.
+    np.testing.assert_allclose(true[v : v + 3], speed, atol=1e-3)
+    np.testing.assert_allclose(true[p : p + 3], way, atol=1e-4)
 
 
 @pytest.mark.parametrize("dimensions", [2, 3])
