@@ -145,8 +145,10 @@ class MeasurementBlock:
         block.kind[0] = kind
         block.i[0] = i
         block.j[0] = i if j is None else j
-        if kind is Kind.RANGE:
-            block.antenna_i[0], block.antenna_j[0] = antennas or (block.i[0], block.j[0])
+        if antennas is None and kind is Kind.RANGE:
+            antennas = block.i[0], block.j[0]
+        if antennas is not None:
+            block.antenna_i[0], block.antenna_j[0] = antennas
         block.values[0, :, : values.shape[1]] = values
         if has_power is not None:
             block.has_power[0] = has_power
