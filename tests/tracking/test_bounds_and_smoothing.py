@@ -68,15 +68,12 @@ def test_smoothing_leaves_the_tracker_where_it_was(drive):
 
 
 def test_smoothing_with_nothing_later_is_the_estimate(drive):
-    """At the moment of a range: in between, smoothing lets the wheels speak once more.
-
-    The last corrections go round the centre (`_rotation_kernels`) when something comes after them.
-    """
+    """At the moment of a range: in between, smoothing lets the wheels speak once more."""
     heard = (drive.block.kind[0] == Kind.RANGE) & (drive.block.t[0] < 20.0)
     moment = float(drive.block.t[0, heard][-1])
     tracker, estimate, later = run_until(drive, moment)
     smooth = tracker.smooth(later.take(slice(0, 0)), moment)
-    np.testing.assert_allclose(smooth.pos_ij_w, estimate.pos_ij_w, atol=1e-4)
+    np.testing.assert_allclose(smooth.pos_ij_w, estimate.pos_ij_w, atol=1e-6)
     np.testing.assert_allclose(smooth.cov, estimate.cov, atol=1e-3)
     np.testing.assert_array_equal(smooth.status, estimate.status)
 

@@ -253,11 +253,10 @@ def test_the_covariance_of_a_rotation_follows_the_estimate(dimensions):
     assert not s.moved.any()
 
 
-@pytest.mark.parametrize("dimensions", [2, 3])
-def test_a_group_that_is_turned_back_and_forth_keeps_its_shape(dimensions):
+def test_a_group_that_is_turned_back_and_forth_keeps_its_shape():
     """Every correction moves along tangents, which alone would be a stretch of 80 % in the end."""
-    c, s, scratch, _ = running(dimensions, "human")
-    rng, d = np.random.default_rng(4), dimensions
+    c, s, scratch, _ = running(3, "human")
+    rng, d = np.random.default_rng(4), 3
     at_p, at_v = (s.nodes[k][:, None] + np.arange(d) for k in ("at_p", "at_v"))
 
     def lengths():
@@ -267,11 +266,9 @@ def test_a_group_that_is_turned_back_and_forth_keeps_its_shape(dimensions):
 
     before, centre = lengths(), s.x[0, at_p].mean(axis=0)
     for _ in range(30):
-        w = rng.uniform(-0.2, 0.2, 3) * ([0.0, 0.0, 1.0] if d == 2 else 1.0)
+        w = rng.uniform(-0.2, 0.2, 3)
         for at, about in ((at_p, s.x[0, at_p].mean(axis=0)), (at_v, np.zeros(d))):
-            arm = np.zeros((len(at), 3))
-            arm[:, :d] = s.x[0, at] - about
-            s.moved[0, at] = np.cross(w, arm)[:, :d]
+            s.moved[0, at] = np.cross(w, s.x[0, at] - about)
         s.x[0] += s.moved[0]
         _rotation_kernels.turn_covariance(c, s, 0, 1.0)
     np.testing.assert_allclose(lengths(), before, rtol=5e-3)

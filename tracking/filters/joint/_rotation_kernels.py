@@ -15,7 +15,8 @@ kept by the filter of section 4 of [2], in the states that are used here anyway.
 A correction is linear: it moves every node straight ahead along its tangent, which is a rotation
 and a stretch of ``1 - cos``. Corrections back and forth stretch again and again, and what is known
 of a shape (distances that were surveyed) does not undo it, since it is used up. So what is a
-rotation in a move is made one; velocities turn with the positions.
+rotation in a move is made one, velocities with the positions; in space, where turns are large:
+in the plane the wheels know them, and drives were as far off either way.
 
 References:
     [1] Huang, Mourikis, Roumeliotis, Observability-based rules for designing consistent EKF
@@ -88,7 +89,8 @@ def turn_covariance(c, s, h, share):
     find_centre(c, s, h, mean, shift)
     turned_positions(s, h, mean, N)
     A = best_rotation(N)
-    bend_move(c, s, h, mean, A)
+    if c.d == 3:
+        bend_move(s, h, mean, A)
     turned_moves(s, h, shift, G)
     B = np.zeros((axes, n))
     for r in range(n):
@@ -190,12 +192,11 @@ def turned_moves(s, h, shift, G):
 
 
 @allocating_kernel
-def bend_move(c, s, h, mean, A):
+def bend_move(s, h, mean, A):
     """Let what is a rotation of the group in a move go round the centre instead of straight ahead.
 
     Args:
-        c: Coefficients.
-        s: JointState of one environment; `x` and `moved` are updated.
+        s: JointState of one environment, in space; `x` and `moved` are updated.
         h: Hypothesis.
         mean: The centre before the move.
         A: What reads the rotation off a move, (axis, state).
@@ -215,9 +216,9 @@ def bend_move(c, s, h, mean, A):
         for at, is_position in ((node.at_p, True), (node.at_v, False)):
             if not node.present or at < 0:
                 continue
-            for k in range(c.d):
+            for k in range(3):
                 arm[k] = s.x[h, at + k] - s.moved[h, at + k] - (mean[k] if is_position else 0.0)
-            for k in range(c.d):
+            for k in range(3):
                 change = np.sum(aside[k] * arm)
                 s.x[h, at + k] += change
                 s.moved[h, at + k] += change
