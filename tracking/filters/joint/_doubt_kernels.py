@@ -40,9 +40,12 @@ become another."""
 
 
 @small_kernel
-def note_fit(s, p, fits, nu):
-    """Count a range of pair p, which fits, 1, or not, 0, and was predicted shorter by nu [m]."""
+def note_fit(s, p, distance, fits, nu):
+    """Count a range [m] of pair p, which fits, 1, or not, 0, predicted shorter by nu [m]."""
     pair = s.pairs[p]
+    if pair.n_ranges > 0:
+        pair.jumps += LATELY * (min(abs(distance - pair.heard), FAR) - pair.jumps)
+    pair.heard = distance
     pair.residual += LATELY * (nu - pair.residual)
     off = min(max(nu - pair.beyond, -FAR), FAR)
     pair.beyond += LATELY * off

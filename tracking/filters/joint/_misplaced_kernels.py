@@ -6,13 +6,19 @@ would lead it away fit nothing and hardly count. But what it ranges tells of it:
 some too short, which no obstacle makes them, some too long, and a place that all of them agree
 on. Ranges that err alike are of a wrong calibration, and those that scatter mean nothing: both
 are for `_doubt_kernels`.
+
+A node can also leave, by dead reckoning: once it is metres off, no range fits any more, and none
+brings it back. No calibration errs by so much: if there is a place for it, it joins anew.
 """
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from tracking.compiled import allocating_kernel, kernel, small_kernel
+from tracking.filters.joint._bank_kernels import remove_node
 from tracking.filters.joint._doubt_kernels import ranges_now
 from tracking.filters.joint._place_kernels import SHORT, best_place, misfit, sum_of_misfits
 from tracking.filters.joint._start_kernels import add_node
@@ -21,6 +27,10 @@ SETTLED = 10
 """[-] Ranges after which the running mean of what a pair ranges beyond its prediction counts."""
 STEADY = 0.25
 """[m] Those that scatter more about it mean nothing."""
+AWAY = 1.5
+"""[m] No calibration and no obstacle makes all ranges of a node err by more in the mean."""
+SMOOTH = 0.4
+"""[m] Successive ranges that mean something differ by less."""
 CONTRADICTED = 24.0
 """[-] Sum of misfits of a node's ranges from which on another place is looked for: more than one
 range has to be wrong, for which the other end may be to blame."""
@@ -30,75 +40,102 @@ BETTER = 0.25
 
 @kernel
 def watch_places(c, s, layout, t):
-    """Move the node that its ranges contradict most, if there is a place that they agree on."""
-    worst, most = -1, CONTRADICTED
+    """Look for another place for the node that its ranges contradict most."""
+    worst, most, worst_is_away = -1, CONTRADICTED, False
     for i in range(s.nodes.shape[0]):
         if s.nodes[i].present and not s.nodes[i].static:
-            total, n = contradiction(c, s, layout, i, t)
-            if n > c.d and total > most:
-                worst, most = i, total
+            total, is_away = contradiction(c, s, layout, i, t)
+            if total > most:
+                worst, most, worst_is_away = i, total, is_away
     if worst >= 0:
-        move_node(c, s, layout, worst, t)
+        replace_node(c, s, layout, worst, worst_is_away, t)
 
 
 @kernel
 def contradiction(c, s, layout, i, t):
-    """What the ranges of node i say against its place, and how many there are.
+    """What the ranges of node i say against its place, and whether most are metres off.
 
-    Nothing where all of them are too long, or all too short.
+    Nothing where they are too few, or all too long, or too short, as by a wrong calibration.
     """
-    total, n, least, greatest = 0.0, 0, 0.0, 0.0
+    total, n, n_far, least, greatest = 0.0, 0, 0, 0.0, 0.0
     for k in range(s.nodes.shape[0]):
-        if k != i and has_settled(c, s, layout, i, k, t):
-            error = slow_error(s, layout.pair_index[i, k])
+        if k != i and tells_place(c, s, layout, i, k, t):
+            error = slow_error(c, s, layout.pair_index[i, k])
             total += misfit(error)
             least, greatest = min(least, error), max(greatest, error)
             n += 1
-    return total if least < -SHORT and greatest > SHORT else 0.0, n
+            n_far += is_far_off(s.pairs[layout.pair_index[i, k]])
+    if n >= c.d and 2 * n_far > n:
+        return total, True
+    return total if n > c.d and least < -SHORT and greatest > SHORT else 0.0, False
 
 
 @small_kernel
-def has_settled(c, s, layout, i, k, t):
-    """True if nodes i and k range with each other, and have for a while."""
+def tells_place(c, s, layout, i, k, t):
+    """True if nodes i and k range with each other, have for a while, and mean something by it."""
     p = layout.pair_index[i, k]
     pair = s.pairs[p]
-    return ranges_now(c, s, p, t) and pair.n_ranges >= SETTLED and pair.scatter < STEADY
+    if not ranges_now(c, s, p, t) or pair.n_ranges < SETTLED:
+        return False
+    return pair.scatter < STEADY or is_far_off(pair)
 
 
 @small_kernel
-def slow_error(s, p):
+def is_far_off(pair):
+    """True if plausible ranges have the ends of a pair metres from where they are."""
+    return abs(pair.residual) > AWAY and pair.jumps < SMOOTH
+
+
+@small_kernel
+def slow_error(c, s, p):
     """By how much pair p lately ranges more than its distance [m], in the best hypothesis."""
-    error = s.pairs[p].beyond
-    if s.pairs[p].at_e >= 0:
-        at, h = s.pairs[p].at_e, s.group[0].best
-        error += s.x[h, at] + s.x[h, at + 1]
+    pair, h = s.pairs[p], s.group[0].best
+    if is_far_off(pair):
+        at_i, at_j, squared = s.nodes[pair.i].at_p, s.nodes[pair.j].at_p, 0.0
+        for k in range(c.d):
+            squared += (s.x[h, at_j + k] - s.x[h, at_i + k]) ** 2
+        return pair.heard - math.sqrt(squared)
+    error = pair.beyond
+    if pair.at_e >= 0:
+        error += s.x[h, pair.at_e] + s.x[h, pair.at_e + 1]
     return error
 
 
 @allocating_kernel
-def move_node(c, s, layout, i, t):
-    """Move node i, in every hypothesis, to where its ranges fit much better, if there is such."""
+def replace_node(c, s, layout, i, is_away, t):
+    """Move node i, in every hypothesis, to where its ranges fit much better, if there is such.
+
+    One that is metres away joins anew instead, on both sides of the others where that is open. What
+    is ranged with others that are away as well tells nothing; where all are, the group begins anew.
+    """
     n = s.nodes.shape[0]
     others, m = np.empty(n, np.int64), 0
     for k in range(n):
-        if k != i and has_settled(c, s, layout, i, k, t):
+        tells = k != i and tells_place(c, s, layout, i, k, t)
+        if tells and not (is_away and contradiction(c, s, layout, k, t)[1]):
             others[m] = k
             m += 1
+    if is_away and m < c.d:
+        for k in range(n):
+            if s.nodes[k].present and not s.nodes[k].static:
+                remove_node(c, s, layout, k)
+        return
     known, distance, pos = np.zeros((m, 3)), np.empty(m), np.zeros(3)
     read_places(c, s, s.group[0].best, i, others, known, pos)
     for a in range(m):
         way = np.sqrt(np.sum((known[a] - pos) ** 2))
-        distance[a] = max(way + slow_error(s, layout.pair_index[i, others[a]]), 0.0)
+        distance[a] = max(way + slow_error(c, s, layout.pair_index[i, others[a]]), 0.0)
     moved = False
     for h in range(s.alive.shape[0]):
         if s.alive[h]:
             read_places(c, s, h, i, others, known, pos)
             before = sum_of_misfits(known, distance, pos)
-            if before > CONTRADICTED:
-                after = best_place(c.d, known, distance, pos)
-                if after < BETTER * before:
-                    add_node(c, s, layout, h, i, pos, t)
-                    moved = True
+            if before > CONTRADICTED and best_place(c.d, known, distance, pos) < BETTER * before:
+                if is_away:
+                    remove_node(c, s, layout, i)
+                    return
+                add_node(c, s, layout, h, i, pos, t)
+                moved = True
     if moved:
         s.nodes[i].astray = 0.0
 

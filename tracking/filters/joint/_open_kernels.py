@@ -44,6 +44,9 @@ TIE = 1e-6
 """[s] Times that differ by less are equal, whatever the clock began with."""
 CLEAR = 1.0
 """[-] By so much another turn has to be likelier (log-likelihood) before it is reported."""
+CLEARER = 5.0
+"""[-] By so much instead where one was known and is doubted: noise that is larger than believed,
+and lasts, makes some other look likelier by a little time and again."""
 KNOWN = 0.2
 """[rad] Turns that are known so well are left to filters that are linear about each of them."""
 LONG = 20.0
@@ -200,12 +203,13 @@ def watch_turns(c, s, layout):
         R = np.eye(3)
         value = climb(s.information[h], s.score[h], R, H)
         turns, values = find_peaks(s.information[h], s.score[h], layout.rotations)
-        if values[0] > value + CLEAR:
+        clear = CLEARER if group.held else CLEAR
+        if values[0] > value + clear:
             R[:] = turns[0]
             value = values[0]
         if group.held:
             # One that is near is what these seconds tell; the filter knows it better from before.
-            if value < CLEAR or is_near(R, np.eye(3)):
+            if value < CLEARER or is_near(R, np.eye(3)):
                 rivals = len(values) > 1 and values[1] > values[0] - c.prune
                 if not rivals or group.t - group.t_open > LONG:
                     group.open = False

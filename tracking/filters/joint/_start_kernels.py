@@ -152,7 +152,7 @@ def begin_pair(c, s, h, p, hidden):
 def forget_fits(pair):
     """How well a pair's ranges fit, as if none had come yet."""
     pair.n_ranges, pair.misfit = 0, 1.0
-    pair.residual, pair.beyond, pair.scatter = 0.0, 0.0, 0.0
+    pair.residual, pair.beyond, pair.scatter, pair.jumps = 0.0, 0.0, 0.0, 0.0
 
 
 @allocating_kernel
