@@ -85,7 +85,9 @@ def matched_params(scenario: Scenario | HumanScenario) -> JointParams:
         nlos=NlosParams(
             enter_rate=ENTER_RATE if hidden else NEVER,
             leave_rate=LEAVE_RATE,
+            enter_rate_with_power=ENTER_RATE if hidden else NEVER,
             leave_rate_with_power=LEAVE_RATE,
+            far_share=0.0,
             excess=max(mean, 1e-3),
             excess_std=max(std, 1e-3),
             excess_length=channel.excess_length,

@@ -35,7 +35,7 @@ def test_sight_is_lost_only_where_something_may_hide(name, hides):
     scenario = recordable(name)
     assert can_hide(scenario) == hides
     nlos = matched_params(scenario).nlos
-    assert nlos.enter_rate == (ENTER_RATE if hides else NEVER)
+    assert nlos.enter_rate == nlos.enter_rate_with_power == (ENTER_RATE if hides else NEVER)
     assert nlos.leave_rate == nlos.leave_rate_with_power == LEAVE_RATE
 
 

@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.stats import norm
 
 from tests.tracking.test_joint_kernels import running
 from tracking.filters.joint._motion_kernels import predict
-from tracking.filters.joint._sight_kernels import change_sight
+from tracking.filters.joint._sample_kernels import decay
+from tracking.filters.joint._sight_kernels import change_sight, judge_sight
 
 SHARES = st.floats(0.0, 0.99)
 
@@ -35,17 +37,21 @@ def covariance(s):
 
 
 @settings(deadline=None, max_examples=30)
-@given(st.integers(0, 99), st.floats(0.0, 1.0), SHARES)
-def test_by_so_much_it_is_forgotten(seed, hidden, switched):
+@given(st.integers(0, 99), st.floats(0.0, 1.0), SHARES, st.floats(0.0, 1.0))
+def test_by_so_much_it_is_forgotten(seed, hidden, switched, is_far):
     """Mean and variance move towards those of a new error; nothing else changes."""
     c, s, _ = believing(seed, hidden, waiting=True)
     at, before, x = s.pairs["at_e"][0] + 1, covariance(s), s.x[0].copy()
-    change_sight(c, s, 0, 0, switched)
+    change_sight(c, s, 0, 0, switched, is_far)
     after, stays = covariance(s), 1.0 - switched
-    new = c["slow_var"] + hidden * c["excess_var"]
+    shares = np.array([1.0 - is_far, is_far])
+    means = np.array([c["excess"], c["far_excess"]])
+    excess = shares @ means
+    excess_var = shares @ (np.array([c["excess_var"], c["far_excess_var"]]) + means**2) - excess**2
+    new = c["slow_var"] + hidden * excess_var
     expected = stays**2 * before[at, at] + (1.0 - stays**2) * new
     assert after[at, at] == pytest.approx(expected)
-    assert s.x[0, at] == pytest.approx(stays * x[at] + switched * hidden * c["excess"])
+    assert s.x[0, at] == pytest.approx(stays * x[at] + switched * hidden * excess)
     others = np.arange(len(x)) != at
     np.testing.assert_array_equal(s.x[0, others], x[others])
     np.testing.assert_allclose(after[at, others], stays * before[at, others], atol=1e-12)
@@ -59,7 +65,7 @@ def test_a_change_that_waits_for_the_prediction_is_the_same_as_one_at_once(seed,
     c, s, scratch = believing(seed, hidden, waiting=False)
     x, P = s.x[0].copy(), s.P[0].copy()
     s.pre[:] = 0.0
-    change_sight(c, s, 0, 0, switched)
+    change_sight(c, s, 0, 0, switched, 0.0)
     predict(c, s, 0, 0.0, scratch)
     at_once = s.x[0].copy(), s.P[0].copy()
     s.x[0], s.P[0] = x, P
@@ -67,3 +73,33 @@ def test_a_change_that_waits_for_the_prediction_is_the_same_as_one_at_once(seed,
     predict(c, s, 0, 0.0, scratch)
     np.testing.assert_allclose(s.x[0], at_once[0], atol=1e-12)
     np.testing.assert_allclose(s.P[0], at_once[1], atol=1e-12)
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.floats(0.0, 1.0), st.floats(-1.0, 3.0), st.floats(0.001, 0.2), st.floats(-3.0, 3.0))
+def test_sight_is_judged_by_the_rule_of_bayes(before, nu, variance, evidence):
+    """Over sight before and after, and over small and large excesses."""
+    c, s, _, _ = running(2, seed=1)
+    s.P[0], s.nlos[0, 0] = np.eye(s.x.shape[1]), before
+    at, dt, rates = s.pairs["at_e"][0] + 1, 0.1, (0.7, 2.5)
+    slow = s.x[0, at]
+    found = judge_sight(c, s, 0, 0, dt, nu, variance, (evidence, *rates), np.zeros(s.x.shape[1]))
+
+    def density(mean, var):
+        return norm.pdf(nu, mean, np.sqrt(var))
+
+    enter, leave = (1.0 - decay(rate * dt) for rate in rates)
+    S, hidden = variance + c["white_var"], np.exp(evidence)
+    near = (1.0 - c["far_share"]) * density(c["excess"], S + c["excess_var"])
+    far = c["far_share"] * density(c["far_excess"], S + c["far_excess_var"])
+    same = density(0.0, S)
+    entered = (1.0 - before) * enter * (near + far) * hidden
+    left = before * leave * density(-slow, S + 1.0 + c["slow_var"])
+    stayed = np.array(
+        [(1.0 - before) * (1.0 - enter) * same, before * (1.0 - leave) * same * hidden]
+    )
+    total = entered + left + stayed.sum()
+    assert s.nlos[0, 0] == pytest.approx(np.clip((entered + stayed[1]) / total, 1e-4, 1 - 1e-4))
+    assert found[0] == pytest.approx((entered + left) / total, abs=1e-9)
+    assert found[1] == pytest.approx(total / (total + c["outlier_prob"] / c["outlier_span"]))
+    assert found[3] == pytest.approx(far / (near + far))

@@ -186,7 +186,7 @@ def fuse_range(c, s, h, p, dt, distance, levers, sight, scratch):
         distance: The range [m].
         levers: Antennas of i and j relative to their nodes, six numbers [m].
         sight: What its powers say of it: log-likelihood ratio of none, 0 where they are not
-            reported; and how often it is regained [1/s].
+            reported; how often it is lost, and regained [1/s].
         scratch: Room.
 
     Returns:
@@ -203,7 +203,7 @@ def fuse_range(c, s, h, p, dt, distance, levers, sight, scratch):
         open_var = turn_gradient(s, h, m, scratch)
     S = variance + open_var + c.white_var
     expected = variance + open_var
-    switched, sane, likelihood = judge_sight(c, s, h, p, dt, nu, expected, sight, scratch.w)
+    switched, sane, likelihood, is_far = judge_sight(c, s, h, p, dt, nu, expected, sight, scratch.w)
     if s.group[0].n_alive > 1:
         loglik = math.log(likelihood)
         s.loglik[h] += c.evidence * max(loglik, -0.5 * (c.max_nis + math.log(S)))
@@ -211,7 +211,7 @@ def fuse_range(c, s, h, p, dt, distance, levers, sight, scratch):
     if switched < AT_ONCE or s.pairs[p].at_e < 0:
         s.stays[h, p] *= 1.0 - switched
     else:
-        change_sight(c, s, h, p, switched)
+        change_sight(c, s, h, p, switched, is_far)
         predicted, m = range_model(c, s, h, p, levers[:3], levers[3:], scratch.idx, scratch.val)
         nu = distance - predicted
         variance = project(s, h, m, scratch)

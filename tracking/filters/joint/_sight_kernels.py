@@ -27,12 +27,18 @@ def gap_evidence(c, gap):
 
 
 @small_kernel
+def likelihood(off, variance):
+    """Of a Gaussian, but for the root of two pi."""
+    return math.exp(-0.5 * off * off / variance) / math.sqrt(variance)
+
+
+@small_kernel
 def judge_sight(c, s, h, p, dt, nu, variance, sight, w):
     """Bayes' rule over what the sight was and is; updates the pair's NLOS probability.
 
     The slow error holds the excess while there is no sight. So in sight before and after, or
     in neither, the range is predicted as it is; entering adds an excess, leaving takes the
-    slow error away.
+    slow error away. Most obstacles add little, some a lot: so the excess has two parts.
 
     Args:
         c: Coefficients.
@@ -46,30 +52,30 @@ def judge_sight(c, s, h, p, dt, nu, variance, sight, w):
         w: ``P H``.
 
     Returns:
-        Probability that the sight changed; that the range meant anything; likelihood.
+        Probability that the sight changed; that the range meant anything; likelihood; and
+        probability that the excess, if any came, is one of the large ones.
     """
     at = s.pairs[p].at_e + 1
     before = s.nlos[h, p]
-    evidence, leave_rate = sight
-    enter, leave = 1.0 - decay(c.enter_rate * dt), 1.0 - decay(leave_rate * dt)
+    evidence, enter_rate, leave_rate = sight
+    enter, leave = 1.0 - decay(enter_rate * dt), 1.0 - decay(leave_rate * dt)
     S = variance + c.white_var
-    off = nu - c.excess
-    S_enter = S + c.excess_var
+    near = (1.0 - c.far_share) * likelihood(nu - c.excess, S + c.excess_var)
+    far = c.far_share * likelihood(nu - c.far_excess, S + c.far_excess_var)
+    enters = near + far
     nu_leave, S_leave = nu, S
     if at > 0:
         nu_leave = nu + s.x[h, at]
         S_leave += max(covariance(s, h, at, at) - 2.0 * w[at], -0.9 * variance) + c.slow_var
     hidden = math.exp(evidence)
-    stays = math.exp(-0.5 * nu * nu / S) / math.sqrt(S)
+    stays = likelihood(nu, S)
     los_los = (1.0 - before) * (1.0 - enter) * stays
-    los_nlos = (1.0 - before) * enter * math.exp(-0.5 * off * off / S_enter) / math.sqrt(S_enter)
-    nlos_los = before * leave * math.exp(-0.5 * nu_leave * nu_leave / S_leave) / math.sqrt(S_leave)
+    los_nlos = (1.0 - before) * enter * enters
+    nlos_los = before * leave * likelihood(nu_leave, S_leave)
     nlos_nlos = before * (1.0 - leave) * stays
     if at <= 0:
         # Without a state for the excess, no sight is a range that is worse.
-        nlos_nlos = (
-            before * (1.0 - leave) * math.exp(-0.5 * off * off / S_enter) / math.sqrt(S_enter)
-        )
+        nlos_nlos = before * (1.0 - leave) * enters
     los_nlos *= hidden
     nlos_nlos *= hidden
     wild = SQRT_2PI * c.outlier_prob / c.outlier_span
@@ -77,16 +83,20 @@ def judge_sight(c, s, h, p, dt, nu, variance, sight, w):
     s.nlos[h, p] = min(max((los_nlos + nlos_nlos) / max(total, 1e-300), MIN_PROB), 1.0 - MIN_PROB)
     if total < 1e-300:
         s.nlos[h, p] = before
-        return 0.0, 0.0, wild
+        return 0.0, 0.0, wild, 0.0
     # The power says nothing about where the nodes are: it is no evidence for a hypothesis.
     norm = 1.0 + (s.nlos[h, p]) * (hidden - 1.0) if hidden > 1.0 else 1.0
     switched = (los_nlos + nlos_los) / total
-    return switched, total / (total + wild), total / norm + wild
+    is_far = far / max(enters, 1e-300)
+    return switched, total / (total + wild), total / norm + wild, is_far
 
 
 @small_kernel
-def change_sight(c, s, h, p, switched):
-    """Forget the slow error of a pair by the probability that its sight changed."""
+def change_sight(c, s, h, p, switched, is_far):
+    """Forget the slow error of a pair by the probability that its sight changed.
+
+    A new one is of the large ones with the probability `is_far`, a mixture taken for a Gaussian.
+    """
     at = s.pairs[p].at_e + 1
     if at <= 0:
         return
@@ -99,5 +109,8 @@ def change_sight(c, s, h, p, switched):
     for k in range(s.slope.shape[1]):
         s.slope[h, k, at] *= stays
     hidden = s.nlos[h, p]
-    s.P[h, at, at] += (1.0 - stays * stays) * (c.slow_var + hidden * c.excess_var)
-    s.x[h, at] = stays * s.x[h, at] + switched * hidden * c.excess
+    apart = c.far_excess - c.excess
+    within = c.excess_var + is_far * (c.far_excess_var - c.excess_var)
+    excess_var = within + is_far * (1.0 - is_far) * apart * apart
+    s.P[h, at, at] += (1.0 - stays * stays) * (c.slow_var + hidden * excess_var)
+    s.x[h, at] = stays * s.x[h, at] + switched * hidden * (c.excess + is_far * apart)
