@@ -5,9 +5,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 from tracking.constellation import Constellation, NodeConfig
 from tracking.measurements import Kind, MeasurementBlock
+
+# A first example may have kernels compiled in it.
+settings.register_profile("compiled", deadline=None)
+settings.load_profile("compiled")
 
 ROOT = Path(__file__).resolve().parents[1]
 

@@ -82,7 +82,7 @@ def test_observations_of_another_size_are_refused(name):
         build(name).act(np.zeros(23, np.float32))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(data=st.data())
 @pytest.mark.parametrize(("name", "mode"), READABLE)
 def test_any_observation_gives_an_action(name, mode, data):

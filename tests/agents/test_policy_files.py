@@ -172,7 +172,7 @@ def test_truncated_files_are_refused_or_harmless(end):
 
 
 @given(flips=st.lists(st.tuples(st.integers(0, len(GOOD) - 1), st.integers(0, 7)), min_size=1))
-@settings(suppress_health_check=[HealthCheck.too_slow], deadline=None)
+@settings(suppress_health_check=[HealthCheck.too_slow])
 def test_flipped_bits_never_come_through(flips):
     data = bytearray(GOOD)
     for at, bit in flips:

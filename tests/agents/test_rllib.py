@@ -87,7 +87,7 @@ def drive(seed, arguments=LIVELY):
         yield theirs, found, wanted
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(st.integers(0, 10_000))
 def test_every_key_has_the_value_of_the_pettingzoo_form(seed):
     check_keys(drive(seed))

@@ -97,7 +97,7 @@ def test_a_thousand_wraps_are_unwrapped_exactly(clock, ppm):
     assert (stream.steps, stream.strays) == (0, 0)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.sampled_from(WRAPPING),
     st.floats(-200.0, 200.0),
@@ -117,7 +117,7 @@ def test_any_silence_is_unwrapped_exactly(clock, ppm, gaps):
     assert (stream.steps, stream.strays) == (0, 0)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(
     st.floats(-200.0, 200.0),
     st.lists(
@@ -137,7 +137,7 @@ def test_times_never_fall_and_never_come_after_the_arrival(ppm, stamps):
     assert stream.steps == 0
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(
     st.sampled_from([*WRAPPING, MICROSECONDS_64, DeviceClock(999.7, 5000)]),
     st.lists(
@@ -301,7 +301,7 @@ def test_memory_is_bounded():
     assert len(stream._kept) <= 81
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(st.tuples(st.integers(1, S), st.integers(0, S)), min_size=1, max_size=300))
 def test_the_line_is_below_the_newest_point_and_its_inverse_is_right(points):
     line = LowerEnvelope(ClockParams())

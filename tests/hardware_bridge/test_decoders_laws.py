@@ -35,7 +35,7 @@ def test_every_format_has_a_sample():
 
 
 @FORMATS
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(data=st.data())
 def test_any_cut_gives_the_same(name, data):
     stream = data.draw(pieces(name))
@@ -58,7 +58,7 @@ def test_damage_and_garbage_cost_at_most_one_frame(name):
 
 
 @FORMATS
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(data=st.data())
 def test_garbage_that_ends_costs_nothing(name, data):
     """Between whole frames, and not itself the beginning of one."""

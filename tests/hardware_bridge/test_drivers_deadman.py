@@ -10,7 +10,7 @@ from hardware_bridge.emulator.cars import FIRMWARE, make_firmware
 from hardware_bridge.emulator.cars.emulated_car import EmulatedCar
 from hardware_bridge.emulator.cars.vesc import VescFirmware
 
-patient = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
+patient = settings(suppress_health_check=[HealthCheck.too_slow])
 
 MS = 1_000_000
 EVERY = pytest.mark.parametrize("name", sorted(FIRMWARE))

@@ -11,7 +11,7 @@ from hardware_bridge.drivers import DRIVERS, make_driver
 from hardware_bridge.emulator.cars import FIRMWARE, make_firmware
 from hardware_bridge.readings import DriveReading
 
-patient = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
+patient = settings(suppress_health_check=[HealthCheck.too_slow])
 
 KEY = bytes(range(16))
 REVERSING = {"pwm": {"reverse": [[0.5, 1440], [2.0, 1300]]}}

@@ -8,7 +8,7 @@ from hardware_bridge.drivers.pwm import PwmDriver, PwmOptions, pulse_of, speed_o
 from hardware_bridge.emulator.cars.pwm import PwmFirmware
 from hardware_bridge.errors import BridgeError
 
-patient = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
+patient = settings(suppress_health_check=[HealthCheck.too_slow])
 
 OPTIONS = PwmOptions(
     steering_span=-400, forward=((0.5, 1560), (1.0, 1600), (3.0, 1700)),

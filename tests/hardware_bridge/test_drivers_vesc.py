@@ -21,7 +21,7 @@ from hardware_bridge.emulator.cars.vesc import VescFirmware
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.readings import NOBODY, MotionReading, StatusReading
 
-patient = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
+patient = settings(suppress_health_check=[HealthCheck.too_slow])
 
 GOLDEN = {
     "02 01 04 40 84 03": frame(b"\x04"),

@@ -125,12 +125,12 @@ class OneAuthenticatedDevice(OneDevice):
 
 
 TestOneDevice = OneDevice.TestCase
-TestOneDevice.settings = settings(max_examples=60, stateful_step_count=30, deadline=None)
+TestOneDevice.settings = settings(max_examples=60, stateful_step_count=30)
 TestOneAuthenticatedDevice = OneAuthenticatedDevice.TestCase
 TestOneAuthenticatedDevice.settings = TestOneDevice.settings
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.lists(st.booleans(), max_size=60), st.integers(1, 1000))
 def test_twins_are_found_within_four_messages(turns, period_ms):
     """Two devices that speak by any turns: four messages of the first after one of the other."""
@@ -297,7 +297,7 @@ sources = st.builds(
 )
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.booleans(), st.lists(st.tuples(sources, st.sampled_from("abc"), st.integers(-S, 5 * S))))
 def test_anything_is_survived(authenticated, messages):
     identities = Identities(authenticated)
@@ -311,7 +311,7 @@ def test_anything_is_survived(authenticated, messages):
             seen.add(key)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.integers(0, MODULUS - 1), st.lists(st.integers(-1200, 1200), max_size=60))
 def test_the_window_knows_what_it_saw(first, steps):
     window = SequenceWindow(first, endless=True)

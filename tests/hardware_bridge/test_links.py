@@ -155,7 +155,7 @@ def test_what_is_read_at_once_fits_a_record(monkeypatch, piece):
     assert sum(sizes) == 3 * MOST_PAYLOAD
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.lists(st.tuples(st.integers(0, 9000), st.integers(0, 9000)), max_size=30))
 def test_a_stream_cuts_no_message_and_keeps_no_second_one(steps):
     import fcntl
@@ -338,7 +338,7 @@ class Shelf:
 NAMES = ("links.a", "links.b", "cars.1")
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     st.lists(
         st.tuples(

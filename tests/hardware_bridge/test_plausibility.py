@@ -84,7 +84,7 @@ def test_what_damage_lets_through_is_near_the_truth(write, pattern, damage):
         assert gate.refused["jump"] >= 10
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(
     st.lists(st.tuples(st.floats(0.0, 20.0), st.floats(-1.0, 1.0), st.floats(-0.5, 0.5))),
     st.floats(2.0, 290.0),

@@ -64,7 +64,7 @@ def place(tmp_path_factory):
         yield lambda: folder / f"{next(n)}.rec"
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.lists(records, max_size=20))
 def test_what_was_written_comes_back(place, content):
     path = write(place(), content)
@@ -83,7 +83,7 @@ def start_of_records(data):
     return HEAD.size + OVERHEAD + len(decode_record(data, HEAD.size, marker).payload)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.lists(records, max_size=8), st.data())
 def test_a_cut_file_gives_a_prefix(place, content, data):
     path = write(place(), content)
@@ -133,7 +133,7 @@ def damage(data, start, how):
     return data[:at] + data[at + n : at + 2 * n] + data[at : at + n] + data[at + 2 * n :]
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.lists(records, min_size=1, max_size=10), damages)
 def test_damage_gives_some_of_what_was_written_in_order(place, content, blows):
     path = write(place(), content)
@@ -199,7 +199,7 @@ def test_memory_is_bounded_and_long_files_are_whole(place):
     assert is_part_in_order(plain(recording), plain(content))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.binary(max_size=200))
 def test_what_is_no_recording_is_refused(place, data):
     path = place()

@@ -198,7 +198,7 @@ def test_a_mistake_in_the_thread_is_a_lost_recording(tmp_path):
     assert not recorder.close()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.lists(
         st.tuples(

@@ -289,12 +289,12 @@ class Gates(RuleBasedStateMachine):
         assert not out.speed[~out.moving].any()
 
 
-Gates.TestCase.settings = settings(max_examples=20, stateful_step_count=20, deadline=None)
+Gates.TestCase.settings = settings(max_examples=20, stateful_step_count=20)
 TestGates = Gates.TestCase
 
 
 @given(st.lists(st.floats(-3.0, 3.0), min_size=5, max_size=30))
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 def test_whatever_is_wanted_the_cap_holds(wishes):
     group = Driven(SafetyParams(fence=SQUARE), spacing=1.0).drive()
     for wish in wishes:

@@ -150,7 +150,7 @@ def same(data, key, echo):
     return met, b"".join(back)
 
 
-SOME = settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+SOME = settings(max_examples=25, suppress_health_check=[HealthCheck.too_slow])
 
 
 @SOME

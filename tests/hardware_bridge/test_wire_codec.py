@@ -44,7 +44,6 @@ def test_crc_of_the_usual_check_string():
     assert sums(b"123456789")[0] == 0xCBF43926
 
 
-@settings(deadline=None)
 @given(st.binary(max_size=520), st.binary(min_size=16, max_size=16))
 def test_check_sums_are_those_of_the_twins(data, key):
     assert sums(data, key) == (zlib.crc32(data), siphash(data, key))
@@ -63,7 +62,7 @@ def decode(data, key=None):
         at = then
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(payloads(), words, words, st.sampled_from([None, KEY]))
 def test_decoding_and_encoding_are_those_of_the_twin(spoken, boot, time, key):
     message, data = spoken

@@ -44,7 +44,7 @@ def said(chunks, key=None):
     return met, decoder.counts
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.lists(readings, max_size=8), st.sampled_from([None, KEY]), words)
 def test_what_was_encoded_is_decoded(spoken, key, boot):
     encoder = RelposEncoder(7, boot, key)
@@ -64,7 +64,7 @@ def test_what_was_encoded_is_decoded(spoken, key, boot):
     assert counts.frames == encoder.sequence
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.integers(0, 1000), st.lists(st.integers(0, 1500)), st.binary(max_size=700), st.booleans())
 def test_any_cut_gives_the_same(seed, places, garbage, behind):
     frames = b"".join(spread(seed, 8))
@@ -203,7 +203,7 @@ def driver(key=None, **options):
     return RelposDriver(4, RelposOptions(**options), key, 6, lambda: next(clock))
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.floats(), st.floats(), st.floats(0.01, 32.0), st.floats(0.01, 3.0))
 def test_a_command_stays_within_limits(speed, steering, max_speed, max_steering):
     car = driver(max_speed=max_speed, max_steering=max_steering)

@@ -179,7 +179,7 @@ def test_covariance_stays_symmetric_and_positive(name, group):
     assert (np.linalg.eigvalsh(P) > 0.0).all()
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=25, suppress_health_check=list(HealthCheck))
 @given(seed=st.integers(0, 2**32 - 1), share=st.floats(0.0, 0.9), wild=st.floats(0.0, 0.5))
 def test_survives_any_ranges(name, group, seed, share, wild):
     """Lost, absurd and doubled measurements in any mixture: finite and positive definite."""

@@ -28,7 +28,7 @@ def layout(seed, d, n=5):
 
 
 @given(seed=st.integers(0, 2**32 - 1), d=st.sampled_from([2, 3]))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_exact_distances_lead_to_the_place_from_anywhere(seed, d):
     known, pos, distance = layout(seed, d)
     found = np.zeros(3)
@@ -38,7 +38,7 @@ def test_exact_distances_lead_to_the_place_from_anywhere(seed, d):
 
 
 @given(seed=st.integers(0, 2**32 - 1), d=st.sampled_from([2, 3]), k=st.integers(0, 4))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_place_is_never_replaced_by_one_that_fits_worse(seed, d, k):
     """One distance is what an obstacle made of it, and the search begins at the truth."""
     known, pos, distance = layout(seed, d)
@@ -50,7 +50,7 @@ def test_a_place_is_never_replaced_by_one_that_fits_worse(seed, d, k):
 
 
 @given(seed=st.integers(0, 2**32 - 1), d=st.sampled_from([2, 3]))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_the_mirror_image_of_the_mirror_image_is_the_place(seed, d):
     known, pos, _ = layout(seed, d)
     image = mirror_image(d, known, pos)
@@ -85,7 +85,7 @@ def test_others_in_line_leave_both_sides():
     more=st.integers(0, 2),
     wide=st.floats(0.5, 3.0),
 )
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_others_close_together_leave_two_sides_and_one_is_right(seed, d, more, wide):
     """As many others as the space has dimensions, or more, however close to each other."""
     rng = np.random.default_rng(seed)

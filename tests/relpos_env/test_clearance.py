@@ -30,7 +30,7 @@ def outline(box, n=400):
 
 
 @given(a=boxes, b=boxes)
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_the_gap_of_two_rectangles_is_that_of_their_outlines(a, b):
     a, b = row(*a), row(*b)
     offset = b[:2] - a[:2]

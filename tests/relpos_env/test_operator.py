@@ -124,7 +124,7 @@ def test_an_environment_of_a_batch_is_that_environment_alone_and_seeds_repeat():
     max_speed=st.floats(0.01, 5.0),
     seed=st.integers(0, 2**63),
 )
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_commands_are_within_their_limits(gain, reaction, std, max_trim, max_speed, seed):
     r = room()
     seeds = np.full(3, seed, dtype=np.uint64)

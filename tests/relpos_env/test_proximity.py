@@ -111,7 +111,7 @@ def scene(seed):
     return cars, boxes
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.integers(0, 2**32),
     st.integers(1, 32),
@@ -125,7 +125,7 @@ def test_without_noise_it_is_the_twin(seed, beams, cone, most):
     np.testing.assert_allclose(got, twin(cars, boxes, (3.0, 2.0), beams, params), atol=1e-9)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 2**32), st.integers(1, 32), st.floats(0.0, 1.0))
 def test_readings_are_within_reach(seed, beams, noise):
     cars, boxes = scene(seed)
@@ -136,7 +136,7 @@ def test_readings_are_within_reach(seed, beams, noise):
     assert not got[1].any()
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     st.integers(0, 2**32), st.floats(-7, 7), st.floats(-50, 50), st.floats(-50, 50)
 )  # fmt: skip
@@ -155,7 +155,7 @@ def test_moving_everything_changes_nothing(seed, turn, dx, dy):
 
 
 @given(st.integers(0, 2**32))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_a_quarter_turn_of_the_room_changes_nothing(seed):
     cars, boxes = scene(seed)
     turned = [(-y, x, heading + 0.5 * math.pi) for x, y, heading in cars]

@@ -200,7 +200,7 @@ changes = st.one_of(
 
 
 @given(st.lists(st.tuples(st.sampled_from(list(places(VALID))), changes), min_size=1, max_size=2))
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=500)
 def test_any_change_of_a_file_loads_or_names_a_key(edits):
     table = VALID
     for path, change in edits:
@@ -217,7 +217,7 @@ def test_any_change_of_a_file_loads_or_names_a_key(edits):
 
 
 @given(st.integers(0, 10_000), st.text(max_size=3))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_any_change_of_a_files_text_loads_or_is_named(tmp_path_factory, at, text):
     source = (FILES / "warehouse.toml").read_text()
     at %= len(source)

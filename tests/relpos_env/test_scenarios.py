@@ -36,7 +36,7 @@ boxes = st.tuples(
 
 
 @given(boxes, boxes)
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_boxes_overlap_where_points_of_one_lie_in_the_other(a, b):
     rows = boxes_of((a, b))
     share = np.linspace(-1.0, 1.0, 41)

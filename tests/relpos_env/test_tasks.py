@@ -199,7 +199,7 @@ def test_other_environments_are_left_alone(name):
     t=st.floats(0.0, 1e5),
     fast=st.floats(0.0, 1e6),
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_every_term_is_finite_and_within_its_bounds(name, n_cars, seed, absent, t, fast):
     state = rooms(2, n_cars, seed, absent)
     state.vel_w *= fast

@@ -42,7 +42,7 @@ some_car = st.builds(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(some_car, state, st.floats(-0.42, 0.42), st.sampled_from([0.1, 1.0]))
 def test_tyres_and_brakes_only_take_energy(params, start, steering, scale):
     """From any slide, at every step, to standstill."""
@@ -57,7 +57,7 @@ def test_tyres_and_brakes_only_take_energy(params, start, steering, scale):
         assert car.energy() == 0.0
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(some_car, state, st.floats(-3.0, 3.0), st.floats(-0.42, 0.42))
 def test_the_floor_gives_no_more_than_the_grip(params, start, speed, steering):
     car = Car(params, body=(0.0, 0.0, *start)).go(speed, steering, 0.3)
@@ -65,7 +65,7 @@ def test_the_floor_gives_no_more_than_the_grip(params, start, speed, steering):
     assert force.max() <= params.friction * params.mass * GRAVITY * (1.0 + 1e-12)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(state, st.floats(-3.0, 3.0), st.floats(-0.42, 0.42))
 def test_mirrored_commands_give_mirrored_motion(start, speed, steering):
     mirror = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])

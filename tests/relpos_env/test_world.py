@@ -104,7 +104,7 @@ HARD_TURNS = st.lists(
 )
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=25, suppress_health_check=list(HealthCheck))
 @given(HARD_TURNS)
 def test_nobody_gets_through_a_wall(turns):
     swarm = placed(STARTS, room=SMALL, obstacles=BOXES)

@@ -299,7 +299,7 @@ POINT = st.tuples(*[st.floats(-3.0, 3.0)] * 3)
 ALONG = np.linspace(0.0, 1.0, 1001)[:, None]
 
 
-@settings(max_examples=400, deadline=None, derandomize=True)
+@settings(max_examples=400, derandomize=True)
 @given(POINT, POINT, POINT, st.floats(0.01, 2.0), st.floats(0.01, 2.0), st.floats(-4.0, 4.0))
 def test_boxes_hide_what_points_along_the_line_say(a, b, centre, width, depth, angle):
     c, s = np.cos(angle), np.sin(angle)
@@ -333,7 +333,7 @@ def check_capsule(a, b, p, q, radius, skin):
         assert not hidden
 
 
-@settings(max_examples=400, deadline=None, derandomize=True)
+@settings(max_examples=400, derandomize=True)
 @given(POINT, POINT, POINT, POINT, st.floats(0.01, 1.0), st.floats(0.5, 1.0))
 @example((-2.0, 0.1, 0.0), (2.0, 0.1, 0.0), (-0.5, 0.0, 0.0), (0.5, 0.0, 0.0), 0.2, 0.9)
 @example((-2.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (-0.5, 0.0, 0.0), (0.5, 0.0, 0.0), 0.2, 0.9)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from tracking._angle_kernels import SERIES, cosine_sine
@@ -10,7 +10,6 @@ from tracking._angle_kernels import SERIES, cosine_sine
 LIMIT = float(np.sqrt(SERIES))
 
 
-@settings(deadline=None)
 @given(st.floats(-10.0, 10.0))
 @example(LIMIT)
 @example(np.nextafter(LIMIT, 0.0))

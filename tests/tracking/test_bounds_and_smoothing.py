@@ -106,7 +106,7 @@ def test_only_joint_looks_back(drive):
         tracker.smooth(drive.block.take(slice(0, 0)), 1.0)
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(seed=st.integers(0, 2**31))
 def test_late_doubled_and_shuffled_measurements_change_nothing(drive, seed):
     """Whatever arrives within the delay, in any order and however often."""

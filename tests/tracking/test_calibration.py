@@ -130,7 +130,7 @@ def turned(seed, soft, hard, n=1500):
     return body @ soft.T + hard
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(
     parts=st.lists(st.floats(-0.15, 0.15), min_size=6, max_size=6),
     hard=st.tuples(*[st.floats(-80.0, 80.0)] * 3),
@@ -363,7 +363,7 @@ calibrations = st.builds(
 )
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(calibration=calibrations)
 def test_what_is_written_reads_back(calibration, tmp_path_factory):
     path = tmp_path_factory.mktemp("file") / "calibration.toml"

@@ -16,7 +16,7 @@ def ranges(t):
     return MeasurementBlock.of_kind(Kind.RANGE, t, 0 * ones, t[:, None], j=ones)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(st.floats(0.0, 0.099), min_size=1, max_size=60), st.integers(1, 7))
 def test_order_of_arrival_does_not_matter(delays, n_blocks):
     n = len(delays)

@@ -66,7 +66,7 @@ def assert_events(block, e, expected):
             np.testing.assert_array_equal(getattr(alone, name)[0], column, err_msg=name)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seed=st.integers(0, 2**31), n_envs=st.integers(1, 3), largest=st.sampled_from([3, 40, 150]))
 def test_it_is_a_sorted_list(seed, n_envs, largest):
     """What comes out, waits, and is counted, while the ring turns and grows."""
@@ -95,7 +95,7 @@ def test_a_long_block_is_as_good_as_its_pieces():
         np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seed=st.integers(0, 2**31))
 def test_no_order_of_arrival_shows(seed):
     """Whether it is a block at once, its events in another order, or one block sorted."""

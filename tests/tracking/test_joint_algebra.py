@@ -106,7 +106,7 @@ def test_a_hypothesis_that_is_another_one_turned_a_little_is_the_same(dimensions
     assert not are_same(c, s, 0, 1, found)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 2**31))
 def test_while_every_turn_is_open_layouts_are_the_same_whose_shapes_are(seed):
     rng = np.random.default_rng(seed)

@@ -36,7 +36,7 @@ def covariance(s):
     return s.P[0] - rows.T @ rows
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.integers(0, 99), st.floats(0.0, 1.0), SHARES, st.floats(0.0, 1.0))
 def test_by_so_much_it_is_forgotten(seed, hidden, switched, is_far):
     """Mean and variance move towards those of a new error; nothing else changes."""
@@ -59,7 +59,7 @@ def test_by_so_much_it_is_forgotten(seed, hidden, switched, is_far):
     assert np.linalg.eigvalsh(after).min() > -1e-12
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.integers(0, 99), st.floats(0.0, 1.0), SHARES)
 def test_a_change_that_waits_for_the_prediction_is_the_same_as_one_at_once(seed, hidden, switched):
     c, s, scratch = believing(seed, hidden, waiting=False)
@@ -75,7 +75,7 @@ def test_a_change_that_waits_for_the_prediction_is_the_same_as_one_at_once(seed,
     np.testing.assert_allclose(s.P[0], at_once[1], atol=1e-12)
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(st.floats(0.0, 1.0), st.floats(-1.0, 3.0), st.floats(0.001, 0.2), st.floats(-3.0, 3.0))
 def test_sight_is_judged_by_the_rule_of_bayes(before, nu, variance, evidence):
     """Over sight before and after, and over small and large excesses."""

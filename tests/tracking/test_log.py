@@ -201,7 +201,7 @@ def test_faults_of_meta_are_named(folder, old, new, word):
 finite = st.floats(-1e3, 1e3)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     st.lists(st.floats(0.0, 1e4), min_size=2, max_size=15),
     st.floats(0.01, 299.0),

@@ -52,7 +52,7 @@ def evidence(rng, n=12):
     return information, score + 0.3 * rng.standard_normal(9), R
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 2**31))
 def test_derivatives_of_the_likelihood_by_a_turn_are_its_differences(seed):
     rng = np.random.default_rng(seed)
@@ -76,7 +76,7 @@ def test_derivatives_of_the_likelihood_by_a_turn_are_its_differences(seed):
             assert -second / (4 * h * h) == pytest.approx(H[a, b], abs=1e-3 * scale)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 2**31))
 def test_no_turn_is_likelier_than_the_first_peak(seed):
     rng = np.random.default_rng(seed)

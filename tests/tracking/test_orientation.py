@@ -124,7 +124,7 @@ def test_a_sensor_that_sticks_gives_no_states():
     assert not out.valid[0, 120:300].any()
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seed=st.integers(0, 2**31), cuts=st.lists(st.integers(1, 399), max_size=6))
 def test_any_cut_into_blocks_judges_samples_the_same(seed, cuts):
     rng = np.random.default_rng(seed)
@@ -141,7 +141,7 @@ def test_any_cut_into_blocks_judges_samples_the_same(seed, cuts):
         np.testing.assert_array_equal(np.concatenate([p[k] for p in parts]), whole[k])
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seed=st.integers(0, 2**31), cuts=st.lists(st.integers(1, 399), max_size=6))
 def test_any_cut_into_blocks_finds_the_same_limits(seed, cuts):
     accel = 3.0 * np.random.default_rng(seed).standard_normal((400, 3)).clip(-1.0, 1.0)

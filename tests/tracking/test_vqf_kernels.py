@@ -134,7 +134,7 @@ def test_it_is_the_library_with_a_slower_magnetometer(every):
     np.testing.assert_allclose(found[1], expected, rtol=0.0, atol=1e-9)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 2**31), hz=st.floats(5.0, 800.0))
 def test_it_is_the_library_on_anything(seed, hz):
     rng = np.random.default_rng(seed)
@@ -191,7 +191,7 @@ def assert_equal_blocks(a, b):
         np.testing.assert_array_equal(getattr(a, name), getattr(b, name), err_msg=name)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     seed=st.integers(0, 2**31),
     cuts=st.lists(st.integers(1, 400), max_size=8),

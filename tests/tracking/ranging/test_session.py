@@ -25,7 +25,7 @@ from tracking.ranging.wire import MAX_ID, MAX_PARTS, Entry, Frame, Type, decode,
 BYTE = st.integers(0, 255)
 STAMP = st.integers(0, MODULUS - 1)
 WAIT = st.sampled_from([0.0, 1e-6, 60e-6, 1e-3, 4e-3, 12e-3, 0.05, 0.3, 0.7, 2.0])
-quick = settings(max_examples=150, deadline=None, derandomize=True)
+quick = settings(max_examples=150, derandomize=True)
 
 
 class Alone:

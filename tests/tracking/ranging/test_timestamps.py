@@ -20,7 +20,7 @@ HALF = MODULUS // 2
 TIMES = st.integers(-(2**60), 2**60)
 STEPS = st.integers(-HALF, HALF - 1)
 STAMPS = st.integers(0, MODULUS - 1) | st.sampled_from([0, 1, HALF - 1, HALF, MODULUS - 1])
-quick = settings(max_examples=100, deadline=None, derandomize=True)
+quick = settings(max_examples=100, derandomize=True)
 
 
 def test_constants_as_in_the_data_sheet():
