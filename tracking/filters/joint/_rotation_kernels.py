@@ -15,8 +15,8 @@ kept by the filter of section 4 of [2], in the states that are used here anyway.
 A correction is linear: it moves every node straight ahead along its tangent, which is a rotation
 and a stretch of ``1 - cos``. Corrections back and forth stretch again and again, and what is known
 of a shape (distances that were surveyed) does not undo it, since it is used up. So what is a
-rotation in a move is made one, velocities with the positions; in space, where turns are large:
-in the plane the wheels know them, and drives were as far off either way.
+rotation in a move is made one, velocities with the positions; in space only: in the plane all
+nodes range with each other, which takes back within the same move what a layout has grown by.
 
 References:
     [1] Huang, Mourikis, Roumeliotis, Observability-based rules for designing consistent EKF
