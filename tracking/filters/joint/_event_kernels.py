@@ -76,9 +76,8 @@ def run_events(coefficients, layout, state, scratch, block, t_out, out):
                     i, j, a_i, a_j = j, i, a_j, a_i
                 sight = (0.0, c.enter_rate, c.leave_rate)
                 if has_power[e, k]:
-                    gap = values[e, k, 1] - values[e, k, 2]
-                    rates = c.enter_rate_with_power, c.leave_rate_with_power
-                    sight = (gap_evidence(c, gap), rates[0], rates[1])
+                    evidence = gap_evidence(c, values[e, k, 1] - values[e, k, 2])
+                    sight = (evidence, c.enter_rate_with_power, c.leave_rate_with_power)
                 is_survey, now, distance = what == SURVEY, t[e, k], values[e, k, 0]
                 hear(c, s, layout, scratch, i, j, a_i, a_j, now, distance, sight, is_survey)
             elif what == LEAVE or (what == JOIN and s.nodes[i].present):

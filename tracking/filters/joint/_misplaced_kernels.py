@@ -115,6 +115,8 @@ def replace_node(c, s, layout, i, is_away, t):
         if tells and not (is_away and contradiction(c, s, layout, k, t)[1]):
             others[m] = k
             m += 1
+    if is_away and c.n > c.n_own:
+        return  # a smoother would lose the past that it holds
     if is_away and m < c.d:
         for k in range(n):
             if s.nodes[k].present and not s.nodes[k].static:
