@@ -118,7 +118,7 @@ def learn_range(c, s, layout, scratch, p, a_i, a_j, is_hidden, what):
         was_hidden = s.nlos[0, p] > 0.5
         s.nlos[0, p] = 1.0 if is_hidden else 0.0
         if was_hidden != is_hidden:
-            change_sight(c, s, 0, p, 1.0, 0.0)
+            change_sight(c, s, 0, p, 1.0, c.far_share)
         variance = c.white_var + s.nlos[0, p] * c.excess_white_var
     _, m = range_model(c, s, 0, p, (i0, i1, i2), (j0, j1, j2), scratch.idx, scratch.val)
     S = project(s, 0, m, scratch) + variance

@@ -24,6 +24,8 @@ LATELY = 0.1
 """[-] The same of what it ranges beyond what is predicted."""
 FAR = 1.0
 """[m] A single range pulls no further than this."""
+FAST = 10.0
+"""[m/s] Ranges that change faster jump."""
 STAYS = 0.5
 """[-] It remains one down to this part of it."""
 HELD = 2.0
@@ -40,12 +42,13 @@ become another."""
 
 
 @small_kernel
-def note_fit(s, p, distance, fits, nu):
-    """Count a range [m] of pair p, which fits, 1, or not, 0, predicted shorter by nu [m]."""
+def note_fit(s, p, dt, distance, fits, nu):
+    """Count a range [m] of pair p, dt after its last [s]: fits, 1, or not, 0; nu too long [m]."""
     pair = s.pairs[p]
     if pair.n_ranges > 0:
-        pair.jumps += LATELY * (min(abs(distance - pair.heard), FAR) - pair.jumps)
-    pair.heard = distance
+        jump = max(abs(distance - pair.last_used) - FAST * dt, 0.0)
+        pair.jumps += LATELY * (min(jump, FAR) - pair.jumps)
+    pair.last_used = distance
     pair.residual += LATELY * (nu - pair.residual)
     off = min(max(nu - pair.beyond, -FAR), FAR)
     pair.beyond += LATELY * off

@@ -240,7 +240,7 @@ def take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, sight, is_survey
             pair.misfit += 0.05 * (capped - pair.misfit)
             fits = 1.0 if weight > 0.5 and nis < 6.0 else 0.0
             group.fit += 0.01 * (fits - group.fit)
-            note_fit(s, p, distance, fits, nu)
+            note_fit(s, p, dt, distance, fits, nu)
             if not (s.nodes[pair.i].doubted or s.nodes[pair.j].doubted):
                 group.misfit += 0.01 * (weight * capped - group.misfit)
             if weight > 0.5:

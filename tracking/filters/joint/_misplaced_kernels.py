@@ -28,9 +28,10 @@ SETTLED = 10
 STEADY = 0.25
 """[m] Those that scatter more about it mean nothing."""
 AWAY = 1.5
-"""[m] No calibration and no obstacle makes all ranges of a node err by more in the mean."""
-SMOOTH = 0.4
-"""[m] Successive ranges that mean something differ by less."""
+"""[m] Where most of a node's ranges err by more, some of them too short, it is elsewhere: no
+obstacle shortens a range, and no calibration by so much."""
+SMOOTH = 0.25
+"""[m] Ranges that mean something jump by less."""
 CONTRADICTED = 24.0
 """[-] Sum of misfits of a node's ranges from which on another place is looked for: more than one
 range has to be wrong, for which the other end may be to blame."""
@@ -43,7 +44,7 @@ def watch_places(c, s, layout, t):
     """Look for another place for the node that its ranges contradict most."""
     worst, most, worst_is_away = -1, CONTRADICTED, False
     for i in range(s.nodes.shape[0]):
-        if s.nodes[i].present and not s.nodes[i].static:
+        if s.nodes[i].present:
             total, is_away = contradiction(c, s, layout, i, t)
             if total > most:
                 worst, most, worst_is_away = i, total, is_away
@@ -57,6 +58,8 @@ def contradiction(c, s, layout, i, t):
 
     Nothing where they are too few, or all too long, or too short, as by a wrong calibration.
     """
+    if s.nodes[i].static:
+        return 0.0, False
     total, n, n_far, least, greatest = 0.0, 0, 0, 0.0, 0.0
     for k in range(s.nodes.shape[0]):
         if k != i and tells_place(c, s, layout, i, k, t):
@@ -65,7 +68,7 @@ def contradiction(c, s, layout, i, t):
             least, greatest = min(least, error), max(greatest, error)
             n += 1
             n_far += is_far_off(s.pairs[layout.pair_index[i, k]])
-    if n >= c.d and 2 * n_far > n:
+    if n >= c.d and 2 * n_far > n and least < -AWAY:
         return total, True
     return total if n > c.d and least < -SHORT and greatest > SHORT else 0.0, False
 
@@ -83,7 +86,7 @@ def tells_place(c, s, layout, i, k, t):
 @small_kernel
 def is_far_off(pair):
     """True if plausible ranges have the ends of a pair metres from where they are."""
-    return abs(pair.residual) > AWAY and pair.jumps < SMOOTH
+    return abs(pair.beyond) > AWAY and pair.jumps < SMOOTH
 
 
 @small_kernel
@@ -94,7 +97,7 @@ def slow_error(c, s, p):
         at_i, at_j, squared = s.nodes[pair.i].at_p, s.nodes[pair.j].at_p, 0.0
         for k in range(c.d):
             squared += (s.x[h, at_j + k] - s.x[h, at_i + k]) ** 2
-        return pair.heard - math.sqrt(squared)
+        return pair.last_used - math.sqrt(squared)
     error = pair.beyond
     if pair.at_e >= 0:
         error += s.x[h, pair.at_e] + s.x[h, pair.at_e + 1]
@@ -106,20 +109,22 @@ def replace_node(c, s, layout, i, is_away, t):
     """Move node i, in every hypothesis, to where its ranges fit much better, if there is such.
 
     One that is metres away joins anew instead, on both sides of the others where that is open. What
-    is ranged with others that are away as well tells nothing; where all are, the group begins anew.
+    is ranged with others that are away as well tells nothing; where all that move are, the group
+    begins anew.
     """
     n = s.nodes.shape[0]
-    others, m = np.empty(n, np.int64), 0
+    others, m, all_away = np.empty(n, np.int64), 0, True
     for k in range(n):
-        tells = k != i and tells_place(c, s, layout, i, k, t)
-        if tells and not (is_away and contradiction(c, s, layout, k, t)[1]):
+        other_is_away = is_away and s.nodes[k].present and contradiction(c, s, layout, k, t)[1]
+        all_away = all_away and (other_is_away or s.nodes[k].static or not s.nodes[k].present)
+        if k != i and not other_is_away and tells_place(c, s, layout, i, k, t):
             others[m] = k
             m += 1
     if is_away and c.n > c.n_own:
         return  # a smoother would lose the past that it holds
-    if is_away and m < c.d:
+    if is_away and (all_away or m < c.d):
         for k in range(n):
-            if s.nodes[k].present and not s.nodes[k].static:
+            if k == i or (all_away and s.nodes[k].present and not s.nodes[k].static):
                 remove_node(c, s, layout, k)
         return
     known, distance, pos = np.zeros((m, 3)), np.empty(m), np.zeros(3)

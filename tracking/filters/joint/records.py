@@ -72,8 +72,8 @@ PAIR = np.dtype(
         ("residual", "f8"),  # running mean of its innovations [m]
         ("beyond", "f8"),  # the same, single ones counting as 1 m off at most [m]
         ("scatter", "f8"),  # running mean of their distance from it [m]
-        ("heard", "f8"),  # its last range that was used [m]
-        ("jumps", "f8"),  # running mean of what successive ones differ by, 1 m at most [m]
+        ("last_used", "f8"),  # its last range that was used [m]
+        ("jumps", "f8"),  # running mean of what they change faster than things move [m]
         ("start_sum", "f8"),  # sum of the first ranges of a pair not started [m]
         ("start_t", "f8"),  # time of the first of them [s]
         ("start_n", "i8"),  # how many
