@@ -73,6 +73,22 @@ def matched_params(scenario: Scenario | HumanScenario) -> JointParams:
             slip=1.0 / (scenario.car.rear_cornering * GRAVITY),
             sideways_std=SIDEWAYS,
         )
+    nlos = NlosParams(
+        enter_rate=ENTER_RATE if hidden else NEVER,
+        leave_rate=LEAVE_RATE,
+        enter_rate_with_power=ENTER_RATE if hidden else NEVER,
+        leave_rate_with_power=LEAVE_RATE,
+        excess=max(mean, 1e-3),
+        excess_std=max(std, 1e-3),
+        excess_length=channel.excess_length,
+        white_std=1e-3,
+        gap_los=channel.gap,
+        gap_los_std=max(gap_los_std, 0.1),
+        gap_nlos=channel.gap + max(channel.gap_nlos, 0.1),
+        gap_nlos_std=max(gap_nlos_std, 0.1),
+        # Simulated radios lose ranges; none of those that come means nothing.
+        outlier_prob=NEVER,
+    )
     return JointParams(
         carriers=carriers,
         range_error=RangeErrorParams(
@@ -82,23 +98,8 @@ def matched_params(scenario: Scenario | HumanScenario) -> JointParams:
             slow_std=max(channel.slow, 1e-4),
             slow_length=channel.slow_length,
         ),
-        nlos=NlosParams(
-            enter_rate=ENTER_RATE if hidden else NEVER,
-            leave_rate=LEAVE_RATE,
-            enter_rate_with_power=ENTER_RATE if hidden else NEVER,
-            leave_rate_with_power=LEAVE_RATE,
-            far_share=0.0,
-            excess=max(mean, 1e-3),
-            excess_std=max(std, 1e-3),
-            excess_length=channel.excess_length,
-            white_std=1e-3,
-            gap_los=channel.gap,
-            gap_los_std=max(gap_los_std, 0.1),
-            gap_nlos=channel.gap + max(channel.gap_nlos, 0.1),
-            gap_nlos_std=max(gap_nlos_std, 0.1),
-            # Simulated radios lose ranges; none of those that come means nothing.
-            outlier_prob=NEVER,
-        ),
+        nlos=nlos,
+        nlos_in_space=nlos,
         # The NIS is 1 where noise is what it is believed to be.
         start=JointStartParams(strained=2.0),
     )

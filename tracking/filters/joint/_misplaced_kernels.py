@@ -109,22 +109,24 @@ def replace_node(c, s, layout, i, is_away, t):
     """Move node i, in every hypothesis, to where its ranges fit much better, if there is such.
 
     One that is metres away joins anew instead, on both sides of the others where that is open. What
-    is ranged with others that are away as well tells nothing; where all that move are, the group
+    is ranged with others that are away as well tells nothing; where most that move are, the group
     begins anew.
     """
     n = s.nodes.shape[0]
-    others, m, all_away = np.empty(n, np.int64), 0, True
+    others, m, n_moving, n_away = np.empty(n, np.int64), 0, 0, 0
     for k in range(n):
         other_is_away = is_away and s.nodes[k].present and contradiction(c, s, layout, k, t)[1]
-        all_away = all_away and (other_is_away or s.nodes[k].static or not s.nodes[k].present)
+        n_moving += s.nodes[k].present and not s.nodes[k].static
+        n_away += other_is_away
         if k != i and not other_is_away and tells_place(c, s, layout, i, k, t):
             others[m] = k
             m += 1
     if is_away and c.n > c.n_own:
         return  # a smoother would lose the past that it holds
-    if is_away and (all_away or m < c.d):
+    if is_away and (2 * n_away > n_moving or m < c.d):
         for k in range(n):
-            if k == i or (all_away and s.nodes[k].present and not s.nodes[k].static):
+            anew = 2 * n_away > n_moving and s.nodes[k].present and not s.nodes[k].static
+            if k == i or anew:
                 remove_node(c, s, layout, k)
         return
     known, distance, pos = np.zeros((m, 3)), np.empty(m), np.zeros(3)

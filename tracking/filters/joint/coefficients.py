@@ -79,7 +79,8 @@ COEFFICIENTS = np.dtype(
 
 def make_coefficients(constellation: Constellation, params: JointParams) -> Records:
     """Derive the constants of the kernels, (1)."""
-    e, v, s = params.range_error, params.nlos, params.start
+    e, s = params.range_error, params.start
+    v = params.nlos_in_space if constellation.dimensions == 3 else params.nlos
     has_states = has_range_errors(constellation, params)
     moving = [n for n in constellation.nodes if n.kind != "static"] or constellation.nodes
     white_var = e.white_std**2
