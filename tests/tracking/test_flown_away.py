@@ -66,19 +66,6 @@ def test_drones_that_flew_away_come_back(swarm, gone, within):
     assert np.sqrt((error[soon] ** 2).mean()) < 0.25
 
 
-@pytest.mark.parametrize("gone", [(0,), (2,)])
-def test_a_car_that_drove_away_comes_back(gone):
-    log = simulate(scenario="cars-los", seconds=30.0, seed=7001)
-    group = log.constellation
-    t = np.array([20.02, *np.arange(21.0, 28.0, 0.5)])
-    error, estimate = errors_after(
-        group, log.block, lambda t: log.truth.pairs(group, t)[0], gone, 20.0, t
-    )
-    assert error[0].max() > 20.0
-    assert error[t >= 23.0].max() < 0.6
-    assert (estimate.status[-1] == Status.OK).all()
-
-
 def test_a_hand_that_went_away_from_fixed_nodes_comes_back(space):
     run = space["hand"](12)
     i, j = run.constellation.pairs.T

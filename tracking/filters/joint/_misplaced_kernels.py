@@ -7,8 +7,8 @@ some too short, which no obstacle makes them, some too long, and a place that al
 on. Ranges that err alike are of a wrong calibration, and those that scatter mean nothing: both
 are for `_doubt_kernels`.
 
-A node can also leave, by dead reckoning: once it is metres off, no range fits any more, and none
-brings it back. No calibration errs by so much: if there is a place for it, it joins anew.
+In space a node can also leave, by dead reckoning: once it is metres off, no range fits any more,
+and none brings it back. No calibration errs by so much: if there is a place for it, it joins anew.
 """
 
 from __future__ import annotations
@@ -68,7 +68,8 @@ def contradiction(c, s, layout, i, t):
             least, greatest = min(least, error), max(greatest, error)
             n += 1
             n_far += is_far_off(s.pairs[layout.pair_index[i, k]])
-    if n >= c.d and 2 * n_far > n and least < -AWAY:
+    # In the plane a layout that is turned the wrong way looks like it, and is found as such.
+    if c.d == 3 and n >= c.d and 2 * n_far > n and least < -AWAY:
         return total, True
     return total if n > c.d and least < -SHORT and greatest > SHORT else 0.0, False
 
