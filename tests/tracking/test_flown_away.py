@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from agents.simulate import simulate
 from tracking import Tracker
 from tracking.estimate import Status
 from tracking.measurements import Kind
@@ -83,16 +82,17 @@ def test_a_hand_that_went_away_from_fixed_nodes_comes_back(space):
 
 
 @pytest.mark.parametrize(("node", "rounds", "beyond"), [(0, 1, 20.0), (1, 2, 8.0), (2, 3, -2.5)])
-def test_a_few_absurd_rounds_of_a_car_send_it_nowhere(node, rounds, beyond):
+def test_a_few_absurd_rounds_of_a_drone_send_it_nowhere(swarm, node, rounds, beyond):
     """All of its ranges are wrong alike for a moment; it stays where it is, and is there."""
-    log = simulate(scenario="cars-los", seconds=24.0, seed=7001)
-    group, block, t = log.constellation, log.block, np.arange(20.1, 23.0, 0.1)
+    block, t = swarm.block, np.arange(30.1, 33.0, 0.1)
+    i, j = swarm.constellation.pairs.T
     values = block.values.copy()
     of_it = (block.kind == Kind.RANGE) & ((block.i == node) | (block.j == node))
-    first = np.nonzero(of_it[0] & (block.t[0] > 20.0))[0][: 2 * rounds]
+    first = np.nonzero(of_it[0] & (block.t[0] > 30.0))[0][: 4 * rounds]
     values[0, first, 0] = np.maximum(values[0, first, 0] + beyond, 0.1)
-    estimate = Tracker(group).run(replace(block, values=values), t).take(0)
-    truth = log.truth.pairs(group, t)[0]
+    estimate = Tracker(swarm.constellation).run(replace(block, values=values), t).take(0)
+    where = swarm.positions(t)
     assert (estimate.status != Status.STARTING).all()
-    error = np.linalg.norm(estimate.pos_ij_w, axis=-1) - np.linalg.norm(truth, axis=-1)
-    assert np.abs(error).max() < 0.4
+    error = np.linalg.norm(estimate.pos_ij_w, axis=-1)
+    error -= np.linalg.norm(where[:, j] - where[:, i], axis=-1)
+    assert np.abs(error).max() < 0.6
