@@ -246,7 +246,7 @@ def test_the_covariance_of_a_rotation_follows_the_estimate(dimensions):
     s.moved[0] = h * np.random.default_rng(3).standard_normal(n)
     s.x[0] += s.moved[0]
     N1 = blind(s.x[0])
-    _rotation_kernels.turn_covariance(c, s, 0, 1.0)
+    _rotation_kernels.turn_covariance(c, s, 0, 1.0, scratch)
     moved, left = np.abs(N1 @ N1.T - N0 @ N0.T).max(), np.abs(s.P[0] - N1 @ N1.T).max()
     assert left < 0.02 * moved
     np.testing.assert_allclose(s.P[0], s.P[0].T, atol=1e-12)
@@ -270,6 +270,6 @@ def test_a_group_that_is_turned_back_and_forth_keeps_its_shape():
         for at, about in ((at_p, s.x[0, at_p].mean(axis=0)), (at_v, np.zeros(d))):
             s.moved[0, at] = np.cross(w, s.x[0, at] - about)
         s.x[0] += s.moved[0]
-        _rotation_kernels.turn_covariance(c, s, 0, 1.0)
+        _rotation_kernels.turn_covariance(c, s, 0, 1.0, scratch)
     np.testing.assert_allclose(lengths(), before, rtol=5e-3)
     np.testing.assert_allclose(s.x[0, at_p].mean(axis=0), centre, atol=1e-12)

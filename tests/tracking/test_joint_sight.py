@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from scipy.stats import norm
 
 from tests.tracking.test_joint_kernels import running
+from tracking._exponential_kernels import decay
 from tracking.filters.joint._motion_kernels import predict
-from tracking.filters.joint._sample_kernels import decay
 from tracking.filters.joint._sight_kernels import change_sight, judge_sight
 
 SHARES = st.floats(0.0, 0.99)

@@ -40,6 +40,11 @@ def four(static=(), seed=0, *, dimensions=2):
     return c, s, make_layout(constellation, params)
 
 
+def room_for(s):
+    """Scratch of such a group."""
+    return make_scratch(N, len(s.pairs), len(s.x[0]))
+
+
 def turned(s, but=(), *, velocities=True):
     """What a turn of the group by a radian does to the states."""
     D, moving = np.zeros(len(s.x[0])), ~s.nodes["static"]  # noqa: N806
@@ -88,7 +93,7 @@ def test_in_space_it_is_spread_about_every_axis():
 def test_a_group_that_knows_as_little_anyway_does_not_wake_with_less():
     c, s, _ = four()
     for _ in range(2):
-        wake_turn(c, s, 0)
+        wake_turn(c, s, 0, room_for(s))
         note_turn(c, s)
         assert s.group["turn_var"][0] == pytest.approx(c["rotation_var"], rel=1e-9)
 
@@ -116,7 +121,7 @@ def test_two_nodes_have_no_shape_that_could_turn_with_their_moves():
     s.nodes["present"][2:] = False
     s.moved[0] = 1.0
     before = s.P[0].copy()
-    follow_rotation(c, s, 0)
+    follow_rotation(c, s, 0, room_for(s))
     assert not s.moved.any()
     assert np.array_equal(s.P[0], before)
 
@@ -134,7 +139,7 @@ def test_surveys_do_not_tell_how_a_group_is_turned():
         )
     note_turn(c, s)
     before = s.group["turn_var"][0]
-    scratch = make_scratch(N, len(s.pairs), len(s.x[0]))
+    scratch = room_for(s)
     rng = np.random.default_rng(0)
     for p in np.tile(np.arange(len(s.pairs)), 10):
         i, j = (s.nodes["at_p"][s.pairs[name][p]] for name in "ij")

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from tracking._exponential_kernels import decay
 from tracking.compiled import allocating_kernel, kernel
 from tracking.filters._shape_kernels import SURVEYED
 from tracking.filters.joint._agreement_kernels import are_same, turn_between
@@ -20,7 +21,6 @@ from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_hypothesi
 from tracking.filters.joint._flatness_kernels import flatness, least_axis, scatter_of
 from tracking.filters.joint._linear_kernels import decouple
 from tracking.filters.joint._open_kernels import can_open, doubt_turn
-from tracking.filters.joint._sample_kernels import decay
 from tracking.filters.joint._sleep_kernels import TIE, turn_all_ways
 from tracking.filters.joint._start_kernels import begin_pair, forget_fits
 

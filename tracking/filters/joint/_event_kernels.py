@@ -165,7 +165,7 @@ def advance(c, s, layout, scratch, t, at_once):
     group = s.group[0]
     if group.asleep and not none_moved(c, s, t):
         settle_all(s)
-        wake_up(c, s, layout)
+        wake_up(c, s, layout, scratch)
     carriers_due = t - group.t_carrier + SAME >= c.carrier_period
     since = t - group.t
     if since > SAME and (at_once or carriers_due or since + SAME >= c.carry_period):
@@ -195,7 +195,7 @@ def carry(c, s, scratch, t):
     for h in range(first, end):
         if s.alive[h]:
             settle(s, h)
-            follow_rotation(c, s, h)
+            follow_rotation(c, s, h, scratch)
             carry_moves(c, s, h)
             predict(c, s, h, t - group.t, scratch)
             if group.open:

@@ -18,9 +18,9 @@ import math
 import numpy as np
 
 from tracking._angle_kernels import cosine_sine
+from tracking._exponential_kernels import decay
 from tracking.compiled import small_kernel
 from tracking.filters.joint._mirror_kernels import mirror
-from tracking.filters.joint._sample_kernels import decay
 from tracking.filters.joint._turned_kernels import (
     PER_GRAVITY,
     measured_motion,

@@ -11,7 +11,7 @@ from numba import config, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from tracking.compiled import kernel
+from tracking.compiled import kernel, small_kernel
 from tracking.filters.joint import _vector_kernels as vectors
 from tracking.filters.joint._vector_kernels import (
     CONTRACT,
@@ -97,7 +97,7 @@ def _sum_rows(context, P, h, idx, val, m, W, share, q, w):
     return types.void(P, h, idx, val, m, W, share, q, w), generate
 
 
-@kernel
+@small_kernel
 def _sum_rows_in_stretches(P, h, idx, val, m, W, share, q, w):
     if P.shape[2] < SHORT:
         sum_rows_plainly(P, h, idx, val, m, W, share, q, w)

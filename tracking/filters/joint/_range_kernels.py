@@ -193,7 +193,7 @@ def fuse_range(c, s, h, p, dt, distance, levers, sight, scratch):
         Innovation [m], NIS, and the probability that the range meant anything, 0 to 1.
     """
     if s.group[0].turn_var > UNSURE * UNSURE:
-        follow_rotation(c, s, h)
+        follow_rotation(c, s, h, scratch)
     predicted, m = range_model(c, s, h, p, levers[:3], levers[3:], scratch.idx, scratch.val)
     nu = distance - predicted
     variance = project(s, h, m, scratch)

@@ -28,11 +28,10 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from tracking.compiled import allocating_kernel, small_kernel
+from tracking.compiled import kernel, small_kernel
 from tracking.filters.joint._linear_kernels import settle
-from tracking.filters.joint._peak_kernels import turned_by
+from tracking.filters.joint._mirror_kernels import mirror
+from tracking.filters.joint._projection_kernels import sum_rows
 
 ENOUGH = 0.01
 """[-] The covariance follows once the positions have moved by this share of the group's extent."""
@@ -40,10 +39,12 @@ FALSE = 0.05
 """[-] Or once a range would see an uncertain turn of the plane by this share of its noise."""
 MOST = 0.3
 """[-] It follows a move by at most this share at once."""
+LINE = 1e-3
+"""[-] Share of a group's extent that a line has across, so that it has a rotation about itself."""
 
 
 @small_kernel
-def follow_rotation(c, s, h):
+def follow_rotation(c, s, h, scratch):
     """Let the covariance of hypothesis h follow what measurements have moved.
 
     That must not be late while the rotation is uncertain: each range that tells of it what it
@@ -68,7 +69,7 @@ def follow_rotation(c, s, h):
         s.moved[h, :] = 0.0
     elif moved2 > ENOUGH * ENOUGH * extent2 or false2 > FALSE * FALSE * c.white_var:
         settle(s, h)
-        turn_covariance(c, s, h, min(1.0, MOST * math.sqrt(extent2 / moved2)))
+        turn_covariance(c, s, h, min(1.0, MOST * math.sqrt(extent2 / moved2)), scratch)
 
 
 @small_kernel
@@ -81,144 +82,214 @@ def carry_moves(c, s, h):
                 s.moved[h, node.at_p + k] += s.pre[i, 0] * s.moved[h, node.at_v + k]
 
 
-@allocating_kernel
-def turn_covariance(c, s, h, share):
-    """Make rotations of what was moved, and ``P <- T P T^T`` for the given share of it."""
-    n, axes = c.n, 3 if c.d == 3 else 1
-    N, G, mean, shift = np.zeros((axes, n)), np.zeros((axes, n)), np.zeros(3), np.zeros(3)
-    find_centre(c, s, h, mean, shift)
-    turned_positions(s, h, mean, N)
-    A = best_rotation(N)
+@kernel
+def turn_covariance(c, s, h, share, scratch):
+    """Make rotations of what was moved, and ``P <- T P T^T`` for the given share of it.
+
+    Nothing of hypothesis h waits.
+    """
+    n, end, axes = c.n, c.n_motion, 3 if c.d == 3 else 1
+    A, B, G, P = scratch.turns[0], scratch.turns[1], scratch.turns[2], s.P
+    centre, shift = find_centre(c, s, h)
+    n_positions = turned_positions(c.d, s, h, centre, A, scratch.idx)
+    read_rotation(c.d, A, scratch.idx, n_positions)
     if c.d == 3:
-        bend_move(s, h, mean, A)
-    turned_moves(s, h, shift, G)
-    B = np.zeros((axes, n))
-    for r in range(n):
-        for a in range(axes):
-            if A[a, r] != 0.0:
-                for k in range(n):
-                    B[a, k] += A[a, r] * s.P[h, r, k]
-    G *= share
-    B += 0.5 * (A @ B.T.copy()) @ G
-    P = s.P
-    for r in range(n):
+        bend_move(s, h, centre, A, scratch.idx, n_positions)
+    turned_moves(c.d, s, h, shift, share, end, G)
+    for a in range(axes):
+        for r in range(n_positions):
+            scratch.val[r] = A[a, scratch.idx[r]]
+        sum_rows(P, h, scratch.idx, scratch.val, n_positions, s.waiting, scratch.share, 0, B[a])
+    add_half_square(c.d, A, B, G, scratch.idx, n_positions, end)
+    for r in range(end):
         g, b = G[0, r], B[0, r]
         if axes == 1:
-            for k in range(n):
+            for k in range(end):
                 P[h, r, k] += g * B[0, k] + b * G[0, k]
+            for k in range(end, n):
+                P[h, r, k] += g * B[0, k]
         else:
             g1, b1, g2, b2 = G[1, r], B[1, r], G[2, r], B[2, r]
-            for k in range(n):
+            for k in range(end):
                 turn = (g * B[0, k] + b * G[0, k]) + (g1 * B[1, k] + b1 * G[1, k])
                 P[h, r, k] += turn + (g2 * B[2, k] + b2 * G[2, k])
+            for k in range(end, n):
+                P[h, r, k] += g * B[0, k] + g1 * B[1, k] + g2 * B[2, k]
+    mirror(P, h, end)
     s.moved[h, :] = 0.0
 
 
-@allocating_kernel
-def best_rotation(N):
-    """``(N N^T)^-1 N``, which reads the rotation off an error, (axis, state).
-
-    A few elements by hand: calling a library for them takes longer than all else here.
-    """
-    axes, n = N.shape
-    M, inverse = np.zeros((axes, axes)), np.zeros((axes, axes))
-    trace = 0.0
-    for a in range(axes):
-        for b in range(axes):
-            for r in range(n):
-                M[a, b] += N[a, r] * N[b, r]
-        trace += M[a, a]
-    for a in range(axes):
-        M[a, a] += 1e-3 * trace + 1e-9  # a line has no rotation about itself
-    if axes == 1:
-        inverse[0, 0] = 1.0 / M[0, 0]
-    else:
-        for a in range(3):
-            u, v = (a + 1) % 3, (a + 2) % 3
-            for b in range(3):
-                f, g = (b + 1) % 3, (b + 2) % 3
-                inverse[b, a] = M[u, f] * M[v, g] - M[u, g] * M[v, f]
-        inverse /= M[0, 0] * inverse[0, 0] + M[0, 1] * inverse[1, 0] + M[0, 2] * inverse[2, 0]
-    return inverse @ N
-
-
 @small_kernel
-def find_centre(c, s, h, mean, shift):
-    """Write the centre of the positions before the move, and the move of it, three numbers each."""
-    present = 0
+def find_centre(c, s, h):
+    """The centre of the positions before the move, and the move of it, three numbers each [m]."""
+    mean0, mean1, mean2, shift0, shift1, shift2, present = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0
     for i in range(s.nodes.shape[0]):
         if s.nodes[i].present:
             present += 1
-            for k in range(c.d):
-                at = s.nodes[i].at_p + k
-                mean[k] += s.x[h, at] - s.moved[h, at]
-                shift[k] += s.moved[h, at]
-    for k in range(c.d):
-        mean[k] /= max(present, 1)
-        shift[k] /= max(present, 1)
+            at = s.nodes[i].at_p
+            shift0, shift1 = shift0 + s.moved[h, at], shift1 + s.moved[h, at + 1]
+            mean0, mean1 = mean0 + s.x[h, at], mean1 + s.x[h, at + 1]
+            if c.d == 3:
+                mean2, shift2 = mean2 + s.x[h, at + 2], shift2 + s.moved[h, at + 2]
+    share = 1.0 / max(present, 1)
+    shift = (share * shift0, share * shift1, share * shift2)
+    return (share * mean0 - shift[0], share * mean1 - shift[1], share * mean2 - shift[2]), shift
 
 
 @small_kernel
-def turned_positions(s, h, mean, N):
+def turned_positions(d, s, h, centre, N, idx):
     """Write the positions before the move, turned by a radian about each axis through the centre.
 
-    N is (axis, state); z comes first.
+    Args:
+        d: Dimensions.
+        s: JointState of one environment.
+        h: Hypothesis.
+        centre: Before the move, three numbers [m].
+        N: (axis, state), z first, written where there are positions.
+        idx: Their states, written.
+
+    Returns:
+        How many there are.
     """
+    m = 0
     for i in range(s.nodes.shape[0]):
-        node = s.nodes[i]
-        if not node.present:
-            continue
-        for a in range(N.shape[0]):
-            u, v = (3 - a) % 3, (4 - a) % 3
-            at_u, at_v = node.at_p + u, node.at_p + v
-            N[a, at_u] = -(s.x[h, at_v] - s.moved[h, at_v] - mean[v])
-            N[a, at_v] = s.x[h, at_u] - s.moved[h, at_u] - mean[u]
+        if s.nodes[i].present:
+            at, z = s.nodes[i].at_p, 0.0
+            x = s.x[h, at] - s.moved[h, at] - centre[0]
+            y = s.x[h, at + 1] - s.moved[h, at + 1] - centre[1]
+            if d == 3:
+                z = s.x[h, at + 2] - s.moved[h, at + 2] - centre[2]
+            turn_about(d, N, at, x, y, z)
+            for k in range(d):
+                idx[m + k] = at + k
+            m += d
+    return m
 
 
 @small_kernel
-def turned_moves(s, h, shift, G):
-    """Write the moves of positions and velocities, turned likewise, (axis, state)."""
+def turned_moves(d, s, h, shift, share, end, G):
+    """Write a share of the moves of positions and velocities, turned likewise, (axis, state)."""
+    for a in range(3):
+        for r in range(end):
+            G[a, r] = 0.0
     for i in range(s.nodes.shape[0]):
         node = s.nodes[i]
         if not node.present:
             continue
-        for a in range(G.shape[0]):
-            u, v = (3 - a) % 3, (4 - a) % 3
-            G[a, node.at_p + u] = -(s.moved[h, node.at_p + v] - shift[v])
-            G[a, node.at_p + v] = s.moved[h, node.at_p + u] - shift[u]
-            if not node.static:
-                G[a, node.at_v + u] = -s.moved[h, node.at_v + v]
-                G[a, node.at_v + v] = s.moved[h, node.at_v + u]
+        at, z = node.at_p, 0.0
+        x, y = share * (s.moved[h, at] - shift[0]), share * (s.moved[h, at + 1] - shift[1])
+        if d == 3:
+            z = share * (s.moved[h, at + 2] - shift[2])
+        turn_about(d, G, at, x, y, z)
+        if not node.static:
+            at = node.at_v
+            x, y = share * s.moved[h, at], share * s.moved[h, at + 1]
+            if d == 3:
+                z = share * s.moved[h, at + 2]
+            turn_about(d, G, at, x, y, z)
 
 
-@allocating_kernel
-def bend_move(s, h, mean, A):
+@small_kernel
+def turn_about(d, N, at, x, y, z):
+    """Write a vector turned by a radian about z, and in space about y and x, to rows of N."""
+    N[0, at], N[0, at + 1] = -y, x
+    if d == 3:
+        N[0, at + 2] = 0.0
+        N[1, at], N[1, at + 1], N[1, at + 2] = z, 0.0, -x
+        N[2, at], N[2, at + 1], N[2, at + 2] = 0.0, -z, y
+
+
+@small_kernel
+def read_rotation(d, N, idx, m):
+    """Make ``(N N^T)^-1 N`` of N, which reads the rotation off an error, (axis, state).
+
+    A few elements by hand: calling a library for them takes longer than all else here.
+    """
+    zz, yy, xx, zy, zx, yx = 1e-9, 1e-9, 1e-9, 0.0, 0.0, 0.0
+    for r in range(m):
+        at = idx[r]
+        zz += N[0, at] * N[0, at]
+        if d == 3:
+            yy, xx = yy + N[1, at] * N[1, at], xx + N[2, at] * N[2, at]
+            zy, zx = zy + N[0, at] * N[1, at], zx + N[0, at] * N[2, at]
+            yx += N[1, at] * N[2, at]
+    # A line has no rotation about itself.
+    if d == 2:
+        zz *= 1.0 + LINE
+        for r in range(m):
+            N[0, idx[r]] /= zz
+        return
+    least = LINE * (zz + yy + xx)
+    zz, yy, xx = zz + least, yy + least, xx + least
+    i00, i01, i02 = yy * xx - yx * yx, zx * yx - zy * xx, zy * yx - zx * yy
+    i11, i12, i22 = zz * xx - zx * zx, zy * zx - zz * yx, zz * yy - zy * zy
+    inverse = 1.0 / (zz * i00 + zy * i01 + zx * i02)
+    for r in range(m):
+        at = idx[r]
+        n0, n1, n2 = inverse * N[0, at], inverse * N[1, at], inverse * N[2, at]
+        N[0, at] = i00 * n0 + i01 * n1 + i02 * n2
+        N[1, at] = i01 * n0 + i11 * n1 + i12 * n2
+        N[2, at] = i02 * n0 + i12 * n1 + i22 * n2
+
+
+@small_kernel
+def add_half_square(d, A, B, G, idx, m, end):
+    """``B += A B^T G / 2``, with which ``B^T G + G^T B`` is all that T adds to P."""
+    s00, s01, s02, s10, s11, s12, s20, s21, s22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for r in range(m):
+        at = idx[r]
+        half, b0 = 0.5 * A[0, at], B[0, at]
+        s00 += half * b0
+        if d == 3:
+            b1, b2, half1, half2 = B[1, at], B[2, at], 0.5 * A[1, at], 0.5 * A[2, at]
+            s01, s02 = s01 + half * b1, s02 + half * b2
+            s10, s11, s12 = s10 + half1 * b0, s11 + half1 * b1, s12 + half1 * b2
+            s20, s21, s22 = s20 + half2 * b0, s21 + half2 * b1, s22 + half2 * b2
+    if d == 2:
+        for k in range(end):
+            B[0, k] += s00 * G[0, k]
+        return
+    for k in range(end):
+        g0, g1, g2 = G[0, k], G[1, k], G[2, k]
+        B[0, k] += s00 * g0 + s01 * g1 + s02 * g2
+        B[1, k] += s10 * g0 + s11 * g1 + s12 * g2
+        B[2, k] += s20 * g0 + s21 * g1 + s22 * g2
+
+
+@small_kernel
+def bend_move(s, h, centre, A, idx, m):
     """Let what is a rotation of the group in a move go round the centre instead of straight ahead.
 
     Args:
         s: JointState of one environment, in space; `x` and `moved` are updated.
         h: Hypothesis.
-        mean: The centre before the move.
+        centre: Before the move, three numbers [m].
         A: What reads the rotation off a move, (axis, state).
+        idx: States of positions.
+        m: How many.
     """
-    w = np.zeros(3)
-    for a in range(A.shape[0]):
-        w[2 - a] = np.sum(A[a] * s.moved[h])
-    aside = turned_by(w)  # R - 1 - [w]
-    for a in range(3):
-        u, v = (a + 1) % 3, (a + 2) % 3
-        aside[a, a] -= 1.0
-        aside[u, v] += w[a]
-        aside[v, u] -= w[a]
-    arm = np.zeros(3)
+    w0, w1, w2 = 0.0, 0.0, 0.0
+    for r in range(m):
+        move = s.moved[h, idx[r]]
+        w0, w1, w2 = w0 + A[2, idx[r]] * move, w1 + A[1, idx[r]] * move, w2 + A[0, idx[r]] * move
+    angle = math.sqrt(w0 * w0 + w1 * w1 + w2 * w2)
+    # Rodrigues' formula without what a move has already: R a - a - w x a.
+    first = math.sin(angle) / angle - 1.0 if angle > 1e-9 else 0.0
+    second = (1.0 - math.cos(angle)) / (angle * angle) if angle > 1e-9 else 0.5
     for i in range(s.nodes.shape[0]):
         node = s.nodes[i]
-        for at, is_position in ((node.at_p, True), (node.at_v, False)):
+        for at, share in ((node.at_p, 1.0), (node.at_v, 0.0)):
             if not node.present or at < 0:
                 continue
+            a0 = s.x[h, at] - s.moved[h, at] - share * centre[0]
+            a1 = s.x[h, at + 1] - s.moved[h, at + 1] - share * centre[1]
+            a2 = s.x[h, at + 2] - s.moved[h, at + 2] - share * centre[2]
+            c0, c1, c2 = w1 * a2 - w2 * a1, w2 * a0 - w0 * a2, w0 * a1 - w1 * a0
+            change = (
+                first * c0 + second * (w1 * c2 - w2 * c1),
+                first * c1 + second * (w2 * c0 - w0 * c2),
+                first * c2 + second * (w0 * c1 - w1 * c0),
+            )
             for k in range(3):
-                arm[k] = s.x[h, at + k] - s.moved[h, at + k] - (mean[k] if is_position else 0.0)
-            for k in range(3):
-                change = np.sum(aside[k] * arm)
-                s.x[h, at + k] += change
-                s.moved[h, at + k] += change
+                s.x[h, at + k] += change[k]
+                s.moved[h, at + k] += change[k]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 
+from tracking._exponential_kernels import decay
 from tracking.compiled import small_kernel
 from tracking.filters._level_kernels import angle_between, direction, level
 
@@ -16,12 +17,6 @@ from tracking.filters._level_kernels import angle_between, direction, level
 def is_aided(c, node, t):
     """True if the IMU of a node is heard."""
     return node.has_state and t - node.t_state <= c.unaided_after
-
-
-@small_kernel
-def decay(ratio):
-    """``exp(-ratio)``, to second order: between 0 and 1 for any ratio above 0."""
-    return 1.0 / (1.0 + ratio * (1.0 + 0.5 * ratio))
 
 
 @small_kernel

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import math
 
+from tracking._exponential_kernels import decay, exponential, likelihood
 from tracking.compiled import small_kernel
 from tracking.filters.joint._linear_kernels import covariance
-from tracking.filters.joint._sample_kernels import decay
 
 MIN_PROB = 1e-4
 SQRT_2PI = math.sqrt(2.0 * math.pi)
@@ -24,12 +24,6 @@ def gap_evidence(c, gap):
     nlos = min(gap - c.gap_nlos, 0.0) / c.gap_nlos_std
     ratio = 0.5 * (los * los - nlos * nlos) - math.log(c.gap_nlos_std / c.gap_los_std)
     return min(max(c.gap_weight * ratio, -4.0), 4.0)
-
-
-@small_kernel
-def likelihood(off, variance):
-    """Of a Gaussian, but for the root of two pi."""
-    return math.exp(-0.5 * off * off / variance) / math.sqrt(variance)
 
 
 @small_kernel
@@ -67,7 +61,7 @@ def judge_sight(c, s, h, p, dt, nu, variance, sight, w):
     if at > 0:
         nu_leave = nu + s.x[h, at]
         S_leave += max(covariance(s, h, at, at) - 2.0 * w[at], -0.9 * variance) + c.slow_var
-    hidden = math.exp(evidence)
+    hidden = exponential(evidence)
     stays = likelihood(nu, S)
     los_los = (1.0 - before) * (1.0 - enter) * stays
     los_nlos = (1.0 - before) * enter * enters

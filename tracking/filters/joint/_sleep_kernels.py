@@ -57,7 +57,7 @@ def may_move(s, t):
 
 
 @allocating_kernel
-def wake_up(c, s, layout):
+def wake_up(c, s, layout, scratch):
     """Follow all rotations and mirror images from now on, in space by one filter for all.
 
     Where a node that joined may be on two sides there are two layouts; in the plane the bank has
@@ -75,7 +75,7 @@ def wake_up(c, s, layout):
             if was_alive[h] and node.present and not node.static:
                 decouple(s, h, c.n, node.at_h, node.first_heading_var)
         if was_alive[h]:
-            wake_turn(c, s, h)
+            wake_turn(c, s, h, scratch)
     if can_open(c, s):
         for h in range(s.alive.shape[0]):
             if s.alive[h]:
@@ -94,13 +94,13 @@ def wake_up(c, s, layout):
 
 
 @kernel
-def wake_turn(c, s, h):
+def wake_turn(c, s, h, scratch):
     """Make hypothesis h as uncertain of how it is turned as the gap between two that are tried.
 
     In space it is as uncertain as the start and ranges left it (`_turn_kernels`).
     """
     if c.d == 2:
-        turn_covariance(c, s, h, 1.0)  # by what moved lately
+        turn_covariance(c, s, h, 1.0, scratch)  # by what moved lately
         spread_turn(c, s, h, max(c.rotation_var - turn_variance(c, s, h), 0.0))
         s.group[0].turn_var = max(s.group[0].turn_var, c.rotation_var)
 

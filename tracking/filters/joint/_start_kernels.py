@@ -13,6 +13,7 @@ import math
 
 import numpy as np
 
+from tracking._exponential_kernels import decay
 from tracking.compiled import allocating_kernel, kernel
 from tracking.filters._shape_kernels import (
     choose_members,
@@ -26,7 +27,6 @@ from tracking.filters.joint._linear_kernels import decouple
 from tracking.filters.joint._motion_kernels import unsettled_var
 from tracking.filters.joint._open_kernels import can_open, open_frame
 from tracking.filters.joint._place_kernels import best_sides
-from tracking.filters.joint._sample_kernels import decay
 from tracking.filters.joint._sleep_kernels import ORIENTED, PATIENCE, none_moved, rests
 from tracking.filters.joint._turn_kernels import read_turn, spread_turn
 

@@ -26,7 +26,7 @@ def fuse_survey(c, s, h, p, distance, scratch):
     them, long before anybody moves.
     """
     if s.group[0].turn_var > UNSURE * UNSURE:
-        follow_rotation(c, s, h)
+        follow_rotation(c, s, h, scratch)
     none = scratch.none
     predicted, m = range_model(c, s, h, p, none, none, scratch.idx, scratch.val)
     variance, open_var = project(s, h, m, scratch), 0.0

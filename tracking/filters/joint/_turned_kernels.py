@@ -11,8 +11,8 @@ Without the last part a layout is believed to lean as the orientation of what mo
 
 from __future__ import annotations
 
+from tracking._exponential_kernels import decay
 from tracking.compiled import small_kernel
-from tracking.filters.joint._sample_kernels import decay
 from tracking.geometry import GRAVITY
 
 PER_GRAVITY = 1.0 / GRAVITY

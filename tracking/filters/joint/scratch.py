@@ -45,11 +45,13 @@ class Scratch(NamedTuple):
     """Of an innovation by the turn of an open group, (9)."""
     direct: F64
     """Of a prediction by it, the states held, (9)."""
+    turns: F64
+    """What reads a rotation of the group, its covariance, and moves turned, (3, axis, state)."""
 
 
 def make_scratch(n_nodes: int, n_pairs: int, n_states: int) -> Scratch:
     """Room for a group of the given size."""
-    most = max(16, n_nodes)
+    most = max(16, 3 * n_nodes)
     return Scratch(
         idx=np.zeros(most, dtype=np.int64),
         val=np.zeros(most),
@@ -67,4 +69,5 @@ def make_scratch(n_nodes: int, n_pairs: int, n_states: int) -> Scratch:
         stays=np.zeros((1, n_pairs)),
         gradient=np.zeros(9),
         direct=np.zeros(9),
+        turns=aligned(3, 3, n_states),
     )

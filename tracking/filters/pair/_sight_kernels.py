@@ -12,18 +12,13 @@ from __future__ import annotations
 
 import math
 
+from tracking._exponential_kernels import decay, exponential, likelihood
 from tracking.compiled import small_kernel
 
 E = 6
 """Place of the range error in the state."""
 MIN_PROB = 1e-4
 SQRT_2PI = math.sqrt(2.0 * math.pi)
-
-
-@small_kernel
-def decay(ratio):
-    """``exp(-ratio)``, to second order: between 0 and 1 for any ratio above 0."""
-    return 1.0 / (1.0 + ratio * (1.0 + 0.5 * ratio))
 
 
 @small_kernel
@@ -73,15 +68,13 @@ def judge_sight(c, s, p, h, dt, nu, variance, w_e, evidence):
     before = s.nlos[p, h]
     enter, leave = 1.0 - decay(c.enter_rate * dt), 1.0 - decay(c.leave_rate * dt)
     S = variance + c.range_var
-    off = nu - c.excess
-    S_enter = S + c.excess_var
     nu_leave = nu + s.x[p, h, E]
     S_leave = S + max(s.P[p, h, E, E] - 2.0 * w_e, -0.9 * variance) + c.slow_var
-    hidden = math.exp(evidence)
-    stays = math.exp(-0.5 * nu * nu / S) / math.sqrt(S)
+    hidden = exponential(evidence)
+    stays = likelihood(nu, S)
     los_los = (1.0 - before) * (1.0 - enter) * stays
-    los_nlos = (1.0 - before) * enter * math.exp(-0.5 * off * off / S_enter) / math.sqrt(S_enter)
-    nlos_los = before * leave * math.exp(-0.5 * nu_leave * nu_leave / S_leave) / math.sqrt(S_leave)
+    los_nlos = (1.0 - before) * enter * likelihood(nu - c.excess, S + c.excess_var)
+    nlos_los = before * leave * likelihood(nu_leave, S_leave)
     nlos_nlos = before * (1.0 - leave) * stays
     los_nlos *= hidden
     nlos_nlos *= hidden
