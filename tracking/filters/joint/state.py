@@ -100,8 +100,11 @@ def make_layout(constellation: Constellation, params: JointParams) -> Layout:
 
 
 def room_to_wait(n_states: int) -> int:
-    """How many corrections may wait: none where the covariance fits the nearest cache."""
-    return 16 if n_states > 48 else 0
+    """How many corrections may wait: none where the covariance fits the nearest cache.
+
+    Room for a round of six nodes and what is known of their carriers.
+    """
+    return 24 if n_states > 48 else 0
 
 
 def open_elements(dimensions: int) -> int:
