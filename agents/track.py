@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from tracking.arrays import F64, Bool
+from tracking.bounds import Bound, recorded_bound
 from tracking.constellation import Constellation
 from tracking.estimate import Status, TeamEstimate
 from tracking.filters import DEFAULT_FILTER
@@ -24,6 +25,8 @@ from tracking.tracker import Tracker, TrackerParams
 
 CSV_HZ = 20.0
 """[Hz] Rate of estimates.csv."""
+ERRORS = ("rmse", "rmse_yaw", "rmse_shape")
+"""The three errors of a run, in the order they are shown."""
 LAG = HorizonParams().delay
 """[s] So much later is what smoothed estimates know."""
 N_CHUNKS = 50
@@ -52,6 +55,8 @@ class TrackResult:
     """[s] Time after the first range that is not scored."""
     realtime_factor: float
     """[-] Duration of the log over the time that tracking took."""
+    bound: Bound | None = None
+    """The least errors that its measurements allow, where asked for."""
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -72,6 +77,7 @@ class TrackResult:
             "rmse_yaw": _number(s.rmse_yaw),
             "yaw_deg": _number(s.yaw_deg),
             "rmse_shape": _number(s.rmse_shape),
+            **{f"bound_{name}": value for name, value in self.least.items()},
             "pair_rmse": pair_rmse,
             "nees": _number(s.nees),
             "nis": _number(self.nis),
@@ -83,6 +89,13 @@ class TrackResult:
             "skipped": sum(self.log.skipped.values()),
         }
 
+    @property
+    def least(self) -> dict[str, float]:
+        """The bound under the names of the errors [m]; empty where it was not asked for."""
+        if self.bound is None:
+            return {}
+        return {name: float(getattr(self.bound, name)) for name in ERRORS}
+
 
 def track_log(
     log: Log | Path | str,
@@ -90,6 +103,7 @@ def track_log(
     filter: str = DEFAULT_FILTER,
     skip: float = 10.0,
     smooth: bool = False,
+    bound: bool = False,
     params: TrackerParams | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> TrackResult:
@@ -101,15 +115,18 @@ def track_log(
         skip: Times until so many seconds after the first range are not scored.
         smooth: Whether estimates know what was measured in the `LAG` after them, too; the filter
             goes its way as without.
+        bound: Whether to work out the least errors that the measurements allow, too
+            (`tracking.bounds.recorded_bound`).
         params: What the tracker believes.
         progress: Called with the share done, 0 to 1.
 
     Raises:
-        LogError: The folder cannot be read.
+        LogError: The folder cannot be read, or its truth does not tell a bound.
         ConfigError: No such filter, or one that cannot smooth.
     """
     log = log if isinstance(log, Log) else read_log(log)
     constellation, block = log.constellation, log.block
+    least = recorded_bound(log, skip=skip) if bound else None
     tracker = Tracker(constellation, params, filter=filter)
     first, last = log.t_range
     # From whole multiples, so that large times stay on the grid.
@@ -153,6 +170,7 @@ def track_log(
         n_rejected=int(tracker.n_rejected()[0]),
         skip=skip,
         realtime_factor=log.duration / max(elapsed, 1e-9),
+        bound=least,
     )
 
 

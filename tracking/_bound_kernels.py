@@ -10,6 +10,7 @@ from tracking.filters.joint._range_kernels import antenna_offset, range_model
 from tracking.filters.joint._sample_kernels import sum_inertial, take_state
 from tracking.filters.joint._sight_kernels import change_sight
 from tracking.filters.joint._start_kernels import begin_node, begin_pair, forget_sums
+from tracking.filters.joint._turn_kernels import spread_turn
 from tracking.filters.joint.state import N_PRE
 
 STATE, SURVEY, RANGE = 3, 4, 5
@@ -49,7 +50,7 @@ def put_on_truth(c, s, truth, k):
 
 
 @kernel
-def run_bound(coefficients, layout, s, scratch, block, hidden, truth, t_out, out):
+def run_bound(coefficients, layout, s, scratch, block, hidden, truth, turn_var, t_out, out):
     """Carry the covariance through the events of one environment.
 
     Args:
@@ -60,6 +61,7 @@ def run_bound(coefficients, layout, s, scratch, block, hidden, truth, t_out, out
         block: t, kind, i, j, antenna_i, antenna_j, values of one environment, (event, ...).
         hidden: True for ranges without line of sight, (event).
         truth: Positions [m], velocities [m/s], (event, node, 3), heading errors, (event, node).
+        turn_var: How uncertain the rotation of the group is at first, about every axis [rad2].
         t_out: Times, ascending, (time) [s].
         out: Covariance of all positions, (time, node * d, node * d), written.
     """
@@ -80,6 +82,9 @@ def run_bound(coefficients, layout, s, scratch, block, hidden, truth, t_out, out
             continue
         if not group.started:
             begin(c, s, now)
+            put_on_truth(c, s, truth, k)
+            if turn_var > 0.0:
+                spread_turn(c, s, 0, turn_var)
         if now > group.t:
             for i in range(n):
                 if not s.nodes[i].static:

@@ -4,7 +4,8 @@ No estimator has a smaller mean square error than the inverse of the posterior i
 which for white Gaussian noise obeys the Riccati recursion linearised at the truth [1]. The
 model is that of the joint filter (`tracking.filters.joint`): its motion, its range errors and
 what it knows of the carriers. Given are the true motion, which ranges had no line of sight,
-and the rotation and mirror image of the group at the start; an estimator has to find these.
+and, unless it is asked otherwise, the rotation and mirror image of the group at the start; an
+estimator has to find these.
 The bound is as good as its parameters: give it those of the world that made the run. Errors
 behind obstacles are not Gaussian; their variance is used, so that there the bound is that of
 the best linear estimator.
@@ -16,12 +17,13 @@ References:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tracking._bound_kernels import run_bound
 from tracking.arrays import F64, Bool
+from tracking.calibration.range_errors import measure_range_errors
 from tracking.constellation import Constellation
 from tracking.errors import LogError
 from tracking.filters.joint.coefficients import make_coefficients
@@ -36,6 +38,9 @@ from tracking.orientation import Orientation, OrientationParams
 
 RATE = 5.0
 """[Hz] How often the bound is written down."""
+UNKNOWN_TURN = {2: 1.0, 3: 0.5**0.5}
+"""[rad] Rotation of a group of which nothing is known, about every axis, by dimensions: a linear
+error by it is as large as that of the best guess, all nodes in one place."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +55,8 @@ class Bound:
     """Over all pairs after the best rotation at each instant, (time) [m]."""
     rmse: float
     """In the world frame, over the scored time [m]."""
+    rmse_yaw: float
+    """After the best yaw at each instant [m]: no estimate is better after one yaw for all."""
     rmse_shape: float
     """After the best rotation at each instant, over the scored time [m]."""
 
@@ -60,6 +67,7 @@ def posterior_bound(
     *,
     orientation: OrientationParams | None = None,
     skip: float = 10.0,
+    turn_std: float = 0.0,
 ) -> Bound:
     """The bound of a recorded run.
 
@@ -68,6 +76,8 @@ def posterior_bound(
         params: What the world did, in the terms of the joint filter.
         orientation: Parameters of the orientation stage.
         skip: Times until so many seconds after the first range do not count.
+        turn_std: How uncertain the rotation of the group is at first, about every axis [rad]:
+            `UNKNOWN_TURN` for who begins with nothing. Its mirror image is known.
 
     Raises:
         LogError: The log has no truth, or no ranges.
@@ -106,11 +116,39 @@ def posterior_bound(
         tuple(np.ascontiguousarray(a) for a in events),
         hidden,
         truth,
+        turn_std**2,
         t_out,
         cov,
     )
     pos, known = log.truth.positions(constellation, t_out)
     return _summarise(constellation, t_out, cov, pos[..., :d], known)
+
+
+def recorded_bound(
+    log: Log,
+    params: JointParams | None = None,
+    *,
+    orientation: OrientationParams | None = None,
+    skip: float = 10.0,
+) -> Bound:
+    """The bound of a recording of which nothing is known but its truth.
+
+    The noise of its ranges in sight is measured (`measure_range_errors`), and nothing is known of
+    the rotation of the group at first. What carries the nodes is as the parameters say.
+
+    Args:
+        log: A recording with truth.
+        params: What else the world does.
+        orientation: Parameters of the orientation stage.
+        skip: As of `posterior_bound`.
+
+    Raises:
+        LogError: As of `posterior_bound`, or nothing tells what the ranges err by.
+    """
+    params = params or JointParams()
+    measured = replace(params, range_error=measure_range_errors(log, params.range_error))
+    turn_std = UNKNOWN_TURN[log.constellation.dimensions]
+    return posterior_bound(log, measured, orientation=orientation, skip=skip, turn_std=turn_std)
 
 
 def _truth_at_events(log: Log, block: MeasurementBlock) -> tuple[F64, F64, F64]:
@@ -145,27 +183,33 @@ def _summarise(constellation: Constellation, t: F64, cov: F64, pos: F64, known: 
     wanted = known[:, i] & known[:, j] & moving
     pair_cov = difference @ cov @ difference.T
     variance = np.diagonal(pair_cov, axis1=1, axis2=2).reshape(len(t), -1, d).sum(axis=2)
-    shape = np.zeros(len(t))
+    shape, yaw = np.zeros(len(t)), np.zeros(len(t))
     for k in range(len(t)):
         used = np.repeat(wanted[k], d)
         generators = _rotations((pos[k, j] - pos[k, i]).reshape(-1, d), d)[used]
-        basis, size, _ = np.linalg.svd(generators, full_matrices=False)
-        basis = basis[:, size > 1e-9 * max(float(size.max(initial=0.0)), 1e-300)]
-        left = pair_cov[k][np.ix_(used, used)]
-        total = np.trace(left) - np.trace(basis.T @ left @ basis)
-        shape[k] = total / max(int(wanted[k].sum()), 1)
+        left, pairs = pair_cov[k][np.ix_(used, used)], max(int(wanted[k].sum()), 1)
+        shape[k] = _beside(left, generators) / pairs
+        yaw[k] = _beside(left, generators[:, -1:]) / pairs
     counted = wanted.any(axis=1)
     return Bound(
         t=t,
         pair_rms=np.sqrt(variance),
         shape_rms=np.sqrt(np.maximum(shape, 0.0)),
         rmse=float(np.sqrt(variance[wanted].mean())),
+        rmse_yaw=float(np.sqrt(np.maximum(yaw[counted], 0.0).mean())),
         rmse_shape=float(np.sqrt(np.maximum(shape[counted], 0.0).mean())),
     )
 
 
+def _beside(cov: F64, generators: F64) -> float:
+    """Trace of a covariance (number, number) off the directions of generators (number, k)."""
+    basis, size, _ = np.linalg.svd(generators, full_matrices=False)
+    basis = basis[:, size > 1e-9 * max(float(size.max(initial=0.0)), 1e-300)]
+    return float(np.trace(cov) - np.trace(basis.T @ cov @ basis))
+
+
 def _rotations(relative: F64, d: int) -> F64:
-    """How relative positions (pair, d) change with a rotation, (pair * d, 1 or 3)."""
+    """How relative positions (pair, d) change with a rotation, (pair * d, 1 or 3), yaw last."""
     if d == 2:
         return np.stack([-relative[:, 1], relative[:, 0]], axis=1).reshape(-1, 1)
     axes = [np.cross(axis, relative).reshape(-1) for axis in np.eye(3)]

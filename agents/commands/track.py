@@ -32,6 +32,11 @@ from agents.errors import UsageError
     is_flag=True,
     help="Estimates know what was measured in the 0.1 s after them, too; joint only.",
 )
+@click.option(
+    "--bound",
+    is_flag=True,
+    help="The least errors that the measurements allow, beside; needs truth.",
+)
 @click.option("--skip", default=10.0, show_default=True, help="Seconds that are not scored.")
 @click.option("--out", type=Path, help="Folder for estimates.csv and report.html.")
 @click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
@@ -40,6 +45,7 @@ def track(
     filters: tuple[str, ...],
     calibrations: tuple[Path, ...],
     smooth: bool,
+    bound: bool,
     skip: float,
     out: Path | None,
     as_json: bool,
@@ -70,7 +76,9 @@ def track(
             label = f"{log.name}, {name}"
             with progress_bar(label, shown=log.duration > 20.0) as report:
                 results.append(
-                    track_log(log, filter=name, skip=skip, smooth=smooth, progress=report)
+                    track_log(
+                        log, filter=name, skip=skip, smooth=smooth, bound=bound, progress=report
+                    )
                 )
     if out is not None:
         many = len(results) > 1
@@ -90,19 +98,21 @@ def track(
 def print_tracks(results: Sequence[Any]) -> None:
     """Errors over all pairs and for each of them."""
     from agents.report.page import metres, percent
-    from agents.track import pair_name
+    from agents.track import ERRORS, pair_name
 
     rows = []
     for r in results:
         s = r.summary
         head = [f"{s['log']}  {s['filter']}", "all"]
-        rows.append([*head, *(metres(s[k]) for k in ("rmse", "rmse_yaw", "rmse_shape"))])
+        rows.append([*head, *(metres(s[k]) for k in ERRORS)])
+        if r.least:
+            rows.append(["", "least possible", *(metres(r.least[k]) for k in ERRORS)])
         pairs = [p for p, e in enumerate(r.score.pair_rmse) if e == e]
         for p in pairs:
             figures = (r.score.pair_rmse, r.score.pair_rmse_yaw, r.score.pair_rmse_shape)
             name = pair_name(r.log.constellation, p)
             rows.append(["", name, *(metres(float(f[p])) for f in figures)])
-    header = ["log and filter", "pair", "rmse", "rmse_yaw", "rmse_shape"]
+    header = ["log and filter", "pair", *ERRORS]
     print_table("Errors of relative positions [m]", header, rows)
     for r in results:
         skipped = ", ".join(f"{n} in {name}" for name, n in r.log.skipped.items()) or "0"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from agents.report.page import Page, metres, percent
-from agents.track import TrackResult, pair_name
+from agents.track import ERRORS, TrackResult, pair_name
 from tracking.estimate import Status
 from tracking.log import notes_on
 from tracking.measurements import Kind
@@ -38,6 +38,9 @@ def track_report(results: Sequence[TrackResult]) -> str:
         others = [metres(s[k]) for k in ("rmse_shape", "nees", "nis")]
         yaw = "-" if s["yaw_deg"] is None else f"{s['yaw_deg']:.1f}"
         rows.append([s["log"], s["filter"], *figures, yaw, *others])
+        if r.least:
+            world, turned, shape = (metres(r.least[name]) for name in ERRORS)
+            rows.append(["", "least possible", world, turned, "", shape, "", ""])
     page.table(header, rows)
     for r in results:
         _add_result(page, r)

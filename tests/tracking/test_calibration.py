@@ -1,5 +1,7 @@
 """Calibration: known errors are found and taken off, and poor data is refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -213,7 +215,7 @@ def table(n=2000, nodes=4, slope=1.03, offset=(0.2, 0.1, -0.1, 0.3), noise=0.0, 
     z = slope * d + np.array(offset)[i] + np.array(offset)[j] + noise * draw.standard_normal(n)
     late = draw.random(n) < nlos
     z[late] += draw.uniform(0.4, 2.5, late.sum())
-    return RangeTable(i, j, z, d, np.ones(n, dtype=bool)), late
+    return RangeTable(np.arange(n) / 100.0, i, j, z, d, np.ones(n, dtype=bool)), late
 
 
 def test_slope_and_delays_are_found():
@@ -264,7 +266,7 @@ def test_a_node_with_a_handful_of_agreeing_ranges_has_no_offset():
     measured = data.measured.copy()
     of_last = np.flatnonzero((data.i == 4) | (data.j == 4))
     measured[of_last[5:]] += rng().uniform(1.0, 15.0, len(of_last) - 5)
-    spoiled = RangeTable(data.i, data.j, measured, data.true, data.known)
+    spoiled = replace(data, measured=measured)
     found = calibrate_uwb(spoiled, (1, 2, 3, 4, 5), random_state=0)
     assert found.calibration.offset == pytest.approx({1: 0.2, 2: 0.1, 3: -0.1, 4: 0.3}, abs=0.01)
     assert not found.used[of_last].any()
@@ -281,13 +283,13 @@ def test_offsets_that_no_antenna_has_are_refused(b):
 
 def unknown():
     data = table()[0]
-    return RangeTable(data.i, data.j, data.measured, data.true, np.zeros(2000, dtype=bool))
+    return replace(data, known=np.zeros(2000, dtype=bool))
 
 
 def scattered():
     data = table()[0]
     measured = rng().uniform(0.0, 40.0, 2000)
-    return RangeTable(data.i, data.j, measured, data.true, data.known)
+    return replace(data, measured=measured)
 
 
 @pytest.mark.parametrize(

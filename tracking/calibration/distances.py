@@ -17,6 +17,8 @@ from tracking.measurements import Kind, MeasurementBlock
 class RangeTable:
     """The ranges of one environment, in order."""
 
+    t: F64
+    """(range) [s]"""
     i: I64
     """Node index, (range)."""
     j: I64
@@ -56,7 +58,7 @@ def range_table(block: MeasurementBlock, constellation: Constellation, truth: Tr
             ok[mine] &= has
         ends.append(end)
     true = np.linalg.norm(ends[1] - ends[0], axis=1)
-    return RangeTable(r.i[0], r.j[0], r.values[0, :, 0], np.where(ok, true, 0.0), ok)
+    return RangeTable(r.t[0], r.i[0], r.j[0], r.values[0, :, 0], np.where(ok, true, 0.0), ok)
 
 
 def _orientation(truth: Truth, node: int, static: bool, t: F64) -> tuple[F64, Bool]:
