@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from tracking.compiled import kernel, small_kernel
+from tracking.filters.joint._antenna_kernels import antenna_offset
 from tracking.filters.joint._carrier_kernels import apply_carriers, centre
 from tracking.filters.joint._linear_kernels import absorb, project, settle
 from tracking.filters.joint._motion_kernels import predict
-from tracking.filters.joint._range_kernels import antenna_offset, range_model
+from tracking.filters.joint._range_kernels import range_model
 from tracking.filters.joint._sample_kernels import sum_inertial, take_state
 from tracking.filters.joint._sight_kernels import change_sight
 from tracking.filters.joint._start_kernels import begin_node, begin_pair, forget_sums

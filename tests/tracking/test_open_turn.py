@@ -97,7 +97,7 @@ def open_group(vehicle="human", static=()):
     A = rng.standard_normal((n, n))
     s.P[0] = A @ A.T / n + 0.1 * np.eye(n)
     s.x[0, s.pairs["at_e"].min() :] = 0.0
-    _open_kernels.open_frame(c, s, 0)
+    _open_kernels.open_frame(c, s, layout, 0)
     return c, s, scratch, layout
 
 
@@ -230,7 +230,7 @@ def test_fixed_nodes_of_a_room_are_rather_flat_than_tall():
     at = s.nodes["at_p"]
     for k, place in enumerate(([0.0, 0.0, 0.0], [0.3, 0.0, 4.0], [0.3, 0.2, 9.0])):
         s.x[0, at[k] : at[k] + 3] = place
-    _open_kernels.open_frame(c, s, 0)
+    _open_kernels.open_frame(c, s, layout, 0)
     turns, _ = _peak_kernels.find_peaks(s.information[0], s.score[0], layout.rotations)
     _open_kernels.turn_frame(c, s, 0, turns[0])
     heights = s.x[0, at + 2]

@@ -76,7 +76,7 @@ def watch_rotation(c, s, layout, dt):
         return
     if can_open(c, s):
         group.strain = 0.0
-        doubt_turn(c, s, h)
+        doubt_turn(c, s, layout, h)
         return
     group.strain_limit = RAISED * max(group.strain, group.strain_limit)
     group.strain = 0.0

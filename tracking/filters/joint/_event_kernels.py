@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from tracking.compiled import kernel, small_kernel
 from tracking.filters._shape_kernels import collect
+from tracking.filters.joint._antenna_kernels import antenna_offset
 from tracking.filters.joint._bank_kernels import (
     open_up,
     prune_bank,
@@ -20,7 +21,7 @@ from tracking.filters.joint._linear_kernels import settle, settle_all
 from tracking.filters.joint._misplaced_kernels import watch_places
 from tracking.filters.joint._motion_kernels import moves, predict
 from tracking.filters.joint._open_kernels import carry_slope, watch_turns
-from tracking.filters.joint._range_kernels import antenna_offset, fuse_range
+from tracking.filters.joint._range_kernels import fuse_range
 from tracking.filters.joint._rotation_kernels import carry_moves, follow_rotation
 from tracking.filters.joint._sample_kernels import sum_inertial, take_state
 from tracking.filters.joint._sight_kernels import gap_evidence
@@ -140,6 +141,7 @@ def hear(c, s, layout, scratch, i, j, a_i, a_j, t, distance, sight, is_survey):
         remove_faded(c, s, layout, t)
     node_i.heard, node_j.heard = True, True
     node_i.t_heard, node_j.t_heard = t, t
+    node_i.antenna, node_j.antenna = a_i, a_j
     runs = node_i.present and node_j.present
     if s.group[0].started:
         advance(c, s, layout, scratch, t, not runs)

@@ -27,6 +27,7 @@ from __future__ import annotations
 import numpy as np
 
 from tracking.compiled import allocating_kernel, kernel, small_kernel
+from tracking.filters.joint._antenna_kernels import turn_with_world
 from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_part
 from tracking.filters.joint._motion_kernels import moves
 from tracking.filters.joint._peak_kernels import (
@@ -64,12 +65,13 @@ def can_open(c, s):
 
 
 @allocating_kernel
-def open_frame(c, s, h):
+def open_frame(c, s, layout, h):
     """Take back what is known of the turn of hypothesis h, nothing of which waits.
 
     But that fixed nodes differ less in height than in width, where people put them.
     """
-    s.slope[h], s.score[h], s.information[h] = 0.0, 0.0, 0.0
+    s.score[h], s.information[h] = 0.0, 0.0
+    turn_with_world(s, layout, h)
     mean, m = np.zeros(3), 0
     for i in range(s.nodes.shape[0]):
         if s.nodes[i].present and s.nodes[i].static:
@@ -172,12 +174,12 @@ def tell_turn(s, h, scratch, nu, S):
 
 
 @allocating_kernel
-def doubt_turn(c, s, h):
+def doubt_turn(c, s, layout, h):
     """Look for other turns of hypothesis h, the only one; until one is likelier it stays as it is.
 
     It has a head start, of which a mirror image feels all.
     """
-    open_frame(c, s, h)
+    open_frame(c, s, layout, h)
     for k in range(9):
         s.information[h, k, k] += 0.5 * c.head_start
     note_spread(s, h)
@@ -192,7 +194,7 @@ def watch_turns(c, s, layout):
         # Nothing counts yet for or against any.
         for h in range(s.alive.shape[0]):
             if was_alive[h]:
-                open_frame(c, s, h)
+                open_frame(c, s, layout, h)
         return
     if group.held and group.n_alive > 1:
         group.held = False

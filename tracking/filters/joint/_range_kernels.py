@@ -15,6 +15,7 @@ import math
 
 from tracking._angle_kernels import cosine_sine
 from tracking.compiled import small_kernel
+from tracking.filters.joint._antenna_kernels import note_levers
 from tracking.filters.joint._linear_kernels import absorb, project
 from tracking.filters.joint._motion_kernels import time_since, way_since
 from tracking.filters.joint._open_kernels import tell_turn, turn_gradient
@@ -28,26 +29,6 @@ NEGLIGIBLE, MOST_BENT = 1e-3, 0.2
 """[-, m] Share of the noise that is not worth working out; the most a range is thought bent."""
 AT_ONCE = 0.1
 """[-] A sight that may have changed with a smaller probability is forgotten with the next step."""
-
-
-@small_kernel
-def antenna_offset(held, layout, n, antenna):
-    """Position of an antenna relative to its node, world frame as measured [m]."""
-    o0, o1, o2 = (
-        layout.antenna_b[antenna, 0],
-        layout.antenna_b[antenna, 1],
-        layout.antenna_b[antenna, 2],
-    )
-    if o0 == 0.0 and o1 == 0.0 and o2 == 0.0:
-        return 0.0, 0.0, 0.0
-    w, x, y, z = held[n, 0], held[n, 1], held[n, 2], held[n, 3]
-    # o + 2 w (u x o) + 2 u x (u x o), with u the vector part
-    c0, c1, c2 = y * o2 - z * o1, z * o0 - x * o2, x * o1 - y * o0
-    return (
-        o0 + 2.0 * (w * c0 + y * c2 - z * c1),
-        o1 + 2.0 * (w * c1 + z * c0 - x * c2),
-        o2 + 2.0 * (w * c2 + x * c1 - y * c0),
-    )
 
 
 @small_kernel
@@ -121,15 +102,6 @@ def range_model(c, s, h, p, lever_i, lever_j, idx, val):
         m += 2
         distance += s.x[h, pair.at_e] + s.x[h, pair.at_e + 1]
     return distance, m
-
-
-@small_kernel
-def note_levers(levers, scratch):
-    """Derivatives of a range by the turn, the positions held: only its antennas turn with M."""
-    u, direct = scratch.val, scratch.direct
-    for k in range(3):
-        lever = levers[3 + k] - levers[k]
-        direct[k], direct[3 + k], direct[6 + k] = u[2] * lever, u[3] * lever, u[5] * lever
 
 
 @small_kernel

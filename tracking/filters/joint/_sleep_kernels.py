@@ -79,7 +79,7 @@ def wake_up(c, s, layout, scratch):
     if can_open(c, s):
         for h in range(s.alive.shape[0]):
             if s.alive[h]:
-                open_frame(c, s, h)
+                open_frame(c, s, layout, h)
         return
     for _ in range(s.alive.shape[0]):
         # The likelier layout first.

@@ -75,7 +75,7 @@ def try_start(c, s, layout, t):
     group.flat = False
     group.asleep, group.open = asleep, False
     if opens:
-        open_frame(c, s, 0)
+        open_frame(c, s, layout, 0)
     group.n_alive = n_first
     group.best = 0
     group.t, group.t_check, group.t_carrier, group.t_gauge = t, t, t, t

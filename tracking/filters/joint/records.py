@@ -15,6 +15,7 @@ NODE = np.dtype(
         ("t_pre", "f8"),  # time up to which the inertial samples are summed [s]
         ("t_state", "f8"),  # time of the last STATE event [s]
         ("t_heard", "f8"),  # time of the last range it took part in [s]
+        ("antenna", "i8"),  # with which
         ("cos_yaw", "f8"),  # of the last STATE event, as measured
         ("sin_yaw", "f8"),
         ("yaw_rate", "f8"),  # [rad/s]
