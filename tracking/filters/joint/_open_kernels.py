@@ -37,7 +37,7 @@ from tracking.filters.joint._peak_kernels import (
     is_near,
     least_curvature,
 )
-from tracking.filters.joint._turned_kernels import tilt_to_rise
+from tracking.filters.joint._turned_kernels import tilt_to_rise, write_rotation
 
 LOOSE = 3.0
 """[-] Each element of M has a variance of a third, over all rotations."""
@@ -256,7 +256,22 @@ def turn_frame(c, s, h, R):
             if at >= 0:
                 turn_part(s, c.n, h, at, none, back)
                 s.slope[h, :, at : at + 3] = s.slope[h, :, at : at + 3].copy() @ R
+        if node.at_o >= 0:
+            turn_offset_covariance(c, s, h, i, back)
     s.moved[h, :] = 0.0
+
+
+@allocating_kernel
+def turn_offset_covariance(c, s, h, i, back):
+    """Let what an offset of node i did to the frame turn with it: ``M R(q_wb) o`` is as ever.
+
+    The offset stays, but which of it goes with which error of position, velocity and bias turns.
+    """
+    body, at = np.zeros((3, 3)), s.nodes[i].at_o
+    write_rotation(s.held, i, body)
+    offset = s.x[h, at : at + 3].copy()
+    turn_part(s, c.n, h, at, np.zeros(3), body.T.copy() @ (back @ body))
+    s.x[h, at : at + 3] = offset
 
 
 @allocating_kernel
