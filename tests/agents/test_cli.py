@@ -1,6 +1,7 @@
 """The command line as a user meets it: results, JSON, and faults without a traceback."""
 
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -56,6 +57,27 @@ def test_track_prints_a_table(recording):
     assert done.returncode == 0
     for word in ("rmse_yaw", "rmse_shape", "1-2", "all", "bad rows skipped: 0"):
         assert word in done.stdout
+
+
+def test_track_tells_the_least_error_that_is_possible(recording, tmp_path):
+    done = relpos("track", recording, "--bound", "--skip", 5, "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    assert "least possible" in done.stdout
+    assert "least possible" in (tmp_path / "out" / "report.html").read_text()
+    told = json.loads(relpos("track", recording, "--bound", "--json").stdout)
+    assert 0.0 < told["bound_rmse_shape"] <= told["bound_rmse_yaw"] <= told["bound_rmse"]
+    assert "bound_rmse" not in json.loads(relpos("track", recording, "--json").stdout)
+
+
+def test_without_truth_no_bound_is_told(recording, tmp_path):
+    blind = tmp_path / "blind"
+    shutil.copytree(recording, blind)
+    for name in blind.glob("truth*"):
+        name.unlink()
+    done = relpos("track", blind, "--bound")
+    assert done.returncode == 2
+    assert "truth" in done.stderr
+    assert "Traceback" not in done.stderr
 
 
 def test_smoothed_estimates_are_better(recording):

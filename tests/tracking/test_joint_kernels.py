@@ -253,6 +253,37 @@ def test_the_covariance_of_a_rotation_follows_the_estimate(dimensions):
     assert not s.moved.any()
 
 
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_it_is_followed_by_the_product_of_matrices(dimensions):
+    """``T P T^T`` with ``T = 1 + share G A^T``, of a group of which one node is fixed."""
+    c, s, scratch, _ = running(dimensions, "human", static=(2,))
+    n, rng, share = s.x.shape[1], np.random.default_rng(8), 0.4
+    root = rng.standard_normal((n, n))
+    s.P[0], s.moved[0] = root @ root.T, 0.0
+    at_p = s.nodes["at_p"][:, None] + np.arange(dimensions)
+    at_v = s.nodes["at_v"][~s.nodes["static"]][:, None] + np.arange(dimensions)
+    s.moved[0, at_p], s.moved[0, at_v] = 1e-4, 1e-4 * rng.standard_normal(at_v.shape)
+    s.moved[0, at_p] += 1e-4 * rng.standard_normal(at_p.shape)
+    x0, P0, moved = s.x[0] - s.moved[0], s.P[0].copy(), s.moved[0].copy()  # noqa: N806
+    axes = np.eye(3) if dimensions == 3 else np.eye(3)[2:]
+
+    def turned(values):
+        full = np.zeros((len(values), 3))
+        full[:, :dimensions] = values
+        return np.stack([np.cross(axis, full)[:, :dimensions] for axis in axes])
+
+    N, G = np.zeros((len(axes), n)), np.zeros((len(axes), n))
+    N[:, at_p] = turned(x0[at_p] - x0[at_p].mean(axis=0))
+    G[:, at_p] = turned(moved[at_p] - moved[at_p].mean(axis=0))
+    G[:, at_v] = turned(moved[at_v])
+    M = N @ N.T
+    M += (1e-3 * np.trace(M) + 1e-9) * np.eye(len(axes))
+    T = np.eye(n) + share * G.T @ np.linalg.solve(M, N)
+    _rotation_kernels.turn_covariance(c, s, 0, share, scratch)
+    np.testing.assert_allclose(s.P[0], T @ P0 @ T.T, atol=1e-6 * np.abs(T @ P0 @ T.T - P0).max())
+    np.testing.assert_array_equal(s.P[0], s.P[0].T)
+
+
 def test_a_group_that_is_turned_back_and_forth_keeps_its_shape():
     """Every correction moves along tangents, which alone would be a stretch of 80 % in the end."""
     c, s, scratch, _ = running(3, "human")

@@ -15,7 +15,9 @@ from tracking.filters.joint import (
     _peak_kernels,
     _survey_kernels,
 )
+from tracking.filters.joint._antenna_kernels import antenna_offset, note_levers
 from tracking.filters.joint._flatness_kernels import flatness
+from tracking.filters.joint._range_kernels import range_model
 from tracking.filters.joint._sample_kernels import sum_inertial
 from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.params import JointParams
@@ -156,8 +158,9 @@ def test_one_filter_gives_the_states_and_likelihoods_of_all_turns(static):
         # As records, like those of the filter.
         other = other._replace(nodes=begun.nodes.copy(), group=begun.group.copy())
         other.group["open"] = False
-        total = drive(c, other, scratch, turn)
         d = (turn - np.eye(3)).ravel()
+        other.x[0] += d @ begun.slope[0]  # what was found of biases is turned as well
+        total = drive(c, other, scratch, turn)
         np.testing.assert_allclose(s.x[0] + d @ s.slope[0], other.x[0], atol=1e-9)
         np.testing.assert_allclose(s.P[0], other.P[0], atol=1e-9)
         told = log_likelihood(s.information[0], s.score[0], turn)
@@ -206,6 +209,58 @@ def test_slopes_are_carried_as_errors_of_the_states_are(vehicle):
         _open_kernels.carry_slope(c, s, 0, scratch)
         np.testing.assert_allclose(s.slope[0, 0], expected, atol=1e-6)
         s.slope[0] = before
+
+
+def test_what_stands_still_tells_nothing_of_a_turn():
+    """Antennas away from their nodes are where they were, and what is read at rest is a bias."""
+    c, s, scratch, layout = running(3, "hand", static=(3,))
+    antenna_b = np.array([[0.1, -0.2, 0.05], [0.0, 0.0, 0.0], [-0.1, 0.0, 0.3]])
+    layout = layout._replace(antenna_b=antenna_b)
+    s.nodes["antenna"] = [0, 1, 2]
+    moving = ~s.nodes["static"]
+    for i in np.nonzero(moving)[0]:
+        s.x[0, s.nodes["at_o"][i] + np.arange(3)] = 0.0
+        s.x[0, [s.nodes["at_h"][i], *(s.nodes["at_v"][i] + np.arange(3))]] = 0.0
+        s.x[0, s.nodes["at_b"][i] + np.arange(3)] *= 0.01
+        s.held[i, 4:] = s.x[0, s.nodes["at_b"][i] + np.arange(3)]
+    _open_kernels.open_frame(c, s, layout, 0)
+    for p in range(len(s.pairs)):
+        i, j = s.pairs["i"][p], s.pairs["j"][p]
+        levers = [antenna_offset(s.held, layout, k, k) for k in (i, j)]
+        _, m = range_model(c, s, 0, p, *levers, scratch.idx, scratch.val)
+        note_levers(np.concatenate(levers), scratch)
+        _open_kernels.turn_gradient(s, 0, m, scratch)
+        np.testing.assert_allclose(scratch.gradient, 0.0, atol=1e-12)
+    s.pre[:] = 0.0
+    for i in np.nonzero(moving)[0]:
+        sum_inertial(c, s.nodes, s.held, s.pre, i, 0.3)
+    _motion_kernels.predict(c, s, 0, 0.3, scratch)
+    _open_kernels.carry_slope(c, s, 0, scratch)
+    at_v = s.nodes["at_v"][moving][:, None] + np.arange(3)
+    # But for the tilt that the bias is thought to come from, which is of second order.
+    assert np.abs(s.slope[0][:, at_v]).max() < 0.01 * 0.3 * np.abs(s.held[moving, 4:]).max()
+
+
+def test_an_offset_does_to_the_frame_what_it_did():
+    """However it is turned: at rest it is all that there is of a bias, ``b = -R(q_wb) o``."""
+    c, s, _, _ = open_group("hand")
+    rng, n, std = np.random.default_rng(6), s.x.shape[1], 0.2
+    T, at_o, at_b = np.eye(n), s.nodes["at_o"], s.nodes["at_b"]  # noqa: N806
+    bodies = [Rotation.from_quat(np.roll(s.held[i, :4], -1)).as_matrix() for i in range(3)]
+    for i, body in enumerate(bodies):
+        T[at_b[i] : at_b[i] + 3, at_o[i] : at_o[i] + 3] = -body
+    free = np.full(n, 0.1)
+    for i in range(3):
+        free[at_b[i] : at_b[i] + 3], free[at_o[i] : at_o[i] + 3] = 1e-4, std
+    s.P[0] = T @ np.diag(free**2) @ T.T
+    before, offsets = np.linalg.eigvalsh(s.P[0]), s.x[0, at_o[:, None] + np.arange(3)].copy()
+    s.slope[0][:, at_o[:, None] + np.arange(3)] = 0.0
+    _open_kernels.turn_frame(c, s, 0, anywhere(rng))
+    for i, body in enumerate(bodies):
+        block = s.P[0, at_b[i] : at_b[i] + 3, at_o[i] : at_o[i] + 3]
+        np.testing.assert_allclose(block, -(std**2) * body, atol=1e-12)
+    np.testing.assert_allclose(np.linalg.eigvalsh(s.P[0]), before, atol=1e-12)
+    np.testing.assert_array_equal(s.x[0, at_o[:, None] + np.arange(3)], offsets)
 
 
 @pytest.mark.parametrize("vehicle", ["human", "hand"])
