@@ -27,7 +27,7 @@ from __future__ import annotations
 import numpy as np
 
 from tracking.compiled import allocating_kernel, kernel, small_kernel
-from tracking.filters.joint._antenna_kernels import turn_with_world
+from tracking.filters.joint._antenna_kernels import turn_offset_covariance, turn_with_world
 from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_part
 from tracking.filters.joint._motion_kernels import moves
 from tracking.filters.joint._peak_kernels import (
@@ -37,17 +37,15 @@ from tracking.filters.joint._peak_kernels import (
     is_near,
     least_curvature,
 )
-from tracking.filters.joint._turned_kernels import tilt_to_rise, write_rotation
+from tracking.filters.joint._turned_kernels import tilt_to_rise
 
 LOOSE = 3.0
 """[-] Each element of M has a variance of a third, over all rotations."""
 TIE = 1e-6
 """[s] Times that differ by less are equal, whatever the clock began with."""
-CLEAR = 1.0
-"""[-] By so much another turn has to be likelier (log-likelihood) before it is reported."""
-CLEARER = 5.0
-"""[-] By so much instead where one was known and is doubted: noise that is larger than believed,
-and lasts, makes some other look likelier by a little time and again."""
+CLEAR, CLEARER = 1.0, 5.0
+"""[-] By so much another turn has to be likelier (log-likelihood) before it is reported; where one
+was known and is doubted by more: noise that lasts makes some other look a little likelier."""
 KNOWN = 0.2
 """[rad] Turns that are known so well are left to filters that are linear about each of them."""
 LONG = 20.0
@@ -75,8 +73,7 @@ def open_frame(c, s, layout, h):
     mean, m = np.zeros(3), 0
     for i in range(s.nodes.shape[0]):
         if s.nodes[i].present and s.nodes[i].static:
-            at = s.nodes[i].at_p
-            mean += s.x[h, at : at + 3]
+            mean += s.x[h, s.nodes[i].at_p : s.nodes[i].at_p + 3]
             m += 1
     mean /= max(m, 1)
     for i in range(s.nodes.shape[0]):
@@ -207,8 +204,7 @@ def watch_turns(c, s, layout):
         turns, values = find_peaks(s.information[h], s.score[h], layout.rotations)
         clear = CLEARER if group.held else CLEAR
         if values[0] > value + clear:
-            R[:] = turns[0]
-            value = values[0]
+            R[:], value = turns[0], values[0]
         if group.held:
             # One that is near is what these seconds tell; the filter knows it better from before.
             if value < CLEARER or is_near(R, np.eye(3)):
@@ -259,19 +255,6 @@ def turn_frame(c, s, h, R):
         if node.at_o >= 0:
             turn_offset_covariance(c, s, h, i, back)
     s.moved[h, :] = 0.0
-
-
-@allocating_kernel
-def turn_offset_covariance(c, s, h, i, back):
-    """Let what an offset of node i did to the frame turn with it: ``M R(q_wb) o`` is as ever.
-
-    The offset stays, but which of it goes with which error of position, velocity and bias turns.
-    """
-    body, at = np.zeros((3, 3)), s.nodes[i].at_o
-    write_rotation(s.held, i, body)
-    offset = s.x[h, at : at + 3].copy()
-    turn_part(s, c.n, h, at, np.zeros(3), body.T.copy() @ (back @ body))
-    s.x[h, at : at + 3] = offset
 
 
 @allocating_kernel

@@ -20,27 +20,6 @@ PER_GRAVITY = 1.0 / GRAVITY
 
 
 @small_kernel
-def write_rotation(held, i, R):
-    """Write the orientation of node i as a matrix, (3, 3)."""
-    w, x, y, z = held[i, 0], held[i, 1], held[i, 2], held[i, 3]
-    R[0, 0], R[0, 1], R[0, 2] = (
-        1.0 - 2.0 * (y * y + z * z),
-        2.0 * (x * y - w * z),
-        2.0 * (x * z + w * y),
-    )
-    R[1, 0], R[1, 1], R[1, 2] = (
-        2.0 * (x * y + w * z),
-        1.0 - 2.0 * (x * x + z * z),
-        2.0 * (y * z - w * x),
-    )
-    R[2, 0], R[2, 1], R[2, 2] = (
-        2.0 * (x * z - w * y),
-        2.0 * (y * z + w * x),
-        1.0 - 2.0 * (x * x + y * y),
-    )
-
-
-@small_kernel
 def measured_motion(node, pre, x, h, i):
     """What the samples of node i add to velocity and way, as measured, its offset taken off."""
     dv0, dv1, dv2 = pre[i, 1], pre[i, 2], pre[i, 3]
