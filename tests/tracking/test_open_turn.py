@@ -241,28 +241,6 @@ def test_what_stands_still_tells_nothing_of_a_turn():
     assert np.abs(s.slope[0][:, at_v]).max() < 0.01 * 0.3 * np.abs(s.held[moving, 4:]).max()
 
 
-def test_an_offset_does_to_the_frame_what_it_did():
-    """However it is turned: at rest it is all that there is of a bias, ``b = -R(q_wb) o``."""
-    c, s, _, _ = open_group("hand")
-    rng, n, std = np.random.default_rng(6), s.x.shape[1], 0.2
-    T, at_o, at_b = np.eye(n), s.nodes["at_o"], s.nodes["at_b"]  # noqa: N806
-    bodies = [Rotation.from_quat(np.roll(s.held[i, :4], -1)).as_matrix() for i in range(3)]
-    for i, body in enumerate(bodies):
-        T[at_b[i] : at_b[i] + 3, at_o[i] : at_o[i] + 3] = -body
-    free = np.full(n, 0.1)
-    for i in range(3):
-        free[at_b[i] : at_b[i] + 3], free[at_o[i] : at_o[i] + 3] = 1e-4, std
-    s.P[0] = T @ np.diag(free**2) @ T.T
-    before, offsets = np.linalg.eigvalsh(s.P[0]), s.x[0, at_o[:, None] + np.arange(3)].copy()
-    s.slope[0][:, at_o[:, None] + np.arange(3)] = 0.0
-    _open_kernels.turn_frame(c, s, 0, anywhere(rng))
-    for i, body in enumerate(bodies):
-        block = s.P[0, at_b[i] : at_b[i] + 3, at_o[i] : at_o[i] + 3]
-        np.testing.assert_allclose(block, -(std**2) * body, atol=1e-12)
-    np.testing.assert_allclose(np.linalg.eigvalsh(s.P[0]), before, atol=1e-12)
-    np.testing.assert_array_equal(s.x[0, at_o[:, None] + np.arange(3)], offsets)
-
-
 @pytest.mark.parametrize("vehicle", ["human", "hand"])
 def test_turning_the_frame_back_changes_nothing(vehicle):
     c, s, scratch, _ = open_group(vehicle)

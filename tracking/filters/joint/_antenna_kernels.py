@@ -1,17 +1,13 @@
-"""What is known in the body of a node: offsets of its antennas, and of its accelerometer.
+"""Antennas that are not at the origin of their nodes: where they are, and what a turn does to them.
 
-Both are turned by the orientation of the node, as accelerations are: while it is open how the group
-is turned (`_open_kernels`), what they do in its frame turns with M.
+Offsets are known in the body, so they are turned by the orientation of the node, as accelerations
+are: while it is open how the group is turned (`_open_kernels`), they turn with M.
 """
 
 from __future__ import annotations
 
-import numpy as np
-
-from tracking.compiled import allocating_kernel, small_kernel
-from tracking.filters.joint._copy_kernels import turn_part
+from tracking.compiled import small_kernel
 from tracking.filters.joint._motion_kernels import moves
-from tracking.filters.joint._sample_kernels import rotation_of
 
 
 @small_kernel
@@ -62,17 +58,3 @@ def turn_with_world(s, layout, h):
                 s.slope[h, 3 * r + q, node.at_p + r] = -offset[q]
                 if moves(node) and not node.levelled:
                     s.slope[h, 3 * r + q, node.at_b + r] = s.x[h, node.at_b + q]
-
-
-@allocating_kernel
-def turn_offset_covariance(c, s, h, i, back):
-    """Let what an offset of node i did to the frame turn with it: ``M R(q_wb) o`` is as ever.
-
-    The offset stays, but which of it goes with which error of position, velocity and bias turns.
-    """
-    rotation, body, at = rotation_of(s.held, i), np.zeros((3, 3)), s.nodes[i].at_o
-    for k in range(9):
-        body[k // 3, k % 3] = rotation[k]
-    offset = s.x[h, at : at + 3].copy()
-    turn_part(s, c.n, h, at, np.zeros(3), body.T.copy() @ (back @ body))
-    s.x[h, at : at + 3] = offset

@@ -27,7 +27,7 @@ from __future__ import annotations
 import numpy as np
 
 from tracking.compiled import allocating_kernel, kernel, small_kernel
-from tracking.filters.joint._antenna_kernels import turn_offset_covariance, turn_with_world
+from tracking.filters.joint._antenna_kernels import turn_with_world
 from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_part
 from tracking.filters.joint._motion_kernels import moves
 from tracking.filters.joint._peak_kernels import (
@@ -252,8 +252,6 @@ def turn_frame(c, s, h, R):
             if at >= 0:
                 turn_part(s, c.n, h, at, none, back)
                 s.slope[h, :, at : at + 3] = s.slope[h, :, at : at + 3].copy() @ R
-        if node.at_o >= 0:
-            turn_offset_covariance(c, s, h, i, back)
     s.moved[h, :] = 0.0
 
 

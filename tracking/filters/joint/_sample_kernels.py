@@ -50,20 +50,14 @@ def sum_inertial(c, nodes, held, pre, i, t):
 
 
 @small_kernel
-def rotation_of(held, i):
-    """The orientation of node i as a matrix, nine numbers row by row."""
+def sum_orientation(held, pre, i, dt, share):
+    """Add how node i was turned: that is what an offset of its accelerometer does."""
     w, x, y, z = held[i, 0], held[i, 1], held[i, 2], held[i, 3]
-    return (
+    rotation = (
         1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y),
         2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x),
         2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y),
     )  # fmt: skip
-
-
-@small_kernel
-def sum_orientation(held, pre, i, dt, share):
-    """Add how node i was turned: that is what an offset of its accelerometer does."""
-    rotation = rotation_of(held, i)
     for k in range(9):
         once = share * dt * rotation[k]
         pre[i, 21 + k] += dt * pre[i, 12 + k] + 0.5 * dt * once
