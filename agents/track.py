@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from tracking.arrays import F64, Bool
-from tracking.bounds import Bound, recorded_bound
+from tracking.bounds import Bound
 from tracking.constellation import Constellation
 from tracking.estimate import Status, TeamEstimate
 from tracking.filters import DEFAULT_FILTER
@@ -103,7 +103,7 @@ def track_log(
     filter: str = DEFAULT_FILTER,
     skip: float = 10.0,
     smooth: bool = False,
-    bound: bool = False,
+    bound: Bound | None = None,
     params: TrackerParams | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> TrackResult:
@@ -115,18 +115,17 @@ def track_log(
         skip: Times until so many seconds after the first range are not scored.
         smooth: Whether estimates know what was measured in the `LAG` after them, too; the filter
             goes its way as without.
-        bound: Whether to work out the least errors that the measurements allow, too
+        bound: The least errors that the measurements allow, kept beside those there are
             (`tracking.bounds.recorded_bound`).
         params: What the tracker believes.
         progress: Called with the share done, 0 to 1.
 
     Raises:
-        LogError: The folder cannot be read, or its truth does not tell a bound.
+        LogError: The folder cannot be read.
         ConfigError: No such filter, or one that cannot smooth.
     """
     log = log if isinstance(log, Log) else read_log(log)
     constellation, block = log.constellation, log.block
-    least = recorded_bound(log, skip=skip) if bound else None
     tracker = Tracker(constellation, params, filter=filter)
     first, last = log.t_range
     # From whole multiples, so that large times stay on the grid.
@@ -170,7 +169,7 @@ def track_log(
         n_rejected=int(tracker.n_rejected()[0]),
         skip=skip,
         realtime_factor=log.duration / max(elapsed, 1e-9),
-        bound=least,
+        bound=bound,
     )
 
 

@@ -55,6 +55,7 @@ def track(
     from agents.output import check_folder, write_results
     from agents.report.track_report import track_report
     from agents.track import estimates_csv, track_log
+    from tracking.bounds import recorded_bound
     from tracking.filters import DEFAULT_FILTER, filter_builder
     from tracking.log import notes_on, read_log
 
@@ -72,12 +73,13 @@ def track(
         click.echo(line, err=True)
     results = []
     for log in read:
+        least = recorded_bound(log, skip=skip) if bound else None
         for name in names:
             label = f"{log.name}, {name}"
             with progress_bar(label, shown=log.duration > 20.0) as report:
                 results.append(
                     track_log(
-                        log, filter=name, skip=skip, smooth=smooth, bound=bound, progress=report
+                        log, filter=name, skip=skip, smooth=smooth, bound=least, progress=report
                     )
                 )
     if out is not None:

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from agents.track import track_log
+from tracking.bounds import recorded_bound
 from tracking.constellation import Constellation, NodeConfig
 from tracking.filters import FILTERS
 from tracking.geometry import quat_conjugate, quat_multiply
+from tracking.log import read_log
 from tracking.measurements import Kind, MeasurementBlock
 from tracking.orientation import Orientation, OrientationParams
 
@@ -70,7 +72,8 @@ def test_a_walk_is_followed_once_it_is_found_how_the_group_is_turned(data):
 
 def test_recordings_are_near_what_their_ranges_allow(data):
     """Of the noise that their truth shows."""
-    found = track_log(data / "logs" / "inrol_env1", bound=True)
+    log = read_log(data / "logs" / "inrol_env1")
+    found = track_log(log, bound=recorded_bound(log))
     for name, least in found.least.items():
         assert getattr(found.score, name) < 1.25 * least, name
 

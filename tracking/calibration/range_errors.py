@@ -20,7 +20,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import nnls
 
 from tracking.arrays import F64
 from tracking.calibration.distances import range_table
@@ -68,6 +67,8 @@ def measure_range_errors(log: Log, like: RangeErrorParams | None = None) -> Rang
     Raises:
         LogError: There is no truth, or too little moves to tell what stays from what does not.
     """
+    from scipy.optimize import nnls
+
     found = range_variogram(log)
     weight = np.sqrt(found.n / found.n.max()) / found.gamma
     best, least = (0.0, 0.0, 0.0, 0.0, 0.0), np.inf
