@@ -186,6 +186,8 @@ def take_first_range(c, s, layout, i, j, p, t, distance, is_survey):
     collect(c, s.pairs[p], t, distance, is_survey)
     if not s.group[0].started:
         try_start(c, s, layout, t)
+        # Three nodes in space are their own mirror image: room for both sides of a fourth.
+        prune_bank(c, s)
         return
     if not s.nodes[i].present:
         try_join(c, s, layout, i, t)
