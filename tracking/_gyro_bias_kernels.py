@@ -14,12 +14,17 @@ References:
 
 from __future__ import annotations
 
+import math
+
 from tracking._lowpass_kernels import low_pass
 from tracking._rest_kernels import GYR, MAX_BIAS, RESTING
 from tracking.compiled import small_kernel
 
 START_VAR = 50.0**2
 """[(0.01 deg/s)^2] Variance before any measurement."""
+
+UNIT = 0.01 * math.pi / 180.0
+"""[rad/s] What it is counted in."""
 
 ROTATION, LEAN, BIAS, P = 0, 9, 33, 36
 N_BIAS = 42
@@ -48,6 +53,16 @@ def worst_variance(bias, e, n):
         abs(bias[e, n, P + 5]) + p02 + p12,
     )
     return min(rows, START_VAR)
+
+
+@small_kernel
+def leaning_variance(bias, e, n, x, y, z):
+    """Mean variance of the bias across the vertical (x, y, z) in the body [(rad/s)^2]."""
+    p00, p01, p02 = bias[e, n, P], bias[e, n, P + 1], bias[e, n, P + 2]
+    p11, p12, p22 = bias[e, n, P + 3], bias[e, n, P + 4], bias[e, n, P + 5]
+    along = x * (p00 * x + p01 * y + p02 * z) + y * (p01 * x + p11 * y + p12 * z)
+    along += z * (p02 * x + p12 * y + p22 * z)
+    return 0.5 * (p00 + p11 + p22 - along) * UNIT * UNIT
 
 
 @small_kernel

@@ -10,10 +10,10 @@ from __future__ import annotations
 from tracking.compiled import kernel, small_kernel
 from tracking.measurements import N_VALUES
 
-TIME, KIND, NODE_I, NODE_J, ANTENNA_I, ANTENNA_J, VALUES, HAS_POWER = 0, 1, 2, 3, 4, 5, 6, 14
+TIME, KIND, NODE_I, NODE_J, ANTENNA_I, ANTENNA_J, VALUES, HAS_POWER = 0, 1, 2, 3, 4, 5, 6, 18
 """Columns of a slot: the fields of `MeasurementBlock` [s, -], their order that of handling."""
-N_COLUMNS = 16
-"""Columns of a slot, two lines of the cache; the last means nothing."""
+N_COLUMNS = 24
+"""Columns of a slot, three lines of the cache; those after the last mean nothing."""
 
 
 @small_kernel

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import math
 
-from tracking._gyro_bias_kernels import START_VAR, worst_variance
+from tracking._gyro_bias_kernels import START_VAR, leaning_variance, worst_variance
 from tracking._inertial_kernels import GOOD, inspect_sample
 from tracking._limit_kernels import find_limits
 from tracking._magnetic_kernels import COS, SIN
 from tracking._rest_kernels import RESTING
 from tracking._vqf_kernels import (
     Q_6D,
+    UPRIGHT,
     about_vertical,
     start_vqf,
     turned,
@@ -29,12 +30,13 @@ STEADY = 1.5
 """[-] Samples that are further apart than so many nominal intervals have lost some between."""
 
 STARTED, T, GRAVITY, COS_YAW, SIN_YAW = 0, 1, 2, 3, 4
-LAST_GYR, LAST_ACC, FIELD, HAS_FIELD, SEEN_FIELD = 5, 8, 11, 14, 15
-N_NODE = 16
+LAST_GYR, LAST_ACC, FIELD, HAS_FIELD, SEEN_FIELD, TURNED = 5, 8, 11, 14, 15, 16
+N_NODE = 18
 """Columns of what a node remembers beside its VQF: 1 after the first sample; its time [s]; length
 of gravity [m/s2]; cosine and sine of half the turn that gives the initial heading; the last
 sample, gyroscope [rad/s] and specific force [m/s2]; a field that no sample followed yet, and 1
-if there is one; 1 after a field was used."""
+if there is one; 1 after a field was used; by how much it was turned upright, about x and y of the
+world [rad]."""
 
 
 @kernel
@@ -49,7 +51,7 @@ def orient(c, s, t, kind, node, values, valid):
         t: Time, (env, event) [s], in order.
         kind: `Kind`, (env, event), written.
         node: Node, (env, event).
-        values: What was measured, (env, event, 8), written.
+        values: What was measured, (env, event, N_VALUES), written.
         valid: False for padding, (env, event), written.
     """
     for e in range(t.shape[0]):
@@ -99,7 +101,30 @@ def take_sample(c, s, e, n, t, kind, values, valid, k):
     values[e, k, 0], values[e, k, 1], values[e, k, 2], values[e, k, 3] = qw, qx, qy, qz
     values[e, k, 4], values[e, k, 5], values[e, k, 6] = x, y, z - m[e, n, GRAVITY]
     values[e, k, 7] = 2.0 if cut_x or cut_y else (1.0 if cut_z else 0.0)
+    tell_upright(s, e, n, cos, sin, values, k)
     valid[e, k] = m[e, n, SEEN_FIELD] != 0.0 or not c.magnetic[n]
+
+
+@small_kernel
+def tell_upright(s, e, n, cos, sin, values, k):
+    """Write how node n was turned upright so far, and how fast its gyroscope may lean.
+
+    Cosine and sine are of half the turn about the vertical that gives its heading.
+    """
+    m, q = s.node, s.tilt
+    turn_cos, turn_sin = cos * cos - sin * sin, 2.0 * cos * sin
+    x, y = q[e, n, UPRIGHT], q[e, n, UPRIGHT + 1]
+    q[e, n, UPRIGHT] = q[e, n, UPRIGHT + 1] = 0.0
+    m[e, n, TURNED] += turn_cos * x - turn_sin * y
+    m[e, n, TURNED + 1] += turn_sin * x + turn_cos * y
+    values[e, k, 8] = 1.0
+    values[e, k, 9], values[e, k, 10] = m[e, n, TURNED], m[e, n, TURNED + 1]
+    qw, qx = q[e, n, Q_6D], q[e, n, Q_6D + 1]
+    qy, qz = q[e, n, Q_6D + 2], q[e, n, Q_6D + 3]
+    values[e, k, 11] = leaning_variance(
+        s.bias, e, n,
+        2.0 * (qx * qz - qw * qy), 2.0 * (qy * qz + qw * qx), 1.0 - 2.0 * (qx * qx + qy * qy),
+    )  # fmt: skip
 
 
 @small_kernel

@@ -17,6 +17,7 @@ from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.params import CARRIERS, JointParams, NlosParams
 from tracking.filters.joint.records import as_records
 from tracking.filters.joint.state import JointState, make_state
+from tracking.measurements import N_VALUES
 
 
 def one_env(vehicle="car"):
@@ -33,7 +34,7 @@ def one_env(vehicle="car"):
 ])  # fmt: skip
 def test_after_a_blow_the_speed_is_uncertain(vehicle, accel, is_blow):
     c, s = one_env(vehicle)
-    values = np.zeros((1, 3, 8))
+    values = np.zeros((1, 3, N_VALUES))
     values[..., 0] = 1.0  # level, and pointing along x
     values[0, 1, 4] = accel
     for k, t in enumerate((0.0, 0.01, 0.02)):
@@ -66,7 +67,7 @@ def test_a_tilt_that_is_being_found_leaves_the_bias_uncertain(at_rest):
 def test_an_orientation_goes_on_over_gaps_that_are_filled(gap, anew):
     """What VQF goes on from is as old as it was, though the group has to see who moves anew."""
     c, s = one_env("hand")
-    values = np.zeros((1, 2, 8))
+    values = np.zeros((1, 2, N_VALUES))
     values[..., 0] = 1.0
     for k, t in enumerate((7.0, 7.0 + gap)):
         take_state(c, s.nodes, s.held, s.pre, 0, t, values, 0, k)

@@ -28,6 +28,7 @@ from tracking.filters.joint._turned_kernels import (
     turn_offset,
     turn_rows,
 )
+from tracking.filters.joint._upright_kernels import bias_time, lean_noise, turn_upright
 
 
 @small_kernel
@@ -87,7 +88,8 @@ def move_mean(c, node, pre, x, h, i, scale, w, speed):
     d, T = c.d, pre[i, 0]
     p, v, b, y = node.at_p, node.at_v, node.at_b, node.at_h
     psi = x[h, y]
-    cos_r, sin_r = cosine_sine(psi)
+    cos_psi, sin_psi = cosine_sine(psi)
+    cos_r, sin_r = cos_psi, sin_psi
     if node.at_o >= 0:
         turn_offset(node, pre, x, h, i, cos_r, sin_r, scale, w)
     dv0, dv1, dv2, dp0, dp1, dp2 = measured_motion(node, pre, x, h, i)
@@ -121,7 +123,9 @@ def move_mean(c, node, pre, x, h, i, scale, w, speed):
             x[h, v + 2] += PER_GRAVITY * (dv0 * b0 + dv1 * b1)
         squared += x[h, v + 2] ** 2
     speed[i] = math.sqrt(squared)
-    keep = decay(T / node.bias_tau)
+    if node.at_o >= 0:
+        turn_upright(node, pre, x, h, i, cos_psi, sin_psi, w)
+    keep = decay(T / bias_time(node))
     scale[b], scale[b + 1] = keep, keep
     if d == 3:
         scale[b + 2] = decay(T / node.rise_bias_tau)
@@ -248,6 +252,8 @@ def add_noise(c, node, pre, P, h, i, scale, step):
         P[h, v + k, v + k] += q
         bias_var = node.bias_var if k < 2 else node.rise_bias_var
         P[h, b + k, b + k] += (1.0 - scale[b + k] * scale[b + k]) * bias_var
+    for k in range(2):
+        P[h, b + k, b + k] += lean_noise(node, T)
     if node.unsettled2 > 0.0:
         age = max(node.t_pre - node.t_oriented, 1.0)
         for k in range(2):

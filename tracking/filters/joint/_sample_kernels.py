@@ -11,6 +11,7 @@ import math
 from tracking._exponential_kernels import decay
 from tracking.compiled import small_kernel
 from tracking.filters._level_kernels import angle_between, direction, level
+from tracking.filters.joint._upright_kernels import take_upright
 
 
 @small_kernel
@@ -74,8 +75,10 @@ def take_state(c, nodes, held, pre, i, t, values, e, k):
     a0, a1, a2 = values[e, k, 4], values[e, k, 5], values[e, k, 6]
     dt = t - node.t_state
     fresh = not node.has_state or dt > c.unaided_after
-    if not node.has_state or dt > c.anew_after:
+    anew = not node.has_state or dt > c.anew_after
+    if anew:
         node.t_oriented = t
+    take_upright(node, pre, i, values, e, k, anew)
     if not fresh and dt > 1e-4:
         # The angle between two orientations, from the vector part of their quotient.
         qw, qx, qy, qz = held[i, 0], held[i, 1], held[i, 2], held[i, 3]

@@ -24,6 +24,10 @@ NODE = np.dtype(
         ("turning", "f8"),  # running mean of the angular rate [rad/s]
         ("t_first", "f8"),  # its first sample, or the first after a long silence [s]
         ("t_oriented", "f8"),  # since when its orientation goes on without a break [s]
+        ("told", "?"),  # it is told how it is turned upright
+        ("upright0", "f8"),  # by how much so far, about x and y [rad]
+        ("upright1", "f8"),
+        ("lean_var", "f8"),  # of the rate at which its gyroscope makes it lean [(rad/s)^2]
         ("t_moved", "f8"),  # last time it was not at rest [s]
         ("t_shaken", "f8"),  # last time its acceleration told so [s]
         ("cut_off", "?"),  # its last acceleration was at the end of the sensor's scale
@@ -42,6 +46,8 @@ NODE = np.dtype(
         ("blow_share", "f8"),
         ("bias_var", "f8"),
         ("bias_tau", "f8"),
+        ("told_bias_tau", "f8"),
+        ("lean_gain", "f8"),
         ("rise_bias_var", "f8"),
         ("rise_bias_tau", "f8"),
         ("unsettled2", "f8"),

@@ -24,7 +24,7 @@ class Scratch(NamedTuple):
     scale: F64
     """(state)"""
     step: F64
-    """(node, 31)"""
+    """(node, 33)"""
     speed: F64
     """(node)"""
     none: F64
@@ -58,7 +58,7 @@ def make_scratch(n_nodes: int, n_pairs: int, n_states: int) -> Scratch:
         w=aligned(n_states),
         share=np.zeros(room_to_wait(n_states)),
         scale=aligned(n_states),
-        step=np.zeros((n_nodes, 31)),
+        step=np.zeros((n_nodes, 33)),
         speed=np.zeros(n_nodes),
         none=np.zeros(3),
         x=aligned(1, n_states),

@@ -30,8 +30,9 @@ from tracking.filters.joint.coefficients import (
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.records import GROUP, NODE, PAIR, Records
 from tracking.filters.rotations import starting_rotations
+from tracking.geometry import GRAVITY
 
-N_PRE = 30
+N_PRE = 32
 """Columns of `JointState.pre`."""
 
 
@@ -47,7 +48,8 @@ class JointState(NamedTuple):
     """Sums over inertial samples since the states' time, (env, node, N_PRE): time [s]; velocity
     and way that they add [m/s, m]; cosine and sine that turn a bias, summed once and twice;
     square of the acceleration [m2/s3]; the orientation, row by row, summed once and twice, of nodes
-    whose accelerometer has an offset."""
+    whose accelerometer has an offset; the bias that they gain as they are turned upright
+    [m/s2]."""
     pairs: Records
     """PAIR, (env, pair)."""
     group: Records
@@ -136,6 +138,8 @@ def make_state(
             "blow_share": carrier.blow_share,
             "bias_var": carrier.bias_std**2,
             "bias_tau": carrier.bias_tau,
+            "told_bias_tau": carrier.told_bias_tau,
+            "lean_gain": GRAVITY**2 * carrier.lean_time,
             "rise_bias_var": carrier.rise_bias_std**2,
             "rise_bias_tau": carrier.rise_bias_tau,
             "unsettled2": carrier.unsettled_speed**2,

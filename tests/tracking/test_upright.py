@@ -1,0 +1,83 @@
+"""What an orientation was turned upright by: told as it is, and taken off the acceleration."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from tracking import Constellation, NodeConfig, Tracker, TrackerParams
+from tracking.filters import FilterParams
+from tracking.filters.joint.params import CARRIERS, JointParams
+from tracking.geometry import GRAVITY
+from tracking.measurements import N_VALUES, Kind, MeasurementBlock
+from tracking.orientation import Orientation, OrientationParams
+
+FIXED = np.array([[-2.0, -2.0, 0.2], [2.0, -1.5, 2.0], [1.5, 2.0, 0.4], [-1.8, 1.7, 1.9]])
+
+
+def test_what_is_read_changes_by_what_was_turned_upright():
+    """What lasts is taken for a tilt; before and after it is the same acceleration and gravity."""
+    n = 1500
+    t = np.arange(1, n + 1) / 100.0
+    force = np.array([0.1, -0.06, GRAVITY])
+    imu = np.zeros((n, 6))
+    imu[:, 3:] = np.where(t[:, None] < 2.0, [0.0, 0.0, GRAVITY], force)
+    imu += 1e-4 * np.random.default_rng(0).standard_normal(imu.shape)
+    nodes = (
+        NodeConfig(id=1, vehicle="hand", initial_heading=0.7),
+        NodeConfig(id=2, kind="static"),
+    )
+    stage = Orientation(Constellation(nodes=nodes, heading="initial"), OrientationParams())
+    block = MeasurementBlock.of_kind(Kind.IMU, t, np.zeros(n, dtype=np.int64), imu)
+    out = stage.step(block).values[0]
+    assert (out[:, 8] == 1.0).all()
+    assert (out[:, 11] > 0.0).all()
+    accel, (x, y) = out[:, 4:6], out[:, 9:11].T
+    moved = accel[t > 2.5] - GRAVITY * np.stack([y, -x], axis=1)[t > 2.5]
+    turn = np.array([[np.cos(0.7), -np.sin(0.7)], [np.sin(0.7), np.cos(0.7)]])
+    assert np.abs(accel[-1]).max() < 0.2 * np.abs(turn @ force[:2]).max()  # upright by now
+    np.testing.assert_allclose(moved, np.tile(turn @ force[:2], (len(moved), 1)), atol=2e-3)
+
+
+def walk(upright, told, seed=0):
+    """Tracked states of a hand whose acceleration errs by a tilt that changes: (time, pair, 3)."""
+    rng = np.random.default_rng(seed)
+    nodes = (
+        NodeConfig(id=0, vehicle="hand", initial_heading=0.0),
+        *(NodeConfig(id=k + 1, kind="static") for k in range(len(FIXED))),
+    )
+    carriers = {**CARRIERS, "hand": replace(CARRIERS["hand"], told_bias_tau=1e9)}
+    params = TrackerParams(filter=FilterParams(joint=JointParams(carriers=carriers)))
+    tracker = Tracker(Constellation(nodes=nodes, heading="initial", dimensions=3), params)
+    t = np.arange(0.0, 12.0, 0.01)
+    angle = np.array([0.7, 1.1, 1.6])
+    place = np.array([1.0, 0.8, 0.4]) * np.sin(angle * t[:, None]) + [0.0, 0.0, 1.0]
+    accel = -np.array([1.0, 0.8, 0.4]) * angle**2 * np.sin(angle * t[:, None])
+    values = np.zeros((len(t), N_VALUES))
+    values[:, 0], values[:, 4:7] = 1.0, accel
+    tilt = upright * np.stack([np.sin(0.5 * t), np.cos(0.3 * t) - 1.0], axis=1)
+    force = accel + [0.0, 0.0, GRAVITY]
+    values[:, 4:7] += np.cross(np.pad(tilt, ((0, 0), (0, 1))), force)
+    if told:
+        values[:, 8], values[:, 9:11], values[:, 11] = 1.0, tilt, 1e-8
+    other = np.arange(len(t)) % len(FIXED)
+    z = np.linalg.norm(FIXED[other] - place, axis=1) + rng.normal(0.0, 0.03, len(t))
+    i, j = np.triu_indices(len(FIXED), 1)
+    surveyed = np.linalg.norm(FIXED[i] - FIXED[j], axis=1)
+    zeros = np.zeros(len(t), dtype=np.int64)
+    block = MeasurementBlock.concatenate([
+        MeasurementBlock.of_kind(Kind.STATE, t, zeros, values),
+        MeasurementBlock.of_kind(Kind.SURVEY, np.zeros(len(i)), i + 1, surveyed[:, None], j=j + 1),
+        MeasurementBlock.of_kind(Kind.RANGE, t + 0.005, zeros, z[:, None], j=other + 1),
+    ]).sorted()  # fmt: skip
+    return tracker.run(block, np.arange(1.0, 12.0, 0.5)[None]).pos_ij_w[0]
+
+
+def test_a_tilt_that_changes_as_it_is_told_changes_little():
+    """What is left is of how samples are summed: a turn counts from the next sum on."""
+    small, known = 1e-5, slice(6, None)
+    told, untold = (
+        np.abs(walk(small, told)[known] - walk(0.0, told)[known]).max() / small
+        for told in (True, False)
+    )
+    assert untold > 5.0  # [m/rad]
+    assert told < 0.15 * untold
