@@ -15,7 +15,7 @@ from tracking._magnetic_kernels import COS, SIN
 from tracking._rest_kernels import RESTING
 from tracking._vqf_kernels import (
     Q_6D,
-    UPRIGHT,
+    TURN,
     about_vertical,
     start_vqf,
     turned,
@@ -23,6 +23,7 @@ from tracking._vqf_kernels import (
     update_vqf,
 )
 from tracking.compiled import kernel, small_kernel
+from tracking.measurements import LEAN_VAR, TOLD, UPRIGHT
 
 # Plain numbers of `Kind`: kernels do not know enums.
 MAG, IMU, STATE = 1, 2, 3
@@ -113,15 +114,15 @@ def tell_upright(s, e, n, cos, sin, values, k):
     """
     m, q = s.node, s.tilt
     turn_cos, turn_sin = cos * cos - sin * sin, 2.0 * cos * sin
-    x, y = q[e, n, UPRIGHT], q[e, n, UPRIGHT + 1]
-    q[e, n, UPRIGHT] = q[e, n, UPRIGHT + 1] = 0.0
+    x, y = q[e, n, TURN], q[e, n, TURN + 1]
+    q[e, n, TURN] = q[e, n, TURN + 1] = 0.0
     m[e, n, TURNED] += turn_cos * x - turn_sin * y
     m[e, n, TURNED + 1] += turn_sin * x + turn_cos * y
-    values[e, k, 8] = 1.0
-    values[e, k, 9], values[e, k, 10] = m[e, n, TURNED], m[e, n, TURNED + 1]
+    values[e, k, TOLD] = 1.0
+    values[e, k, UPRIGHT], values[e, k, UPRIGHT + 1] = m[e, n, TURNED], m[e, n, TURNED + 1]
     qw, qx = q[e, n, Q_6D], q[e, n, Q_6D + 1]
     qy, qz = q[e, n, Q_6D + 2], q[e, n, Q_6D + 3]
-    values[e, k, 11] = leaning_variance(
+    values[e, k, LEAN_VAR] = leaning_variance(
         s.bias, e, n,
         2.0 * (qx * qz - qw * qy), 2.0 * (qy * qz + qw * qx), 1.0 - 2.0 * (qx * qx + qy * qy),
     )  # fmt: skip

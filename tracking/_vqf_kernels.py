@@ -25,10 +25,11 @@ from tracking._rest_kernels import GYR, N_REST, RESTING, watch_accelerometer, wa
 from tracking.compiled import kernel, small_kernel
 
 Q_GYR, Q_ACC, Q_6D, FORCE, N_GYR_READ, N_ACC_READ = 0, 4, 8, 12, 21, 22
-UPRIGHT = 23
+TURN = 23
 N_TILT = 25
 """Columns of the memory: the rotations; the low pass of the specific force in the frame of the
-gyroscope; numbers of readings; by how much it was turned upright, about x and y [rad]."""
+gyroscope; numbers of readings; by how much it was turned upright since that was told, about x and
+y [rad]."""
 
 
 @small_kernel
@@ -132,8 +133,8 @@ def correct_tilt(s, c, e, n, ax, ay, az):
     cw, cx, cy = 0.0, 1.0, 0.0
     if half > 1e-6:
         cw, cx, cy = half, 0.5 * uy / half, -0.5 * ux / half
-    q[e, n, UPRIGHT] += 2.0 * cx
-    q[e, n, UPRIGHT + 1] += 2.0 * cy
+    q[e, n, TURN] += 2.0 * cx
+    q[e, n, TURN + 1] += 2.0 * cy
     w, x, y, z = multiply(cw, cx, cy, 0.0, aw, bx, by, bz)
     store_unit(q, e, n, Q_ACC, w, x, y, z)
     store_6d(q, e, n)

@@ -17,6 +17,8 @@ from tracking.arrays import F64, I64, Bool
 
 N_VALUES = 12
 """Columns of `MeasurementBlock.values`."""
+TOLD, UPRIGHT, LEAN_VAR = 8, 9, 11
+"""Columns of what a STATE event tells beside orientation and acceleration, see `Kind`."""
 
 
 class Kind(IntEnum):

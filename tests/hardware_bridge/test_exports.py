@@ -15,7 +15,7 @@ from tracking.constellation import Antenna, Constellation, NodeConfig
 from tracking.estimate import Status, TeamEstimate
 from tracking.geometry import GRAVITY, quat_from_yaw, quat_multiply, rotate
 from tracking.log import read_log
-from tracking.measurements import Kind, MeasurementBlock
+from tracking.measurements import N_VALUES, Kind, MeasurementBlock
 
 GROUP = Constellation(
     nodes=(
@@ -232,7 +232,7 @@ def test_a_log_folder_reads_back_to_the_last_bit(block, tmp_path):
         assert np.array_equal(getattr(log.block, name), getattr(wanted, name)), name
     # Orientations are made of unit length, and powers that are none are not written.
     values = np.where(
-        (wanted.kind == Kind.RANGE)[..., None] & ~wanted.has_power[..., None] & (np.arange(8) > 0),
+        (wanted.kind == Kind.RANGE)[..., None] & ~wanted.has_power[..., None] & (np.arange(N_VALUES) > 0),
         0.0,
         wanted.values,
     )

@@ -38,6 +38,7 @@ from tracking.filters.joint._peak_kernels import (
     least_curvature,
 )
 from tracking.filters.joint._turned_kernels import tilt_to_rise
+from tracking.filters.joint._upright_kernels import STEP
 
 LOOSE = 3.0
 """[-] Each element of M has a variance of a third, over all rotations."""
@@ -119,7 +120,7 @@ def carry_slope(c, s, h, scratch):
             for e in range(9 if node.at_o >= 0 else 0):
                 z[v + e // 3] -= w[9 + e] * z[node.at_o + e % 3]
                 z[p + e // 3] -= w[18 + e] * z[node.at_o + e % 3]
-            z[b + row] += (w[31], w[32], 0.0)[column] if node.at_o >= 0 else 0.0
+            z[b + row] += (w[STEP], w[STEP + 1], 0.0)[column] if node.at_o >= 0 else 0.0
             # A turn by the heading error is one of M as well.
             z[p + row] += (w[6], -w[5], w[28])[column]
             z[v + row] += (w[8], -w[7], w[27])[column]

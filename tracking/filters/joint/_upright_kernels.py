@@ -15,9 +15,8 @@ from __future__ import annotations
 
 from tracking.compiled import small_kernel
 from tracking.geometry import GRAVITY
+from tracking.measurements import LEAN_VAR, TOLD, UPRIGHT
 
-TOLD, UPRIGHT, LEAN_VAR = 8, 9, 11
-"""Columns of the values of a STATE event."""
 GAIN = 30
 """First of two columns of the sums since the states' time: the bias that was added [m/s2]."""
 STEP = 31
