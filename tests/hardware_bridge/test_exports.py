@@ -231,8 +231,9 @@ def test_a_log_folder_reads_back_to_the_last_bit(block, tmp_path):
     for name in ("t", "kind", "i", "j", "antenna_i", "antenna_j", "has_power"):
         assert np.array_equal(getattr(log.block, name), getattr(wanted, name)), name
     # Orientations are made of unit length, and powers that are none are not written.
+    unsaid = (wanted.kind == Kind.RANGE) & ~wanted.has_power
     values = np.where(
-        (wanted.kind == Kind.RANGE)[..., None] & ~wanted.has_power[..., None] & (np.arange(N_VALUES) > 0),
+        unsaid[..., None] & (np.arange(N_VALUES) > 0),
         0.0,
         wanted.values,
     )
