@@ -19,6 +19,7 @@ from tracking.filters.joint._antenna_kernels import antenna_offset, note_levers
 from tracking.filters.joint._flatness_kernels import flatness
 from tracking.filters.joint._range_kernels import range_model
 from tracking.filters.joint._sample_kernels import sum_inertial
+from tracking.filters.joint._upright_kernels import GAIN
 from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.records import as_records
@@ -209,6 +210,31 @@ def test_slopes_are_carried_as_errors_of_the_states_are(vehicle):
         _open_kernels.carry_slope(c, s, 0, scratch)
         np.testing.assert_allclose(s.slope[0, 0], expected, atol=1e-6)
         s.slope[0] = before
+
+
+def test_what_an_orientation_is_turned_upright_by_turns_with_the_frame():
+    """Its bias is one of the world: with the turn M it is ``M u`` in the frame."""
+    c, s, scratch, _ = open_group("hand")
+    s.held[:, 4:], s.nodes["told"] = 0.0, True
+    x0, reached = s.x[0].copy(), []
+    gain = np.random.default_rng(4).standard_normal((3, 2))
+    for given_ in (0.0 * gain, gain):
+        s.x[0], s.slope[0], s.pre[:] = x0, 0.0, 0.0
+        for i in range(3):
+            s.nodes["t_pre"][i] = 0.0
+            sum_inertial(c, s.nodes, s.held, s.pre, i, 0.05)
+        s.pre[:, GAIN : GAIN + 2] = given_
+        _motion_kernels.predict(c, s, 0, 0.05, scratch)
+        _open_kernels.carry_slope(c, s, 0, scratch)
+        reached.append((s.x[0].copy(), s.slope[0].copy()))
+    (x, slope), (x_told, slope_told) = reached
+    for i, at in enumerate(s.nodes["at_b"]):
+        cos, sin = np.cos(x0[s.nodes["at_h"][i]]), np.sin(x0[s.nodes["at_h"][i]])
+        u = np.array([*(np.array([[cos, -sin], [sin, cos]]) @ gain[i]), 0.0])
+        keep = scratch.scale[at : at + 3]
+        np.testing.assert_allclose((x_told - x)[at : at + 3], keep * u, atol=1e-9)
+        by_turn = (slope_told - slope)[:, at : at + 3].reshape(3, 3, 3)
+        np.testing.assert_allclose(by_turn, np.einsum("ra,q,r->rqa", np.eye(3), u, keep), atol=1e-9)
 
 
 def test_what_stands_still_tells_nothing_of_a_turn():
