@@ -17,6 +17,15 @@ from tracking.filters.joint._flatness_kernels import least_axis
 from tracking.filters.joint._mirror_kernels import mirror, mirror_plainly
 from tracking.filters.joint._product_kernels import take_off, take_off_plainly
 from tracking.filters.joint._projection_kernels import sum_rows, sum_rows_plainly
+from tracking.filters.joint._step_kernels import (
+    ROOM,
+    SHAPES,
+    STATES,
+    add_to_columns,
+    add_to_columns_plainly,
+    add_to_rows,
+    add_to_rows_plainly,
+)
 from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.records import as_records
@@ -169,6 +178,53 @@ def test_one_half_is_the_mirror_image_of_the_other(n, rows):
     mirror(P, 1, rows)
     mirror_plainly(twin, 1, rows)
     np.testing.assert_array_equal(P, twin)
+
+
+def step_to_add(p, shape, n, seed):
+    """What `add_to_rows` takes: a random covariance and step of the second of two nodes."""
+    rng = np.random.default_rng(seed)
+    d, m = shape
+    A = rng.standard_normal((2, n, n))
+    F = np.zeros((2, STATES + 1, ROOM))
+    F[1, :m, : 2 * d] = rng.standard_normal((m, 2 * d))
+    F[1, STATES, :d] = 0.1
+    if d == 3:  # a vertical bias adds to the height only, and in space nothing else without offset
+        F[1, 2, [0, 1, 3, 4]] = 0.0
+        if m < STATES:
+            F[1][np.ix_([0, 1, 3], [2, 5])] = 0.0
+    return A @ np.swapaxes(A, 1, 2), 1, p, n - m, m, F, 1
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize(("n", "p"), [(19, 4), (24, 0), (40, 12), (96, 30)])
+def test_a_step_is_a_product_with_its_derivatives(n, p, shape):
+    arguments = step_to_add(p, shape, n, seed=n)
+    P, h, _, b, m, F, i = arguments
+    d, before = shape[0], P.copy()
+    T = np.eye(n)
+    T[p : p + d, p + d : p + 2 * d] = 0.1 * np.eye(d)
+    T[p : p + 2 * d, b : b + m] = F[i, :m, : 2 * d].T
+    whole = T @ before[h] @ T.T
+    add_to_rows(*arguments)
+    np.testing.assert_allclose(P[h], T @ before[h], atol=1e-12 * n)
+    add_to_columns(*arguments)
+    end = p + 2 * d
+    np.testing.assert_allclose(P[h, :end], whole[:end], atol=1e-12 * n)
+    np.testing.assert_array_equal(P[0], before[0])
+
+
+@pytest.mark.skipif(config.DISABLE_JIT, reason="the plain loops are all there is")
+@pytest.mark.parametrize("add", [add_to_rows, add_to_columns])
+@pytest.mark.parametrize("lanes", [2, 4, 8])
+def test_a_step_in_registers_of_any_width_is_the_same(monkeypatch, lanes, add):
+    monkeypatch.setattr(_vector_kernels, "LANES", lanes)
+    anew = njit(add.py_func)  # kept nowhere
+    plainly = add_to_rows_plainly if add is add_to_rows else add_to_columns_plainly
+    for shape in SHAPES:
+        ours, twin = step_to_add(6, shape, 40, 1), step_to_add(6, shape, 40, 1)
+        anew(*ours)
+        plainly(*twin)
+        np.testing.assert_allclose(ours[0], twin[0], atol=1e-12)
 
 
 @pytest.mark.skipif(config.DISABLE_JIT, reason="the plain loops are all there is")

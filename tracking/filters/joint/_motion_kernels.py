@@ -19,14 +19,15 @@ import numpy as np
 
 from tracking._angle_kernels import cosine_sine
 from tracking._exponential_kernels import decay
+from tracking.arrays import LINE
 from tracking.compiled import small_kernel
 from tracking.filters.joint._mirror_kernels import mirror
+from tracking.filters.joint._step_kernels import STATES, add_to_columns, add_to_rows
 from tracking.filters.joint._turned_kernels import (
     PER_GRAVITY,
     measured_motion,
-    turn_columns,
     turn_offset,
-    turn_rows,
+    write_turned,
 )
 from tracking.filters.joint._upright_kernels import bias_time, lean_noise, turn_upright
 
@@ -44,9 +45,9 @@ def predict(c, s, h, step, scratch):
             of each node; `speed`.
     """
     nodes, pairs, x, P = s.nodes, s.pairs, s.x, s.P
-    scale, w, speed = scratch.scale, scratch.step, scratch.speed
-    n, d = c.n, c.d
-    for r in range(n):
+    scale, w, F, speed = scratch.scale, scratch.step, scratch.derivatives, scratch.speed
+    d = c.d
+    for r in range(P.shape[2]):
         scale[r] = 1.0
     for i in range(nodes.shape[0]):
         speed[i] = 0.0
@@ -66,11 +67,12 @@ def predict(c, s, h, step, scratch):
         x[h, at + 1] += (1.0 - scale[at + 1]) * hidden * c.excess
     for i in range(nodes.shape[0]):
         if moves(nodes[i]):
-            move_rows(d, n, nodes[i], P, h, i, w)
+            write_derivatives(d, nodes[i], w, i, F)
+            add_to_rows(P, h, nodes[i].at_p, nodes[i].at_b, states_behind(nodes[i]), F, i)
     for i in range(nodes.shape[0]):
         if moves(nodes[i]):
-            move_columns(d, nodes[i], P, h, i, w)
-    fade(P, h, c.n_motion, n, scale)
+            add_to_columns(P, h, nodes[i].at_p, nodes[i].at_b, states_behind(nodes[i]), F, i)
+    fade(P, h, c.n_motion, scale)
     for i in range(nodes.shape[0]):
         if nodes[i].present:
             add_noise(c, nodes[i], s.pre, P, h, i, scale, step)
@@ -164,66 +166,44 @@ def way_since(c, s, h, i):
 
 
 @small_kernel
-def move_rows(d, n, node, P, h, i, w):
-    """``F P``: the rows of position and velocity of node i."""
-    p, v, b, y = node.at_p, node.at_v, node.at_b, node.at_h
-    T, pc, ps, vc, vs = w[i, 0], w[i, 1], w[i, 2], w[i, 3], w[i, 4]
-    yp0, yp1, yv0, yv1 = w[i, 5], w[i, 6], w[i, 7], w[i, 8]
-    for k in range(n):
-        b0, b1, y0 = P[h, b, k], P[h, b + 1, k], P[h, y, k]
-        P[h, p, k] += T * P[h, v, k] - pc * b0 + ps * b1 + yp0 * y0
-        P[h, p + 1, k] += T * P[h, v + 1, k] - ps * b0 - pc * b1 + yp1 * y0
-        P[h, v, k] += -vc * b0 + vs * b1 + yv0 * y0
-        P[h, v + 1, k] += -vs * b0 - vc * b1 + yv1 * y0
-    if d == 3:
-        half = 0.5 * T * T
-        for k in range(n):
-            P[h, p + 2, k] += T * P[h, v + 2, k] - half * P[h, b + 2, k]
-            P[h, v + 2, k] -= T * P[h, b + 2, k]
-    if node.at_o >= 0:
-        turn_rows(n, node, P, h, i, w)
-
-
-@small_kernel
 def moves(node):
     """True for a node of the group that is not fixed."""
     return node.present and not node.static
 
 
 @small_kernel
-def move_columns(d, node, P, h, i, w):
-    """``F P F^T``, the rows done: the columns of position and velocity of node i.
-
-    Down to the diagonal: `fade` mirrors what is right of it.
-    """
-    p, v, b, y = node.at_p, node.at_v, node.at_b, node.at_h
-    T, pc, ps, vc, vs = w[i, 0], w[i, 1], w[i, 2], w[i, 3], w[i, 4]
-    yp0, yp1, yv0, yv1 = w[i, 5], w[i, 6], w[i, 7], w[i, 8]
-    half = 0.5 * T * T
-    for r in range(v + d):
-        b0, b1, y0 = P[h, r, b], P[h, r, b + 1], P[h, r, y]
-        v0, v1 = P[h, r, v], P[h, r, v + 1]
-        P[h, r, p] += T * v0 - pc * b0 + ps * b1 + yp0 * y0
-        P[h, r, p + 1] += T * v1 - ps * b0 - pc * b1 + yp1 * y0
-        P[h, r, v] = v0 + (-vc * b0 + vs * b1 + yv0 * y0)
-        P[h, r, v + 1] = v1 + (-vs * b0 - vc * b1 + yv1 * y0)
-        if d == 3:
-            P[h, r, p + 2] += T * P[h, r, v + 2] - half * P[h, r, b + 2]
-            P[h, r, v + 2] -= T * P[h, r, b + 2]
-    if node.at_o >= 0:
-        turn_columns(node, P, h, i, w)
+def states_behind(node):
+    """How many states stand behind position and velocity of a node: bias, offset, heading."""
+    return node.at_h + 1 - node.at_b
 
 
 @small_kernel
-def fade(P, h, n_motion, n, scale):
+def write_derivatives(d, node, w, i, F):
+    """What position and velocity of node i gain by the states behind, to `_step_kernels`' F."""
+    T, pc, ps, vc, vs = w[i, 0], w[i, 1], w[i, 2], w[i, 3], w[i, 4]
+    y = node.at_h - node.at_b
+    F[i, :, :] = 0.0
+    F[i, STATES, :d] = T
+    F[i, 0, 0], F[i, 0, 1], F[i, 0, d], F[i, 0, d + 1] = -pc, -ps, -vc, -vs
+    F[i, 1, 0], F[i, 1, 1], F[i, 1, d], F[i, 1, d + 1] = ps, -pc, vs, -vc
+    F[i, y, 0], F[i, y, 1], F[i, y, d], F[i, y, d + 1] = w[i, 5], w[i, 6], w[i, 7], w[i, 8]
+    if d == 3:
+        F[i, 2, 2], F[i, 2, 5] = -0.5 * T * T, -T
+    if node.at_o >= 0:
+        write_turned(w, i, F)
+
+
+@small_kernel
+def fade(P, h, n_motion, scale):
     """What decays, right of positions and velocities and below; then left of the diagonal."""
-    end = np.uint64(n)  # unsigned: no index from the end
+    # Unsigned: no index from the end. Whole lines: the few before them stay as they are.
+    first, end = np.uint64(n_motion // LINE * LINE), np.uint64(P.shape[2])
     for r in range(n_motion):
-        for k in range(np.uint64(n_motion), end):
+        for k in range(first, end):
             P[h, r, k] *= scale[k]
     for r in range(np.uint64(n_motion), end):
         s = scale[r]
-        for k in range(np.uint64(n_motion), end):
+        for k in range(first, end):
             P[h, r, k] *= s * scale[k]
     mirror(P, h, n_motion)
 

@@ -29,7 +29,7 @@ import numpy as np
 from tracking.compiled import allocating_kernel, kernel, small_kernel
 from tracking.filters.joint._antenna_kernels import turn_with_world
 from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_part
-from tracking.filters.joint._motion_kernels import moves
+from tracking.filters.joint._motion_kernels import moves, states_behind
 from tracking.filters.joint._peak_kernels import (
     climb,
     find_peaks,
@@ -37,7 +37,7 @@ from tracking.filters.joint._peak_kernels import (
     is_near,
     least_curvature,
 )
-from tracking.filters.joint._turned_kernels import tilt_to_rise
+from tracking.filters.joint._step_kernels import STATES
 from tracking.filters.joint._upright_kernels import STEP
 
 LOOSE = 3.0
@@ -105,21 +105,11 @@ def carry_slope(c, s, h, scratch):
             node = s.nodes[i]
             if not moves(node):
                 continue
-            p, v, b, w = node.at_p, node.at_v, node.at_b, scratch.step[i]
-            T, b0, b1, b2, psi = w[0], z[b], z[b + 1], z[b + 2], z[node.at_h]
-            z[p] += T * z[v] - w[1] * b0 + w[2] * b1 + w[5] * psi
-            z[p + 1] += T * z[v + 1] - w[2] * b0 - w[1] * b1 + w[6] * psi
-            z[p + 2] += T * z[v + 2] - 0.5 * T * T * b2
-            z[v] += -w[3] * b0 + w[4] * b1 + w[7] * psi
-            z[v + 1] += -w[4] * b0 - w[3] * b1 + w[8] * psi
-            z[v + 2] -= T * b2
-            if node.at_o >= 0:
-                pb0, pb1, py, vb0, vb1, vy = tilt_to_rise(scratch.step, i)
-                z[p + 2] += pb0 * b0 + pb1 * b1 + py * psi
-                z[v + 2] += vb0 * b0 + vb1 * b1 + vy * psi
-            for e in range(9 if node.at_o >= 0 else 0):
-                z[v + e // 3] -= w[9 + e] * z[node.at_o + e % 3]
-                z[p + e // 3] -= w[18 + e] * z[node.at_o + e % 3]
+            p, v, b, w, F = node.at_p, node.at_v, node.at_b, scratch.step[i], scratch.derivatives[i]
+            for r in range(6):
+                z[p + r] += F[STATES, r] * z[p + 3 + r] if r < 3 else 0.0
+                for q in range(states_behind(node)):
+                    z[p + r] += F[q, r] * z[b + q]
             z[b + row] += (w[STEP], w[STEP + 1], 0.0)[column] if node.at_o >= 0 else 0.0
             # A turn by the heading error is one of M as well.
             z[p + row] += (w[6], -w[5], w[28])[column]

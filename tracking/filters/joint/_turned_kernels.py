@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from tracking._exponential_kernels import decay
 from tracking.compiled import small_kernel
+from tracking.filters.joint._step_kernels import STATES
 from tracking.geometry import GRAVITY
 
 PER_GRAVITY = 1.0 / GRAVITY
@@ -51,42 +52,12 @@ def turn_offset(node, pre, x, h, i, cos_r, sin_r, scale, w):
 
 
 @small_kernel
-def tilt_to_rise(w, i):
-    """Derivatives of height and rise by a horizontal bias and the heading, from row i of `step`."""
-    g = PER_GRAVITY
-    return g * w[i, 6], -g * w[i, 5], g * w[i, 30], g * w[i, 8], -g * w[i, 7], g * w[i, 29]
-
-
-@small_kernel
-def turn_rows(n, node, P, h, i, w):
-    """What offset, bias and heading add to the rows of position and velocity of node i."""
-    p, v, b, y, at_o = node.at_p, node.at_v, node.at_b, node.at_h, node.at_o
-    pb0, pb1, py, vb0, vb1, vy = tilt_to_rise(w, i)
-    for k in range(n):
-        b0, b1, y0 = P[h, b, k], P[h, b + 1, k], P[h, y, k]
-        P[h, p + 2, k] += pb0 * b0 + pb1 * b1 + py * y0
-        P[h, v + 2, k] += vb0 * b0 + vb1 * b1 + vy * y0
-    for k in range(n):
-        o0, o1, o2 = P[h, at_o, k], P[h, at_o + 1, k], P[h, at_o + 2, k]
-        for r in range(3):
-            at = 9 + 3 * r
-            P[h, v + r, k] -= w[i, at] * o0 + w[i, at + 1] * o1 + w[i, at + 2] * o2
-            at = 18 + 3 * r
-            P[h, p + r, k] -= w[i, at] * o0 + w[i, at + 1] * o1 + w[i, at + 2] * o2
-
-
-@small_kernel
-def turn_columns(node, P, h, i, w):
-    """The same for the columns, down to the diagonal."""
-    p, v, b, y, at_o = node.at_p, node.at_v, node.at_b, node.at_h, node.at_o
-    pb0, pb1, py, vb0, vb1, vy = tilt_to_rise(w, i)
-    for r in range(v + 3):
-        b0, b1, y0 = P[h, r, b], P[h, r, b + 1], P[h, r, y]
-        P[h, r, p + 2] += pb0 * b0 + pb1 * b1 + py * y0
-        P[h, r, v + 2] += vb0 * b0 + vb1 * b1 + vy * y0
-        o0, o1, o2 = P[h, r, at_o], P[h, r, at_o + 1], P[h, r, at_o + 2]
+def write_turned(w, i, F):
+    """What a node in space gains by its offset, and what its height does by a tilt, to F."""
+    g, y = PER_GRAVITY, STATES - 1
+    F[i, 0, 2], F[i, 1, 2], F[i, y, 2] = g * w[i, 6], -g * w[i, 5], g * w[i, 30]
+    F[i, 0, 5], F[i, 1, 5], F[i, y, 5] = g * w[i, 8], -g * w[i, 7], g * w[i, 29]
+    for r in range(3):
         for k in range(3):
-            at = 9 + 3 * k
-            P[h, r, v + k] -= w[i, at] * o0 + w[i, at + 1] * o1 + w[i, at + 2] * o2
-            at = 18 + 3 * k
-            P[h, r, p + k] -= w[i, at] * o0 + w[i, at + 1] * o1 + w[i, at + 2] * o2
+            F[i, 3 + k, r] = -w[i, 18 + 3 * r + k]
+            F[i, 3 + k, 3 + r] = -w[i, 9 + 3 * r + k]

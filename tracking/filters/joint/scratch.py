@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracking.arrays import F64, I64, aligned
+from tracking.filters.joint._step_kernels import ROOM, STATES
 from tracking.filters.joint.state import N_PRE, room_to_wait
 
 
@@ -25,6 +26,8 @@ class Scratch(NamedTuple):
     """(state)"""
     step: F64
     """(node, 33)"""
+    derivatives: F64
+    """Of position and velocity by the states behind, see `_step_kernels`."""
     speed: F64
     """(node)"""
     none: F64
@@ -59,6 +62,7 @@ def make_scratch(n_nodes: int, n_pairs: int, n_states: int) -> Scratch:
         share=np.zeros(room_to_wait(n_states)),
         scale=aligned(n_states),
         step=np.zeros((n_nodes, 33)),
+        derivatives=aligned(n_nodes, STATES + 1, ROOM),
         speed=np.zeros(n_nodes),
         none=np.zeros(3),
         x=aligned(1, n_states),
