@@ -8,6 +8,7 @@ from tracking.filters.joint._carrier_kernels import apply_carriers, centre
 from tracking.filters.joint._linear_kernels import absorb, project, settle
 from tracking.filters.joint._motion_kernels import predict
 from tracking.filters.joint._range_kernels import range_model
+from tracking.filters.joint._rest_kernels import learn_at_rest
 from tracking.filters.joint._sample_kernels import sum_inertial, take_state
 from tracking.filters.joint._sight_kernels import change_sight
 from tracking.filters.joint._start_kernels import begin_node, begin_pair, forget_sums
@@ -92,6 +93,9 @@ def run_bound(coefficients, layout, s, scratch, block, hidden, truth, turn_var, 
                     sum_inertial(c, s.nodes, s.held, s.pre, i, now)
             settle(s, 0)
             predict(c, s, 0, now - group.t, scratch)
+            for i in range(n):
+                if s.nodes[i].told:
+                    learn_at_rest(s, 0, i, scratch)
             s.pre[:, :N_PRE] = 0.0
             group.t = now
         put_on_truth(c, s, truth, k)

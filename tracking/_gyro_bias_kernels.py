@@ -56,13 +56,9 @@ def worst_variance(bias, e, n):
 
 
 @small_kernel
-def leaning_variance(bias, e, n, x, y, z):
-    """Mean variance of the bias across the vertical (x, y, z) in the body [(rad/s)^2]."""
-    p00, p01, p02 = bias[e, n, P], bias[e, n, P + 1], bias[e, n, P + 2]
-    p11, p12, p22 = bias[e, n, P + 3], bias[e, n, P + 4], bias[e, n, P + 5]
-    along = x * (p00 * x + p01 * y + p02 * z) + y * (p01 * x + p11 * y + p12 * z)
-    along += z * (p02 * x + p12 * y + p22 * z)
-    return 0.5 * (p00 + p11 + p22 - along) * UNIT * UNIT
+def mean_variance(bias, e, n):
+    """Mean variance of the bias about an axis [(rad/s)^2]."""
+    return (bias[e, n, P] + bias[e, n, P + 3] + bias[e, n, P + 5]) / 3.0 * UNIT * UNIT
 
 
 @small_kernel

@@ -10,7 +10,7 @@ from __future__ import annotations
 from tracking.compiled import kernel, small_kernel
 from tracking.measurements import N_VALUES
 
-TIME, KIND, NODE_I, NODE_J, ANTENNA_I, ANTENNA_J, VALUES, HAS_POWER = 0, 1, 2, 3, 4, 5, 6, 18
+TIME, KIND, NODE_I, NODE_J, ANTENNA_I, ANTENNA_J, VALUES, HAS_POWER = 0, 1, 2, 3, 4, 5, 6, 22
 """Columns of a slot: the fields of `MeasurementBlock` [s, -], their order that of handling."""
 N_COLUMNS = 24
 """Columns of a slot, three lines of the cache; those after the last mean nothing."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from tracking._gyro_bias_kernels import START_VAR, leaning_variance, worst_variance
+from tracking._gyro_bias_kernels import BIAS, START_VAR, mean_variance, worst_variance
 from tracking._inertial_kernels import GOOD, inspect_sample
 from tracking._limit_kernels import find_limits
 from tracking._magnetic_kernels import COS, SIN
@@ -23,7 +23,7 @@ from tracking._vqf_kernels import (
     update_vqf,
 )
 from tracking.compiled import kernel, small_kernel
-from tracking.measurements import LEAN_VAR, TOLD, UPRIGHT
+from tracking.measurements import GYRO_BIAS, GYRO_VAR, TOLD, UPRIGHT
 
 # Plain numbers of `Kind`: kernels do not know enums.
 MAG, IMU, STATE = 1, 2, 3
@@ -108,7 +108,7 @@ def take_sample(c, s, e, n, t, kind, values, valid, k):
 
 @small_kernel
 def tell_upright(s, e, n, cos, sin, values, k):
-    """Write how node n was turned upright so far, and how fast its gyroscope may lean.
+    """Write how node n was turned upright so far, and what is taken for its gyroscope's bias.
 
     Cosine and sine are of half the turn about the vertical that gives its heading.
     """
@@ -118,14 +118,11 @@ def tell_upright(s, e, n, cos, sin, values, k):
     q[e, n, TURN] = q[e, n, TURN + 1] = 0.0
     m[e, n, TURNED] += turn_cos * x - turn_sin * y
     m[e, n, TURNED + 1] += turn_sin * x + turn_cos * y
-    values[e, k, TOLD] = 1.0
+    values[e, k, TOLD] = 2.0 if s.rest[e, n, RESTING] != 0.0 else 1.0
     values[e, k, UPRIGHT], values[e, k, UPRIGHT + 1] = m[e, n, TURNED], m[e, n, TURNED + 1]
-    qw, qx = q[e, n, Q_6D], q[e, n, Q_6D + 1]
-    qy, qz = q[e, n, Q_6D + 2], q[e, n, Q_6D + 3]
-    values[e, k, LEAN_VAR] = leaning_variance(
-        s.bias, e, n,
-        2.0 * (qx * qz - qw * qy), 2.0 * (qy * qz + qw * qx), 1.0 - 2.0 * (qx * qx + qy * qy),
-    )  # fmt: skip
+    for a in range(3):
+        values[e, k, GYRO_BIAS + a] = s.bias[e, n, BIAS + a]
+    values[e, k, GYRO_VAR] = mean_variance(s.bias, e, n)
 
 
 @small_kernel

@@ -15,9 +15,9 @@ import numpy as np
 
 from tracking.arrays import F64, I64, Bool
 
-N_VALUES = 12
+N_VALUES = 16
 """Columns of `MeasurementBlock.values`."""
-TOLD, UPRIGHT, LEAN_VAR = 8, 9, 11
+TOLD, UPRIGHT, GYRO_BIAS, GYRO_VAR = 8, 9, 11, 14
 """Columns of what a STATE event tells beside orientation and acceleration, see `Kind`."""
 
 
@@ -37,9 +37,9 @@ class Kind(IntEnum):
     """Node i's own orientation filter: q_wb (w x y z), gravity-free accel_w x y z [m/s2], then
     which part of it means nothing because the sensor is at the end of its scale: 0 none, 1 what
     is along the body's z, 2 more than that. Then 1 if the rest is told, as the tracker's own
-    orientations do: by how much it has been turned upright so far, about x and y of the world
-    [rad], and the variance of the rate at which its gyroscope makes it lean about one of them
-    [(rad/s)^2]."""
+    orientations do, 2 if it is and the body rests: by how much it has been turned upright so far,
+    about x and y of the world [rad]; the bias that is taken off its gyroscope, x y z in the body
+    [rad/s], and the variance of that about one axis [(rad/s)^2]."""
     SURVEY = 4
     """Distance between static nodes i and j that was surveyed, not ranged [m]."""
     RANGE = 5

@@ -71,14 +71,20 @@ def test_once_it_is_found_how_the_group_is_turned_it_is_so_for_good(data):
     assert found.rmse_yaw <= 0.15
 
 
-@pytest.mark.xfail(
-    strict=True, reason="its layout leans by 10 to 25 degrees at first: shape 0.153 m"
-)
-def test_a_walk_is_followed_once_it_is_found_how_the_group_is_turned(data):
+@pytest.fixture(scope="module")
+def settled_walk(data):
+    """Its score once it is found how the group is turned."""
+    return track_log(data / "logs" / "isas_walk1", skip=20.0).score
+
+
+def test_a_walk_is_followed_once_it_is_found_how_the_group_is_turned(settled_walk):
+    assert settled_walk.rmse_yaw <= 0.35
+
+
+@pytest.mark.xfail(strict=True, reason="its layout leans by 10 to 25 degrees at first: 0.144 m")
+def test_its_shape_is_too(settled_walk):
     """With a turn that nothing had measured it was: by luck, as other headings at first showed."""
-    walk = track_log(data / "logs" / "isas_walk1", skip=20.0).score
-    assert walk.rmse_yaw <= 0.35
-    assert walk.rmse_shape <= 0.13
+    assert settled_walk.rmse_shape <= 0.13
 
 
 def test_recordings_are_near_what_their_ranges_allow(data):

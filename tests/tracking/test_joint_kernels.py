@@ -64,12 +64,15 @@ def carry(c, s, scratch, x, P, t=0.05):  # noqa: N803
     return s.x[0].copy(), s.P[0].copy()
 
 
-@pytest.mark.parametrize("vehicle", ["car", "human", "hand"])
+@pytest.mark.parametrize("vehicle", ["car", "human", "hand", "hand, told"])
 @pytest.mark.parametrize("dimensions", [2, 3])
 @pytest.mark.parametrize("static", [(), (3,)])
 def test_prediction_is_that_of_its_own_derivatives(dimensions, vehicle, static):
     """P -> F P F^T + Q with F from finite differences and Q from P = 0."""
+    vehicle, *told = vehicle.split(", ")
     c, s, scratch, _ = running(dimensions, vehicle, static=static)
+    s.nodes["told"] = (s.nodes["at_g"] >= 0) & bool(told)
+    s.nodes["by_gyroscope"] = True
     n = s.x.shape[1]
     # Range errors forget with the speed; their derivative by it is left out on purpose.
     x0 = s.x[0].copy()

@@ -8,7 +8,14 @@ from tracking import Constellation, NodeConfig, Tracker, TrackerParams
 from tracking.filters import FilterParams
 from tracking.filters.joint.params import CARRIERS, JointParams
 from tracking.geometry import GRAVITY
-from tracking.measurements import N_VALUES, Kind, MeasurementBlock
+from tracking.measurements import (
+    GYRO_VAR,
+    N_VALUES,
+    TOLD,
+    UPRIGHT,
+    Kind,
+    MeasurementBlock,
+)
 from tracking.orientation import Orientation, OrientationParams
 
 FIXED = np.array([[-2.0, -2.0, 0.2], [2.0, -1.5, 2.0], [1.5, 2.0, 0.4], [-1.8, 1.7, 1.9]])
@@ -29,17 +36,22 @@ def test_what_is_read_changes_by_what_was_turned_upright():
     stage = Orientation(Constellation(nodes=nodes, heading="initial"), OrientationParams())
     block = MeasurementBlock.of_kind(Kind.IMU, t, np.zeros(n, dtype=np.int64), imu)
     out = stage.step(block).values[0]
-    assert (out[:, 8] == 1.0).all()
-    assert (out[:, 11] > 0.0).all()
-    accel, (x, y) = out[:, 4:6], out[:, 9:11].T
+    assert np.isin(out[:, TOLD], (1.0, 2.0)).all()
+    assert (out[t > 1.9, TOLD][0], out[0, TOLD]) == (2.0, 1.0)  # at rest
+    assert (out[:, GYRO_VAR] > 0.0).all()
+    assert out[-1, GYRO_VAR] < 0.1 * out[0, GYRO_VAR]
+    accel, (x, y) = out[:, 4:6], out[:, UPRIGHT : UPRIGHT + 2].T
     moved = accel[t > 2.5] - GRAVITY * np.stack([y, -x], axis=1)[t > 2.5]
     turn = np.array([[np.cos(0.7), -np.sin(0.7)], [np.sin(0.7), np.cos(0.7)]])
     assert np.abs(accel[-1]).max() < 0.2 * np.abs(turn @ force[:2]).max()  # upright by now
     np.testing.assert_allclose(moved, np.tile(turn @ force[:2], (len(moved), 1)), atol=2e-3)
 
 
-def walk(upright, told, seed=0):
-    """Tracked states of a hand whose acceleration errs by a tilt that changes: (time, pair, 3)."""
+def walk(upright, told, lean=0.0, seconds=12.0, seed=0):
+    """A hand whose acceleration errs by a tilt that changes: places, (time, pair, 3), and tracker.
+
+    A gyroscope that leans by so much a second [rad/s] is told of by its variance only.
+    """
     rng = np.random.default_rng(seed)
     nodes = (
         NodeConfig(id=0, vehicle="hand", initial_heading=0.0),
@@ -48,7 +60,7 @@ def walk(upright, told, seed=0):
     carriers = {**CARRIERS, "hand": replace(CARRIERS["hand"], told_bias_tau=1e9)}
     params = TrackerParams(filter=FilterParams(joint=JointParams(carriers=carriers)))
     tracker = Tracker(Constellation(nodes=nodes, heading="initial", dimensions=3), params)
-    t = np.arange(0.0, 12.0, 0.01)
+    t = np.arange(0.0, seconds, 0.01)
     angle = np.array([0.7, 1.1, 1.6])
     place = np.array([1.0, 0.8, 0.4]) * np.sin(angle * t[:, None]) + [0.0, 0.0, 1.0]
     accel = -np.array([1.0, 0.8, 0.4]) * angle**2 * np.sin(angle * t[:, None])
@@ -56,9 +68,11 @@ def walk(upright, told, seed=0):
     values[:, 0], values[:, 4:7] = 1.0, accel
     tilt = upright * np.stack([np.sin(0.5 * t), np.cos(0.3 * t) - 1.0], axis=1)
     force = accel + [0.0, 0.0, GRAVITY]
-    values[:, 4:7] += np.cross(np.pad(tilt, ((0, 0), (0, 1))), force)
+    leans = tilt + np.stack([lean * t, 0.5 * lean * t], axis=1)
+    values[:, 4:7] += np.cross(np.pad(leans, ((0, 0), (0, 1))), force)
     if told:
-        values[:, 8], values[:, 9:11], values[:, 11] = 1.0, tilt, 1e-8
+        values[:, TOLD], values[:, UPRIGHT : UPRIGHT + 2] = 1.0, tilt
+        values[:, GYRO_VAR] = 1e-4 if lean else 1e-8
     other = np.arange(len(t)) % len(FIXED)
     z = np.linalg.norm(FIXED[other] - place, axis=1) + rng.normal(0.0, 0.03, len(t))
     i, j = np.triu_indices(len(FIXED), 1)
@@ -69,14 +83,14 @@ def walk(upright, told, seed=0):
         MeasurementBlock.of_kind(Kind.SURVEY, np.zeros(len(i)), i + 1, surveyed[:, None], j=j + 1),
         MeasurementBlock.of_kind(Kind.RANGE, t + 0.005, zeros, z[:, None], j=other + 1),
     ]).sorted()  # fmt: skip
-    return tracker.run(block, np.arange(1.0, 12.0, 0.5)[None]).pos_ij_w[0]
+    return tracker.run(block, np.arange(1.0, seconds, 0.5)[None]).pos_ij_w[0], tracker
 
 
 def test_a_tilt_that_changes_as_it_is_told_changes_little():
     """What is left is of how samples are summed: a turn counts from the next sum on."""
     small, known = 1e-5, slice(6, None)
     told, untold = (
-        np.abs(walk(small, told)[known] - walk(0.0, told)[known]).max() / small
+        np.abs(walk(small, told)[0][known] - walk(0.0, told)[0][known]).max() / small
         for told in (True, False)
     )
     assert untold > 5.0  # [m/rad]

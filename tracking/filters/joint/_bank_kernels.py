@@ -19,6 +19,7 @@ from tracking.filters._shape_kernels import SURVEYED
 from tracking.filters.joint._agreement_kernels import are_same, turn_between
 from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_hypothesis
 from tracking.filters.joint._flatness_kernels import flatness, least_axis, scatter_of
+from tracking.filters.joint._gyroscope_kernels import last_state
 from tracking.filters.joint._linear_kernels import decouple
 from tracking.filters.joint._open_kernels import can_open, doubt_turn
 from tracking.filters.joint._sleep_kernels import TIE, turn_all_ways
@@ -183,7 +184,7 @@ def remove_node(c, s, layout, i):
             for r in range(node.at_p, node.at_p + (c.d if node.static else 2 * c.d)):
                 s.moved[h, r] = 0.0
                 decouple(s, h, c.n, r, 1.0)
-            for r in range(node.at_b, node.at_b if node.static else node.at_h + 1):
+            for r in range(node.at_b, node.at_b if node.static else last_state(node) + 1):
                 decouple(s, h, c.n, r, 1.0)
             for k in range(s.nodes.shape[0]):
                 at = s.pairs[layout.pair_index[i, k]].at_e if k != i else -1

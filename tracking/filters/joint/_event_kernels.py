@@ -22,6 +22,7 @@ from tracking.filters.joint._misplaced_kernels import watch_places
 from tracking.filters.joint._motion_kernels import moves, predict
 from tracking.filters.joint._open_kernels import carry_slope, watch_turns
 from tracking.filters.joint._range_kernels import fuse_range
+from tracking.filters.joint._rest_kernels import learn_at_rest
 from tracking.filters.joint._rotation_kernels import carry_moves, follow_rotation
 from tracking.filters.joint._sample_kernels import sum_inertial, take_state
 from tracking.filters.joint._sight_kernels import gap_evidence
@@ -202,6 +203,9 @@ def carry(c, s, scratch, t):
             predict(c, s, h, t - group.t, scratch)
             if group.open:
                 carry_slope(c, s, h, scratch)
+            for i in range(s.nodes.shape[0]):
+                if moves(s.nodes[i]) and s.nodes[i].told:
+                    learn_at_rest(s, h, i, scratch)
             s.stays[h, :] = 1.0
     for i in range(s.nodes.shape[0]):
         for k in range(N_PRE):

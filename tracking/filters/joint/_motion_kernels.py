@@ -21,6 +21,7 @@ from tracking._angle_kernels import cosine_sine
 from tracking._exponential_kernels import decay
 from tracking.arrays import LINE
 from tracking.compiled import small_kernel
+from tracking.filters.joint._gyroscope_kernels import lean_columns, lean_rows
 from tracking.filters.joint._mirror_kernels import mirror
 from tracking.filters.joint._step_kernels import STATES, add_to_columns, add_to_rows
 from tracking.filters.joint._turned_kernels import (
@@ -29,7 +30,7 @@ from tracking.filters.joint._turned_kernels import (
     turn_offset,
     write_turned,
 )
-from tracking.filters.joint._upright_kernels import bias_time, lean_noise, turn_upright
+from tracking.filters.joint._upright_kernels import bias_time, turn_upright
 
 
 @small_kernel
@@ -72,6 +73,10 @@ def predict(c, s, h, step, scratch):
     for i in range(nodes.shape[0]):
         if moves(nodes[i]):
             add_to_columns(P, h, nodes[i].at_p, nodes[i].at_b, states_behind(nodes[i]), F, i)
+    for i in range(nodes.shape[0]):
+        if moves(nodes[i]) and nodes[i].told:
+            lean_rows(nodes[i], P, h, i, w)
+            lean_columns(nodes[i], P, h, i, w)
     fade(P, h, c.n_motion, scale)
     for i in range(nodes.shape[0]):
         if nodes[i].present:
@@ -125,7 +130,7 @@ def move_mean(c, node, pre, x, h, i, scale, w, speed):
             x[h, v + 2] += PER_GRAVITY * (dv0 * b0 + dv1 * b1)
         squared += x[h, v + 2] ** 2
     speed[i] = math.sqrt(squared)
-    if node.at_o >= 0:
+    if node.told:
         turn_upright(node, pre, x, h, i, cos_psi, sin_psi, w)
     keep = decay(T / bias_time(node))
     scale[b], scale[b + 1] = keep, keep
@@ -232,8 +237,6 @@ def add_noise(c, node, pre, P, h, i, scale, step):
         P[h, v + k, v + k] += q
         bias_var = node.bias_var if k < 2 else node.rise_bias_var
         P[h, b + k, b + k] += (1.0 - scale[b + k] * scale[b + k]) * bias_var
-    for k in range(2):
-        P[h, b + k, b + k] += lean_noise(node, T)
     if node.unsettled2 > 0.0:
         age = max(node.t_pre - node.t_oriented, 1.0)
         for k in range(2):
@@ -241,3 +244,5 @@ def add_noise(c, node, pre, P, h, i, scale, step):
     for k in range(node.at_o, node.at_o + (3 if node.at_o >= 0 else 0)):
         P[h, k, k] += (1.0 - scale[k] * scale[k]) * node.offset_var
     P[h, y, y] += (1.0 - scale[y] * scale[y]) * node.heading_var
+    for k in range(node.at_g, node.at_g + (3 if node.told else 0)):
+        P[h, k, k] += node.gyro_drift2 * T

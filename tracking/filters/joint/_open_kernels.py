@@ -29,6 +29,7 @@ import numpy as np
 from tracking.compiled import allocating_kernel, kernel, small_kernel
 from tracking.filters.joint._antenna_kernels import turn_with_world
 from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_part
+from tracking.filters.joint._gyroscope_kernels import STEP, lean_slope
 from tracking.filters.joint._motion_kernels import moves, states_behind
 from tracking.filters.joint._peak_kernels import (
     climb,
@@ -38,7 +39,6 @@ from tracking.filters.joint._peak_kernels import (
     least_curvature,
 )
 from tracking.filters.joint._step_kernels import STATES
-from tracking.filters.joint._upright_kernels import STEP
 
 LOOSE = 3.0
 """[-] Each element of M has a variance of a third, over all rotations."""
@@ -110,7 +110,9 @@ def carry_slope(c, s, h, scratch):
                 z[p + r] += F[STATES, r] * z[p + 3 + r] if r < 3 else 0.0
                 for q in range(states_behind(node)):
                     z[p + r] += F[q, r] * z[b + q]
-            z[b + row] += (w[STEP], w[STEP + 1], 0.0)[column] if node.at_o >= 0 else 0.0
+            if node.told:
+                lean_slope(node, z, w)
+                z[b + row] += (w[STEP], w[STEP + 1], 0.0)[column]
             # A turn by the heading error is one of M as well.
             z[p + row] += (w[6], -w[5], w[28])[column]
             z[v + row] += (w[8], -w[7], w[27])[column]

@@ -127,6 +127,8 @@ def begin_node(c, s, h, i, t):
     for k in range(node.at_o, node.at_o + (3 if node.at_o >= 0 else 0)):
         decouple(s, h, c.n, k, node.offset_var)
     decouple(s, h, c.n, node.at_h, heading_var)
+    for k in range(node.at_g, node.at_g + (3 if node.at_g >= 0 else 0)):
+        decouple(s, h, c.n, k, min(node.gyro_var, node.first_gyro_var) if node.told else 0.0)
 
 
 @kernel

@@ -6,21 +6,19 @@ its offset and by motion that lasts, too. A horizontal bias b is gravity seen th
 
     b + g (t_y, -t_x)
 
-Where these turns are told, only what the gyroscope leans by is not known of the bias: it errs at
-a rate of variance V, which is another after the time tau in which the body is turned, so that b
-walks at random by ``g^2 V tau`` per second. VQF knows V: at rest it hardly leans.
+Where these turns are told, only what the gyroscope leans by is not known of the bias
+(`_gyroscope_kernels`).
 """
 
 from __future__ import annotations
 
 from tracking.compiled import small_kernel
+from tracking.filters.joint._gyroscope_kernels import STEP, lean, take_gyroscope
 from tracking.geometry import GRAVITY
-from tracking.measurements import LEAN_VAR, TOLD, UPRIGHT
+from tracking.measurements import TOLD, UPRIGHT
 
 GAIN = 30
 """First of two columns of the sums since the states' time: the bias that was added [m/s2]."""
-STEP = 31
-"""First of two columns of a step: the same, the heading error taken off."""
 
 
 @small_kernel
@@ -29,11 +27,12 @@ def take_upright(node, pre, i, values, e, k, anew):
     told = node.at_o >= 0 and values[e, k, TOLD] != 0.0
     if told:
         turned0, turned1 = values[e, k, UPRIGHT], values[e, k, UPRIGHT + 1]
-        if node.told and not anew:
+        begins = anew or not node.told
+        if not begins:
             pre[i, GAIN] += GRAVITY * (turned1 - node.upright1)
             pre[i, GAIN + 1] -= GRAVITY * (turned0 - node.upright0)
         node.upright0, node.upright1 = turned0, turned1
-        node.lean_var = values[e, k, LEAN_VAR]
+        take_gyroscope(node, pre, i, values, e, k, begins)
     node.told = told
 
 
@@ -42,17 +41,15 @@ def turn_upright(node, pre, x, h, i, cos_r, sin_r, w):
     """Add that to the bias of node i in hypothesis h, and write it to row i of w."""
     w[i, STEP] = cos_r * pre[i, GAIN] - sin_r * pre[i, GAIN + 1]
     w[i, STEP + 1] = sin_r * pre[i, GAIN] + cos_r * pre[i, GAIN + 1]
+    b0, b1, y = lean(node, pre, x, h, i, cos_r, sin_r, w)
+    w[i, STEP] += b0
+    w[i, STEP + 1] += b1
     x[h, node.at_b] += w[i, STEP]
     x[h, node.at_b + 1] += w[i, STEP + 1]
+    x[h, node.at_h] += y
 
 
 @small_kernel
 def bias_time(node):
     """How long the horizontal bias of a node stays the same [s]."""
     return node.told_bias_tau if node.told else node.bias_tau
-
-
-@small_kernel
-def lean_noise(node, T):
-    """Variance that the horizontal bias of a node gains in a time T by how its gyroscope errs."""
-    return T * node.lean_gain * node.lean_var if node.told else 0.0

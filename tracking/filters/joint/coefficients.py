@@ -123,7 +123,7 @@ def count_states(constellation: Constellation, params: JointParams) -> int:
     """How many states there are."""
     d = constellation.dimensions
     n = count_motion(constellation) + (d + 1) * int((~constellation.is_static).sum())
-    n += 3 * sum(has_offset(constellation, params, k) for k in range(constellation.n_nodes))
+    n += 6 * sum(has_offset(constellation, params, k) for k in range(constellation.n_nodes))
     if has_range_errors(constellation, params):
         n += 2 * int(moving_pairs(constellation).sum())
     return n

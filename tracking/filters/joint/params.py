@@ -31,9 +31,11 @@ class CarrierParams:
     """[s] How long it stays the same."""
     told_bias_tau: float = 100.0
     """[s] The same in space, beside an offset, where it is told how the orientation is turned
-    upright: what is left of it, and what the gyroscope makes it lean by has noise of its own."""
-    lean_time: float = 1.5
-    """[s] How long a wrong bias of the gyroscope makes it lean the same way: the body is turned."""
+    upright: what is left of it, and what the gyroscope makes it lean by has states of its own."""
+    gyro_std: float = 3e-3
+    """[rad/s] What is left of the bias of the gyroscope at first, unless rest has told better."""
+    gyro_drift: float = 2e-4
+    """[rad/s/sqrt(s)] How fast the bias of the gyroscope changes, where it has states."""
     rise_bias_std: float = 0.1
     """[m/s2] The same along the vertical, where a wrong tilt shows by its square only: the offset
     of the accelerometer, less what is learned of it at rest."""

@@ -27,7 +27,10 @@ NODE = np.dtype(
         ("told", "?"),  # it is told how it is turned upright
         ("upright0", "f8"),  # by how much so far, about x and y [rad]
         ("upright1", "f8"),
-        ("lean_var", "f8"),  # of the rate at which its gyroscope makes it lean [(rad/s)^2]
+        ("gyro0", "f8"),  # what is taken for the bias of its gyroscope [rad/s]
+        ("gyro1", "f8"),
+        ("gyro2", "f8"),
+        ("gyro_var", "f8"),  # its variance [(rad/s)^2]
         ("t_moved", "f8"),  # last time it was not at rest [s]
         ("t_shaken", "f8"),  # last time its acceleration told so [s]
         ("cut_off", "?"),  # its last acceleration was at the end of the sensor's scale
@@ -47,7 +50,9 @@ NODE = np.dtype(
         ("bias_var", "f8"),
         ("bias_tau", "f8"),
         ("told_bias_tau", "f8"),
-        ("lean_gain", "f8"),
+        ("first_gyro_var", "f8"),
+        ("gyro_drift2", "f8"),
+        ("by_gyroscope", "?"),  # its heading is what its gyroscope adds to the first
         ("rise_bias_var", "f8"),
         ("rise_bias_tau", "f8"),
         ("unsettled2", "f8"),
@@ -65,6 +70,7 @@ NODE = np.dtype(
         ("at_b", "i8"),
         ("at_o", "i8"),  # of the offset of its accelerometer; -1 for none
         ("at_h", "i8"),
+        ("at_g", "i8"),  # of what the bias of its gyroscope is off; -1 for none
     ]
 )
 PAIR = np.dtype(

@@ -25,7 +25,7 @@ class Scratch(NamedTuple):
     scale: F64
     """(state)"""
     step: F64
-    """(node, 33)"""
+    """(node, 42)"""
     derivatives: F64
     """Of position and velocity by the states behind, see `_step_kernels`."""
     speed: F64
@@ -61,7 +61,7 @@ def make_scratch(n_nodes: int, n_pairs: int, n_states: int) -> Scratch:
         w=aligned(n_states),
         share=np.zeros(room_to_wait(n_states)),
         scale=aligned(n_states),
-        step=np.zeros((n_nodes, 33)),
+        step=np.zeros((n_nodes, 42)),
         derivatives=aligned(n_nodes, STATES + 1, ROOM),
         speed=np.zeros(n_nodes),
         none=np.zeros(3),

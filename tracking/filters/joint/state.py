@@ -30,9 +30,8 @@ from tracking.filters.joint.coefficients import (
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.records import GROUP, NODE, PAIR, Records
 from tracking.filters.rotations import starting_rotations
-from tracking.geometry import GRAVITY
 
-N_PRE = 32
+N_PRE = 39
 """Columns of `JointState.pre`."""
 
 
@@ -48,8 +47,8 @@ class JointState(NamedTuple):
     """Sums over inertial samples since the states' time, (env, node, N_PRE): time [s]; velocity
     and way that they add [m/s, m]; cosine and sine that turn a bias, summed once and twice;
     square of the acceleration [m2/s3]; the orientation, row by row, summed once and twice, of nodes
-    whose accelerometer has an offset; the bias that they gain as they are turned upright
-    [m/s2]."""
+    whose accelerometer has an offset; of these the bias that they gain as they are turned upright
+    [m/s2], and what is told of their gyroscopes (`_gyroscope_kernels`)."""
     pairs: Records
     """PAIR, (env, pair)."""
     group: Records
@@ -139,7 +138,9 @@ def make_state(
             "bias_var": carrier.bias_std**2,
             "bias_tau": carrier.bias_tau,
             "told_bias_tau": carrier.told_bias_tau,
-            "lean_gain": GRAVITY**2 * carrier.lean_time,
+            "first_gyro_var": carrier.gyro_std**2,
+            "gyro_drift2": carrier.gyro_drift**2,
+            "by_gyroscope": initial,
             "rise_bias_var": carrier.rise_bias_std**2,
             "rise_bias_tau": carrier.rise_bias_tau,
             "unsettled2": carrier.unsettled_speed**2,
@@ -157,11 +158,12 @@ def make_state(
             "at_b": -1 if static else fades,
             "at_o": fades + d if offset else -1,
             "at_h": -1 if static else fades + d + 3 * offset,
+            "at_g": fades + d + 4 if offset else -1,
         }
         for name, value in constants.items():
             nodes[name][:, k] = value
         at += d if static else 2 * d
-        fades += 0 if static else d + 3 * offset + 1
+        fades += 0 if static else d + 1 + 6 * offset
     pairs = np.zeros((n_envs, p), dtype=PAIR)
     pairs["i"], pairs["j"] = constellation.pairs.T
     pairs["at_e"] = -1
