@@ -184,20 +184,22 @@ def test_a_survey_counts_against_a_layout_by_what_no_turn_explains(from_turn):
     assert s.loglik[0] == (before if from_turn else pytest.approx(before - 0.5 * c["max_nis"]))
 
 
-@pytest.mark.parametrize("vehicle", ["human", "hand", "car"])
+@pytest.mark.parametrize("vehicle", ["human", "hand", "hand, told", "car"])
 def test_slopes_are_carried_as_errors_of_the_states_are(vehicle):
     """With no acceleration, of which a turn would make another."""
+    vehicle, *told = vehicle.split(", ")
     c, s, scratch, _ = open_group(vehicle)
+    s.nodes["told"], s.nodes["by_gyroscope"] = bool(told), True
     c["fast_length"] = c["slow_length"] = c["excess_length"] = 1e12
     s.held[:, 4:] = 0.0
-    for name in ("at_b", "at_o"):
+    for name in ("at_b", "at_o", "at_g"):
         for at in s.nodes[name][s.nodes[name] >= 0]:
             s.x[0, at : at + 3] = 0.0
     x0, h = s.x[0].copy(), 1e-6
     s.slope[0] = np.random.default_rng(3).standard_normal(s.slope[0].shape)
     for z in s.slope[0].copy():
         reached = []
-        for step in (h, -h):
+        for step in (h, -h, 0.0):  # the last is the step that slopes are carried over
             s.x[0], s.pre[:] = x0 + step * z, 0.0
             for i in range(3):
                 s.nodes["t_pre"][i] = 0.0

@@ -46,7 +46,7 @@ def take_gyroscope(node, pre, i, values, e, k, begins):
         pre[i, CHANGE] += d0
         pre[i, CHANGE + 1] += d1
         pre[i, CHANGE + 2] += d2
-        if values[e, k, TOLD] == RESTS and var < node.gyro_var:
+        if values[e, k, TOLD] == RESTS and 0.0 < var < node.gyro_var:
             gained = 1.0 / var - 1.0 / node.gyro_var
             pre[i, KNOWN] += gained
             pre[i, REST] += gained * g0 + d0 / node.gyro_var
