@@ -176,14 +176,4 @@ Args:
 """
 
 add_to_columns = add_to_columns_plainly if config.DISABLE_JIT else _add_to_columns_in_vectors
-"""The same for the columns, down to the last row of the velocity.
-
-Args:
-    P: (matrix, n, n); fast where n is a multiple of 8.
-    h: Matrix.
-    p: First state of the position; the velocity is behind it.
-    b: First of the states by which both change, behind all positions and velocities.
-    m: How many, one of `SHAPES`.
-    F: (node, STATES + 1, ROOM)
-    i: Node.
-"""
+"""The same for the columns, down to the last row of the velocity; what it takes is the same."""
