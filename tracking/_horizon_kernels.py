@@ -2,18 +2,19 @@
 
 Events lie in slots that never move; `order` lists the slots, as a ring: from `head` on those that
 wait, in order, then the free ones. An event that comes is put at the end and moved forward past
-those that come after it, which is one comparison for one that arrives in order.
+those that come after it, which is one comparison for one that arrives in order. Only what devices
+send is kept: what the tracker's own orientations tell beside comes behind the horizon.
 """
 
 from __future__ import annotations
 
 from tracking.compiled import kernel, small_kernel
-from tracking.measurements import N_VALUES
+from tracking.measurements import N_MEASURED, N_VALUES
 
-TIME, KIND, NODE_I, NODE_J, ANTENNA_I, ANTENNA_J, VALUES, HAS_POWER = 0, 1, 2, 3, 4, 5, 6, 22
+TIME, KIND, NODE_I, NODE_J, ANTENNA_I, ANTENNA_J, VALUES, HAS_POWER = 0, 1, 2, 3, 4, 5, 6, 14
 """Columns of a slot: the fields of `MeasurementBlock` [s, -], their order that of handling."""
-N_COLUMNS = 24
-"""Columns of a slot, three lines of the cache; those after the last mean nothing."""
+N_COLUMNS = 16
+"""Columns of a slot, two lines of the cache; the one after the last means nothing."""
 
 
 @small_kernel
@@ -45,7 +46,7 @@ def put_in_slot(s, e, slot, block, k):
     slots[e, slot, TIME], slots[e, slot, KIND] = t[e, k], kind[e, k]
     slots[e, slot, NODE_I], slots[e, slot, NODE_J] = i[e, k], j[e, k]
     slots[e, slot, ANTENNA_I], slots[e, slot, ANTENNA_J] = antenna_i[e, k], antenna_j[e, k]
-    for v in range(N_VALUES):
+    for v in range(N_MEASURED):
         slots[e, slot, VALUES + v] = values[e, k, v]
     slots[e, slot, HAS_POWER] = has_power[e, k]
 
@@ -141,8 +142,10 @@ def hand_on(s, until, remove, out):
             i[e, n], j[e, n] = int(slots[e, slot, NODE_I]), int(slots[e, slot, NODE_J])
             antenna_i[e, n] = int(slots[e, slot, ANTENNA_I])
             antenna_j[e, n] = int(slots[e, slot, ANTENNA_J])
-            for v in range(N_VALUES):
+            for v in range(N_MEASURED):
                 values[e, n, v] = slots[e, slot, VALUES + v]
+            for v in range(N_MEASURED, N_VALUES):
+                values[e, n, v] = 0.0
             has_power[e, n], valid[e, n] = slots[e, slot, HAS_POWER] > 0.0, True
             n += 1
         for k in range(n, t.shape[1]):

@@ -17,6 +17,8 @@ from tracking.arrays import F64, I64, Bool
 
 N_VALUES = 16
 """Columns of `MeasurementBlock.values`."""
+N_MEASURED = 8
+"""The first of them: what devices send. The rest is told by the tracker's own orientations."""
 TOLD, UPRIGHT, GYRO_BIAS, GYRO_VAR = 8, 9, 11, 14
 """Columns of what a STATE event tells beside orientation and acceleration, see `Kind`."""
 
