@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tracking._horizon_kernels import hand_on, take_in
 from tracking.errors import ConfigError
 from tracking.horizon import Horizon, HorizonParams
-from tracking.measurements import MeasurementBlock
+from tracking.measurements import N_MEASURED, MeasurementBlock
 
 NAMES = tuple(f.name for f in fields(MeasurementBlock))
 DELAY = 0.5
@@ -192,3 +192,16 @@ def test_a_reset_environment_forgets_and_the_others_do_not():
     assert horizon.n_late.tolist() == [n_late[0], 0]
     assert horizon.t.tolist() == [0.5, -np.inf]
     assert [horizon.waiting.env(e).n_events for e in (0, 1)] == [left, 0]
+
+
+def test_what_devices_send_is_handed_on_and_the_rest_is_nothing():
+    """Into arrays of before, in which states stand that have told more."""
+    horizon = Horizon(HorizonParams())
+    block, out = MeasurementBlock.empty(1, 3), MeasurementBlock.empty(1, 3)
+    block.t[:], block.valid[:] = [[0.1, 0.2, 0.3]], True
+    block.values[:] = np.random.default_rng(0).uniform(1.0, 2.0, block.values.shape)
+    out.values[:] = 7.0
+    horizon.bind(block, np.array([9.0]), out)()
+    assert out.valid.all()
+    np.testing.assert_array_equal(out.values[..., :N_MEASURED], block.values[..., :N_MEASURED])
+    np.testing.assert_array_equal(out.values[..., N_MEASURED:], 0.0)
