@@ -8,6 +8,7 @@ import numpy as np
 
 from tracking.compiled import allocating_kernel, kernel, small_kernel
 from tracking.filters.joint._open_kernels import can_open
+from tracking.filters.joint._peak_kernels import APART
 
 SAME_TURN = 0.15
 """[rad] Hypotheses that differ by a smaller turn of the group only are one. The rotations that are
@@ -28,6 +29,8 @@ def are_same(c, s, a, b, turn):
         b: Another, turned before it is compared,
         turn: by this, orthogonal, (d, d).
     """
+    # Those that come from one filter, turned, are bent by that.
+    limit = c.merge_distance * (2.0 if s.group[0].parted else 1.0)
     way, pace = centre_of(c, s, b, False), centre_of(c, s, b, True)
     way_a, pace_a = centre_of(c, s, a, False), centre_of(c, s, a, True)
     for i in range(s.nodes.shape[0]):
@@ -43,7 +46,7 @@ def are_same(c, s, a, b, turn):
                 for k in range(c.d):
                     off -= turn[r, k] * (s.x[b, at + k] - of_b[k])
                 squared += off * off
-        if squared > c.merge_distance**2:
+        if squared > limit * limit:
             return False
     return True
 
@@ -54,7 +57,8 @@ def turn_between(c, s, a, b, turn):
 
     Each rotation that was tried stands for those near it. Two of them that have come nearer than
     `SAME_TURN` are one, and nobody should wait until a drive tells which is better. While each
-    stands for all turns and mirror images, in space, it may be any of them. By Procrustes.
+    stands for all turns and mirror images, in space, it may be any of them; while each stands for
+    the turns near its own, those nearer than its peaks can be. By Procrustes.
     """
     way_a, way_b = centre_of(c, s, a, False), centre_of(c, s, b, False)
     scatter = np.zeros((c.d, c.d))
@@ -65,14 +69,15 @@ def turn_between(c, s, a, b, turn):
                 for k in range(c.d):
                     scatter[r, k] += (s.x[a, at + r] - way_a[r]) * (s.x[b, at + k] - way_b[k])
     u, _, v = np.linalg.svd(scatter)
-    if can_open(c, s) and (s.group[0].asleep or s.group[0].open):
+    if can_open(c, s) and (s.group[0].asleep or (s.group[0].open and not s.group[0].parted)):
         turn[:] = u @ v
         return
     if np.linalg.det(u) * np.linalg.det(v) < 0.0:
         u[:, c.d - 1] *= -1.0
     nearest = u @ v
     # The trace is 2 cos in the plane, 1 + 2 cos in space.
-    if np.trace(nearest) > (c.d - 2) + 2.0 * math.cos(SAME_TURN):
+    limit = APART if s.group[0].parted else SAME_TURN
+    if np.trace(nearest) > (c.d - 2) + 2.0 * math.cos(limit):
         turn[:] = nearest
 
 

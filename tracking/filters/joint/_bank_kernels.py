@@ -21,7 +21,8 @@ from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_hypothesi
 from tracking.filters.joint._flatness_kernels import flatness, least_axis, scatter_of
 from tracking.filters.joint._gyroscope_kernels import last_state
 from tracking.filters.joint._linear_kernels import decouple
-from tracking.filters.joint._open_kernels import can_open, doubt_turn
+from tracking.filters.joint._open_kernels import can_open
+from tracking.filters.joint._frame_kernels import doubt_turn
 from tracking.filters.joint._sleep_kernels import TIE, turn_all_ways
 from tracking.filters.joint._start_kernels import begin_pair, forget_fits
 
@@ -115,6 +116,7 @@ def prune_bank(c, s):
     """Drop hypotheses that are unlikely or the same as a better one; choose the best."""
     group = s.group[0]
     if group.n_alive < 2:
+        group.parted = group.parted and group.open
         return
     n_hyps = s.alive.shape[0]
     if not group.asleep and group.t < group.t_patient - TIE:
@@ -142,7 +144,7 @@ def prune_bank(c, s):
             if a == b or b == group.best or not (s.alive[a] and s.alive[b] and better):
                 continue
             turn[:] = np.eye(c.d)
-            if a == group.best:
+            if a == group.best or group.parted:
                 turn_between(c, s, a, b, turn)
             if are_same(c, s, a, b, turn):
                 s.alive[b] = False

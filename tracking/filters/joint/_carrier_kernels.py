@@ -48,12 +48,13 @@ def apply_carriers(c, s, h, t, dt, scratch):
 @small_kernel
 def judge(c, s, h, nu, m, variance, scratch):
     """Correct with a constraint, and let it speak for or against the hypothesis."""
-    S = project(s, h, m, scratch) + variance
+    S, open_var = project(s, h, m, scratch) + variance, 0.0
     if s.group[0].open:
-        turn_gradient(s, h, m, scratch)
+        open_var = turn_gradient(s, h, m, scratch)
         tell_turn(s, h, scratch, nu, max(S, nu * nu / 25.0))
     if s.group[0].n_alive > 1:
-        s.loglik[h] -= 0.5 * (min(nu * nu / S, c.max_nis) + math.log(S))
+        expected = S + open_var
+        s.loglik[h] -= 0.5 * (min(nu * nu / expected, c.max_nis) + math.log(expected))
     if nu * nu > 25.0 * S:
         S = nu * nu / 25.0  # a jolt or a skid: it counts for less
     absorb(s, h, scratch.w, nu, S)

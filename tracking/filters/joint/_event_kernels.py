@@ -17,10 +17,11 @@ from tracking.filters.joint._carrier_kernels import apply_carriers, centre
 from tracking.filters.joint._cut_off_kernels import doubt_acceleration
 from tracking.filters.joint._doubt_kernels import note_fit, watch_nodes
 from tracking.filters.joint._estimate_kernels import write_estimate
+from tracking.filters.joint._frame_kernels import watch_turns
 from tracking.filters.joint._linear_kernels import settle, settle_all
 from tracking.filters.joint._misplaced_kernels import watch_places
 from tracking.filters.joint._motion_kernels import moves, predict
-from tracking.filters.joint._open_kernels import carry_slope, watch_turns
+from tracking.filters.joint._open_kernels import carry_slope
 from tracking.filters.joint._range_kernels import fuse_range
 from tracking.filters.joint._rest_kernels import learn_at_rest
 from tracking.filters.joint._rotation_kernels import carry_moves, follow_rotation

@@ -9,12 +9,10 @@ likelihood of every M, which is Gaussian in its elements,
 
     log L(M) = score . (M - 1) - (M - 1) . information (M - 1) / 2,
 
-among them all rotations and mirror images, which `_peak_kernels` looks through. The frame is
-turned time and again so that the likeliest is M = 1: what is reported is the likeliest turn.
-It is the estimate of a constant by the sensitivities of a Kalman filter to it [1], and to look
-for a rotation among all matrices first is an old way to find one without a first guess [2].
-
-Once only turns are left each of which is known to a few degrees, they become hypotheses.
+among them all rotations and mirror images, which `_peak_kernels` looks through and
+`_frame_kernels` follows. It is the estimate of a constant by the sensitivities of a Kalman filter
+to it [1], and to look for a rotation among all matrices first is an old way to find one without a
+first guess [2].
 
 References:
     [1] Friedland, Treatment of bias in recursive filtering, IEEE Trans. Automatic Control 14
@@ -28,29 +26,14 @@ import numpy as np
 
 from tracking.compiled import allocating_kernel, kernel, small_kernel
 from tracking.filters.joint._antenna_kernels import turn_with_world
-from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_part
 from tracking.filters.joint._gyroscope_kernels import STEP, lean_slope
 from tracking.filters.joint._motion_kernels import moves, states_behind
-from tracking.filters.joint._peak_kernels import (
-    climb,
-    find_peaks,
-    inverse,
-    is_near,
-    least_curvature,
-)
 from tracking.filters.joint._step_kernels import STATES
 
 LOOSE = 3.0
 """[-] Each element of M has a variance of a third, over all rotations."""
-TIE = 1e-6
-"""[s] Times that differ by less are equal, whatever the clock began with."""
-CLEAR, CLEARER = 1.0, 5.0
-"""[-] By so much another turn has to be likelier (log-likelihood) before it is reported; where one
-was known and is doubted by more: noise that lasts makes some other look a little likelier."""
-KNOWN = 0.2
-"""[rad] Turns that are known so well are left to filters that are linear about each of them."""
-LONG = 20.0
-"""[s] After so long without a likelier turn it is kept."""
+NEAR = 0.7
+"""[rad] How far a frame may be from the turn that it is followed for."""
 
 
 @small_kernel
@@ -84,14 +67,30 @@ def open_frame(c, s, layout, h):
                 s.score[h, 3 * r + 2] -= out[r] * out[2] / c.height_var
                 for q in range(3):
                     s.information[h, 3 * r + 2, 3 * q + 2] += out[r] * out[q] / c.height_var
+    group = s.group[0]
+    group.open, group.held, group.parted, group.t_open = True, False, False, group.t
     note_spread(s, h)
-    s.group[0].open, s.group[0].held, s.group[0].t_open = True, False, s.group[0].t
 
 
 @allocating_kernel
 def note_spread(s, h):
-    """Work out how uncertain the elements of the turn are."""
-    s.spread[h] = np.linalg.inv(s.information[h] + LOOSE * np.eye(9))
+    """Work out how uncertain the elements of the turn are: those of any, or of one that is near."""
+    if s.group[0].parted:
+        J = near_turns()
+        H = J @ (s.information[h] @ J.T.copy()) + np.eye(3) / NEAR**2
+        s.spread[h] = J.T.copy() @ (np.linalg.inv(H) @ J)
+    else:
+        s.spread[h] = np.linalg.inv(s.information[h] + LOOSE * np.eye(9))
+
+
+@allocating_kernel
+def near_turns():
+    """Derivatives of the elements of a small turn by its three components, (3, 9)."""
+    J = np.zeros((3, 9))
+    for a in range(3):
+        u, v = (a + 1) % 3, (a + 2) % 3
+        J[a, 3 * u + v], J[a, 3 * v + u] = -1.0, 1.0
+    return J
 
 
 @kernel
@@ -162,130 +161,3 @@ def tell_turn(s, h, scratch, nu, S):
             s.information[h, k, q] += share * g[q]
         for r in range(s.slope.shape[2]):
             s.slope[h, k, r] += w[r] * share
-
-
-@allocating_kernel
-def doubt_turn(c, s, layout, h):
-    """Look for other turns of hypothesis h, the only one; until one is likelier it stays as it is.
-
-    It has a head start, of which a mirror image feels all.
-    """
-    open_frame(c, s, layout, h)
-    for k in range(9):
-        s.information[h, k, k] += 0.5 * c.head_start
-    note_spread(s, h)
-    s.group[0].held = True
-
-
-@allocating_kernel
-def watch_turns(c, s, layout):
-    """Turn the frames so that the likeliest turn is none; go on with hypotheses once it is time."""
-    group, was_alive = s.group[0], s.alive.copy()
-    if group.t < group.t_patient - TIE:
-        # Nothing counts yet for or against any.
-        for h in range(s.alive.shape[0]):
-            if was_alive[h]:
-                open_frame(c, s, layout, h)
-        return
-    if group.held and group.n_alive > 1:
-        group.held = False
-    known, H = True, np.zeros((3, 3))
-    for h in range(s.alive.shape[0]):
-        if not was_alive[h]:
-            continue
-        R = np.eye(3)
-        value = climb(s.information[h], s.score[h], R, H)
-        turns, values = find_peaks(s.information[h], s.score[h], layout.rotations)
-        clear = CLEARER if group.held else CLEAR
-        if values[0] > value + clear:
-            R[:], value = turns[0], values[0]
-        if group.held:
-            # One that is near is what these seconds tell; the filter knows it better from before.
-            if value < CLEARER or is_near(R, np.eye(3)):
-                rivals = len(values) > 1 and values[1] > values[0] - c.prune
-                if not rivals or group.t - group.t_open > LONG:
-                    group.open = False
-                return
-            group.held = False
-        for a in range(len(values)):
-            if values[a] > values[0] - c.prune:
-                climb(s.information[h], s.score[h], turns[a], H)
-                known = known and least_curvature(H) > KNOWN**-2
-        turn_frame(c, s, h, R)
-        note_spread(s, h)
-    if known:
-        close_frames(c, s, layout)
-
-
-@allocating_kernel
-def turn_frame(c, s, h, R):
-    """Turn the frame of hypothesis h so that the turn R becomes none."""
-    d = np.zeros(9)
-    for k in range(9):
-        d[k] = R[k // 3, k % 3] - (1.0 if k % 4 == 0 else 0.0)
-    change = s.information[h] @ d
-    s.loglik[h] += np.sum(d * s.score[h]) - 0.5 * np.sum(d * change)
-    # M = R M': derivatives by the elements of the one from those by the other.
-    E = np.zeros((9, 9))
-    for k in range(3):
-        for r in range(3):
-            for q in range(3):
-                E[3 * k + q, 3 * r + q] = R[k, r]
-    s.score[h] = E.T.copy() @ (s.score[h] - change)
-    s.information[h] = E.T.copy() @ (s.information[h] @ E)
-    for r in range(c.n):
-        for k in range(9):
-            s.x[h, r] += d[k] * s.slope[h, k, r]
-    s.slope[h] = E.T.copy() @ s.slope[h]
-    none, back = np.zeros(3), R.T.copy()
-    for i in range(s.nodes.shape[0]):
-        node = s.nodes[i]
-        if not node.present:
-            continue
-        for at in (node.at_p, node.at_v, -1 if node.levelled else node.at_b):
-            if at >= 0:
-                turn_part(s, c.n, h, at, none, back)
-                s.slope[h, :, at : at + 3] = s.slope[h, :, at : at + 3].copy() @ R
-    s.moved[h, :] = 0.0
-
-
-@allocating_kernel
-def close_frames(c, s, layout):
-    """Make a hypothesis of every turn that may be, the likeliest of each layout first."""
-    s.group[0].open = False
-    was_alive = s.alive.copy()
-    for h in range(s.alive.shape[0]):
-        if not was_alive[h]:
-            continue
-        turns, values = find_peaks(s.information[h], s.score[h], layout.rotations)
-        for a in range(len(values) - 1, -1, -1):
-            if a > 0 and values[a] < values[0] - c.prune:
-                continue
-            target = copy_hypothesis(s, h) if a > 0 else h
-            if target >= 0:
-                turn_frame(c, s, target, turns[a])
-                spread_frame(c, s, target)
-
-
-@allocating_kernel
-def spread_frame(c, s, h):
-    """Add to P what is not known of the turn, which is the likeliest: none."""
-    H = np.zeros((3, 3))
-    climb(s.information[h], s.score[h], np.eye(3), H)
-    least = least_curvature(H)
-    for a in range(3):
-        H[a, a] += max(KNOWN**-2 - least, 0.0)
-    J, cov = np.zeros((3, c.n)), np.zeros((3, 3))
-    s.loglik[h] += 0.5 * np.log(inverse(H, cov))
-    for a in range(3):
-        u, v = (a + 1) % 3, (a + 2) % 3
-        # M = 1 + [a], and the world is that of M^T.
-        J[a] = s.slope[h, 3 * v + u] - s.slope[h, 3 * u + v]
-        for i in range(s.nodes.shape[0]):
-            node = s.nodes[i]
-            if node.present:
-                for at in (node.at_p, node.at_v, -1 if node.levelled else node.at_b):
-                    if at >= 0:
-                        J[a, at + u] += s.x[h, at + v]
-                        J[a, at + v] -= s.x[h, at + u]
-    s.P[h] += J.T.copy() @ (cov @ J)

@@ -12,7 +12,7 @@ import numpy as np
 from tracking.compiled import allocating_kernel, kernel, small_kernel
 from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_hypothesis
 from tracking.filters.joint._linear_kernels import decouple
-from tracking.filters.joint._open_kernels import TIE, can_open, open_frame
+from tracking.filters.joint._open_kernels import can_open, open_frame
 from tracking.filters.joint._rotation_kernels import turn_covariance
 from tracking.filters.joint._turn_kernels import spread_turn, turn_variance
 
@@ -22,6 +22,8 @@ turns means nothing for longer; but nobody starts without being shaken."""
 PATIENCE, STOOD = 4.0, 1.0
 """[s] A group on wheels that starts while it moves, and has not stood first, knows nothing of its
 velocities: for so long wheels speak against the right rotation as well."""
+TIE = 1e-6
+"""[s] Times that differ by less are equal, whatever the clock began with."""
 
 
 @small_kernel

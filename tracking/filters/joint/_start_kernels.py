@@ -73,7 +73,7 @@ def try_start(c, s, layout, t):
     group = s.group[0]
     group.started = True
     group.flat = False
-    group.asleep, group.open = asleep, False
+    group.asleep, group.open, group.parted = asleep, False, False
     if opens:
         open_frame(c, s, layout, 0)
     group.n_alive = n_first
