@@ -19,10 +19,10 @@ from tracking.filters._shape_kernels import SURVEYED
 from tracking.filters.joint._agreement_kernels import are_same, turn_between
 from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_hypothesis
 from tracking.filters.joint._flatness_kernels import flatness, least_axis, scatter_of
+from tracking.filters.joint._frame_kernels import doubt_turn
 from tracking.filters.joint._gyroscope_kernels import last_state
 from tracking.filters.joint._linear_kernels import decouple
 from tracking.filters.joint._open_kernels import can_open
-from tracking.filters.joint._frame_kernels import doubt_turn
 from tracking.filters.joint._sleep_kernels import TIE, turn_all_ways
 from tracking.filters.joint._start_kernels import begin_pair, forget_fits
 
