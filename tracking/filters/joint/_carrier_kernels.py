@@ -54,7 +54,9 @@ def judge(c, s, h, nu, m, variance, scratch):
         tell_turn(s, h, scratch, nu, max(S, nu * nu / 25.0))
     if s.group[0].n_alive > 1:
         expected = S + open_var
-        s.loglik[h] -= 0.5 * (min(nu * nu / expected, c.max_nis) + math.log(expected))
+        s.loglik[h] -= 0.5 * min(nu * nu / expected, c.max_nis)
+        if not s.group[0].parted:
+            s.loglik[h] -= 0.5 * math.log(expected)
     if nu * nu > 25.0 * S:
         S = nu * nu / 25.0  # a jolt or a skid: it counts for less
     absorb(s, h, scratch.w, nu, S)

@@ -5,8 +5,9 @@ ten times a second: what is reported is that. But what it learns of headings, an
 sensors, which turn with the body, is right for its own frame only, and so are its gains, as soon as
 either counts. So once each turn that may be is known roughly, a frame of its own is followed for
 each, by the likelihood of what comes from there on, and turned to the likeliest turn near it: a
-Gaussian sum [1] over turns. Once all are known to a few degrees, what is left of the turn becomes
-a part of P, and they are hypotheses like any others.
+Gaussian sum [1] over turns, whose members have one covariance as far as all is linear: so what
+counts between them is how well they fit, not how sure they are. Once all are known to a few
+degrees, what is left of the turn becomes a part of P, and they are hypotheses like any others.
 
 References:
     [1] Alspach and Sorenson, Nonlinear Bayesian estimation using Gaussian sum approximations, IEEE
@@ -133,7 +134,8 @@ def likely_turns(c, s, layout, h):
 @allocating_kernel
 def follow_turns(c, s, h, turns, values):
     """Follow hypothesis h in each of these turns, by so much likelier, while the bank has room."""
-    for a in range(len(values) - 1, -1, -1):
+    for k in range(len(values)):
+        a = (k + 1) % len(values)  # itself last
         target = copy_hypothesis(s, h) if a > 0 else h
         if target >= 0:
             s.loglik[target] += values[a]
@@ -143,17 +145,18 @@ def follow_turns(c, s, h, turns, values):
 
 @allocating_kernel
 def watch_near(c, s):
-    """Turn every frame to the likeliest turn near it; make hypotheses of them once all are known."""
+    """Turn every frame to the likeliest turn near it; hypotheses follow once all are known."""
     known = True
     for h in range(s.alive.shape[0]):
         if s.alive[h]:
             known = turn_to_peak(c, s, h) and known
             note_spread(s, h)
-    if known:
-        s.group[0].open = False
-        for h in range(s.alive.shape[0]):
-            if s.alive[h]:
-                spread_frame(c, s, h)
+    if not known:
+        return
+    s.group[0].open = False
+    for h in range(s.alive.shape[0]):
+        if s.alive[h]:
+            spread_frame(c, s, h)
 
 
 @allocating_kernel

@@ -177,8 +177,12 @@ def fuse_range(c, s, h, p, dt, distance, levers, sight, scratch):
     expected = variance + open_var
     switched, sane, likelihood, is_far = judge_sight(c, s, h, p, dt, nu, expected, sight, scratch.w)
     if s.group[0].n_alive > 1:
-        loglik = math.log(likelihood)
-        s.loglik[h] += c.evidence * max(loglik, -0.5 * (c.max_nis + math.log(S)))
+        loglik = max(math.log(likelihood), -0.5 * (c.max_nis + math.log(S)))
+        if s.group[0].parted:
+            # Frames of one group are equally uncertain but for how far each was bent, and wrong
+            # ones, bent most, look surest.
+            loglik += 0.5 * math.log(S)
+        s.loglik[h] += c.evidence * loglik
     before, nis = nu, nu * nu / S
     if switched < AT_ONCE or s.pairs[p].at_e < 0:
         s.stays[h, p] *= 1.0 - switched

@@ -1,0 +1,154 @@
+"""Frames that are followed for the turns of a group in space that may be."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+from test_joint_kernels import running
+from test_open_turn import MIRROR, anywhere, log_likelihood
+
+from tracking.filters.joint import (
+    _bank_kernels,
+    _carrier_kernels,
+    _frame_kernels,
+    _open_kernels,
+    _peak_kernels,
+    _range_kernels,
+)
+from tracking.filters.joint.state import JointState
+
+
+def told(rng, R, weight):
+    """A likelihood of turns that is highest at R: by vectors that it takes to others."""
+    information, score = np.zeros((9, 9)), np.zeros(9)
+    for v in rng.standard_normal((8, 3)):
+        for r in range(3):
+            g = np.zeros((3, 3))
+            g[r] = v
+            information += weight * np.outer(g.ravel(), g.ravel())
+            score += weight * ((R - np.eye(3)) @ v)[r] * g.ravel()
+    return information, score
+
+
+def open_bank(n_hyps=3):
+    """A group of three whose turn is open, in a bank with room."""
+    c, s, scratch, layout = running(3, "human")
+    names = "x P waiting n_waiting moved nlos stays loglik alive slope score information spread"
+    s = s._replace(**{k: np.repeat(getattr(s, k), n_hyps, axis=0) for k in names.split()})
+    s.alive[1:] = False
+    n = s.x.shape[1]
+    A = np.random.default_rng(5).standard_normal((n, n))
+    s.P[0] = A @ A.T / n + 0.1 * np.eye(n)
+    _open_kernels.open_frame(c, s, layout, 0)
+    s.group["parted"] = True
+    return c, s, scratch, layout
+
+
+def places(s, h):
+    return s.x[h, s.nodes["at_p"][:, None] + np.arange(3)]
+
+
+def test_derivatives_of_a_small_turn():
+    J, step = _open_kernels.near_turns(), 1e-6
+    for a in range(3):
+        turn = Rotation.from_rotvec(step * np.eye(3)[a]).as_matrix() - np.eye(3)
+        np.testing.assert_allclose(J[a], turn.ravel() / step, atol=1e-5)
+
+
+@settings(max_examples=25)
+@given(seed=st.integers(0, 2**31))
+def test_a_frame_goes_to_the_peak_near_it(seed):
+    rng = np.random.default_rng(seed)
+    c, s, _, _ = open_bank()
+    R = Rotation.from_rotvec(rng.uniform(-0.3, 0.3, 3)).as_matrix()
+    s.information[0], s.score[0] = told(rng, R, 100.0)
+    before = places(s, 0)
+    for _ in range(20):
+        known = _frame_kernels.turn_to_peak(c, s, 0)
+    assert known
+    # What was the turn R is none in the frame now, to what a frame is not turned by.
+    np.testing.assert_allclose(places(s, 0), before @ R, atol=6.0 * _frame_kernels.SMALL)
+    peak, H = np.eye(3), np.zeros((3, 3))
+    _peak_kernels.climb(s.information[0], s.score[0], peak, H)
+    assert Rotation.from_matrix(peak).magnitude() < 2.0 * _frame_kernels.SMALL
+
+
+def test_a_frame_does_not_turn_about_an_axis_of_which_nothing_is_known():
+    c, s, _, _ = open_bank()
+    # The vertical was seen, and leans: which is how a turn about the vertical cannot be told.
+    lean = Rotation.from_rotvec([0.2, 0.0, 0.0]).as_matrix()
+    information, score, up = np.zeros((9, 9)), np.zeros(9), [0.0, 0.0, 1.0]
+    for r in range(3):
+        g = np.outer(np.eye(3)[r], up).ravel()
+        information += 500.0 * np.outer(g, g)
+        score += 500.0 * ((lean - np.eye(3)) @ up)[r] * g
+    s.information[0], s.score[0] = information, score
+    before = places(s, 0)
+    for _ in range(5):
+        assert not _frame_kernels.turn_to_peak(c, s, 0)
+    turn, _ = Rotation.align_vectors(before - before.mean(0), places(s, 0) - places(s, 0).mean(0))
+    np.testing.assert_allclose(turn.as_rotvec(), [0.2, 0.0, 0.0], atol=_frame_kernels.SMALL)
+
+
+def test_every_turn_that_may_be_has_a_frame():
+    c, s, _, _ = open_bank()
+    rng = np.random.default_rng(2)
+    turns = np.array([anywhere(rng), MIRROR @ anywhere(rng), anywhere(rng), anywhere(rng)])
+    values = np.array([30.0, 28.0, 20.0, 15.0])
+    s.information[0], s.score[0] = told(rng, turns[0], 10.0)
+    s.loglik[0] = 1.0
+    begun = JointState._make(a.copy() for a in s)
+    _frame_kernels.follow_turns(c, s, 0, turns, values)
+    assert s.alive.all()
+    assert s.group["n_alive"][0] == 3
+    for h in range(3):  # the bank has no room for a fourth
+        assert s.loglik[h] == pytest.approx(1.0 + values[h])
+        np.testing.assert_allclose(places(s, h), places(begun, 0) @ turns[h], atol=1e-9)
+        # What one frame says of a turn R M', the other says of M'.
+        other = anywhere(rng)
+        old = log_likelihood(begun.information[0], begun.score[0], other)
+        old -= log_likelihood(begun.information[0], begun.score[0], turns[h])
+        new = log_likelihood(s.information[h], s.score[h], turns[h].T @ other)
+        assert new == pytest.approx(old, abs=1e-8)
+
+
+@pytest.mark.parametrize("parted", [True, False])
+def test_frames_that_have_come_together_are_one(parted):
+    """Nearer to each other than two peaks can be."""
+    c, s, _, _ = open_bank()
+    s.group["parted"], s.group["t"], s.group["best"] = parted, 100.0, 0
+    s.information[0], s.score[0] = told(np.random.default_rng(3), np.eye(3), 10.0)
+    turns = np.array([np.eye(3), Rotation.from_rotvec([0.0, 0.0, 0.25]).as_matrix()])
+    _frame_kernels.follow_turns(c, s, 0, turns, np.zeros(2))
+    s.group["open"] = parted
+    _bank_kernels.prune_bank(c, s)
+    assert s.alive.sum() == (1 if parted else 2)
+
+
+@pytest.mark.parametrize("parted", [True, False])
+def test_a_frame_is_not_likelier_for_being_surer(parted):
+    """As far as all is linear each is as sure as the others; wrong ones are bent and look surer."""
+    c, s, scratch, _ = open_bank()
+    s.group["parted"], s.group["n_alive"] = parted, 2
+    p, gained = 0, []
+    for scale in (1.0, 0.01):
+        s.P[1], s.x[1], s.slope[1], s.nlos[1] = scale * s.P[0], s.x[0], s.slope[0], s.nlos[0]
+        s.spread[1], s.loglik[1], s.waiting[1], s.n_waiting[1] = 0.0, 0.0, 0.0, 0
+        levers = np.zeros(6)
+        distance, _ = _range_kernels.range_model(
+            c, s, 1, p, levers[:3], levers[3:], scratch.idx, scratch.val
+        )
+        scratch.direct[:] = 0.0
+        sight = (0.0, c["enter_rate"], c["leave_rate"])
+        _range_kernels.fuse_range(c, s, 1, p, 0.02, distance, levers, sight, scratch)
+        of_range = s.loglik[1]
+        scratch.idx[0], scratch.val[0] = s.nodes["at_v"][0], 1.0
+        _carrier_kernels.judge(c, s, 1, 0.0, 1, 0.1, scratch)
+        gained.append((of_range, s.loglik[1] - of_range))
+    surer = np.subtract(gained[1], gained[0])
+    if parted:
+        # What another sight would have told is all that is left.
+        np.testing.assert_allclose(surer, 0.0, atol=0.1)
+    else:
+        assert (surer > 0.5).all()
