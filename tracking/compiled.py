@@ -75,6 +75,7 @@ def _compile(function: Function, *, inline: bool = False, nrt: bool = False) -> 
         index = compiled._cache._cache_file
         index._source_stamp = (index._source_stamp, _stamp(folder))
         index._load_index = _tolerant(index._load_index)
+        index.load, index.save = _labelled(index)
     return compiled  # type: ignore[no-any-return]
 
 
@@ -88,6 +89,25 @@ def _tolerant(load: Callable[[], Any]) -> Callable[[], Any]:
             return {}
 
     return load_or_start_anew
+
+
+def _labelled(index: Any) -> tuple[Callable[[Any], Any], Callable[[Any, Any], None]]:
+    """How an index loads and saves code that says what it was compiled from, and for which types.
+
+    Its files are numbered. Where several processes compile at a time, one can find under a number
+    what another has saved for other types, or what is left from before a change.
+    """
+    load, save = index.load, index.save
+
+    def load_own(key: Any) -> Any:
+        found = load(key)
+        is_own = found is not None and found[0] == (index._source_stamp, key)
+        return found[1] if is_own else None
+
+    def save_labelled(key: Any, data: Any) -> None:
+        save(key, ((index._source_stamp, key), data))
+
+    return load_own, save_labelled
 
 
 @cache
