@@ -78,10 +78,11 @@ def settled_walk(data):
 
 
 def test_a_walk_is_followed_once_it_is_found_how_the_group_is_turned(settled_walk):
-    assert settled_walk.rmse_yaw <= 0.35
+    assert settled_walk.rmse_yaw <= 0.27
+    assert settled_walk.ok_share >= 0.95
 
 
-@pytest.mark.xfail(strict=True, reason="its layout leans by 10 to 25 degrees at first: 0.144 m")
+@pytest.mark.xfail(strict=True, reason="its layout leans by 10 to 25 degrees at first: 0.1300 m")
 def test_its_shape_is_too(settled_walk):
     """With a turn that nothing had measured it was: by luck, as other headings at first showed."""
     assert settled_walk.rmse_shape <= 0.13
