@@ -137,13 +137,15 @@ def test_while_every_turn_is_open_layouts_are_the_same_whose_shapes_are(seed):
 
 @pytest.mark.parametrize("n", [3, 8, 20, 24, 40, 72, 96, 352])
 @pytest.mark.parametrize("m", [0, 1, 3, 15, 16])
-def test_what_is_taken_off_is_the_product(n, m):
+@pytest.mark.parametrize("fades", [False, True])
+def test_what_is_taken_off_is_the_product(n, m, fades):
     rng = np.random.default_rng(n + m)
+    scale = rng.uniform(0.1, 1.0, n) if fades else None
     A = rng.standard_normal((n, n))
     P, W = np.stack([A @ A.T, A @ A.T]), rng.standard_normal((2, 16, n))
     twin, before, rows = P.copy(), P[0].copy(), W.copy()
-    take_off(P, 1, W, 0, m)
-    take_off_plainly(twin, 1, W, 0, m)
+    take_off(P, 1, W, 0, m, scale)
+    take_off_plainly(twin, 1, W, 0, m, scale)
     np.testing.assert_allclose(P[1], twin[1], atol=1e-10)
     np.testing.assert_array_equal(P[1], P[1].T)  # to the last bit
     np.testing.assert_array_equal(P[0], before)
@@ -237,8 +239,8 @@ def test_registers_of_any_width_give_the_same(monkeypatch, lanes):
         A = rng.standard_normal((n, n))
         P, W = (A @ A.T)[None], rng.standard_normal((1, 8, n))
         twin = P.copy()
-        anew(P, 0, W, 0, 7)
-        take_off_plainly(twin, 0, W, 0, 7)
+        anew(P, 0, W, 0, 7, None)
+        take_off_plainly(twin, 0, W, 0, 7, None)
         np.testing.assert_allclose(P, twin, atol=1e-10)
         np.testing.assert_array_equal(P[0], P[0].T)
     anew = njit(sum_rows.py_func)

@@ -87,7 +87,7 @@ def look_ahead(c, s, scratch, t):
         scratch.x[0, r] = s.x[h, r]
         for k in range(c.n):
             scratch.P[0, r, k] = s.P[h, r, k]
-    take_off(scratch.P, 0, s.waiting, h, s.n_waiting[h])
+    take_off(scratch.P, 0, s.waiting, h, s.n_waiting[h], None)
     for i in range(n):
         for k in range(N_PRE):
             scratch.pre[i, k] = s.pre[i, k]
@@ -106,7 +106,7 @@ def look_ahead(c, s, scratch, t):
             scratch.x,
             scratch.P,
             s.waiting,
-            s.n_waiting,
+            scratch.none_waiting,
             s.moved,
             scratch.nlos,
             scratch.stays,

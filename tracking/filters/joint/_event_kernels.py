@@ -18,7 +18,7 @@ from tracking.filters.joint._cut_off_kernels import doubt_acceleration
 from tracking.filters.joint._doubt_kernels import note_fit, watch_nodes
 from tracking.filters.joint._estimate_kernels import write_estimate
 from tracking.filters.joint._frame_kernels import watch_turns
-from tracking.filters.joint._linear_kernels import settle, settle_all
+from tracking.filters.joint._linear_kernels import settle_all
 from tracking.filters.joint._misplaced_kernels import watch_places
 from tracking.filters.joint._motion_kernels import moves, predict
 from tracking.filters.joint._open_kernels import carry_slope
@@ -198,7 +198,6 @@ def carry(c, s, scratch, t):
     first, end = bank_range(s)
     for h in range(first, end):
         if s.alive[h]:
-            settle(s, h)
             follow_rotation(c, s, h, scratch)
             carry_moves(c, s, h)
             predict(c, s, h, t - group.t, scratch)

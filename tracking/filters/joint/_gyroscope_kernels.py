@@ -76,11 +76,22 @@ def lean(node, pre, x, h, i, cos_r, sin_r, w):
 
 
 @small_kernel
-def lean_rows(node, P, h, i, w):
+def fade_lean(node, i, w, scale):
+    """What is added to biases and heading error of node i as they were, to what is left of them."""
+    for k in range(2):
+        w[i, STEP + k] *= scale[node.at_b + k]
+    for k in range(3):
+        w[i, LEAN + k] *= scale[node.at_b]
+        w[i, LEAN + 3 + k] *= scale[node.at_b + 1]
+        w[i, LEAN + 6 + k] *= scale[node.at_h]
+
+
+@small_kernel
+def lean_rows(node, P, h, i, w, scale):
     """What g and the heading error add to the rows of biases and heading error of node i."""
-    b, y, g = node.at_b, node.at_h, node.at_g
+    b, y, g, undo = node.at_b, node.at_h, node.at_g, 1.0 / scale[node.at_h]
     for k in range(P.shape[2]):
-        g0, g1, g2, y0 = P[h, g, k], P[h, g + 1, k], P[h, g + 2, k], P[h, y, k]
+        g0, g1, g2, y0 = P[h, g, k], P[h, g + 1, k], P[h, g + 2, k], undo * P[h, y, k]
         b0 = w[i, LEAN] * g0 + w[i, LEAN + 1] * g1 + w[i, LEAN + 2] * g2
         b1 = w[i, LEAN + 3] * g0 + w[i, LEAN + 4] * g1 + w[i, LEAN + 5] * g2
         P[h, b, k] += b0 - w[i, STEP + 1] * y0
@@ -89,11 +100,11 @@ def lean_rows(node, P, h, i, w):
 
 
 @small_kernel
-def lean_columns(node, P, h, i, w):
+def lean_columns(node, P, h, i, w, scale):
     """The same for the columns."""
-    b, y, g = node.at_b, node.at_h, node.at_g
+    b, y, g, undo = node.at_b, node.at_h, node.at_g, 1.0 / scale[node.at_h]
     for r in range(P.shape[2]):
-        g0, g1, g2, y0 = P[h, r, g], P[h, r, g + 1], P[h, r, g + 2], P[h, r, y]
+        g0, g1, g2, y0 = P[h, r, g], P[h, r, g + 1], P[h, r, g + 2], undo * P[h, r, y]
         b0 = w[i, LEAN] * g0 + w[i, LEAN + 1] * g1 + w[i, LEAN + 2] * g2
         b1 = w[i, LEAN + 3] * g0 + w[i, LEAN + 4] * g1 + w[i, LEAN + 5] * g2
         P[h, r, b] += b0 - w[i, STEP + 1] * y0
@@ -102,9 +113,10 @@ def lean_columns(node, P, h, i, w):
 
 
 @small_kernel
-def lean_slope(node, z, w):
+def lean_slope(node, z, w, scale):
     """The same for one row of slopes by an open turn, from a row w of the step."""
-    g0, g1, g2, y0 = z[node.at_g], z[node.at_g + 1], z[node.at_g + 2], z[node.at_h]
+    g0, g1, g2 = z[node.at_g], z[node.at_g + 1], z[node.at_g + 2]
+    y0 = z[node.at_h] / scale[node.at_h]
     z[node.at_b] += w[LEAN] * g0 + w[LEAN + 1] * g1 + w[LEAN + 2] * g2 - w[STEP + 1] * y0
     z[node.at_b + 1] += w[LEAN + 3] * g0 + w[LEAN + 4] * g1 + w[LEAN + 5] * g2 + w[STEP] * y0
     z[node.at_h] += w[LEAN + 6] * g0 + w[LEAN + 7] * g1 + w[LEAN + 8] * g2

@@ -90,7 +90,7 @@ def absorb(s, h, w, nu, S):
 def settle(s, h):
     """Take off what waits: from here on P is the covariance of hypothesis h."""
     if s.n_waiting[h] > 0:
-        take_off(s.P, h, s.waiting, h, s.n_waiting[h])
+        take_off(s.P, h, s.waiting, h, s.n_waiting[h], None)
         s.n_waiting[h] = 0
 
 

@@ -15,14 +15,12 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from tracking._angle_kernels import cosine_sine
 from tracking._exponential_kernels import decay
-from tracking.arrays import LINE
 from tracking.compiled import small_kernel
-from tracking.filters.joint._gyroscope_kernels import lean_columns, lean_rows
+from tracking.filters.joint._gyroscope_kernels import fade_lean, lean_columns, lean_rows
 from tracking.filters.joint._mirror_kernels import mirror
+from tracking.filters.joint._product_kernels import take_off
 from tracking.filters.joint._step_kernels import STATES, add_to_columns, add_to_rows
 from tracking.filters.joint._turned_kernels import (
     PER_GRAVITY,
@@ -35,7 +33,10 @@ from tracking.filters.joint._upright_kernels import bias_time, turn_upright
 
 @small_kernel
 def predict(c, s, h, step, scratch):
-    """Carry hypothesis h over the summed time of every node.
+    """Carry hypothesis h over the summed time of every node; nothing of it waits from then on.
+
+    What decays does so first, in the sweep over P that takes off what waits. What is added after
+    it goes by what is left.
 
     Args:
         c: Coefficients.
@@ -66,18 +67,21 @@ def predict(c, s, h, step, scratch):
         x[h, at] *= scale[at]
         x[h, at + 1] *= scale[at + 1]
         x[h, at + 1] += (1.0 - scale[at + 1]) * hidden * c.excess
+    take_off(P, h, s.waiting, h, s.n_waiting[h], scale)
+    s.n_waiting[h] = 0
     for i in range(nodes.shape[0]):
         if moves(nodes[i]):
-            write_derivatives(d, nodes[i], w, i, F)
+            write_derivatives(d, nodes[i], w, i, F, scale)
             add_to_rows(P, h, nodes[i].at_p, nodes[i].at_b, states_behind(nodes[i]), F, i)
     for i in range(nodes.shape[0]):
         if moves(nodes[i]):
             add_to_columns(P, h, nodes[i].at_p, nodes[i].at_b, states_behind(nodes[i]), F, i)
     for i in range(nodes.shape[0]):
         if moves(nodes[i]) and nodes[i].told:
-            lean_rows(nodes[i], P, h, i, w)
-            lean_columns(nodes[i], P, h, i, w)
-    fade(P, h, c.n_motion, scale)
+            fade_lean(nodes[i], i, w, scale)
+            lean_rows(nodes[i], P, h, i, w, scale)
+            lean_columns(nodes[i], P, h, i, w, scale)
+    mirror(P, h, c.n_motion)
     for i in range(nodes.shape[0]):
         if nodes[i].present:
             add_noise(c, nodes[i], s.pre, P, h, i, scale, step)
@@ -183,8 +187,8 @@ def states_behind(node):
 
 
 @small_kernel
-def write_derivatives(d, node, w, i, F):
-    """What position and velocity of node i gain by the states behind, to `_step_kernels`' F."""
+def write_derivatives(d, node, w, i, F, scale):
+    """What position and velocity of node i gain by what is left of the states behind, to F."""
     T, pc, ps, vc, vs = w[i, 0], w[i, 1], w[i, 2], w[i, 3], w[i, 4]
     y = node.at_h - node.at_b
     F[i, :, :] = 0.0
@@ -196,21 +200,10 @@ def write_derivatives(d, node, w, i, F):
         F[i, 2, 2], F[i, 2, 5] = -0.5 * T * T, -T
     if node.at_o >= 0:
         write_turned(w, i, F)
-
-
-@small_kernel
-def fade(P, h, n_motion, scale):
-    """What decays, right of positions and velocities and below; then left of the diagonal."""
-    # Unsigned: no index from the end. Whole lines: the few before them stay as they are.
-    first, end = np.uint64(n_motion // LINE * LINE), np.uint64(P.shape[2])
-    for r in range(n_motion):
-        for k in range(first, end):
-            P[h, r, k] *= scale[k]
-    for r in range(np.uint64(n_motion), end):
-        s = scale[r]
-        for k in range(first, end):
-            P[h, r, k] *= s * scale[k]
-    mirror(P, h, n_motion)
+    for q in range(y + 1):
+        undo = 1.0 / scale[node.at_b + q]
+        for r in range(2 * d):
+            F[i, q, r] *= undo
 
 
 @small_kernel

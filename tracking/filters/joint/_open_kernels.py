@@ -100,6 +100,8 @@ def carry_slope(c, s, h, scratch):
     for k in range(9):
         row, column = k // 3, k % 3
         z = s.slope[h, k]
+        for r in range(first, last):
+            z[r] *= scratch.scale[r]
         for i in range(s.nodes.shape[0]):
             node = s.nodes[i]
             if not moves(node):
@@ -110,13 +112,11 @@ def carry_slope(c, s, h, scratch):
                 for q in range(states_behind(node)):
                     z[p + r] += F[q, r] * z[b + q]
             if node.told:
-                lean_slope(node, z, w)
+                lean_slope(node, z, w, scratch.scale)
                 z[b + row] += (w[STEP], w[STEP + 1], 0.0)[column]
             # A turn by the heading error is one of M as well.
             z[p + row] += (w[6], -w[5], w[28])[column]
             z[v + row] += (w[8], -w[7], w[27])[column]
-        for r in range(first, last):
-            z[r] *= scratch.scale[r]
 
 
 @small_kernel

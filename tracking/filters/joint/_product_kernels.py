@@ -1,4 +1,4 @@
-"""``P - W^T W``, the one sum of products that the joint filter's time goes into.
+"""``D (P - W^T W) D``, the one sum of products that the joint filter's time goes into.
 
 A compiler finds vectors along a row by itself, but not that a square of P can stay in registers
 while all rows of W are taken off it, and not how to transpose it there for the other half of P.
@@ -32,24 +32,29 @@ and not more than fit in the registers: a square is twice as wide as high."""
 
 
 @kernel
-def take_off_plainly(P, h, W, g, m):
-    """``P[h] - W[g]^T W[g]`` of the first m rows of W, in plain loops."""
+def take_off_plainly(P, h, W, g, m, scale):
+    """What `take_off` does, in plain loops."""
     n = P.shape[2]
     for r in range(n):
         for k in range(n):
             for q in range(m):
                 P[h, r, k] -= W[g, q, r] * W[g, q, k]
+            if scale is not None:
+                P[h, r, k] *= scale[r] * scale[k]
 
 
 @intrinsic
-def _take_off(context, P, h, W, g, m):
+def _take_off(context, P, h, W, g, m, scale):
     """The code of `take_off` for whole squares."""
+    fades = not isinstance(scale, types.NoneType)
 
     def generate(target, builder, signature, arguments):
-        P, h, W, g, m = arguments
+        P, h, W, g, m, scale = arguments
         lanes = vectors.LANES
         states, n = matrix_at(target, builder, signature.args[0], P, h)
         rows, _ = matrix_at(target, builder, signature.args[2], W, g)
+        if fades:
+            scale = target.make_array(signature.args[5])(target, builder, scale).data
         sums = [[cgutils.alloca_once(builder, vector()) for _ in range(WIDE)] for _ in range(lanes)]
 
         def square(row, column, wide):
@@ -67,8 +72,17 @@ def _take_off(context, P, h, W, g, m):
                     product = builder.fmul(left[i], right[j], flags=CONTRACT)
                     total = builder.fsub(builder.load(sums[i][j]), product, flags=CONTRACT)
                     builder.store(total, sums[i][j])
+            if fades:
+                keep = [spread(builder, scale, builder.add(row, INT(i))) for i in range(lanes)]
             for j, at in enumerate(columns):
                 block = [builder.load(sums[i][j]) for i in range(lanes)]
+                if fades:
+                    # Of the two first, so that both halves are rounded alike.
+                    both = load(builder, scale, at)
+                    block = [
+                        builder.fmul(total, builder.fmul(one, both))
+                        for total, one in zip(block, keep, strict=True)
+                    ]
                 for i, numbers in enumerate(block):
                     store(builder, numbers, own[i], at)
                 for i, numbers in enumerate(transpose(builder, block)):
@@ -83,19 +97,19 @@ def _take_off(context, P, h, W, g, m):
                 square(row, column, 1)
         return target.get_dummy_value()
 
-    return types.void(P, h, W, g, m), generate
+    return types.void(P, h, W, g, m, scale), generate
 
 
 @kernel
-def _take_off_in_squares(P, h, W, g, m):
+def _take_off_in_squares(P, h, W, g, m, scale):
     if P.shape[2] % vectors.LANES:
-        take_off_plainly(P, h, W, g, m)
+        take_off_plainly(P, h, W, g, m, scale)
     else:
-        _take_off(P, h, W, g, m)
+        _take_off(P, h, W, g, m, scale)
 
 
 take_off = take_off_plainly if config.DISABLE_JIT else _take_off_in_squares
-"""``P[h] - W[g]^T W[g]`` of the first m rows of W; equal across the diagonal to the last bit.
+"""``P[h] - W[g]^T W[g]`` of m rows of W, faded; to the last bit equal across the diagonal.
 
 Args:
     P: Symmetric, (matrix, n, n); fast where n is a multiple of 8.
@@ -103,4 +117,5 @@ Args:
     W: (matrix, row, n)
     g: Matrix of W.
     m: Rows.
+    scale: How much of each error stays, (n): rows and columns are multiplied by it. Or None.
 """

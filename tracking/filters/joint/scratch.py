@@ -44,6 +44,8 @@ class Scratch(NamedTuple):
     """(1, pair)"""
     stays: F64
     """(1, pair)"""
+    none_waiting: I64
+    """Of its covariance nothing waits: zero, (1)."""
     gradient: F64
     """Of an innovation by the turn of an open group, (9)."""
     direct: F64
@@ -71,6 +73,7 @@ def make_scratch(n_nodes: int, n_pairs: int, n_states: int) -> Scratch:
         t_pre=np.zeros(n_nodes),
         nlos=np.zeros((1, n_pairs)),
         stays=np.zeros((1, n_pairs)),
+        none_waiting=np.zeros(1, dtype=np.int64),
         gradient=np.zeros(9),
         direct=np.zeros(9),
         turns=aligned(3, 3, n_states),
