@@ -92,6 +92,26 @@ def test_prediction_is_that_of_its_own_derivatives(dimensions, vehicle, static):
     np.testing.assert_allclose(P1, F @ P0 @ F.T + Q, atol=2e-7)
 
 
+@pytest.mark.parametrize("vehicle", ["car", "hand, told"])
+def test_prediction_takes_off_what_waits(vehicle):
+    vehicle, *told = vehicle.split(", ")
+    c, s, scratch, _ = running(3 if told else 2, vehicle)
+    s.nodes["told"] = (s.nodes["at_g"] >= 0) & bool(told)
+    n = s.x.shape[1]
+    rng = np.random.default_rng(3)
+    W = rng.standard_normal((1, 16, n))
+    s = s._replace(waiting=W)
+    A = rng.standard_normal((n, n))
+    s.nodes["heading_tau"], s.nodes["bias_tau"] = 0.05, 0.02
+    x0, P0 = s.x[0].copy(), A @ A.T + 100.0 * np.eye(n)
+    _, settled = carry(c, s, scratch, x0, P0 - W[0, :5].T @ W[0, :5])
+    assert s.n_waiting[0] == 0
+    s.n_waiting[0] = 5
+    _, found = carry(c, s, scratch, x0, P0)
+    assert s.n_waiting[0] == 0
+    np.testing.assert_allclose(found, settled, atol=1e-9)
+
+
 def sum_since(c, s, since):
     """The sums of all nodes over so long [s]."""
     for k in range(3):
