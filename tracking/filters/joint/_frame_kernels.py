@@ -6,8 +6,8 @@ sensors, which turn with the body, is right for its own frame only, and so are i
 either counts. So once each turn that may be is known roughly, a frame of its own is followed for
 each, by the likelihood of what comes from there on, and turned to the likeliest turn near it: a
 Gaussian sum [1] over turns, whose members have one covariance as far as all is linear: so what
-counts between them is how well they fit, not how sure they are. Once all are known to a few
-degrees, what is left of the turn becomes a part of P, and they are hypotheses like any others.
+counts between them, until one is left, is how well they fit, not how sure they are. Once all are
+known to a few degrees, what is left of the turn becomes a part of P, and none is turned any more.
 
 References:
     [1] Alspach and Sorenson, Nonlinear Bayesian estimation using Gaussian sum approximations, IEEE

@@ -102,7 +102,7 @@ GROUP = np.dtype(
     [
         ("started", "?"),
         ("open", "?"),  # in space: nothing has told yet how it is turned
-        ("parted", "?"),  # each hypothesis stands for the turns near its own
+        ("parted", "?"),  # each hypothesis is a turn of the same group, or those near it
         ("held", "?"),  # open, but reported as it is until another turn is likelier
         ("asleep", "?"),  # nothing has moved yet, and one rotation stands for all
         ("flat", "?"),  # the layout was too flat to tell its mirror image
