@@ -1,19 +1,26 @@
-"""The decorator of every compiled kernel.
+"""The decorator of every compiled kernel, and the cache of compiled code.
 
-Numba keeps compiled code on disk and compiles a function anew when *its* file changes. A
-kernel that calls kernels of other files has their code compiled in, so here it is compiled
-anew when any kernel file of its package or of this one changes.
+Numba keeps compiled code on disk and names it after the time of the kernel's own file. But the
+code of the kernels it calls is compiled into it, and so are the constants it imports. Here cached
+code is stamped with the contents of all of these (`fingerprint`): a change of any of them compiles
+the kernel again, a change of anything else does not, and neither does a copy with new file times.
 """
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Callable
-from functools import cache, partial
+import hashlib
+import re
+from collections.abc import Callable, Iterator
+from dis import opmap
+from functools import partial
 from pathlib import Path
+from types import CodeType, FunctionType, ModuleType
 from typing import Any, TypeVar
 
+import numpy as np
 from numba import config, njit, typeof
+from numba.core.caching import IndexDataCacheFile
+from numba.core.dispatcher import Dispatcher
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -59,6 +66,25 @@ def bind(kernel: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
     return partial(entry, *arguments)
 
 
+def fingerprint(kernel: Any) -> str:
+    """Hash of a kernel's code and, recursively, of everything that is compiled into it.
+
+    Args:
+        kernel: Of any of the three kinds.
+    """
+    found: str | None = getattr(kernel, "_fingerprint", None)
+    if found is None:
+        function, sha = kernel.py_func, hashlib.sha256()
+        sha.update(repr(sorted(kernel.targetoptions.items(), key=str)).encode())
+        for part in _code_parts(function.__code__):
+            sha.update(part.encode())
+        for name in sorted(_globals_of(function.__code__)):
+            if name in function.__globals__:
+                sha.update(f"{name}={_describe(function.__globals__[name])};".encode())
+        found = kernel._fingerprint = sha.hexdigest()
+    return found
+
+
 def _compile(function: Function, *, inline: bool = False, nrt: bool = False) -> Function:
     compiled = njit(
         cache=True,
@@ -68,51 +94,106 @@ def _compile(function: Function, *, inline: bool = False, nrt: bool = False) -> 
         _nrt=nrt,
     )(function)
     if not config.DISABLE_JIT:
-        package = function.__module__.partition(".")[0]
-        # A kernel of a script has no package, only its own file, whose stamp numba has.
-        parents = Path(inspect.getfile(function)).parents
-        folder = next((p for p in parents if p.name == package), Path(__file__).parent)
-        index = compiled._cache._cache_file
-        index._source_stamp = (index._source_stamp, _stamp(folder))
-        index._load_index = _tolerant(index._load_index)
-        index.load, index.save = _labelled(index)
+        compiled._cache._cache_file = _CacheFile(compiled)
     return compiled  # type: ignore[no-any-return]
 
 
-def _tolerant(load: Callable[[], Any]) -> Callable[[], Any]:
-    """An index that names classes which have moved since is as good as none."""
+class _CacheFile(IndexDataCacheFile):
+    """The cache of one kernel; each entry says what it was compiled from, and for which types.
 
-    def load_or_start_anew() -> Any:
+    Entries are numbered files. Where several processes compile at a time, one can find under a
+    number what another has saved for other types, or what is left from before a change.
+    """
+
+    def __init__(self, compiled: Any) -> None:
+        impl = compiled._cache._impl
+        # The number of the kernel's first line says nothing about its contents.
+        base = re.sub(r"-\d+\.", ".", impl.filename_base, count=1)
+        super().__init__(impl.locator.get_cache_path(), base, None)
+        self._kernel = compiled
+
+    def load(self, key: Any) -> Any:
+        """The compiled code for a key, None if there is none, or none that can be read."""
+        self._source_stamp = fingerprint(self._kernel)
         try:
-            return load()
-        except (AttributeError, ImportError):
+            stamp, data = super().load(key) or (None, None)
+        except Exception:
+            # A class that has moved, a file that was cut short: what cannot be read is no code.
+            return None
+        return data if stamp == (self._source_stamp, key) else None
+
+    def save(self, key: Any, data: Any) -> None:
+        """Keep compiled code under a key."""
+        self._source_stamp = fingerprint(self._kernel)
+        super().save(key, ((self._source_stamp, key), data))
+
+    def _load_index(self) -> Any:
+        try:
+            return super()._load_index()
+        except Exception:
             return {}
 
-    return load_or_start_anew
+
+def _code_parts(code: CodeType) -> Iterator[str]:
+    """What a function does, without its names for lines, files and itself, nor its docstring."""
+    constants = code.co_consts
+    if constants and isinstance(constants[0], str | None):
+        constants = constants[1:]  # the docstring, or that there is none
+    yield code.co_code.hex()
+    yield repr((code.co_names, code.co_varnames, code.co_freevars))
+    for constant in constants:
+        if isinstance(constant, CodeType):
+            yield from _code_parts(constant)
+        else:
+            yield repr(constant)
 
 
-def _labelled(index: Any) -> tuple[Callable[[Any], Any], Callable[[Any, Any], None]]:
-    """How an index loads and saves code that says what it was compiled from, and for which types.
-
-    Its files are numbered. Where several processes compile at a time, one can find under a number
-    what another has saved for other types, or what is left from before a change.
-    """
-    load, save = index.load, index.save
-
-    def load_own(key: Any) -> Any:
-        found = load(key)
-        is_own = found is not None and found[0] == (index._source_stamp, key)
-        return found[1] if is_own else None
-
-    def save_labelled(key: Any, data: Any) -> None:
-        save(key, ((index._source_stamp, key), data))
-
-    return load_own, save_labelled
+def _globals_of(code: CodeType) -> set[str]:
+    """Names of the globals that a function reads, those of functions in it included."""
+    names, extended = set[str](), 0
+    for op, arg in zip(code.co_code[::2], code.co_code[1::2], strict=True):
+        if op == opmap["EXTENDED_ARG"]:
+            extended = (extended | arg) << 8
+            continue
+        if op == opmap["LOAD_GLOBAL"]:
+            names.add(code.co_names[(extended | arg) >> 1])
+        extended = 0
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            names |= _globals_of(constant)
+    return names
 
 
-@cache
-def _stamp(folder: Path) -> tuple[int, int]:
-    """Changes when a kernel file under the folder or this one's does: newest time, and a sum."""
-    folders = {folder, Path(__file__).parent}
-    stats = [path.stat() for f in sorted(folders) for path in sorted(f.rglob("_*_kernels.py"))]
-    return max(s.st_mtime_ns for s in stats), sum(s.st_mtime_ns + s.st_size for s in stats)
+def _describe(value: Any) -> str:
+    """The contents of a global of a kernel."""
+    if isinstance(value, Dispatcher):
+        return fingerprint(value)
+    if isinstance(value, np.ndarray):
+        return f"{value.dtype}{value.shape}{value.tobytes().hex()}"
+    if isinstance(value, type):
+        return f"{value.__module__}.{value.__qualname__}{getattr(value, '_fields', '')}"
+    if isinstance(value, ModuleType):
+        return value.__name__
+    maker = getattr(value, "_defn", value)  # of an intrinsic
+    if isinstance(maker, FunctionType):
+        return _files_of(maker)
+    return repr(value)
+
+
+def _files_of(function: FunctionType) -> str:
+    """The files that a function which writes machine code is made of, its own package's."""
+    package = function.__module__.partition(".")[0]
+    waiting, files = [function.__globals__], dict[str, str]()
+    while waiting:
+        names = waiting.pop()
+        path = names.get("__file__")
+        if path is None or path in files:
+            continue
+        files[path] = hashlib.sha256(Path(path).read_bytes()).hexdigest()
+        for value in names.values():
+            if isinstance(value, ModuleType):
+                if value.__name__.partition(".")[0] == package:
+                    waiting.append(vars(value))
+            elif isinstance(value, FunctionType) and value.__module__.startswith(package + "."):
+                waiting.append(value.__globals__)
+    return " ".join(sorted(files.values()))

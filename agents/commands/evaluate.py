@@ -12,7 +12,10 @@ from agents.console import emit_json, print_table, progress_bar
 @click.command()
 @click.option("--suite", default="paper", show_default=True, help="paper, robustness or scaling.")
 @click.option(
-    "--filters", default="joint,ekf-mds,ekf", show_default=True, help="Names, commas between."
+    "--filters",
+    default="joint,ekf-mds,ekf,paper-ekf-mds,paper-ekf",
+    show_default=True,
+    help="Names, commas between.",
 )
 @click.option(
     "--seeds", type=int, help="Runs of each case: 0 to N-1. Default 50, robustness 20, scaling 10."

@@ -18,7 +18,7 @@ from agents.errors import UsageError
     "--filter",
     "filters",
     multiple=True,
-    help="joint (default), ekf-mds or ekf; may be given again.",
+    help="joint (default), ekf-mds, ekf, paper-ekf-mds or paper-ekf; may be given again.",
 )
 @click.option(
     "--calibration",

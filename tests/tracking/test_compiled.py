@@ -41,3 +41,69 @@ def test_code_under_another_number_is_not_taken_for_what_it_is_not(tmp_path):
     # What was compiled instead has its place now.
     compiled = "double(1), double(1.5), sum(double.stats.cache_hits.values())"
     assert run(tmp_path, compiled) == "2 3.0 2"
+
+
+def results(folder, call="double(1)"):
+    """Result of a call in a process of its own, and how often its code came from disk."""
+    return run(folder, f"{call}, sum(double.stats.cache_hits.values())")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A kernel that calls a kernel of another file, which uses a constant of a third."""
+    (tmp_path / "sizes.py").write_text("FACTOR = 2\nOTHER = 1\n")
+    (tmp_path / "_times_kernels.py").write_text(
+        "from sizes import FACTOR\nfrom tracking.compiled import kernel\n\n\n"
+        "@kernel\ndef times(x):\n    return FACTOR * x\n"
+    )
+    (tmp_path / "_double_kernels.py").write_text(
+        "from _times_kernels import times\nfrom tracking.compiled import kernel\n\n\n"
+        "@kernel\ndef double(x):\n    return times(x)\n"
+    )
+    return tmp_path
+
+
+@pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
+def test_a_changed_constant_of_any_file_compiles_again(folder):
+    assert results(folder) == "2 0"
+    assert results(folder) == "2 1"
+    (folder / "sizes.py").write_text("FACTOR = 3\nOTHER = 1\n")
+    assert results(folder) == "3 0"
+
+
+@pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
+def test_a_changed_kernel_of_another_file_compiles_its_callers_again(folder):
+    assert results(folder) == "2 0"
+    text = (folder / "_times_kernels.py").read_text()
+    (folder / "_times_kernels.py").write_text(text.replace("FACTOR * x", "FACTOR * x + 1"))
+    assert results(folder) == "3 0"
+
+
+@pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
+def test_what_is_not_compiled_in_compiles_nothing_again(folder):
+    """Other constants, comments, docstrings, lines above, times of files."""
+    assert results(folder) == "2 0"
+    (folder / "sizes.py").write_text("FACTOR = 2\nOTHER = 5\n")
+    for name in ("_times_kernels.py", "_double_kernels.py"):
+        text = (folder / name).read_text()
+        text = text.replace("):\n", '):\n    """What it does."""\n')
+        (folder / name).write_text("# A comment.\n" + text)
+    assert results(folder) == "2 1"
+
+
+@pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
+@pytest.mark.parametrize("damage", ["moved class", "cut index", "cut data", "no data"])
+def test_a_cache_that_cannot_be_read_is_replaced(folder, damage):
+    assert results(folder) == "2 0"
+    pattern = "*.nbc" if "data" in damage else "*.nbi"
+    for path in (folder / "__pycache__").glob(pattern):
+        if damage == "no data":
+            path.unlink()
+        elif damage == "moved class":
+            # A pickle of a name that is not there any more.
+            for cached in (folder / "__pycache__").glob("*.nbc"):
+                cached.write_bytes(b"cnumba\nwas_here_once\n.")
+        else:
+            path.write_bytes(path.read_bytes()[:-20])
+    assert results(folder) == "2 0"
+    assert results(folder) == "2 1"

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from tracking.filters.joint.params import JointParams
 from tracking.filters.pair.params import PairEkfParams
+from tracking.filters.paper.params import PaperParams
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -14,3 +15,4 @@ class FilterParams:
 
     joint: JointParams = field(default_factory=JointParams)
     pair: PairEkfParams = field(default_factory=PairEkfParams)
+    paper: PaperParams = field(default_factory=PaperParams)

@@ -1,0 +1,320 @@
+"""Armani and Holz (ICRA 2024) in plain numpy: the specification of `paper-ekf-mds`.
+
+One EKF per pair of nodes i < j; state ``(x_ij, v_ij, q_ij)``, 3 + 3 + 4 numbers, world frame,
+metres and seconds; MDS over the group. Equation numbers are those of arXiv 2409.12505. What the
+text leaves open is an option of `PaperParams`. `PaperEkf` is the same algorithm, compiled and for
+many groups at once; the tests hold one against the other.
+
+References:
+    [1] Armani, Holz, Accurately tracking relative positions of moving trackers based on UWB
+        ranging and inertial sensing without anchors, ICRA 2024.
+    [2] Schoenemann, A generalized solution of the orthogonal Procrustes problem, Psychometrika 31
+        (1966) 1.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+
+from tracking.arrays import F64
+from tracking.constellation import Constellation
+from tracking.filters.paper.params import PaperParams
+from tracking.geometry import quat_conjugate, quat_multiply
+from tracking.measurements import Kind, MeasurementBlock
+
+CONJUGATE = np.diag([1.0, -1.0, -1.0, -1.0])
+TINY = 1e-6
+"""[m, m/s] Shorter vectors have no direction."""
+
+
+class PairFilter:
+    """The EKF of one pair, from its first k measurements on."""
+
+    def __init__(self, d: int, x_0: F64, q_0: F64, t: float, distance: float, static: bool) -> None:
+        self.x = np.concatenate([x_0, np.zeros(3), q_0])  # v_0 = 0
+        axes = np.arange(3) < d
+        self.P = np.diag(np.concatenate([axes, axes & (not static), np.ones(4)]).astype(float))
+        self.t = self.t_range = t
+        self.mean = self.last = distance
+        self.rate, self.n_rejected = 0.0, 0
+
+    def predict(self, t: float, u: F64, Sigma_u: F64, d: int) -> None:
+        """Dead reckoning to time t with the control ``u = (a_i, a_j, q_i, q_j)``, eq. (7) to (9)."""
+        dT = t - self.t
+        if dT <= 0.0:
+            return
+        a_i, a_j, q_i, q_j = u[:3], u[3:6], u[6:10], u[10:]
+        I = np.diag((np.arange(3) < d).astype(float))
+        F = np.zeros((10, 10))  # q_ij is a function of the control alone
+        F[:3, :3], F[:3, 3:6], F[3:6, 3:6] = I, dT * I, I
+        W = np.zeros((10, 14))
+        W[:3, :3], W[:3, 3:6] = -0.5 * dT**2 * I, 0.5 * dT**2 * I
+        W[3:6, :3], W[3:6, 3:6] = -dT * I, dT * I
+        W[6:, 6:10] = _right(q_j) @ CONJUGATE
+        W[6:, 10:] = _left(quat_conjugate(q_i))
+        self.x[:6] = F[:6, :6] @ self.x[:6] + W[:6, :6] @ np.concatenate([a_i, a_j])
+        self.x[6:] = quat_multiply(quat_conjugate(q_i), q_j)
+        self.P = F @ self.P @ F.T + W @ Sigma_u @ W.T
+        self.t = t
+
+    def correct(self, t: float, distance: float, c: PaperParams) -> float | None:
+        """Gate a range, then correct with it and its derivative, eq. (10) and (11).
+
+        Returns:
+            The range's innovation, squared, over its variance; None for an outlier.
+        """
+        age = t - self.t_range
+        x, v = self.x[:3], self.x[3:6]
+        if abs(distance - self.mean) > c.gate_floor + c.gate_gain * float(np.linalg.norm(v)):
+            self.n_rejected += 1
+            if self.n_rejected < c.gate_reset:
+                return None
+            self.mean, self.rate = distance, 0.0
+        else:
+            self.mean += age / (c.gate_tau + age) * (distance - self.mean)
+            if age > 0.0:
+                raw = (distance - self.last) / age
+                self.rate += age / (c.speed_tau + age) * (raw - self.rate)
+        self.n_rejected, self.last, self.t_range = 0, distance, t
+        d, speed = float(np.linalg.norm(x)), float(np.linalg.norm(v))
+        u = x / d if d > TINY else np.zeros(3)
+        H = np.zeros((2, 10))
+        H[0, :3] = u
+        if c.speed == "norm":
+            H[1, 3:6] = v / speed if speed > TINY else 0.0
+            h, z = np.array([d, speed]), np.array([distance, abs(self.rate)])
+        else:
+            H[1, :3], H[1, 3:6] = (v - u * (u @ v)) / d if d > TINY else 0.0, u
+            h, z = np.array([d, u @ v]), np.array([distance, self.rate])
+        R = np.diag([c.range_std**2, c.speed_std**2])
+        S = H @ self.P @ H.T + R
+        K = self.P @ H.T @ np.linalg.inv(S)
+        self.x += K @ (z - h)
+        self.P = self.P - K @ S @ K.T
+        return float((z[0] - h[0]) ** 2 / S[0, 0])
+
+    def use_mds(self, x: F64, c: PaperParams, d: int) -> None:
+        """Take the refined relative position of the pair."""
+        if c.feedback == "replace":
+            self.x[:3] = x
+        elif c.feedback == "update":
+            H = np.eye(10)[:d]
+            K = self.P @ H.T @ np.linalg.inv(H @ self.P @ H.T + c.mds_std**2 * np.eye(d))
+            self.x += K @ (x[:d] - self.x[:d])
+            self.P = self.P - K @ H @ self.P
+
+
+class PaperReference:
+    """The filters of one group."""
+
+    def __init__(self, constellation: Constellation, params: PaperParams) -> None:
+        self.group, self.c, self.d = constellation, params, constellation.dimensions
+        n = constellation.n_nodes
+        self.u = [np.concatenate([np.zeros(3), [1.0, 0.0, 0.0, 0.0]]) for _ in range(n)]
+        self.t_imu, self.t_heard = np.full(n, -np.inf), np.full(n, -np.inf)
+        self.present: list[int] = []
+        self.filters: dict[tuple[int, int], PairFilter] = {}
+        self.first: dict[tuple[int, int], tuple[list[float], list[F64]]] = {}
+        self.surveyed: dict[tuple[int, int], float] = {}
+        self.n_since_mds = 0
+
+    def run(self, block: MeasurementBlock, t_out: F64) -> tuple[F64, F64]:
+        """States (time, pair, 10) and covariances (time, pair, 10, 10) at the given times.
+
+        Args:
+            block: Events of one environment in order, STATE and not IMU.
+            t_out: Ascending times [s].
+        """
+        p = self.group.n_pairs
+        x, P = np.zeros((len(t_out), p, 10)), np.zeros((len(t_out), p, 10, 10))
+        o = 0
+        for k in range(block.n_events):
+            t = float(block.t[0, k])
+            while o < len(t_out) and t_out[o] < t:
+                self.report(float(t_out[o]), x[o], P[o])
+                o += 1
+            i, j = sorted((int(block.i[0, k]), int(block.j[0, k])))
+            if block.kind[0, k] == Kind.STATE:
+                self.take_state(i, t, block.values[0, k])
+            elif block.kind[0, k] in (Kind.RANGE, Kind.SURVEY):
+                self.take_range(i, j, t, block.values[0, k, 0], block.kind[0, k] == Kind.SURVEY)
+            elif block.kind[0, k] == Kind.LEAVE:
+                self.remove(i)
+        for o in range(o, len(t_out)):
+            self.report(float(t_out[o]), x[o], P[o])
+        return x, P
+
+    def take_state(self, i: int, t: float, values: F64) -> None:
+        """Eq. (1) and (2): a node's orientation and world acceleration."""
+        accel = np.where(np.arange(3) < self.d, values[4:7], 0.0)
+        self.u[i], self.t_imu[i] = np.concatenate([accel, values[:4]]), t
+        for pair in self.filters:
+            if i in pair:
+                self.predict(pair, t)
+
+    def take_range(self, i: int, j: int, t: float, distance: float, is_survey: bool) -> None:
+        """Correct the pair's filter, or collect its first k measurements."""
+        for node in np.nonzero(t - self.t_heard > self.c.leave_after)[0]:
+            self.remove(int(node))
+        self.t_heard[i] = self.t_heard[j] = t
+        if is_survey:
+            self.surveyed[i, j] = distance
+        if (i, j) not in self.filters:
+            distances, orientations = self.first.setdefault((i, j), ([], []))
+            if len(distances) < self.c.k and not is_survey:
+                distances.append(distance)
+                orientations.append(quat_multiply(quat_conjugate(self.u[i][3:]), self.u[j][3:]))
+            self.initialise(t)
+            return
+        self.predict((i, j), t)
+        if self.filters[i, j].correct(t, distance, self.c) is not None:
+            self.n_since_mds += 1
+        if self.n_since_mds >= len(self.filters) and len(self.present) > 2:
+            self.refine(t)
+
+    def initialise(self, t: float) -> None:
+        """Spawn the filters of new nodes from MDS on the first k measurements."""
+        while True:
+            n = self.group.n_nodes
+            absent = [m for m in range(n) if m not in self.present]
+            size = 1 if self.present else min(3, n)
+            ready = [new for new in combinations(absent, size) if self.has_first(new)]
+            if not ready:
+                return
+            members = sorted([*self.present, *ready[0]])
+            D = np.zeros((len(members), len(members)))
+            for (a, i), (b, j) in combinations(enumerate(members), 2):
+                known = self.filters.get((i, j))
+                if known is not None:
+                    self.predict((i, j), t)
+                D[a, b] = D[b, a] = (
+                    self.first_distance((i, j)) if known is None else np.linalg.norm(known.x[:3])
+                )
+            X, target = self.mds(D), self.positions(members)
+            if self.present:
+                known_rows = [m in self.present for m in members]
+                X = _align(X, target, known_rows, self.d)
+            elif self.c.first_layout is not None:
+                layout = np.array(self.c.first_layout)[members]
+                X = _align(X, layout, [True] * len(members), self.d)
+            self.present = members
+            for (a, i), (b, j) in combinations(enumerate(members), 2):
+                if (i, j) not in self.filters:
+                    distance, static = self.first_distance((i, j)), self.group.is_static[[i, j]]
+                    _, q = self.first.pop((i, j), ([], []))
+                    x_0, q_0 = X[b] - X[a], _mean(q)
+                    self.filters[i, j] = PairFilter(self.d, x_0, q_0, t, distance, static.all())
+
+    def has_first(self, new: tuple[int, ...]) -> bool:
+        """True if all pairs of new nodes, and of new and present ones, have k measurements."""
+        pairs = [p for p in combinations(sorted([*self.present, *new]), 2) if p not in self.filters]
+        n = [len(self.first.get(p, ([], []))[0]) for p in pairs]
+        return all(p in self.surveyed or m >= self.c.k for p, m in zip(pairs, n, strict=True))
+
+    def first_distance(self, pair: tuple[int, int]) -> float:
+        """Surveyed distance of a pair, or the mean of its first k ranges [m]."""
+        return self.surveyed.get(pair, float(np.mean(self.first.get(pair, ([0.0], []))[0])))
+
+    def refine(self, t: float) -> None:
+        """MDS over the group; its positions go to the filters for the next iteration."""
+        self.n_since_mds = 0
+        if self.c.feedback == "none":
+            return
+        D = np.zeros((len(self.present), len(self.present)))
+        for (a, i), (b, j) in combinations(enumerate(self.present), 2):
+            self.predict((i, j), t)
+            D[a, b] = D[b, a] = np.linalg.norm(self.filters[i, j].x[:3])
+        X = self.mds(D)
+        if self.c.alignment == "procrustes":
+            X = _align(X, self.positions(self.present), [True] * len(X), self.d)
+        for (a, i), (b, j) in combinations(enumerate(self.present), 2):
+            self.filters[i, j].use_mds(X[b] - X[a], self.c, self.d)
+
+    def mds(self, D: F64) -> F64:
+        """Positions (node, 3) with the distances D: K, its eigenvectors, ``E Lambda^(1/2)``."""
+        J = np.eye(len(D)) - 1.0 / len(D)
+        eigenvalues, E = np.linalg.eigh(-0.5 * J @ D**2 @ J)
+        X = np.zeros((len(D), 3))
+        power = 0.5 if self.c.scaling == "root" else 0.25
+        for axis in range(min(self.d, len(D))):
+            largest = max(eigenvalues[-1 - axis], 0.0)
+            # LAPACK's signs differ between machines; the first node decides here.
+            X[:, axis] = E[:, -1 - axis] * largest**power * (-1.0 if E[0, -1 - axis] < 0.0 else 1.0)
+        return X
+
+    def positions(self, members: list[int]) -> F64:
+        """Positions of nodes about their centre by the filters' x_ij, (member, 3)."""
+        pos = np.zeros((len(members), 3))
+        for (a, i), (b, j) in combinations(enumerate(members), 2):
+            if (i, j) in self.filters:
+                pos[b] += self.filters[i, j].x[:3]
+                pos[a] -= self.filters[i, j].x[:3]
+        return pos / max(sum(m in self.present for m in members), 1)
+
+    def predict(self, pair: tuple[int, int], t: float) -> None:
+        """Predict a pair's filter with the controls of its nodes."""
+        u, sigma = self.control(pair, t)
+        self.filters[pair].predict(t, u, np.diag(sigma**2), self.d)
+
+    def control(self, pair: tuple[int, int], t: float) -> tuple[F64, F64]:
+        """``u``, eq. (6), and the standard deviations of its noise, both (14)."""
+        u, sigma = np.zeros(14), np.zeros(14)
+        for side, node in enumerate(pair):
+            moves = not self.group.is_static[node]
+            if t - self.t_imu[node] <= self.c.imu_timeout:
+                u[3 * side : 3 * side + 3] = self.u[node][:3]
+            u[6 + 4 * side : 10 + 4 * side] = self.u[node][3:]
+            sigma[3 * side : 3 * side + 3] = self.c.accel_std * moves
+            sigma[6 + 4 * side : 10 + 4 * side] = self.c.orientation_std * moves
+        return u, sigma
+
+    def remove(self, node: int) -> None:
+        """Destroy the filters of a node that left."""
+        self.present = [m for m in self.present if m != node]
+        left = [pair for pair in self.filters if node in pair]
+        for pair in left:
+            del self.filters[pair]
+        for pair in [p for p in self.first if node in p]:
+            del self.first[pair]
+        if len(self.present) < 2:
+            self.present, self.filters = [], {}
+
+    def report(self, t: float, x: F64, P: F64) -> None:
+        """Write every filter's state at time t, without touching it."""
+        for pair, f in self.filters.items():
+            saved = f.x.copy(), f.P, f.t
+            self.predict(pair, t)
+            p = self.group.pair_index[pair]
+            x[p], P[p] = f.x, f.P
+            f.x, f.P, f.t = saved
+
+
+def _left(q: F64) -> F64:
+    """Matrix of ``q r`` as a function of r."""
+    w, x, y, z = q
+    return np.array([[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]])
+
+
+def _right(r: F64) -> F64:
+    """Matrix of ``q r`` as a function of q."""
+    w, x, y, z = r
+    return np.array([[w, -x, -y, -z], [x, w, z, -y], [y, -z, w, x], [z, y, -x, w]])
+
+
+def _mean(q: list[F64]) -> F64:
+    """Mean of quaternions, q and -q being one orientation, (4)."""
+    if not q:
+        return np.array([1.0, 0.0, 0.0, 0.0])
+    total = np.sum([r if r @ q[0] >= 0.0 else -r for r in q], axis=0)
+    return np.asarray(total / np.linalg.norm(total))
+
+
+def _align(X: F64, target: F64, rows: list[bool], d: int) -> F64:
+    """Rotate, reflect and shift X so that the given rows are nearest to the target's [2]."""
+    x_mean, mean = X[rows].mean(axis=0), target[rows].mean(axis=0)
+    U, _, V = np.linalg.svd((X[rows] - x_mean)[:, :d].T @ (target[rows] - mean)[:, :d])
+    M = np.eye(3)
+    M[:d, :d] = U @ V
+    return np.asarray((X - x_mean) @ M + mean)

@@ -1,0 +1,144 @@
+"""Arrays of the paper's filter: what evolves, and the constants of its kernels."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import config
+from numpy.typing import NDArray
+
+from tracking.arrays import F64, I64
+from tracking.constellation import Constellation
+from tracking.filters.paper.params import CHOICES, PaperParams
+
+Records = NDArray[Any]
+
+NODE = np.dtype(
+    [
+        ("t_imu", "f8"),  # time of the last STATE event [s]; -inf before the first
+        ("t_heard", "f8"),  # time of the last range [s]; -inf before the first
+        ("present", "?"),  # has filters
+        ("static", "?"),  # constant
+    ]
+)
+PAIR = np.dtype(
+    [
+        ("t", "f8"),  # time of the state [s]
+        ("t_range", "f8"),  # time of the last accepted range [s]
+        ("mean", "f8"),  # running average of accepted ranges [m]
+        ("last", "f8"),  # last accepted range [m]
+        ("rate", "f8"),  # low-passed derivative of the range [m/s]
+        ("nis", "f8"),  # normalised innovation squared of the last accepted range [-]
+        ("in_a_row", "i8"),  # ranges rejected since the last accepted one
+        ("n_rejected", "i8"),  # ranges rejected in all
+        ("first_sum", "f8"),  # sum of the first ranges of a pair without filter [m]
+        ("first_n", "i8"),  # how many
+        ("surveyed", "f8"),  # surveyed distance [m]; 0 for none
+        ("i", "i8"),  # constant: node indices, i < j
+        ("j", "i8"),
+    ]
+)
+GROUP = np.dtype(
+    [
+        ("n_since_mds", "i8"),  # ranges accepted since the last MDS
+        ("nis_sum", "f8"),  # over accepted ranges
+        ("nis_n", "i8"),
+    ]
+)
+_NUMBERS = tuple(
+    name
+    for name in PaperParams.__slots__
+    if name not in (*CHOICES, "k", "gate_reset", "first_layout")
+)
+CONSTANTS = np.dtype(
+    [
+        ("d", "i8"),
+        ("k", "i8"),
+        ("gate_reset", "i8"),
+        ("speed_is_norm", "?"),
+        ("feedback", "i8"),
+        ("aligned", "?"),
+        ("power", "f8"),  # exponent of the eigenvalues
+        ("has_layout", "?"),
+        *((name, "f8") for name in _NUMBERS),
+    ]
+)
+REPLACE, UPDATE, NONE = range(3)
+"""Values of `feedback`, as in `CHOICES`."""
+
+
+class PaperState(NamedTuple):
+    """Everything that evolves."""
+
+    nodes: Records
+    """NODE, (env, node)."""
+    control: F64
+    """World acceleration [m/s2] and orientation q_wb of each node, (env, node, 7)."""
+    pairs: Records
+    """PAIR, (env, pair)."""
+    q_sum: F64
+    """Sum of the first relative orientations of a pair, (env, pair, 4)."""
+    group: Records
+    """GROUP, (env, 1)."""
+    x: F64
+    """(x_ij, v_ij, q_ij) of each pair, (env, pair, 10) [m, m/s, -]."""
+    P: F64
+    """Its covariance, (env, pair, 10, 10)."""
+
+
+class Layout(NamedTuple):
+    """Tables derived once from the constellation and the parameters."""
+
+    pair_index: I64
+    """(node, node)"""
+    first: F64
+    """Positions that the first MDS is aligned to, (node, 3) [m]."""
+
+
+def as_records(array: Records) -> Records:
+    """An array of records whose fields the interpreter, too, finds under their names."""
+    return array.view(np.recarray) if config.DISABLE_JIT else array
+
+
+def make_constants(constellation: Constellation, params: PaperParams) -> Records:
+    """Derive the constants of the kernels, (1)."""
+    c = np.zeros(1, dtype=CONSTANTS)
+    for name in _NUMBERS:
+        c[name] = getattr(params, name)
+    c["d"], c["k"], c["gate_reset"] = constellation.dimensions, params.k, params.gate_reset
+    c["speed_is_norm"] = params.speed == "norm"
+    c["feedback"] = CHOICES["feedback"].index(params.feedback)
+    c["aligned"] = params.alignment == "procrustes"
+    c["power"] = 0.5 if params.scaling == "root" else 0.25
+    c["has_layout"] = params.first_layout is not None
+    return c
+
+
+def make_layout(constellation: Constellation, params: PaperParams) -> Layout:
+    """Derive the tables of the kernels."""
+    first = np.zeros((constellation.n_nodes, 3))
+    if params.first_layout is not None:
+        first[:] = params.first_layout
+    return Layout(constellation.pair_index, first)
+
+
+def make_state(constellation: Constellation, n_envs: int) -> PaperState:
+    """The state before any measurement."""
+    n, p = constellation.n_nodes, constellation.n_pairs
+    nodes = np.zeros((n_envs, n), dtype=NODE)
+    nodes["t_imu"] = nodes["t_heard"] = -np.inf
+    nodes["static"] = constellation.is_static
+    control = np.zeros((n_envs, n, 7))
+    control[..., 3] = 1.0
+    pairs = np.zeros((n_envs, p), dtype=PAIR)
+    pairs["i"], pairs["j"] = constellation.pairs.T
+    return PaperState(
+        nodes=nodes,
+        control=control,
+        pairs=pairs,
+        q_sum=np.zeros((n_envs, p, 4)),
+        group=np.zeros((n_envs, 1), dtype=GROUP),
+        x=np.zeros((n_envs, p, 10)),
+        P=np.zeros((n_envs, p, 10, 10)),
+    )
