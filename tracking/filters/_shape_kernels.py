@@ -6,43 +6,73 @@ import numpy as np
 
 from tracking.compiled import allocating_kernel, kernel
 
-SURVEYED = 1_000_000
-"""So many ranges a surveyed distance counts as."""
+N_FIRST = 8
+"""Ranges of a pair that are kept until it runs, the newest."""
+FEWEST = 3
+"""Fewer say nothing of how far they are to be trusted: one may be absurd."""
 MIN_EXTENT = 0.1
 """[m] Along an axis of which others extend less, the errors of ranges are all that they tell."""
 
 
 @kernel
 def collect(c, pair, t, distance, is_survey):
-    """Add one of the first ranges of a pair; a survey replaces them."""
+    """Keep a range of a pair that does not run yet, or a surveyed distance, for good."""
     if is_survey:
-        pair.start_sum = distance * SURVEYED
-        pair.start_n = SURVEYED
+        pair.surveyed = distance
         return
-    if pair.start_n >= SURVEYED:
-        return
-    if pair.start_n == 0 or t - pair.start_t > c.start_max_age:
+    if pair.start_n > 0 and t - pair.start_t[(pair.start_n - 1) % N_FIRST] > c.leave_after:
         pair.start_n = 0
-        pair.start_sum = 0.0
-        pair.start_t = t
-    pair.start_sum += distance
+    if pair.start_n == 0:
+        pair.t_start = t
+    pair.start_r[pair.start_n % N_FIRST] = distance
+    pair.start_t[pair.start_n % N_FIRST] = t
     pair.start_n += 1
 
 
 @kernel
 def is_ready(c, s, layout, i, j, t):
-    """True when a pair has its first k ranges, and they are not of long ago."""
+    """True when a pair has k ranges of a short time, or what came in a longer one is enough."""
     pair = s.pairs[layout.pair_index[i, j]]
-    if pair.start_n >= SURVEYED:
+    if pair.surveyed > 0.0:
         return True
-    return pair.start_n >= c.start_k and t - pair.start_t <= c.start_max_age
+    n = min(pair.start_n, N_FIRST)
+    if n < FEWEST or t - pair.start_t[(pair.start_n - 1) % N_FIRST] > c.leave_after:
+        return False
+    if pair.start_n >= c.start_k and t - pair.start_t[(pair.start_n - n) % N_FIRST] <= c.start_max_age:
+        return True
+    return t - pair.t_start >= c.start_max_age
+
+
+@allocating_kernel
+def start_distance(c, s, layout, i, j):
+    """Surveyed distance of a pair, or the median of its newest ranges, and how far these scatter.
+
+    The median of eight holds against three that are absurd. Ranges of the same `start_max_age`
+    count, three at least; their scatter is 1.5 times the median deviation, which for normal
+    errors is their standard deviation.
+
+    Returns:
+        Distance and scatter [m].
+    """
+    pair = s.pairs[layout.pair_index[i, j]]
+    if pair.surveyed > 0.0:
+        return pair.surveyed, 0.0
+    n = min(pair.start_n, N_FIRST)
+    newest = pair.start_t[(pair.start_n - 1) % N_FIRST]
+    kept, m = np.zeros(N_FIRST), 0
+    for k in range(n):
+        at = (pair.start_n - 1 - k) % N_FIRST
+        if k < FEWEST or newest - pair.start_t[at] <= c.start_max_age:
+            kept[m] = pair.start_r[at]
+            m += 1
+    middle = np.median(kept[:m])
+    return middle, 1.5 * np.median(np.abs(kept[:m] - middle))
 
 
 @kernel
-def start_distance(s, layout, i, j):
-    """Mean of the first ranges of a pair [m]."""
-    pair = s.pairs[layout.pair_index[i, j]]
-    return pair.start_sum / pair.start_n
+def forget_first(pair):
+    """Begin to collect the first ranges of a pair; a surveyed distance is kept."""
+    pair.start_n = 0
 
 
 @kernel
@@ -144,16 +174,16 @@ def place_across(d, known, distance, axis, sides):
 
 
 @allocating_kernel
-def first_shape(s, layout, members, m, d):
+def first_shape(c, s, layout, members, m):
     """Classical MDS of the first ranges: positions of the members round their centre, (m, 3)."""
     D2 = np.zeros((m, m))
     for a in range(m):
         for b in range(m):
             if a != b:
-                D2[a, b] = start_distance(s, layout, members[a], members[b]) ** 2
+                D2[a, b] = start_distance(c, s, layout, members[a], members[b])[0] ** 2
     J = np.eye(m) - 1.0 / m
     eigenvalues, E = np.linalg.eigh(-0.5 * J @ D2 @ J)
     X = np.zeros((m, 3))
-    for k in range(min(d, m)):
+    for k in range(min(c.d, m)):
         X[:, k] = E[:, m - 1 - k] * np.sqrt(max(eigenvalues[m - 1 - k], 0.0))
     return X

@@ -15,7 +15,7 @@ import numpy as np
 
 from tracking._exponential_kernels import decay
 from tracking.compiled import allocating_kernel, kernel
-from tracking.filters._shape_kernels import SURVEYED
+from tracking.filters._shape_kernels import forget_first
 from tracking.filters.joint._agreement_kernels import are_same, turn_between
 from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_hypothesis
 from tracking.filters.joint._flatness_kernels import flatness, least_axis, scatter_of
@@ -179,8 +179,7 @@ def remove_node(c, s, layout, i):
         if k != i:
             pair = s.pairs[layout.pair_index[i, k]]
             pair.n_ranges = 0
-            if pair.start_n < SURVEYED:
-                pair.start_n = 0
+            forget_first(pair)
     for h in range(s.alive.shape[0]):
         if s.alive[h]:
             for r in range(node.at_p, node.at_p + (c.d if node.static else 2 * c.d)):

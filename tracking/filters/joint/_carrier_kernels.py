@@ -53,10 +53,7 @@ def judge(c, s, h, nu, m, variance, scratch):
         open_var = turn_gradient(s, h, m, scratch)
         tell_turn(s, h, scratch, nu, max(S, nu * nu / 25.0))
     if s.group[0].n_alive > 1:
-        expected = S + open_var
-        s.loglik[h] -= 0.5 * min(nu * nu / expected, c.max_nis)
-        if not s.group[0].parted:
-            s.loglik[h] -= 0.5 * math.log(expected)
+        s.loglik[h] -= 0.5 * min(nu * nu / (S + open_var), c.max_nis)
     if nu * nu > 25.0 * S:
         S = nu * nu / 25.0  # a jolt or a skid: it counts for less
     absorb(s, h, scratch.w, nu, S)

@@ -28,6 +28,8 @@ FAST = 10.0
 """[m/s] Ranges that change faster jump."""
 STAYS = 0.5
 """[-] It remains one down to this part of it."""
+MISSED = 3.0
+"""[-] A pair ranges no longer after so many of its usual intervals, if these are long."""
 HELD = 2.0
 """[s] A node is doubted until nothing has been found for so long."""
 ASTRAY, LOST = 0.6, 0.4
@@ -108,7 +110,8 @@ def ranges_now(c, s, p, t):
     """True if both nodes of pair p are there and it was ranged lately."""
     pair = s.pairs[p]
     both = s.nodes[pair.i].present and s.nodes[pair.j].present
-    return both and pair.n_ranges > 0 and t - pair.t_range < c.lost_after
+    waits = max(c.lost_after, MISSED * pair.interval)
+    return both and pair.n_ranges > 0 and t - pair.t_range < waits
 
 
 @kernel

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from tracking.compiled import kernel
 from tracking.filters._clear_kernels import clear_estimate, is_heard
+from tracking.filters.joint._doubt_kernels import MISSED
 from tracking.filters.joint._motion_kernels import predict
 from tracking.filters.joint._product_kernels import take_off
 from tracking.filters.joint._sample_kernels import sum_inertial
@@ -36,7 +37,7 @@ def write_estimate(c, s, scratch, t, e, o, out):
             status[e, o, p] = STARTING if both else ABSENT
             continue
         nlos[e, o, p] = s.nlos[h, p]
-        age[e, o, p] = t - pair.t_range
+        age[e, o, p] = t - pair.t_used
         worst = 0.0
         for k in range(d):
             pos[e, o, p, k] = x[node_j.at_p + k] - x[node_i.at_p + k]
@@ -56,7 +57,7 @@ def write_estimate(c, s, scratch, t, e, o, out):
             status[e, o, p] = AMBIGUOUS
         elif node_i.static and node_j.static:
             status[e, o, p] = OK
-        elif age[e, o, p] > c.lost_after or worst > c.ok_var:
+        elif age[e, o, p] > max(c.lost_after, MISSED * pair.interval) or worst > c.ok_var:
             status[e, o, p] = LOST
         elif pair.misfit > c.doubt or node_i.doubted or node_j.doubted:
             status[e, o, p] = DOUBTFUL

@@ -36,9 +36,11 @@ from tracking.filters.joint._turn_kernels import note_turn
 from tracking.filters.joint.state import N_PRE, JointState
 
 # Plain numbers of `Kind`: kernels do not know enums.
-JOIN, STATE, SURVEY, RANGE, LEAVE = 0, 3, 4, 5, 6
+STATE, SURVEY, RANGE, LEAVE = 3, 4, 5, 6
 SAME = 1e-5
 """[s] Ranges of one message differ by their rounding only: they share a prediction."""
+RECENT, SLOWEST = 0.1, 5.0
+"""[-, s] Weight of a time between two ranges in its running mean; longer ones are gaps."""
 GAUGE_PERIOD = 1.0
 """[s] Time between two moves of the centre to the origin."""
 
@@ -83,7 +85,7 @@ def run_events(coefficients, layout, state, scratch, block, t_out, out):
                     sight = (evidence, c.enter_rate_with_power, c.leave_rate_with_power)
                 is_survey, now, distance = what == SURVEY, t[e, k], values[e, k, 0]
                 hear(c, s, layout, scratch, i, j, a_i, a_j, now, distance, sight, is_survey)
-            elif what == LEAVE or (what == JOIN and s.nodes[i].present):
+            elif what == LEAVE:
                 settle_all(s)
                 remove_node(c, s, layout, i)
         while o < t_out.shape[1]:
@@ -141,9 +143,10 @@ def hear(c, s, layout, scratch, i, j, a_i, a_j, t, distance, sight, is_survey):
         advance(c, s, layout, scratch, t, True)
         settle_all(s)
         remove_faded(c, s, layout, t)
-    node_i.heard, node_j.heard = True, True
-    node_i.t_heard, node_j.t_heard = t, t
-    node_i.antenna, node_j.antenna = a_i, a_j
+    note_heard(node_i, t)
+    note_heard(node_j, t)
+    if not is_survey:
+        node_i.antenna, node_j.antenna = a_i, a_j
     runs = node_i.present and node_j.present
     if s.group[0].started:
         advance(c, s, layout, scratch, t, not runs)
@@ -156,6 +159,14 @@ def hear(c, s, layout, scratch, i, j, a_i, a_j, t, distance, sight, is_survey):
         take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, sight, is_survey)
     else:
         take_first_range(c, s, layout, scratch, i, j, p, t, distance, sight, is_survey)
+
+
+@small_kernel
+def note_heard(node, t):
+    """Note that a node takes part in a range, and how often it does."""
+    if node.heard:
+        node.interval += RECENT * (min(t - node.t_heard, SLOWEST) - node.interval)
+    node.heard, node.t_heard = True, t
 
 
 @small_kernel
@@ -239,12 +250,12 @@ def take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, sight, is_survey
         if is_survey:
             fuse_survey(c, s, h, p, distance, scratch)
             continue
-        nu, nis, weight = fuse_range(c, s, h, p, dt, distance, levers, sight, scratch)
+        nu, misfit, nis, weight = fuse_range(c, s, h, p, dt, distance, levers, sight, scratch)
         if h == group.best:
             pair.nis = nis
-            capped = min(nis, 25.0) if weight > 0.5 else 25.0
+            capped = min(misfit, 25.0) if weight > 0.5 else 25.0
             pair.misfit += 0.05 * (capped - pair.misfit)
-            fits = 1.0 if weight > 0.5 and nis < 6.0 else 0.0
+            fits = 1.0 if weight > 0.5 and misfit < 6.0 else 0.0
             group.fit += 0.01 * (fits - group.fit)
             note_fit(s, p, dt, distance, fits, nu)
             if not (s.nodes[pair.i].doubted or s.nodes[pair.j].doubted):
@@ -252,8 +263,12 @@ def take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, sight, is_survey
             if weight > 0.5:
                 group.nis_sum += nis
                 group.nis_n += 1
+                pair.t_used = t
             else:
                 pair.n_rejected += 1
+    if is_survey:
+        pair.t_used = t
+    pair.interval += RECENT * (min(dt, SLOWEST) - pair.interval)
     pair.t_range = t
     pair.n_ranges += 1
 

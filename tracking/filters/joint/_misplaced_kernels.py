@@ -144,7 +144,7 @@ def replace_node(c, s, layout, i, is_away, t):
                 if is_away:
                     remove_node(c, s, layout, i)
                     return
-                add_node(c, s, layout, h, i, pos, t)
+                add_node(c, s, layout, h, i, pos, c.position_var, t)
                 moved = True
     if moved:
         s.nodes[i].astray = 0.0

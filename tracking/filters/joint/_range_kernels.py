@@ -162,7 +162,8 @@ def fuse_range(c, s, h, p, dt, distance, levers, sight, scratch):
         scratch: Room.
 
     Returns:
-        Innovation [m], NIS, and the probability that the range meant anything, 0 to 1.
+        Innovation [m] and its square over the variance it was expected to have, its square over
+        the variance that the correction used, and the probability that the range meant anything.
     """
     if s.group[0].turn_var > UNSURE * UNSURE:
         follow_rotation(c, s, h, scratch)
@@ -173,17 +174,15 @@ def fuse_range(c, s, h, p, dt, distance, levers, sight, scratch):
     if s.group[0].open:
         note_levers(levers, scratch)
         open_var = turn_gradient(s, h, m, scratch)
-    S = variance + open_var + c.white_var
-    expected = variance + open_var
+    bent = bend_variance(c, s, h, p, scratch.val)
+    expected = variance + open_var + bent
+    S = expected + c.white_var
     switched, sane, likelihood, is_far = judge_sight(c, s, h, p, dt, nu, expected, sight, scratch.w)
     if s.group[0].n_alive > 1:
-        loglik = max(math.log(likelihood), -0.5 * (c.max_nis + math.log(S)))
-        if s.group[0].parted:
-            # Frames of one group are equally uncertain but for how far each was bent, and wrong
-            # ones, bent most, look surest.
-            loglik += 0.5 * math.log(S)
-        s.loglik[h] += c.evidence * loglik
-    before, nis = nu, nu * nu / S
+        # Rotations and mirror images of one group are equally uncertain but for how far each was
+        # bent, and wrong ones, bent most, look surest: only how well they fit counts.
+        s.loglik[h] += max(math.log(likelihood) + 0.5 * math.log(S), -0.5 * c.max_nis)
+    before, misfit = nu, nu * nu / S
     if switched < AT_ONCE or s.pairs[p].at_e < 0:
         s.stays[h, p] *= 1.0 - switched
     else:
@@ -192,9 +191,9 @@ def fuse_range(c, s, h, p, dt, distance, levers, sight, scratch):
         nu = distance - predicted
         variance = project(s, h, m, scratch)
         if s.group[0].open:
-            turn_gradient(s, h, m, scratch)
-    R = c.white_var + bend_variance(c, s, h, p, scratch.val)
-    R += s.nlos[h, p] * c.excess_white_var
+            open_var = turn_gradient(s, h, m, scratch)
+    R = c.white_var + bent + s.nlos[h, p] * c.excess_white_var
+    nis = nu * nu / (variance + open_var + R)
     # A pair whose ranges have long contradicted all else is believed less and less; where most
     # contradict the filter, it is the filter that is wrong.
     doubt = s.pairs[p].misfit / (0.7 * c.doubt)
@@ -205,4 +204,4 @@ def fuse_range(c, s, h, p, dt, distance, levers, sight, scratch):
         if s.group[0].open:
             tell_turn(s, h, scratch, nu, variance + R / trust)
         absorb(s, h, scratch.w, nu, variance + R / trust)
-    return before, nis, sane
+    return before, misfit, nis, sane

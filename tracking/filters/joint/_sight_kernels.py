@@ -52,7 +52,8 @@ def judge_sight(c, s, h, p, dt, nu, variance, sight, w):
     at = s.pairs[p].at_e + 1
     before = s.nlos[h, p]
     evidence, enter_rate, leave_rate = sight
-    enter, leave = 1.0 - decay(enter_rate * dt), 1.0 - decay(leave_rate * dt)
+    changes = (1.0 - decay((enter_rate + leave_rate) * dt)) / (enter_rate + leave_rate)
+    enter, leave = enter_rate * changes, leave_rate * changes
     S = variance + c.white_var
     near = (1.0 - c.far_share) * likelihood(nu - c.excess, S + c.excess_var)
     far = c.far_share * likelihood(nu - c.far_excess, S + c.far_excess_var)
@@ -95,6 +96,7 @@ def change_sight(c, s, h, p, switched, is_far):
     if at <= 0:
         return
     stays = 1.0 - switched
+    before = covariance(s, h, at, at)
     for r in range(c.n):
         s.P[h, at, r] *= stays
         s.P[h, r, at] *= stays
@@ -106,5 +108,9 @@ def change_sight(c, s, h, p, switched, is_far):
     apart = c.far_excess - c.excess
     within = c.excess_var + is_far * (c.far_excess_var - c.excess_var)
     excess_var = within + is_far * (1.0 - is_far) * apart * apart
-    s.P[h, at, at] += (1.0 - stays * stays) * (c.slow_var + hidden * excess_var)
-    s.x[h, at] = stays * s.x[h, at] + switched * hidden * (c.excess + is_far * apart)
+    excess = c.excess + is_far * apart
+    new_var = c.slow_var + hidden * excess_var + hidden * (1.0 - hidden) * excess * excess
+    off = s.x[h, at] - hidden * excess
+    # Of the mixture of both; the waiting corrections hold what has been taken off already.
+    s.P[h, at, at] += switched * stays * before + switched * new_var + switched * stays * off * off
+    s.x[h, at] -= switched * off

@@ -14,6 +14,7 @@ import numpy as np
 
 from tracking.compiled import allocating_kernel, kernel, small_kernel
 from tracking.filters.joint._bank_kernels import remove_node
+from tracking.filters.joint._doubt_kernels import MISSED
 
 FADED = 0.5
 """[-] Share of the variance of a pair that is not ok from which on a distance is open: by then the
@@ -23,7 +24,8 @@ line of sight at 2 m may be off by 20 degrees."""
 @small_kernel
 def was_silent(c, node, t):
     """True for a node of the group that moves and was not heard lately."""
-    return node.present and not node.static and t - node.t_heard > c.silent_after
+    waits = max(c.silent_after, MISSED * node.interval)
+    return node.present and not node.static and t - node.t_heard > waits
 
 
 @allocating_kernel

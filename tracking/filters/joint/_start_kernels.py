@@ -16,6 +16,7 @@ import numpy as np
 from tracking._exponential_kernels import decay
 from tracking.compiled import allocating_kernel, kernel
 from tracking.filters._shape_kernels import (
+    N_FIRST,
     choose_members,
     first_shape,
     is_ready,
@@ -27,7 +28,7 @@ from tracking.filters.joint._linear_kernels import decouple
 from tracking.filters.joint._motion_kernels import unsettled_var
 from tracking.filters.joint._open_kernels import can_open, open_frame
 from tracking.filters.joint._place_kernels import best_sides
-from tracking.filters.joint._sleep_kernels import ORIENTED, PATIENCE, none_moved, rests
+from tracking.filters.joint._sleep_kernels import ORIENTED, PATIENCE, SETTLE, none_moved, rests
 from tracking.filters.joint._turn_kernels import read_turn, spread_turn
 
 
@@ -37,9 +38,9 @@ def try_start(c, s, layout, t):
     n = s.nodes.shape[0]
     members = np.empty(n, np.int64)
     m = choose_members(c, s, layout, members, t)
-    if m == 0:
+    if m == 0 or not_known_to_rest(s, members, m, t):
         return False
-    X = first_shape(s, layout, members, m, c.d)
+    X = first_shape(c, s, layout, members, m)
     for a in range(m):
         s.nodes[members[a]].present = True
         forget_sums(s, members[a], t)
@@ -58,17 +59,21 @@ def try_start(c, s, layout, t):
             s.P[h, r, r] = 1.0
         for a in range(m):
             begin_node(c, s, h, members[a], t)
-            at = s.nodes[members[a]].at_p
+            at, variance = s.nodes[members[a]].at_p, c.position_var
+            for b in range(m):
+                if b != a:
+                    _, scatter = start_distance(c, s, layout, members[a], members[b])
+                    variance = max(variance, scatter * scatter)
             for k in range(c.d):
                 s.x[h, at + k] = Y[a, k]
-                s.P[h, at + k, at + k] = c.position_var
+                s.P[h, at + k, at + k] = variance
         spread_centre(c, s, h, members, m)
         spread_turn(c, s, h, c.rotation_var)
         for p in range(s.pairs.shape[0]):
             if s.nodes[s.pairs[p].i].present and s.nodes[s.pairs[p].j].present:
                 begin_pair(c, s, h, p, first_sight(c, s.pairs[p]))
     for p in range(s.pairs.shape[0]):
-        s.pairs[p].t_range = t
+        begin_ranging(s.pairs[p], t)
         forget_fits(s.pairs[p])
     group = s.group[0]
     group.started = True
@@ -87,6 +92,29 @@ def try_start(c, s, layout, t):
     group.misfit, group.fit, group.lost = 1.0, 1.0, False
     group.strain, group.strain_limit = 0.0, c.strained
     return True
+
+
+@kernel
+def not_known_to_rest(s, members, m, t):
+    """True while a node's samples are too few to tell whether it moves.
+
+    Nodes at rest are followed in one rotation that stands for all; of nodes that move it would use
+    the accelerations in a wrong one.
+    """
+    for a in range(m):
+        node = s.nodes[members[a]]
+        if node.has_state and not node.static and t - node.t_first <= SETTLE:
+            return True
+    return False
+
+
+@kernel
+def begin_ranging(pair, t):
+    """A pair that runs from here on; of how often it ranges its first ranges tell."""
+    n = min(pair.start_n, N_FIRST)
+    first = pair.start_t[(pair.start_n - n) % N_FIRST]
+    pair.interval = (t - first) / (n - 1) if n > 1 else 0.0
+    pair.t_range, pair.t_used = t, t
 
 
 @kernel
@@ -171,7 +199,7 @@ def try_join(c, s, layout, new, t):
                 n_ready += 1
     if n_ready < min(c.d + 1, n_present):
         return False
-    sides = np.empty((2, 3))
+    sides, variance = np.empty((2, 3)), c.position_var
     known, distance = np.zeros((n_ready, 3)), np.empty(n_ready)
     was_alive = s.alive.copy()
     forget_sums(s, new, t)
@@ -183,21 +211,22 @@ def try_join(c, s, layout, new, t):
             at = s.nodes[ready[a]].at_p
             for k in range(c.d):
                 known[a, k] = s.x[h, at + k]
-            distance[a] = start_distance(s, layout, new, ready[a])
+            distance[a], scatter = start_distance(c, s, layout, new, ready[a])
+            variance = max(variance, scatter * scatter)
         n_sides = best_sides(c.d, c.merge_distance, known, distance, sides)
         for side in range(n_sides):
             target = h if side == 0 else copy_hypothesis(s, h)
             if target >= 0:
-                add_node(c, s, layout, target, new, sides[side], t)
+                add_node(c, s, layout, target, new, sides[side], variance, t)
     for k in range(n):
         if s.nodes[k].present:
-            s.pairs[layout.pair_index[new, k]].t_range = t
+            begin_ranging(s.pairs[layout.pair_index[new, k]], t)
     s.nodes[new].present = True
     return True
 
 
 @allocating_kernel
-def add_node(c, s, layout, h, new, pos, t):
+def add_node(c, s, layout, h, new, pos, variance, t):
     """Put a node at a position: its error is that of a body with the others, and its own.
 
     Where the others are elsewhere, or turned, it is as well: ranges to it tell neither.
@@ -230,7 +259,7 @@ def add_node(c, s, layout, h, new, pos, t):
     for k in range(d):
         for q in range(d):
             s.P[h, s.nodes[new].at_p + k, s.nodes[new].at_p + q] = own[k, q]
-        s.P[h, s.nodes[new].at_p + k, s.nodes[new].at_p + k] += c.position_var
+        s.P[h, s.nodes[new].at_p + k, s.nodes[new].at_p + k] += variance
     for i in range(n):
         if i != new and s.nodes[i].present:
             p = layout.pair_index[i, new]

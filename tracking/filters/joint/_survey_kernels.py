@@ -7,7 +7,6 @@ is used once more when they do. It is remembered while a node is away.
 from __future__ import annotations
 
 from tracking.compiled import kernel, small_kernel
-from tracking.filters._shape_kernels import SURVEYED, start_distance
 from tracking.filters.joint._linear_kernels import absorb, project, settle_all
 from tracking.filters.joint._open_kernels import tell_turn, turn_gradient
 from tracking.filters.joint._range_kernels import range_model
@@ -47,8 +46,8 @@ def use_surveys(c, s, layout, scratch, i, end):
     for k in range(end):
         if k != i and s.nodes[i].present and s.nodes[k].present:
             p = layout.pair_index[i, k]
-            if s.pairs[p].start_n >= SURVEYED:
+            if s.pairs[p].surveyed > 0.0:
                 for h in range(s.alive.shape[0]):
                     if s.alive[h]:
-                        fuse_survey(c, s, h, p, start_distance(s, layout, i, k), scratch)
+                        fuse_survey(c, s, h, p, s.pairs[p].surveyed, scratch)
     settle_all(s)

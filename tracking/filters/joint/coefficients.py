@@ -63,7 +63,6 @@ _NUMBERS = (
     "ok_var",
     "doubt",
     "common_error",
-    "evidence",
 )
 COEFFICIENTS = np.dtype(
     [
@@ -93,8 +92,6 @@ def make_coefficients(constellation: Constellation, params: JointParams) -> Reco
         "slow_var": e.slow_std**2,
         "excess_var": v.excess_std**2,
         "far_excess_var": v.far_excess_std**2,
-        # Errors that last and have no state make successive ranges say the same thing.
-        "evidence": 1.0 if has_states else 0.1,
         "excess_white_var": v.white_std**2 if has_states else v.repeats * v.excess_std**2,
         "height_var": s.height_std**2,
         "start_k": s.k,

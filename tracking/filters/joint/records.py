@@ -15,6 +15,7 @@ NODE = np.dtype(
         ("t_pre", "f8"),  # time up to which the inertial samples are summed [s]
         ("t_state", "f8"),  # time of the last STATE event [s]
         ("t_heard", "f8"),  # time of the last range it took part in [s]
+        ("interval", "f8"),  # running mean of the time between two of these [s]
         ("antenna", "i8"),  # with which
         ("cos_yaw", "f8"),  # of the last STATE event, as measured
         ("sin_yaw", "f8"),
@@ -75,7 +76,9 @@ NODE = np.dtype(
 )
 PAIR = np.dtype(
     [
-        ("t_range", "f8"),  # time of the last range that counted [s]
+        ("t_range", "f8"),  # time of the last range [s]
+        ("t_used", "f8"),  # time of the last range that counted [s]
+        ("interval", "f8"),  # running mean of the time between two ranges [s]
         ("nis", "f8"),  # NIS of the last range in the best hypothesis [-]
         ("misfit", "f8"),  # running mean of it [-]
         ("last", "f8"),  # its last range as reported [m]
@@ -87,9 +90,11 @@ PAIR = np.dtype(
         ("scatter", "f8"),  # running mean of their distance from it [m]
         ("last_used", "f8"),  # its last range that was used [m]
         ("jumps", "f8"),  # running mean of what they change faster than things move [m]
-        ("start_sum", "f8"),  # sum of the first ranges of a pair not started [m]
-        ("start_t", "f8"),  # time of the first of them [s]
-        ("start_n", "i8"),  # how many
+        ("start_r", "f8", (8,)),  # newest ranges of a pair not started, a ring [m]
+        ("start_t", "f8", (8,)),  # their times [s]
+        ("start_n", "i8"),  # how many came
+        ("t_start", "f8"),  # when the first came [s]
+        ("surveyed", "f8"),  # surveyed distance [m]; 0 for none
         ("start_sight", "f8"),  # what their powers say: log-likelihood ratio of no sight
         ("n_ranges", "i8"),
         ("n_rejected", "i8"),  # ranges that hardly counted

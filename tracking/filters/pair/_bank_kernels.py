@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tracking.compiled import allocating_kernel, kernel, small_kernel
-from tracking.filters._shape_kernels import SURVEYED
+from tracking.filters._shape_kernels import forget_first
 from tracking.filters.pair._mds_kernels import add_pair, factor, move_pair, solve, weigh
 from tracking.filters.pair._start_kernels import (
     copy_hypothesis,
@@ -188,8 +188,7 @@ def remove_node(s, layout, i):
         if k != i:
             pair = s.pairs[layout.pair_index[i, k]]
             pair.n_ranges = 0
-            if pair.start_n < SURVEYED:
-                pair.start_n = 0
+            forget_first(pair)
     if n_present < 2:
         for k in range(s.nodes.shape[0]):
             s.nodes[k].present, s.nodes[k].heard = False, False

@@ -32,8 +32,10 @@ from tracking.filters.pair._wheel_kernels import add_mean_velocity, apply_wheels
 from tracking.filters.pair.state import FilterState
 
 # Plain numbers of `Kind` and `Status`: kernels do not know enums.
-JOIN, STATE, SURVEY, RANGE, LEAVE = 0, 3, 4, 5, 6
+STATE, SURVEY, RANGE, LEAVE = 3, 4, 5, 6
 ABSENT, STARTING, AMBIGUOUS, OK, LOST = 0, 1, 2, 3, 4
+MISSED = 3.0
+"""[-] A pair is lost after so many of its usual intervals, if these are long."""
 
 
 class Scratch(NamedTuple):
@@ -123,7 +125,7 @@ def run_events(coefficients, layout, state, block, t_out, out):
                     take_range(
                         c, s, layout, scratch, p, a_i, a_j, t[e, k], distance, evidence, is_survey
                     )
-            elif what == LEAVE or (what == JOIN and s.nodes[i].present):
+            elif what == LEAVE:
                 remove_node(s, layout, i)
         while o < t_out.shape[1]:
             write_estimate(c, s, t_out[e, o], e, o, out)
@@ -166,7 +168,7 @@ def take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, evidence, is_sur
     advance_pair(c, s, p, t)
     if is_survey:
         fuse_survey(c, s, p, distance, scratch.work)
-        s.pairs[p].t_range = t
+        s.pairs[p].t_range, s.pairs[p].t_used = t, t
     else:
         fuse_range(c, s, layout, p, t, distance, evidence, a_i, a_j, scratch.work)
     if not c.use_mds or t - group.t_mds < c.mds_period:
@@ -244,10 +246,10 @@ def write_estimate(c, s, t, e, o, out):
         pos[e, o, p] = x[0, 0, :3]
         vel[e, o, p] = x[0, 0, 3:]
         cov[e, o, p] = P[0, 0]
-        age[e, o, p] = t - pair.t_range
+        age[e, o, p] = t - pair.t_used
         if s.group[0].n_alive > 1:
             status[e, o, p] = AMBIGUOUS
-        elif age[e, o, p] > c.lost_after and not (node_i.static and node_j.static):
+        elif age[e, o, p] > max(c.lost_after, MISSED * pair.interval) and not (node_i.static and node_j.static):
             status[e, o, p] = LOST
         else:
             status[e, o, p] = OK

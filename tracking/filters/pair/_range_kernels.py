@@ -163,23 +163,26 @@ def fuse_range(c, s, layout, p, t, distance, evidence, antenna_i, antenna_j, wor
         fade_error(c, s, p, h, dt)
         nu = distance - range_model(s.x, p, h, l0, l1, l2, work)
         variance, w_e = predicted_variance(s.P, p, h, work)
-        nis = nu * nu / (variance + c.range_var)
+        expected = variance + c.range_var
+        misfit = nu * nu / expected
         switched, sane, loglik = judge_sight(c, s, p, h, dt, nu, variance, w_e, evidence)
         nu += s.x[p, h, E]
         change_sight(c, s, p, h, switched)
         nu -= s.x[p, h, E]
         bent = min(c.bend_gain * bend(s, p, h, work), MOST_BEND)
         R = c.range_var + bent * bent + s.nlos[p, h] * c.excess_white_var
+        variance, _ = predicted_variance(s.P, p, h, work)
+        nis = nu * nu / (variance + R)
         if sane > 1e-3:
             correct(s.x, s.P, p, h, work, nu, R / sane)
-        s.loglik[h] += c.evidence * max(
-            loglik, -0.5 * (c.max_nis + math.log(variance + c.range_var))
-        )
+        s.loglik[h] += c.evidence * max(loglik, -0.5 * (c.max_nis + math.log(expected)))
         if h == group.best:
             pair.nis = nis
             group.nis_sum += nis
             group.nis_n += 1
-            group.misfit += 0.01 * (sane * min(nis, 25.0) - group.misfit)
+            group.misfit += 0.01 * (sane * min(misfit, 25.0) - group.misfit)
+            if sane > 0.5:
+                pair.t_used = t
         if has_rate and c.speed_model == 1:
             nu = pair.rate - range_rate_model(s.x, p, h, l0, l1, l2, work)
             correct(s.x, s.P, p, h, work, nu, c.speed_var)
@@ -187,6 +190,7 @@ def fuse_range(c, s, layout, p, t, distance, evidence, antenna_i, antenna_j, wor
             nu = abs(pair.rate) - speed_model(s.x, p, h, work)
             correct(s.x, s.P, p, h, work, nu, c.speed_var)
     pair.last_distance = distance
+    pair.interval += 0.1 * (min(dt, c.leave_after) - pair.interval)
     pair.t_range = t
     pair.n_ranges += 1
 

@@ -66,7 +66,8 @@ def judge_sight(c, s, p, h, dt, nu, variance, w_e, evidence):
         Probability that the sight changed; that the range meant anything; log-likelihood.
     """
     before = s.nlos[p, h]
-    enter, leave = 1.0 - decay(c.enter_rate * dt), 1.0 - decay(c.leave_rate * dt)
+    changes = (1.0 - decay((c.enter_rate + c.leave_rate) * dt)) / (c.enter_rate + c.leave_rate)
+    enter, leave = c.enter_rate * changes, c.leave_rate * changes
     S = variance + c.range_var
     nu_leave = nu + s.x[p, h, E]
     S_leave = S + max(s.P[p, h, E, E] - 2.0 * w_e, -0.9 * variance) + c.slow_var
@@ -98,6 +99,7 @@ def change_sight(c, s, p, h, switched):
         s.P[p, h, k, E] = v
         s.P[p, h, E, k] = v
     hidden = s.nlos[p, h]
-    s.P[p, h, E, E] *= stays * stays
-    s.P[p, h, E, E] += (1.0 - stays * stays) * (c.slow_var + hidden * c.excess_var)
-    s.x[p, h, E] = stays * s.x[p, h, E] + switched * hidden * c.excess
+    new_var = c.slow_var + hidden * c.excess_var + hidden * (1.0 - hidden) * c.excess * c.excess
+    off = s.x[p, h, E] - hidden * c.excess
+    s.P[p, h, E, E] = stays * s.P[p, h, E, E] + switched * (new_var + stays * off * off)
+    s.x[p, h, E] -= switched * off

@@ -12,6 +12,7 @@ import numpy as np
 
 from tracking.compiled import allocating_kernel, kernel
 from tracking.filters._shape_kernels import (
+    N_FIRST,
     choose_members,
     first_shape,
     is_ready,
@@ -38,7 +39,10 @@ def begin_pair(c, s, h, p, pos, t):
     s.P[p, h, E, E] = c.slow_var
     s.nlos[p, h] = 0.1
     pair.t = t
-    pair.t_range = t
+    n = min(pair.start_n, N_FIRST)
+    first = pair.start_t[(pair.start_n - n) % N_FIRST]
+    pair.interval = (t - first) / (n - 1) if n > 1 else 0.0
+    pair.t_range, pair.t_used = t, t
     pair.n_ranges = 0
     pair.in_a_row = 0
     pair.rate = 0.0
@@ -60,7 +64,7 @@ def try_start(c, s, layout, t):
     m = choose_members(c, s, layout, members, t)
     if m == 0:
         return
-    X = first_shape(s, layout, members, m, c.d)
+    X = first_shape(c, s, layout, members, m)
     for a in range(m):
         s.nodes[members[a]].present = True
     for h in range(layout.rotations.shape[0]):
@@ -125,7 +129,7 @@ def try_join(c, s, layout, new, t):
         hypothesis_positions(s, layout, h, pos)
         for a in range(n_ready):
             known[a] = pos[ready[a]]
-            distance[a] = start_distance(s, layout, new, ready[a])
+            distance[a], _ = start_distance(c, s, layout, new, ready[a])
         n_sides = place(c.d, c.mds_min_spread, c.merge_distance, known, distance, sides)
         for side in range(n_sides):
             target = h if side == 0 else copy_hypothesis(s, h)

@@ -47,9 +47,13 @@ PAIR = np.dtype(
         ("mean_distance", "f8"),  # running average of accepted ranges [m]
         ("last_distance", "f8"),  # the last accepted range [m]
         ("rate", "f8"),  # low-passed derivative of the range [m/s]
-        ("start_sum", "f8"),  # sum of the first ranges of a pair not started [m]
-        ("start_t", "f8"),  # time of the first of them [s]
-        ("start_n", "i8"),  # how many
+        ("start_r", "f8", (8,)),  # newest ranges of a pair not started, a ring [m]
+        ("start_t", "f8", (8,)),  # their times [s]
+        ("start_n", "i8"),  # how many came
+        ("t_start", "f8"),  # when the first came [s]
+        ("surveyed", "f8"),  # surveyed distance [m]; 0 for none
+        ("t_used", "f8"),  # time of the last accepted range that meant anything [s]
+        ("interval", "f8"),  # running mean of the time between two ranges [s]
         ("n_ranges", "i8"),  # accepted ranges since the pair started or was silent
         ("n_rejected", "i8"),  # ranges the gate has refused, ever
         ("in_a_row", "i8"),  # ranges refused since the last accepted one
