@@ -25,8 +25,8 @@ from tracking.tracker import Tracker, TrackerParams
 
 CSV_HZ = 20.0
 """[Hz] Rate of estimates.csv."""
-ERRORS = ("rmse", "rmse_yaw", "rmse_shape")
-"""The three errors of a run, in the order they are shown."""
+ERRORS = ("rmse", "rmse_yaw", "rmse_shape", "rmse_mirror")
+"""The errors of a run, in the order they are shown."""
 LAG = HorizonParams().delay
 """[s] So much later is what smoothed estimates know."""
 N_CHUNKS = 50
@@ -77,6 +77,7 @@ class TrackResult:
             "rmse_yaw": _number(s.rmse_yaw),
             "yaw_deg": _number(s.yaw_deg),
             "rmse_shape": _number(s.rmse_shape),
+            "rmse_mirror": _number(s.rmse_mirror),
             **{f"bound_{name}": value for name, value in self.least.items()},
             "pair_rmse": pair_rmse,
             "nees": _number(s.nees),
@@ -84,6 +85,8 @@ class TrackResult:
             "realtime_factor": _number(self.realtime_factor),
             "coverage": s.coverage,
             "ok_share": s.ok_share,
+            "integrity_share": s.integrity_share,
+            "integrity_worst_s": s.integrity_worst_s,
             "notes": list(notes_on(self.log)),
             "rejected": self.n_rejected,
             "skipped": sum(self.log.skipped.values()),

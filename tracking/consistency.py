@@ -50,13 +50,15 @@ def pair_nees(estimate: TeamEstimate, truth_ij_w: F64) -> tuple[F64, Bool]:
         truth_ij_w: True relative positions, (time, pair, 3) [m].
 
     Returns:
-        (time, pair) [-], NaN where P is not known, and where it is, (time, pair).
+        (time, pair) [-], NaN where there is no covariance, and where there is one, (time, pair).
+        A covariance that is not positive definite is wrong, however small the error: infinite.
     """
     d = estimate.constellation.dimensions
     cov = estimate.cov[..., :d, :d]
-    known = np.linalg.eigvalsh(cov)[..., 0] > 0.0
-    e = (estimate.pos_ij_w - truth_ij_w)[known][:, :d]
-    nees = np.full(known.shape, np.nan)
-    whitened = np.linalg.solve(cov[known], e[..., None])[..., 0]
-    nees[known] = np.sum(e * whitened, axis=-1) / d
+    known = np.trace(cov, axis1=-2, axis2=-1) != 0.0
+    is_positive = known & (np.linalg.eigvalsh(cov)[..., 0] > 0.0)
+    e = (estimate.pos_ij_w - truth_ij_w)[is_positive][:, :d]
+    nees = np.where(known, np.inf, np.nan)
+    whitened = np.linalg.solve(cov[is_positive], e[..., None])[..., 0]
+    nees[is_positive] = np.sum(e * whitened, axis=-1) / d
     return nees, known

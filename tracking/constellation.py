@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
@@ -81,11 +82,28 @@ class Constellation:
                 f"nodes.{node.id}.vehicle: expected one of {', '.join(VEHICLES)}, "
                 f"got {node.vehicle!r}",
             )
-            _expect(node.imu_hz > 0, f"nodes.{node.id}.imu_hz: expected > 0, got {node.imu_hz}")
+            _expect(
+                0.0 < node.imu_hz < math.inf,
+                f"nodes.{node.id}.imu_hz: expected > 0, got {node.imu_hz}",
+            )
+            _expect(
+                node.mag_hz is None or 0.0 < node.mag_hz < math.inf,
+                f"nodes.{node.id}.mag_hz: expected > 0, got {node.mag_hz}",
+            )
+            _expect(
+                node.initial_heading is None or math.isfinite(node.initial_heading),
+                f"nodes.{node.id}.initial_heading: expected a finite angle, "
+                f"got {node.initial_heading}",
+            )
         _expect(
             len({a.id for a in self.antennas}) == len(self.antennas), "antennas: ids must differ"
         )
         for antenna in self.antennas:
+            _expect(
+                len(antenna.offset_b) == 3 and all(math.isfinite(x) for x in antenna.offset_b),
+                f"antennas.{antenna.id}.offset_b: expected 3 finite numbers, "
+                f"got {antenna.offset_b}",
+            )
             _expect(
                 antenna.node in ids, f"antennas.{antenna.id}.node: no node {antenna.node} in {ids}"
             )

@@ -20,6 +20,7 @@ from tracking.compiled import bind
 from tracking.constellation import Constellation
 from tracking.errors import ConfigError
 from tracking.measurements import Kind, MeasurementBlock
+from tracking.numbers import check_numbers
 
 LONG_BLOCK = 4096
 """[-] Longer blocks are sorted before they are put in order, event by event."""
@@ -31,6 +32,9 @@ class HorizonParams:
 
     delay: float = 0.1
     """[s] Longer puts later measurements in order, and makes every estimate older."""
+
+    def __post_init__(self) -> None:
+        check_numbers(self, may_be_zero=("delay",))
 
 
 class HorizonState(NamedTuple):
@@ -156,9 +160,9 @@ class Horizon:
             made since (`reserve`).
         """
         state, until, delay = self.state, np.empty_like(now), self._params.delay
-        take = bind(take_in, state, block.arrays)
+        take = bind(take_in, state, block.in_place)
         count = bind(count_due, state, until)
-        give = bind(hand_on, state, until, True, out.arrays)
+        give = bind(hand_on, state, until, True, out.in_place)
 
         def step() -> None:
             self._check_memory(state)
@@ -243,5 +247,5 @@ class Horizon:
             out = MeasurementBlock.empty(self._n_envs, n)
         elif out.n_events < n:
             raise ConfigError(f"out: expected at least {n} event columns, got {out.n_events}")
-        hand_on(self.state, until, True, out.arrays)
+        hand_on(self.state, until, True, out.in_place)
         return out

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from tracking.arrays import F64, I64, Bool
+from tracking.errors import ConfigError
 
 N_VALUES = 16
 """Columns of `MeasurementBlock.values`."""
@@ -89,19 +90,20 @@ class MeasurementBlock:
 
     @property
     def arrays(self) -> tuple[Any, ...]:
-        """The fields in their order, contiguous, as kernels take them."""
-        fields = (
-            self.t,
-            self.kind,
-            self.i,
-            self.j,
-            self.antenna_i,
-            self.antenna_j,
-            self.values,
-            self.has_power,
-            self.valid,
-        )
-        return tuple(np.ascontiguousarray(array) for array in fields)
+        """The fields in their order, contiguous, as kernels read them: copies where need be."""
+        return tuple(np.ascontiguousarray(getattr(self, f.name)) for f in fields(self))
+
+    @property
+    def in_place(self) -> tuple[Any, ...]:
+        """The fields in their order, as kernels take them that write, or are bound to the block.
+
+        Raises:
+            ConfigError: A field is not contiguous: kernels would work on a copy of it.
+        """
+        for f in fields(self):
+            if not getattr(self, f.name).flags.c_contiguous:
+                raise ConfigError(f"block: expected contiguous arrays, {f.name} is not")
+        return self.arrays
 
     @classmethod
     def empty(cls, n_envs: int = 1, n_events: int = 0) -> MeasurementBlock:
@@ -142,8 +144,8 @@ class MeasurementBlock:
             t: Times, (event) [s].
             i: Node indices, (event).
             values: The columns that `kind` uses, (event, columns).
-            j: Other node indices, for ranges.
-            antennas: Antenna indices of i and j, for ranges. They count the antennas of all nodes,
+            j: Other node indices, for ranges and surveys.
+            antennas: Antenna indices of i and j, for these. They count the antennas of all nodes,
                 so they are i and j, as assumed here, where every node has one.
             has_power: True where a range came with its powers.
         """
@@ -152,7 +154,7 @@ class MeasurementBlock:
         block.kind[0] = kind
         block.i[0] = i
         block.j[0] = i if j is None else j
-        if antennas is None and kind is Kind.RANGE:
+        if antennas is None and kind in (Kind.RANGE, Kind.SURVEY):
             antennas = block.i[0], block.j[0]
         if antennas is not None:
             block.antenna_i[0], block.antenna_j[0] = antennas

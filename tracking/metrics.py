@@ -6,9 +6,13 @@ Relative positions are scored in the world frame over the pairs with at least on
 - ``rmse_yaw``: after one constant yaw for the whole run, since magnetic north and the frame
   of a motion-capture room differ by a constant.
 - ``rmse_shape``: after the best rotation at each instant. A mirror image stays an error.
+- ``rmse_mirror``: after the best rotation and reflection at each instant: all that ranges alone
+  can tell.
 - ``nees``: mean of e^T P^-1 e over the position errors e after that yaw, per dimension: 1 where
   the covariance P is right, larger where the filter is too sure [1]. P is meant in the frame of
   the filter's own north, which no measurement can compare with another.
+- ``integrity_share`` and ``integrity_worst_s``: how long pairs are OK and wrong, after that yaw and
+  over the whole run (`tracking.integrity`).
 
 References:
     [1] Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking and Navigation,
@@ -25,6 +29,7 @@ from tracking.arrays import F64, Bool
 from tracking.consistency import pair_nees
 from tracking.estimate import Status, TeamEstimate
 from tracking.geometry import best_rotation
+from tracking.integrity import longest, wrong_while_ok
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +43,8 @@ class Score:
     yaw_deg: float | None
     """[deg] The constant yaw that `rmse_yaw` takes out."""
     rmse_shape: float | None
+    """[m]"""
+    rmse_mirror: float | None
     """[m]"""
     nees: float | None
     """[-]"""
@@ -54,6 +61,11 @@ class Score:
     scored. None where there is no truth."""
     ok_share: float | None
     """[-] Share of those with truth whose status was ok; likewise."""
+    integrity_share: float | None
+    """[-] Share of all relative positions with truth, those not scored included, that were ok and
+    wrong. None where nothing could be scored."""
+    integrity_worst_s: float | None
+    """[s] Longest time in one go that a pair was so."""
 
 
 def score(estimate: TeamEstimate, truth_ij_w: F64, has_truth: Bool, skip_until: float) -> Score:
@@ -79,7 +91,9 @@ def score(estimate: TeamEstimate, truth_ij_w: F64, has_truth: Bool, skip_until: 
     n_pairs = constellation.n_pairs
     if not scored.any():
         nothing = np.full(n_pairs, np.nan)
-        return Score(None, None, None, None, None, nothing, nothing, nothing, 0, coverage, ok_share)
+        return Score(
+            *(None,) * 6, nothing, nothing, nothing, 0, coverage, ok_share, None, None
+        )
     x = np.where(scored[..., None], x, 0.0)
     truth = np.where(scored[..., None], truth, 0.0)
     if planar:
@@ -90,9 +104,13 @@ def score(estimate: TeamEstimate, truth_ij_w: F64, has_truth: Bool, skip_until: 
     c, s = np.cos(yaw), np.sin(yaw)
     R_yaw = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])  # noqa: N806
     R_shape = best_rotation(x, truth, planar=planar)  # noqa: N806
-    errors = [x - truth, x @ R_yaw.T - truth, x @ np.swapaxes(R_shape, -1, -2) - truth]
+    M = best_rotation(x, truth, planar=planar, reflect=True)  # noqa: N806
+    errors = [x - truth, *(x @ np.swapaxes(R, -1, -2) - truth for R in (R_yaw, R_shape, M))]
 
-    nees, known = pair_nees(estimate, truth_ij_w @ R_yaw)
+    turned = truth_ij_w @ R_yaw
+    nees, known = pair_nees(estimate, turned)
+    judged = has_truth & moving
+    wrong = judged & wrong_while_ok(estimate, turned)
     nees, known = nees[rows], known[rows] & scored
     squared = [np.sum(e * e, axis=-1) for e in errors]
     overall = [float(np.sqrt(sq[scored].mean())) for sq in squared]
@@ -105,6 +123,7 @@ def score(estimate: TeamEstimate, truth_ij_w: F64, has_truth: Bool, skip_until: 
         rmse_yaw=overall[1],
         yaw_deg=float(np.degrees(yaw)),
         rmse_shape=overall[2],
+        rmse_mirror=overall[3],
         nees=float(nees[known].mean()) if known.any() else None,
         pair_rmse=per_pair[0],
         pair_rmse_yaw=per_pair[1],
@@ -112,6 +131,8 @@ def score(estimate: TeamEstimate, truth_ij_w: F64, has_truth: Bool, skip_until: 
         n_scored=int(scored.sum()),
         coverage=coverage,
         ok_share=ok_share,
+        integrity_share=float(wrong.sum() / judged.sum()),
+        integrity_worst_s=longest(estimate.t, wrong),
     )
 
 

@@ -88,6 +88,7 @@ class Orientation:
 
     def bind(self, block: MeasurementBlock) -> Callable[[], None]:
         """`step` in place, for a block that stays where it is and is filled anew every time."""
+        block.in_place  # noqa: B018 -- refuses what is not contiguous
         arrays = (block.t, block.kind, block.i, block.values, block.valid)
         return bind(orient, self.coefficients, self.state, *arrays)
 

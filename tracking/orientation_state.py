@@ -23,6 +23,7 @@ from tracking._vqf_kernels import N_TILT
 from tracking.arrays import F64, Bool
 from tracking.constellation import CARRIED, WHEELED, Constellation
 from tracking.geometry import GRAVITY
+from tracking.numbers import check_numbers
 
 VQF_TAU_ACC = 3.0
 """[s] VQF's accelerometer time constant."""
@@ -53,6 +54,9 @@ class OrientationParams:
     gravity_tau: float = 0.5
     """[s] Time constant with which a node at rest learns the length of gravity that its own
     accelerometer reads, which removes the vertical part of its offset."""
+
+    def __post_init__(self) -> None:
+        check_numbers(self)
 
 
 class OrientationCoefficients(NamedTuple):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -22,8 +22,9 @@ from tracking.filters import DEFAULT_FILTER, filter_builder
 from tracking.filters.joint import JointEkf
 from tracking.filters.params import FilterParams
 from tracking.horizon import HorizonParams
-from tracking.measurements import Kind, MeasurementBlock
+from tracking.measurements import MeasurementBlock
 from tracking.orientation import Orientation, OrientationParams
+from tracking.usable import check, usable
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,6 +54,8 @@ class Tracker:
         params = params or TrackerParams()
         self.constellation = constellation
         self.n_envs = n_envs
+        self._t = np.full(n_envs, -np.inf)
+        """Time of the last event that `run` handled, (env) [s]."""
         self._filter = filter_builder(filter)(constellation, params.filter, n_envs)
         self._orientation = Orientation(
             constellation, params.orientation, n_envs, follows_bias=self._filter.follows_bias
@@ -77,10 +80,10 @@ class Tracker:
         """Handle a block and report at several times.
 
         Args:
-            block: Events in order, none earlier than those handled before. What is no number, or
-                a range of a node with itself, is passed over.
-            t_out: Ascending times, (time) or (env, time) [s]. An estimate holds every event
-                up to its time.
+            block: Events in order, none earlier than those handled before. What cannot be is
+                passed over (`tracking.usable`).
+            t_out: Ascending times, (time) or (env, time) [s], none before the events of earlier
+                blocks. An estimate holds every event up to its time.
 
         Returns:
             Estimates, arrays over (env, time, ...).
@@ -89,8 +92,9 @@ class Tracker:
             ConfigError: The block has other environments or nodes, or times go back.
         """
         t_out = np.atleast_2d(np.asarray(t_out, dtype=np.float64))
-        block = _usable(block)
-        _check(block, t_out, self.n_envs, self.constellation)
+        block = usable(block)
+        check(block, t_out, self.n_envs, self.constellation, self._t)
+        np.maximum(self._t, _last_event(block), out=self._t)
         t_out = np.broadcast_to(t_out, (self.n_envs, t_out.shape[1]))
         return self._filter.run(self._orientation.step(block), t_out)
 
@@ -123,18 +127,25 @@ class Tracker:
             Estimates, arrays over (env, ...).
 
         Raises:
-            ConfigError: The filter cannot smooth; `joint` can.
+            ConfigError: The filter cannot smooth; `joint` can. Or as of `run`.
         """
         if not isinstance(self._filter, JointEkf):
             raise ConfigError("smoothing: expected filter 'joint', the others cannot look back")
         at = np.broadcast_to(np.asarray(t, dtype=np.float64), (self.n_envs,))
+        later = usable(later)
+        check(later, at[:, None], self.n_envs, self.constellation, self._t)
+        if np.any(later.valid & (later.t < at[:, None])):
+            raise ConfigError("later: expected events after t")
         saved = self._orientation.save()
-        states = self._orientation.step(later)
-        self._orientation.restore(saved)
+        try:
+            states = self._orientation.step(later)
+        finally:
+            self._orientation.restore(saved)
         return self._filter.smooth(states, at.copy())
 
     def reset(self, env: int) -> None:
         """Forget everything of one environment."""
+        self._t[env] = -np.inf
         self._orientation.reset(env)
         self._filter.reset(env)
 
@@ -142,16 +153,22 @@ class Tracker:
         """Some of the environments, without a step between them; shares their memory."""
         part = copy.copy(self)
         part.n_envs = len(range(*envs.indices(self.n_envs)))
+        part._t = self._t[envs]
         part._orientation = self._orientation.part(envs)
         part._filter = self._filter.part(envs)
         return part
 
     def save(self) -> dict[str, Any]:
         """A copy of everything that evolves."""
-        return {"orientation": self._orientation.save(), "filter": self._filter.save()}
+        return {
+            "t": self._t.copy(),
+            "orientation": self._orientation.save(),
+            "filter": self._filter.save(),
+        }
 
     def restore(self, saved: dict[str, Any]) -> None:
         """Go on from a saved copy."""
+        self._t[:] = saved["t"]
         self._orientation.restore(saved["orientation"])
         self._filter.restore(saved["filter"])
 
@@ -164,31 +181,7 @@ class Tracker:
         return self._filter.n_rejected()
 
 
-def _usable(block: MeasurementBlock) -> MeasurementBlock:
-    """The block without measurements that cannot be."""
-    between = np.isin(block.kind, (Kind.RANGE, Kind.SURVEY))
-    finite = np.isfinite(block.values)
-    whole = finite.all(axis=-1) | (between & ~block.has_power & finite[..., 0])
-    valid = block.valid & whole & np.isfinite(block.t) & ~(between & (block.i == block.j))
-    return block if np.array_equal(valid, block.valid) else replace(block, valid=valid)
-
-
-def _check(block: MeasurementBlock, t_out: F64, n_envs: int, group: Constellation) -> None:
-    """See that kernels, which look at nothing of this, can take a block."""
-    if len(block.t) != n_envs:
-        raise ConfigError(f"block: expected {n_envs} environments, got {len(block.t)}")
-    n = group.n_nodes
-    wrong = block.valid & ((block.i < 0) | (block.i >= n) | (block.j < 0) | (block.j >= n))
-    if wrong.any():
-        raise ConfigError(f"block: expected nodes 0 to {n - 1}, got another")
-    ranges = block.valid & (block.kind == Kind.RANGE)
-    owner = group.antenna_node
-    for antenna, node in ((block.antenna_i, block.i), (block.antenna_j, block.j)):
-        known = (antenna >= 0) & (antenna < len(owner))
-        if np.any(ranges & ~(known & (owner.take(antenna, mode="clip") == node))):
-            raise ConfigError("block: expected antennas of the nodes of a range, got another's")
-    t = np.where(block.valid, block.t, -np.inf)
-    if np.any(block.valid[:, 1:] & (t[:, 1:] < np.maximum.accumulate(t, axis=1)[:, :-1])):
-        raise ConfigError("block: expected events in order of time, see `MeasurementBlock.sorted`")
-    if np.isnan(t_out).any() or np.any(np.diff(t_out, axis=1) < 0.0):
-        raise ConfigError("t_out: expected times that do not go back")
+def _last_event(block: MeasurementBlock) -> F64:
+    """Time of the last event of each environment, (env) [s]."""
+    t: F64 = np.where(block.valid, block.t, -np.inf).max(axis=1, initial=-np.inf)
+    return t

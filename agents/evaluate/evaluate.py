@@ -60,6 +60,8 @@ class CaseResult:
             "gospa": self.median("gospa"),
             "coverage": _mean(r.coverage for r in self.runs),
             "ok_share": _mean(r.ok_share for r in self.runs),
+            "integrity_share": _mean(r.integrity_share for r in self.runs),
+            "integrity_worst_s": max(self.values("integrity_worst_s"), default=None),
             "us_per_round": self.median("us_per_round"),
             "paper": self.paper,
             "targets": [target.record for target in self.targets],

@@ -55,6 +55,10 @@ class RunResult:
     """[-] Share of the scored time with an estimate."""
     ok_share: float | None
     """[-] Share of the scored time with status ok."""
+    integrity_share: float | None
+    """[-] Share of the whole run in which pairs were ok and wrong, see `tracking.integrity`."""
+    integrity_worst_s: float | None
+    """[s] Longest time in one go that a pair was so."""
     converged_s: float
     """[s] From the first range until all pairs were ok, at most 10."""
     lost_s: float | None
@@ -139,6 +143,8 @@ def run(case: Case, log: Log, filter: str, seed: int, bound: Bound | None) -> Ru
         gospa=_number(np.sqrt(np.mean(gospa**2))) if len(gospa) else None,
         coverage=s.coverage,
         ok_share=s.ok_share,
+        integrity_share=s.integrity_share,
+        integrity_worst_s=s.integrity_worst_s,
         converged_s=converged_at(estimate, first) - first,
         lost_s=lost_at(estimate, truth, has_truth, first),
         rejected=int(tracker.n_rejected()[0]),

@@ -9,13 +9,14 @@ from agents.evaluate.lost import FOR, WRONG
 from agents.evaluate.run import SKIP
 from agents.evaluate.targets import NEAR
 from agents.report import evaluate_figures as figures
-from agents.report.page import Page, metres, png
+from agents.report.page import Page, metres, percent, png
+from tracking.integrity import LIMIT, SIGMAS
 
 TARGETS = ["case", "filter", "figure", "reached", "asked", "target", ""]
 """Names of the columns of targets."""
 _FIGURES = [
     "rmse", "rmse_yaw", "rmse_shape", "bound", "yaw/b", "shape/b",
-    "gospa", "lost", "nees", "nis", "us",
+    "gospa", "lost", "ok", "wrong", "worst s", "nees", "nis", "us",
 ]  # fmt: skip
 
 
@@ -36,7 +37,9 @@ def rows(result: EvaluateResult) -> list[list[str]]:
     for r in result.records:
         lengths = [metres(r[k]) for k in ("rmse", "rmse_yaw", "rmse_shape", "bound")]
         ratios = [_number(r[k]) for k in ("ratio_bound", "ratio_shape")]
-        rest = [f"{r['lost_runs']}/{r['seeds']}", *(_number(r[k]) for k in ("nees", "nis"))]
+        shares = [percent(r[k], 2) for k in ("ok_share", "integrity_share")]
+        numbers = [_number(r[k]) for k in ("integrity_worst_s", "nees", "nis")]
+        rest = [f"{r['lost_runs']}/{r['seeds']}", *shares, *numbers]
         name = r["case"] if r["case"] != before else ""
         before = r["case"]
         head = [name, r["filter"], *([metres(r["paper"])] if has_paper(result) else [])]
@@ -53,6 +56,9 @@ def notes(result: EvaluateResult) -> list[str]:
         "range. Errors [m], the bound and the ratios to it are medians over the seeds.",
         f"lost: a pair was off by more than {WRONG:g} m for more than {FOR:g} s in one go. "
         "nees and nis are means, 1 is right.",
+        f"ok: share of the scored time; wrong: share of the whole run in which a pair was ok and "
+        f"off by more than {LIMIT:g} m and {SIGMAS:g} of its own standard deviations; worst s: the "
+        "longest time in one go, of all seeds.",
         "gospa: errors, pairs without an estimate, and pairs that are not there, all in one [m].",
         "us: time of the tracker for a ranging round [us]; compare it only at --jobs 1 on an "
         "idle machine.",

@@ -86,9 +86,9 @@ def png(figure: Figure) -> bytes:
     return raw.getvalue()
 
 
-def percent(share: float | None) -> str:
+def percent(share: float | None, digits: int = 0) -> str:
     """A share for a table or a sentence, or a dash."""
-    return "-" if share is None else f"{100.0 * share:.0f} %"
+    return "-" if share is None else f"{100.0 * share:.{digits}f} %"
 
 
 def metres(value: float | None) -> str:

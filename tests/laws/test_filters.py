@@ -11,6 +11,8 @@ from tracking import Status, TeamEstimate, Tracker, TrackerParams
 from tracking.filters import FILTERS, FilterParams
 from tracking.filters.joint.state import JointState
 from tracking.filters.pair.params import PairEkfParams
+from tracking.filters.paper import PaperParams
+from tracking.filters.paper.state import PaperState
 from tracking.measurements import Kind, MeasurementBlock
 
 pytestmark = pytest.mark.parametrize("name", FILTERS)
@@ -21,15 +23,21 @@ def assert_identical(a: TeamEstimate, b: TeamEstimate) -> None:
         np.testing.assert_array_equal(getattr(a, f.name), getattr(b, f.name), err_msg=f.name)
 
 
-def put_on_truth(state, group, turn=None):
+def needs_no_layout(name):
+    """Skip the paper's algorithm, which is given the rotation and reflection of its start."""
+    if name.startswith("paper"):
+        pytest.skip("the paper names no rotation and reflection of the first layout")
+
+
+def put_on_truth(state, group, turn=None, clock=0.0):
     """Give every hypothesis of a filter's state the true positions and velocities.
 
-    Turned by the matrix `turn`, if there is one.
+    Turned by the matrix `turn`, if there is one; `clock` is what the state's times began with.
     """
     h = 1e-4
     turn = np.eye(3) if turn is None else turn
     if isinstance(state, JointState):
-        t = state.group["t"][0]
+        t = state.group["t"][0] - clock
         vel = (group.pos(t + h)[0] - group.pos(t - h)[0]) / (2 * h)
         for k, node in enumerate(state.nodes[0]):
             d = node["at_v"] - node["at_p"]
@@ -38,21 +46,23 @@ def put_on_truth(state, group, turn=None):
             state.x[0, :, node["at_b"] : node["at_h"] + 1] = 0.0
         state.x[0, :, state.nodes[0, -1]["at_h"] + 1 :] = 0.0
         return
-    for p, t in enumerate(state.pairs["t"][0]):
+    for p, t in enumerate(state.pairs["t"][0] - clock):
         vel = (group.pairs(t + h)[p] - group.pairs(t - h)[p]) / (2 * h)
-        state.x[0, p, :, :3], state.x[0, p, :, 3:6] = turn @ group.pairs(t)[p], turn @ vel
-        state.x[0, p, :, 6] = 0.0
+        x = state.x[0, p]
+        x[..., :3], x[..., 3:6] = turn @ group.pairs(t)[p], turn @ vel
+        if not isinstance(state, PaperState):
+            x[..., 6] = 0.0
 
 
-def half_on_truth(name, group, block, turn=None, params=None):
+def half_on_truth(name, group, block, turn=None, params=None, clock=0.0):
     """The estimate at the end, of a filter that was put on the truth at half time."""
     tracker = Tracker(group.constellation, params, filter=name)
     half = block.n_events // 2
     tracker.step(block.take(slice(0, half)), block.t[0, half - 1])
     saved = tracker.save()
-    put_on_truth(saved["filter"], group, turn)
+    put_on_truth(saved["filter"], group, turn, clock)
     tracker.restore(saved)
-    return tracker.step(block.take(slice(half, None)), group.t[-1])
+    return tracker.step(block.take(slice(half, None)), group.t[-1] + clock)
 
 
 def times(group, n=60):
@@ -65,8 +75,8 @@ def test_noiseless_data_keep_zero_error(name, make_group):
     Without the speed measurement: a low-passed derivative lags, with or without noise.
     """
     group = make_group(n=4, seconds=30.0, hz=250.0)
-    pair = PairEkfParams(speed_model="none")
-    params = TrackerParams(filter=FilterParams(pair=pair))
+    pair, paper = PairEkfParams(speed_model="none"), PaperParams(speed="rate", speed_std=1e3)
+    params = TrackerParams(filter=FilterParams(pair=pair, paper=paper))
     estimate = half_on_truth(name, group, group.block, params=params)
     error = np.linalg.norm(estimate.pos_ij_w[0] - group.pairs(group.t[-1]), axis=-1)
     assert error.max() < 0.02
@@ -84,6 +94,7 @@ def test_between_measurements_the_estimate_goes_on_as_fast_as_it_says(name, grou
 
 
 def test_cold_start_finds_rotation_and_mirror_image(name, make_group):
+    needs_no_layout(name)
     group = make_group(n=4, seconds=40.0, hz=100.0)
     estimate = Tracker(group.constellation, filter=name).step(group.block, group.t[-1])
     assert (estimate.status == Status.OK).all()
@@ -161,8 +172,13 @@ def test_numbering_nodes_the_other_way_mirrors(name, make_group):
         b, i=flip[b.i], j=flip[b.j], antenna_i=flip[b.antenna_i], antenna_j=flip[b.antenna_j]
     ).sorted()
     constellation = replace(group.constellation, nodes=group.constellation.nodes[::-1])
-    one = Tracker(group.constellation, filter=name).step(b, group.t[-1])
-    other = Tracker(constellation, filter=name).step(turned, group.t[-1])
+    first = [tuple(map(float, p)) for p in group.pos(0.05)]
+    params = [
+        TrackerParams(filter=FilterParams(paper=PaperParams(first_layout=tuple(layout))))
+        for layout in (first, first[::-1])
+    ]
+    one = Tracker(group.constellation, params[0], filter=name).step(b, group.t[-1])
+    other = Tracker(constellation, params[1], filter=name).step(turned, group.t[-1])
     for i in range(n):
         for j in range(n):
             if i != j:
@@ -279,7 +295,8 @@ def test_turning_the_world_turns_the_estimate(name, group):
 
 
 def test_shifting_the_clock_changes_nothing(name, group):
+    """Put on the truth at half time, as above."""
     shifted = replace(group.block, t=group.block.t + 512.0)
-    one = Tracker(group.constellation, filter=name).step(group.block, group.t[-1])
-    other = Tracker(group.constellation, filter=name).step(shifted, group.t[-1] + 512.0)
+    one = half_on_truth(name, group, group.block)
+    other = half_on_truth(name, group, shifted, clock=512.0)
     np.testing.assert_allclose(one.pos_ij_w, other.pos_ij_w, atol=1e-4)

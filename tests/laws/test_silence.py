@@ -39,6 +39,8 @@ def test_after_a_common_silence_the_group_begins_anew(name, make_group):
 @pytest.mark.parametrize("name", FILTERS)
 def test_first_ranges_of_long_ago_place_nobody(name, make_group):
     """A newcomer's distance to one of three is four seconds old when it ranges the others."""
+    if name.startswith("paper"):
+        pytest.skip("the paper names no age of the first k measurements")
     group = make_group(n=4, seconds=12.0)
     b = group.block
     early = ranges_of(b, 3, 0) & (b.t[0] < 4.0)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.linalg import expm
 from scipy.stats import norm
 
 from tests.tracking.test_joint_kernels import running
-from tracking._exponential_kernels import decay
 from tracking.filters.joint._motion_kernels import predict
 from tracking.filters.joint._sight_kernels import change_sight, judge_sight
 
@@ -48,8 +48,11 @@ def test_by_so_much_it_is_forgotten(seed, hidden, switched, is_far):
     means = np.array([c["excess"], c["far_excess"]])
     excess = shares @ means
     excess_var = shares @ (np.array([c["excess_var"], c["far_excess_var"]]) + means**2) - excess**2
-    new = c["slow_var"] + hidden * excess_var
-    expected = stays**2 * before[at, at] + (1.0 - stays**2) * new
+    # Four cases, each with its probability, mean and variance: the moments of their mixture.
+    chance = np.array([stays, switched * (1.0 - hidden), switched * hidden])
+    mean = np.array([x[at], 0.0, excess])
+    var = c["slow_var"] + np.array([before[at, at] - c["slow_var"], 0.0, excess_var])
+    expected = chance @ (var + mean**2) - (chance @ mean) ** 2
     assert after[at, at] == pytest.approx(expected)
     assert s.x[0, at] == pytest.approx(stays * x[at] + switched * hidden * excess)
     others = np.arange(len(x)) != at
@@ -88,7 +91,9 @@ def test_sight_is_judged_by_the_rule_of_bayes(before, nu, variance, evidence):
     def density(mean, var):
         return norm.pdf(nu, mean, np.sqrt(var))
 
-    enter, leave = (1.0 - decay(rate * dt) for rate in rates)
+    # A Markov chain of two states: the exponential of its generator.
+    chain = expm(dt * np.array([[-rates[0], rates[0]], [rates[1], -rates[1]]]))
+    enter, leave = chain[0, 1], chain[1, 0]
     S, hidden = variance + c["white_var"], np.exp(evidence)
     near = (1.0 - c["far_share"]) * density(c["excess"], S + c["excess_var"])
     far = c["far_share"] * density(c["far_excess"], S + c["far_excess_var"])

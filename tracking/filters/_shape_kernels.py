@@ -20,7 +20,7 @@ def collect(c, pair, t, distance, is_survey):
     if is_survey:
         pair.surveyed = distance
         return
-    if pair.start_n > 0 and t - pair.start_t[(pair.start_n - 1) % N_FIRST] > c.leave_after:
+    if pair.start_n > 0 and t - newest_first(pair) > c.leave_after:
         pair.start_n = 0
     if pair.start_n == 0:
         pair.t_start = t
@@ -36,11 +36,19 @@ def is_ready(c, s, layout, i, j, t):
     if pair.surveyed > 0.0:
         return True
     n = min(pair.start_n, N_FIRST)
-    if n < FEWEST or t - pair.start_t[(pair.start_n - 1) % N_FIRST] > c.leave_after:
+    if n < FEWEST:
         return False
-    if pair.start_n >= c.start_k and t - pair.start_t[(pair.start_n - n) % N_FIRST] <= c.start_max_age:
+    oldest, newest = pair.start_t[(pair.start_n - n) % N_FIRST], newest_first(pair)
+    if pair.start_n >= c.start_k and t - oldest <= c.start_max_age:
         return True
-    return t - pair.t_start >= c.start_max_age
+    is_recent = t - newest <= max(c.start_max_age, FEWEST * (newest - oldest) / (n - 1))
+    return is_recent and t - pair.t_start >= c.start_max_age
+
+
+@kernel
+def newest_first(pair):
+    """Time of the newest of a pair's first ranges [s]."""
+    return pair.start_t[(pair.start_n - 1) % N_FIRST]
 
 
 @allocating_kernel
@@ -58,7 +66,7 @@ def start_distance(c, s, layout, i, j):
     if pair.surveyed > 0.0:
         return pair.surveyed, 0.0
     n = min(pair.start_n, N_FIRST)
-    newest = pair.start_t[(pair.start_n - 1) % N_FIRST]
+    newest = newest_first(pair)
     kept, m = np.zeros(N_FIRST), 0
     for k in range(n):
         at = (pair.start_n - 1 - k) % N_FIRST

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from tracking._exponential_kernels import decay, exponential, likelihood
+from tracking._exponential_kernels import exponential, likelihood
 from tracking.compiled import small_kernel
 from tracking.filters.joint._linear_kernels import covariance
 
@@ -52,7 +52,7 @@ def judge_sight(c, s, h, p, dt, nu, variance, sight, w):
     at = s.pairs[p].at_e + 1
     before = s.nlos[h, p]
     evidence, enter_rate, leave_rate = sight
-    changes = (1.0 - decay((enter_rate + leave_rate) * dt)) / (enter_rate + leave_rate)
+    changes = (1.0 - exponential(-(enter_rate + leave_rate) * dt)) / (enter_rate + leave_rate)
     enter, leave = enter_rate * changes, leave_rate * changes
     S = variance + c.white_var
     near = (1.0 - c.far_share) * likelihood(nu - c.excess, S + c.excess_var)

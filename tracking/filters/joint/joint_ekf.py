@@ -59,7 +59,9 @@ class JointEkf:
 
     def bind(self, block: MeasurementBlock, estimate: TeamEstimate) -> Callable[[], None]:
         """`run` for arrays that stay where they are; see `Filter.bind`."""
-        arguments = self._arguments(self._state, self._coefficients, self._scratch, block, estimate)
+        arguments = self._arguments(
+            self._state, self._coefficients, self._scratch, block.in_place, estimate
+        )
         return bind(run_events, *arguments)
 
     def smooth(self, later: MeasurementBlock, t: F64) -> TeamEstimate:
@@ -73,14 +75,17 @@ class JointEkf:
             Estimates, arrays over (env, ...).
         """
         saved = self.save()
-        now = self.run(MeasurementBlock.empty(self._n_envs), t[:, None])
-        names = TeamEstimate.__slots__[1:]
-        estimate = TeamEstimate(now.constellation, *(getattr(now, name)[:, 0] for name in names))
-        advance_all(
-            as_records(self._coefficients), self._layout, _records(self._state), self._scratch, t
-        )
-        clones, coefficients = with_clones(self._state, self._coefficients)
-        self.restore(saved)
+        try:
+            now = self.run(MeasurementBlock.empty(self._n_envs), t[:, None])
+            names = TeamEstimate.__slots__[1:]
+            estimate = TeamEstimate(
+                now.constellation, *(getattr(now, name)[:, 0] for name in names)
+            )
+            coefficients = as_records(self._coefficients)
+            advance_all(coefficients, self._layout, _records(self._state), self._scratch, t)
+            clones, coefficients = with_clones(self._state, self._coefficients)
+        finally:
+            self.restore(saved)
         scratch = make_scratch(
             self._constellation.n_nodes, self._constellation.n_pairs, int(coefficients[0]["n"])
         )
@@ -132,14 +137,14 @@ class JointEkf:
         estimate: TeamEstimate,
     ) -> None:
         """Handle events and fill the estimate for its times."""
-        run_events(*self._arguments(state, coefficients, scratch, block, estimate))
+        run_events(*self._arguments(state, coefficients, scratch, block.arrays, estimate))
 
     def _arguments(
         self,
         state: JointState,
         coefficients: Records,
         scratch: Scratch,
-        block: MeasurementBlock,
+        events: tuple[Any, ...],
         estimate: TeamEstimate,
     ) -> tuple[Any, ...]:
         """What the kernel takes."""
@@ -148,7 +153,7 @@ class JointEkf:
             self._layout,
             _records(state),
             scratch,
-            block.arrays,
+            events,
             estimate.t,
             estimate.arrays,
         )

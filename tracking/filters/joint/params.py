@@ -2,18 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 
 from tracking.errors import ConfigError
-
-
-def _expect_positive(params: object, *but: str) -> None:
-    """Every number is above 0, but for those named."""
-    for f in fields(params):  # type: ignore[arg-type]
-        value = getattr(params, f.name)
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        if number and f.name not in but and not 0.0 < value < float("inf"):
-            raise ConfigError(f"{f.name}: expected a number above 0, got {value}")
+from tracking.numbers import check_numbers
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,7 +73,7 @@ class CarrierParams:
     do with its older state, without the noise of the time since."""
 
     def __post_init__(self) -> None:
-        _expect_positive(self, "rear_axle", "slip", "unsettled_speed")
+        check_numbers(self, may_be_zero=("rear_axle", "slip", "unsettled_speed"))
 
 
 BODY = CarrierParams(accel_psd=0.05, unsettled_speed=1.0, offset_std=0.2)
@@ -140,7 +132,7 @@ class RangeErrorParams:
     """[-] Larger groups have no states for these errors: their ranges count as worse and white."""
 
     def __post_init__(self) -> None:
-        _expect_positive(self, "fast_std", "slow_std", "bend_gain")
+        check_numbers(self, may_be_zero=("fast_std", "slow_std", "bend_gain"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -187,7 +179,7 @@ class NlosParams:
     """[m] They lie anywhere in so much."""
 
     def __post_init__(self) -> None:
-        _expect_positive(self, "far_share")
+        check_numbers(self, may_be_zero=("far_share",))
         if not 0.0 <= self.far_share <= 1.0:
             raise ConfigError(f"far_share: expected a share from 0 to 1, got {self.far_share}")
 
@@ -231,7 +223,7 @@ class JointStartParams:
     """[-] Log-likelihood by which other rotations have to make up for being looked at so late."""
 
     def __post_init__(self) -> None:
-        _expect_positive(self)
+        check_numbers(self)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -285,4 +277,4 @@ class JointParams:
     """[m] A pair is not ok while its position is less certain than this along an axis."""
 
     def __post_init__(self) -> None:
-        _expect_positive(self)
+        check_numbers(self)

@@ -20,6 +20,7 @@ from tracking.filters.pair._bank_kernels import (
 )
 from tracking.filters.pair._pair_kernels import predict
 from tracking.filters.pair._range_kernels import (
+    TIE,
     advance_pair,
     fuse_range,
     fuse_survey,
@@ -116,7 +117,7 @@ def run_events(coefficients, layout, state, block, t_out, out):
                 evidence = 0.0
                 if has_power[e, k]:
                     evidence = gap_evidence(c, values[e, k, 1] - values[e, k, 2])
-                if t[e, k] - s.group[0].t_check >= c.check_period:
+                if t[e, k] - s.group[0].t_check + TIE >= c.check_period:
                     look_at_group(c, s, layout, t[e, k])
                 p, runs = hear(s, layout, i, j, t[e, k])
                 if not runs:
@@ -171,14 +172,14 @@ def take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, evidence, is_sur
         s.pairs[p].t_range, s.pairs[p].t_used = t, t
     else:
         fuse_range(c, s, layout, p, t, distance, evidence, a_i, a_j, scratch.work)
-    if not c.use_mds or t - group.t_mds < c.mds_period:
+    if not c.use_mds or t - group.t_mds + TIE < c.mds_period:
         return
     for q in range(s.pairs.shape[0]):
         if s.nodes[s.pairs[q].i].present and s.nodes[s.pairs[q].j].present:
             advance_pair(c, s, q, t)
     group.t_mds = t
     refine_group(c, s, layout, scratch)
-    if t - group.t_wheels >= c.wheel_period:
+    if t - group.t_wheels + TIE >= c.wheel_period:
         apply_wheels(c, s, layout, t, scratch.work)
 
 

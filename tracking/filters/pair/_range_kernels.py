@@ -14,6 +14,8 @@ from tracking.filters.pair._pair_kernels import (
 )
 from tracking.filters.pair._sight_kernels import E, change_sight, fade_error, judge_sight
 
+TIE = 1e-6
+"""[s] Times that differ by less are equal, whatever the clock began with."""
 MOST_BEND = 0.1
 """[m] No more noise than this is added for what the straight line misses."""
 
@@ -120,7 +122,7 @@ def update_rate(c, pair, t, distance):
     if pair.n_ranges > 0 and 0.0 < age < 3.0 * c.speed_tau:
         raw = (distance - pair.last_distance) / age
         pair.rate += age / (c.speed_tau + age) * (raw - pair.rate)
-        return pair.n_ranges * age > 2.0 * c.speed_tau
+        return pair.n_ranges * age > 2.0 * c.speed_tau + TIE
     if age > 0.0:
         pair.rate = 0.0
         pair.n_ranges = 0

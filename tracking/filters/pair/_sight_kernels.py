@@ -66,7 +66,8 @@ def judge_sight(c, s, p, h, dt, nu, variance, w_e, evidence):
         Probability that the sight changed; that the range meant anything; log-likelihood.
     """
     before = s.nlos[p, h]
-    changes = (1.0 - decay((c.enter_rate + c.leave_rate) * dt)) / (c.enter_rate + c.leave_rate)
+    rates = c.enter_rate + c.leave_rate
+    changes = (1.0 - exponential(-rates * dt)) / rates
     enter, leave = c.enter_rate * changes, c.leave_rate * changes
     S = variance + c.range_var
     nu_leave = nu + s.x[p, h, E]

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -60,20 +61,23 @@ class PairEkf:
         estimate = TeamEstimate.empty(
             self._constellation, np.ascontiguousarray(t_out, dtype=np.float64)
         )
-        self.bind(block, estimate)()
+        run_events(*self._arguments(block.arrays, estimate))
         return estimate
 
     def bind(self, block: MeasurementBlock, estimate: TeamEstimate) -> Callable[[], None]:
         """`run` for arrays that stay where they are; see `Filter.bind`."""
-        arguments = (
+        return bind(run_events, *self._arguments(block.in_place, estimate))
+
+    def _arguments(self, events: tuple[Any, ...], estimate: TeamEstimate) -> tuple[Any, ...]:
+        """What the kernel takes."""
+        return (
             as_records(self._coefficients),
             self._layout,
             self._records(),
-            block.arrays,
+            events,
             estimate.t,
             estimate.arrays,
         )
-        return bind(run_events, *arguments)
 
     def reset(self, env: int) -> None:
         """Forget everything of one environment."""

@@ -6,13 +6,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from tracking.errors import ConfigError
-
-
-def _expect_positive(params: object, names: str) -> None:
-    for name in names.split():
-        value = getattr(params, name)
-        if not 0.0 < value < float("inf"):
-            raise ConfigError(f"{name}: expected a number above 0, got {value}")
+from tracking.numbers import check_numbers
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,7 +29,7 @@ class GateParams:
     """[-] So many rejected in a row are believed after all: the average was wrong."""
 
     def __post_init__(self) -> None:
-        _expect_positive(self, "tau floor speed_gain min_speed max_rejected")
+        check_numbers(self)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,7 +42,7 @@ class MdsParams:
     """[m] A newcomer is placed on both sides of a layout that is flatter than this."""
 
     def __post_init__(self) -> None:
-        _expect_positive(self, "period min_spread")
+        check_numbers(self)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,7 +63,7 @@ class RangeErrorParams:
     second-order error there."""
 
     def __post_init__(self) -> None:
-        _expect_positive(self, "white_std slow_std slow_length least_speed bend_gain")
+        check_numbers(self)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,7 +98,7 @@ class NlosParams:
     """[m] They lie anywhere in so much."""
 
     def __post_init__(self) -> None:
-        _expect_positive(self, " ".join(self.__slots__))
+        check_numbers(self)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,7 +115,7 @@ class WheelParams:
     """[s] Time between two uses."""
 
     def __post_init__(self) -> None:
-        _expect_positive(self, "std rear_axle period")
+        check_numbers(self, may_be_zero=("rear_axle", "slip"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -152,7 +146,7 @@ class StartParams:
     """[s] Time between two looks at the bank."""
 
     def __post_init__(self) -> None:
-        _expect_positive(self, " ".join(self.__slots__))
+        check_numbers(self)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -192,11 +186,7 @@ class PairEkfParams:
     start: StartParams = field(default_factory=StartParams)
 
     def __post_init__(self) -> None:
-        _expect_positive(self, "accel_psd wheeled_accel_psd hand_accel_psd unaided_accel_psd")
-        _expect_positive(
-            self,
-            "unaided_after survey_std speed_std speed_tau lost_after leave_after",
-        )
+        check_numbers(self)
         if self.speed_model not in ("range-rate", "speed-norm", "none"):
             raise ConfigError(
                 f"speed_model: expected 'range-rate', 'speed-norm' or 'none', "

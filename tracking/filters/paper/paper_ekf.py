@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -54,19 +55,22 @@ class PaperEkf:
         """Handle the events and report at the given times; see `Filter.run`."""
         t_out = np.ascontiguousarray(t_out, dtype=np.float64)
         estimate = TeamEstimate.empty(self._constellation, t_out)
-        self.bind(block, estimate)()
+        run_events(*self._arguments(block.arrays, estimate))
         return estimate
 
     def bind(self, block: MeasurementBlock, estimate: TeamEstimate) -> Callable[[], None]:
         """`run` for arrays that stay where they are; see `Filter.bind`."""
+        return bind(run_events, *self._arguments(block.in_place, estimate))
+
+    def _arguments(self, events: tuple[Any, ...], estimate: TeamEstimate) -> tuple[Any, ...]:
+        """What the kernel takes."""
         s = self._state
         nodes, pairs, group = (as_records(a) for a in (s.nodes, s.pairs, s.group))
-        return bind(
-            run_events,
+        return (
             as_records(self._constants),
             self._layout,
             s._replace(nodes=nodes, pairs=pairs, group=group),
-            block.arrays,
+            events,
             estimate.t,
             estimate.arrays,
         )

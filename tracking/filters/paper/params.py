@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Literal
 
 from tracking.errors import ConfigError
+from tracking.numbers import check_numbers
 
 CHOICES = {
     "speed": ("norm", "rate"),
@@ -70,11 +71,8 @@ class PaperParams:
     reflection of the eigenvectors: the paper names no other."""
 
     def __post_init__(self) -> None:
-        for f in fields(self):
-            value = getattr(self, f.name)
-            if f.name in CHOICES:
-                if value not in CHOICES[f.name]:
-                    names = " or ".join(map(repr, CHOICES[f.name]))
-                    raise ConfigError(f"{f.name}: expected {names}, got {value!r}")
-            elif f.name != "first_layout" and not 0.0 < value < float("inf"):
-                raise ConfigError(f"{f.name}: expected a number above 0, got {value}")
+        check_numbers(self)
+        for name, values in CHOICES.items():
+            if getattr(self, name) not in values:
+                wanted = " or ".join(map(repr, values))
+                raise ConfigError(f"{name}: expected {wanted}, got {getattr(self, name)!r}")
