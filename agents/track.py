@@ -18,7 +18,7 @@ from tracking.constellation import Constellation
 from tracking.estimate import Status, TeamEstimate
 from tracking.filters import DEFAULT_FILTER
 from tracking.horizon import HorizonParams
-from tracking.log import Log, notes_on, read_log
+from tracking.log import Log, notes_on, notes_on_estimate, read_log
 from tracking.measurements import MeasurementBlock
 from tracking.metrics import Score, score
 from tracking.tracker import Tracker, TrackerParams
@@ -56,7 +56,7 @@ class TrackResult:
     realtime_factor: float
     """[-] Duration of the log over the time that tracking took."""
     bound: Bound | None = None
-    """The least errors that its measurements allow, where asked for."""
+    """The expected errors of an efficient estimator, where asked for."""
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -78,7 +78,7 @@ class TrackResult:
             "yaw_deg": _number(s.yaw_deg),
             "rmse_shape": _number(s.rmse_shape),
             "rmse_mirror": _number(s.rmse_mirror),
-            **{f"bound_{name}": value for name, value in self.least.items()},
+            **{f"bound_{name}": value for name, value in self.expected.items()},
             "pair_rmse": pair_rmse,
             "nees": _number(s.nees),
             "nis": _number(self.nis),
@@ -87,17 +87,22 @@ class TrackResult:
             "ok_share": s.ok_share,
             "integrity_share": s.integrity_share,
             "integrity_worst_s": s.integrity_worst_s,
-            "notes": list(notes_on(self.log)),
+            "notes": self.notes,
             "rejected": self.n_rejected,
             "skipped": sum(self.log.skipped.values()),
         }
 
     @property
-    def least(self) -> dict[str, float]:
-        """The bound under the names of the errors [m]; empty where it was not asked for."""
+    def notes(self) -> list[str]:
+        """What a reader should know of the recording and of what became of it, a line each."""
+        return [*notes_on(self.log), *notes_on_estimate(self.log, self.estimate)]
+
+    @property
+    def expected(self) -> dict[str, float]:
+        """The bound under the names of its errors [m]; empty where it was not asked for."""
         if self.bound is None:
             return {}
-        return {name: float(getattr(self.bound, name)) for name in ERRORS}
+        return {name: float(getattr(self.bound, name)) for name in ERRORS if name != "rmse_mirror"}
 
 
 def track_log(
@@ -118,7 +123,7 @@ def track_log(
         skip: Times until so many seconds after the first range are not scored.
         smooth: Whether estimates know what was measured in the `LAG` after them, too; the filter
             goes its way as without.
-        bound: The least errors that the measurements allow, kept beside those there are
+        bound: The expected errors of an efficient estimator, kept beside those there are
             (`tracking.bounds.recorded_bound`).
         params: What the tracker believes.
         progress: Called with the share done, 0 to 1.

@@ -1,10 +1,15 @@
-"""The recursion of `tracking.bounds`: the joint filter's covariance along the true motion."""
+"""The recursion of `tracking.bounds`: the joint filter's covariance along the true motion.
+
+One row behind the states is correlated with them and has no dynamics: the sum of the errors so far
+along a yaw of the whole run. Corrections change its correlation with the present errors as a filter
+changes those, which is what the variance of a sum over time needs.
+"""
 
 from __future__ import annotations
 
 from tracking.compiled import kernel, small_kernel
 from tracking.filters.joint._antenna_kernels import antenna_offset
-from tracking.filters.joint._carrier_kernels import apply_carriers, centre
+from tracking.filters.joint._carrier_kernels import centre, hold_nodes
 from tracking.filters.joint._linear_kernels import absorb, project, settle
 from tracking.filters.joint._motion_kernels import predict
 from tracking.filters.joint._range_kernels import range_model
@@ -52,7 +57,7 @@ def put_on_truth(c, s, truth, k):
 
 
 @kernel
-def run_bound(coefficients, layout, s, scratch, block, hidden, truth, turn_var, t_out, out):
+def run_bound(coefficients, layout, s, scratch, block, hidden, truth, turn_var, t_out, yaw, out):
     """Carry the covariance through the events of one environment.
 
     Args:
@@ -65,18 +70,24 @@ def run_bound(coefficients, layout, s, scratch, block, hidden, truth, turn_var, 
         truth: Positions [m], velocities [m/s], (event, node, 3), heading errors, (event, node).
         turn_var: How uncertain the rotation of the group is at first, about every axis [rad2].
         t_out: Times, ascending, (time) [s].
+        yaw: Derivatives of the positions by a yaw of all, summed over the pairs that count,
+            (time, node * d) [m].
         out: Covariance of all positions, (time, node * d, node * d), written.
+
+    Returns:
+        Variance of the sum over all times of the errors along `yaw` [m4].
     """
     t, kind, node_i, node_j, antenna_i, antenna_j, values = block
     c = coefficients[0]
     n, d = s.nodes.shape[0], c.d
-    group = s.group[0]
-    o = 0
+    group, v = s.group[0], scratch.turns[0, 0]
+    o, variance = 0, 0.0
     for k in range(t.shape[1]):
         what, now = kind[0, k], t[0, k]
         while o < t_out.shape[0] and t_out[o] < now:
             settle(s, 0)
             write_positions(s, d, n, o, out)
+            variance += add_to_sum(c, s, yaw[o], v)
             o += 1
         if what == STATE:
             take_state(c, s.nodes, s.held, s.pre, node_i[0, k], now, values, 0, k)
@@ -87,6 +98,7 @@ def run_bound(coefficients, layout, s, scratch, block, hidden, truth, turn_var, 
             put_on_truth(c, s, truth, k)
             if turn_var > 0.0:
                 spread_turn(c, s, 0, turn_var)
+            s.P[0, c.n_own :, :], s.P[0, :, c.n_own :] = 0.0, 0.0
         if now > group.t:
             for i in range(n):
                 if not s.nodes[i].static:
@@ -100,7 +112,7 @@ def run_bound(coefficients, layout, s, scratch, block, hidden, truth, turn_var, 
             group.t = now
         put_on_truth(c, s, truth, k)
         if now - group.t_carrier >= c.carrier_period:
-            apply_carriers(c, s, 0, now, now - group.t_carrier, scratch)
+            hold_nodes(c, s, 0, now, scratch)
             group.t_carrier = now
             put_on_truth(c, s, truth, k)
         if now - group.t_gauge >= GAUGE_PERIOD:
@@ -114,7 +126,38 @@ def run_bound(coefficients, layout, s, scratch, block, hidden, truth, turn_var, 
     while o < t_out.shape[0]:
         settle(s, 0)
         write_positions(s, d, n, o, out)
+        variance += add_to_sum(c, s, yaw[o], v)
         o += 1
+    return variance
+
+
+@small_kernel
+def add_to_sum(c, s, yaw, v):
+    """Add the present errors along a yaw to their sum; returns what that adds to its variance.
+
+    Args:
+        c: Coefficients.
+        s: JointState of one environment; nothing waits.
+        yaw: Derivatives of the positions, (node * d) [m].
+        v: Room, (state).
+    """
+    a, P, added = c.n_own, s.P, 0.0
+    for r in range(c.n):
+        v[r] = 0.0
+    for i in range(s.nodes.shape[0]):
+        for k in range(c.d):
+            g, at = yaw[i * c.d + k], s.nodes[i].at_p + k
+            added += 2.0 * g * P[0, a, at]
+            for r in range(c.n):
+                v[r] += g * P[0, at, r]
+    for i in range(s.nodes.shape[0]):
+        for k in range(c.d):
+            added += yaw[i * c.d + k] * v[s.nodes[i].at_p + k]
+    for r in range(c.n_own):
+        P[0, a, r] += v[r]
+        P[0, r, a] = P[0, a, r]
+    P[0, a, a] += added
+    return added
 
 
 @small_kernel

@@ -1,14 +1,17 @@
-"""What is possible: the posterior Cramer-Rao bound along a recorded run.
+"""The expected error of an efficient estimator: the posterior Cramer-Rao bound along a run.
 
-No estimator has a smaller mean square error than the inverse of the posterior information,
-which for white Gaussian noise obeys the Riccati recursion linearised at the truth [1]. The
-model is that of the joint filter (`tracking.filters.joint`): its motion, its range errors and
-what it knows of the carriers. Given are the true motion, which ranges had no line of sight,
-and, unless it is asked otherwise, the rotation and mirror image of the group at the start; an
-estimator has to find these.
-The bound is as good as its parameters: give it those of the world that made the run. Errors
+The mean square error of an estimator, over all runs of a world, is at least the inverse of the
+posterior information, which for white Gaussian noise obeys the Riccati recursion linearised at the
+truth [1]. The model is that of the joint filter (`tracking.filters.joint`) with the parameters of
+the world that made the run (`relpos_env.matched`): its motion, its range errors, wheels that slide
+as those of the world do, nodes that rest. What the filter only believes (the speed of the group) is
+no part of it. Given are the true motion, which ranges had no line of sight, and, unless it is asked
+otherwise, the rotation and mirror image of the group at the start; an estimator has to find these.
+
+It is a mean over runs: the error of a single run may be smaller. Of a recording, whose world is not
+known, it is what an efficient estimator would err by if the assumed noise were the true one. Errors
 behind obstacles are not Gaussian; their variance is used, so that there the bound is that of
-the best linear estimator.
+the best linear estimator. The figures are aligned as those of `tracking.metrics` are.
 
 References:
     [1] Tichavsky, Muravchik, Nehorai, Posterior Cramer-Rao bounds for discrete-time nonlinear
@@ -22,15 +25,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tracking._bound_kernels import run_bound
-from tracking.arrays import F64, Bool
+from tracking.arrays import F64, Bool, aligned, whole_lines
 from tracking.calibration.range_errors import measure_range_errors
 from tracking.constellation import Constellation
 from tracking.errors import LogError
 from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.params import JointParams
-from tracking.filters.joint.records import as_records
+from tracking.filters.joint.records import Records, as_records
 from tracking.filters.joint.scratch import make_scratch
-from tracking.filters.joint.state import JointState, make_layout, make_state
+from tracking.filters.joint.state import JointState, make_layout, make_state, room_to_wait
 from tracking.geometry import quat_conjugate, quat_multiply, yaw_of
 from tracking.log import Log
 from tracking.measurements import Kind, MeasurementBlock
@@ -45,7 +48,7 @@ error by it is as large as that of the best guess, all nodes in one place."""
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """The least root mean square errors of the relative positions of a run."""
+    """Expected root mean square errors of the relative positions of a run."""
 
     t: F64
     """(time) [s]"""
@@ -56,7 +59,7 @@ class Bound:
     rmse: float
     """In the world frame, over the scored time [m]."""
     rmse_yaw: float
-    """After the best yaw at each instant [m]: no estimate is better after one yaw for all."""
+    """After the best constant yaw of the whole run [m]."""
     rmse_shape: float
     """After the best rotation at each instant, over the scored time [m]."""
 
@@ -104,11 +107,16 @@ def posterior_bound(
 
     n = constellation.n_nodes
     cov = np.zeros((len(t_out), n * d, n * d))
-    batch = make_state(constellation, params, 1, 1)
-    fields = (as_records(a[0]) if a.dtype.names else a[0] for a in batch)
-    coefficients = as_records(make_coefficients(constellation, params))
+    coefficients = make_coefficients(constellation, params)
+    state = _with_a_row_more(make_state(constellation, params, 1, 1), coefficients)
+    fields = (as_records(a[0]) if a.dtype.names else a[0] for a in state)
+    coefficients = as_records(coefficients)
+    pos, known = log.truth.positions(constellation, t_out)
+    pos = np.nan_to_num(pos[..., :d])
+    wanted = _wanted(constellation, known)
+    yaw, weight = _yaw_generators(constellation, pos, wanted)
     events = (block.t, block.kind, block.i, block.j, block.antenna_i, block.antenna_j, block.values)
-    run_bound(
+    variance = run_bound(
         coefficients,
         make_layout(constellation, params),
         JointState._make(fields),
@@ -118,10 +126,11 @@ def posterior_bound(
         truth,
         turn_std**2,
         t_out,
+        yaw,
         cov,
     )
-    pos, known = log.truth.positions(constellation, t_out)
-    return _summarise(constellation, t_out, cov, pos[..., :d], known)
+    taken = variance / weight if weight > 0.0 else 0.0
+    return _summarise(constellation, t_out, cov, pos, wanted, taken)
 
 
 def recorded_bound(
@@ -131,7 +140,7 @@ def recorded_bound(
     orientation: OrientationParams | None = None,
     skip: float = 10.0,
 ) -> Bound:
-    """The bound of a recording of which nothing is known but its truth.
+    """The expected error of an efficient estimator on a recording, if the assumed noise is true.
 
     The noise of its ranges in sight is measured (`measure_range_errors`), and nothing is known of
     the rotation of the group at first. What carries the nodes is as the parameters say.
@@ -171,32 +180,88 @@ def _truth_at_events(log: Log, block: MeasurementBlock) -> tuple[F64, F64, F64]:
     return np.nan_to_num(pos), np.nan_to_num((ahead - behind) / (2.0 * h)), heading
 
 
-def _summarise(constellation: Constellation, t: F64, cov: F64, pos: F64, known: Bool) -> Bound:
-    """From covariances of positions (time, node * d, node * d) to errors of pairs."""
-    n, d = constellation.n_nodes, constellation.dimensions
+def _with_a_row_more(state: JointState, coefficients: Records) -> JointState:
+    """A state with room for one number behind its own; its coefficients, (1), know."""
+    n = state.x.shape[2]
+    width = whole_lines(n + 1)
+    coefficients["n"] = width
+    P = aligned(1, 1, width, width)  # noqa: N806
+    P[..., :n, :n] = state.P
+    return state._replace(
+        x=aligned(1, 1, width),
+        P=P,
+        waiting=aligned(1, 1, room_to_wait(width), width),
+        moved=aligned(1, 1, width),
+        slope=np.zeros((1, 1, 0, width)),
+    )
+
+
+def _wanted(constellation: Constellation, known: Bool) -> Bool:
+    """Pairs that count: both positions known, (time, node), and one node moves; (time, pair)."""
     i, j = constellation.pairs.T
     moving = ~constellation.is_static[constellation.pairs].all(axis=1)
+    return np.asarray(known[:, i] & known[:, j] & moving)
+
+
+def _yaw_generators(constellation: Constellation, pos: F64, wanted: Bool) -> tuple[F64, float]:
+    """How a yaw of all relative positions adds up over the pairs that count.
+
+    Args:
+        constellation: The nodes.
+        pos: True positions, (time, node, d) [m].
+        wanted: Pairs that count, (time, pair).
+
+    Returns:
+        Coefficients of the position errors in ``sum over pairs (z x x_ij) . e_ij``, (time,
+        node * d) [m], and the sum of ``|z x x_ij|^2`` over pairs and times [m2].
+    """
+    i, j = constellation.pairs.T
+    relative = pos[:, j] - pos[:, i]
+    turned = np.zeros_like(relative)
+    turned[..., 0], turned[..., 1] = -relative[..., 1], relative[..., 0]
+    turned *= wanted[..., None]
+    yaw = np.zeros_like(pos)
+    for p in range(constellation.n_pairs):
+        yaw[:, j[p]] += turned[:, p]
+        yaw[:, i[p]] -= turned[:, p]
+    return yaw.reshape(len(pos), -1), float(np.sum(turned**2))
+
+
+def _summarise(
+    constellation: Constellation, t: F64, cov: F64, pos: F64, wanted: Bool, taken: float
+) -> Bound:
+    """From covariances of positions to errors of pairs.
+
+    Args:
+        constellation: The nodes.
+        t: (time) [s]
+        cov: (time, node * d, node * d) [m2]
+        pos: True positions, (time, node, d) [m].
+        wanted: Pairs that count, (time, pair).
+        taken: Part of the sum of squared errors that the best constant yaw takes out [m2].
+    """
+    n, d = constellation.n_nodes, constellation.dimensions
+    i, j = constellation.pairs.T
     difference = np.zeros((constellation.n_pairs * d, n * d))
     for p in range(constellation.n_pairs):
         for k in range(d):
             difference[p * d + k, j[p] * d + k], difference[p * d + k, i[p] * d + k] = 1.0, -1.0
-    wanted = known[:, i] & known[:, j] & moving
     pair_cov = difference @ cov @ difference.T
     variance = np.diagonal(pair_cov, axis1=1, axis2=2).reshape(len(t), -1, d).sum(axis=2)
-    shape, yaw = np.zeros(len(t)), np.zeros(len(t))
+    shape = np.zeros(len(t))
     for k in range(len(t)):
         used = np.repeat(wanted[k], d)
         generators = _rotations((pos[k, j] - pos[k, i]).reshape(-1, d), d)[used]
         left, pairs = pair_cov[k][np.ix_(used, used)], max(int(wanted[k].sum()), 1)
         shape[k] = _beside(left, generators) / pairs
-        yaw[k] = _beside(left, generators[:, -1:]) / pairs
-    counted = wanted.any(axis=1)
+    counted, total = wanted.any(axis=1), max(int(wanted.sum()), 1)
+    after_yaw = max(float(variance[wanted].sum()) - taken, 0.0) / total
     return Bound(
         t=t,
         pair_rms=np.sqrt(variance),
         shape_rms=np.sqrt(np.maximum(shape, 0.0)),
         rmse=float(np.sqrt(variance[wanted].mean())),
-        rmse_yaw=float(np.sqrt(np.maximum(yaw[counted], 0.0).mean())),
+        rmse_yaw=float(np.sqrt(after_yaw)),
         rmse_shape=float(np.sqrt(np.maximum(shape[counted], 0.0).mean())),
     )
 

@@ -35,7 +35,7 @@ from agents.errors import UsageError
 @click.option(
     "--bound",
     is_flag=True,
-    help="The least errors that the measurements allow, beside; needs truth.",
+    help="Also show the expected errors of an efficient estimator; needs truth.",
 )
 @click.option("--skip", default=10.0, show_default=True, help="Seconds that are not scored.")
 @click.option("--out", type=Path, help="Folder for estimates.csv and report.html.")
@@ -54,10 +54,10 @@ def track(
     from agents.calibrate import apply_calibrations
     from agents.output import check_folder, write_results
     from agents.report.track_report import track_report
-    from agents.track import estimates_csv, track_log
+    from agents.track import TrackResult, estimates_csv, track_log
     from tracking.bounds import recorded_bound
     from tracking.filters import DEFAULT_FILTER, filter_builder
-    from tracking.log import notes_on, read_log
+    from tracking.log import read_log
 
     if not 0.0 <= skip < float("inf"):
         raise UsageError(f"--skip: expected 0 or more seconds, got {skip:g}")
@@ -69,19 +69,19 @@ def track(
     if out is not None:
         check_folder(out, ["report.html"])
     read = [apply_calibrations(read_log(path), calibrations) for path in logs]
-    for line in [f"{log.name}: {note}" for log in read for note in notes_on(log)]:
-        click.echo(line, err=True)
-    results = []
+    results: list[TrackResult] = []
     for log in read:
-        least = recorded_bound(log, skip=skip) if bound else None
+        expected = recorded_bound(log, skip=skip) if bound else None
         for name in names:
             label = f"{log.name}, {name}"
             with progress_bar(label, shown=log.duration > 20.0) as report:
                 results.append(
                     track_log(
-                        log, filter=name, skip=skip, smooth=smooth, bound=least, progress=report
+                        log, filter=name, skip=skip, smooth=smooth, bound=expected, progress=report
                     )
                 )
+    for line in dict.fromkeys(f"{r.log.name}: {note}" for r in results for note in r.notes):
+        click.echo(line, err=True)
     if out is not None:
         many = len(results) > 1
         files = {"report.html": track_report(results)}
@@ -107,8 +107,8 @@ def print_tracks(results: Sequence[Any]) -> None:
         s = r.summary
         head = [f"{s['log']}  {s['filter']}", "all"]
         rows.append([*head, *(metres(s[k]) for k in ERRORS)])
-        if r.least:
-            rows.append(["", "least possible", *(metres(r.least[k]) for k in ERRORS)])
+        if r.expected:
+            rows.append(["", "efficient", *(metres(r.expected.get(k)) for k in ERRORS)])
         pairs = [p for p, e in enumerate(r.score.pair_rmse) if e == e]
         for p in pairs:
             figures = (r.score.pair_rmse, r.score.pair_rmse_yaw, r.score.pair_rmse_shape)
@@ -121,7 +121,8 @@ def print_tracks(results: Sequence[Any]) -> None:
         click.echo(
             f"{r.log.name}, {r.filter}: {r.log.n_ranges} ranges in {r.log.duration:.0f} s, "
             f"{r.n_rejected} refused as outliers, bad rows skipped: {skipped}, "
-            f"status ok {percent(r.score.ok_share)} of the scored time, "
+            f"status ok {percent(r.score.ok_share)} of the scored time, ok and wrong "
+            f"{percent(r.score.integrity_share, 2)} of the run{_longest(r.score)}, "
             f"{r.realtime_factor:.0f} times faster than real time"
         )
         if r.score.rmse is None:
@@ -131,6 +132,11 @@ def print_tracks(results: Sequence[Any]) -> None:
                 else (f"no estimated pair has truth from {r.skip:g} s after the first range")
             )
             click.echo(f"{r.log.name}, {r.filter}: no errors, since {reason}")
+
+
+def _longest(score: Any) -> str:
+    worst = score.integrity_worst_s
+    return f" (at most {worst:.1f} s in one go)" if worst else ""
 
 
 def _file_name(name: str) -> str:

@@ -15,7 +15,7 @@ from agents.evaluate.suites import SUITES, Case, Suite
 from agents.evaluate.targets import Outcome, outcomes
 from tracking.filters import FILTERS
 
-MEDIANS = ("rmse", "rmse_yaw", "rmse_shape", "bound", "bound_shape")
+MEDIANS = ("rmse", "rmse_yaw", "rmse_shape", "bound", "bound_yaw", "bound_shape")
 """Lengths that are medians over the seeds [m]."""
 SHORTEST, LONGEST = 15.0, 1800.0
 """[s] The first ten seconds are not scored; a person is simulated for half an hour at most."""

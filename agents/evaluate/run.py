@@ -42,9 +42,11 @@ class RunResult:
     rmse_shape: float | None
     """[m]"""
     bound: float | None
-    """[m] Least possible `rmse`."""
+    """[m] `rmse` that is expected of an efficient estimator (`tracking.bounds`)."""
+    bound_yaw: float | None
+    """[m] The same of `rmse_yaw`."""
     bound_shape: float | None
-    """[m] Least possible `rmse_shape`."""
+    """[m] The same of `rmse_shape`."""
     nees: float | None
     """[-]"""
     nis: float | None
@@ -79,8 +81,8 @@ class RunResult:
 
     @property
     def ratio_bound(self) -> float | None:
-        """`rmse_yaw` over the bound [-]."""
-        return _ratio(self.rmse_yaw, self.bound)
+        """`rmse_yaw` over its bound [-]."""
+        return _ratio(self.rmse_yaw, self.bound_yaw)
 
     @property
     def ratio_shape(self) -> float | None:
@@ -137,6 +139,7 @@ def run(case: Case, log: Log, filter: str, seed: int, bound: Bound | None) -> Ru
         rmse_yaw=_number(s.rmse_yaw),
         rmse_shape=_number(s.rmse_shape),
         bound=None if bound is None else _number(bound.rmse),
+        bound_yaw=None if bound is None else _number(bound.rmse_yaw),
         bound_shape=None if bound is None else _number(bound.rmse_shape),
         nees=_number(s.nees),
         nis=_number(float(tracker.mean_nis()[0])),

@@ -12,7 +12,7 @@ from typing import Any
 
 NEAR = 1.10
 """[-] So near to the bound is good enough where the bound is the limit."""
-BOUNDS = {"rmse_yaw": "bound", "rmse_shape": "bound_shape"}
+BOUNDS = {"rmse_yaw": "bound_yaw", "rmse_shape": "bound_shape"}
 """Figure to the bound on it."""
 
 

@@ -38,7 +38,7 @@ def figures(result: EvaluateResult) -> dict[str, tuple[str, Figure, str]]:
             "Error over seeds",
             _over_seeds(result),
             "rmse_yaw of every run with the median as a bar; lost runs as crosses. Dashed: the "
-            "least error that is possible, median over the seeds.",
+            "expected error of an efficient estimator, median over the seeds.",
         ),
         "evaluate-nees.png": (
             "Consistency: position errors",
@@ -59,7 +59,7 @@ def figures(result: EvaluateResult) -> dict[str, tuple[str, Figure, str]]:
             "Cost and error over the size of the group",
             _scaling(result),
             "Left: time of the tracker for a ranging round. Right: errors, medians over the "
-            "seeds; dashed: the least rmse that is possible.",
+            "seeds; dashed: the rmse expected of an efficient estimator.",
         )
     return drawn
 

@@ -15,7 +15,7 @@ from tracking.integrity import LIMIT, SIGMAS
 TARGETS = ["case", "filter", "figure", "reached", "asked", "target", ""]
 """Names of the columns of targets."""
 _FIGURES = [
-    "rmse", "rmse_yaw", "rmse_shape", "bound", "yaw/b", "shape/b",
+    "rmse", "rmse_yaw", "rmse_shape", "bound_yaw", "yaw/b", "shape/b",
     "gospa", "lost", "ok", "wrong", "worst s", "nees", "nis", "us",
 ]  # fmt: skip
 
@@ -35,7 +35,7 @@ def rows(result: EvaluateResult) -> list[list[str]]:
     cells = []
     before = ""
     for r in result.records:
-        lengths = [metres(r[k]) for k in ("rmse", "rmse_yaw", "rmse_shape", "bound")]
+        lengths = [metres(r[k]) for k in ("rmse", "rmse_yaw", "rmse_shape", "bound_yaw")]
         ratios = [_number(r[k]) for k in ("ratio_bound", "ratio_shape")]
         shares = [percent(r[k], 2) for k in ("ok_share", "integrity_share")]
         numbers = [_number(r[k]) for k in ("integrity_worst_s", "nees", "nis")]

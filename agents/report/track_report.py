@@ -10,7 +10,7 @@ import numpy as np
 from agents.report.page import Page, metres, percent
 from agents.track import ERRORS, TrackResult, pair_name
 from tracking.estimate import Status
-from tracking.log import notes_on
+from tracking.integrity import LIMIT, SIGMAS
 from tracking.measurements import Kind
 from tracking.metrics import errors_after
 
@@ -27,20 +27,28 @@ def track_report(results: Sequence[TrackResult]) -> str:
     page.heading("Errors")
     page.text(
         "Root-mean-square errors of the relative positions in metres: as they are (rmse), after "
-        "one constant yaw (rmse_yaw), and after the best rotation at each instant (rmse_shape). "
-        "NEES and NIS are 1 where the filter knows how wrong it is."
+        "one constant yaw (rmse_yaw), after the best rotation at each instant (rmse_shape), and "
+        "after the best rotation and reflection (rmse_mirror). ok: share of the scored time; wrong: "
+        f"share of the whole run in which a pair was ok and off by more than {LIMIT:g} m and "
+        f"{SIGMAS:g} of its own standard deviations. NEES and NIS are 1 where the covariance is "
+        "right. efficient: expected errors of an efficient estimator, if the assumed noise is true."
     )
-    header = ["log", "filter", "rmse", "rmse_yaw", "yaw deg", "rmse_shape", "nees", "nis"]
+    header = [
+        "log", "filter", "rmse", "rmse_yaw", "yaw deg", "rmse_shape", "rmse_mirror", "ok",
+        "wrong", "nees", "nis",
+    ]  # fmt: skip
     rows = []
     for r in results:
         s = r.summary
         figures = [metres(s[k]) for k in ("rmse", "rmse_yaw")]
-        others = [metres(s[k]) for k in ("rmse_shape", "nees", "nis")]
+        others = [metres(s[k]) for k in ("rmse_shape", "rmse_mirror")]
+        others += [percent(s["ok_share"]), percent(s["integrity_share"], 2)]
+        others += [metres(s[k]) for k in ("nees", "nis")]
         yaw = "-" if s["yaw_deg"] is None else f"{s['yaw_deg']:.1f}"
         rows.append([s["log"], s["filter"], *figures, yaw, *others])
-        if r.least:
-            world, turned, shape = (metres(r.least[name]) for name in ERRORS)
-            rows.append(["", "least possible", world, turned, "", shape, "", ""])
+        if r.expected:
+            world, turned, shape, _ = (metres(r.expected.get(name)) for name in ERRORS)
+            rows.append(["", "efficient", world, turned, "", shape, *[""] * 5])
     page.table(header, rows)
     for r in results:
         _add_result(page, r)
@@ -57,7 +65,7 @@ def _add_result(page: Page, r: TrackResult) -> None:
         f"was an estimate for {percent(r.score.coverage)}, with status ok for "
         f"{percent(r.score.ok_share)}."
     )
-    for note in notes_on(log):
+    for note in r.notes:
         page.text(f"Note: {note}.")
     constellation = log.constellation
     rows = []

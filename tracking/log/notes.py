@@ -4,16 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 
+from tracking.estimate import Status, TeamEstimate
+from tracking.filters._shape_kernels import FEWEST
 from tracking.log.folder import Log
 from tracking.measurements import Kind
 
 
 def notes_on(log: Log) -> list[str]:
     """A line for each thing that is amiss with sensors, none if all is well."""
-    block, constellation, notes = log.block, log.constellation, []
+    block, constellation, notes = log.block, log.constellation, list[str]()
     kind, node = block.kind[0], block.i[0]
     ids = np.array(constellation.ids)
     with_imu = np.unique(node[kind == Kind.IMU])
+    if not np.isin(kind, (Kind.IMU, Kind.STATE)).any():
+        notes.append(
+            "no IMU samples and no orientations: ranges alone tell neither the rotation nor the "
+            "mirror image of the group, so pairs stay ambiguous; rmse_mirror is what can be judged"
+        )
     if constellation.heading == "initial":
         unknown = [n for n in with_imu if constellation.nodes[n].initial_heading is None]
         if unknown:
@@ -25,6 +32,40 @@ def notes_on(log: Log) -> list[str]:
         deaf = np.setdiff1d(with_imu, np.unique(node[kind == Kind.MAG]))
         if len(deaf):
             notes.append(f"{_names(ids[deaf])}: no magnetometer readings, so the IMU is not used")
+    return notes
+
+
+def notes_on_estimate(log: Log, estimate: TeamEstimate) -> list[str]:
+    """A line for each node that was never placed, and what it lacks.
+
+    Args:
+        log: The recording.
+        estimate: Its estimates, arrays over (time, pair).
+    """
+    constellation, block = log.constellation, log.block
+    placed = estimate.status >= Status.AMBIGUOUS
+    i, j = constellation.pairs.T
+    ever = placed.any(axis=0)
+    is_range = np.isin(block.kind[0], (Kind.RANGE, Kind.SURVEY)) & block.valid[0]
+    a, b = block.i[0, is_range], block.j[0, is_range]
+    found = [n for n in range(constellation.n_nodes) if ever[(i == n) | (j == n)].any()]
+    needed = min(constellation.dimensions + 1, len(found))
+    notes = []
+    for n in range(constellation.n_nodes):
+        if n in found:
+            continue
+        partners = np.concatenate([b[a == n], a[b == n]])
+        others, counts = np.unique(partners, return_counts=True)
+        enough = int((counts >= FEWEST).sum())
+        lacks = (
+            f"a node joins by {FEWEST} ranges or more with each of {needed} placed nodes"
+            if found
+            else f"a group starts by {FEWEST} ranges or more of every pair of three nodes"
+        )
+        notes.append(
+            f"node {constellation.ids[n]} was never placed: {len(partners)} ranges with "
+            f"{len(others)} nodes, {FEWEST} or more with {enough}; {lacks}"
+        )
     return notes
 
 

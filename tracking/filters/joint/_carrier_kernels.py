@@ -30,6 +30,13 @@ def apply_carriers(c, s, h, t, dt, scratch):
         dt: Time since the last use [s].
         scratch: Room.
     """
+    hold_nodes(c, s, h, t, scratch)
+    hold_speed(c, s, h, dt, scratch)
+
+
+@small_kernel
+def hold_nodes(c, s, h, t, scratch):
+    """Nodes that rest do not move, and the axles of cars do not slide."""
     for i in range(s.nodes.shape[0]):
         node = s.nodes[i]
         if not node.present or node.static or t - node.t_state > c.unaided_after:
@@ -42,7 +49,6 @@ def apply_carriers(c, s, h, t, dt, scratch):
                 judge(c, s, h, -s.x[h, node.at_v + k], 1, c.rest_var, scratch)
         elif node.sideways_var > 0.0:
             hold_on_wheels(c, s, h, i, scratch)
-    hold_speed(c, s, h, dt, scratch)
 
 
 @small_kernel

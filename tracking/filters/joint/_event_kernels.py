@@ -164,7 +164,7 @@ def hear(c, s, layout, scratch, i, j, a_i, a_j, t, distance, sight, is_survey):
 @small_kernel
 def note_heard(node, t):
     """Note that a node takes part in a range, and how often it does."""
-    if node.heard:
+    if node.heard and t - node.t_heard > SAME:
         node.interval += RECENT * (min(t - node.t_heard, SLOWEST) - node.interval)
     node.heard, node.t_heard = True, t
 
@@ -240,9 +240,13 @@ def take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, sight, is_survey
     i0, i1, i2 = antenna_offset(s.held, layout, pair.i, a_i)
     j0, j1, j2 = antenna_offset(s.held, layout, pair.j, a_j)
     levers = (i0, i1, i2, j0, j1, j2)
-    if is_survey:
-        collect(c, pair, t, distance, True)  # for when one of them comes again
     dt = max(t - pair.t_range, 0.0)
+    if is_survey:
+        is_news = distance != pair.surveyed
+        collect(c, pair, t, distance, True)  # for when one of them comes again
+        if not is_news:
+            pair.t_range, pair.t_used = t, t
+            return
     first, end = bank_range(s)
     for h in range(first, end):
         if not s.alive[h]:
@@ -268,7 +272,8 @@ def take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, sight, is_survey
                 pair.n_rejected += 1
     if is_survey:
         pair.t_used = t
-    pair.interval += RECENT * (min(dt, SLOWEST) - pair.interval)
+    if dt > SAME:
+        pair.interval += RECENT * (min(dt, SLOWEST) - pair.interval)
     pair.t_range = t
     pair.n_ranges += 1
 

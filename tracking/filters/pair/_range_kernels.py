@@ -192,7 +192,8 @@ def fuse_range(c, s, layout, p, t, distance, evidence, antenna_i, antenna_j, wor
             nu = abs(pair.rate) - speed_model(s.x, p, h, work)
             correct(s.x, s.P, p, h, work, nu, c.speed_var)
     pair.last_distance = distance
-    pair.interval += 0.1 * (min(dt, c.leave_after) - pair.interval)
+    if dt > TIE:
+        pair.interval += 0.1 * (min(dt, c.leave_after) - pair.interval)
     pair.t_range = t
     pair.n_ranges += 1
 
