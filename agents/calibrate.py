@@ -27,11 +27,14 @@ from tracking.calibration import (
 from tracking.geometry import GRAVITY
 from tracking.log import Log
 from tracking.measurements import Kind
+from tracking.short_repr import short_repr
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CalibrateResult:
     """One kind of sensor of one log."""
+
+    __repr__ = short_repr
 
     log: Log
     calibration: Calibration

@@ -21,6 +21,7 @@ from relpos_env.parallel_env import FormationEnv
 from relpos_env.registry import look_up
 from relpos_env.timing import DECISION
 from tracking.filters import FILTERS
+from tracking.short_repr import short_repr
 
 TOLD = ("estimate", "truth", "nothing")
 """What the cars are told in the drives of a demonstration."""
@@ -33,6 +34,8 @@ SETTLE = 10.0
 @dataclass(frozen=True, slots=True)
 class DemoResult:
     """One demonstration."""
+
+    __repr__ = short_repr
 
     scenario: str
     task: str

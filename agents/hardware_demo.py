@@ -32,6 +32,7 @@ from agents.errors import UsageError
 from relpos_env.timing import DECISION
 from tracking.arrays import F64
 from tracking.log import Log, read_log
+from tracking.short_repr import short_repr
 
 LONGEST_START = 120.0
 """[s] From the first byte to cars that drive."""
@@ -40,6 +41,8 @@ LONGEST_START = 120.0
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HardwareDemoResult:
     """One emulated drive and its twin in the simulator."""
+
+    __repr__ = short_repr
 
     seed: int
     drive: DriveResult

@@ -21,6 +21,7 @@ from tracking.horizon import HorizonParams
 from tracking.log import Log, notes_on, notes_on_estimate, read_log
 from tracking.measurements import MeasurementBlock
 from tracking.metrics import Score, score
+from tracking.short_repr import short_repr
 from tracking.tracker import Tracker, TrackerParams
 
 CSV_HZ = 20.0
@@ -36,6 +37,8 @@ N_CHUNKS = 50
 @dataclass(frozen=True, slots=True)
 class TrackResult:
     """One log tracked by one filter."""
+
+    __repr__ = short_repr
 
     log: Log
     filter: str

@@ -18,6 +18,7 @@ from relpos_env.solver import Solver, connect, disconnect
 from relpos_env.timing import SOON
 from relpos_env.vehicle import CarParams
 from tracking.arrays import F64, Bool
+from tracking.short_repr import short_repr
 
 WAIT = 0.5
 """[s] A car that cannot come in, because another stands there, tries again after so long."""
@@ -26,6 +27,8 @@ WAIT = 0.5
 @dataclass(slots=True)
 class Group:
     """One environment; the whole of a batch and its parts have the same object."""
+
+    __repr__ = short_repr
 
     life: tuple[LifeEvent, ...] = ()
     """What is still to happen, by rising time."""

@@ -7,11 +7,14 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from tracking.arrays import F64, Bool
+from tracking.short_repr import short_repr
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorldState:
     """Arrays over (env, car, ...), or over (car, ...) for one environment."""
+
+    __repr__ = short_repr
 
     t: F64
     """Time since the environment began, (env) [s]."""

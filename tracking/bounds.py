@@ -38,6 +38,7 @@ from tracking.geometry import quat_conjugate, quat_multiply, yaw_of
 from tracking.log import Log
 from tracking.measurements import Kind, MeasurementBlock
 from tracking.orientation import Orientation, OrientationParams
+from tracking.short_repr import short_repr
 
 RATE = 5.0
 """[Hz] How often the bound is written down."""
@@ -49,6 +50,8 @@ error by it is as large as that of the best guess, all nodes in one place."""
 @dataclass(frozen=True, slots=True)
 class Bound:
     """Expected root mean square errors of the relative positions of a run."""
+
+    __repr__ = short_repr
 
     t: F64
     """(time) [s]"""

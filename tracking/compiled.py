@@ -98,7 +98,7 @@ def _compile(function: Function, *, inline: bool = False, nrt: bool = False) -> 
     return compiled  # type: ignore[no-any-return]
 
 
-class _CacheFile(IndexDataCacheFile):
+class _CacheFile(IndexDataCacheFile):  # type: ignore[misc]
     """The cache of one kernel; each entry says what it was compiled from, and for which types.
 
     Entries are numbered files. Where several processes compile at a time, one can find under a

@@ -12,6 +12,7 @@ from tracking.arrays import F64, I64, Bool
 from tracking.constellation import Constellation
 from tracking.errors import ConfigError
 from tracking.geometry import quat_conjugate, quat_multiply, quat_to_matrix
+from tracking.short_repr import short_repr
 
 
 class Status(IntEnum):
@@ -38,6 +39,8 @@ class TeamEstimate:
     The leading axes are (env,) for one instant and (env, time) for a run. Pairs are those of
     `Constellation.pairs`; `between` gives either order.
     """
+
+    __repr__ = short_repr
 
     constellation: Constellation
     t: F64

@@ -4,10 +4,14 @@ A quaternion is (w, x, y, z), of unit length, and maps the body frame to the wor
 ``v_w = R(q) v_b``. Functions work on any leading axes.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from tracking.arrays import F64
 
+FLAT = 1e-9
+"""[-] Smallest singular value, over the largest, of vectors that span a space."""
 GRAVITY = 9.81
 """[m/s2] Length of gravity assumed where it is not measured; VQF's convention as well."""
 
@@ -25,6 +29,27 @@ def quat_multiply(a: F64, b: F64) -> F64:
         ],
         axis=-1,
     )
+
+
+def quat_left(q: F64) -> F64:
+    """Matrix of the product ``q r`` as a function of r, (4, 4)."""
+    w, x, y, z = q
+    return np.array([[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]])
+
+
+def quat_right(r: F64) -> F64:
+    """Matrix of the product ``q r`` as a function of q, (4, 4)."""
+    w, x, y, z = r
+    return np.array([[w, -x, -y, -z], [x, w, z, -y], [y, -z, w, x], [z, y, -x, w]])
+
+
+def quat_mean(q: Sequence[F64]) -> F64:
+    """Mean of orientations that are near each other, (4); the identity of none."""
+    if len(q) == 0:
+        return np.array([1.0, 0.0, 0.0, 0.0])
+    total = np.sum([r if r @ q[0] >= 0.0 else -r for r in q], axis=0)
+    mean: F64 = total / np.linalg.norm(total)
+    return mean
 
 
 def quat_conjugate(q: F64) -> F64:
@@ -71,7 +96,8 @@ def best_rotation(source: F64, target: F64, *, planar: bool, reflect: bool = Fal
         source: Vectors, (..., vector, 3).
         target: Vectors, (..., vector, 3).
         planar: Rotate about the vertical only.
-        reflect: Also allow mirror images.
+        reflect: Also allow mirror images, where the vectors are no line (plane, in space), which
+            is its own image.
 
     Returns:
         (..., 3, 3), R such that ``R @ source[k]`` is near ``target[k]``.
@@ -81,10 +107,10 @@ def best_rotation(source: F64, target: F64, *, planar: bool, reflect: bool = Fal
     """
     d = 2 if planar else 3
     H = np.swapaxes(target[..., :d], -1, -2) @ source[..., :d]  # noqa: N806
-    U, _, Vt = np.linalg.svd(H)  # noqa: N806
-    if not reflect:
-        U = U.copy()  # noqa: N806
-        U[..., :, -1] *= np.sign(np.linalg.det(U @ Vt))[..., None]
+    U, size, Vt = np.linalg.svd(H)  # noqa: N806
+    proper = size[..., -1] <= FLAT * size[..., 0] if reflect else np.ones(size.shape[:-1], bool)
+    U = U.copy()  # noqa: N806
+    U[..., :, -1] *= np.where(proper, np.sign(np.linalg.det(U @ Vt)), 1.0)[..., None]
     R = np.zeros((*H.shape[:-2], 3, 3))  # noqa: N806
     R[..., :d, :d] = U @ Vt
     if planar:

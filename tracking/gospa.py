@@ -23,11 +23,14 @@ import numpy as np
 from tracking.arrays import F64, I64, Bool
 from tracking.errors import ConfigError
 from tracking.estimate import Status, TeamEstimate
+from tracking.short_repr import short_repr
 
 
 @dataclass(frozen=True, slots=True)
 class Gospa:
     """The metric over a run and what it is made of."""
+
+    __repr__ = short_repr
 
     total: F64
     """(time) [m]"""

@@ -15,6 +15,7 @@ import numpy as np
 
 from tracking.arrays import F64, I64, Bool
 from tracking.errors import ConfigError
+from tracking.short_repr import short_repr
 
 N_VALUES = 16
 """Columns of `MeasurementBlock.values`."""
@@ -58,6 +59,8 @@ class MeasurementBlock:
     Laws: any split of the same events into blocks gives the same estimate; environment k of
     a block gives what that environment alone gives, bit for bit.
     """
+
+    __repr__ = short_repr
 
     t: F64
     """Time, (env, event) [s]."""

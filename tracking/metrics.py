@@ -30,11 +30,14 @@ from tracking.consistency import pair_nees
 from tracking.estimate import Status, TeamEstimate
 from tracking.geometry import best_rotation
 from tracking.integrity import longest, wrong_while_ok
+from tracking.short_repr import short_repr
 
 
 @dataclass(frozen=True, slots=True)
 class Score:
     """Errors of one run; figures are None where nothing could be scored."""
+
+    __repr__ = short_repr
 
     rmse: float | None
     """[m]"""
@@ -91,9 +94,7 @@ def score(estimate: TeamEstimate, truth_ij_w: F64, has_truth: Bool, skip_until: 
     n_pairs = constellation.n_pairs
     if not scored.any():
         nothing = np.full(n_pairs, np.nan)
-        return Score(
-            *(None,) * 6, nothing, nothing, nothing, 0, coverage, ok_share, None, None
-        )
+        return Score(*(None,) * 6, nothing, nothing, nothing, 0, coverage, ok_share, None, None)
     x = np.where(scored[..., None], x, 0.0)
     truth = np.where(scored[..., None], truth, 0.0)
     if planar:

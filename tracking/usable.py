@@ -21,11 +21,11 @@ UNIT = 1e-3, 0.1
 
 
 def usable(block: MeasurementBlock) -> MeasurementBlock:
-    """The block without measurements that cannot be: what is not finite, ranges of a node with
-    itself, of 0 m or less, or of more than `FARTHEST`, and orientations that are no rotation.
+    """The block without measurements that cannot be.
 
-    A range whose powers are not finite is one without powers. Quaternions that are nearly unit
-    ones are normalised.
+    These are what is not finite, ranges of a node with itself, of 0 m or less, or of more than
+    `FARTHEST`, and orientations that are no rotation. A range whose powers are not finite is one
+    without powers. Quaternions that are nearly unit ones are normalised.
     """
     between = block.valid & np.isin(block.kind, (Kind.RANGE, Kind.SURVEY))
     has_power = block.has_power & np.isfinite(block.values[..., 1:3]).all(axis=-1)
@@ -33,7 +33,9 @@ def usable(block: MeasurementBlock) -> MeasurementBlock:
     finite = np.isfinite(block.values).all(axis=-1)
     good = np.where(between, is_distance & (block.i != block.j), finite)
     states = block.valid & (block.kind == Kind.STATE)
-    off = np.abs(np.linalg.norm(np.where(states[..., None], block.values[..., :4], 0.5), axis=-1) - 1.0)
+    off = np.abs(
+        np.linalg.norm(np.where(states[..., None], block.values[..., :4], 0.5), axis=-1) - 1.0
+    )
     good &= ~(off > UNIT[1])
     valid = block.valid & good & np.isfinite(block.t)
     odd = states & valid & (off > UNIT[0])
@@ -47,7 +49,9 @@ def usable(block: MeasurementBlock) -> MeasurementBlock:
     return replace(block, values=values, has_power=has_power, valid=valid)
 
 
-def check(block: MeasurementBlock, t_out: F64, n_envs: int, group: Constellation, since: F64) -> None:
+def check(
+    block: MeasurementBlock, t_out: F64, n_envs: int, group: Constellation, since: F64
+) -> None:
     """See that kernels, which look at nothing of this, can take a block.
 
     Args:

@@ -20,7 +20,10 @@ if TYPE_CHECKING:
 @click.argument("recording", type=Path)
 @click.option("--speed", type=float, help="Times as fast as it happened; 1 is real time.")
 @click.option("--fast", is_flag=True, help="As fast as possible, which is the default.")
-@click.option("--filter", help="joint, ekf-mds, ekf, paper-ekf-mds or paper-ekf; by default the one of the recording.")
+@click.option(
+    "--filter",
+    help="joint, ekf-mds, ekf, paper-ekf-mds or paper-ekf; by default the one of the recording.",
+)
 @click.option(
     "--export",
     "exports",

@@ -12,6 +12,7 @@ from relpos_env.timing import DECISION
 from relpos_env.vehicle import CarParams
 from tracking.arrays import F64, Bool
 from tracking.geometry import GRAVITY
+from tracking.short_repr import short_repr
 
 IN_FORMATION = 0.3
 """[m] A group is in formation while the error of every car is below this. Tighter than the 0.4 m
@@ -22,6 +23,8 @@ estimates and tyres leave as a mean, so that it says how often something goes wr
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EpisodeResult:
     """One episode; lengths and times as of `Setting`, NaN where there was nothing to score."""
+
+    __repr__ = short_repr
 
     seed: int
     """On real cars the number of the round."""

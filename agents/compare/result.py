@@ -13,6 +13,7 @@ from agents.compare.meter import EpisodeResult
 from agents.compare.setting import Setting
 from agents.compare.statistics import Interval, mean, ratio
 from tracking.arrays import F64
+from tracking.short_repr import short_repr
 
 FIGURES = (
     "formation_error", "place_error", "tracking_error", "collisions_per_min", "contact_time",
@@ -24,6 +25,8 @@ FIGURES = (
 @dataclass(frozen=True, kw_only=True)
 class Row:
     """One driver on one mode of observations in one scenario, over all seeds."""
+
+    __repr__ = short_repr
 
     contender: Contender
     trained_on: str | None
@@ -65,6 +68,8 @@ class Row:
 @dataclass(frozen=True, kw_only=True)
 class CompareResult:
     """Drivers compared."""
+
+    __repr__ = short_repr
 
     rows: tuple[Row, ...]
     """By scenario, then driver, then observation."""

@@ -10,6 +10,7 @@ from agents.errors import UsageError
 from relpos_env.interface.observations import OBSERVATIONS, Field, observation_mode, total_size
 from relpos_env.interface.observations.base import F32
 from tracking.arrays import F64, Bool
+from tracking.short_repr import short_repr
 
 TINY = 1e-9
 """Divisions by what may be zero are by this at least."""
@@ -21,6 +22,8 @@ Plane = tuple[F64, F64]
 @dataclass(frozen=True, slots=True)
 class Certainty:
     """How sure positions are, each (..., other)."""
+
+    __repr__ = short_repr
 
     ahead: F64
     """Standard deviation forward [m]."""
@@ -37,6 +40,8 @@ class Sight:
     Where the observation has ranges in place of positions, `pos` is the range in the direction of
     the other's place: good where the formation is nearly right.
     """
+
+    __repr__ = short_repr
 
     ok: Bool
     """Whose position can be used, (..., other)."""

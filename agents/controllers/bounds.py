@@ -8,11 +8,14 @@ import numpy as np
 
 from agents.controllers.base import Plane
 from tracking.arrays import F64
+from tracking.short_repr import short_repr
 
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
     """Largest velocity towards each of several things, each (..., thing)."""
+
+    __repr__ = short_repr
 
     toward: Plane
     """Direction of the thing, of length 1."""

@@ -21,6 +21,7 @@ import numpy as np
 from agents.controllers.base import TINY, Plane, Sight
 from relpos_env.interface.beams import FARTHEST, beam_directions, beam_starts
 from tracking.arrays import F64
+from tracking.short_repr import short_repr
 
 HALF_LENGTH, HALF_WIDTH = 0.21, 0.10
 """[m] Of a car."""
@@ -39,6 +40,8 @@ NOTHING = 1e3
 @dataclass(frozen=True, slots=True)
 class Surroundings:
     """Points that are in the way, `NOTHING` away where there is none, each (..., beam)."""
+
+    __repr__ = short_repr
 
     ahead: F64
     """[m] From the middle of the car."""

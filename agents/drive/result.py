@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from tracking.arrays import F64, I64, Bool
+from tracking.short_repr import short_repr
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -16,6 +17,8 @@ class DriveResult:
 
     Of drives of more than ten minutes they have the last decisions only.
     """
+
+    __repr__ = short_repr
 
     driver: str
     """The controller or policy."""

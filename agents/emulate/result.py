@@ -13,6 +13,7 @@ from hardware_bridge.emulator.fault_plan import Fault
 from hardware_bridge.emulator.line import Line
 from tracking.arrays import F64
 from tracking.log import Log
+from tracking.short_repr import short_repr
 
 SETTLE = 10.0
 """[s] Errors are averaged from here on, as in `agents.demo`."""
@@ -21,6 +22,8 @@ SETTLE = 10.0
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EmulateResult:
     """One emulation."""
+
+    __repr__ = short_repr
 
     scenario: str
     task: str

@@ -14,6 +14,7 @@ from agents.evaluate.run import RunResult, run_seed
 from agents.evaluate.suites import SUITES, Case, Suite
 from agents.evaluate.targets import Outcome, outcomes
 from tracking.filters import FILTERS
+from tracking.short_repr import short_repr
 
 MEDIANS = ("rmse", "rmse_yaw", "rmse_shape", "bound", "bound_yaw", "bound_shape")
 """Lengths that are medians over the seeds [m]."""
@@ -24,6 +25,8 @@ SHORTEST, LONGEST = 15.0, 1800.0
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CaseResult:
     """One case and filter over all seeds: medians of errors, means of consistency."""
+
+    __repr__ = short_repr
 
     suite: str
     case: Case
@@ -89,6 +92,8 @@ class CaseResult:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EvaluateResult:
     """A suite evaluated."""
+
+    __repr__ = short_repr
 
     suite: Suite
     filters: tuple[str, ...]

@@ -10,6 +10,7 @@ from tracking.arrays import F64, I64, Bool
 from tracking.consistency import pair_nees
 from tracking.estimate import Status, TeamEstimate
 from tracking.metrics import errors_after
+from tracking.short_repr import short_repr
 
 BIN = 0.5
 """[s]"""
@@ -20,6 +21,8 @@ NIS_EDGES = np.linspace(0.0, 10.0, 41)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OverTime:
     """What a run looks like over time; NaN where nothing could be said."""
+
+    __repr__ = short_repr
 
     t: F64
     """Middle of each bin, (bin) [s]."""

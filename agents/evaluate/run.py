@@ -18,6 +18,7 @@ from tracking.gospa import labelled_gospa
 from tracking.log import Log
 from tracking.measurements import Kind
 from tracking.metrics import score
+from tracking.short_repr import short_repr
 from tracking.tracker import Tracker
 
 SKIP = 10.0
@@ -29,6 +30,8 @@ WARM_UP = 200
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunResult:
     """One case, seed and filter; figures are None where there was nothing to score."""
+
+    __repr__ = short_repr
 
     case: str
     scenario: str

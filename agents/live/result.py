@@ -7,11 +7,14 @@ from typing import Any
 
 from tracking.arrays import I64
 from tracking.estimate import TeamEstimate
+from tracking.short_repr import short_repr
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LiveResult:
     """One run."""
+
+    __repr__ = short_repr
 
     name: str
     """Of the swarm."""

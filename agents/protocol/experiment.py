@@ -13,11 +13,14 @@ from agents.protocol.rates import NODES, measure_rates
 from agents.protocol.recovery import MODES, measure_recovery
 from agents.protocol.timeline import Timeline, run_timeline
 from tracking.ranging.members import MAX_MEMBERS
+from tracking.short_repr import short_repr
 
 
 @dataclass(frozen=True, slots=True)
 class ProtocolResult:
     """What was measured."""
+
+    __repr__ = short_repr
 
     rates: list[dict[str, Any]]
     recovery: list[dict[str, Any]]

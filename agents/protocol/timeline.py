@@ -9,6 +9,7 @@ import numpy as np
 from agents.protocol.group import Group, radio_params
 from tracking.arrays import F64
 from tracking.ranging.wire import Type
+from tracking.short_repr import short_repr
 
 SCRIPT = (
     (1.0, "a responder joins", 5, True),
@@ -30,6 +31,8 @@ RUNS = 10
 @dataclass(frozen=True, slots=True)
 class Timeline:
     """Ranging frequency over time in one mode."""
+
+    __repr__ = short_repr
 
     mode: str
     t: F64

@@ -16,11 +16,14 @@ from tracking.calibration.calibration import Calibration
 from tracking.estimate import TeamEstimate
 from tracking.measurements import MeasurementBlock
 from tracking.metrics import Score
+from tracking.short_repr import short_repr
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scored:
     """A replay against the truth."""
+
+    __repr__ = short_repr
 
     score: Score
     offset: float
@@ -36,6 +39,8 @@ class Scored:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplayResult:
     """One replay."""
+
+    __repr__ = short_repr
 
     recording: Recording
     """Torn or damaged ones are used as far as they go."""

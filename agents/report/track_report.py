@@ -28,8 +28,8 @@ def track_report(results: Sequence[TrackResult]) -> str:
     page.text(
         "Root-mean-square errors of the relative positions in metres: as they are (rmse), after "
         "one constant yaw (rmse_yaw), after the best rotation at each instant (rmse_shape), and "
-        "after the best rotation and reflection (rmse_mirror). ok: share of the scored time; wrong: "
-        f"share of the whole run in which a pair was ok and off by more than {LIMIT:g} m and "
+        "after the best rotation and reflection (rmse_mirror). ok: share of the scored time; "
+        f"wrong: share of the run in which a pair was ok and off by more than {LIMIT:g} m and "
         f"{SIGMAS:g} of its own standard deviations. NEES and NIS are 1 where the covariance is "
         "right. efficient: expected errors of an efficient estimator, if the assumed noise is true."
     )

@@ -9,11 +9,14 @@ import numpy as np
 from hardware_bridge.readings import PairReading, PoseReading, Vector
 from tracking.arrays import F64
 from tracking.estimate import Status
+from tracking.short_repr import short_repr
 
 
 @dataclass(frozen=True, slots=True)
 class ToldPlace:
     """Where a pair or a node was said to be; world frame."""
+
+    __repr__ = short_repr
 
     t: float
     """[s]"""

@@ -18,6 +18,7 @@ from hardware_bridge.safety.picture import Picture
 from hardware_bridge.safety.recent import Recent, at_rest
 from hardware_bridge.safety.rules import RULES
 from tracking.arrays import F64, I64, Bool
+from tracking.short_repr import short_repr
 
 NO_REASON = -1
 NOT_ARMED = -2
@@ -41,6 +42,8 @@ def reason_text(code: int) -> str:
 @dataclass(frozen=True, slots=True)
 class GateOutput:
     """What the cars are told now, arrays over (env, car)."""
+
+    __repr__ = short_repr
 
     speed: F64
     """[m/s]"""

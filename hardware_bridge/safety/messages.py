@@ -13,11 +13,14 @@ import numpy as np
 
 from hardware_bridge.safety.picture import Picture
 from tracking.arrays import F64
+from tracking.short_repr import short_repr
 
 
 @dataclass(frozen=True, slots=True)
 class Word:
     """A sign of life."""
+
+    __repr__ = short_repr
 
     t: float
     """[s] When it was given."""
@@ -53,6 +56,8 @@ class Telemetry:
 @dataclass(frozen=True, slots=True)
 class Report:
     """What the gate did, arrays over (car)."""
+
+    __repr__ = short_repr
 
     t: float
     """[s]"""

@@ -19,6 +19,7 @@ from hardware_bridge.wire.layout import (
     MESSAGE_TABLE,
     Records,
 )
+from tracking.short_repr import short_repr
 
 MOST_CODED = MOST_FRAME + 3
 """[bytes] Longest frame when it is stuffed, without the zero that ends it."""
@@ -32,6 +33,8 @@ class Batch:
     Values stand in the order of `hardware_bridge.wire.definition`, in SI units (uT and dBm), a
     row for a message or for each row of a message that has rows; columns beyond are not written.
     """
+
+    __repr__ = short_repr
 
     capacity: int = 256
     """Frames; for each there is room for four rows."""

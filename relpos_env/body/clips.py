@@ -18,6 +18,7 @@ from relpos_env.body.motion import HIDING
 from relpos_env.errors import EnvError
 from tracking.arrays import F64, Bool
 from tracking.geometry import quat_from_yaw, quat_multiply, rotate
+from tracking.short_repr import short_repr
 
 FOREARM = 0.04
 """[m] Radius."""
@@ -44,6 +45,8 @@ ARRAYS = {
 @dataclass(frozen=True, slots=True)
 class Clip:
     """One recording, round the middle of the floor."""
+
+    __repr__ = short_repr
 
     dt: float
     """Time between samples [s]."""

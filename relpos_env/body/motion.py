@@ -20,6 +20,7 @@ from scipy.interpolate import BSpline, make_interp_spline
 from relpos_env.errors import EnvError
 from tracking.arrays import F64, Bool
 from tracking.geometry import quat_conjugate, quat_multiply
+from tracking.short_repr import short_repr
 
 HIDING = ("trunk", "head")
 """Limbs that hide what is behind them. Arms and legs, 8 cm to 16 cm thick, are narrower than the
@@ -32,6 +33,8 @@ SITES = ("right upper arm", "right wrist", "right hip", "left wrist", "right kne
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BodySamples:
     """A body at evenly spaced times."""
+
+    __repr__ = short_repr
 
     t: F64
     """(time) [s]"""
@@ -52,6 +55,8 @@ class BodySamples:
 @dataclass(frozen=True, slots=True)
 class BodyState:
     """The trackers at some times."""
+
+    __repr__ = short_repr
 
     pos_w: F64
     """(time, site, 3) [m]"""

@@ -13,6 +13,7 @@ import numpy as np
 
 from relpos_env.body.skeleton_size import SkeletonSize
 from tracking.arrays import F64
+from tracking.short_repr import short_repr
 
 SIDES = np.array([-1.0, 1.0])
 """Right and left; y points left."""
@@ -25,6 +26,8 @@ TOE_OUT = 0.12
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pose:
     """A person over time."""
+
+    __repr__ = short_repr
 
     pelvis_w: F64
     """Middle between the hip joints, (time, 3) [m]."""

@@ -12,6 +12,7 @@ from gymnasium import spaces
 from relpos_env.errors import EnvError
 from relpos_env.registry import look_up
 from tracking.arrays import F64
+from tracking.short_repr import short_repr
 
 MAX_SPEED = 2.0
 """[m/s] Asked of a car at most."""
@@ -22,6 +23,8 @@ MAX_STEERING = 0.42
 @dataclass(frozen=True, slots=True)
 class DriveCommand:
     """Commands to every car of a group, (car)."""
+
+    __repr__ = short_repr
 
     t: float
     """Time of the decision [s]."""

@@ -21,6 +21,7 @@ from relpos_env.sensors.proximity import ProximitySimParams
 from relpos_env.sensors.radio.params import RadioSimParams
 from relpos_env.vehicle import CarParams
 from tracking.arrays import F64, Bool
+from tracking.short_repr import short_repr
 
 KINDS = ("number", "clutter", "car", "imu", "mag", "odometer", "radio", "leaving", "power", "joins")
 """What has a generator of its own. New kinds go to the end, so that the others stay."""
@@ -31,6 +32,8 @@ DOORS = 8
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Episode:
     """What one episode of one environment is made of."""
+
+    __repr__ = short_repr
 
     obstacles: tuple[Obstacle, ...]
     """Those of the scenario, then the drawn ones."""

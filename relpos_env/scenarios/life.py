@@ -18,6 +18,7 @@ from relpos_env.errors import EnvError
 from relpos_env.scenarios.randomisation import Interval, Randomisation
 from relpos_env.timing import STAND_STILL
 from tracking.arrays import Bool
+from tracking.short_repr import short_repr
 
 Happening = Literal["join", "leave", "power-off", "power-on"]
 Pose = tuple[float, float, float]
@@ -29,6 +30,8 @@ LEAST = 2
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LifeEvent:
     """Something that happens to one car."""
+
+    __repr__ = short_repr
 
     t: float
     """[s] Since the start of the episode, the time at rest included."""

@@ -12,6 +12,7 @@ from relpos_env.errors import EnvError
 from relpos_env.registry import look_up
 from relpos_env.tasks.options import points
 from tracking.arrays import F64
+from tracking.short_repr import short_repr
 
 KNOT = 0.1
 """[m] Distance of the knots of the cubics."""
@@ -29,6 +30,8 @@ _STEP = 0.01
 @dataclass(frozen=True, slots=True)
 class Curve:
     """A curve whose speed is 1 m per metre of arc, to about a hundredth."""
+
+    __repr__ = short_repr
 
     pieces: F64
     """Coefficients of x and y on equal pieces of arc, falling powers, (segment, 2, 4)."""

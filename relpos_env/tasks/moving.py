@@ -14,6 +14,7 @@ from relpos_env.tasks.curves import Curve
 from relpos_env.tasks.shapes import Formation
 from relpos_env.tasks.ways import Ways
 from tracking.arrays import F64, I64, Bool
+from tracking.short_repr import short_repr
 
 ERROR_SCALE = 0.5
 """[m] Formation error over which half of the formation term falls off to exp(-1)."""
@@ -38,6 +39,8 @@ class Stand:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Motion:
     """How the frame of a formation moves."""
+
+    __repr__ = short_repr
 
     curve: Curve
     """What its origin follows."""

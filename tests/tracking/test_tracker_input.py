@@ -6,9 +6,13 @@ import numpy as np
 import pytest
 
 from tracking import Constellation, NodeConfig, Tracker
+from tracking.constellation import Antenna
 from tracking.errors import ConfigError
-from tracking.filters.joint.params import JointParams
+from tracking.filters.joint.params import CarrierParams, JointParams
+from tracking.filters.pair.params import PairEkfParams
+from tracking.horizon import Horizon, HorizonParams
 from tracking.measurements import Kind, MeasurementBlock
+from tracking.orientation import OrientationParams
 
 GROUP = Constellation(nodes=tuple(NodeConfig(id=k, kind="static") for k in range(4)), dimensions=2)
 T = np.arange(0.0, 3.0, 0.05)
@@ -71,3 +75,139 @@ def test_a_node_is_nowhere_relative_to_itself():
 def test_parameters_are_above_0_whole_or_not(name, value):
     with pytest.raises(ConfigError, match=name):
         JointParams(**{name: value})
+
+
+def test_time_does_not_go_back_between_calls():
+    block = ranges()
+    tracker = Tracker(GROUP)
+    tracker.run(block, np.array([3.0]))
+    with pytest.raises(ConfigError, match="earlier blocks"):
+        tracker.step(block.take(slice(0, 6)), 4.0)
+    with pytest.raises(ConfigError, match="not before the last event"):
+        tracker.step(MeasurementBlock.empty(), 1.0)
+    saved = tracker.save()
+    tracker.reset(0)
+    tracker.step(block.take(slice(0, 6)), 4.0)
+    tracker.restore(saved)
+    with pytest.raises(ConfigError, match="earlier blocks"):
+        tracker.step(block.take(slice(0, 6)), 4.0)
+
+
+@pytest.mark.parametrize("distance", [0.0, -1.0, 1e6])
+@pytest.mark.parametrize("filter", ["joint", "ekf-mds", "paper-ekf-mds"])
+def test_distances_that_cannot_be_are_passed_over(filter, distance):
+    good = ranges()
+    bad = good.take(slice(0, 3))
+    values = bad.values.copy()
+    values[0, :, 0] = distance
+    mixed = MeasurementBlock.concatenate([good, replace(bad, values=values)]).sorted()
+    clean, found = (Tracker(GROUP, filter=filter).run(b, np.array([3.0])) for b in (good, mixed))
+    np.testing.assert_array_equal(found.pos_ij_w, clean.pos_ij_w)
+
+
+def test_a_range_with_a_power_that_is_no_number_is_one_without():
+    good = ranges()
+    values, has_power = good.values.copy(), np.ones_like(good.has_power)
+    values[0, :, 1], values[0, :, 2] = -80.0, np.nan
+    odd = replace(good, values=values, has_power=has_power)
+    clean, found = (Tracker(GROUP).run(b, np.array([3.0])) for b in (good, odd))
+    np.testing.assert_array_equal(found.pos_ij_w, clean.pos_ij_w)
+
+
+@pytest.mark.parametrize(
+    ("length", "used"), [(1.0, True), (1.05, True), (0.0, False), (3.0, False)]
+)
+def test_orientations_are_unit_quaternions_or_none(length, used):
+    group = Constellation(nodes=(NodeConfig(id=0), NodeConfig(id=1)))
+    values = np.zeros((1, 7))
+    values[0, :4] = length * np.array([0.6, 0.0, 0.8, 0.0])
+    state = MeasurementBlock.of_kind(Kind.STATE, np.array([0.1]), np.array([0]), values)
+    estimate = Tracker(group).step(state, 0.2)
+    assert estimate.has_orientation[0, 0] == used
+    if used:
+        np.testing.assert_allclose(estimate.q_wb[0, 0], [0.6, 0.0, 0.8, 0.0], atol=1e-12)
+
+
+def test_foreign_antennas_of_surveys_are_refused():
+    t, i, j = np.array([0.1]), np.array([0]), np.array([1])
+    survey = MeasurementBlock.of_kind(
+        Kind.SURVEY, t, i, np.array([[2.0]]), j=j, antennas=(np.array([3]), np.array([1]))
+    )
+    with pytest.raises(ConfigError, match="antennas of the nodes"):
+        Tracker(GROUP).step(survey, 0.2)
+
+
+def test_smoothing_refuses_what_running_refuses_and_survives_it():
+    block = ranges()
+    tracker, half = Tracker(GROUP), block.n_events // 2
+    t = float(block.t[0, half - 1])
+    tracker.step(block.take(slice(0, half)), t)
+    later = block.take(slice(half, half + 12))
+    before = tracker.save()
+    with pytest.raises(ConfigError, match="nodes 0 to 3"):
+        tracker.smooth(replace(later, j=later.j + 9), t)
+    with pytest.raises(ConfigError, match="events after t"):
+        tracker.smooth(later, t + 1.0)
+    values = later.values.copy()
+    values[0, 3, 0] = np.nan
+    smooth = tracker.smooth(replace(later, values=values), t)
+    assert np.isfinite(smooth.pos_ij_w).all()
+    for old, new in zip(before["filter"], tracker.save()["filter"], strict=True):
+        np.testing.assert_array_equal(old, new)
+
+
+@pytest.mark.parametrize("filter", ["joint", "ekf-mds", "paper-ekf-mds"])
+def test_to_join_again_changes_nothing(filter):
+    block = ranges()
+    join = MeasurementBlock.of_kind(
+        Kind.JOIN, np.array([2.01]), np.array([1]), np.zeros((1, 1)), j=np.array([1])
+    )
+    with_join = MeasurementBlock.concatenate([block, join]).sorted()
+    clean, found = (
+        Tracker(GROUP, filter=filter).run(b, np.array([2.9])) for b in (block, with_join)
+    )
+    np.testing.assert_array_equal(found.pos_ij_w, clean.pos_ij_w)
+
+
+@pytest.mark.parametrize(
+    ("make", "named"),
+    [
+        (lambda v: HorizonParams(delay=v), "delay"),
+        (lambda v: OrientationParams(tau_acc=v), "tau_acc"),
+        (lambda v: group_of(imu_hz=v), "imu_hz"),
+        (lambda v: group_of(mag_hz=v), "mag_hz"),
+        (lambda v: PairEkfParams(speed_tau=v), "speed_tau"),
+        (lambda v: CarrierParams(slip=v), "slip"),
+    ],
+)
+@pytest.mark.parametrize("value", [-1.0, float("nan"), float("inf")])
+def test_numbers_that_make_no_sense_are_named(make, named, value):
+    with pytest.raises(ConfigError, match=named):
+        make(value)
+
+
+def group_of(**of_first):
+    return Constellation(nodes=(NodeConfig(id=0, **of_first), NodeConfig(id=1)))
+
+
+def test_an_antenna_is_at_a_finite_place():
+    with pytest.raises(ConfigError, match="offset_b"):
+        replace(GROUP, antennas=(Antenna(id=1, node=0, offset_b=(0.0, float("nan"), 0.0)),))
+
+
+def test_arrays_that_kernels_write_are_contiguous():
+    horizon, block = Horizon(HorizonParams(delay=0.0)), ranges()
+    wide = MeasurementBlock.empty(2, 2 * block.n_events)
+    out = wide.take(slice(0, None, 2))  # every other column
+    with pytest.raises(ConfigError, match="contiguous"):
+        horizon.step(block, 10.0, out=replace(out, **{f: getattr(out, f)[:1] for f in FIELDS}))
+
+
+FIELDS = ("t", "kind", "i", "j", "antenna_i", "antenna_j", "values", "has_power", "valid")
+
+
+def test_what_is_printed_is_short():
+    block, group = ranges(), GROUP
+    estimate = Tracker(group).run(block, np.linspace(0.1, 3.0, 500))
+    assert len(repr(block)) < 400
+    assert len(repr(estimate)) < 600

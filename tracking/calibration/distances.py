@@ -11,11 +11,14 @@ from tracking.constellation import Constellation
 from tracking.geometry import rotate
 from tracking.log.truth import MAX_GAP, Truth
 from tracking.measurements import Kind, MeasurementBlock
+from tracking.short_repr import short_repr
 
 
 @dataclass(frozen=True, slots=True)
 class RangeTable:
     """The ranges of one environment, in order."""
+
+    __repr__ = short_repr
 
     t: F64
     """(range) [s]"""

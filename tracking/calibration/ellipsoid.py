@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tracking.arrays import F64, Bool
+from tracking.short_repr import short_repr
 
 N_TRIALS = 100
 N_SUBSET = 20
@@ -27,6 +28,8 @@ GATE = 3.5
 @dataclass(frozen=True, slots=True)
 class Ellipsoid:
     """The points x with ``|root (x - centre)| = 1``, in 2 or 3 dimensions."""
+
+    __repr__ = short_repr
 
     centre: F64
     """(d), in the unit of the points."""

@@ -25,6 +25,7 @@ from tracking.calibration.calibration import NodeCalibration
 from tracking.calibration.errors import CalibrationError
 from tracking.calibration.rest import Rest, RestParams, find_rest
 from tracking.geometry import GRAVITY
+from tracking.short_repr import short_repr
 
 MIN_REST = 1.0
 """[s] Rest that is needed; white noise of a second is far below any offset."""
@@ -48,6 +49,8 @@ MAX_SCALE = 0.1
 @dataclass(frozen=True, slots=True)
 class ImuResult:
     """The IMU of one node at rest."""
+
+    __repr__ = short_repr
 
     calibration: NodeCalibration
     gyr_se: F64

@@ -26,6 +26,7 @@ from tracking.calibration.distances import range_table
 from tracking.errors import LogError
 from tracking.filters.joint.params import RangeErrorParams
 from tracking.log import Log
+from tracking.short_repr import short_repr
 
 EDGES = np.concatenate([[0.0], np.geomspace(0.005, 12.0, 19)])
 """[m] Ways between two ranges of a pair that are looked at together."""
@@ -48,6 +49,8 @@ STEP = 0.05
 @dataclass(frozen=True, slots=True)
 class Variogram:
     """Half the mean squares of differences between the errors of two ranges of a pair."""
+
+    __repr__ = short_repr
 
     way: F64
     """Mean way of both ends between the two, (bin) [m]."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tracking.arrays import F64, Bool
+from tracking.short_repr import short_repr
 
 MAX_GAP = 0.5
 """[s] A silence this long ends a phase."""
@@ -33,6 +34,8 @@ class RestParams:
 @dataclass(frozen=True, slots=True)
 class Rest:
     """The rest phases of one node, in time order."""
+
+    __repr__ = short_repr
 
     at_rest: Bool
     """(sample)"""

@@ -21,6 +21,7 @@ from tracking.arrays import F64, I64, Bool
 from tracking.calibration.calibration import RangeCalibration
 from tracking.calibration.distances import RangeTable
 from tracking.calibration.errors import CalibrationError
+from tracking.short_repr import short_repr
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,6 +50,8 @@ class UwbParams:
 @dataclass(frozen=True, slots=True)
 class UwbResult:
     """The ranges of a group, calibrated."""
+
+    __repr__ = short_repr
 
     calibration: RangeCalibration
     slope_fitted: bool

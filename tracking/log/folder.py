@@ -10,6 +10,7 @@ from tracking.arrays import Bool
 from tracking.constellation import Constellation
 from tracking.log.truth import Truth
 from tracking.measurements import Kind, MeasurementBlock
+from tracking.short_repr import short_repr
 
 FORMAT = 1
 GYR = ("gyr_x", "gyr_y", "gyr_z")
@@ -22,6 +23,8 @@ POWERS = ("rx_power_dbm", "fp_power_dbm")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Log:
     """A recorded run of one group."""
+
+    __repr__ = short_repr
 
     name: str
     constellation: Constellation

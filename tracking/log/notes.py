@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from tracking.arrays import Bool
 from tracking.estimate import Status, TeamEstimate
 from tracking.filters._shape_kernels import FEWEST
 from tracking.log.folder import Log
@@ -43,9 +44,9 @@ def notes_on_estimate(log: Log, estimate: TeamEstimate) -> list[str]:
         estimate: Its estimates, arrays over (time, pair).
     """
     constellation, block = log.constellation, log.block
-    placed = estimate.status >= Status.AMBIGUOUS
+    placed = np.asarray(estimate.status >= Status.AMBIGUOUS)
     i, j = constellation.pairs.T
-    ever = placed.any(axis=0)
+    ever: Bool = np.asarray(placed.any(axis=0))
     is_range = np.isin(block.kind[0], (Kind.RANGE, Kind.SURVEY)) & block.valid[0]
     a, b = block.i[0, is_range], block.j[0, is_range]
     found = [n for n in range(constellation.n_nodes) if ever[(i == n) | (j == n)].any()]

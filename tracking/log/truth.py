@@ -8,6 +8,7 @@ import numpy as np
 
 from tracking.arrays import F64, I64, Bool
 from tracking.constellation import Constellation
+from tracking.short_repr import short_repr
 
 MAX_GAP = 0.5
 """[s] Truth of a moving node is interpolated over gaps up to here."""
@@ -16,6 +17,8 @@ MAX_GAP = 0.5
 @dataclass(frozen=True, slots=True)
 class Truth:
     """One row per node and time, in time order."""
+
+    __repr__ = short_repr
 
     t: F64
     """(row) [s]"""

@@ -12,11 +12,14 @@ from relpos_env.body.pose import Pose
 from relpos_env.body.skeleton import leg_stretch
 from relpos_env.body.skeleton_size import STRETCH, SkeletonSize
 from tracking.arrays import F64
+from tracking.short_repr import short_repr
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bout:
     """Some seconds of an exercise."""
+
+    __repr__ = short_repr
 
     pose: Pose
     """At steps of `dt`; standing at both ends."""

@@ -19,6 +19,7 @@ from relpos_env.body.pose import STANCE, Pose, ball_at
 from relpos_env.body.skeleton_size import SkeletonSize
 from tracking.arrays import F64
 from tracking.geometry import GRAVITY
+from tracking.short_repr import short_repr
 
 WIND_UP = 0.45
 """[s] From standing to the first take-off, and from the last touchdown to standing."""
@@ -31,6 +32,8 @@ PUSH, HEEL = 0.12, 1.1
 @dataclass(frozen=True, slots=True)
 class Hops:
     """When the person is in the air."""
+
+    __repr__ = short_repr
 
     off: F64
     """Take-offs, (hop) [s]."""

@@ -38,11 +38,14 @@ from tracking.ranging.airtime import airtime, round_rate
 from tracking.ranging.members import MAX_MEMBERS
 from tracking.ranging.timestamps import TICK_HZ
 from tracking.ranging.wire import ENTRY_BYTES, FIXED_BYTES, entries_per_frame
+from tracking.short_repr import short_repr
 
 
 @dataclass(frozen=True, slots=True)
 class Ranges:
     """What the radios resolved in one window, padded; (env, slot)."""
+
+    __repr__ = short_repr
 
     t: F64
     """When it was so [s]."""

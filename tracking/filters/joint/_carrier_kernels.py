@@ -10,10 +10,12 @@ from __future__ import annotations
 import math
 
 from tracking.compiled import small_kernel
-from tracking.filters.joint._linear_kernels import absorb, project, settle, symmetrise
+from tracking.filters.joint._linear_kernels import absorb, covariance, project, settle, symmetrise
 from tracking.filters.joint._open_kernels import tell_turn, turn_gradient
 from tracking.filters.joint._sleep_kernels import rests
 
+GLIDES = 9.0
+"""[-] Square of the standard deviations by which a velocity differs from zero."""
 CENTRE_VAR = 1.0
 """[m2] Variance of the centre after it was moved back."""
 
@@ -42,6 +44,10 @@ def hold_nodes(c, s, h, t, scratch):
         if not node.present or node.static or t - node.t_state > c.unaided_after:
             continue
         if rests(c, node, t):
+            if glides(c, s, h, i):
+                if h == s.group[0].best:
+                    node.t_moved = t
+                continue
             for k in range(c.d):
                 scratch.idx[0], scratch.val[0] = node.at_v + k, 1.0
                 if s.group[0].open:
@@ -49,6 +55,20 @@ def hold_nodes(c, s, h, t, scratch):
                 judge(c, s, h, -s.x[h, node.at_v + k], 1, c.rest_var, scratch)
         elif node.sideways_var > 0.0:
             hold_on_wheels(c, s, h, i, scratch)
+
+
+@small_kernel
+def glides(c, s, h, i):
+    """True if node i, whose IMU reads the same for a while, is known to move all the same.
+
+    At a constant velocity, or slowly round a curve, an IMU reads what it reads at rest.
+    """
+    for k in range(c.d):
+        at = s.nodes[i].at_v + k
+        v = s.x[h, at]
+        if v * v > GLIDES * (covariance(s, h, at, at) + c.rest_var):
+            return True
+    return False
 
 
 @small_kernel

@@ -208,6 +208,12 @@ def look_at_group(c, s, layout, t):
     s.group[0].t_check = t
 
 
+@small_kernel
+def is_lost(c, pair, age):
+    """True if a pair had no range that meant anything for longer than it usually takes."""
+    return age > max(c.lost_after, MISSED * pair.interval)
+
+
 @allocating_kernel
 def write_estimate(c, s, t, e, o, out):
     """The best hypothesis at time t, without touching the state."""
@@ -250,7 +256,7 @@ def write_estimate(c, s, t, e, o, out):
         age[e, o, p] = t - pair.t_used
         if s.group[0].n_alive > 1:
             status[e, o, p] = AMBIGUOUS
-        elif age[e, o, p] > max(c.lost_after, MISSED * pair.interval) and not (node_i.static and node_j.static):
+        elif is_lost(c, pair, age[e, o, p]) and not (node_i.static and node_j.static):
             status[e, o, p] = LOST
         else:
             status[e, o, p] = OK

@@ -71,18 +71,18 @@ def run_events(constants, layout, state, block, t_out, out):
 
 @kernel
 def take_state(c, s, layout, i, t, values):
-    """A node's orientation and world acceleration, eq. (1) and (2): a step of its filters."""
-    for a in range(3):
-        s.control[i, a] = values[4 + a] if a < c.d else 0.0
-    for a in range(4):
-        s.control[i, 3 + a] = values[a]
-    s.nodes[i].t_imu = t
+    """A node's orientation and world acceleration, eq. (1) and (2), held until the next."""
     if s.nodes[i].present:
         for j in range(s.nodes.shape[0]):
             if j != i and s.nodes[j].present:
                 p = layout.pair_index[i, j]
                 predict(c, s, p, t, s.x[p], s.P[p])
                 s.pairs[p].t = t
+    for a in range(3):
+        s.control[i, a] = values[4 + a] if a < c.d else 0.0
+    for a in range(4):
+        s.control[i, 3 + a] = values[a]
+    s.nodes[i].t_imu = t
 
 
 @allocating_kernel

@@ -30,6 +30,7 @@ def predict(c, s, p, t, x, P):
     """
     i, j = s.pairs[p].i, s.pairs[p].j
     dt = t - s.pairs[p].t
+    relative_orientation(s.control, i, j, x)
     if dt <= 0.0:
         return
     node_i, node_j = s.nodes[i], s.nodes[j]
@@ -57,7 +58,6 @@ def predict(c, s, p, t, x, P):
         P[a, VELOCITY + a] += half * dt * q
         P[VELOCITY + a, a] += half * dt * q
         P[VELOCITY + a, VELOCITY + a] += dt * dt * q
-    relative_orientation(s.control, i, j, x)
     # W_q (sigma^2 1) W_q^T: the derivatives of a product of unit quaternions are orthogonal.
     q = moving * c.orientation_std * c.orientation_std
     for a in range(4):

@@ -14,6 +14,7 @@ from tracking.filters.paper._filter_kernels import (
     predict,
     update_position,
 )
+from tracking.geometry import FLAT
 
 REPLACE, NONE = 0, 2
 """Values of `feedback`."""
@@ -59,7 +60,9 @@ def align(X, target, rows, d):
             for r in range(d):
                 for k in range(d):
                     C[r, k] += (X[a, r] - mean_x[r]) * (target[a, k] - mean[k])
-    U, _, V = np.linalg.svd(C)
+    U, size, V = np.linalg.svd(C)
+    if size[d - 1] <= FLAT * size[0] and np.linalg.det(U) * np.linalg.det(V) < 0.0:
+        U[:, d - 1] *= -1.0  # a line is its own mirror image
     M = U @ V
     for a in range(len(rows)):
         off = X[a] - mean_x
@@ -93,9 +96,9 @@ def has_first(c, pair):
 def can_join(c, s, layout, new):
     """True if a node has the first ranges of its pairs with all present nodes."""
     for i in range(s.nodes.shape[0]):
-        if i != new and s.nodes[i].present:
-            if not has_first(c, s.pairs[layout.pair_index[i, new]]):
-                return False
+        is_other = i != new and s.nodes[i].present
+        if is_other and not has_first(c, s.pairs[layout.pair_index[i, new]]):
+            return False
     return True
 
 

@@ -14,6 +14,7 @@ References:
 
 from __future__ import annotations
 
+from copy import copy
 from itertools import combinations
 
 import numpy as np
@@ -21,89 +22,14 @@ import numpy as np
 from tracking.arrays import F64
 from tracking.constellation import Constellation
 from tracking.filters.paper.params import PaperParams
-from tracking.geometry import quat_conjugate, quat_multiply
+from tracking.filters.paper.reference_ekf import PairFilter
+from tracking.geometry import (
+    best_rotation,
+    quat_conjugate,
+    quat_mean,
+    quat_multiply,
+)
 from tracking.measurements import Kind, MeasurementBlock
-
-CONJUGATE = np.diag([1.0, -1.0, -1.0, -1.0])
-TINY = 1e-6
-"""[m, m/s] Shorter vectors have no direction."""
-
-
-class PairFilter:
-    """The EKF of one pair, from its first k measurements on."""
-
-    def __init__(self, d: int, x_0: F64, q_0: F64, t: float, distance: float, static: bool) -> None:
-        self.x = np.concatenate([x_0, np.zeros(3), q_0])  # v_0 = 0
-        axes = np.arange(3) < d
-        self.P = np.diag(np.concatenate([axes, axes & (not static), np.ones(4)]).astype(float))
-        self.t = self.t_range = t
-        self.mean = self.last = distance
-        self.rate, self.n_rejected = 0.0, 0
-
-    def predict(self, t: float, u: F64, Sigma_u: F64, d: int) -> None:
-        """Dead reckoning to time t with the control ``u = (a_i, a_j, q_i, q_j)``, eq. (7) to (9)."""
-        dT = t - self.t
-        if dT <= 0.0:
-            return
-        a_i, a_j, q_i, q_j = u[:3], u[3:6], u[6:10], u[10:]
-        I = np.diag((np.arange(3) < d).astype(float))
-        F = np.zeros((10, 10))  # q_ij is a function of the control alone
-        F[:3, :3], F[:3, 3:6], F[3:6, 3:6] = I, dT * I, I
-        W = np.zeros((10, 14))
-        W[:3, :3], W[:3, 3:6] = -0.5 * dT**2 * I, 0.5 * dT**2 * I
-        W[3:6, :3], W[3:6, 3:6] = -dT * I, dT * I
-        W[6:, 6:10] = _right(q_j) @ CONJUGATE
-        W[6:, 10:] = _left(quat_conjugate(q_i))
-        self.x[:6] = F[:6, :6] @ self.x[:6] + W[:6, :6] @ np.concatenate([a_i, a_j])
-        self.x[6:] = quat_multiply(quat_conjugate(q_i), q_j)
-        self.P = F @ self.P @ F.T + W @ Sigma_u @ W.T
-        self.t = t
-
-    def correct(self, t: float, distance: float, c: PaperParams) -> float | None:
-        """Gate a range, then correct with it and its derivative, eq. (10) and (11).
-
-        Returns:
-            The range's innovation, squared, over its variance; None for an outlier.
-        """
-        age = t - self.t_range
-        x, v = self.x[:3], self.x[3:6]
-        if abs(distance - self.mean) > c.gate_floor + c.gate_gain * float(np.linalg.norm(v)):
-            self.n_rejected += 1
-            if self.n_rejected < c.gate_reset:
-                return None
-            self.mean, self.rate = distance, 0.0
-        else:
-            self.mean += age / (c.gate_tau + age) * (distance - self.mean)
-            if age > 0.0:
-                raw = (distance - self.last) / age
-                self.rate += age / (c.speed_tau + age) * (raw - self.rate)
-        self.n_rejected, self.last, self.t_range = 0, distance, t
-        d, speed = float(np.linalg.norm(x)), float(np.linalg.norm(v))
-        u = x / d if d > TINY else np.zeros(3)
-        H = np.zeros((2, 10))
-        H[0, :3] = u
-        if c.speed == "norm":
-            H[1, 3:6] = v / speed if speed > TINY else 0.0
-            h, z = np.array([d, speed]), np.array([distance, abs(self.rate)])
-        else:
-            H[1, :3], H[1, 3:6] = (v - u * (u @ v)) / d if d > TINY else 0.0, u
-            h, z = np.array([d, u @ v]), np.array([distance, self.rate])
-        R = np.diag([c.range_std**2, c.speed_std**2])
-        S = H @ self.P @ H.T + R
-        K = self.P @ H.T @ np.linalg.inv(S)
-        self.x += K @ (z - h)
-        self.P = self.P - K @ S @ K.T
-        return float((z[0] - h[0]) ** 2 / S[0, 0])
-
-    def use_mds(self, x: F64, c: PaperParams, d: int) -> None:
-        """Take the refined relative position of the pair."""
-        if c.feedback == "replace":
-            self.x[:3] = x
-        elif c.feedback == "update":
-            H = np.eye(10)[:d]
-            K = self.P @ H.T @ np.linalg.inv(H @ self.P @ H.T + c.mds_std**2 * np.eye(d))
-            self.x += K @ (x[:d] - self.x[:d])
-            self.P = self.P - K @ H @ self.P
 
 
 class PaperReference:
@@ -129,30 +55,37 @@ class PaperReference:
         """
         p = self.group.n_pairs
         x, P = np.zeros((len(t_out), p, 10)), np.zeros((len(t_out), p, 10, 10))
-        o = 0
-        for k in range(block.n_events):
-            t = float(block.t[0, k])
-            while o < len(t_out) and t_out[o] < t:
-                self.report(float(t_out[o]), x[o], P[o])
-                o += 1
-            i, j = sorted((int(block.i[0, k]), int(block.j[0, k])))
-            if block.kind[0, k] == Kind.STATE:
-                self.take_state(i, t, block.values[0, k])
-            elif block.kind[0, k] in (Kind.RANGE, Kind.SURVEY):
-                self.take_range(i, j, t, block.values[0, k, 0], block.kind[0, k] == Kind.SURVEY)
-            elif block.kind[0, k] == Kind.LEAVE:
-                self.remove(i)
-        for o in range(o, len(t_out)):
-            self.report(float(t_out[o]), x[o], P[o])
+        due, k = np.searchsorted(block.t[0], t_out, side="right"), 0
+        for o, t in enumerate(t_out):
+            for event in range(k, due[o]):
+                self.take(block, event)
+            k = due[o]
+            for pair, f in self.filters.items():
+                ahead, (u, sigma) = copy(f), self.control(pair, t)
+                ahead.x = f.x.copy()
+                ahead.predict(t, u, np.diag(sigma**2), self.d)
+                x[o, self.group.pair_index[pair]] = ahead.x
+                P[o, self.group.pair_index[pair]] = ahead.P
         return x, P
+
+    def take(self, block: MeasurementBlock, k: int) -> None:
+        """Handle one event."""
+        i, j = sorted((int(block.i[0, k]), int(block.j[0, k])))
+        t, kind = float(block.t[0, k]), block.kind[0, k]
+        if kind == Kind.STATE:
+            self.take_state(i, t, block.values[0, k])
+        elif kind in (Kind.RANGE, Kind.SURVEY):
+            self.take_range(i, j, t, block.values[0, k, 0], kind == Kind.SURVEY)
+        elif kind == Kind.LEAVE:
+            self.remove(i)
 
     def take_state(self, i: int, t: float, values: F64) -> None:
         """Eq. (1) and (2): a node's orientation and world acceleration."""
-        accel = np.where(np.arange(3) < self.d, values[4:7], 0.0)
-        self.u[i], self.t_imu[i] = np.concatenate([accel, values[:4]]), t
         for pair in self.filters:
             if i in pair:
-                self.predict(pair, t)
+                self.predict(pair, t)  # a control holds until the next
+        accel = np.where(np.arange(3) < self.d, values[4:7], 0.0)
+        self.u[i], self.t_imu[i] = np.concatenate([accel, values[:4]]), t
 
     def take_range(self, i: int, j: int, t: float, distance: float, is_survey: bool) -> None:
         """Correct the pair's filter, or collect its first k measurements."""
@@ -204,8 +137,10 @@ class PaperReference:
                 if (i, j) not in self.filters:
                     distance, static = self.first_distance((i, j)), self.group.is_static[[i, j]]
                     _, q = self.first.pop((i, j), ([], []))
-                    x_0, q_0 = X[b] - X[a], _mean(q)
-                    self.filters[i, j] = PairFilter(self.d, x_0, q_0, t, distance, static.all())
+                    x_0, q_0 = X[b] - X[a], quat_mean(q)
+                    self.filters[i, j] = PairFilter(
+                        self.d, x_0, q_0, t, distance, bool(static.all())
+                    )
 
     def has_first(self, new: tuple[int, ...]) -> bool:
         """True if all pairs of new nodes, and of new and present ones, have k measurements."""
@@ -281,40 +216,9 @@ class PaperReference:
         if len(self.present) < 2:
             self.present, self.filters = [], {}
 
-    def report(self, t: float, x: F64, P: F64) -> None:
-        """Write every filter's state at time t, without touching it."""
-        for pair, f in self.filters.items():
-            saved = f.x.copy(), f.P, f.t
-            self.predict(pair, t)
-            p = self.group.pair_index[pair]
-            x[p], P[p] = f.x, f.P
-            f.x, f.P, f.t = saved
-
-
-def _left(q: F64) -> F64:
-    """Matrix of ``q r`` as a function of r."""
-    w, x, y, z = q
-    return np.array([[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]])
-
-
-def _right(r: F64) -> F64:
-    """Matrix of ``q r`` as a function of q."""
-    w, x, y, z = r
-    return np.array([[w, -x, -y, -z], [x, w, z, -y], [y, -z, w, x], [z, y, -x, w]])
-
-
-def _mean(q: list[F64]) -> F64:
-    """Mean of quaternions, q and -q being one orientation, (4)."""
-    if not q:
-        return np.array([1.0, 0.0, 0.0, 0.0])
-    total = np.sum([r if r @ q[0] >= 0.0 else -r for r in q], axis=0)
-    return np.asarray(total / np.linalg.norm(total))
-
 
 def _align(X: F64, target: F64, rows: list[bool], d: int) -> F64:
     """Rotate, reflect and shift X so that the given rows are nearest to the target's [2]."""
     x_mean, mean = X[rows].mean(axis=0), target[rows].mean(axis=0)
-    U, _, V = np.linalg.svd((X[rows] - x_mean)[:, :d].T @ (target[rows] - mean)[:, :d])
-    M = np.eye(3)
-    M[:d, :d] = U @ V
-    return np.asarray((X - x_mean) @ M + mean)
+    M = best_rotation(X[rows] - x_mean, target[rows] - mean, planar=d == 2, reflect=True)
+    return np.asarray((X - x_mean) @ M.T + mean)
