@@ -20,7 +20,7 @@ from relpos_env import formation_v0
 from relpos_env.parallel_env import FormationEnv
 from relpos_env.registry import look_up
 from relpos_env.timing import DECISION
-from tracking.filters import FILTERS
+from tracking.filters import DEFAULT_FILTER, FILTERS, filter_builder
 from tracking.short_repr import short_repr
 
 TOLD = ("estimate", "truth", "nothing")
@@ -96,6 +96,7 @@ def demo(
     proximity: int | None = None,
     controller: str | None = None,
     policy: str | Path | None = None,
+    filter: str = DEFAULT_FILTER,
     progress: Callable[[float], None] | None = None,
 ) -> DemoResult:
     """Drive a formation on estimates and, for comparison, on the truth and on nothing.
@@ -112,9 +113,11 @@ def demo(
         controller: One of `agents.controllers.CONTROLLERS`, by default `CONTROLLER`.
         policy: A trained policy in its place, as for `load_policy`; the cars observe what it
             was trained on.
+        filter: The cars' tracker, one of `tracking.filters.FILTERS`.
         progress: Called with the share done, 0 to 1.
 
     Raises:
+        ConfigError: No such filter.
         EnvError: An unknown name or a number out of range.
         UsageError: A controller and a policy, or a policy that cannot be loaded or is not for
             these cars.
@@ -127,6 +130,7 @@ def demo(
     task = task or trained_task or TASK
     if scenario is None and task == trained_task:
         scenario = trained_scenario
+    filter_builder(filter)
     drives: dict[str, Drive] = {}
     modes, history = _modes(trained), 1 if trained is None else trained.layout.history
     if trained is not None:
@@ -151,6 +155,7 @@ def demo(
             proximity=proximity or 0,
             max_cycles=round(seconds / DECISION),
             record=told == "estimate",
+            filter=filter,
         )
         driver: Driver
         if trained is None:

@@ -20,6 +20,7 @@ from relpos_env._vehicle_kernels import (
 )
 from relpos_env.sensors._imu_kernels import felt_on_car, read_imu
 from relpos_env.sensors._magnetometer_kernels import read_magnetometer
+from relpos_env.sensors.radio._membership_kernels import note_members
 from relpos_env.sensors.radio._radio_kernels import run_env_window
 from relpos_env.timing import SOON
 from tracking._angle_kernels import cosine_sine
@@ -62,7 +63,8 @@ def begin_decision(bodies, events, t, next_life, speed, steering):
 
 @kernel
 def run_steps(
-    bodies, solver, sensors, radio, scenes, n_steps, dt, events, speed, steering, t, waiting
+    bodies, solver, sensors, radio, members, scenes, n_steps, dt, events, speed, steering, t,
+    waiting,
 ):  # fmt: skip
     """Go on with the decision of every environment until it is over or must wait.
 
@@ -71,6 +73,7 @@ def run_steps(
         solver: Solver, updated.
         sensors: Sensors, updated.
         radio: SessionNumbers, RadioNumbers, Air and RangeBuffer; updated.
+        members: What is kept of who is in the group, (env, node, 2), see `note_members`.
         scenes: Scene of all environments.
         n_steps: Steps of a decision.
         dt: [s]
@@ -106,7 +109,7 @@ def run_steps(
                         integrate_car(bodies.cars[e], bodies.body, bodies.wrench, e, n, dt)
             bodies.pushed[e] = False
             bodies.tick[e] += 1
-            sense(bodies, sensors, radio, scenes, dt, events, e)
+            sense(bodies, sensors, radio, members, scenes, dt, events, e)
             bodies.done[e] += 1
         t[e] = bodies.tick[e] * dt
     return n_waiting
@@ -127,7 +130,7 @@ def push_cars(bodies, speed, steering, dt, e):
 
 
 @small_kernel
-def sense(bodies, sensors, radio, scenes, dt, events, e):
+def sense(bodies, sensors, radio, members, scenes, dt, events, e):
     """All that the nodes of an environment measure in a step, after it."""
     body, drive, accel, turn = bodies.body, bodies.drive, bodies.accel, bodies.turn
     tick, step = bodies.tick[e], bodies.done[e]
@@ -185,7 +188,7 @@ def sense(bodies, sensors, radio, scenes, dt, events, e):
         events.has_power[e, k], events.valid[e, k] = True, True
         events.nlos[e, k] = ranges.nlos[e, r]
         k += 1
-    events.used[e] = k
+    events.used[e] = note_members(air, members, t, events, e, k)
 
 
 @small_kernel

@@ -85,6 +85,7 @@ class Swarm:
         self._scene = Scene(
             np.zeros((e, n, 3)), np.zeros((e, n, 3)), self._bodies.boxes, np.zeros((e, 0, 7))
         )
+        self._members: F64 = np.zeros((e, n, 2))
         self.events = make_events(e, n, n_steps, self._radio.room)
         self._groups = [Group() for _ in range(e)]
         self._solver = make_solver(e, n, self._bodies.boxes.shape[1])
@@ -142,7 +143,7 @@ class Swarm:
         part._sensors = Sensors._make(a[envs] for a in self._sensors)
         part.odometer, part.proximity = self.odometer[envs], self.proximity[envs]
         part._clearance = self._clearance[envs]
-        part._radio = self._radio.part(envs)
+        part._radio, part._members = self._radio.part(envs), self._members[envs]
         part._scene = Scene._make(a[envs] for a in self._scene)
         part._groups = self._groups[envs]
         part._solver = Solver._make(a[envs] for a in self._solver)
@@ -169,6 +170,7 @@ class Swarm:
         group.close_room(self._solver, env)
         group.obstacles, group.car, group.size = episode.obstacles, episode.car, self.scenario.room
         self._radio.reset(env, int(rng.integers(1 << 62)), episode.radio)
+        self._members[env] = 0.0
         group.boots = rng.spawn(1)[0]
         for n in np.nonzero(episode.present)[0].tolist():
             self._radio.switch_on(env, n, boot=int(group.boots.integers(256)))
@@ -249,8 +251,9 @@ class Swarm:
         )  # fmt: skip
         solver = self._solver._replace(calls=as_records(self._solver.calls))
         self._run_steps = bind(
-            run_steps, bodies, solver, sensors, self._radio.kernel_arguments, self._scene,
-            self.n_steps, DT, self.events, self._speed, self._steering, self.t, self._waiting,
+            run_steps, bodies, solver, sensors, self._radio.kernel_arguments, self._members,
+            self._scene, self.n_steps, DT, self.events, self._speed, self._steering, self.t,
+            self._waiting,
         )  # fmt: skip
         self._read_odometers = bind(
             read_odometers, sensors.odometer, sensors.odometer_seed, bodies.tick, bodies.body,

@@ -39,6 +39,12 @@ from agents.errors import UsageError
     metavar="NAME_OR_PATH",
     help="A trained policy drives: its name, its file or its folder; see `relpos policy list`.",
 )
+@click.option(
+    "--filter",
+    default="joint",
+    show_default=True,
+    help="The cars' tracker: joint, ekf-mds, ekf, paper-ekf-mds or paper-ekf.",
+)
 @click.option("--out", type=Path, default=Path("demo"), show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
 def demo(

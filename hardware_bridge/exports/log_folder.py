@@ -36,8 +36,7 @@ def export_log(
     """Write measurements as a log, and read it back to see that it is one.
 
     A log holds what can be: a range that is not above 0 and at most 300 m, a value beyond any
-    sensor, an inertial sample of a static node are left out, as `read_log` would. It has no
-    place for JOIN and LEAVE; there, silence says the same, later.
+    sensor, an inertial sample of a static node are left out, as `read_log` would.
 
     Args:
         folder: New or empty.
@@ -81,7 +80,7 @@ def export_log(
 def _fits(block: MeasurementBlock, constellation: Constellation) -> Bool:
     """Events that a log has a place for, (event)."""
     kind, values, i, j = block.kind[0], block.values[0], block.i[0], block.j[0]
-    good = np.zeros(block.n_events, dtype=bool)
+    good = np.isin(kind, (Kind.JOIN, Kind.LEAVE))
     static = constellation.is_static
     with np.errstate(invalid="ignore"):
         ranged = (values[:, 0] > 0.0) & (values[:, 0] <= MAX_DISTANCE) & (i != j)

@@ -148,9 +148,11 @@ class LiveSwarm:
         )
 
     def _let_go(self, t_ns: int, now: float) -> None:
-        """Nodes that have fallen silent leave; they are back when they are heard."""
+        """Nodes that are heard join; those that have fallen silent leave."""
         recent = {k for k, t in self.intake.heard_ns.items() if (t_ns - t) * 1e-9 <= GONE}
-        for node in self._here - recent:
+        for node in sorted(recent - self._here):
+            self.intake.events.add(now, Kind.JOIN, node, ())
+        for node in sorted(self._here - recent):
             self.intake.events.add(now, Kind.LEAVE, node, ())
         self._here = recent
 

@@ -157,10 +157,9 @@ class Faults:
         Of a silent radio of four cars 1.07 for three seconds and 1.12 for ten.
         """
 
-        def of_the_others(constellation, t, cov, pos, known):
-            known = known.copy()
-            known[:, BAD] = False
-            return summarise(constellation, t, cov, pos, known)
+        def of_the_others(constellation, t, cov, pos, wanted, taken):
+            others = (constellation.pairs != BAD).all(axis=1)
+            return summarise(constellation, t, cov, pos, wanted & others, taken)
 
         summarise = bounds._summarise
         params, ratios = matched_params(recordable(self.scenario)), []

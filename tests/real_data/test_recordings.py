@@ -92,7 +92,7 @@ def test_recordings_are_near_what_their_ranges_allow(data):
     """Of the noise that their truth shows."""
     log = read_log(data / "logs" / "inrol_env1")
     found = track_log(log, bound=recorded_bound(log))
-    for name, least in found.least.items():
+    for name, least in found.expected.items():
         assert getattr(found.score, name) < 1.25 * least, name
 
 

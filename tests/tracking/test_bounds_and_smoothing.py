@@ -10,13 +10,23 @@ from hypothesis import strategies as st
 from agents.simulate import simulate
 from relpos_env.matched import matched_params
 from relpos_env.scenarios import recordable
-from tracking import ConfigError, Status, TeamEstimate, Tracker, TrackerParams
+from tracking import (
+    ConfigError,
+    Constellation,
+    NodeConfig,
+    Status,
+    TeamEstimate,
+    Tracker,
+    TrackerParams,
+)
 from tracking.bounds import posterior_bound
 from tracking.consistency import chi_square_band, pair_nees
 from tracking.filters import FilterParams
+from tracking.filters.joint.params import CARRIERS, JointParams, RangeErrorParams
 from tracking.gospa import labelled_gospa
 from tracking.horizon import Horizon, HorizonParams
-from tracking.measurements import Kind
+from tracking.log import Log, Truth
+from tracking.measurements import Kind, MeasurementBlock
 from tracking.metrics import score
 
 
@@ -177,3 +187,95 @@ def test_gospa_counts_what_is_missed_and_what_is_not_there(drive):
     assert labelled_gospa(estimate, truth, np.ones((1, 3), dtype=bool)).rms == pytest.approx(1.0)
     with pytest.raises(ConfigError, match="cutoff"):
         labelled_gospa(estimate, truth, there, cutoff=0.0)
+
+
+PSD, SIGMA, HZ, SECONDS, SKIP = 0.4, 0.1, 10.0, 12.0, 2.0
+FAR = 100.0 * np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.2], [0.1, -1.0]])
+
+
+def far_nodes():
+    """A node that stands at the origin, if only it knew, among four that are so far off that all
+    is linear; accelerations are white noise, ranges have white noise and nothing else."""
+    nodes = [NodeConfig(id=k, kind="static") for k in range(4)]
+    group = Constellation(
+        nodes=(*nodes, NodeConfig(id=4, vehicle="drone", imu_hz=HZ)), dimensions=2
+    )
+    carrier = replace(
+        CARRIERS["drone"], accel_psd=PSD, turn_psd=1e-9, bias_std=1e-9, rise_bias_std=1e-9,
+        heading_std=1e-9, unsettled_speed=0.0,
+    )  # fmt: skip
+    params = JointParams(
+        carriers={**CARRIERS, "drone": carrier},
+        range_error=RangeErrorParams(white_std=SIGMA, fast_std=0.0, slow_std=0.0),
+        static_drift=1e-9,
+    )
+    t = np.arange(1, int(SECONDS * HZ)) / HZ
+    values = np.zeros((len(t), 7))
+    values[:, 0] = 1.0
+    four = np.full(len(t), 4)
+    parts = [MeasurementBlock.of_kind(Kind.STATE, t, four, values)]
+    for k in range(4):
+        distance = np.full((len(t), 1), np.linalg.norm(FAR[k]))
+        parts.append(MeasurementBlock.of_kind(Kind.RANGE, t, np.full(len(t), k), distance, j=four))
+    pos = np.zeros((5, 3))
+    pos[:4, :2] = FAR
+    rows = np.repeat(np.arange(0.0, SECONDS + 0.1, 0.1), 5)
+    truth = Truth(
+        rows, np.tile(np.arange(5), len(rows) // 5), np.tile(pos, (len(rows) // 5, 1)),
+        np.tile([1.0, 0.0, 0.0, 0.0], (len(rows), 1)), np.ones(len(rows), bool),
+        np.ones(len(rows), bool),
+    )  # fmt: skip
+    block = MeasurementBlock.concatenate(parts).sorted()
+    return Log(name="far", constellation=group, block=block, truth=truth), params, t
+
+
+def kalman_runs(params, t, n_runs, seed):
+    """Errors of a textbook Kalman filter in simulated runs, (run, time, node, 2)."""
+    rng, dt = np.random.default_rng(seed), 1.0 / HZ
+    F = np.eye(12)
+    F[8:10, 10:12] = dt * np.eye(2)
+    Q = np.zeros((12, 12))
+    for a in (8, 9):
+        Q[np.ix_([a, a + 2], [a, a + 2])] = PSD**2 * np.array(
+            [[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]]
+        )
+    root = np.linalg.cholesky(Q + 1e-18 * np.eye(12))
+    H = np.zeros((4, 12))
+    for k, far in enumerate(FAR):
+        u = -far / np.linalg.norm(far)
+        H[k, 2 * k : 2 * k + 2], H[k, 8:10] = -u, u
+    P0 = np.diag([*[params.start.position_std**2] * 10, *[params.start.speed_std**2] * 2])
+    error = rng.standard_normal((n_runs, 12)) * np.sqrt(np.diag(P0))
+    P, found = P0, np.zeros((n_runs, len(t), 5, 2))
+    for k in range(len(t)):
+        if k > 0:
+            # The error of a filter that knows F grows by the noise that it does not know.
+            error = error @ F.T + rng.standard_normal((n_runs, 12)) @ root.T
+            P = F @ P @ F.T + Q
+        K = P @ H.T @ np.linalg.inv(H @ P @ H.T + SIGMA**2 * np.eye(4))
+        noise = SIGMA * rng.standard_normal((n_runs, 4))
+        error = error - (error @ H.T + noise) @ K.T
+        P = (np.eye(12) - K @ H) @ P
+        found[:, k] = error[:, :10].reshape(n_runs, 5, 2)
+    return found
+
+
+def test_the_bound_of_a_linear_gaussian_run_is_what_a_kalman_filter_errs_by():
+    """In all three alignments, over 400 simulated runs."""
+    log, params, t = far_nodes()
+    bound = posterior_bound(log, params, skip=SKIP)
+    at = np.round((bound.t - t[0]) * HZ).astype(int)
+    errors = kalman_runs(params, t, 400, seed=5)[:, at]
+    estimate = TeamEstimate.empty(log.constellation, bound.t)
+    estimate.status[:] = Status.OK
+    estimate.cov[:] = np.eye(6)
+    truth, known = log.truth.pairs(log.constellation, bound.t)
+    i, j = log.constellation.pairs.T
+    squared = []
+    for run in errors:
+        estimate.pos_ij_w[..., :2] = truth[..., :2] + run[:, j] - run[:, i]
+        found = score(estimate, truth, known, 0.0)
+        squared.append([found.rmse**2, found.rmse_yaw**2, found.rmse_shape**2])
+    rms = np.sqrt(np.mean(squared, axis=0))
+    np.testing.assert_allclose([bound.rmse, bound.rmse_yaw, bound.rmse_shape], rms, rtol=0.04)
+    assert bound.rmse_yaw < 0.95 * bound.rmse

@@ -158,7 +158,7 @@ def test_who_joins_turns_with_the_others():
     spread_turn(c, s, 0, c["rotation_var"])
     note_turn(c, s)
     before = s.group["turn_var"][0]
-    add_node(c, s, layout, 0, new, pos, 0.0)
+    add_node(c, s, layout, 0, new, pos, c["position_var"], 0.0)
     s.nodes["present"][new] = True
     note_turn(c, s)
     assert s.group["turn_var"][0] == pytest.approx(before, rel=0.05)
@@ -190,7 +190,7 @@ def test_a_join_is_as_uncertain_as_centre_and_turn_of_the_others_and_its_own_pla
     J = np.outer([-arm[1], arm[0]], read)  # noqa: N806
     for k in range(2):
         J[k, at[:3] + k] += 1.0 / 3.0
-    add_node(c, s, layout, 0, new, pos, 0.0)
+    add_node(c, s, layout, 0, new, pos, c["position_var"], 0.0)
     mine = at[new] + np.arange(2)
     own = J @ P @ J.T + c["position_var"] * np.eye(2)
     np.testing.assert_allclose(s.P[0][np.ix_(mine, mine)], own, rtol=1e-6)

@@ -70,7 +70,9 @@ def with_rates(constellation: Constellation, block: MeasurementBlock) -> Constel
         mine = block.i[0] == n
         imu_hz = _rate(block.t[0, mine & (block.kind[0] == Kind.IMU)]) or config.imu_hz
         mag_hz = _rate(block.t[0, mine & (block.kind[0] == Kind.MAG)])
-        nodes.append(replace(config, imu_hz=imu_hz, mag_hz=None if mag_hz == imu_hz else mag_hz))
+        nodes.append(
+            replace(config, imu_hz=imu_hz, mag_hz=None if mag_hz in (0.0, imu_hz) else mag_hz)
+        )
     return replace(constellation, nodes=tuple(nodes))
 
 

@@ -195,8 +195,8 @@ def _read_imu(
 def _read_optional(
     folder: Path, constellation: Constellation, skipped: dict[str, int]
 ) -> list[MeasurementBlock]:
-    """Events of mag.csv and state.csv."""
-    blocks = []
+    """Events of mag.csv, state.csv and members.csv."""
+    blocks = _read_members(folder, constellation)
     for stem, kind, columns, limits in (
         ("mag", Kind.MAG, MAG, np.full(3, MAX_MAG)),
         ("state", Kind.STATE, (*QUAT, "ax", "ay", "az"), np.array([1.1] * 4 + [MAX_ACC] * 3)),
@@ -216,6 +216,22 @@ def _read_optional(
         skipped[path.name] = int(np.sum(~good))
         blocks.append(MeasurementBlock.of_kind(kind, t[good], node[good], values[good]))
     return blocks
+
+
+def _read_members(folder: Path, constellation: Constellation) -> list[MeasurementBlock]:
+    """JOIN and LEAVE events of members.csv."""
+    path = find_table(folder, "members")
+    if path is None:
+        return []
+    table = Table.read(path, ("t_s", "node", "joins"))
+    t, node = table.times(), table.nodes("node", constellation.index_of)
+    joins, filled = table.numbers(("joins",))
+    table.check_share(filled[:, 0] & np.isin(joins[:, 0], (0.0, 1.0)), "0 or 1", ("joins",))
+    none = np.zeros((table.n_rows, 1))
+    return [
+        MeasurementBlock.of_kind(kind, t[of], node[of], none[of])
+        for kind, of in ((Kind.JOIN, joins[:, 0] == 1.0), (Kind.LEAVE, joins[:, 0] == 0.0))
+    ]
 
 
 def _read_truth(folder: Path, constellation: Constellation, skipped: dict[str, int]) -> Truth:

@@ -102,10 +102,11 @@ def _quoted(text: str) -> str:
 def _tables(log: Log) -> Iterable[tuple[str, Sequence[str], list[list[object]]]]:
     """Name, header and rows of every file that the run needs."""
     block = log.block
-    odd = block.valid[0] & np.isin(block.kind[0], (Kind.JOIN, Kind.LEAVE))
-    if odd.any():
-        raise LogError("a log has no place for JOIN and LEAVE events; silence says the same")
     ids = np.array(log.constellation.ids)
+    member = block.take(block.valid[0] & np.isin(block.kind[0], (Kind.JOIN, Kind.LEAVE)))
+    if member.n_events:
+        joins = (member.kind[0] == Kind.JOIN).astype(np.int64)[:, None]
+        yield "members", ["t_s", "node", "joins"], _rows(member, ids, joins)
     yield "ranges", *_ranges(log, ids)
     imu, mag = (_of_kind(block, kind) for kind in (Kind.IMU, Kind.MAG))
     # One row where every sample has its own magnetometer reading, else a file of its own.

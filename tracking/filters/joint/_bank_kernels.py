@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from tracking._exponential_kernels import decay
-from tracking.compiled import allocating_kernel, kernel
+from tracking.compiled import allocating_kernel, kernel, small_kernel
 from tracking.filters._shape_kernels import forget_first
 from tracking.filters.joint._agreement_kernels import are_same, turn_between
 from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_hypothesis
@@ -37,6 +37,15 @@ LOOSE_POSITION, LOOSE_SPEED = 0.2, 0.5
 """[m, m/s] What is added to the standard deviations then."""
 LOST_SPEED = 0.7
 """[m/sqrt(s), m/s/sqrt(s)] How fast a lost filter forgets positions and velocities."""
+
+
+@small_kernel
+def bank_range(s):
+    """Hypotheses to go through: all, or the only one."""
+    group = s.group[0]
+    if group.n_alive > 1:
+        return 0, s.alive.shape[0]
+    return group.best, group.best + 1
 
 
 @allocating_kernel

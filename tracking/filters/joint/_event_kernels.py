@@ -6,6 +6,7 @@ from tracking.compiled import kernel, small_kernel
 from tracking.filters._shape_kernels import collect
 from tracking.filters.joint._antenna_kernels import antenna_offset
 from tracking.filters.joint._bank_kernels import (
+    bank_range,
     open_up,
     prune_bank,
     remove_node,
@@ -27,7 +28,12 @@ from tracking.filters.joint._rest_kernels import learn_at_rest
 from tracking.filters.joint._rotation_kernels import carry_moves, follow_rotation
 from tracking.filters.joint._sample_kernels import sum_inertial, take_state
 from tracking.filters.joint._sight_kernels import gap_evidence
-from tracking.filters.joint._silence_kernels import remove_faded, was_silent
+from tracking.filters.joint._silence_kernels import (
+    note_heard,
+    note_interval,
+    remove_faded,
+    was_silent,
+)
 from tracking.filters.joint._sleep_kernels import may_move, none_moved, wake_up
 from tracking.filters.joint._start_kernels import try_join, try_start
 from tracking.filters.joint._stuck_kernels import is_stuck
@@ -39,8 +45,6 @@ from tracking.filters.joint.state import N_PRE, JointState
 STATE, SURVEY, RANGE, LEAVE = 3, 4, 5, 6
 SAME = 1e-5
 """[s] Ranges of one message differ by their rounding only: they share a prediction."""
-RECENT, SLOWEST = 0.1, 5.0
-"""[-, s] Weight of a time between two ranges in its running mean; longer ones are gaps."""
 GAUGE_PERIOD = 1.0
 """[s] Time between two moves of the centre to the origin."""
 
@@ -162,14 +166,6 @@ def hear(c, s, layout, scratch, i, j, a_i, a_j, t, distance, sight, is_survey):
 
 
 @small_kernel
-def note_heard(node, t):
-    """Note that a node takes part in a range, and how often it does."""
-    if node.heard and t - node.t_heard > SAME:
-        node.interval += RECENT * (min(t - node.t_heard, SLOWEST) - node.interval)
-    node.heard, node.t_heard = True, t
-
-
-@small_kernel
 def advance(c, s, layout, scratch, t, at_once):
     """Carry every hypothesis to time t, and use what is known about the carriers.
 
@@ -225,34 +221,22 @@ def carry(c, s, scratch, t):
 
 
 @small_kernel
-def bank_range(s):
-    """Hypotheses to go through: all, or the only one."""
-    group = s.group[0]
-    if group.n_alive > 1:
-        return 0, s.alive.shape[0]
-    return group.best, group.best + 1
-
-
-@small_kernel
 def take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, sight, is_survey):
     """A range or survey of a running pair, at most `carry_period` after the states."""
     pair, group = s.pairs[p], s.group[0]
     i0, i1, i2 = antenna_offset(s.held, layout, pair.i, a_i)
     j0, j1, j2 = antenna_offset(s.held, layout, pair.j, a_j)
     levers = (i0, i1, i2, j0, j1, j2)
-    dt = max(t - pair.t_range, 0.0)
+    dt, is_news = max(t - pair.t_range, 0.0), False
     if is_survey:
-        is_news = distance != pair.surveyed
+        pair.t_range, pair.t_used, is_news = t, t, distance != pair.surveyed
         collect(c, pair, t, distance, True)  # for when one of them comes again
-        if not is_news:
-            pair.t_range, pair.t_used = t, t
-            return
     first, end = bank_range(s)
     for h in range(first, end):
         if not s.alive[h]:
             continue
         if is_survey:
-            fuse_survey(c, s, h, p, distance, scratch)
+            fuse_survey(c, s, h, p, distance, is_news, scratch)
             continue
         nu, misfit, nis, weight = fuse_range(c, s, h, p, dt, distance, levers, sight, scratch)
         if h == group.best:
@@ -270,10 +254,7 @@ def take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, sight, is_survey
                 pair.t_used = t
             else:
                 pair.n_rejected += 1
-    if is_survey:
-        pair.t_used = t
-    if dt > SAME:
-        pair.interval += RECENT * (min(dt, SLOWEST) - pair.interval)
+    note_interval(pair, dt)
     pair.t_range = t
     pair.n_ranges += 1
 

@@ -38,7 +38,7 @@ from tracking.filters.joint._sleep_kernels import TIE
 CLEAR, CLEARER = 1.0, 5.0
 """[-] By so much another turn has to be likelier (log-likelihood) before it is reported; where one
 was known and is doubted by more: noise that lasts makes some other look a little likelier."""
-KNOWN = 0.14
+KNOWN = 0.2
 """[rad] Turns that are known so well are left to filters that are linear about each of them."""
 SMALL = 0.02
 """[rad] A frame is not turned by less."""

@@ -16,9 +16,28 @@ from tracking.compiled import allocating_kernel, kernel, small_kernel
 from tracking.filters.joint._bank_kernels import remove_node
 from tracking.filters.joint._doubt_kernels import MISSED
 
+SAME = 1e-5
+"""[s] Ranges of one message differ by their rounding only."""
+RECENT, SLOWEST = 0.1, 5.0
+"""[-, s] Weight of a time between two ranges in its running mean; longer ones are gaps."""
 FADED = 0.5
 """[-] Share of the variance of a pair that is not ok from which on a distance is open: by then the
 line of sight at 2 m may be off by 20 degrees."""
+
+
+@small_kernel
+def note_heard(node, t):
+    """Note that a node takes part in a range, and how often it does."""
+    if node.heard:
+        note_interval(node, t - node.t_heard)
+    node.heard, node.t_heard = True, t
+
+
+@small_kernel
+def note_interval(record, dt):
+    """Count a time between two ranges of a node or a pair [s]; those of one round are one."""
+    if dt > SAME:
+        record.interval += RECENT * (min(dt, SLOWEST) - record.interval)
 
 
 @small_kernel

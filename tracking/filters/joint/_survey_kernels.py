@@ -18,8 +18,11 @@ CONTRADICTS = 6.6
 
 
 @small_kernel
-def fuse_survey(c, s, h, p, distance, scratch):
+def fuse_survey(c, s, h, p, distance, is_news, scratch):
     """Correct hypothesis h with a surveyed distance between the origins of two nodes.
+
+    The same distance again says nothing new, so P stays: it takes back what linear corrections
+    have stretched since.
 
     A hypothesis that puts a newcomer on the wrong side of the others is told so by the next of
     them, long before anybody moves.
@@ -29,6 +32,12 @@ def fuse_survey(c, s, h, p, distance, scratch):
     none = scratch.none
     predicted, m = range_model(c, s, h, p, none, none, scratch.idx, scratch.val)
     variance, open_var = project(s, h, m, scratch), 0.0
+    if not is_news:
+        share = (distance - predicted) / (variance + c.survey_var)
+        for r in range(c.n):
+            s.x[h, r] += scratch.w[r] * share
+            s.moved[h, r] += scratch.w[r] * share
+        return
     if s.group[0].open:
         scratch.direct[:] = 0.0
         open_var = turn_gradient(s, h, m, scratch)
@@ -49,5 +58,5 @@ def use_surveys(c, s, layout, scratch, i, end):
             if s.pairs[p].surveyed > 0.0:
                 for h in range(s.alive.shape[0]):
                     if s.alive[h]:
-                        fuse_survey(c, s, h, p, s.pairs[p].surveyed, scratch)
+                        fuse_survey(c, s, h, p, s.pairs[p].surveyed, True, scratch)
     settle_all(s)

@@ -1,0 +1,63 @@
+"""Who is in the group, as the radios' own protocol has it: JOIN and LEAVE events.
+
+The initiator of a round decides who takes part in the next (`tracking.ranging.members`), and a host
+that listens hears its table. A node in no table for `PATIENCE` has left: an obstacle that hides a
+node for some rounds is no reason to forget where it is.
+"""
+
+from __future__ import annotations
+
+from tracking.compiled import small_kernel
+
+INITIATOR = 1
+"""Role of a session, see `tracking.ranging._turn_kernels`."""
+JOIN, LEAVE = 0, 6
+PATIENCE = 1.0
+"""[s]"""
+LAST, IS_MEMBER = 0, 1
+"""Columns of what is kept of each node: when it was last in a table [s]; 1 after its JOIN."""
+
+
+@small_kernel
+def note_members(air, members, t, events, e, k):
+    """Append what has changed in the group; returns the place of the next event.
+
+    Args:
+        air: Air of all environments.
+        members: What is kept of each node, (env, node, 2), updated.
+        t: Now [s].
+        events: Events, appended from place k on.
+        e: Environment.
+        k: Place of the next event.
+    """
+    table = 0
+    for n in range(members.shape[1]):
+        if air.nodes[e, n].on and air.sessions[e, n].role == INITIATOR:
+            table |= air.sessions[e, n].members
+    if table == 0:
+        return k  # nobody leads, and nobody knows
+    for n in range(members.shape[1]):
+        if k >= events.t.shape[1]:
+            break
+        was_member = members[e, n, IS_MEMBER] > 0.0
+        if (table >> n) & 1:
+            members[e, n, LAST] = t
+            changes = not was_member
+        else:
+            changes = was_member and t - members[e, n, LAST] > PATIENCE
+        if changes:
+            members[e, n, IS_MEMBER] = 0.0 if was_member else 1.0
+            write_member(events, e, k, t, LEAVE if was_member else JOIN, n)
+            k += 1
+    return k
+
+
+@small_kernel
+def write_member(events, e, k, t, kind, n):
+    """An event of one node without values."""
+    events.t[e, k], events.kind[e, k] = t, kind
+    events.i[e, k], events.j[e, k] = n, n
+    events.antenna_i[e, k], events.antenna_j[e, k] = 0, 0
+    for column in range(events.values.shape[2]):
+        events.values[e, k, column] = 0.0
+    events.has_power[e, k], events.nlos[e, k], events.valid[e, k] = False, False, True

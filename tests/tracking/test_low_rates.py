@@ -1,0 +1,71 @@
+"""Groups whose pairs range a few times a second or less: they start, and know how well."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.exact_motion import ExactGroup
+from tracking import Status, Tracker
+from tracking.integrity import wrong_while_ok
+from tracking.log import Log, notes_on, notes_on_estimate
+from tracking.measurements import Kind
+
+
+def thinned(group, rate, loss, seed):
+    """Every pair ranges `rate` times a second, at times of its own; a share is lost."""
+    block, rng = group.block, np.random.default_rng(seed)
+    keep = block.kind[0] != Kind.RANGE
+    for i, j in group.constellation.pairs:
+        mine = np.nonzero((block.kind[0] == Kind.RANGE) & (block.i[0] == i) & (block.j[0] == j))[0]
+        due = np.arange(rng.uniform(0.0, 1.0 / rate), group.t[-1], 1.0 / rate)
+        at = np.unique(np.searchsorted(block.t[0, mine], due))
+        at = at[(at < len(mine)) & (rng.random(len(at)) >= loss)]
+        keep[mine[at]] = True
+    return block.take(keep)
+
+
+@pytest.mark.parametrize("loss", [0.0, 0.3])
+@pytest.mark.parametrize("rate", [0.5, 1.0, 2.0, 4.0, 6.0])
+@pytest.mark.parametrize("n", [3, 5])
+def test_every_group_with_enough_ranges_starts(n, rate, loss):
+    """And no car is ok and wrong by it."""
+    group = ExactGroup("car", range(n), hz=50.0, seconds=30.0)
+    t = np.arange(0.5, 29.9, 0.1)
+    for seed in range(3):
+        block = thinned(group, rate, loss, seed)
+        estimate = Tracker(group.constellation).run(block, t).take(0)
+        runs = (estimate.status >= Status.AMBIGUOUS).all(axis=1)
+        # Three ranges of every pair in a row that are not too old, or two seconds of more.
+        assert t[runs][0] < 3.0 + 9.0 / (rate * (1.0 - loss))
+        assert not wrong_while_ok(estimate, group.pairs(t)).any()
+
+
+def test_a_pair_that_ranges_once_a_second_is_not_lost_between():
+    group = ExactGroup("robot", range(3), hz=50.0, seconds=20.0, at_rest=True)
+    t = np.arange(12.0, 19.5, 0.05)
+    estimate = Tracker(group.constellation).run(thinned(group, 1.0, 0.0, 1), t).take(0)
+    by_age = (estimate.status == Status.LOST) & (estimate.pos_std.max(axis=-1) < 1.0)
+    assert not by_age.any()
+
+
+def test_what_was_never_placed_is_told_with_what_it_lacks():
+    group = ExactGroup("robot", range(4), hz=50.0, seconds=8.0)
+    block = group.block
+    of_last = (block.kind[0] == Kind.RANGE) & (block.j[0] == 3)
+    few = of_last & (block.i[0] > 0)
+    block = block.take(~few)
+    log = Log(name="one-pair", constellation=group.constellation, block=block)
+    estimate = Tracker(group.constellation).run(block, np.arange(0.5, 7.9, 0.1)).take(0)
+    (note,) = notes_on_estimate(log, estimate)
+    assert "node 13 was never placed" in note
+    assert "with 1 nodes" in note
+    assert "each of 3 placed nodes" in note
+
+
+def test_without_any_imu_the_notes_say_what_cannot_be_known():
+    group = ExactGroup("robot", range(3), hz=20.0, seconds=4.0)
+    block = group.block.take(group.block.kind[0] == Kind.RANGE)
+    log = Log(name="no-imu", constellation=group.constellation, block=block)
+    assert "mirror" in " ".join(notes_on(log))
+    assert notes_on(replace(log, block=group.block)) == []
