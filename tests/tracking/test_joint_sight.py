@@ -64,7 +64,10 @@ def test_by_so_much_it_is_forgotten(seed, hidden, switched, is_far):
 
 @settings(max_examples=30)
 @given(st.integers(0, 99), st.floats(0.0, 1.0), SHARES)
-def test_a_change_that_waits_for_the_prediction_is_the_same_as_one_at_once(seed, hidden, switched):
+def test_a_change_that_waits_for_the_prediction_moves_the_mean_as_one_at_once(
+    seed, hidden, switched
+):
+    """And all covariances; its own variance is that of a way which leaves as much."""
     c, s, scratch = believing(seed, hidden, waiting=False)
     x, P = s.x[0].copy(), s.P[0].copy()
     s.pre[:] = 0.0
@@ -75,6 +78,10 @@ def test_a_change_that_waits_for_the_prediction_is_the_same_as_one_at_once(seed,
     s.stays[0, 0] = 1.0 - switched
     predict(c, s, 0, 0.0, scratch)
     np.testing.assert_allclose(s.x[0], at_once[0], atol=1e-12)
+    at, stays = s.pairs["at_e"][0] + 1, 1.0 - switched
+    new = c["slow_var"] + hidden * c["excess_var"]
+    assert s.P[0, at, at] == pytest.approx(stays**2 * P[at, at] + (1.0 - stays**2) * new)
+    s.P[0, at, at] = at_once[1][at, at]
     np.testing.assert_allclose(s.P[0], at_once[1], atol=1e-12)
 
 

@@ -181,7 +181,7 @@ def test_a_survey_counts_against_a_layout_by_what_no_turn_explains(from_turn):
     s.slope[0], s.spread[0] = 0.0, np.eye(9)
     s.slope[0, :, at[2]] = 1.0 if from_turn else 0.0
     before = s.loglik[0]
-    _survey_kernels.fuse_survey(c, s, 0, pair, 3.0, scratch)
+    _survey_kernels.fuse_survey(c, s, 0, pair, 3.0, True, scratch)
     assert s.loglik[0] == (before if from_turn else pytest.approx(before - 0.5 * c["max_nis"]))
 
 

@@ -144,7 +144,7 @@ def test_surveys_do_not_tell_how_a_group_is_turned():
     for p in np.tile(np.arange(len(s.pairs)), 10):
         i, j = (s.nodes["at_p"][s.pairs[name][p]] for name in "ij")
         way = np.linalg.norm(s.x[0, j : j + 2] - s.x[0, i : i + 2])
-        fuse_survey(c, s, 0, p, way + rng.normal(0.0, 0.1), scratch)
+        fuse_survey(c, s, 0, p, way + rng.normal(0.0, 0.1), True, scratch)
     settle(s, 0)
     note_turn(c, s)
     assert s.group["turn_var"][0] > 0.5 * before

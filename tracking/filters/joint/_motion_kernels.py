@@ -19,7 +19,6 @@ from tracking._angle_kernels import cosine_sine
 from tracking._exponential_kernels import decay
 from tracking.compiled import small_kernel
 from tracking.filters.joint._gyroscope_kernels import fade_lean, lean_columns, lean_rows
-from tracking.filters.joint._linear_kernels import covariance
 from tracking.filters.joint._mirror_kernels import mirror
 from tracking.filters.joint._product_kernels import take_off
 from tracking.filters.joint._step_kernels import STATES, add_to_columns, add_to_rows
@@ -49,7 +48,6 @@ def predict(c, s, h, step, scratch):
     """
     nodes, pairs, x, P = s.nodes, s.pairs, s.x, s.P
     scale, w, F, speed = scratch.scale, scratch.step, scratch.derivatives, scratch.speed
-    added = scratch.added
     d = c.d
     for r in range(P.shape[2]):
         scale[r] = 1.0
@@ -59,20 +57,14 @@ def predict(c, s, h, step, scratch):
             move_mean(c, nodes[i], s.pre, x, h, i, scale, w, speed)
     for p in range(pairs.shape[0]):
         at = pairs[p].at_e
-        added[p] = 0.0
         if at < 0 or not (nodes[pairs[p].i].present and nodes[pairs[p].j].present):
             continue
         way = (speed[pairs[p].i] + speed[pairs[p].j]) * step
         scale[at] = decay(way / c.fast_length)
-        hidden, stays = s.nlos[h, p], s.stays[h, p]
-        keep = decay(way * ((1.0 - hidden) / c.slow_length + hidden / c.excess_length))
-        scale[at + 1] = keep * stays
+        hidden = s.nlos[h, p]
+        scale[at + 1] = decay(way * ((1.0 - hidden) / c.slow_length + hidden / c.excess_length))
+        scale[at + 1] *= s.stays[h, p]  # as a way does that leaves so much
         x[h, at] *= scale[at]
-        # What is left of the error is a mixture of what it was and of a new one.
-        off = x[h, at + 1] - hidden * c.excess
-        spread = covariance(s, h, at + 1, at + 1) + off * off
-        added[p] = keep * keep * (1.0 - stays) * stays * spread
-        added[p] += (1.0 - keep * keep * stays) * new_error_variance(c, hidden)
         x[h, at + 1] *= scale[at + 1]
         x[h, at + 1] += (1.0 - scale[at + 1]) * hidden * c.excess
     take_off(P, h, s.waiting, h, s.n_waiting[h], scale)
@@ -96,14 +88,9 @@ def predict(c, s, h, step, scratch):
     for p in range(pairs.shape[0]):
         at = pairs[p].at_e
         if at >= 0:
+            slow_var = c.slow_var + s.nlos[h, p] * c.excess_var
             P[h, at, at] += (1.0 - scale[at] * scale[at]) * c.fast_var
-            P[h, at + 1, at + 1] += added[p]
-
-
-@small_kernel
-def new_error_variance(c, hidden):
-    """Variance of a slow range error of which only the probability of no sight is known [m2]."""
-    return c.slow_var + hidden * c.excess_var + hidden * (1.0 - hidden) * c.excess * c.excess
+            P[h, at + 1, at + 1] += (1.0 - scale[at + 1] * scale[at + 1]) * slow_var
 
 
 @small_kernel

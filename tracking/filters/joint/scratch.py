@@ -30,8 +30,6 @@ class Scratch(NamedTuple):
     """Of position and velocity by the states behind, see `_step_kernels`."""
     speed: F64
     """(node)"""
-    added: F64
-    """To the variance of each pair's slow range error, (pair)."""
     none: F64
     """Zeros, (3)."""
     x: F64
@@ -68,7 +66,6 @@ def make_scratch(n_nodes: int, n_pairs: int, n_states: int) -> Scratch:
         step=np.zeros((n_nodes, 42)),
         derivatives=aligned(n_nodes, STATES + 1, ROOM),
         speed=np.zeros(n_nodes),
-        added=np.zeros(n_pairs),
         none=np.zeros(3),
         x=aligned(1, n_states),
         P=aligned(1, n_states, n_states),
