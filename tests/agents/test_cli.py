@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from agents.frames import NAMES
+from tracking.filters import FILTERS
 
 RELPOS = Path(sys.executable).with_name("relpos")
 
@@ -325,7 +326,7 @@ def test_demo_tells_errors_and_draws_the_drive(tmp_path):
     done = relpos("demo", "--seconds", 20, "--out", tmp_path / "demo", "--json")
     assert done.returncode == 0, done.stderr
     *tracks, formation = [json.loads(line) for line in done.stdout.splitlines()]
-    assert [t["filter"] for t in tracks] == ["joint", "ekf-mds", "ekf"]
+    assert [t["filter"] for t in tracks] == list(FILTERS)
     assert 0.0 < formation["formation_error_truth"] < formation["formation_error"]
     assert formation["formation_error"] < 0.5 * formation["formation_error_blind"]
     assert "<canvas" in (tmp_path / "demo" / "report.html").read_text()
