@@ -34,8 +34,8 @@ from tracking.measurements import Kind
 RELPOS = Path(sys.executable).with_name("relpos")
 KEYS = {
     "suite", "scenario", "filter", "seeds", "rmse", "rmse_yaw", "rmse_shape", "bound",
-    "bound_yaw", "bound_shape", "ratio_bound", "ratio_shape", "lost_runs", "nees", "nis", "us_per_round",
-    "paper", "gospa",
+    "bound_yaw", "bound_shape", "ratio_bound", "ratio_shape", "lost_runs", "nees", "nis",
+    "us_per_round", "paper", "gospa",
 }  # fmt: skip
 
 
