@@ -110,8 +110,8 @@ def run(case: Case, log: Log, filter: str, seed: int, bound: Bound | None) -> Ru
         log: Its log, with truth.
         filter: One of `tracking.filters.FILTERS`.
         seed: That of the log.
-        bound: The least possible errors of the log; None where cars come and go, which it does
-            not know.
+        bound: Expected errors of an efficient estimator; None where cars come and go, which it
+            does not know.
     """
     constellation, block = log.constellation, log.block
     first, last = log.t_range

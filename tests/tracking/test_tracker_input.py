@@ -137,6 +137,34 @@ def test_foreign_antennas_of_surveys_are_refused():
         Tracker(GROUP).step(survey, 0.2)
 
 
+def test_a_survey_does_not_say_with_which_antenna_a_node_ranges():
+    nodes = NodeConfig(id=0), NodeConfig(id=1)
+    antennas = tuple(Antenna(id=k, node=0, offset_b=(0.1 * k, 0.0, 0.0)) for k in (1, 2))
+    group = Constellation(nodes=nodes, antennas=antennas, dimensions=2)
+    metres = np.array([[2.0]])
+    first, second, of_other = np.array([0]), np.array([1]), np.array([2])
+    ranged = MeasurementBlock.of_kind(
+        Kind.RANGE,
+        np.array([0.1]),
+        np.array([0]),
+        metres,
+        j=np.array([1]),
+        antennas=(second, of_other),
+    )
+    survey = MeasurementBlock.of_kind(
+        Kind.SURVEY,
+        np.array([0.2]),
+        np.array([0]),
+        metres,
+        j=np.array([1]),
+        antennas=(first, of_other),
+    )
+    tracker = Tracker(group)
+    for block, t in ((ranged, 0.15), (survey, 0.25)):
+        tracker.step(block, t)
+        np.testing.assert_array_equal(tracker._filter._state.nodes["antenna"][0], [1, 2])
+
+
 def test_smoothing_refuses_what_running_refuses_and_survives_it():
     block = ranges()
     tracker, half = Tracker(GROUP), block.n_events // 2
