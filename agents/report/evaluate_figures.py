@@ -121,11 +121,11 @@ def _over_seeds(result: EvaluateResult) -> Figure:
                 ax.plot(x[chosen], errors[chosen], marker, color=colour, ms=5, alpha=0.6, mew=1)
             if runs:
                 ax.hlines(np.median(errors), k - 0.34, k + 0.34, color=colour, lw=2)
-        bound = rows[0].median("bound")
+        bound = rows[0].median("bound_yaw")
         if bound is not None:
             ax.axhline(bound, color="k", ls="--", lw=1)
         ax.set(yscale="log", xlim=(-0.6, len(rows) - 0.4))
-        ax.set_xticks(range(len(rows)), [c.filter for c in rows], fontsize=9)
+        ax.set_xticks(range(len(rows)), [c.filter for c in rows], fontsize=9, rotation=20)
         _plain_ticks(ax.yaxis)
     _finish(figure, "rmse_yaw [m]", legend=False)
     return figure
