@@ -22,14 +22,14 @@ class PaperParams:
     """Noise, gate and options of `paper-ekf` and `paper-ekf-mds`.
 
     Covariances are constant and diagonal, "determined empirically" in the paper. The defaults are
-    chosen on simulated runs of three cars, seeds 1000 to 1004 (docs/paper.md).
+    chosen on simulated runs of cars and people, seeds 1000 to 1009 (docs/paper.md).
     """
 
-    accel_std: float = 0.1
+    accel_std: float = 0.2
     """[m/s2] Noise n_a of a node's world acceleration: the root of the diagonal of Q_a, eq. (2)."""
     orientation_std: float = 0.02
     """[-] Noise n_q of a quaternion component: the root of the diagonal of Q_q, eq. (1)."""
-    range_std: float = 0.03
+    range_std: float = 0.02
     """[m] Noise of a range: the root of the first element of R."""
     speed_std: float = 10.0
     """[m/s] Noise of the low-passed derivative of the range: the root of the second of R."""
