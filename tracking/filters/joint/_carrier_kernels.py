@@ -66,7 +66,8 @@ def glides(c, s, h, i):
     for k in range(c.d):
         at = s.nodes[i].at_v + k
         v = s.x[h, at]
-        if v * v > GLIDES * (covariance(s, h, at, at) + c.rest_var):
+        floor = GLIDES * c.rest_var
+        if v * v > floor and v * v > floor + GLIDES * covariance(s, h, at, at):
             return True
     return False
 
