@@ -32,10 +32,13 @@ def needs_no_layout(name):
 def steady(layout):
     """The paper's filter with a first layout and without its speed model.
 
-    With the norm of the velocity any rounding grows a thousandfold in two seconds.
+    With the norm of the velocity any rounding grows a thousandfold in two seconds, with ranges
+    that are trusted to centimetres not much less.
     """
     first = tuple(tuple(map(float, p)) for p in layout)
-    return PaperParams(first_layout=first, speed="rate", speed_std=1e3)
+    return PaperParams(
+        first_layout=first, accel_std=0.5, range_std=0.1, speed="rate", speed_std=1e3
+    )
 
 
 def put_on_truth(state, group, turn=None, clock=0.0):
