@@ -12,6 +12,7 @@ from tracking.filters.joint import (
     _bank_kernels,
     _carrier_kernels,
     _frame_kernels,
+    _linear_kernels,
     _open_kernels,
     _peak_kernels,
     _range_kernels,
@@ -149,3 +150,25 @@ def test_a_frame_is_not_likelier_for_being_surer(parted):
     surer = np.subtract(gained[1], gained[0])
     # What another sight would have told is all that is left.
     np.testing.assert_allclose(surer, 0.0, atol=0.1)
+
+
+def test_the_nis_is_over_the_variance_that_the_correction_used():
+    """From how much the correction narrows the range: its variance goes from v to v - v^2 / S."""
+    c, s, scratch, _ = open_bank()
+    s.group["n_alive"], s.group["open"], s.group["parted"] = 1, False, False
+    h, p, levers = 0, 0, np.zeros(6)
+    sight = (0.0, c["enter_rate"], c["leave_rate"])
+
+    def predicted():
+        distance, m = _range_kernels.range_model(
+            c, s, h, p, levers[:3], levers[3:], scratch.idx, scratch.val
+        )
+        return distance, _linear_kernels.project(s, h, m, scratch)
+
+    before, v = predicted()
+    nu, _, nis, sane = _range_kernels.fuse_range(
+        c, s, h, p, 0.02, before + 0.05, levers, sight, scratch
+    )
+    _, after = predicted()
+    assert sane > 0.99
+    assert nis == pytest.approx(nu * nu * (v - after) / (v * v), rel=0.02)
