@@ -65,8 +65,11 @@ def test_they_keep_their_formation(name):
     ("name", "task", "scenario", "cars"),
     [
         *(("ring", "ring", "ring-nlos", n) for n in (3, 4, 5, 6)),
-        # Four cars have 0.31 m there (docs/results.md), which is not in formation.
         ("hold-beams", "hold", "ring-nlos", 3),
+        pytest.param(
+            *("hold-beams", "hold", "ring-nlos", 4),
+            marks=pytest.mark.xfail(strict=True, reason="0.32 m; 0.31 m over 40 episodes"),
+        ),
         *(("hold-beams", "hold", "hall", n) for n in (4, 6)),
     ],
 )

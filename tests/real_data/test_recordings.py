@@ -61,8 +61,9 @@ def test_one_filter_over_all_nodes_follows_a_hand_among_reflections(results):
 
 
 @pytest.mark.xfail(strict=True, reason="it takes 12 s to find the heading: 0.171 m from 10 s on")
-def test_it_does_so_from_ten_seconds_on(results):
-    assert results["inrol_env1", "joint"].score.rmse_yaw <= 0.15
+@pytest.mark.parametrize("limit", [0.15, 0.165])
+def test_it_does_so_from_ten_seconds_on(results, limit):
+    assert results["inrol_env1", "joint"].score.rmse_yaw <= limit
 
 
 def test_once_it_is_found_how_the_group_is_turned_it_is_so_for_good(data):
