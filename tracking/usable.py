@@ -9,15 +9,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from tracking._usable_kernels import mark_usable
 from tracking.arrays import F64
 from tracking.constellation import Constellation
 from tracking.errors import ConfigError
 from tracking.measurements import Kind, MeasurementBlock
-
-FARTHEST = 1000.0
-"""[m] No UWB radio ranges farther."""
-UNIT = 1e-3, 0.1
-"""[-] A quaternion's length may differ from 1 by so much as it is; by so much it is normalised."""
 
 
 def usable(block: MeasurementBlock) -> MeasurementBlock:
@@ -27,25 +23,12 @@ def usable(block: MeasurementBlock) -> MeasurementBlock:
     `FARTHEST`, and orientations that are no rotation. A range whose powers are not finite is one
     without powers. Quaternions that are nearly unit ones are normalised.
     """
-    between = block.valid & np.isin(block.kind, (Kind.RANGE, Kind.SURVEY))
-    has_power = block.has_power & np.isfinite(block.values[..., 1:3]).all(axis=-1)
-    is_distance = (block.values[..., 0] > 0.0) & (block.values[..., 0] <= FARTHEST)
-    finite = np.isfinite(block.values).all(axis=-1)
-    good = np.where(between, is_distance & (block.i != block.j), finite)
-    states = block.valid & (block.kind == Kind.STATE)
-    off = np.abs(
-        np.linalg.norm(np.where(states[..., None], block.values[..., :4], 0.5), axis=-1) - 1.0
-    )
-    good &= ~(off > UNIT[1])
-    valid = block.valid & good & np.isfinite(block.t)
-    odd = states & valid & (off > UNIT[0])
-    values = block.values
-    if odd.any():
-        values = values.copy()
-        values[odd, :4] /= np.linalg.norm(values[odd, :4], axis=-1, keepdims=True)
-    unchanged = np.array_equal(valid, block.valid) and np.array_equal(has_power, block.has_power)
-    if unchanged and values is block.values:
+    valid, has_power = block.valid.copy(), block.has_power.copy()
+    odd = np.empty_like(valid)
+    if not mark_usable(block.t, block.kind, block.i, block.j, block.values, valid, has_power, odd):
         return block
+    values = block.values.copy()
+    values[odd, :4] /= np.linalg.norm(values[odd, :4], axis=-1, keepdims=True)
     return replace(block, values=values, has_power=has_power, valid=valid)
 
 

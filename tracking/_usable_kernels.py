@@ -1,0 +1,56 @@
+"""Marks the measurements of a block that can be, and the powers and quaternions that cannot."""
+
+from __future__ import annotations
+
+import math
+
+from tracking.compiled import kernel
+
+# Plain numbers of `Kind`: kernels do not know enums.
+STATE, SURVEY, RANGE = 3, 4, 5
+FARTHEST = 1000.0
+"""[m] No UWB radio ranges farther."""
+UNIT, NEAR_UNIT = 1e-3, 0.1
+"""[-] A quaternion's length may differ from 1 by the first; up to the second it is normalised."""
+
+
+@kernel
+def mark_usable(t, kind, i, j, values, valid, has_power, odd):
+    """Take marks off what cannot be.
+
+    Args:
+        t: Of the block, like all that follow, (env, event) [s].
+        kind: (env, event).
+        i: (env, event).
+        j: (env, event).
+        values: (env, event, N_VALUES).
+        valid: Written, (env, event).
+        has_power: Written, (env, event).
+        odd: Written: True for quaternions that are to be normalised, (env, event).
+
+    Returns:
+        True if anything was marked otherwise than it came.
+    """
+    changed = False
+    for e in range(t.shape[0]):
+        for k in range(t.shape[1]):
+            odd[e, k] = False
+            if not valid[e, k]:
+                continue
+            v, what, good = values[e, k], kind[e, k], math.isfinite(t[e, k])
+            if what in (RANGE, SURVEY):
+                good = good and 0.0 < v[0] <= FARTHEST and i[e, k] != j[e, k]
+                if has_power[e, k] and not (math.isfinite(v[1]) and math.isfinite(v[2])):
+                    has_power[e, k] = False
+                    changed = True
+            else:
+                for c in range(v.shape[0]):
+                    good = good and math.isfinite(v[c])
+                if good and what == STATE:
+                    off = abs(math.sqrt(v[0] ** 2 + v[1] ** 2 + v[2] ** 2 + v[3] ** 2) - 1.0)
+                    good = off <= NEAR_UNIT
+                    odd[e, k] = good and off > UNIT
+            if not good or odd[e, k]:
+                valid[e, k] = good
+                changed = True
+    return changed
