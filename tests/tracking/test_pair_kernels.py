@@ -16,6 +16,7 @@ from tracking.filters.pair.state import (
     make_state,
 )
 from tracking.mds import refine_positions, weighted_mds
+from tracking.tracker import Tracker
 
 Y = {2: [0, 1, 3, 4], 3: [0, 1, 2, 3, 4, 5]}
 
@@ -201,6 +202,19 @@ def test_wheels_are_those_of_cars():
     before = s.x.copy()
     _wheel_kernels.apply_wheels(c, s, layout, 0.05, np.zeros((2, 7)))
     np.testing.assert_array_equal(s.x, before)
+
+
+def test_shifting_the_clock_leaves_the_mean_velocity_of_cars(group):
+    nodes = tuple(replace(node, vehicle="car") for node in group.constellation.nodes)
+    cars = replace(group.constellation, nodes=nodes)
+    begun = group.block.take(group.block.t[0] < 0.5)
+    means = []
+    for clock in (0.0, 512.0):
+        tracker = Tracker(cars, filter="ekf-mds")
+        tracker.step(replace(begun, t=begun.t + clock), 0.5 + clock)
+        means.append(tracker.save()["filter"].mean_v)
+    assert np.any(means[0] != 0.0)
+    np.testing.assert_allclose(means[0], means[1], atol=1e-9)
 
 
 def test_large_groups_are_refined_less_often():

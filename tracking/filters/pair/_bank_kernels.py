@@ -176,12 +176,12 @@ def are_same(c, s, a, b):
 
 
 @kernel
-def remove_node(s, layout, i):
+def remove_node(s, layout, i, t):
     """Destroy the filters of a node that left."""
     s.nodes[i].present = False
     s.nodes[i].heard = False
     s.group[0].flat = False
-    forget_mean(s)
+    forget_mean(s, t)
     n_present = 0
     for k in range(s.nodes.shape[0]):
         n_present += s.nodes[k].present
@@ -202,4 +202,4 @@ def remove_silent(c, s, layout, t):
     """Remove the nodes that were not heard for so long that they must have left."""
     for i in range(s.nodes.shape[0]):
         if (s.nodes[i].present or s.nodes[i].heard) and t - s.nodes[i].t_heard > c.leave_after:
-            remove_node(s, layout, i)
+            remove_node(s, layout, i, t)

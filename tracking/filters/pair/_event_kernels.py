@@ -127,7 +127,7 @@ def run_events(coefficients, layout, state, block, t_out, out):
                         c, s, layout, scratch, p, a_i, a_j, t[e, k], distance, evidence, is_survey
                     )
             elif what == LEAVE:
-                remove_node(s, layout, i)
+                remove_node(s, layout, i, t[e, k])
         while o < t_out.shape[1]:
             write_estimate(c, s, t_out[e, o], e, o, out)
             o += 1

@@ -49,8 +49,11 @@ def begin_pair(c, s, h, p, pos, t):
 
 
 @kernel
-def forget_mean(s):
-    """The mean velocity of another group is not known."""
+def forget_mean(s, t):
+    """The mean velocity of another group is not known, and what came before t changed none."""
+    s.group[0].dv0, s.group[0].dv1 = 0.0, 0.0
+    for i in range(s.nodes.shape[0]):
+        s.nodes[i].t_sum = t
     s.mean_v[:] = 0.0
     s.mean_cov[:] = 0.0
     s.mean_cov[:, 0, 0] = MEAN_SPEED_VAR
@@ -76,7 +79,7 @@ def try_start(c, s, layout, t):
                 if members[a] < members[b]:
                     p = layout.pair_index[members[a], members[b]]
                     begin_pair(c, s, h, p, Y[b] - Y[a], t)
-    forget_mean(s)
+    forget_mean(s, t)
     group = s.group[0]
     group.started = True
     group.flat = False
@@ -141,7 +144,7 @@ def try_join(c, s, layout, new, t):
                     p = layout.pair_index[k, new]
                     begin_pair(c, s, target, p, sign * (sides[side] - pos[k]), t)
     s.nodes[new].present = True
-    forget_mean(s)
+    forget_mean(s, t)
 
 
 @allocating_kernel
