@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from relpos_env.room import CAR_RADIUS, WALL_RADIUS
+from relpos_env.world import CAR_RADIUS, WALL_RADIUS
 from tracking.compiled import kernel, small_kernel
 
 FARTHEST = 0.5

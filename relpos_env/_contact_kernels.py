@@ -8,10 +8,9 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
+from relpos_env.world import REST
 from tracking.compiled import kernel, small_kernel
 
-REST = 1e-4
-"""[m/s, rad/s] A box that is slower stands."""
 LASTS = 3
 """[-] Steps for which the solver remembers a contact that is gone; what comes back then is not
 new."""
@@ -70,41 +69,29 @@ def solve(bodies, solver, e, dt):
 @small_kernel
 def put_bodies(bodies, solver, e):
     """Where everything is and what pushes it, in the order of the space."""
-    rows = solver.bodies
-    row = 0
-    for n in range(bodies.body.shape[1]):
-        if solver.car_ids[e, n] != 0:
+    rows, n_cars = solver.bodies, bodies.body.shape[1]
+    for row in range(rows.shape[1]):
+        owner = solver.owner[e, row]
+        for k in range(rows.shape[2]):
+            rows[e, row, k] = 0.0
+        if owner >= n_cars:
             for k in range(6):
-                rows[e, row, k] = bodies.body[e, n, k]
+                rows[e, row, k] = bodies.box_body[e, owner - n_cars, k]
+        elif owner >= 0:
+            for k in range(6):
+                rows[e, row, k] = bodies.body[e, owner, k]
             for k in range(3):
-                rows[e, row, 6 + k] = bodies.wrench[e, n, k]
-            row += 1
-    for b in range(bodies.box_body.shape[1]):
-        if solver.movable[e, b]:
-            for k in range(6):
-                rows[e, row, k] = bodies.box_body[e, b, k]
-            for k in range(6, 9):
-                rows[e, row, k] = 0.0
-            row += 1
-    # The room itself is a body, behind the others.
-    for k in range(rows.shape[2]):
-        rows[e, row, k] = 0.0
+                rows[e, row, 6 + k] = bodies.wrench[e, owner, k]
 
 
 @small_kernel
 def take_bodies(bodies, solver, e):
     """Where everything is after the step."""
-    rows = solver.moved
-    row = 0
-    for n in range(bodies.body.shape[1]):
-        if solver.car_ids[e, n] != 0:
-            for k in range(6):
-                bodies.body[e, n, k] = rows[e, row, k]
-            row += 1
-    for b in range(bodies.box_body.shape[1]):
-        if solver.movable[e, b]:
-            body = bodies.box_body
-            stands = True
+    rows, n_cars = solver.moved, bodies.body.shape[1]
+    for row in range(rows.shape[1]):
+        owner = solver.owner[e, row]
+        if owner >= n_cars:
+            b, body, stands = owner - n_cars, bodies.box_body, True
             for k in range(6):
                 body[e, b, k] = rows[e, row, k]
                 stands = stands and (k < 3 or abs(rows[e, row, k]) < REST)
@@ -113,7 +100,9 @@ def take_bodies(bodies, solver, e):
             bodies.boxes[e, b, 0], bodies.boxes[e, b, 1] = body[e, b, 0], body[e, b, 1]
             bodies.boxes[e, b, 4] = math.cos(body[e, b, 2])
             bodies.boxes[e, b, 5] = math.sin(body[e, b, 2])
-            row += 1
+        elif owner >= 0:
+            for k in range(6):
+                bodies.body[e, owner, k] = rows[e, row, k]
 
 
 @small_kernel

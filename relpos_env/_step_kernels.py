@@ -1,7 +1,8 @@
 """One decision of every environment: cars drive, sensors read, radios talk, step by step.
 
-Steps in which something touches, or nearly, are the rigid-body solver's. It needs a space for
-that, so an environment in which something comes near waits for one, and goes on.
+Cars move in a space of pymunk. With `physics="fast"` only those steps are made there in which
+something touches, or nearly. An environment waits where its space cannot be stepped by compiled
+code: a space must be built, or others have put something into it.
 """
 
 from __future__ import annotations
@@ -27,6 +28,8 @@ from tracking._angle_kernels import cosine_sine
 from tracking.compiled import kernel, small_kernel
 
 MAG, IMU, RANGE = 1, 2, 5
+WAITS, PUSHED, MOVED = 0, 1, 2
+"""How far the step under way is: nothing is done, forces are known, bodies have moved."""
 CALM = 5
 """[-] Steps that the solver keeps a room in which nothing touches any more: it remembers contacts
 for three."""
@@ -81,7 +84,7 @@ def run_steps(
         speed: Commands, (env, car) [m/s].
         steering: Commands, (env, car) [rad].
         t: Time since each environment began, (env) [s], written.
-        waiting: Numbers of the environments that wait for a space, written.
+        waiting: Numbers of the environments that wait for `Group.move`, written.
 
     Returns:
         How many wait.
@@ -89,15 +92,17 @@ def run_steps(
     n_waiting = 0
     for e in range(bodies.done.shape[0]):
         while bodies.done[e] < n_steps:
-            if not bodies.pushed[e]:
+            if bodies.stage[e] == WAITS:
                 push_cars(bodies, speed, steering, dt, e)
-                near = touches_soon(
+                near = not bodies.fast[e] or touches_soon(
                     bodies.body, bodies.present, bodies.box_body, bodies.boxes, bodies.room,
                     bodies.size, e,
                 )  # fmt: skip
                 bodies.calm[e] = CALM if near else max(bodies.calm[e] - 1, 0)
-                bodies.pushed[e] = True
-            if bodies.calm[e] > 0:
+                bodies.stage[e] = PUSHED
+            if bodies.stage[e] == MOVED:
+                pass
+            elif bodies.calm[e] > 0:
                 if solver.calls[e].ready != bodies.tick[e]:
                     waiting[n_waiting] = e
                     n_waiting += 1
@@ -107,7 +112,7 @@ def run_steps(
                 for n in range(bodies.body.shape[1]):
                     if bodies.present[e, n]:
                         integrate_car(bodies.cars[e], bodies.body, bodies.wrench, e, n, dt)
-            bodies.pushed[e] = False
+            bodies.stage[e] = WAITS
             bodies.tick[e] += 1
             sense(bodies, sensors, radio, members, scenes, dt, events, e)
             bodies.done[e] += 1

@@ -57,8 +57,10 @@ class Bodies(NamedTuple):
     """Steps of this decision that are done, (env)."""
     calm: Array
     """Steps for which the solver keeps the room yet, (env)."""
-    pushed: Array
-    """The forces of the step under way are known, (env)."""
+    stage: Array
+    """How far the step under way is, see `_step_kernels`, (env)."""
+    fast: Array
+    """Steps in which nothing touches are made without the space, (env)."""
 
 
 def make_bodies(n_envs: int, n_cars: int, n_boxes: int) -> Bodies:
@@ -82,7 +84,8 @@ def make_bodies(n_envs: int, n_cars: int, n_boxes: int) -> Bodies:
         tick=np.zeros(e, dtype=np.int64),
         done=np.zeros(e, dtype=np.int64),
         calm=np.zeros(e, dtype=np.int64),
-        pushed=np.zeros(e, dtype=bool),
+        stage=np.zeros(e, dtype=np.int64),
+        fast=np.zeros(e, dtype=bool),
     )
 
 
@@ -108,8 +111,7 @@ def place_bodies(b: Bodies, env: int, episode: Episode, room: tuple[float, float
     for k, box in enumerate(episode.obstacles):
         b.box_body[env, k, :3] = box.x, box.y, box.angle
         b.boxes[env, k] = box_row(box.x, box.y, box.width, box.height, box.angle)
-    b.tick[env] = b.done[env] = b.calm[env] = 0
-    b.pushed[env] = False
+    b.tick[env] = b.done[env] = b.calm[env] = b.stage[env] = 0
 
 
 def box_row(x: float, y: float, width: float, height: float, angle: float) -> tuple[float, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from relpos_env.loop import default_params
 from relpos_env.scenarios import Scenario
 from relpos_env.scenarios import scenario as find_scenario
 from relpos_env.sensors.operator import OperatorSimParams
+from relpos_env.swarm import Physics
 from relpos_env.tasks import Task, make_task, reward_weights
 from relpos_env.tasks.needs import DEFAULT_SCENARIO, needs_of
 from tracking.errors import ConfigError
@@ -68,6 +69,10 @@ class FormationConfig:
     """The operator who tells the group where to go."""
     weights: Mapping[str, float] | None = None
     """Weights of reward terms that differ from `relpos_env.tasks.DEFAULT_WEIGHTS`."""
+    physics: Physics | None = None
+    """``pymunk``: a space that is kept for the episode, see `relpos_env.world`; ``fast``: the same
+    motion while nothing touches, for batches. By default ``pymunk`` in the PettingZoo and
+    Gymnasium environments, ``fast`` in the vector forms."""
     max_cycles: int = 600
     """Steps of 0.1 s until truncation."""
     end_on_collision: bool = False
@@ -85,6 +90,8 @@ class FormationConfig:
             history=whole_number("history", self.history, 1, 64),
             proximity=whole_number("proximity", self.proximity, 0, MOST_BEAMS),
         )
+        if self.physics not in (None, *get_args(Physics)):
+            raise EnvError(f"physics: expected pymunk or fast, got {self.physics!r}")
         for name, kinds in KINDS.items():
             if not isinstance(getattr(self, name), kinds):
                 expected = " or ".join("None" if k is type(None) else k.__name__ for k in kinds)

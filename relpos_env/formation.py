@@ -19,7 +19,7 @@ from relpos_env.interface.views import reveal
 from relpos_env.loop import TrackedSwarm
 from relpos_env.scenarios.episode import draw_episode
 from relpos_env.sensors.operator import Operator
-from relpos_env.swarm import Swarm
+from relpos_env.swarm import Physics, Swarm
 from relpos_env.tasks import reward_weights
 from relpos_env.timing import DECISION, DT, STAND_STILL
 from relpos_env.world_state import WorldState
@@ -38,13 +38,16 @@ class Formation:
     a batch is that environment alone.
     """
 
-    def __init__(self, parts: Parts, n_envs: int = 1, threads: int = 1) -> None:
+    def __init__(
+        self, parts: Parts, n_envs: int = 1, threads: int = 1, physics: Physics = "fast"
+    ) -> None:
         """Make room for the batch; `begin` puts episodes into it.
 
         Args:
             parts: What the environments are made of.
             n_envs: How many.
             threads: The batch is stepped in so many parts at a time.
+            physics: Where the configuration says nothing.
         """
         n_envs = whole_number("n_envs", n_envs, 1, MOST_ENVS)
         threads = whole_number("threads", threads, 1, n_envs)
@@ -58,6 +61,7 @@ class Formation:
             params=parts.params,
             n_steps=round(DECISION / DT),
             proximity=config.proximity,
+            physics=config.physics or physics,
         )
         self.task = parts.make_task(n_envs)
         self.operator = Operator(config.operator, n, n_envs)

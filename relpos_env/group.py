@@ -1,22 +1,23 @@
-"""What a group of cars has besides numbers: its boxes, its room in the solver, its life."""
+"""What a group of cars has besides numbers: its boxes, its world in pymunk, its life."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
-from typing import Any
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from relpos_env._step_kernels import MOVED
 from relpos_env.bodies import Bodies
-from relpos_env.room import Room
+from relpos_env.errors import EnvError
 from relpos_env.scenarios.floor import spacing
 from relpos_env.scenarios.life import LifeEvent
 from relpos_env.scenarios.obstacle import Obstacle
 from relpos_env.scenarios.overlap import distance
 from relpos_env.sensors.radio.radio import Radio
-from relpos_env.solver import Solver, connect, disconnect
+from relpos_env.solver import UNKNOWN, Solver, connect, disconnect
 from relpos_env.timing import SOON
 from relpos_env.vehicle import CarParams
+from relpos_env.world import World
 from tracking.arrays import F64, Bool
 from tracking.short_repr import short_repr
 
@@ -38,17 +39,8 @@ class Group:
     car: CarParams = field(default_factory=CarParams)
     size: tuple[float, float] = (0.0, 0.0)
     """[m] Width and depth of the room."""
-    room: Room | None = None
-    """Made when something is about to touch, for the solver that is connected to it."""
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Everything but the room: what is touching then is solved anew."""
-        return {f.name: getattr(self, f.name) for f in fields(self) if f.name != "room"}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.room = None
-        for name, value in state.items():
-            setattr(self, name, value)
+    world: World | None = None
+    """Kept for a whole episode; with `physics="fast"` for as long as something touches."""
 
     @property
     def next_event(self) -> float:
@@ -65,20 +57,50 @@ class Group:
         movable[: len(self.obstacles)] = [box.movable for box in self.obstacles]
         return movable
 
-    def open_room(self, b: Bodies, solver: Solver, env: int) -> None:
-        """Let the rigid-body solver make the next moves of the environment.
-
-        The order in which a space takes its contacts is a matter of what it had before, so that
-        each time something touches begins with a new one.
-        """
-        cars = np.nonzero(b.present[env])[0]
-        self.room = Room(self.size, self.obstacles, self.car, cars)
-        connect(solver, env, self.room, int(b.tick[env]))
-
-    def close_room(self, solver: Solver, env: int) -> None:
-        """Let what touches next begin anew."""
+    def begin(self, b: Bodies, solver: Solver, env: int) -> None:
+        """Build the world of an episode, if it is kept."""
         disconnect(solver, env)
-        self.room = None
+        self.world = None if b.fast[env] else self._build(b, env)
+
+    def move(self, b: Bodies, solver: Solver, env: int, dt: float) -> None:
+        """Let the next step of the environment be made by its space, or make it.
+
+        Args:
+            b: Bodies, updated.
+            solver: Connected, if compiled code can make the step.
+            env: Number of the environment in these.
+            dt: [s]
+        """
+        if self.world is None or (b.fast[env] and not UNKNOWN):
+            # The order in which a space takes its contacts is a matter of what it had before, so
+            # that each time something touches begins with a new one.
+            self.world = self._build(b, env)
+        if UNKNOWN or self.world.is_open:
+            if b.fast[env]:
+                self.world.put(b, env)
+            self.world.step(b, env, dt)
+            b.stage[env] = MOVED
+        else:
+            connect(solver, env, self.world, int(b.tick[env]))
+
+    def open(self, b: Bodies, solver: Solver, env: int) -> World:
+        """The world for others to look into and to change.
+
+        Raises:
+            EnvError: It is not kept.
+        """
+        if self.world is None or b.fast[env]:
+            raise EnvError("world: expected physics 'pymunk', a fast one keeps no space")
+        disconnect(solver, env)
+        if not self.world.is_open:
+            self.world.put(b, env)
+            self.world.is_open = True
+        return self.world
+
+    def _build(self, b: Bodies, env: int) -> World:
+        world = World(self.size, self.obstacles, self.car, np.nonzero(b.present[env])[0])
+        world.put(b, env)
+        return world
 
     def live(
         self, b: Bodies, solver: Solver, radio: Radio, antennas: F64, env: int, t: float
@@ -116,7 +138,8 @@ class Group:
                 b.body[env, n, 3:] = 0.0
                 b.present[env, n] = False
             if event.what in ("join", "leave"):
-                self.close_room(solver, env)
+                disconnect(solver, env)
+                self._come_or_go(b, env, n)
             on = event.what in ("join", "power-on")
             if on and not b.powered[env, n]:
                 radio.switch_on(env, n, boot=int(self.boots.integers(256)))
@@ -124,6 +147,16 @@ class Group:
                 radio.switch_off(env, n)
             b.powered[env, n] = on
         self.life = events
+
+    def _come_or_go(self, b: Bodies, env: int, car: int) -> None:
+        """Let the world have the cars that are present."""
+        if b.fast[env]:
+            self.world = None
+        elif self.world is not None and b.present[env, car]:
+            self.world.add_car(car)
+            self.world.put(b, env)
+        elif self.world is not None:
+            self.world.remove_car(car)
 
     def _is_taken(self, b: Bodies, env: int, event: LifeEvent) -> bool:
         """True while a car or a box that was pushed stands where one is to come in."""

@@ -20,6 +20,7 @@ from relpos_env.interface.actions import ActionMode
 from relpos_env.interface.observations import space_of
 from relpos_env.interface.observations.base import F32
 from relpos_env.render.film import Film, check_render_mode
+from relpos_env.world import World
 from tracking.arrays import F64
 
 
@@ -71,7 +72,7 @@ class FormationGymEnv(gymnasium.Env[F32, Any]):
         check_render_mode(render_mode)
         self.render_mode = render_mode
         self._parts = configure(arguments)
-        self._formation = Formation(self._parts)
+        self._formation = Formation(self._parts, physics="pymunk")
         self.observation_space: Any = team_observation_space(self._parts)
         self.action_space = team_action_space(self._parts)
         self._film = Film(render_mode, 10)
@@ -87,6 +88,15 @@ class FormationGymEnv(gymnasium.Env[F32, Any]):
         if not self._begun:
             raise EnvError("the environment must be reset first")
         return self._formation
+
+    @property
+    def world(self) -> World:
+        """The pymunk space of the episode, to look into and to change; see `relpos_env.world`.
+
+        Raises:
+            EnvError: Before the first reset, or with ``physics="fast"``.
+        """
+        return self.formation.loop.swarm.world(0)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -16,7 +16,7 @@ from relpos_env.interface.perception import Perception
 from relpos_env.interface.views import View
 from relpos_env.scenarios import Scenario
 from relpos_env.scenarios.episode import Episode
-from relpos_env.swarm import Swarm
+from relpos_env.swarm import Physics, Swarm
 from relpos_env.timing import DT, STAND_STILL
 from tracking.arrays import F64, Bool
 from tracking.estimate import TeamEstimate
@@ -53,8 +53,9 @@ class TrackedSwarm:
         params: TrackerParams,
         n_steps: int = 10,
         proximity: int = 0,
+        physics: Physics,
     ) -> None:
-        self.swarm = swarm = Swarm(scenario, n_cars, n_envs, n_steps, proximity)
+        self.swarm = swarm = Swarm(scenario, n_cars, n_envs, n_steps, proximity, physics)
         self.perception = Perception(
             swarm.constellation,
             params,

@@ -21,6 +21,7 @@ from relpos_env.recording import Recording
 from relpos_env.render.film import Film, check_render_mode
 from relpos_env.scenarios import Scenario
 from relpos_env.tasks.options import flag
+from relpos_env.world import World
 from tracking.arrays import F64
 from tracking.log import Log
 
@@ -53,7 +54,7 @@ class FormationEnv(CarsEnv):
         self.render_mode = render_mode
         self._parts = parts = configure(arguments)
         self._record = flag("record", record)
-        self._formation = Formation(parts)
+        self._formation = Formation(parts, physics="pymunk")
         history = parts.config.history
         super().__init__(
             self._formation, parts.mode.fields, parts.actions, n_cars=parts.n_cars, history=history
@@ -84,6 +85,15 @@ class FormationEnv(CarsEnv):
     def loop(self) -> TrackedSwarm:
         """The running simulation with its trackers; a batch of one."""
         return self.formation.loop
+
+    @property
+    def world(self) -> World:
+        """The pymunk space of the episode, to look into and to change; see `relpos_env.world`.
+
+        Raises:
+            EnvError: Before the first reset, or with ``physics="fast"``.
+        """
+        return self.formation.loop.swarm.world(0)
 
     def step(self, actions: dict[str, Any]) -> tuple[dict[str, Any], ...]:
         """Drive for 0.1 s; see `CarsEnv`."""

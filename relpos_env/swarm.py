@@ -7,7 +7,7 @@ tracker ever gets; recorded to a log and tracked from there they give the same e
 from __future__ import annotations
 
 import copy
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -27,12 +27,17 @@ from relpos_env.sensors.radio.radio import Radio
 from relpos_env.sight import pairs_in_sight
 from relpos_env.solver import Solver, make_solver
 from relpos_env.timing import DT, SOON
+from relpos_env.world import World
 from relpos_env.world_state import WorldState
 from tracking.arrays import F64, Bool
 from tracking.compiled import bind
 from tracking.constellation import Antenna, Constellation, NodeConfig
 from tracking.filters.joint.records import as_records
 from tracking.measurements import MeasurementBlock
+
+Physics = Literal["pymunk", "fast"]
+SPARE_BOXES = 8
+"""[-] Shapes that can be added to a space and that sensors see."""
 
 
 def car_constellation(scenario: Scenario, n_cars: int) -> Constellation:
@@ -61,6 +66,7 @@ class Swarm:
         n_envs: int = 1,
         n_steps: int = 10,
         proximity: int = 0,
+        physics: Physics = "pymunk",
     ) -> None:
         """Make room for the batch; `begin` puts something into it.
 
@@ -70,11 +76,15 @@ class Swarm:
             n_envs: Number of groups.
             n_steps: Steps of `DT` in one `step`.
             proximity: Beams that measure distances round each car.
+            physics: `pymunk`: the cars move in a space that is kept, see `world`. `fast`: the same,
+                to the last bit while nothing touches, but the space is left out then.
         """
         self.scenario, self.n_steps = scenario, n_steps
         self.constellation = car_constellation(scenario, n_cars)
         e, n = n_envs, n_cars
-        self._bodies = make_bodies(e, n, max(scenario.max_boxes, 1))
+        spare = SPARE_BOXES if physics == "pymunk" else 0
+        self._bodies = make_bodies(e, n, max(scenario.max_boxes, 1) + spare)
+        self._bodies.fast[:] = physics == "fast"
         self._sensors = make_sensors(e, n, scenario.mag.n_waves)
         self.odometer: F64 = np.zeros((e, n))
         """Last readings, (env, car) [m/s]."""
@@ -167,8 +177,8 @@ class Swarm:
         self._scene.pos1[env, :, :2] = b.body[env, :, :2]
         self._scene.pos1[env, :, 2] = self._sensors.mast[env]
         group.life = episode.events
-        group.close_room(self._solver, env)
         group.obstacles, group.car, group.size = episode.obstacles, episode.car, self.scenario.room
+        group.begin(b, self._solver, env)
         self._radio.reset(env, int(rng.integers(1 << 62)), episode.radio)
         self._members[env] = 0.0
         group.boots = rng.spawn(1)[0]
@@ -191,6 +201,9 @@ class Swarm:
         """
         self._speed[...] = speed
         self._steering[...] = steering
+        for env, group in enumerate(self._groups):
+            if group.world is not None and group.world.is_open:
+                group.world.take(self._bodies, env)
         if self._begin_decision():
             for env in np.nonzero(self._next_life <= self.t + SOON)[0].tolist():
                 t = float(self.t[env])
@@ -199,12 +212,20 @@ class Swarm:
                 self._look_ahead(env)
         while n_waiting := self._run_steps():
             for env in self._waiting[:n_waiting].tolist():
-                self._groups[env].open_room(self._bodies, self._solver, env)
+                self._groups[env].move(self._bodies, self._solver, env, DT)
         self._read_odometers()
         self._read_clearances()
         if self.proximity.shape[-1]:
             self._read_proximity()
         return self.block
+
+    def world(self, env: int) -> World:
+        """The space of a group, to look into and to change; from now on stepped by pymunk alone.
+
+        Raises:
+            EnvError: `physics` is "fast".
+        """
+        return self._groups[env].open(self._bodies, self._solver, env)
 
     def movable(self, env: int) -> Bool:
         """Which boxes of a room can be pushed, (box)."""
