@@ -94,7 +94,7 @@ def run_steps(
         while bodies.done[e] < n_steps:
             if bodies.stage[e] == WAITS:
                 push_cars(bodies, speed, steering, dt, e)
-                near = not bodies.fast[e] or touches_soon(
+                near = touches_soon(
                     bodies.body, bodies.present, bodies.box_body, bodies.boxes, bodies.room,
                     bodies.size, e,
                 )  # fmt: skip
@@ -102,7 +102,7 @@ def run_steps(
                 bodies.stage[e] = PUSHED
             if bodies.stage[e] == MOVED:
                 pass
-            elif bodies.calm[e] > 0:
+            elif bodies.calm[e] > 0 or not bodies.fast[e]:
                 if solver.calls[e].ready != bodies.tick[e]:
                     waiting[n_waiting] = e
                     n_waiting += 1

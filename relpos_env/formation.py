@@ -13,6 +13,7 @@ import numpy as np
 
 from relpos_env._result_kernels import TeamResults, judge, tracking_errors
 from relpos_env.config import Parts, whole_number
+from relpos_env.errors import EnvError
 from relpos_env.interface.observations import total_size
 from relpos_env.interface.observations.base import F32
 from relpos_env.interface.views import reveal
@@ -53,6 +54,12 @@ class Formation:
         threads = whole_number("threads", threads, 1, n_envs)
         self.parts, self.n_envs = parts, n_envs
         config, n = parts.config, parts.n_cars
+        physics = config.physics or physics
+        if parts.scenario.furnish is not None and physics != "pymunk":
+            raise EnvError(
+                f"physics: expected 'pymunk' in scenario {parts.scenario.name!r}, which puts more "
+                f"into the space, got {physics!r}"
+            )
         self.loop = TrackedSwarm(
             parts.scenario,
             n,
@@ -61,7 +68,7 @@ class Formation:
             params=parts.params,
             n_steps=round(DECISION / DT),
             proximity=config.proximity,
-            physics=config.physics or physics,
+            physics=physics,
         )
         self.task = parts.make_task(n_envs)
         self.operator = Operator(config.operator, n, n_envs)

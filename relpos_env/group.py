@@ -83,6 +83,11 @@ class Group:
         else:
             connect(solver, env, self.world, int(b.tick[env]))
 
+    def read(self, b: Bodies, env: int) -> None:
+        """Read from the space what others have changed in it."""
+        if self.world is not None and self.world.is_open:
+            self.world.take(b, env)
+
     def open(self, b: Bodies, solver: Solver, env: int) -> World:
         """The world for others to look into and to change.
 

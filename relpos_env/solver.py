@@ -133,6 +133,14 @@ def _describe(
     calls[f"{way}_max"], calls[f"{way}_arr"] = array.size, array.ctypes.data
 
 
+LAYOUTS = {
+    "pmBatchedData": (24, {"intArray": 0, "floatArray": 8, "fields": 16}),
+    "pmFloatArray": (16, {"num": 0, "max": 4, "arr": 8}),
+    "pmIntArray": (16, {"num": 0, "max": 4, "arr": 8}),
+}
+"""Size and offsets of the fields of C structures, as `SOLVER` has them [bytes]."""
+
+
 class _Private(NamedTuple):
     """What is private to a version of pymunk."""
 
@@ -155,11 +163,7 @@ def _find_private() -> _Private:
     from pymunk._chipmunk_cffi import ffi, lib
     from pymunk.batch import ArbiterFields, BodyFields
 
-    for name, (size, fields) in {
-        "pmBatchedData": (24, {"intArray": 0, "floatArray": 8, "fields": 16}),
-        "pmFloatArray": (16, {"num": 0, "max": 4, "arr": 8}),
-        "pmIntArray": (16, {"num": 0, "max": 4, "arr": 8}),
-    }.items():
+    for name, (size, fields) in LAYOUTS.items():
         found = {field: info.offset for field, info in ffi.typeof(name).fields}
         if ffi.sizeof(name) != size or found != fields:
             raise ImportError(

@@ -186,6 +186,9 @@ class Swarm:
             self._radio.switch_on(env, n, boot=int(group.boots.integers(256)))
         # Last, so that all other draws are what they are without beams.
         self._sensors.proximity_seed[env] = rng.integers(1 << 62)
+        if self.scenario.furnish is not None:
+            self.scenario.furnish(self.world(env), rng.spawn(1)[0])
+            self._groups[env].read(b, env)
         self._read_clearances()
         self._look_ahead(env)
 
@@ -202,8 +205,7 @@ class Swarm:
         self._speed[...] = speed
         self._steering[...] = steering
         for env, group in enumerate(self._groups):
-            if group.world is not None and group.world.is_open:
-                group.world.take(self._bodies, env)
+            group.read(self._bodies, env)
         if self._begin_decision():
             for env in np.nonzero(self._next_life <= self.t + SOON)[0].tolist():
                 t = float(self.t[env])

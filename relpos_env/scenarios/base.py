@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +23,9 @@ from relpos_env.sensors.proximity import ProximitySimParams
 from relpos_env.sensors.radio.params import RadioSimParams
 from relpos_env.vehicle import CarParams
 from tracking.arrays import F64
+
+Furnish = Callable[[Any, np.random.Generator], None]
+"""``(relpos_env.world.World, generator)``"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,6 +60,9 @@ class Scenario:
     proximity: ProximitySimParams = field(default_factory=ProximitySimParams)
     """Distance sensors, of environments that ask for beams."""
     radio: RadioSimParams = field(default_factory=RadioSimParams)
+    furnish: Furnish | None = field(default=None, repr=False, metadata={"in_file": False})
+    """Puts further bodies, shapes, joints and collision handlers into the space of an episode,
+    drawing from the generator; needs ``physics="pymunk"``. In a file ``package.module:name``."""
     randomisation: Randomisation = field(default_factory=Randomisation)
     """What is drawn anew for every episode; nothing by default."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from typing import Any
 from relpos_env.errors import EnvError
 from relpos_env.registry import look_up
 from relpos_env.scenarios.base import Scenario
+from relpos_env.scenarios.floor_plan import read_floor_plan
 from relpos_env.scenarios.gap import Gap
 from relpos_env.scenarios.levels import level
 from relpos_env.scenarios.randomisation import Randomisation
@@ -95,9 +97,18 @@ def scenario_from(
         return base.with_gap(None)  # its wall would stand in the way of another room
 
     rest.setdefault("name", name)
+    furnish, plan = rest.pop("furnish", None), rest.pop("floor_plan", None)
     reader = TableReader(presets={**_PRESETS, Scenario: Preset("extends", str, parent)})
     gap_table = rest.pop("gap", None)
     read = reader.read(Scenario, rest, where)
+    try:
+        if furnish is not None:
+            read = replace(read, furnish=look_up({}, furnish, "furnish", group="relpos_env.worlds"))
+        if plan is not None:
+            walls = read_floor_plan((beside or Path()) / str(plan))
+            read = replace(read, obstacles=read.obstacles + walls)
+    except EnvError as error:
+        raise where.error(str(error)) from error
     gap = next(iter(inherited), None)
     if gap_table is not None:
         gap = reader.read(Gap, gap_table, where.key("gap"), gap)

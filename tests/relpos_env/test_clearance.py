@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from relpos_env._clearance_kernels import FARTHEST, gap, read_clearances
 from relpos_env.formation_v0 import parallel_env
-from relpos_env.room import CAR_RADIUS, WALL_RADIUS
+from relpos_env.world import CAR_RADIUS, WALL_RADIUS
 from relpos_env.scenarios.overlap import distance, overlap
 
 boxes = st.tuples(

@@ -8,15 +8,15 @@ import pytest
 from pymunk.batch import BodyFields, Buffer, get_space_bodies, set_space_bodies
 
 from relpos_env import solver as solver_module
-from relpos_env._contact_kernels import REST, solve
+from relpos_env._contact_kernels import solve
 from relpos_env.bodies import make_bodies, place_bodies
 from relpos_env.group import Group
-from relpos_env.room import Room
 from relpos_env.scenarios import SCENARIOS, draw_episode
 from relpos_env.scenarios.obstacle import Obstacle
 from relpos_env.solver import connect, disconnect, make_solver
 from relpos_env.timing import DT
 from relpos_env.vehicle import CarParams
+from relpos_env.world import REST, World
 
 STATE = BodyFields.POSITION | BodyFields.ANGLE | BodyFields.VELOCITY | BodyFields.ANGULAR_VELOCITY
 INPUT = STATE | BodyFields.FORCE | BodyFields.TORQUE
@@ -35,18 +35,18 @@ class Plain:
     """A room stepped through the interface of pymunk."""
 
     def __init__(self):
-        self.room = Room(SIZE, BOXES, CAR, CARS)
+        self.room = World(SIZE, BOXES, CAR, CARS)
         self.inbox, self.outbox = Buffer(), Buffer()
         self.room.space.on_collision(begin=self.count)
         self.contacts = np.zeros(N_CARS)
 
     def count(self, arbiter, space, data):
         for shape in arbiter.shapes:
-            for car, number in self.room.car_ids.items():
-                self.contacts[car] += shape.body is not None and shape.body.id == number
+            for car, body in self.room.cars.items():
+                self.contacts[car] += shape.body is body
 
     def step(self, body, wrench, box_body):
-        movable = self.room.movable
+        movable = list(self.room.boxes)
         rows = np.zeros((len(CARS) + len(movable) + 1, 9))
         rows[: len(CARS)] = np.hstack([body[CARS], wrench[CARS]])
         for row, box in zip(rows[len(CARS) :], movable, strict=False):
@@ -79,7 +79,7 @@ def crowded(n_envs=3, env=1):
 def test_moves_and_contacts_are_those_of_pymunk_bit_for_bit(seed):
     rng = np.random.default_rng(seed)
     bodies, solver = crowded()
-    plain, room = Plain(), Room(SIZE, BOXES, CAR, CARS)
+    plain, room = Plain(), World(SIZE, BOXES, CAR, CARS)
     connect(solver, 1, room, 0)
     body, box_body = bodies.body[1].copy(), bodies.box_body[1].copy()
     for k in range(600):
@@ -104,7 +104,7 @@ def test_moves_and_contacts_are_those_of_pymunk_bit_for_bit(seed):
 
 def test_a_box_is_drawn_where_it_stands():
     bodies, solver = crowded()
-    room = Room(SIZE, BOXES, CAR, CARS)
+    room = World(SIZE, BOXES, CAR, CARS)
     connect(solver, 1, room, 0)
     bodies.box_body[1, 0, 3:] = 0.5, 0.2, 1.0
     for _ in range(10):
@@ -118,7 +118,7 @@ def test_a_box_is_drawn_where_it_stands():
 def test_the_solvers_arrays_keep_their_room():
     # Where it finds too little room the C code takes other memory.
     bodies, solver = crowded()
-    room = Room(SIZE, BOXES, CAR, CARS)
+    room = World(SIZE, BOXES, CAR, CARS)
     connect(solver, 1, room, 0)
     calls = solver.calls[1]
     places = [int(calls[f"{way}_arr"]) for way in ("put", "got", "met")]
@@ -133,19 +133,30 @@ def test_the_solvers_arrays_keep_their_room():
     ]  # fmt: skip
 
 
-def test_a_group_opens_and_closes_its_room():
+def test_a_kept_world_follows_cars_that_come_and_go():
     bodies, solver = crowded()
-    bodies.tick[1] = 7
     group = Group(obstacles=BOXES, car=CAR, size=SIZE)
-    group.open_room(bodies, solver, 1)
+    group.begin(bodies, solver, 1)
+    bodies.tick[1] = 7
+    group.move(bodies, solver, 1, DT)
     assert solver.calls["ready"].tolist() == [-1, 7, -1]
-    assert sorted(np.nonzero(solver.car_ids[1])[0]) == CARS.tolist()
-    group.close_room(solver, 1)
-    assert group.room is None
-    assert (solver.calls["ready"] == -1).all()
+    assert solver.owner[1].tolist() == [0, 1, 3, 4, 6, -1, -1, -1, -1]
+    solve(bodies, solver, 1, DT)
+    world = group.world
+    for car, comes in ((1, False), (2, True)):
+        bodies.present[1, car] = comes
+        group._come_or_go(bodies, 1, car)
+    group.move(bodies, solver, 1, DT)
+    assert group.world is world
+    assert sorted(np.nonzero(solver.car_ids[1])[0]) == [0, 2, 3]
+    assert sorted(solver.owner[1][solver.owner[1] >= 0]) == [0, 2, 3, 4, 6]
+    solve(bodies, solver, 1, DT)
     disconnect(solver, 1)
+    assert (solver.calls["ready"] == -1).all()
 
 
-def test_a_solver_of_another_layout_is_refused():
-    with pytest.raises(ImportError, match=rf"pymunk {pymunk.version}: expected pmIntArray of 8"):
-        solver_module._expect_layout("pmIntArray", 8, {"num": 0})
+def test_what_a_version_of_pymunk_has_otherwise_is_said(monkeypatch):
+    monkeypatch.setitem(solver_module.LAYOUTS, "pmIntArray", (8, {"num": 0}))
+    private, unknown = solver_module._find_or_say_why()
+    assert private is None
+    assert unknown.startswith(f"pymunk {pymunk.version}: expected pmIntArray of 8 bytes")

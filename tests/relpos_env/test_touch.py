@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from relpos_env.room import BOX_DENSITY, BOX_FRICTION, ELASTICITY, FRICTION, Room
 from relpos_env.scenarios import SCENARIOS, Obstacle
 from relpos_env.scenarios.episode import draw_episode
 from relpos_env.scenarios.life import LifeEvent
 from relpos_env.sensors import ImuSimParams
 from relpos_env.swarm import Swarm
 from relpos_env.vehicle import CarParams
+from relpos_env.world import BOX_DENSITY, BOX_FRICTION, ELASTICITY, FRICTION, World
 from tracking.geometry import GRAVITY
 from tracking.measurements import Kind
 
@@ -27,13 +27,13 @@ def swarm(scenario, start, events=()):
 
 def bare_car(position, velocity, *, spins=True):
     """A car without tyres that flies against the wall at x = 2.5 m; its velocity after it."""
-    room = Room((5.0, 5.0), (), CarParams(), np.array([0]))
-    (body,) = room.space.bodies
+    space = World((5.0, 5.0), (), CarParams(), np.array([0])).space
+    (body,) = space.bodies
     if not spins:
         body.moment = float("inf")
     body.position, body.velocity = position, velocity
     for _ in range(200):
-        room.space.step(0.001)
+        space.step(0.001)
     return body.velocity
 
 

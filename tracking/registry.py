@@ -1,0 +1,68 @@
+"""Names of what can be chosen: our own, those of installed packages, and `package.module:Name`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import import_module
+from importlib.metadata import entry_points
+from typing import Any, TypeVar
+
+from tracking.errors import ConfigError
+
+Entry = TypeVar("Entry")
+
+
+def look_up(
+    registry: Mapping[str, Entry],
+    name: object,
+    argument: str,
+    *,
+    group: str = "",
+    raises: type[Exception] = ConfigError,
+) -> Entry:
+    """Look an entry up.
+
+    Args:
+        registry: Our names and entries.
+        name: One of them, or if there is a group `package.module:Name`, a name among its entry
+            points, or the entry itself, which can be called.
+        argument: Argument that the name was given for, for the message.
+        group: Entry points that other packages declare, as `relpos_env.tasks`.
+        raises: Kind of the error.
+
+    Raises:
+        ConfigError: No entry of that name, or it cannot be imported.
+    """
+    if isinstance(name, str) and name in registry:
+        return registry[name]
+    expected = f"{argument}: expected one of {', '.join(registry)}"
+    if not group:
+        raise raises(f"{expected}, got {name!r}")
+    if callable(name):
+        return name  # type: ignore[return-value]
+    found = {point.name: point for point in entry_points(group=group)}
+    try:
+        if isinstance(name, str) and name in found:
+            entry: Entry = found[name].load()
+            return entry
+        if isinstance(name, str) and ":" in name:
+            return _import(name)  # type: ignore[no-any-return]
+    except Exception as error:  # whatever the module of a user raises
+        raise raises(f"{argument}: cannot import {name!r}: {error}") from error
+    others = f", {', '.join(sorted(found))}" if found else ""
+    raise raises(f"{expected}{others} or package.module:Name, got {name!r}")
+
+
+def _import(name: str) -> Any:
+    """What `package.module:Name` stands for.
+
+    Raises:
+        TypeError: It cannot be called.
+    """
+    module, _, attribute = name.partition(":")
+    found: Any = import_module(module)
+    for part in attribute.split("."):
+        found = getattr(found, part)
+    if not callable(found):
+        raise TypeError(f"expected something to call, got {found!r}")
+    return found
