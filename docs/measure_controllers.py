@@ -48,7 +48,7 @@ def measure(
     formation = Formation(parts, len(seeds))
     for e, seed in enumerate(seeds):
         formation.seed(e, seeding.np_random(seed)[0])
-        formation.begin(e)
+        formation.begin([e])
     driver = CONTROLLERS[controller or "consensus"](parts.mode.fields)
     errors, cars, others = [], 0.0, 0.0
     for _ in range(steps):

@@ -9,7 +9,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from relpos_env.errors import EnvError
+from relpos_env.errors import EnvError, UnknownArgument
 from relpos_env.interface.actions import ActionMode, action_mode
 from relpos_env.interface.beams import MOST_BEAMS
 from relpos_env.interface.observations import ObservationMode, observation_mode
@@ -155,7 +155,9 @@ def configure(arguments: Mapping[str, Any]) -> Parts:
     known = [f.name for f in fields(FormationConfig)]
     for name in arguments:
         if name not in known:
-            raise EnvError(f"{name}: unknown argument, expected one of {', '.join(known)}")
+            raise UnknownArgument(
+                f"unexpected keyword argument {name!r}, expected one of {', '.join(known)}"
+            )
     return FormationConfig(**arguments).resolve()
 
 

@@ -3,3 +3,7 @@
 
 class EnvError(Exception):
     """Root of the package's errors; names the argument, what is allowed and what came."""
+
+
+class UnknownArgument(EnvError, TypeError):
+    """An argument of no such name, as Python's own error for it, which other tools look for."""

@@ -6,7 +6,7 @@ cannot differ.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -17,7 +17,9 @@ from relpos_env.errors import EnvError
 from relpos_env.interface.observations import total_size
 from relpos_env.interface.observations.base import F32
 from relpos_env.interface.views import reveal
+from relpos_env.interface.infos import Columns, car_columns
 from relpos_env.loop import TrackedSwarm
+from relpos_env.reset_options import ResetOptions
 from relpos_env.scenarios.episode import draw_episode
 from relpos_env.sensors.operator import Operator
 from relpos_env.swarm import Physics, Swarm
@@ -28,6 +30,7 @@ from tracking.arrays import F64, I64, Bool
 from tracking.compiled import bind
 
 MOST_ENVS = 1 << 20
+NO_OPTIONS = ResetOptions()
 N_TRUTH = 8
 """[-] Numbers of the truth about each car, see `Formation.truth`."""
 
@@ -102,20 +105,39 @@ class Formation:
         """Let the episodes of an environment come from a generator, from the next one on."""
         self._rngs[env] = rng
 
-    def begin(self, env: int, watch: Callable[[Swarm], None] | None = None) -> None:
-        """Begin a new episode in one environment and observe it.
+    def begin(
+        self,
+        envs: Sequence[int],
+        watch: Callable[[Swarm], None] | None = None,
+        options: ResetOptions = NO_OPTIONS,
+    ) -> None:
+        """Begin a new episode in some environments and observe it.
 
         Args:
-            env: Which.
-            watch: Called with its group after each step in which it stands at first.
+            envs: Which, ascending.
+            watch: Called with each group after each step in which it stands at first.
+            options: Wishes for the episodes.
+
+        Raises:
+            EnvError: A wish that cannot be fulfilled.
         """
-        rng = self._rngs[env].spawn(1)[0]
+        scenario = options.scenario or self.parts.scenario
         seconds = STAND_STILL + DECISION * self.parts.config.max_cycles
-        episode = draw_episode(self.parts.scenario, self.parts.n_cars, seconds, rng)
-        self.loop.begin(env, episode, rng.spawn(1)[0], watch)
+        rngs = [self._rngs[env].spawn(1)[0] for env in envs]
+        episodes = [draw_episode(scenario, self.parts.n_cars, seconds, rng) for rng in rngs]
+        episodes = [options.placed(episode, scenario.room) for episode in episodes]
+        self.loop.begin(envs, episodes, [rng.spawn(1)[0] for rng in rngs], watch)
+        for env, rng in zip(envs, rngs, strict=True):
+            self._begin_task(env, rng, options)
+        self._observe(envs)
+
+    def _begin_task(self, env: int, rng: np.random.Generator, options: ResetOptions) -> None:
         here = slice(env, env + 1)
         seed = np.array([rng.integers(1 << 62)], dtype=np.uint64)
         self.task.reset(self.state, here, self.loop.swarm.boxes)
+        if options.goals is not None:
+            cars = np.flatnonzero(self.state.present[env])
+            self.task.set_goals(env, options.goals, cars)
         self.operator.reset(seed, here)
         self.cycles[env] = 0
         self.active[env] = False
@@ -123,7 +145,6 @@ class Formation:
         self._judge(here)
         self.left[env] = False
         self.observations[env] = 0.0
-        self._observe(here)
 
     def step(self, speed: F64, steering: F64) -> None:
         """Drive all environments for one decision; the results are in the arrays.
@@ -205,6 +226,20 @@ class Formation:
         self._compare()
         return self._tracking_error.copy()
 
+    def infos(self) -> Columns:
+        """What infos say of every car, see `relpos_env.interface.infos`."""
+        self._compare()
+        view, swarm = self.loop.view, self.loop.swarm
+        return car_columns(
+            self.task,
+            self.weights,
+            self.state.present,
+            self.active,
+            view.ok,
+            collisions=swarm.contacts,
+            tracking_error=self._tracking_error,
+        )
+
     def close(self) -> None:
         """Release the threads."""
         if self._pool is not None:
@@ -220,18 +255,25 @@ class Formation:
         else:
             judge(envs.start, envs.stop, *self._verdict)
 
-    def _observe(self, envs: slice) -> None:
-        """Write the observations of some environments; those of the others stay what they are."""
+    def _observe(self, envs: slice | Sequence[int]) -> None:
+        """Write the observations of some environments; those of the others stay what they are.
+
+        A car that left for good saw the room for the last time before it left.
+        """
+        some_left = self.left.any()
+        last = self.observations[self.left] if some_left else None
         if self.parts.mode.needs_truth:
             s = self.state
             reveal(self.loop.view, s.pos_w, s.vel_w, s.heading)
         self._write()
-        if self.parts.config.history == 1:
-            return
-        observations, size = self.observations[envs], self._size
-        observations[..., size:] = observations[..., :-size].copy()
-        observations[..., :size] = self._newest[envs]
-        observations[~self.loop.view.present[envs]] = 0.0
+        if self.parts.config.history > 1:
+            observations, size = self.observations[envs], self._size
+            observations[..., size:] = observations[..., :-size].copy()
+            observations[..., :size] = self._newest[envs]
+            observations[~self.loop.view.present[envs]] = 0.0
+            self.observations[envs] = observations
+        if some_left:
+            self.observations[self.left] = last
 
     def _share_out(self) -> None:
         """Cut the batch into parts for the threads; put together what kernels take."""

@@ -6,20 +6,25 @@ the cars that take part.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import gymnasium
 import numpy as np
 from gymnasium import spaces
-from gymnasium.utils import seeding
+from gymnasium.envs.registration import EnvSpec
 
 from relpos_env.config import Parts, configure
 from relpos_env.errors import EnvError
 from relpos_env.formation import Formation
 from relpos_env.interface.actions import ActionMode
+from relpos_env.interface.infos import team_columns, team_info
 from relpos_env.interface.observations import space_of
 from relpos_env.interface.observations.base import F32
+from relpos_env.interface.truth import state_space, truth_inside
 from relpos_env.render.film import Film, check_render_mode
+from relpos_env.reset_options import reset_options
+from relpos_env.seeding import episode_rng
 from relpos_env.world import World
 from tracking.arrays import F64
 
@@ -71,12 +76,13 @@ class FormationGymEnv(gymnasium.Env[F32, Any]):
         """
         check_render_mode(render_mode)
         self.render_mode = render_mode
+        self._spec: EnvSpec | None = None
         self._parts = configure(arguments)
         self._formation = Formation(self._parts, physics="pymunk")
         self.observation_space: Any = team_observation_space(self._parts)
         self.action_space = team_action_space(self._parts)
         self._film = Film(render_mode, 10)
-        self._begun = False
+        self._begun = self._seeded = self._over = False
 
     @property
     def formation(self) -> Formation:
@@ -98,16 +104,42 @@ class FormationGymEnv(gymnasium.Env[F32, Any]):
         """
         return self.formation.loop.swarm.world(0)
 
+    @property
+    def spec(self) -> EnvSpec | None:
+        """How it was made; `max_episode_steps` is that of its configuration."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        steps = self.max_episode_steps
+        self._spec = None if spec is None else replace(spec, max_episode_steps=steps)
+
+    @property
+    def max_episode_steps(self) -> int:
+        """Steps until truncation."""
+        return self._parts.config.max_cycles
+
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[F32, dict[str, Any]]:
-        """Begin an episode; a seed makes this and all that follow it repeatable."""
+        """Begin an episode; a seed makes this and all that follow it repeatable.
+
+        Args:
+            seed: None goes on with the generator of the episode before.
+            options: ``poses``, ``goals``, ``scenario``, see
+                `relpos_env.reset_options.ResetOptions`.
+
+        Raises:
+            EnvError: An unknown option, or one that cannot be fulfilled.
+        """
         super().reset(seed=seed)
-        if seed is not None or not self._begun:
+        wishes = reset_options(options, self._parts)
+        if seed is not None or not self._seeded:
             # Episodes have a generator of their own, so that `np_random` is the user's.
-            self._formation.seed(0, seeding.np_random(int(self.np_random.integers(1 << 62)))[0])
-        self._formation.begin(0)
-        self._begun = True
+            self._formation.seed(0, episode_rng(seed))
+            self._seeded = True
+        self._formation.begin([0], options=wishes)
+        self._begun, self._over = True, False
         self._film.forget()
         self._show()
         return self._formation.observations[0].ravel().copy(), self._info()
@@ -117,12 +149,14 @@ class FormationGymEnv(gymnasium.Env[F32, Any]):
 
         Raises:
             EnvError: The action has a wrong shape, is not finite, or not in the space; or there
-                was no reset.
+                was no reset, or the episode is over.
         """
-        formation = self.formation
-        parts = self._parts
+        formation, parts = self.formation, self._parts
+        if self._over:
+            raise EnvError("the episode is over, the environment must be reset")
         speed, steering = decode_team(action, parts.actions, (), parts.n_cars, "action")
         formation.step(speed[None], steering[None])
+        self._over = bool(formation.terminated[0] or formation.truncated[0])
         self._show()
         return (
             formation.observations[0].ravel().copy(),
@@ -132,10 +166,9 @@ class FormationGymEnv(gymnasium.Env[F32, Any]):
             self._info(),
         )
 
-    def state(self) -> F64:
+    def state(self) -> F32:
         """The truth, for critics; as in `FormationEnv.state`."""
-        truth: F64 = self.formation.truth()[0]
-        return truth
+        return truth_inside(self.formation, state_space(self._parts))[0]
 
     def render(self) -> Any:
         """A picture of now, uint8 (height, width, 3); None without a mode or with a window."""
@@ -147,22 +180,7 @@ class FormationGymEnv(gymnasium.Env[F32, Any]):
         self._begun = False
 
     def _info(self) -> dict[str, Any]:
-        formation = self._formation
-        active = formation.active[0]
-        rewards = formation.task.rewards[0]
-        n = max(int(active.sum()), 1)
-        terms = (rewards * active[:, None]).sum(axis=0) / n
-        tracking = formation.tracking_error()[0]
-        known = np.isfinite(tracking)
-        info: dict[str, Any] = {
-            "formation_error": float(formation.team.error[0]),
-            "collisions": int(formation.team.contacts[0]),
-            "active": active.copy(),
-            "rewards": dict(zip(formation.task.terms, terms.tolist(), strict=True)),
-        }
-        if known.any():
-            info["tracking_error"] = float(tracking[known].mean())
-        return info
+        return team_info(team_columns(self._formation.infos()), 0)
 
     def _show(self) -> None:
         if self.render_mode is not None:

@@ -8,7 +8,7 @@ The tracker gets nothing but measurements.
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -98,28 +98,39 @@ class TrackedSwarm:
 
     def begin(
         self,
-        env: int,
-        episode: Episode,
-        rng: np.random.Generator,
+        envs: Sequence[int],
+        episodes: Sequence[Episode],
+        rngs: Sequence[np.random.Generator],
         watch: Callable[[Swarm], None] | None = None,
     ) -> None:
-        """Begin a group anew and let it stand while its trackers are switched on.
+        """Begin some groups anew and let them stand while their trackers are switched on.
 
         Args:
-            env: Which.
-            episode: What it is made of.
-            rng: Its own.
-            watch: Called with the group after each of its steps.
+            envs: Which, ascending.
+            episodes: What each is made of.
+            rngs: One for each.
+            watch: Called with each group after each of its steps.
         """
-        self.swarm.begin(env, episode, rng)
-        self.perception.reset(env)
-        if env not in self._singles:
-            self._singles[env] = self.part(slice(env, env + 1))
-        still = np.zeros((1, self.view.speed.shape[1]))
-        for _ in range(round(STAND_STILL / (DT * self.swarm.n_steps))):
-            self._singles[env].step(still, still)
-            if watch is not None:
-                watch(self._singles[env].swarm)
+        for env, episode, rng in zip(envs, episodes, rngs, strict=True):
+            self.swarm.begin(env, episode, rng)
+            self.perception.reset(env)
+        steps = round(STAND_STILL / (DT * self.swarm.n_steps))
+        for part in self._parts(envs):
+            still = np.zeros((part.swarm.n_envs, self.view.speed.shape[1]))
+            for _ in range(steps):
+                part.step(still, still)
+                if watch is not None:
+                    watch(part.swarm)
+
+    def _parts(self, envs: Sequence[int]) -> Iterator[TrackedSwarm]:
+        """Groups to step: the whole batch at once, or each by itself."""
+        if len(envs) == self.swarm.n_envs:
+            yield self
+            return
+        for env in envs:
+            if env not in self._singles:
+                self._singles[env] = self.part(slice(env, env + 1))
+            yield self._singles[env]
 
     def step(self, speed: F64, steering: F64) -> None:
         """Drive for one decision and let the tracker catch up.

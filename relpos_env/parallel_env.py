@@ -7,44 +7,48 @@ tables of observations, actions and rewards.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
-
-import numpy as np
-from gymnasium import spaces
 
 from relpos_env.config import configure
 from relpos_env.errors import EnvError
 from relpos_env.formation import Formation
 from relpos_env.interface.cars_env import CarsEnv
+from relpos_env.interface.observations.base import F32
+from relpos_env.interface.truth import state_space, truth_inside
 from relpos_env.loop import TrackedSwarm
 from relpos_env.recording import Recording
+from relpos_env.reset_options import reset_options
 from relpos_env.render.film import Film, check_render_mode
 from relpos_env.scenarios import Scenario
 from relpos_env.tasks.options import flag
 from relpos_env.world import World
-from tracking.arrays import F64
 from tracking.log import Log
-
-TRUTH_FIELDS = 8
-"""Numbers of a car in `state()`."""
-
 
 class FormationEnv(CarsEnv):
     """Cars in a room keep a formation, each on its own tracker's estimates.
 
-    Agents come and go as `CarsEnv` says.
+    Agents come and go as `CarsEnv` says. `reset` takes the options of
+    `relpos_env.reset_options.ResetOptions`: ``poses``, ``goals`` and ``scenario``.
 
     Law: same arguments, seed and actions, same everything, bit for bit.
     """
 
     def __init__(
-        self, *, render_mode: str | None = None, record: bool = False, **arguments: Any
+        self,
+        *,
+        render_mode: str | None = None,
+        record: bool = False,
+        fixed_agents: bool = False,
+        **arguments: Any,
     ) -> None:
         """Build the environment.
 
         Args:
             render_mode: None, ``human`` or ``rgb_array``.
             record: Keep measurements and truth of the episode, see `recorded_log`.
+            fixed_agents: Every slot is an agent for the whole episode, for tools that know no
+                agents that come and go.
             arguments: Fields of `relpos_env.config.FormationConfig`.
 
         Raises:
@@ -57,11 +61,14 @@ class FormationEnv(CarsEnv):
         self._formation = Formation(parts, physics="pymunk")
         history = parts.config.history
         super().__init__(
-            self._formation, parts.mode.fields, parts.actions, n_cars=parts.n_cars, history=history
+            self._formation,
+            parts.mode.fields,
+            parts.actions,
+            n_cars=parts.n_cars,
+            history=history,
+            fixed_agents=flag("fixed_agents", fixed_agents),
         )
-        self.state_space = spaces.Box(
-            -np.inf, np.inf, shape=(TRUTH_FIELDS * parts.n_cars,), dtype=np.float64
-        )
+        self.state_space = state_space(parts)
         self._film = Film(render_mode, 10.0)
         self._recording: Recording | None = None
 
@@ -103,13 +110,17 @@ class FormationEnv(CarsEnv):
             recorded.add_swarm(self.loop.swarm)
         return results
 
-    def state(self) -> F64:
-        """The truth, for critics, (8 car); zeros for absent cars.
+    @property
+    def max_episode_steps(self) -> int:
+        """Steps until truncation."""
+        return self._parts.config.max_cycles
+
+    def state(self) -> F32:
+        """The truth, for critics, (8 car), inside `state_space`; zeros for absent cars.
 
         Of each car: 1, x, y, cosine and sine of the heading, velocity x, y, yaw rate.
         """
-        truth: F64 = self.formation.truth()[0]
-        return truth
+        return truth_inside(self.formation, self.state_space)[0]
 
     def recorded_log(self, name: str) -> Log:
         """The episode so far as a log with truth.
@@ -138,33 +149,10 @@ class FormationEnv(CarsEnv):
         self.agents = []
         self._begun = False
 
-    def _infos(self, agents: list[str]) -> dict[str, Any]:
-        """Errors, reward terms and whereabouts of cars."""
-        formation, loop = self._formation, self._formation.loop
-        task = formation.task
-        terms, values, errors = task.terms, task.rewards[0].tolist(), task.error[0].tolist()
-        tracking = formation.tracking_error()[0].tolist()
-        usable = loop.view.ok[0].tolist()
-        contacts = loop.swarm.contacts[0].tolist()
-        present = loop.swarm.state.present[0].tolist()
-        infos: dict[str, Any] = {}
-        for agent in agents:
-            k = self._numbers[agent]
-            tracked = usable[k].count(True)
-            infos[agent] = info = {
-                "formation_error": errors[k],
-                "tracked": tracked,
-                "collisions": int(contacts[k]),
-                "present": present[k],
-                "rewards": dict(zip(terms, values[k], strict=True)),
-            }
-            if tracked:
-                info["tracking_error"] = tracking[k]
-        return infos
-
-    def _begin(self) -> None:
+    def _begin(self, options: Mapping[str, Any] | None) -> None:
+        wishes = reset_options(options, self._parts)
         self._recording = recording = Recording() if self._record else None
-        self._formation.begin(0, None if recording is None else recording.add_swarm)
+        self._formation.begin([0], None if recording is None else recording.add_swarm, wishes)
         self._film.forget()
 
     def _show(self) -> None:

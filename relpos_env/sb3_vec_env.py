@@ -7,15 +7,16 @@ from typing import Any
 
 import numpy as np
 from gymnasium.spaces import Box
-from gymnasium.utils import seeding
 
 from relpos_env.config import configure
 from relpos_env.errors import EnvError
 from relpos_env.formation import N_TRUTH, Formation
+from relpos_env.interface.infos import car_infos
 from relpos_env.interface.observations import space_of
 from relpos_env.interface.observations.base import F32
 from relpos_env.render.film import Film, check_render_mode
 from relpos_env.sb3_seats import SharedSeats
+from relpos_env.seeding import episode_rng, seeds_of_batch
 from relpos_env.tasks import reward_weights
 from relpos_env.tasks.options import flag
 from tracking.arrays import F64, Bool
@@ -25,11 +26,12 @@ class FormationVecEnv(SharedSeats):
     """``n_envs`` environments; seat ``e * n_cars + k`` is car k of environment e.
 
     Seeds count on from environment to environment. A seat is done when the episode of its
-    environment is over or its car leaves for good; what it saw last is then in
-    ``infos[seat]["terminal_observation"]``, and ``TimeLimit.truncated`` says whether it only
-    ended. The seat of a car that is not there sees zeros and gets no reward, and its info has
-    ``active`` False; it is done when its car leaves and not again before one sits there, so
-    whoever counts steps from done to done counts those of empty seats with the next episode.
+    environment is over, or when its car leaves for good; its info then has the figures of
+    `relpos_env.interface.infos`, the last observation that the car had as
+    ``terminal_observation``, and ``TimeLimit.truncated``. A seat without a car sees zeros, gets no
+    reward, and its info has ``active`` False at every step: plain algorithms of Stable-Baselines3
+    learn from these rows too, unless they use
+    `agents.train.buffer.SwarmRolloutBuffer`, which leaves them out.
     """
 
     def __init__(
@@ -70,6 +72,11 @@ class FormationVecEnv(SharedSeats):
         super().__init__(n_envs * self.n_cars, space, self._parts.actions.space())
 
     @property
+    def max_episode_steps(self) -> int:
+        """Steps until truncation."""
+        return self._parts.config.max_cycles
+
+    @property
     def active(self) -> Bool:
         """Which seats have a car that takes part, (seat)."""
         return self.formation.active.ravel()
@@ -77,8 +84,7 @@ class FormationVecEnv(SharedSeats):
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Seed all environments, from the next reset on; None leaves their generators alone."""
         if seed is not None:
-            n = self.formation.n_envs
-            self._next_seeds = [int(seed) + k for k in range(n)]
+            self._next_seeds = seeds_of_batch(seed, self.formation.n_envs)
         return [s for s in self._next_seeds for _ in range(self.n_cars)]
 
     def stagger(self, rng: np.random.Generator) -> None:
@@ -106,8 +112,8 @@ class FormationVecEnv(SharedSeats):
         """Begin an episode in every environment; observations, (seat, size)."""
         for env, seed in enumerate(self._next_seeds):
             if seed is not None or not self._begun:
-                self.formation.seed(env, seeding.np_random(seed)[0])
-            self.formation.begin(env)
+                self.formation.seed(env, episode_rng(seed))
+        self.formation.begin(range(self.formation.n_envs))
         self._next_seeds = [None] * self.formation.n_envs
         self._begun = True
         self.reset_infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
@@ -134,25 +140,25 @@ class FormationVecEnv(SharedSeats):
         """Drive for 0.1 s: observations, rewards, dones and infos of all seats."""
         assert self._commands is not None
         f = self.formation
-        was_active = f.active.copy()
         f.step(*self._commands)
         rewards = f.rewards.ravel().astype(np.float32)
         over = f.terminated | f.truncated
-        dones = ((was_active | f.active) & over[:, None] | f.left).ravel()
+        dones = (over[:, None] | f.left).ravel()
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         if not f.active.all():
             for seat in np.nonzero(~f.active.ravel())[0]:
                 infos[seat] = {"active": False}
         if dones.any():
-            last, ended = self._observations(), np.repeat(f.terminated, self.n_cars)
-            for seat in np.nonzero(dones)[0]:
-                infos[seat] = {
+            last, columns = self._observations(), f.infos()
+            for seat in np.nonzero(dones)[0].tolist():
+                env, car = divmod(seat, self.n_cars)
+                infos[seat] = car_infos(columns, env, [car])[0] | {
                     "terminal_observation": last[seat],
-                    "TimeLimit.truncated": not ended[seat],
+                    "TimeLimit.truncated": not f.terminated[env],
                 }
-            for env in np.nonzero(over)[0]:
-                f.begin(int(env))
-                if env == 0:
+            if over.any():
+                f.begin(np.flatnonzero(over).tolist())
+                if over[0]:
                     self._film.forget()
         self._show()
         return self._observations(), rewards, dones, infos

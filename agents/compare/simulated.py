@@ -27,7 +27,7 @@ class Simulated:
         self.formation = Formation(parts, len(seeds))
         for env, seed in enumerate(seeds):
             self.formation.seed(env, seeding.np_random(seed)[0])
-            self.formation.begin(env)
+            self.formation.begin([env])
 
     @property
     def car(self) -> CarParams:

@@ -83,7 +83,7 @@ class VirtualFeed:
         self._swarm.intake.notices.clear()
         if self.report is not None:
             report = self.report
-            self._swarm.apply(report.speed, report.steering, report.armed)
+            self._swarm.apply(report.speed, report.steering, report.armed, report.reason)
         return self.t_ns
 
     def decide(self, picture: Picture) -> None:

@@ -111,7 +111,7 @@ class _Room:
         f = self.formation
         for env in range(f.n_envs):
             f.seed(env, seeding.np_random(first_seed + env)[0])
-            f.begin(env)
+            f.begin([env])
         error, tracking, present, going = [], [], [], []
         contacts, rewards, decisions = 0.0, 0.0, 0.0
         on = np.ones(f.n_envs, dtype=bool)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from hardware_bridge.live.group import Feed, LiveGroup
 from hardware_bridge.live.swarm import LiveSwarm
+from relpos_env.errors import EnvError
 from relpos_env.interface.actions import action_mode
 from relpos_env.interface.cars_env import CarsEnv
 from relpos_env.interface.observations import observation_mode
@@ -15,8 +16,11 @@ from relpos_env.interface.observations import observation_mode
 class LiveFormationEnv(CarsEnv):
     """Cars that are moved by motors, in real time: a step takes a tenth of a second.
 
-    What the gate allows is what happens; `info` says what that was. Formation errors and rewards
-    are those that the cars believe in (``info["rewards_from"]`` is ``"estimates"``).
+    What the gate allows is what happens. Infos have the keys of the simulation but `collisions`,
+    which nobody counts; formation errors and rewards are those of the estimates. They say
+    what the gate made of the last action: ``asked_speed`` and ``allowed_speed`` [m/s],
+    ``allowed_steering`` [rad], ``gate``, why that is less than asked, and ``stopped``, True where
+    the car is not armed, so that the transition is not the policy's.
     """
 
     def __init__(
@@ -62,24 +66,10 @@ class LiveFormationEnv(CarsEnv):
         self.agents = []
         self._begun = False
 
-    def _begin(self) -> None:
+    def _begin(self, options: Mapping[str, Any] | None) -> None:
+        if options:
+            raise EnvError(f"options: expected none on real cars, got {', '.join(options)}")
         self.group.begin()
         if self._prepare is not None:
             self._prepare(self.group)
             self.group.begin()
-
-    def _infos(self, agents: list[str]) -> dict[str, Any]:
-        group = self.group
-        task, view = group.task, group.swarm.view
-        infos: dict[str, Any] = {}
-        for agent in agents:
-            k = self._numbers[agent]
-            infos[agent] = {
-                "formation_error": float(task.error[0, k]),
-                "tracked": int(view.ok[0, k].sum()),
-                "collisions": 0,
-                "present": bool(view.present[0, k]),
-                "rewards": dict(zip(task.terms, task.rewards[0, k].tolist(), strict=True)),
-                "rewards_from": "estimates",
-            }
-        return infos

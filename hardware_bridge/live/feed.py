@@ -89,7 +89,8 @@ class LiveFeed:
         if self._marks is not None:
             self._marks.keep(now)
         if (report := self.report) is not None:
-            applied = {"speed": report.speed, "steering": report.steering, "armed": report.armed}
+            names = ("speed", "steering", "armed", "reason")
+            applied = {name: getattr(report, name) for name in names}
             self._swarm.apply(**applied)
             if self._recorder is not None:
                 said = {name: value.tolist() for name, value in applied.items()}

@@ -13,7 +13,9 @@ from hardware_bridge.errors import BridgeError
 from hardware_bridge.live.believed import Believed
 from hardware_bridge.live.picture import draw_picture
 from hardware_bridge.live.swarm import LiveSwarm
+from hardware_bridge.safety.gate import reason_text
 from hardware_bridge.safety.picture import Picture
+from relpos_env.interface.infos import Columns, car_columns
 from relpos_env.interface.observations import ObservationMode, total_size
 from relpos_env.interface.observations.base import F32
 from relpos_env.tasks import make_task, reward_weights
@@ -117,6 +119,22 @@ class LiveGroup:
         self._feed.decide(draw_picture(self.swarm, t, speed[0], steering[0], fence))
         self.cycles += 1
         self._look(first=False)
+
+    def infos(self) -> Columns:
+        """What infos say of every car; errors and rewards are those of the estimates."""
+        swarm = self.swarm
+        columns = car_columns(
+            self.task, self._weights, swarm.view.present, self.active, swarm.view.ok
+        )
+        why = [reason_text(code) for code in swarm.reasons.tolist()]
+        columns |= {
+            "asked_speed": self.asked[None, :, 0],
+            "allowed_speed": swarm.allowed[None, :, 0],
+            "allowed_steering": swarm.allowed[None, :, 1],
+            "stopped": ~swarm.armed[None],
+            "gate": np.array([why], dtype=object),
+        }
+        return columns
 
     def let_stand(self) -> None:
         """Ask for no motion, without waiting."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,10 +15,14 @@ from hardware_bridge.links.ports import Chunk
 from hardware_bridge.live.marks import Marks, parse_marks
 from hardware_bridge.live.swarm import LiveSwarm
 from hardware_bridge.recording import Kind, Recording, read_recording
+from hardware_bridge.safety.gate import is_reason
 from hardware_bridge.safety.picture import Picture
+from tracking.arrays import F64
 from tracking.calibration.calibration import Calibration
 from tracking.calibration.file import parse_calibration
 from tracking.filters import filter_builder
+
+APPLIED = ("speed", "steering", "armed", "reason")
 
 
 class ReplayFeed:
@@ -73,8 +78,7 @@ class ReplayFeed:
             elif record.kind == Kind.EVENT:
                 event = record.event()
                 if event.get("event") == "applied":
-                    told = (np.array(event[key]) for key in ("speed", "steering", "armed"))
-                    self.swarm.apply(*told)
+                    self.swarm.apply(**self._applied(event))
                 elif event.get("event") == "notice":
                     self.notices.append((record.t_ns, str(event.get("text", ""))))
             elif record.kind == Kind.TICK:
@@ -83,6 +87,26 @@ class ReplayFeed:
                     self._pace(record.t_ns)
                 return record.t_ns
         return None
+
+    def _applied(self, event: Mapping[str, Any]) -> dict[str, F64]:
+        """What the gate let the cars do, from a record of it.
+
+        Raises:
+            BridgeError: The record lacks a number for a car, or has what is none.
+        """
+        n, found = self.swarm.config.n_slots, {}
+        for key in APPLIED:
+            try:
+                found[key] = np.array(event[key], dtype=np.float64)
+            except (KeyError, TypeError, ValueError):
+                found[key] = np.zeros(0)
+            if found[key].shape != (n,) or not np.isfinite(found[key]).all():
+                raise BridgeError(
+                    f"{self.recording.path.name}: a record 'applied' expected {n} numbers as {key}"
+                )
+        if not all(is_reason(int(code)) for code in found["reason"]):
+            raise BridgeError(f"{self.recording.path.name}: a record 'applied' has unknown reasons")
+        return found
 
     def decide(self, picture: Picture) -> None:
         """Nothing moves in a recording."""

@@ -17,7 +17,7 @@ from hardware_bridge.live.ready import ReadyPerception
 from hardware_bridge.live.stuck_places import DRIVES
 from relpos_env.interface.perception import Perception
 from relpos_env.interface.views import View
-from tracking.arrays import F64, Bool
+from tracking.arrays import F64, I64, Bool
 from tracking.calibration.calibration import Calibration, merge
 from tracking.calibration.file import read_calibration
 from tracking.estimate import TeamEstimate
@@ -54,7 +54,10 @@ class LiveSwarm:
         self._powered: Bool = np.zeros((1, config.n_slots), dtype=bool)
         self._room = ROOM
         self._here: set[int] = set()
-        self._applied: tuple[F64, F64] = (np.zeros(config.n_slots), np.zeros(config.n_slots))
+        self.allowed: F64 = np.zeros((config.n_slots, 2))
+        """Speed [m/s] and steering [rad] that the gate let pass last, (slot, 2)."""
+        self.reasons: I64 = np.zeros(config.n_slots, dtype=np.int64)
+        """Why these are less than asked, see `hardware_bridge.safety.gate.reason_text`, (slot)."""
         self.armed: Bool = np.zeros(config.n_slots, dtype=bool)
         """Which cars the gate lets move, (slot)."""
         self._perception = self._make_perception()
@@ -90,15 +93,17 @@ class LiveSwarm:
         """Take bytes as they came."""
         self.intake.take(chunk)
 
-    def apply(self, speed: F64, steering: F64, armed: F64) -> None:
+    def apply(self, speed: F64, steering: F64, armed: F64, reason: F64) -> None:
         """Note what the gate let the cars do, for cars that do not tell themselves.
 
         Args:
             speed: (slot) [m/s]
             steering: (slot) [rad]
             armed: 1 where the car may move, (slot).
+            reason: Why it is slower than wanted, see `hardware_bridge.safety.gate.reason_text`.
         """
-        self._applied = speed.copy(), steering.copy()
+        self.allowed = np.stack([speed, steering], axis=-1)
+        self.reasons = reason.astype(np.int64)
         self.armed = armed > 0.0
 
     def step(self, t_ns: int) -> None:
@@ -174,7 +179,7 @@ class LiveSwarm:
         for k in self._slots:
             here = k in self._here
             self._powered[0, k] = view.present[0, k] = here
-            speed, steering = self._applied[0][k], self._applied[1][k]
+            speed, steering = self.allowed[k].tolist()
             at_ns, said = intake.motion.get(k, (0, None))
             if said is not None and (t_ns - at_ns) * 1e-9 <= SILENT:
                 speed = said.speed

@@ -39,6 +39,11 @@ def reason_text(code: int) -> str:
     return REASONS[code] if code < 0 else RULES[code].meaning
 
 
+def is_reason(code: int) -> bool:
+    """True for the codes that `reason_text` knows."""
+    return code in REASONS or 0 <= code < len(RULES)
+
+
 @dataclass(frozen=True, slots=True)
 class GateOutput:
     """What the cars are told now, arrays over (env, car)."""

@@ -126,6 +126,19 @@ class Task(ABC):
                     self.change(env, state.pos_w[env], cars, before, float(t[env]))
         self.compute(state, t, collided, start, stop)
 
+    def set_goals(self, env: int, goals: F64, cars: I64) -> None:
+        """Let the cars of an episode that has just begun go where they are wanted.
+
+        Args:
+            env: Environment.
+            goals: In the room, (car, 2) [m], or (1, 2) for all.
+            cars: Indices of those that are present.
+
+        Raises:
+            EnvError: The task takes none, or not these.
+        """
+        raise EnvError("goals: expected none, the task has places of its own")
+
     @abstractmethod
     def begin(self, env: int, pos: F64, cars: I64) -> None:
         """Give out places at the start of an episode.

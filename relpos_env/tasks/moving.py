@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from relpos_env.errors import EnvError
 from relpos_env.tasks._frame_kernels import frame_now, update_frame
 from relpos_env.tasks.anchor import free_anchor
 from relpos_env.tasks.assignment import assign
@@ -123,6 +124,19 @@ class MovingFormation(Task):
         heading = 0.0 if motion.turning else motion.heading
         self._frame[env] = (*anchor, arc, heading)
         self._give(env, pos, cars, 0.0)
+
+    def set_goals(self, env: int, goals: F64, cars: I64) -> None:
+        """Let each present car stand at its goal, until cars come or go."""
+        if self._stand is None:
+            raise EnvError("goals: expected none, the task has a way of its own")
+        if len(goals) != len(cars):
+            raise EnvError(f"goals: expected one for each of {len(cars)} cars, got {len(goals)}")
+        if np.any(np.abs(goals) > self._stand.room):
+            raise EnvError(f"goals: expected points in the room, got {goals.tolist()}")
+        anchor = goals.mean(axis=0)
+        c, s = np.cos(self._motion.heading), np.sin(self._motion.heading)
+        self._frame[env, :2] = anchor
+        self._places[env, cars, :2] = (goals - anchor) @ np.array([[c, -s], [s, c]])
 
     def change(self, env: int, pos: F64, cars: I64, before: Bool, t: float) -> None:
         """Give out places for those who are present now; the frame goes on as it did.

@@ -67,6 +67,12 @@ class Rendezvous(Task):
         self._place[env] = middle if self._fixed is None else self._fixed
         self._since[env] = np.inf
 
+    def set_goals(self, env: int, goals: F64, cars: I64) -> None:
+        """Let the cars meet at a place in the room."""
+        if len(goals) != 1 or np.any(np.abs(goals[0]) > self._half):
+            raise EnvError(f"goals: expected one point in the room, got {goals.tolist()}")
+        self._place[env] = goals[0]
+
     def change(self, env: int, pos: F64, cars: I64, before: Bool, t: float) -> None:
         """A newcomer has to come too; the place stays."""
         self._since[env] = np.inf

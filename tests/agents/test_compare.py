@@ -106,7 +106,7 @@ def test_time_in_formation_is_that_of_the_worst_car():
     parts = SHORT.parts("estimate", 1)
     formation, controller = Formation(parts), Consensus(parts.mode.fields)
     formation.seed(0, seeding.np_random(1004)[0])
-    formation.begin(0)
+    formation.begin([0])
     formed = []
     while not formation.truncated[0]:
         actions = np.array([[controller.act(o) for o in formation.observations[0]]])

@@ -167,7 +167,7 @@ def test_hardly_anybody_touches_anything():
         formation = Formation(parts, 6)
         for e in range(6):
             formation.seed(e, seeding.np_random(e)[0])
-            formation.begin(e)
+            formation.begin([e])
         driver, contacts = CONTROLLERS["consensus"](parts.mode.fields), 0.0
         for _ in range(250):
             actions = driver.act(formation.observations)

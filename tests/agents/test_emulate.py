@@ -40,7 +40,7 @@ KEY = bytes(range(16))
 def formation_of(options):
     formation = Formation(options.parts())
     formation.seed(0, seeding.np_random(options.seed)[0])
-    formation.begin(0)
+    formation.begin([0])
     return formation
 
 

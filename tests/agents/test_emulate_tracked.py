@@ -68,7 +68,7 @@ def test_a_live_tracker_knows_what_that_of_the_simulation_knows(form, tmp_path):
     options = EmulateOptions(seed=3, seconds=12.0, format=form)
     live, formation = Live(options, tmp_path), Formation(options.parts())
     formation.seed(0, np.random.default_rng(options.seed))
-    formation.begin(0)
+    formation.begin([0])
     n = live.rig.world.parts.n_cars
     for _ in range(AT_REST // STEPS):
         live.decide(np.zeros(n), np.zeros(n))

@@ -35,7 +35,7 @@ def environments(mode, slots, history=1, steps=25):
         arguments = {"scenario": s, "n_cars": n, "observation": mode, "history": history}
         formation = Formation(configure({**arguments, "params": params}))
         formation.seed(0, np.random.default_rng(5))
-        formation.begin(0)
+        formation.begin([0])
         made.append(formation)
     yield made
     rng = np.random.default_rng(1)

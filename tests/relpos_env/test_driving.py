@@ -87,7 +87,7 @@ def test_a_group_that_stands_at_first_is_found_right(n_cars):
     formation = Formation(configure({"scenario": "ring-nlos", "n_cars": n_cars}), 8)
     for env in range(8):
         formation.seed(env, np.random.default_rng(env))
-        formation.begin(env)
+        formation.begin([env])
     for _ in range(40):
         command, heading = formation.operator.command, formation.state.heading
         ahead = np.cos(heading) * command[..., 0] + np.sin(heading) * command[..., 1]

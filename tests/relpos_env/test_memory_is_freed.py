@@ -16,7 +16,7 @@ def test_an_environment_that_is_gone_leaves_nothing_behind(name):
     formation = Formation(parts, n_envs=2, threads=2)
     for env in range(2):
         formation.seed(env, np.random.default_rng(env))
-        formation.begin(env)
+        formation.begin([env])
     for _ in range(15):  # through the start, with all its hypotheses
         formation.step(np.full((2, 3), 0.5), np.zeros((2, 3)))
     swarm = formation.loop.swarm

@@ -220,7 +220,7 @@ def drive(n_envs=1, steps=12, **arguments):
     formation = Formation(parts, n_envs)
     for e in range(n_envs):
         formation.seed(e, np.random.default_rng(e))
-        formation.begin(e)
+        formation.begin([e])
     seen = []
     for k in range(steps):
         wanted = np.full((n_envs, parts.n_cars), 1.0)

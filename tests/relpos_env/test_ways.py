@@ -227,7 +227,7 @@ def test_cars_that_gather_are_paid_for_it():
     formation = Formation(parts, 2)
     for env in range(2):
         formation.seed(env, np.random.default_rng(env))
-        formation.begin(env)
+        formation.begin([env])
     task = formation.task
     column = task.terms.index("progress")
     assert not task.rewards[..., column].any()

@@ -9,6 +9,7 @@ import numpy as np
 
 from agents.bench.env.drives import Drive
 from agents.bench.env.effort import EPISODE
+from relpos_env.swarm import Physics
 from relpos_env.vector_env import FormationVectorEnv
 
 SCENARIO, TASK = "ring-los", "ring"
@@ -29,9 +30,16 @@ class Batch:
         scenario: str = SCENARIO,
         n_cars: int = 3,
         threads: int = 1,
+        physics: Physics = "fast",
     ) -> None:
         self.env = FormationVectorEnv(
-            n_envs, scenario=scenario, task=TASK, n_cars=n_cars, threads=threads, max_cycles=EPISODE
+            n_envs,
+            scenario=scenario,
+            task=TASK,
+            n_cars=n_cars,
+            threads=threads,
+            max_cycles=EPISODE,
+            physics=physics,
         )
         self.n_envs, self._drive = n_envs, drive
         self.steps = ceil(EPISODE * resets / n_envs)

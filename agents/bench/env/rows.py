@@ -49,6 +49,7 @@ def bench_env(
         lambda: _batch(effort, SCENARIO, "followed"),
         lambda: _batch(effort, SCENARIO, "by chance"),
         lambda: _batch(effort, NLOS, "followed"),
+        lambda: [_kept(effort)],
         lambda: _threads(effort),
         lambda: [_processes(effort, rows)],
         lambda: [_curve_row(point) for point in growth(effort, progress=curve)],
@@ -93,6 +94,17 @@ def _batch(effort: Effort, name: str, drive: str) -> list[Row]:
     return [row] + [
         _row(f"{what}: {part}", spent, envs=effort.envs) for part, spent in parts.cost.items()
     ]
+
+
+def _kept(effort: Effort) -> Row:
+    """A batch whose every step is made in its spaces, beside pymunk."""
+    ours = Batch(effort.envs, followed, resets=effort.resets, physics="pymunk")
+    ours.warm_up(effort.warm_up)
+    theirs = Rooms(effort.envs, resets=effort.resets, name=SCENARIO)
+    cost, peer_cost = best_of_turns([ours.turn, theirs.turn], effort.turns)
+    ours.close()
+    what = f"{SCENARIO}, followed, physics pymunk"
+    return _row(what, cost, envs=effort.envs, peer=pymunk_name(), peer_cost=peer_cost)
 
 
 def _threads(effort: Effort) -> list[Row]:

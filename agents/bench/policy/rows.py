@@ -82,7 +82,7 @@ def _room(proximity: int = 0) -> Formation:
     """An environment in which the trackers know something."""
     formation = Formation(configure({"scenario": SCENARIO, "proximity": proximity}))
     formation.seed(0, np.random.default_rng(0))
-    formation.begin(0)
+    formation.begin([0])
     speed, steering = np.full((1, 3), 0.5), np.full((1, 3), 0.2)
     for _ in range(SETTLE):
         formation.step(speed, steering)
