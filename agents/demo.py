@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from agents.blindfold import Blindfold
-from agents.controllers import CONTROLLERS
+from agents.controllers import controller_builder
 from agents.driver import Driver
 from agents.errors import UsageError
 from agents.frames import FrameRecorder, errors
@@ -18,7 +18,6 @@ from agents.policy import Layout, TrainedPolicy, load_policy
 from agents.track import TrackResult, track_log
 from relpos_env import formation_v0
 from relpos_env.parallel_env import FormationEnv
-from relpos_env.registry import look_up
 from relpos_env.timing import DECISION
 from tracking.filters import DEFAULT_FILTER, FILTERS, filter_builder
 from tracking.short_repr import short_repr
@@ -159,7 +158,7 @@ def demo(
         )
         driver: Driver
         if trained is None:
-            driver = look_up(CONTROLLERS, controller, "controller")(env.fields)
+            driver = controller_builder(controller)(env.fields)
         else:
             driver = trained.driver(Layout(mode, len(env.possible_agents), history, proximity or 0))
         drives[told] = drive(env, driver, seed, blind=told == "nothing", progress=tell)

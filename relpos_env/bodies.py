@@ -13,8 +13,8 @@ from relpos_env.timing import DT
 from relpos_env.vehicle import CAR, car_record
 
 Array = NDArray[Any]
-NOWHERE = 1e6
-"""[m]"""
+NO_BOX = (1e6, 1e6, 0.0, 0.0, 1.0, 0.0)
+"""A place that no box has taken must be in nobody's way."""
 LONG_AGO = -(1 << 40)
 """[-] A step that never was."""
 
@@ -101,8 +101,7 @@ def place_bodies(b: Bodies, env: int, episode: Episode, room: tuple[float, float
     for array in (b.body, b.drive, b.wrench, b.accel, b.turn, b.contacts, b.boxes, b.box_body):
         array[env] = 0.0
     b.touched[env] = LONG_AGO
-    # A place that no box has taken must be in nobody's way.
-    b.boxes[env, :, :2] = NOWHERE
+    b.boxes[env] = NO_BOX
     b.body[env, :, :3] = episode.start
     b.present[env] = b.powered[env] = episode.present
     b.cars[env] = car_record(episode.car, DT)

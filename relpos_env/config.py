@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, get_args
@@ -12,16 +12,18 @@ import numpy as np
 from relpos_env.errors import EnvError, UnknownArgument
 from relpos_env.interface.actions import ActionMode, action_mode
 from relpos_env.interface.beams import MOST_BEAMS
-from relpos_env.interface.observations import ObservationMode, observation_mode
+from relpos_env.interface.observations import ModeBuilder, ObservationMode, observation_mode
 from relpos_env.loop import default_params
+from relpos_env.registry import look_up
 from relpos_env.scenarios import Scenario
 from relpos_env.scenarios import scenario as find_scenario
 from relpos_env.sensors.operator import OperatorSimParams
 from relpos_env.swarm import Physics
-from relpos_env.tasks import Task, make_task, reward_weights
+from relpos_env.tasks import Task, TaskBuilder, make_task, reward_weights, task_builder
 from relpos_env.tasks.needs import DEFAULT_SCENARIO, needs_of
+from tracking.arrays import F64
 from tracking.errors import ConfigError
-from tracking.filters import DEFAULT_FILTER, filter_builder
+from tracking.filters import DEFAULT_FILTER, FilterBuilder, filter_builder
 from tracking.tracker import TrackerParams
 
 MOST_CARS = 20
@@ -31,10 +33,12 @@ KINDS: dict[str, tuple[type, ...]] = {
     "operator": (OperatorSimParams,),
     "weights": (Mapping, type(None)),
     "end_on_collision": (bool,),
-    "filter": (str,),
-    "task": (str,),
 }
 """What arguments that are no names or numbers have to be."""
+
+
+RewardTerm = Callable[[Any], F64]
+"""Takes the `relpos_env.formation.Formation` after a step."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,24 +49,25 @@ class FormationConfig:
     """Room, obstacles, sensors and randomisation: a name in `relpos_env.scenarios.SCENARIOS`, a
     TOML file, or a scenario; by default that of the task in
     `relpos_env.tasks.needs.DEFAULT_SCENARIO`."""
-    task: str = "ring"
-    """What is asked of the cars, one of `relpos_env.tasks.TASKS`."""
+    task: str | TaskBuilder = "ring"
+    """What is asked of the cars: one of `relpos_env.tasks.TASKS`, or of
+    [your own](adding.md#your-own-without-a-change-here)."""
     task_options: Mapping[str, Any] = field(default_factory=dict)
     """The task's own options, by name."""
     n_cars: int | None = None
     """Slots for cars, 2 to 20; by default as many as the scenario can have at a time."""
     level: int | None = None
     """Randomisation of a level of the curriculum, 0 to 4, in place of the scenario's own."""
-    observation: str = "estimate"
-    """One of `relpos_env.interface.observations.OBSERVATIONS`."""
+    observation: str | ModeBuilder = "estimate"
+    """One of `relpos_env.interface.observations.OBSERVATIONS`, or of your own."""
     history: int = 1
     """So many observations in one, the newest first."""
     proximity: int = 0
     """Beams that measure distances round each car, 0 to 32; they end observations."""
-    actions: str = "continuous"
-    """One of `relpos_env.interface.actions.ACTIONS`."""
-    filter: str = DEFAULT_FILTER
-    """Position filter of the trackers, one of `tracking.filters.FILTERS`."""
+    actions: str | Callable[[], ActionMode] = "continuous"
+    """One of `relpos_env.interface.actions.ACTIONS`, or of your own."""
+    filter: str | FilterBuilder = DEFAULT_FILTER
+    """Position filter of the trackers, one of `tracking.filters.FILTERS`, or of your own."""
     params: TrackerParams | None = None
     """What the trackers believe; by default `relpos_env.loop.default_params`."""
     operator: OperatorSimParams = field(default_factory=OperatorSimParams)
@@ -73,6 +78,9 @@ class FormationConfig:
     """``pymunk``: a space that is kept for the episode, see `relpos_env.world`; ``fast``: the same
     motion while nothing touches, for batches. By default ``pymunk`` in the PettingZoo and
     Gymnasium environments, ``fast`` in the vector forms."""
+    reward: str | RewardTerm | None = None
+    """A reward term of your own, ``(formation) -> (env, car)``, which is added to the others; infos
+    have it as ``reward_own``."""
     max_cycles: int = 600
     """Steps of 0.1 s until truncation."""
     end_on_collision: bool = False
@@ -100,7 +108,9 @@ class FormationConfig:
             filter_builder(self.filter)
         except ConfigError as error:
             raise EnvError(str(error)) from error
-        name = DEFAULT_SCENARIO.get(self.task, "ring-nlos")
+        task_builder(self.task)
+        ours = self.task if isinstance(self.task, str) else ""
+        name = DEFAULT_SCENARIO.get(ours, "ring-nlos")
         wanted = name if self.scenario is None else self.scenario
         if not isinstance(wanted, str | Path | Scenario):
             raise EnvError(f"scenario: expected a name, a path or a scenario, got {wanted!r}")
@@ -115,12 +125,15 @@ class FormationConfig:
             scenario = scenario.with_cars(n_cars)
         options = {**needs_of(self.task, scenario), **self.task_options}
         task = make_task(self.task, n_cars, 1, scenario.room, **options)
-        reward_weights(self.task, task.terms, self.weights)
+        reward_weights(self.task, task, self.weights)
         return Parts(
             config=config,
             scenario=scenario,
             n_cars=n_cars,
             task_options=options,
+            reward=None
+            if self.reward is None
+            else look_up({}, self.reward, "reward", group="relpos_env.rewards"),
             mode=observation_mode(self.observation, n_cars, config.proximity),
             actions=action_mode(self.actions),
             params=default_params(scenario, n_cars) if self.params is None else self.params,
@@ -138,6 +151,7 @@ class Parts:
     mode: ObservationMode
     actions: ActionMode
     params: TrackerParams
+    reward: RewardTerm | None
 
     def make_task(self, n_envs: int) -> Task:
         """The task of a batch."""

@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from relpos_env._result_kernels import TeamResults, judge, tracking_errors
-from relpos_env.config import Parts, whole_number
+from relpos_env.config import Parts, RewardTerm, whole_number
 from relpos_env.errors import EnvError
 from relpos_env.interface.observations import total_size
 from relpos_env.interface.observations.base import F32
@@ -75,7 +75,7 @@ class Formation:
         )
         self.task = parts.make_task(n_envs)
         self.operator = Operator(config.operator, n, n_envs)
-        self.weights = reward_weights(config.task, self.task.terms, config.weights)
+        self.weights = reward_weights(config.task, self.task, config.weights)
         self._size = total_size(parts.mode.fields)
         self.observations: F32 = np.zeros((n_envs, n, config.history * self._size), np.float32)
         """(env, car, size); zeros for absent cars."""
@@ -83,6 +83,8 @@ class Formation:
         """(env, car); 0 for absent cars."""
         self.team = TeamResults(np.zeros(n_envs), np.zeros(n_envs), np.zeros(n_envs))
         """What came of the last step for all cars together, (env)."""
+        self.own_reward: F64 = np.zeros((n_envs, n))
+        """What the user's term added to it, (env, car)."""
         self.active: Bool = np.zeros((n_envs, n), dtype=bool)
         """Cars that take part, (env, car): in the room, or away and to return."""
         self.left: Bool = np.zeros((n_envs, n), dtype=bool)
@@ -226,11 +228,20 @@ class Formation:
         self._compare()
         return self._tracking_error.copy()
 
+    def team_observations(self) -> F32:
+        """Observations of all cars one after the other, (env, car size); a copy.
+
+        Zeros for absent cars, and for those that left in the last step too.
+        """
+        rows = self.observations.copy()
+        rows[self.left] = 0.0
+        return rows.reshape(self.n_envs, -1)
+
     def infos(self) -> Columns:
         """What infos say of every car, see `relpos_env.interface.infos`."""
         self._compare()
         view, swarm = self.loop.view, self.loop.swarm
-        return car_columns(
+        columns = car_columns(
             self.task,
             self.weights,
             self.state.present,
@@ -239,6 +250,9 @@ class Formation:
             collisions=swarm.contacts,
             tracking_error=self._tracking_error,
         )
+        if self.parts.reward is not None:
+            columns["reward_own"] = self.own_reward
+        return columns
 
     def close(self) -> None:
         """Release the threads."""
@@ -254,6 +268,22 @@ class Formation:
             self._judge_all()
         else:
             judge(envs.start, envs.stop, *self._verdict)
+        if self.parts.reward is not None:
+            self._add_own_reward(self.parts.reward, envs)
+
+    def _add_own_reward(self, term: RewardTerm, envs: slice) -> None:
+        """Add the user's term to the rewards of the cars in the room.
+
+        Raises:
+            EnvError: It gives no finite number for each car.
+        """
+        own = np.asarray(term(self), dtype=np.float64)
+        if own.shape != self.rewards.shape or not np.isfinite(own[envs]).all():
+            raise EnvError(f"reward: expected finite numbers {self.rewards.shape}, got {own!r}")
+        self.own_reward[envs] = np.where(self.state.present[envs], own[envs], 0.0)
+        self.rewards[envs] += self.own_reward[envs]
+        n = np.maximum(self.active[envs].sum(axis=1), 1)
+        self.team.reward[envs] += self.own_reward[envs].sum(axis=1) / n
 
     def _observe(self, envs: slice | Sequence[int]) -> None:
         """Write the observations of some environments; those of the others stay what they are.

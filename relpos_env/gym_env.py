@@ -142,7 +142,7 @@ class FormationGymEnv(gymnasium.Env[F32, Any]):
         self._begun, self._over = True, False
         self._film.forget()
         self._show()
-        return self._formation.observations[0].ravel().copy(), self._info()
+        return self._formation.team_observations()[0], self._info()
 
     def step(self, action: Any) -> tuple[F32, float, bool, bool, dict[str, Any]]:
         """Drive for 0.1 s.
@@ -159,7 +159,7 @@ class FormationGymEnv(gymnasium.Env[F32, Any]):
         self._over = bool(formation.terminated[0] or formation.truncated[0])
         self._show()
         return (
-            formation.observations[0].ravel().copy(),
+            formation.team_observations()[0],
             float(formation.team.reward[0]),
             bool(formation.terminated[0]),
             bool(formation.truncated[0]),

@@ -20,6 +20,7 @@ from relpos_env.swarm import Physics, Swarm
 from relpos_env.timing import DT, STAND_STILL
 from tracking.arrays import F64, Bool
 from tracking.estimate import TeamEstimate
+from tracking.filters import FilterBuilder
 from tracking.horizon import HorizonParams
 from tracking.ranging.airtime import round_rate
 from tracking.tracker import TrackerParams
@@ -49,7 +50,7 @@ class TrackedSwarm:
         n_cars: int,
         n_envs: int = 1,
         *,
-        filter: str,
+        filter: str | FilterBuilder,
         params: TrackerParams,
         n_steps: int = 10,
         proximity: int = 0,

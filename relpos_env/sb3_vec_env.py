@@ -105,8 +105,8 @@ class FormationVecEnv(SharedSeats):
         Raises:
             EnvError: No term of that name, or a weight that is not finite.
         """
-        terms = self.formation.task.terms
-        self.formation.weights[:] = reward_weights(self._parts.config.task, terms, weights)
+        task = self._parts.config.task
+        self.formation.weights[:] = reward_weights(task, self.formation.task, weights)
 
     def reset(self) -> F32:
         """Begin an episode in every environment; observations, (seat, size)."""
@@ -149,7 +149,7 @@ class FormationVecEnv(SharedSeats):
             for seat in np.nonzero(~f.active.ravel())[0]:
                 infos[seat] = {"active": False}
         if dones.any():
-            last, columns = self._observations(), f.infos()
+            last, columns = self._rows(f.observations), f.infos()
             for seat in np.nonzero(dones)[0].tolist():
                 env, car = divmod(seat, self.n_cars)
                 infos[seat] = car_infos(columns, env, [car])[0] | {
@@ -177,7 +177,12 @@ class FormationVecEnv(SharedSeats):
         return self._film.picture(self.formation)
 
     def _observations(self) -> F32:
-        observations: F32 = self.formation.observations.reshape(self.num_envs, -1)
+        """What the seats see now; zeros where a car has left."""
+        return self._rows(self.formation.team_observations())
+
+    def _rows(self, observations: F32) -> F32:
+        """Observations of all seats, with the truth if it is wanted; a copy."""
+        observations = observations.reshape(self.num_envs, -1)
         if self.with_truth:
             truth = self.formation.own_truth().reshape(self.num_envs, -1).astype(np.float32)
             return np.concatenate([observations, truth], axis=1)

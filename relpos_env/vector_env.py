@@ -200,8 +200,7 @@ class FormationVectorEnv(VectorEnv[F32, Any, Any]):
         return {**ends, "_final_info": over.copy(), **self._infos()}
 
     def _observations(self) -> F32:
-        observations: F32 = self.formation.observations.reshape(self.num_envs, -1).copy()
-        return observations
+        return self.formation.team_observations()
 
     def _infos(self, envs: Bool | None = None) -> dict[str, Any]:
         """The infos of some environments, without a dict for any."""

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pymunk
 
-from relpos_env.bodies import NOWHERE, Bodies, box_row
+from relpos_env.bodies import NO_BOX, Bodies, box_row
 from relpos_env.errors import EnvError
 from relpos_env.scenarios.obstacle import THINNEST, Obstacle
 from relpos_env.vehicle import CarParams
@@ -119,7 +119,7 @@ class World:
         if len(added) > room:
             raise EnvError(f"world.space: expected at most {room} added shapes, got {len(added)}")
         rows = b.boxes[env, self._n_obstacles :]
-        rows[:] = NOWHERE, NOWHERE, 0.0, 0.0, 0.0, 0.0
+        rows[:] = NO_BOX
         for k, shape in enumerate(added):
             x, y, width, height, angle = self._rectangles.setdefault(shape, rectangle_of(shape))
             centre = shape.body.local_to_world((x, y))

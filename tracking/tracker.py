@@ -18,7 +18,7 @@ from tracking.arrays import F64
 from tracking.constellation import Constellation
 from tracking.errors import ConfigError
 from tracking.estimate import TeamEstimate
-from tracking.filters import DEFAULT_FILTER, filter_builder
+from tracking.filters import DEFAULT_FILTER, FilterBuilder, filter_builder
 from tracking.filters.joint import JointEkf
 from tracking.filters.params import FilterParams
 from tracking.horizon import HorizonParams
@@ -48,7 +48,7 @@ class Tracker:
         constellation: Constellation,
         params: TrackerParams | None = None,
         *,
-        filter: str = DEFAULT_FILTER,
+        filter: str | FilterBuilder = DEFAULT_FILTER,
         n_envs: int = 1,
     ) -> None:
         params = params or TrackerParams()

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from typing import TypeVar
 
 from agents.errors import UsageError
-from relpos_env.interface.observations import OBSERVATIONS
+from relpos_env.errors import EnvError
+from relpos_env.interface.observations import observation_mode
 
 SHORTEST, LONGEST = 0.1, 3600.0
 """[s]"""
@@ -22,10 +23,11 @@ def modes(names: Sequence[str]) -> list[str]:
         UsageError: No such mode, or none at all.
     """
     chosen = each_once("--observation", names)
-    for name in chosen:
-        if name not in OBSERVATIONS:
-            modes = ", ".join(OBSERVATIONS)
-            raise UsageError(f"--observation: expected names of {modes}, got {name!r}")
+    try:
+        for name in chosen:
+            observation_mode(name, 2)
+    except EnvError as error:
+        raise UsageError(f"--{error}") from error
     return chosen
 
 

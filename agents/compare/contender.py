@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol
 
 from agents.compare.trained import find_trained
-from agents.controllers import CONTROLLERS
+from agents.controllers import CONTROLLERS, controller_builder
 from agents.driver import Driver
 from agents.errors import UsageError
 from agents.policy import shipped_names
+from relpos_env.errors import EnvError
 from relpos_env.interface.observations import observation_mode
 
 
@@ -59,12 +61,23 @@ class ControllerEntry:
 
     def driver(self, observation: str, n_cars: int, proximity: int) -> Driver:
         """The controller of one mode."""
-        return CONTROLLERS[self.title](observation_mode(observation, n_cars, proximity).fields)
+        fields = observation_mode(observation, n_cars, proximity).fields
+        return controller_builder(self.title)(fields)
 
 
 def find_controller(name: str) -> Entry | None:
-    """A controller of that name, if there is one."""
-    return ControllerEntry(name) if name in CONTROLLERS else None
+    """A controller of that name, if there is one.
+
+    Raises:
+        UsageError: ``package.module:Name`` of what cannot be imported.
+    """
+    try:
+        controller_builder(name)
+    except EnvError as error:
+        if ":" in name and not Path(name).exists():
+            raise UsageError(str(error)) from error
+        return None
+    return ControllerEntry(name)
 
 
 SOURCES: tuple[Callable[[str], Entry | None], ...] = (find_controller, find_trained)

@@ -9,13 +9,31 @@ from agents.controllers.leader_follower import LeaderFollower, LeaderFollowerPar
 from agents.controllers.range_only import RangeOnly, RangeOnlyParams
 from agents.driver import Driver
 from relpos_env.interface.observations import Field
+from relpos_env.registry import look_up
 
-CONTROLLERS: dict[str, Callable[[tuple[Field, ...]], Driver]] = {
+ControllerBuilder = Callable[[tuple[Field, ...]], Driver]
+
+CONTROLLERS: dict[str, ControllerBuilder] = {
     "consensus": Consensus,
     "leader-follower": LeaderFollower,
     "range-only": RangeOnly,
 }
 """Name to builder ``(observation fields) -> Driver``."""
+
+
+
+def controller_builder(name: str | ControllerBuilder) -> ControllerBuilder:
+    """Look a controller up.
+
+    Args:
+        name: One of `CONTROLLERS`, ``package.module:Name``, a name among the entry points
+            ``relpos_env.controllers``, or a builder itself.
+
+    Raises:
+        EnvError: No controller of that name.
+    """
+    return look_up(CONTROLLERS, name, "controller", group="relpos_env.controllers")
+
 
 __all__ = [
     "CONTROLLERS",
@@ -25,4 +43,5 @@ __all__ = [
     "LeaderFollowerParams",
     "RangeOnly",
     "RangeOnlyParams",
+    "controller_builder",
 ]

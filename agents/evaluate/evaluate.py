@@ -203,10 +203,13 @@ def check_filters(names: Iterable[str]) -> tuple[str, ...]:
         UsageError: No such filter, or none at all.
     """
     chosen = tuple(dict.fromkeys(names))
-    wrong = [n for n in chosen if n not in FILTERS]
-    if wrong or not chosen:
-        got = repr(wrong[0]) if wrong else "none"
-        raise UsageError(f"--filters: expected names of {', '.join(FILTERS)}, got {got}")
+    if not chosen:
+        raise UsageError(f"--filters: expected names of {', '.join(FILTERS)}, got none")
+    try:
+        for name in chosen:
+            filter_builder(name)
+    except ConfigError as error:
+        raise UsageError(f"--filters: {error}") from error
     return chosen
 
 

@@ -70,7 +70,7 @@ class LiveGroup:
         config = swarm.config
         n = config.n_slots
         self.task = make_task(config.task.name, n, 1, config.task.room, **config.task.options)
-        self._weights = reward_weights(config.task.name, self.task.terms, None)
+        self._weights = reward_weights(config.task.name, self.task)
         self.believed = Believed(n)
         self._command: F64 = np.zeros((1, n, 2))
         swarm.share(self.task.target, self.task.has_target, self._command)

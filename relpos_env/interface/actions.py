@@ -114,10 +114,14 @@ ACTIONS: dict[str, Callable[[], ActionMode]] = {
 """Name to builder."""
 
 
-def action_mode(name: str) -> ActionMode:
+def action_mode(name: str | Callable[[], ActionMode]) -> ActionMode:
     """Look a kind of actions up.
+
+    Args:
+        name: One of `ACTIONS`, ``package.module:Name``, a name among the entry points
+            ``relpos_env.actions``, or a builder itself.
 
     Raises:
         EnvError: None of that name.
     """
-    return look_up(ACTIONS, name, "actions")()
+    return look_up(ACTIONS, name, "actions", group="relpos_env.actions")()

@@ -111,7 +111,9 @@ class CarsEnv(ParallelEnv, ABC):  # type: ignore[misc]
         space = space_of(fields, history)
         if fixed_agents:
             space = spaces.Box(
-                np.append(space.low, 0.0), np.append(space.high, 1.0), dtype=np.float32
+                np.append(space.low, np.float32(0.0)),
+                np.append(space.high, np.float32(1.0)),
+                dtype=np.float32,
             )
         self.observation_spaces = {a: copy(space) for a in self.possible_agents}
         self.action_spaces = {a: actions.space() for a in self.possible_agents}

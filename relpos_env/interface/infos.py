@@ -2,13 +2,16 @@
 
 | key | of a car | of a team |
 |---|---|---|
-| ``formation_error`` | distance of the others from their places, mean [m]; NaN while absent | mean |
-| ``tracking_error`` | distance of estimates from the truth, mean [m]; NaN where none is | mean |
+| ``formation_error`` | distance of the others from their places, mean [m]; inf while absent | mean |
+| ``tracking_error`` | distance of estimates from the truth, mean [m]; inf where none is | mean |
 | ``tracked`` | others whose estimate can be used | mean |
 | ``collisions`` | contacts begun in the step; not on hardware, which counts none | sum |
 | ``present``, ``active`` | in the room; takes part: in the room, or away and to return | of each car |
 | ``is_success`` | the task is accomplished | the same |
 | ``reward_<term>`` | what the term adds to the reward | mean |
+
+Errors that there are not are infinite: equal to themselves, as the checkers of Gymnasium and
+PettingZoo expect of two equal runs, and no perfect score.
 """
 
 from __future__ import annotations
@@ -48,10 +51,10 @@ def car_columns(
         tracking_error: (env, car) [m], NaN where unknown; None where nobody knows the truth.
     """
     columns: Columns = {
-        "formation_error": np.where(present, task.error, np.nan),
-        "tracking_error": np.full(present.shape, np.nan)
+        "formation_error": np.where(present, task.error, np.inf),
+        "tracking_error": np.full(present.shape, np.inf)
         if tracking_error is None
-        else tracking_error,
+        else np.where(np.isnan(tracking_error), np.inf, tracking_error),
         "tracked": ok.sum(axis=-1),
     }
     if collisions is not None:
@@ -117,9 +120,9 @@ def vector_infos(team: Columns, envs: Bool | None = None) -> dict[str, Any]:
 
 
 def _mean_of_known(column: F64) -> F64:
-    """Mean of what is no NaN in each row, NaN where all are, (env)."""
-    known = ~np.isnan(column)
+    """Mean of what is finite in each row, infinite where nothing is, (env)."""
+    known = np.isfinite(column)
     n = known.sum(axis=1)
     total = np.where(known, column, 0.0).sum(axis=1)
-    mean: F64 = np.where(n > 0, total / np.maximum(n, 1), np.nan)
+    mean: F64 = np.where(n > 0, total / np.maximum(n, 1), np.inf)
     return mean

@@ -18,6 +18,7 @@ from tracking.arrays import F64, I64, Bool
 from tracking.compiled import bind
 from tracking.constellation import Constellation
 from tracking.estimate import TeamEstimate
+from tracking.filters import FilterBuilder
 from tracking.horizon import Horizon
 from tracking.measurements import MeasurementBlock
 from tracking.tracker import Tracker, TrackerParams
@@ -38,7 +39,7 @@ class Perception:
         block: MeasurementBlock,
         powered: Bool,
         *,
-        filter: str,
+        filter: str | FilterBuilder,
         room: int,
         n_beams: int = 0,
     ) -> None:

@@ -17,7 +17,9 @@ from relpos_env.tasks.ring import Ring
 from relpos_env.tasks.travel import travel
 from relpos_env.tasks.weights import DEFAULT_WEIGHTS, reward_weights
 
-TASKS: dict[str, Callable[..., Task]] = {
+TaskBuilder = Callable[..., Task]
+
+TASKS: dict[str, TaskBuilder] = {
     "ring": Ring,
     "hold": hold,
     "travel": travel,
@@ -29,13 +31,26 @@ TASKS: dict[str, Callable[..., Task]] = {
 here, and its weights in `DEFAULT_WEIGHTS`."""
 
 
+def task_builder(name: str | TaskBuilder) -> TaskBuilder:
+    """Look a task up.
+
+    Args:
+        name: One of `TASKS`, ``package.module:Name``, a name among the entry points
+            ``relpos_env.tasks``, or a builder itself.
+
+    Raises:
+        EnvError: No task of that name.
+    """
+    return look_up(TASKS, name, "task", group="relpos_env.tasks")
+
+
 def make_task(
-    name: str, n_cars: int, n_envs: int, room: tuple[float, float], /, **options: Any
+    name: str | TaskBuilder, n_cars: int, n_envs: int, room: tuple[float, float], /, **options: Any
 ) -> Task:
     """Look a task up and build it.
 
     Args:
-        name: One of `TASKS`.
+        name: See `task_builder`.
         n_cars: Slots for cars, 2 to 20.
         n_envs: Environments.
         room: Width along x and depth along y [m]; the origin is the middle.
@@ -44,7 +59,7 @@ def make_task(
     Raises:
         EnvError: No task of that name, no option of that name, or an option out of range.
     """
-    build = look_up(TASKS, name, "task")
+    build = task_builder(name)
     known = [p for p in inspect.signature(build).parameters if p not in _ALWAYS]
     for option in options:
         if option not in known:
@@ -61,4 +76,5 @@ __all__ = [
     "Truth",
     "make_task",
     "reward_weights",
+    "task_builder",
 ]

@@ -8,6 +8,8 @@ every step, one compiled call). What has to be known of the step before is done 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Protocol
 
 import numpy as np
@@ -51,6 +53,9 @@ class Task(ABC):
 
     Law: an environment of a batch has the same numbers as alone, bit for bit.
     """
+
+    default_weights: Mapping[str, float] = MappingProxyType({})
+    """Weights of reward terms that are not 1; tasks of ours have theirs in `DEFAULT_WEIGHTS`."""
 
     def __init__(self, n_cars: int, n_envs: int, terms: tuple[str, ...]) -> None:
         """Make the arrays.

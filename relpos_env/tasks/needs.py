@@ -19,7 +19,7 @@ DEFAULT_SCENARIO: Mapping[str, str] = {
 """Task to the scenario it is done in unless another is asked for."""
 
 
-def needs_of(task: str, scenario: Scenario) -> dict[str, Any]:
+def needs_of(task: object, scenario: Scenario) -> dict[str, Any]:
     """Options of a task that follow from the scenario.
 
     Raises:

@@ -8,7 +8,7 @@ from types import MappingProxyType
 import numpy as np
 
 from relpos_env.errors import EnvError
-from relpos_env.registry import look_up
+from relpos_env.tasks.base import Task
 from relpos_env.tasks.options import finite
 from tracking.arrays import F64
 
@@ -37,21 +37,22 @@ DEFAULT_WEIGHTS: Mapping[str, Mapping[str, float]] = MappingProxyType(
 
 
 def reward_weights(
-    task: str, terms: tuple[str, ...], override: Mapping[str, float] | None = None
+    name: object, task: Task, override: Mapping[str, float] | None = None
 ) -> F64:
     """Weights in the order of a task's terms, (term).
 
     Args:
-        task: Name of the task.
-        terms: Its `terms`.
-        override: Weights by name that differ from the default.
+        name: By which the task was looked up.
+        task: Of a task of ours `DEFAULT_WEIGHTS` count, of others `Task.default_weights`.
+        override: Weights by name that differ from these.
 
     Raises:
         EnvError: No term of that name, or a weight that is not finite.
     """
-    chosen = dict(look_up(DEFAULT_WEIGHTS, task, "task"))
-    for name, weight in (override or {}).items():
-        if name not in terms:
-            raise EnvError(f"weights: expected terms among {', '.join(terms)}, got {name!r}")
-        chosen[name] = finite(f"weights: {name}", weight)
-    return np.array([chosen[name] for name in terms])
+    ours = DEFAULT_WEIGHTS.get(name) if isinstance(name, str) else None
+    chosen = {**dict.fromkeys(task.terms, 1.0), **(ours or task.default_weights)}
+    for term, weight in (override or {}).items():
+        if term not in task.terms:
+            raise EnvError(f"weights: expected terms among {', '.join(task.terms)}, got {term!r}")
+        chosen[term] = finite(f"weights: {term}", weight)
+    return np.array([chosen[term] for term in task.terms])

@@ -54,7 +54,7 @@ BAD_ARGUMENTS = [
         {"task": "gap", "task_options": {"waypoints": [[3, 0], [3, 1]]}},
         "waypoints: .* the first one before the wall",
     ),
-    ({"frames": 3}, "frames: unknown argument, expected one of scenario, task"),
+    ({"frames": 3}, "unexpected keyword argument 'frames', expected one of scenario, task"),
 ]
 
 

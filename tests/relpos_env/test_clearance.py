@@ -91,7 +91,7 @@ def test_to_crash_is_not_the_cheapest_end():
     paid, steps = 0.0, 0
     while env.agents:
         _, _, ends, _, infos = env.step({a: np.array([1.0, 0.3], np.float32) for a in env.agents})
-        paid += infos["car_0"]["rewards"]["time"]
+        paid += infos["car_0"]["reward_time"] / env.formation.weights[-1]
         steps += 1
     assert any(ends.values())
     assert steps < 150

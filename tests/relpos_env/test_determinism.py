@@ -1,9 +1,13 @@
 """Same seed, same everything, bit for bit, in every form; a batch is its environments alone."""
 
+from functools import partial
+
 import numpy as np
 import pytest
-from runs import bits, busy, gym_run, parallel_run, vector_run
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from runs import bits, busy, commands, gym_run, parallel_run, vector_run
 
+from relpos_env.errors import EnvError
 from relpos_env.formation_v0 import parallel_env
 from relpos_env.gym_env import FormationGymEnv
 from relpos_env.vector_env import FormationVectorEnv
@@ -67,30 +71,43 @@ def test_the_busy_scenario_has_joins_leaves_and_losses_of_power():
         (3, {**BUSY, "end_on_collision": True, "max_cycles": 60}),
     ],
 )
-def test_environment_k_of_a_vector_is_the_single_one_with_the_next_seeds(n_envs, kwargs):
-    steps = 70
-    vector = FormationVectorEnv(n_envs, **kwargs)
-    trace, taken = vector_run(vector, 20, steps)
-    for k in range(n_envs):
-        single = FormationGymEnv(**kwargs)
-        observation, _ = single.reset(seed=20 + k)
-        assert bits(trace[0][0][k]) == bits(observation)
-        episodes = 1
-        for step, actions in zip(trace[1:], taken, strict=True):
-            observation, reward, terminated, truncated, info = single.step(actions[k])
-            infos = step[4]
-            assert bits(step[1][k]) == bits(reward)
-            assert (step[2][k], step[3][k]) == (terminated, truncated)
-            if terminated or truncated:
-                assert bits(infos["final_obs"][k]) == bits(observation)
-                for name in ("formation_error", "collisions", "active"):
-                    assert np.array_equal(infos["final_info"][name][k], info[name])
-                observation, info = single.reset()
-                episodes += 1
-            assert bits(step[0][k]) == bits(observation)
-            for name in ("formation_error", "collisions", "active"):
-                assert np.array_equal(infos[name][k], info[name])
-        assert episodes > 1
+@pytest.mark.parametrize("mode", AutoresetMode)
+def test_a_vector_is_the_sync_vector_of_single_ones(n_envs, kwargs, mode):
+    kwargs = {**kwargs, "physics": "fast"}
+    ours = FormationVectorEnv(n_envs, autoreset_mode=mode, **kwargs)
+    theirs = SyncVectorEnv([partial(FormationGymEnv, **kwargs)] * n_envs, autoreset_mode=mode)
+    assert ours.metadata["autoreset_mode"] is theirs.metadata["autoreset_mode"]
+    assert bits(ours.reset(seed=20)) == bits(theirs.reset(seed=20))
+    space, rng, ends = ours.single_action_space, np.random.default_rng(7), 0
+    for _ in range(70):
+        actions = commands(space, rng, (n_envs,))
+        mine, his = ours.step(actions), theirs.step(actions)
+        assert bits(mine) == bits(his)
+        over = mine[2] | mine[3]
+        ends += over.sum()
+        if mode is AutoresetMode.DISABLED and over.any():
+            with pytest.raises(EnvError, match=r"environment \d is over, it must be reset"):
+                ours.step(actions)
+            resets = [env.reset(options={"reset_mask": over.copy()}) for env in (ours, theirs)]
+            assert bits(resets[0]) == bits(resets[1])
+    assert ends >= n_envs
+
+
+def test_one_seed_is_one_series_of_episodes_in_every_form():
+    pytest.importorskip("stable_baselines3")
+    from relpos_env.sb3_vec_env import FormationVecEnv
+
+    kwargs = {"physics": "fast", "max_cycles": 5}
+    one, team = parallel_env(**kwargs), FormationGymEnv(**kwargs)
+    batch, seats = FormationVectorEnv(2, **kwargs), FormationVecEnv(2, **kwargs)
+    seats.seed(8)
+    for seed in (8, None):
+        cars = np.stack(list(one.reset(seed=seed)[0].values()))
+        assert bits(cars.ravel()) == bits(team.reset(seed=seed)[0])
+        assert bits(cars.ravel()) == bits(batch.reset(seed=seed)[0][0])
+        assert bits(cars) == bits(seats.reset()[:3])
+    assert bits(batch.np_random.random()) == bits(np.random.default_rng(8).random())
+    assert one.np_random is one._rng
 
 
 @pytest.mark.parametrize("kwargs", [HARD, BUSY])

@@ -268,7 +268,7 @@ def test_a_batch_is_its_environments():
         )  # fmt: skip
         alone = Formation(parts)
         alone.seed(0, np.random.default_rng(e))
-        alone.begin(0)
+        alone.begin([0])
         for k in range(len(batch)):
             wanted = np.full((1, parts.n_cars), 1.0)
             alone.step(wanted, 0.3 * math.sin(k) * wanted)

@@ -78,14 +78,15 @@ def test_seats_are_the_agents_of_the_pettingzoo_form(kwargs):
         for (seen, rewards, dones, infos), actions in zip(trace[1:], taken, strict=True):
             seats = {f"car_{k}": row for k, row in enumerate(range(n * e, n * e + n))}
             wanted = {a: actions[seats[a]] for a in env.agents}
-            observations, reward, terminated, truncated, _ = env.step(wanted)
+            observations, reward, terminated, truncated, told = env.step(wanted)
             for agent, row in seats.items():
                 assert rewards[row] == np.float32(reward.get(agent, 0.0))
                 over = terminated.get(agent, False) or truncated.get(agent, False)
-                assert dones[row] == over
+                assert dones[row] == (over or not env.agents)
                 if over:
                     last = infos[row]["terminal_observation"]
                     assert bits(last) == bits(observations[agent])
+                    assert {key: infos[row][key] for key in told[agent]} == told[agent]
                     assert infos[row]["TimeLimit.truncated"] == (not terminated[agent])
             left += bool(env.agents) and any(truncated.values())
             if not env.agents:

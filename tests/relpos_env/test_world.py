@@ -80,6 +80,7 @@ def test_a_pushed_box_stays_in_the_room():
 def test_a_car_that_is_taken_out_is_in_nobodys_way():
     swarm = placed([(-1.0, 0.0, 0.0), (0.5, 0.0, 0.0)])
     swarm._bodies.present[0, 1] = False
+    swarm._groups[0].world.remove_car(1)
     assert not drive(swarm, 2.0, [1.0, 0.0]).any()
     assert swarm.state.pos_w[0, 0, 0] > 0.4
 

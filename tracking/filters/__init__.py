@@ -6,14 +6,16 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from tracking.constellation import Constellation
-from tracking.errors import ConfigError
 from tracking.filters.base import Filter
 from tracking.filters.joint import JointEkf
 from tracking.filters.pair import PairEkf
 from tracking.filters.paper import PaperEkf
 from tracking.filters.params import FilterParams
+from tracking.registry import look_up
 
-FILTERS: dict[str, Callable[[Constellation, FilterParams, int], Filter]] = {
+FilterBuilder = Callable[[Constellation, FilterParams, int], Filter]
+
+FILTERS: dict[str, FilterBuilder] = {
     "joint": lambda who, params, n_envs: JointEkf(who, params.joint, n_envs),
     "ekf-mds": lambda who, params, n_envs: PairEkf(who, params.pair, n_envs),
     "ekf": lambda who, params, n_envs: PairEkf(who, params.pair, n_envs, use_mds=False),
@@ -27,15 +29,19 @@ FILTERS: dict[str, Callable[[Constellation, FilterParams, int], Filter]] = {
 DEFAULT_FILTER = "joint"
 
 
-def filter_builder(name: str) -> Callable[[Constellation, FilterParams, int], Filter]:
+def filter_builder(
+    name: str | FilterBuilder,
+) -> FilterBuilder:
     """Look a filter up.
+
+    Args:
+        name: One of `FILTERS`, ``package.module:Name``, a name among the entry points
+            ``relpos_env.filters``, or a builder itself.
 
     Raises:
         ConfigError: No filter of that name.
     """
-    if name not in FILTERS:
-        raise ConfigError(f"filter: expected one of {', '.join(FILTERS)}, got {name!r}")
-    return FILTERS[name]
+    return look_up(FILTERS, name, "filter", group="relpos_env.filters")
 
 
-__all__ = ["DEFAULT_FILTER", "FILTERS", "Filter", "FilterParams", "filter_builder"]
+__all__ = ["DEFAULT_FILTER", "FILTERS", "Filter", "FilterBuilder", "FilterParams", "filter_builder"]

@@ -16,7 +16,9 @@ from relpos_env.interface.observations.ranges import Ranges
 from relpos_env.interface.observations.relative import RelativePositions
 from relpos_env.registry import look_up
 
-OBSERVATIONS: dict[str, Callable[[int, int], ObservationMode]] = {
+ModeBuilder = Callable[[int, int], ObservationMode]
+
+OBSERVATIONS: dict[str, ModeBuilder] = {
     "estimate": partial(RelativePositions, needs_truth=False, with_cov=False),
     "estimate_cov": partial(RelativePositions, needs_truth=False, with_cov=True),
     "ranges": Ranges,
@@ -25,18 +27,20 @@ OBSERVATIONS: dict[str, Callable[[int, int], ObservationMode]] = {
 """Name to builder ``(n_cars, beams of each car) -> ObservationMode``."""
 
 
-def observation_mode(name: str, n_cars: int, proximity: int = 0) -> ObservationMode:
+def observation_mode(name: str | ModeBuilder, n_cars: int, proximity: int = 0) -> ObservationMode:
     """Look a mode up.
 
     Args:
-        name: One of `OBSERVATIONS`.
+        name: One of `OBSERVATIONS`, ``package.module:Name``, a name among the entry points
+            ``relpos_env.observations``, or a builder itself.
         n_cars: Slots for cars.
         proximity: Beams that measure distances round each car.
 
     Raises:
         EnvError: No mode of that name.
     """
-    return look_up(OBSERVATIONS, name, "observation")(n_cars, proximity)
+    build = look_up(OBSERVATIONS, name, "observation", group="relpos_env.observations")
+    return build(n_cars, proximity)
 
 
 __all__ = [

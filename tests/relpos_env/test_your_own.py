@@ -1,0 +1,164 @@
+"""Tasks, observations, actions, rewards, controllers and filters from outside the package."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gymnasium import spaces
+
+from agents.compare.contender import find_entry
+from agents.controllers import CONTROLLERS, controller_builder
+from agents.errors import UsageError
+from relpos_env.errors import EnvError
+from relpos_env.formation_v0 import parallel_env
+from relpos_env.gym_env import FormationGymEnv
+from relpos_env.interface.actions import ContinuousActions
+from relpos_env.interface.observations.ranges import Ranges
+from relpos_env.tasks.rendezvous import Rendezvous
+from tracking.errors import ConfigError
+from tracking.filters import FILTERS, filter_builder
+from tracking.tracker import Tracker
+
+HERE = "tests.relpos_env.test_your_own" if __name__.startswith("tests.") else __name__
+
+
+class Meet(Rendezvous):
+    """A task of a user, with weights of its own."""
+
+    default_weights = {"progress": 3.0}  # noqa: RUF012
+
+
+class Creep(ContinuousActions):
+    """Actions at a tenth of the speed."""
+
+    def space(self):
+        return spaces.Box(-0.1, 0.1, shape=(2,), dtype=np.float32)
+
+
+def keep_right(formation):
+    """A reward for the right half of the room."""
+    return (formation.state.pos_w[..., 0] > 0.0) * 2.0
+
+
+def sleepy(fields):
+    """A controller that does nothing."""
+
+    class Sleepy:
+        observations = ("estimate",)
+
+        def act(self, observations):
+            return np.zeros((*observations.shape[:-1], 2), np.float32)
+
+    return Sleepy()
+
+
+def slow_filter(constellation, params, n_envs):
+    """A filter of a user."""
+    return FILTERS["ekf"](constellation, params, n_envs)
+
+
+@pytest.mark.parametrize("named", [False, True])
+def test_parts_of_an_environment_are_objects_or_names(named):
+    def part(thing):
+        return f"{HERE}:{thing.__name__}" if named else thing
+
+    env = parallel_env(
+        task=part(Meet),
+        scenario="ring-los",
+        observation="relpos_env.interface.observations.ranges:Ranges" if named else Ranges,
+        actions=part(Creep),
+        reward=part(keep_right),
+        filter=part(slow_filter),
+        max_cycles=10,
+    )
+    observations, _ = env.reset(seed=0)
+    plain = parallel_env(task="rendezvous", scenario="ring-los", observation="ranges")
+    assert env.fields == plain.fields
+    assert env.action_space("car_0").high[0] == np.float32(0.1)
+    weights = dict(zip(env.formation.task.terms, env.formation.weights, strict=True))
+    assert weights["progress"] == 3.0
+    assert weights["formation"] == 1.0
+    actions = {a: env.action_space(a).sample() for a in env.agents}
+    _, rewards, *_, infos = env.step(actions)
+    right = env.formation.state.pos_w[0, :, 0] > 0.0
+    for k, (agent, info) in enumerate(infos.items()):
+        assert info["reward_own"] == 2.0 * right[k]
+        parts = sum(value for key, value in info.items() if key.startswith("reward_"))
+        assert rewards[agent] == pytest.approx(parts)
+    assert type(env.loop.perception.tracker._filter).__name__ == "PairEkf"
+
+
+def test_the_mean_reward_of_a_team_has_the_own_term():
+    env, plain = FormationGymEnv(reward=keep_right), FormationGymEnv()
+    for each in (env, plain):
+        each.reset(seed=1)
+    action = np.zeros(env.action_space.shape, np.float32)
+    reward, less = env.step(action)[1], plain.step(action)[1]
+    right = env.formation.state.pos_w[0, :, 0] > 0.0
+    assert reward == pytest.approx(less + 2.0 * right.mean())
+
+
+def test_controllers_and_filters_by_name():
+    assert controller_builder(f"{HERE}:sleepy")(()).act(np.zeros((3, 5))).shape == (3, 2)
+    assert controller_builder("consensus") is CONTROLLERS["consensus"]
+    assert find_entry(f"{HERE}:sleepy").title == f"{HERE}:sleepy"
+    constellation = parallel_env(max_cycles=2).reset(seed=0) and None
+    assert constellation is None
+    assert filter_builder(f"{HERE}:slow_filter") is slow_filter or callable(
+        filter_builder(f"{HERE}:slow_filter")
+    )
+    assert Tracker
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"task": "tag"}, "task: expected one of ring, hold, .* or package.module:Name, got 'tag'"),
+        ({"task": "os:sep"}, "task: cannot import 'os:sep': expected something to call"),
+        ({"task": "no.such:Thing"}, "task: cannot import 'no.such:Thing': No module named 'no'"),
+        ({"observation": 3}, "observation: expected one of estimate"),
+        ({"actions": "json:nothing"}, "actions: cannot import 'json:nothing'"),
+        ({"reward": "sparse"}, "reward: expected one of"),
+        ({"filter": "kalman"}, "filter: expected one of joint"),
+    ],
+)
+def test_what_cannot_be_found_is_named(arguments, message):
+    with pytest.raises(EnvError, match=message):
+        parallel_env(**arguments)
+    with pytest.raises(ConfigError, match="filter: cannot import 'a:b'"):
+        filter_builder("a:b")
+    with pytest.raises(UsageError, match="controller: cannot import 'a:b'"):
+        find_entry("a:b")
+
+
+def test_a_reward_of_the_wrong_shape_is_refused():
+    env = parallel_env(reward=lambda formation: np.zeros(7))
+    with pytest.raises(EnvError, match=r"reward: expected finite numbers \(1, 3\)"):
+        env.reset(seed=0)
+
+
+def test_entry_points_of_an_installed_package_are_names(tmp_path, monkeypatch):
+    (tmp_path / "swarmland.py").write_text(
+        "import numpy as np\n"
+        "def sleepy(fields):\n"
+        "    class S:\n"
+        "        observations = ('estimate',)\n"
+        "        def act(self, o): return np.zeros((*o.shape[:-1], 2), np.float32)\n"
+        "    return S()\n"
+    )
+    info = tmp_path / "swarmland-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: swarmland\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[relpos_env.controllers]\nsleepy = swarmland:sleepy\n")
+    relpos = Path(sys.executable).with_name("relpos")
+    path = {"PYTHONPATH": str(tmp_path), "PATH": str(relpos.parent)}
+    command = [
+        relpos, "compare", "sleepy", "swarmland:sleepy", "--episodes", "1", "--seconds", "3",
+        "--settle", "1", "--json",
+    ]  # fmt: skip
+    done = subprocess.run(command, capture_output=True, text=True, env=path, check=True)
+    names = [json.loads(line).get("name") for line in done.stdout.splitlines()]
+    assert {"sleepy", "swarmland:sleepy"} <= set(names)
