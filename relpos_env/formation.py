@@ -14,10 +14,10 @@ import numpy as np
 from relpos_env._result_kernels import TeamResults, judge, tracking_errors
 from relpos_env.config import Parts, RewardTerm, whole_number
 from relpos_env.errors import EnvError
+from relpos_env.interface.infos import Columns, car_columns
 from relpos_env.interface.observations import total_size
 from relpos_env.interface.observations.base import F32
 from relpos_env.interface.views import reveal
-from relpos_env.interface.infos import Columns, car_columns
 from relpos_env.loop import TrackedSwarm
 from relpos_env.reset_options import ResetOptions
 from relpos_env.scenarios.episode import draw_episode

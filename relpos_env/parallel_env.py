@@ -18,12 +18,13 @@ from relpos_env.interface.observations.base import F32
 from relpos_env.interface.truth import state_space, truth_inside
 from relpos_env.loop import TrackedSwarm
 from relpos_env.recording import Recording
-from relpos_env.reset_options import reset_options
 from relpos_env.render.film import Film, check_render_mode
+from relpos_env.reset_options import reset_options
 from relpos_env.scenarios import Scenario
 from relpos_env.tasks.options import flag
 from relpos_env.world import World
 from tracking.log import Log
+
 
 class FormationEnv(CarsEnv):
     """Cars in a room keep a formation, each on its own tracker's estimates.
@@ -120,7 +121,8 @@ class FormationEnv(CarsEnv):
 
         Of each car: 1, x, y, cosine and sine of the heading, velocity x, y, yaw rate.
         """
-        return truth_inside(self.formation, self.state_space)[0]
+        state: F32 = truth_inside(self.formation, self.state_space)[0]
+        return state
 
     def recorded_log(self, name: str) -> Log:
         """The episode so far as a log with truth.

@@ -9,3 +9,8 @@ from tracking.registry import look_up as find
 
 look_up = partial(find, raises=EnvError)
 """`tracking.registry.look_up`; its errors are `EnvError`."""
+
+
+def name_of(thing: object) -> str:
+    """The name by which something that was chosen can be looked up again, see `look_up`."""
+    return thing if isinstance(thing, str) else f"{thing.__module__}:{thing.__qualname__}"  # type: ignore[attr-defined]

@@ -49,7 +49,9 @@ class ResetOptions:
             raise EnvError(f"poses: expected 2 to {len(episode.start)} cars, got {n}")
         taken = car_boxes(self.poses, episode.car, 0.0)
         apart = np.linalg.norm(self.poses[:, None, :2] - self.poses[None, :, :2], axis=-1)
-        near = np.argwhere(np.triu(apart < spacing(episode.car), 1) & np.triu(overlap(taken, taken), 1))
+        near = np.argwhere(
+            np.triu(apart < spacing(episode.car), 1) & np.triu(overlap(taken, taken), 1)
+        )
         if len(near):
             raise EnvError(f"poses: cars {near[0][0]} and {near[0][1]} overlap")
         hit = overlap(taken, boxes_of(episode.obstacles)).any(axis=1) | beyond_walls(taken, size)

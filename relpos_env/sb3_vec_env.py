@@ -151,10 +151,10 @@ class FormationVecEnv(SharedSeats):
         if dones.any():
             last, columns = self._rows(f.observations), f.infos()
             for seat in np.nonzero(dones)[0].tolist():
-                env, car = divmod(seat, self.n_cars)
-                infos[seat] = car_infos(columns, env, [car])[0] | {
+                of, car = divmod(int(seat), self.n_cars)
+                infos[seat] = car_infos(columns, of, [car])[0] | {
                     "terminal_observation": last[seat],
-                    "TimeLimit.truncated": not f.terminated[env],
+                    "TimeLimit.truncated": not f.terminated[of],
                 }
             if over.any():
                 f.begin(np.flatnonzero(over).tolist())

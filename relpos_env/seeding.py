@@ -28,9 +28,7 @@ def episode_rng(seed: int | None) -> np.random.Generator:
     return seeding.np_random(seed)[0]
 
 
-def seeds_of_batch(
-    seed: int | Sequence[int | None] | None, n_envs: int
-) -> list[int | None]:
+def seeds_of_batch(seed: int | Sequence[int | None] | None, n_envs: int) -> list[int | None]:
     """The seed of each environment of a batch.
 
     Args:

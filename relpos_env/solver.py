@@ -20,7 +20,7 @@ import pymunk.batch
 from numpy.typing import NDArray
 
 from relpos_env.world import N_WALLS, World
-from tracking.arrays import F64, I64, Bool
+from tracking.arrays import F64, I64
 
 N_STATE, N_INPUT, N_TOUCH = 6, 9, 3
 """Numbers of a body that is read, of one that is written, and of a contact."""

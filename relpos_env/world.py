@@ -123,7 +123,7 @@ class World:
         for k, shape in enumerate(added):
             x, y, width, height, angle = self._rectangles.setdefault(shape, rectangle_of(shape))
             centre = shape.body.local_to_world((x, y))
-            rows[k] = box_row(*centre, width, height, shape.body.angle + angle)
+            rows[k] = box_row(centre.x, centre.y, width, height, shape.body.angle + angle)
 
     def step(self, b: Bodies, env: int, dt: float) -> None:
         """Make one step by the interface of pymunk.

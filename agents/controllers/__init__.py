@@ -21,7 +21,6 @@ CONTROLLERS: dict[str, ControllerBuilder] = {
 """Name to builder ``(observation fields) -> Driver``."""
 
 
-
 def controller_builder(name: str | ControllerBuilder) -> ControllerBuilder:
     """Look a controller up.
 

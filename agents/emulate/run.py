@@ -19,6 +19,7 @@ from agents.emulate.rig import STEP_NS, TRUTH_EVERY, EmulatedRig
 from agents.emulate.warm_up import warm_up
 from hardware_bridge.pauses import short_pauses
 from relpos_env.errors import EnvError
+from relpos_env.registry import name_of
 from relpos_env.timing import DECISION, STAND_STILL
 from tracking.log import check_target, write_log
 
@@ -131,7 +132,7 @@ class _Run:
             log = rig.log(name)
         return EmulateResult(
             scenario=parts.scenario.name,
-            task=parts.config.task,
+            task=name_of(parts.config.task),
             seed=rig.options.seed,
             seconds=max(world.t - STAND_STILL, 0.0),
             t=t,

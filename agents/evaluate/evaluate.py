@@ -13,7 +13,8 @@ from agents.errors import UsageError
 from agents.evaluate.run import RunResult, run_seed
 from agents.evaluate.suites import SUITES, Case, Suite
 from agents.evaluate.targets import Outcome, outcomes
-from tracking.filters import FILTERS
+from tracking.errors import ConfigError
+from tracking.filters import FILTERS, filter_builder
 from tracking.short_repr import short_repr
 
 MEDIANS = ("rmse", "rmse_yaw", "rmse_shape", "bound", "bound_yaw", "bound_shape")

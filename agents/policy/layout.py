@@ -20,6 +20,7 @@ from relpos_env.interface.beams import MOST_BEAMS
 from relpos_env.interface.observations import Field, index_table, observation_mode, total_size
 from relpos_env.interface.observations.base import F32
 from relpos_env.interface.views import make_view
+from relpos_env.registry import name_of
 from tracking.arrays import I64
 
 MOST_HISTORY = 64
@@ -55,7 +56,8 @@ class Layout:
     def of(cls, parts: Parts) -> Layout:
         """What the cars of an environment see."""
         config = parts.config
-        return cls(config.observation, parts.n_cars, config.history, config.proximity)
+        name = name_of(config.observation)
+        return cls(name, parts.n_cars, config.history, config.proximity)
 
     @cached_property
     def fields(self) -> tuple[Field, ...]:

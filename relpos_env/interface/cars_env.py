@@ -23,7 +23,6 @@ from relpos_env.interface.observations.base import F32
 from relpos_env.seeding import episode_rng
 from tracking.arrays import F64, Bool
 
-
 PRESENT = Field("present", 1, "-", "1 while the car is in the room", 1.0, signed=False)
 """Ends the observations of agents that are fixed."""
 
@@ -215,7 +214,8 @@ class CarsEnv(ParallelEnv, ABC):  # type: ignore[misc]
         if not self._fixed:
             return observations.copy()
         present = self._group.infos()["present"][0]
-        return np.column_stack([observations * present[:, None], present.astype(np.float32)])
+        rows: F32 = np.column_stack([observations * present[:, None], present.astype(np.float32)])
+        return rows
 
     def _decode(self, actions: dict[str, Any]) -> tuple[F64, F64]:
         """Commands of all cars; those of nobody are zero."""

@@ -2,11 +2,12 @@
 
 | key | of a car | of a team |
 |---|---|---|
-| ``formation_error`` | distance of the others from their places, mean [m]; inf while absent | mean |
+| ``formation_error`` | of the others from their places, mean [m]; inf while absent | mean |
 | ``tracking_error`` | distance of estimates from the truth, mean [m]; inf where none is | mean |
 | ``tracked`` | others whose estimate can be used | mean |
 | ``collisions`` | contacts begun in the step; not on hardware, which counts none | sum |
-| ``present``, ``active`` | in the room; takes part: in the room, or away and to return | of each car |
+| ``present`` | in the room | of each car |
+| ``active`` | takes part: in the room, or away and to return | of each car |
 | ``is_success`` | the task is accomplished | the same |
 | ``reward_<term>`` | what the term adds to the reward | mean |
 
@@ -97,8 +98,7 @@ def team_columns(columns: Columns) -> Columns:
 def team_info(team: Columns, env: int) -> dict[str, Any]:
     """The info of one team: plain numbers, and arrays over its cars."""
     return {
-        key: column[env].item() if column.ndim == 1 else column[env]
-        for key, column in team.items()
+        key: column[env].item() if column.ndim == 1 else column[env] for key, column in team.items()
     }
 
 

@@ -36,9 +36,7 @@ DEFAULT_WEIGHTS: Mapping[str, Mapping[str, float]] = MappingProxyType(
 """Task to term to weight [-]; `time` counts only where the task has an end."""
 
 
-def reward_weights(
-    name: object, task: Task, override: Mapping[str, float] | None = None
-) -> F64:
+def reward_weights(name: object, task: Task, override: Mapping[str, float] | None = None) -> F64:
     """Weights in the order of a task's terms, (term).
 
     Args:
