@@ -150,10 +150,10 @@ class FormationVecEnv(SharedSeats):
                 infos[seat] = {"active": False}
         if dones.any():
             last, columns = self._rows(f.observations), f.infos()
-            for seat in np.nonzero(dones)[0].tolist():
-                of, car = divmod(int(seat), self.n_cars)
-                infos[seat] = car_infos(columns, of, [car])[0] | {
-                    "terminal_observation": last[seat],
+            for done in np.nonzero(dones)[0].tolist():
+                of, car = divmod(done, self.n_cars)
+                infos[done] = car_infos(columns, of, [car])[0] | {
+                    "terminal_observation": last[done],
                     "TimeLimit.truncated": not f.terminated[of],
                 }
             if over.any():

@@ -212,7 +212,8 @@ class CarsEnv(ParallelEnv, ABC):  # type: ignore[misc]
         """A copy for the caller, (car, size)."""
         observations = self._group.observations[0]
         if not self._fixed:
-            return observations.copy()
+            own: F32 = observations.copy()
+            return own
         present = self._group.infos()["present"][0]
         rows: F32 = np.column_stack([observations * present[:, None], present.astype(np.float32)])
         return rows
