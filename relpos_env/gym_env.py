@@ -21,10 +21,10 @@ from relpos_env.interface.actions import ActionMode
 from relpos_env.interface.infos import team_columns, team_info
 from relpos_env.interface.observations import space_of
 from relpos_env.interface.observations.base import F32
-from relpos_env.interface.truth import state_space, truth_inside
 from relpos_env.render.film import Film, check_render_mode
 from relpos_env.reset_options import reset_options
 from relpos_env.seeding import episode_rng
+from relpos_env.state_space import state_space, truth_inside
 from relpos_env.world import World
 from tracking.arrays import F64
 

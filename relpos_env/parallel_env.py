@@ -15,12 +15,12 @@ from relpos_env.errors import EnvError
 from relpos_env.formation import Formation
 from relpos_env.interface.cars_env import CarsEnv
 from relpos_env.interface.observations.base import F32
-from relpos_env.interface.truth import state_space, truth_inside
 from relpos_env.loop import TrackedSwarm
 from relpos_env.recording import Recording
 from relpos_env.render.film import Film, check_render_mode
 from relpos_env.reset_options import reset_options
 from relpos_env.scenarios import Scenario
+from relpos_env.state_space import state_space, truth_inside
 from relpos_env.tasks.options import flag
 from relpos_env.world import World
 from tracking.log import Log

@@ -19,10 +19,10 @@ from relpos_env.gym_env import (
 )
 from relpos_env.interface.infos import team_columns, vector_infos
 from relpos_env.interface.observations.base import F32
-from relpos_env.interface.truth import state_space, truth_inside
 from relpos_env.render.film import Film, check_render_mode
 from relpos_env.reset_options import ResetOptions, reset_options
 from relpos_env.seeding import episode_rng, seeds_of_batch
+from relpos_env.state_space import state_space, truth_inside
 from tracking.arrays import F64, Bool
 
 
