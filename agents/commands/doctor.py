@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -18,9 +18,24 @@ if TYPE_CHECKING:
 @click.command()
 @click.option("--config", type=Path, help="swarm.toml: listen to its links and cars too.")
 @click.option("--seconds", default=3.0, show_default=True, help="How long to listen, 0.1 to 3600.")
+@click.option(
+    "--watchdog",
+    is_flag=True,
+    help="Measure how long each car goes on without commands. Its WHEELS TURN: lift them off the "
+    "ground.",
+)
+@click.option("--wheels-up", is_flag=True, help="Of --watchdog: all wheels are off the ground.")
+@click.option("--write", is_flag=True, help="Of --watchdog: write the results into the swarm.toml.")
 @click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
-def doctor(config: Path | None, seconds: float, as_json: bool) -> None:
-    """See whether ports, links and cars are as they should be; nothing moves.
+def doctor(
+    config: Path | None,
+    seconds: float,
+    watchdog: bool,
+    wheels_up: bool,
+    write: bool,
+    as_json: bool,
+) -> None:
+    """See whether ports, links and cars are as they should be; nothing moves but by --watchdog.
 
     Ends with status 0 if all is well, else with 2 and a line for each problem.
     """
@@ -31,12 +46,45 @@ def doctor(config: Path | None, seconds: float, as_json: bool) -> None:
         from hardware_bridge.config import read_config  # type: ignore
 
         swarm = read_config(config)
+    if watchdog or wheels_up or write:
+        _measure(config, swarm, watchdog, wheels_up, write, as_json)
+        return
     diagnosis = run(swarm, seconds=seconds)
     if as_json:
         emit_json(diagnosis.records)
     else:
         _print(diagnosis)
     if not diagnosis.ok:
+        sys.exit(2)
+
+
+def _measure(
+    path: Path | None, swarm: Any, watchdog: bool, wheels_up: bool, write: bool, as_json: bool
+) -> None:
+    """Measure the watchdogs of the cars."""
+    from agents.errors import UsageError
+    from agents.watchdog import measure_watchdogs, with_watchdogs
+
+    if not watchdog:
+        raise UsageError("--wheels-up, --write: expected together with --watchdog")
+    if path is None:
+        raise UsageError("--watchdog: expected --config, which says where the cars are")
+    if not wheels_up:
+        raise UsageError(
+            "--watchdog: expected --wheels-up as well, once all wheels are off the ground"
+        )
+    found = measure_watchdogs(swarm, tell=lambda line: click.echo(line, err=True))
+    if write:
+        with_watchdogs(path, found)
+    if as_json:
+        emit_json([each.record for each in found])
+    else:
+        for each in found:
+            told = each.problem or f"stops by itself after {each.seconds:g} s"
+            click.echo(f"  {'problem' if each.problem else 'ok     '} cars.{each.car}: {told}")
+            if not (each.problem or write):
+                click.echo(f"          [cars.{each.car}] watchdog = {each.seconds:g}")
+    if any(each.problem for each in found):
         sys.exit(2)
 
 

@@ -32,6 +32,14 @@ EVERY = 10
 )
 @click.option("--observation", help="What they see; default: as the policy, or estimate.")
 @click.option("--arm", is_flag=True, help="Cars may move; without it nothing is sent to them.")
+@click.option(
+    "--stop-source",
+    type=click.Choice(["terminal", "stdin"]),
+    default="terminal",
+    show_default=True,
+    help="Where --arm takes keys from: a terminal, or a program that writes them to standard input "
+    "and a dot at least once a second; its silence stops the cars.",
+)
 @click.option("--seconds", type=float, help="Length, 1 to 86400; by default until Ctrl-C.")
 @click.option(
     "--wait", default=60.0, show_default=True, help="Seconds in which all must be well once."
@@ -44,6 +52,7 @@ def drive(
     controller: str | None,
     observation: str | None,
     arm: bool,
+    stop_source: str,
     seconds: float | None,
     wait: float,
     record: Path | None,
@@ -51,9 +60,11 @@ def drive(
 ) -> None:
     """Drive real cars on the estimates of their trackers. Dry run unless --arm.
 
-    On a terminal: space stops all at once, c clears the stop, a arms again, q quits.
+    On a terminal: space stops all at once, c clears the stop, a arms again, d disarms, g says that
+    cars that have fallen silent are gone, q quits; any other key stops.
     """
     from agents.drive import drive as run
+    from agents.drive.keys import check_stop_source
 
     if policy is not None and controller is not None:
         raise UsageError("--policy: expected either a policy or a --controller, got both")
@@ -62,13 +73,14 @@ def drive(
     if not 1.0 <= wait <= 3600.0:
         raise UsageError(f"--wait: expected 1 to 3600, got {wait:g}")
     if arm:
+        check_stop_source(stop_source)
         # A command late is a car that stops; without the right to hurry, the default has to do.
         with suppress(OSError, AttributeError):
             os.setpriority(os.PRIO_PROCESS, 0, -5)
     # However it is ended from outside, cars stand and the terminal is as it was.
     for name in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(name, signal.default_int_handler)
-    with _Screen(as_json) as screen:
+    with _Screen(as_json, stop_source) as screen:
         result = run(
             config=config,
             name=policy or controller or "consensus",
@@ -90,8 +102,11 @@ def drive(
 class _Screen:
     """What is shown and asked for while it lasts."""
 
-    def __init__(self, as_json: bool) -> None:
+    def __init__(self, as_json: bool, stop_source: str) -> None:
+        from agents.drive.keys import PipedKeys, read_orders
+
         self._json, self._n, self._told = as_json, 0, 0
+        self._read = PipedKeys().read_orders if stop_source == "stdin" else read_orders
         self._live: Any = None
         self._keys: Any = None
 
@@ -116,9 +131,7 @@ class _Screen:
 
     def attend(self, order: Any) -> None:
         """Pass on what was pressed."""
-        from agents.drive.keys import read_orders
-
-        for what in read_orders():
+        for what in self._read():
             order(what)
 
     def show(self, bridge: OpenBridge, env: LiveFormationEnv) -> None:

@@ -5,30 +5,97 @@ from __future__ import annotations
 import contextlib
 import os
 import select
+import signal
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 
-KEYS = {" ": "stop", "a": "arm", "d": "disarm", "c": "clear", "q": "quit"}
+from agents.errors import UsageError
+
+KEYS = {" ": "stop", "a": "arm", "d": "disarm", "c": "clear", "g": "gone", "q": "quit"}
 """Key to order; space is the largest, and stops."""
-HELP = "space: emergency stop   c: clear it   a: arm   d: disarm   q: quit"
+ALIVE = "."
+"""What a program that stops the cars through standard input says to be alive; it asks for
+nothing."""
+PATIENCE = 1.0
+"""[s] Without a word from it, all cars are stopped."""
+HELP = (
+    "space: emergency stop   c: clear it   a: arm   d: disarm   g: silent cars are gone   q: quit"
+)
+
+
+def check_stop_source(source: str) -> None:
+    """See that somebody can stop the cars.
+
+    Args:
+        source: ``terminal`` or ``stdin``.
+
+    Raises:
+        UsageError: There is no terminal.
+    """
+    if source == "terminal" and not _is_terminal():
+        raise UsageError(
+            "--arm: expected a terminal, on which space stops the cars; a program that stops them "
+            "writes keys to standard input, see --stop-source"
+        )
+    if source == "stdin" and (sys.stdin is None or sys.stdin.closed):
+        raise UsageError("--stop-source: expected standard input to be open")
 
 
 @contextlib.contextmanager
 def key_by_key() -> Iterator[None]:
-    """Let the terminal hand on every key at once, while this lasts; nothing without a terminal."""
+    r"""Let the terminal hand on every key at once, while this lasts; nothing without a terminal.
+
+    No key stops the screen, suspends or kills the program: Ctrl-S, Ctrl-Z and Ctrl-\ stop the cars
+    like any other key.
+    """
     if not _is_terminal():
         yield
         return
     import termios
-    import tty
 
     before = termios.tcgetattr(sys.stdin)
-    tty.setcbreak(sys.stdin)
+
+    def set_up(*_: object) -> None:
+        mode = termios.tcgetattr(sys.stdin)
+        mode[0] &= ~(termios.IXON | termios.IXOFF)
+        mode[3] &= ~(termios.ICANON | termios.ECHO)
+        for key in (termios.VSUSP, termios.VQUIT):
+            mode[6][key] = b"\0"
+        termios.tcsetattr(sys.stdin, termios.TCSANOW, mode)
+
+    set_up()
+    resumed = signal.signal(signal.SIGCONT, set_up)  # a shell that took the terminal has changed it
     try:
         yield
     finally:
+        signal.signal(signal.SIGCONT, resumed)
         with contextlib.suppress(termios.error):  # it was closed
             termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
+
+
+class PipedKeys:
+    """Keys from a program, a gamepad's or a switch's, whose silence stops the cars."""
+
+    def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
+        self._now, self._heard, self._is_open = now, now(), True
+
+    def read_orders(self) -> list[str]:
+        """What came since the last look, in order; a stop when nothing did for `PATIENCE`."""
+        pressed = b""
+        while self._is_open and select.select([sys.stdin], [], [], 0.0)[0]:
+            keys = os.read(sys.stdin.fileno(), 1024)
+            if not keys:
+                self._is_open = False
+                return ["stop", "quit"]
+            pressed += keys
+        if pressed:
+            self._heard = self._now()
+            return orders_of(pressed.decode(errors="replace").replace(ALIVE, "").replace("\n", ""))
+        if self._now() - self._heard > PATIENCE:
+            self._heard = self._now()
+            return ["stop"]
+        return []
 
 
 def read_orders() -> list[str]:

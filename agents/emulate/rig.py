@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from agents.emulate.options import EmulateOptions
-from agents.emulate.swarm_file import OPERATOR_PORT, car_port, node_port, swarm_toml
+from agents.emulate.swarm_file import OPERATOR_PORT, WRITTEN_BY, car_port, node_port, swarm_toml
 from agents.emulate.world import EmulatedWorld
 from hardware_bridge.emulator.boots import boot_numbers
 from hardware_bridge.emulator.cars import make_firmware
@@ -20,6 +20,7 @@ from hardware_bridge.emulator.node import EmulatedNode
 from hardware_bridge.emulator.ports import DevicePort, MemoryPort, PortBuilder
 from hardware_bridge.emulator.pty import PtyPort
 from hardware_bridge.errors import BridgeError
+from hardware_bridge.safe_file import write_safely
 from hardware_bridge.wire.encoder import RelposEncoder
 from relpos_env.timing import DT
 from tracking.log import Log
@@ -70,7 +71,7 @@ class EmulatedRig:
         self.folder = None if folder is None else folder.resolve()
         if self.folder is not None:
             self.folder.mkdir(parents=True, exist_ok=True)
-            (self.folder / SWARM_FILE).unlink(missing_ok=True)
+            _check_ours(self.folder / SWARM_FILE)
         self._make_port = ports or _ports_in(self.folder)
         self.ports: dict[str, DevicePort] = {}
         """By name."""
@@ -127,9 +128,7 @@ class EmulatedRig:
     def _write(self, folder: Path) -> None:
         """Write ``swarm.toml``, at once and whole."""
         text = self.swarm_toml(folder)
-        scratch = folder / f".{SWARM_FILE}.new"
-        scratch.write_text(text, encoding="utf-8")
-        scratch.replace(folder / SWARM_FILE)
+        write_safely(folder / SWARM_FILE, text, mode=0o644 if self.options.key is None else 0o600)
         # These devices are new: what others of the same ids said before is nothing to them.
         (folder / SWARM_FILE).with_suffix(".marks.json").unlink(missing_ok=True)
 
@@ -174,6 +173,19 @@ class EmulatedRig:
         """A port and what happens on the way to it."""
         self.ports[name] = port = self._make_port(name)
         return Line(name, port, FaultInjector(faults, self._rng.spawn(1)[0]))
+
+
+def _check_ours(path: Path) -> None:
+    """See that a file that is to be replaced was written by an emulation.
+
+    Raises:
+        BridgeError: It was not.
+    """
+    if not path.exists():
+        return
+    with path.open(encoding="utf-8", errors="replace") as stream:
+        if stream.readline().rstrip("\n") != WRITTEN_BY:
+            raise BridgeError(f"{path}: not written by an emulation, expected another --folder")
 
 
 _DEVICES = 0x0DE71CE5

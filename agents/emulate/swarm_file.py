@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from agents.emulate.options import EmulateOptions
+from hardware_bridge.config.streams import SLOWEST_WATCHDOG
+from hardware_bridge.emulator.cars.base import DEADMAN
 from hardware_bridge.emulator.formats import WireFormat
 from hardware_bridge.emulator.node import EmulatedNode
 from relpos_env.config import Parts
@@ -61,10 +63,12 @@ def swarm_toml(
     if options.operator:
         link = {"port": str(folder / OPERATOR_PORT), "format": "relpos"}
         table["links"][OPERATOR_PORT] = _with_key(link, options.key)
-    return "# Written by `relpos emulate`.\n" + "\n".join(_lines(table, "")) + "\n"
+    return f"{WRITTEN_BY}\n" + "\n".join(_lines(table, "")) + "\n"
 
 
 OPERATOR_PORT = "operator"
+WRITTEN_BY = "# Written by `relpos emulate`."
+"""First line of the file."""
 
 
 def node_port(node: int, k: int) -> str:
@@ -92,7 +96,10 @@ def _link(
 
 def _car(options: EmulateOptions, port: Path) -> dict[str, Any]:
     """One car."""
+    watchdog = DEADMAN if options.deadman is None else options.deadman
     car: dict[str, Any] = {"port": str(port), "driver": options.driver}
+    if watchdog <= SLOWEST_WATCHDOG:
+        car["watchdog"] = watchdog
     if options.driver_options:
         car["options"] = _options(options.driver_options)
     return _with_key(car, options.car_key)

@@ -64,7 +64,14 @@ class VirtualFeed:
         self._dry = () if arm else tuple(config.slot_of(car) for car in config.cars)
         drivers = {slot: driver for slot, (_, _, driver) in self._cars.items()}
         names = {slot: name for slot, (name, _, _) in self._cars.items()}
-        self.supervisor = Supervisor(config.safety, config.n_slots, drivers, names)
+        self.supervisor = Supervisor(
+            config.safety,
+            config.n_slots,
+            drivers,
+            names,
+            cells={config.slot_of(car): car.cells for car in config.cars},
+            watchdog={config.slot_of(car): car.watchdog for car in config.cars if car.watchdog},
+        )
         """Gate and drivers of the cars; whoever watches may ask it, but tells it nothing."""
         self._up: set[int] = set()
         self._decided: tuple[int, Picture] | None = None
@@ -92,8 +99,15 @@ class VirtualFeed:
 
     def order(self, what: str) -> None:
         """Pass on what a person asks for; see `Order`."""
-        self._tell(Order(what))
+        if what == "gone":
+            self._swarm.silent.dismiss()
+        else:
+            self._tell(Order(what))
         self.notices.append((self.t_ns, what))
+
+    def note(self, t_ns: int, text: str) -> None:
+        """Let the user have a line."""
+        self.notices.append((t_ns, text))
 
     def _step(self) -> None:
         """A hundredth of a second: the world, what it said, and what it is told."""
@@ -107,8 +121,9 @@ class VirtualFeed:
         self.rig.step(then)
         for name, port in self._measuring.items():
             self._hear(name, port)
-        for name, port, _ in self._cars.values():
-            self._hear(name, port)
+        for slot, (name, port, _) in self._cars.items():
+            if data := self._hear(name, port):
+                self.supervisor.hear(slot, data, then * 1e-9)
         self._tell(Word(then * 1e-9, self._swarm.heard()))
         self._act()
         if (then - START_NS) // STEP_NS % REPORT_EVERY == 0:
@@ -116,10 +131,11 @@ class VirtualFeed:
             for _, port, driver in self._cars.values():
                 port.send(driver.ask())
 
-    def _hear(self, name: str, port: MemoryPort) -> None:
+    def _hear(self, name: str, port: MemoryPort) -> bytes:
         data = port.receive()
         if data:
             self._swarm.take(Chunk(name, self.t_ns, data))
+        return data
 
     def _act(self) -> None:
         """Tell every car what it may do now."""

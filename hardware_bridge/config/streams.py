@@ -15,6 +15,10 @@ from hardware_bridge.wire.key import parse_key
 from tracking.constellation import Constellation
 from tracking.tables import TableReader, Where
 
+SLOWEST_WATCHDOG = 2.0
+"""[s]"""
+MOST_CELLS = 14
+
 
 @dataclass(frozen=True, kw_only=True)
 class _Link:
@@ -31,6 +35,8 @@ class _Car:
     driver: str
     baud: int | None = None
     key: str | None = None
+    watchdog: float | None = None
+    cells: int = 0
 
 
 def read_links(
@@ -90,10 +96,25 @@ def read_cars(raw: Mapping[str, Any], group: Constellation, where: Where) -> lis
             driver_options(car.driver, node, options, key_bytes)
         except BridgeError as error:
             raise Where(where.file, raises=BridgeError).error(str(error)) from error
+        if car.watchdog is not None and not 0.0 < car.watchdog <= SLOWEST_WATCHDOG:
+            raise at.key("watchdog").error(
+                f"expected above 0 and at most {SLOWEST_WATCHDOG:g} s, got {car.watchdog:g}: a car "
+                "that goes on for longer must be set up otherwise"
+            )
+        if not 0 <= car.cells <= MOST_CELLS:
+            raise at.key("cells").error(f"expected 0 to {MOST_CELLS}, got {car.cells}")
         baud = _baud(car.baud, entry.baud, at)
         spec = PortSpec(name=f"cars.{node}", port=car.port, baud=baud)
         cars.append(
-            CarConfig(node=node, port=spec, driver=car.driver, options=options, key=key_bytes)
+            CarConfig(
+                node=node,
+                port=spec,
+                driver=car.driver,
+                options=options,
+                key=key_bytes,
+                watchdog=car.watchdog,
+                cells=car.cells,
+            )
         )
     return sorted(cars, key=lambda each: group.index_of[each.node])
 

@@ -20,6 +20,8 @@ class CarDriver(Protocol):
     """[s] Commands that follow each other faster pile up in the controller; 0 where none do."""
     slowest: float
     """[m/s] Asked for less it stands, one way or the other."""
+    answers: bool
+    """Whether every command is answered by an `AckReading`."""
     telemetry: Decoder
     """For what the controller answers: `MotionReading`, `StatusReading`, `AckReading`."""
 

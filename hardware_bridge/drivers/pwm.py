@@ -136,6 +136,7 @@ class PwmDriver:
 
     baud = 115200
     gap = 0.03
+    answers = False
 
     def __init__(self, options: PwmOptions) -> None:
         self.options = options

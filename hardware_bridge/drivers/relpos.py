@@ -41,6 +41,7 @@ class RelposDriver:
 
     baud = 115200
     gap = 0.0
+    answers = True
     slowest = 0.0
 
     def __init__(

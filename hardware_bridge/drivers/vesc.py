@@ -136,6 +136,7 @@ class VescDriver:
 
     baud = 115200
     gap = 0.0
+    answers = False
 
     def __init__(self, options: VescOptions) -> None:
         self.options = options

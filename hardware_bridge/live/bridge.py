@@ -15,7 +15,7 @@ from hardware_bridge.links.links import Links
 from hardware_bridge.live.feed import LiveFeed
 from hardware_bridge.live.marks import KeptMarks
 from hardware_bridge.live.opened import OpenBridge
-from hardware_bridge.live.start import Start, StartParams, check_pace
+from hardware_bridge.live.start import Start, StartParams, check_pace, check_watchdogs
 from hardware_bridge.live.swarm import LiveSwarm, load_calibration
 from hardware_bridge.live.warm_up import warm_up
 from hardware_bridge.pauses import short_pauses
@@ -65,6 +65,7 @@ class Bridge(OpenBridge):
             )
         if arm:
             check_pace(config)
+            check_watchdogs(config)
         calibration = load_calibration(config)
         no_ranges = calibration is not None and calibration.ranges is None
         if arm and measures and no_ranges and not config.uncalibrated_ranges:
@@ -81,9 +82,10 @@ class Bridge(OpenBridge):
             stack.callback(self.links.close)
             start_ns = now_ns()
             self.swarm = LiveSwarm(config, start_ns, calibration)
+            wall_s = time.time_ns() // 1_000_000_000
             self.marks: KeptMarks | None = None
             if config.marks is not None:
-                self.marks = KeptMarks(config.marks, self.swarm.intake)
+                self.marks = KeptMarks(config.marks, self.swarm.intake, wall_s)
                 stack.callback(self.marks.close)
             self.recorder: Recorder | None = None
             if record is not None:
@@ -109,7 +111,8 @@ class Bridge(OpenBridge):
             if drive:
                 cars = tuple((config.slot_of(car), car) for car in config.cars)
                 dry = () if arm else tuple(slot for slot, _ in cars)
-                charge = Charge(config.safety, config.n_slots, cars if arm else (), dry)
+                boot = wall_s if self.marks is None else self.marks.boot
+                charge = Charge(config.safety, config.n_slots, cars if arm else (), boot, dry)
                 self.supervisor = SupervisorProcess(charge)
                 stack.callback(self.supervisor.close)
             self.feed = LiveFeed(

@@ -106,9 +106,19 @@ class LiveFeed:
             self._spoken = self._now_ns()
 
     def order(self, what: str) -> None:
-        """Pass on what a person asks for; see `Order`."""
-        if self._supervisor is not None:
-            self._supervisor.send(Order(what))
+        """Pass on what a person asks for: see `Order`; ``gone`` ends the watch for silent cars.
+
+        Raises:
+            BridgeError: The supervisor does not take it.
+        """
+        if what == "gone":
+            self._swarm.silent.dismiss()
+        elif self._supervisor is not None and not self._supervisor.send(Order(what)):
+            # It takes nothing any more. Without it the cars stop by themselves.
+            self._supervisor.close()
+            raise BridgeError(
+                f"supervisor: it did not take {what!r} and was ended; cars stop by their watchdogs"
+            )
         self.note(self._now_ns(), what)
 
     def note(self, t_ns: int, text: str) -> None:

@@ -15,12 +15,15 @@ from typing import TypeAlias
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.identity.verdict import Mark
 from hardware_bridge.live.intake import Intake
+from hardware_bridge.safe_file import write_safely
 
 EVERY_NS = 10_000_000_000
 """[ns] From one write to the next."""
 AHEAD = 4000
 """[-] So many messages of each device count as seen, more than come until the next write: nothing
 that was heard before a crash is believed after it."""
+OURS = "commands"
+"""Who signs them: we."""
 Marks: TypeAlias = Mapping[str, Mapping[int, Mark]]
 """Boot and number of the newest message, by who shares a key and by id."""
 
@@ -63,12 +66,13 @@ def parse_marks(raw: Mapping[str, Mapping[str, list[int]]]) -> Marks:
 class KeptMarks:
     """The marks of an intake in a file."""
 
-    def __init__(self, path: Path, intake: Intake) -> None:
+    def __init__(self, path: Path, intake: Intake, wall_s: int = 0) -> None:
         """Refuse what is older than what the file knows.
 
         Args:
             path: Of the file; made if it is not there.
             intake: Whose devices they are.
+            wall_s: Time by the calendar, as far as the host knows it [s].
 
         Raises:
             BridgeError: It cannot be read or written, or is damaged.
@@ -77,10 +81,14 @@ class KeptMarks:
         self.known = read_marks(path)
         """As they were."""
         intake.restore(self.known)
+        newest, _ = self.known.get(OURS, {}).get(0, (0, 0))
+        self.boot = max(wall_s, newest + 1)
+        """Of what we sign ourselves in this start: higher than that of any start before, even where
+        the host's calendar has gone back."""
         self._due: int | None = None
         self._writing: threading.Thread | None = None
         try:
-            self._write(intake.marks())
+            self._write(self._with_ours())
         except OSError as error:
             raise BridgeError(f"{path}: cannot be written ({error.strerror})") from error
 
@@ -95,7 +103,7 @@ class KeptMarks:
         if t_ns < self._due or (self._writing is not None and self._writing.is_alive()):
             return
         self._due = t_ns + EVERY_NS
-        args = (self._intake.marks(AHEAD),)
+        args = (self._with_ours(AHEAD),)
         self._writing = threading.Thread(target=self._try_to_write, args=args, daemon=True)
         self._writing.start()
 
@@ -103,13 +111,14 @@ class KeptMarks:
         """Write what they are, without more ahead."""
         if self._writing is not None:
             self._writing.join()
-        self._try_to_write(self._intake.marks())
+        self._try_to_write(self._with_ours())
+
+    def _with_ours(self, ahead: int = 0) -> Marks:
+        return {**self._intake.marks(ahead), OURS: {0: (self.boot, 0)}}
 
     def _try_to_write(self, marks: Marks) -> None:
         with contextlib.suppress(OSError):
             self._write(marks)
 
     def _write(self, marks: Marks) -> None:
-        scratch = self._path.with_name(f".{self._path.name}.new")
-        scratch.write_text(json.dumps(marks) + "\n", encoding="utf-8")
-        scratch.replace(self._path)
+        write_safely(self._path, json.dumps(marks) + "\n")

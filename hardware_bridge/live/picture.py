@@ -6,7 +6,7 @@ import numpy as np
 
 from hardware_bridge.live.swarm import LiveSwarm
 from hardware_bridge.safety.params import Fence
-from hardware_bridge.safety.picture import Picture, blank_picture
+from hardware_bridge.safety.picture import Picture, blank_picture, largest_std
 from tracking.arrays import F64, Bool
 from tracking.estimate import Status
 
@@ -40,24 +40,10 @@ def draw_picture(
     for pair, (i, j) in enumerate(group.pairs.tolist()):
         if j < n:
             q.sound[0, i, j] = q.sound[0, j, i] = sound[pair]
+    swarm.silent.write(q, view)
     if fence is not None:
         _place(swarm, q, group.index_of[fence.node], sound)
     return q
-
-
-def largest_std(cov: F64) -> F64:
-    """Largest standard deviation in the plane; NaN where there is none.
-
-    Args:
-        cov: xx, yy, xy, (..., 3) [m2]
-
-    Returns:
-        (...) [m]
-    """
-    xx, yy, xy = cov[..., 0], cov[..., 1], cov[..., 2]
-    with np.errstate(invalid="ignore"):
-        std: F64 = np.sqrt(0.5 * (xx + yy) + np.hypot(0.5 * (xx - yy), xy))
-    return std
 
 
 def is_sound(cov: F64) -> Bool:

@@ -51,6 +51,9 @@ class Gated(Protocol):
     def order(self, what: str) -> None:
         """Pass on what a person asks for; see `Order`."""
 
+    def note(self, t_ns: int, text: str) -> None:
+        """Let the user have a line."""
+
 
 class Start:
     """Arms the cars and lets them find each other."""
@@ -68,6 +71,7 @@ class Start:
         self.attend: Callable[[], bool] | None = None
         """Called after every decision; True ends it all with KeyboardInterrupt."""
         self._held = False
+        self._armed_once = False
 
     def heed(self, what: str) -> None:
         """Take note of what a person has ordered: who has said stop arms the cars, too."""
@@ -88,23 +92,37 @@ class Start:
         self._find(group)
 
     def _get_armed(self, group: LiveGroup) -> None:
-        """Let the cars stand and listen until all is well, and arm them."""
+        """Let the cars stand and listen until all is well, and arm them.
+
+        By itself only the first start arms them. Cars that were stopped later wait for a person.
+        """
         config, feed = group.swarm.config, self._feed
         slots = [config.slot_of(car) for car in config.cars]
         still = np.zeros((1, config.n_slots))
+        asked = False
         for _ in range(round(self._params.wait / DECISION)):
             self._step(group, still, still)
             report = feed.report
             if report is None:
                 continue
             if report.armed[slots].all():
+                self._armed_once = True
                 return
             well = bool((report.well_for[slots] > config.safety.health).all())
             well = well and self._rates_fit(group, slots)
-            if well and not (self._held or report.emergency):
+            if self._armed_once:
+                if not asked:
+                    feed.note(group.t_ns, "stopped cars wait to be armed by a person")
+                    asked = True
+            elif well and not (self._held or report.emergency):
                 feed.order("arm")
         if feed.report is None:
             raise BridgeError("supervisor: no word from it")
+        if self._armed_once:
+            raise BridgeError(
+                f"cars: not armed within {self._params.wait:g} s; they were stopped in the episode "
+                "before, and only a person arms them again"
+            )
         if self._held:
             raise BridgeError(
                 f"cars: not armed within {self._params.wait:g} s, since a key had stopped or "
@@ -175,6 +193,20 @@ def check_pace(config: SwarmConfig, params: StartParams | None = None) -> None:
                 f"cars.{car.node}.options: slower than {driver.slowest:.2g} m/s it stands, and at "
                 f"the start cars find each other at {asked:g} m/s; teach it to drive slower, or "
                 "raise slow of [safety] if that limits it"
+            )
+
+
+def check_watchdogs(config: SwarmConfig) -> None:
+    """Refuse cars of which nobody knows when they stop by themselves.
+
+    Raises:
+        BridgeError: Names the first of them.
+    """
+    for car in config.cars:
+        if car.watchdog is None:
+            raise BridgeError(
+                f"cars.{car.node}.watchdog: missing, expected the seconds after which it stops by "
+                "itself; measure them with `relpos doctor --watchdog`, its wheels off the ground"
             )
 
 

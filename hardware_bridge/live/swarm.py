@@ -14,7 +14,9 @@ from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.ports import Chunk
 from hardware_bridge.live.intake import Intake
 from hardware_bridge.live.ready import ReadyPerception
+from hardware_bridge.live.silent_cars import SilentCars
 from hardware_bridge.live.stuck_places import DRIVES
+from hardware_bridge.safety.picture import largest_std
 from relpos_env.interface.perception import Perception
 from relpos_env.interface.views import View
 from tracking.arrays import F64, I64, Bool
@@ -61,6 +63,8 @@ class LiveSwarm:
         self.armed: Bool = np.zeros(config.n_slots, dtype=bool)
         """Which cars the gate lets move, (slot)."""
         self._perception = self._make_perception()
+        self.silent = SilentCars(config.n_slots)
+        """Those that may stand in the way of the others."""
         self.tap: Callable[[MeasurementBlock], None] | None = None
         """Called with what was measured since the last step, as it came, without calibration; the
         block is overwritten by the next."""
@@ -125,6 +129,7 @@ class LiveSwarm:
         self._note_cars(t_ns)
         self.view.now[0] = now
         self._perception.step()
+        self.silent.move(self.view, now)
 
     def heard(self, never: float = -np.inf) -> F64:
         """When each car's node last told of its motion, by the host's clock, (slot) [s]."""
@@ -157,8 +162,12 @@ class LiveSwarm:
         recent = {k for k, t in self.intake.heard_ns.items() if (t_ns - t) * 1e-9 <= GONE}
         for node in sorted(recent - self._here):
             self.intake.events.add(now, Kind.JOIN, node, ())
+            if node in self._slots:
+                self.silent.forget(node)
         for node in sorted(self._here - recent):
             self.intake.events.add(now, Kind.LEAVE, node, ())
+            if node in self._slots:
+                self.silent.keep(node, self.view, largest_std(self.view.cov[0]))
         self._here = recent
 
     def _make_room(self, n: int) -> None:

@@ -23,5 +23,7 @@ class Charge:
     n_cars: int
     cars: tuple[tuple[int, CarConfig], ...]
     """Slot and configuration; none in a dry run."""
+    boot: int = 0
+    """Of this start, for what is signed; higher than that of any start before."""
     dry: tuple[int, ...] = ()
     """Slots of cars in a dry run: no port is opened, and the gate tells what it would allow."""

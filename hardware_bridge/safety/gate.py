@@ -17,6 +17,7 @@ from hardware_bridge.safety.params import SafetyParams
 from hardware_bridge.safety.picture import Picture
 from hardware_bridge.safety.recent import Recent, at_rest
 from hardware_bridge.safety.rules import RULES
+from hardware_bridge.safety.telemetry import Told, nothing_told
 from tracking.arrays import F64, I64, Bool
 from tracking.short_repr import short_repr
 
@@ -119,7 +120,20 @@ class Gate:
         """How long all has been well with each car, (env, car) [s]."""
         return np.maximum(now[:, None] - self._well_since, 0.0)
 
-    def step(self, picture: Picture, now: F64, word: F64, heard: F64, linked: Bool) -> GateOutput:
+    @property
+    def recent(self) -> Recent:
+        """What the cars may still be doing for what they were sent."""
+        return self._recent
+
+    def step(
+        self,
+        picture: Picture,
+        now: F64,
+        word: F64,
+        heard: F64,
+        linked: Bool,
+        told: Told | None = None,
+    ) -> GateOutput:
         """What the cars may do now.
 
         Args:
@@ -128,8 +142,10 @@ class Gate:
             word: When the deciding process last gave a sign of life, (env) [s].
             heard: When each car's node was last heard, (env, car) [s].
             linked: Whether the car's port is open, (env, car).
+            told: What the cars' controllers say; None where they say nothing.
         """
         p = self.params
+        told = nothing_told(heard.shape, p) if told is None else told
         forward, backward = np.full((2, *heard.shape), p.max_speed)
         left, right = np.full((2, *heard.shape), p.max_steering)
         wanted = np.nan_to_num(
@@ -143,7 +159,7 @@ class Gate:
                 verdict = rule.check(
                     Moment(
                         picture, now, word, heard, linked,
-                        self.armed, self._recent, self._slow[k],
+                        self.armed, self._recent, told, self._slow[k],
                     ), p
                 )  # fmt: skip
                 on, back = (np.where(cap >= 0.0, cap, 0.0) for cap in verdict[:2])

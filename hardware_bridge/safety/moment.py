@@ -8,6 +8,7 @@ import numpy as np
 
 from hardware_bridge.safety.picture import Picture
 from hardware_bridge.safety.recent import Recent
+from hardware_bridge.safety.telemetry import Told
 from tracking.arrays import F64, Bool
 
 FREE = np.inf
@@ -29,6 +30,8 @@ class Moment(NamedTuple):
     """Whether the gate holds the car to its rules, (env, car)."""
     recent: Recent
     """What the cars were told lately."""
+    told: Told
+    """What the cars' own controllers say."""
     was_slow: Bool
     """Whether the last verdict of this rule capped or stopped, (env, car): for hysteresis."""
 

@@ -86,6 +86,21 @@ class SafetyParams:
     range_limit: float = 1.0
     """[s] Where positions are not known, a range as old as this says nothing any more; the car
     stands."""
+    runaway_speed: float = 0.5
+    """[m/s] By which a car may be faster, by its own controller, than it can be for what it was
+    sent: errors of odometry, and wheels that spin."""
+    runaway_time: float = 0.3
+    """[s] For so long; then it is stopped for good."""
+    idle_time: float = 3.0
+    """[s] A car whose wheels stand for so long although it is asked to drive is stopped for good."""
+    answer_time: float = 0.5
+    """[s] A car whose controller answers commands, and has answered none for so long, is stopped
+    for good."""
+    cell_slow: float = 3.4
+    """[V] Of a cell of the battery, mean over seconds; below, `slow`. Looked at where a car has
+    `cells`."""
+    cell_stop: float = 3.2
+    """[V] Below, stopped for good."""
     fence: Fence | None = None
     """None where there is none."""
 
@@ -96,7 +111,11 @@ class SafetyParams:
                 continue
             if not (isfinite(value) and value > 0.0):
                 raise BridgeError(f"{f.name}: expected more than 0, got {value!r}")
-        for low, high in (("stale_slow", "stale_stop"), ("sigma_slow", "sigma_stop")):
+        for low, high in (
+            ("stale_slow", "stale_stop"),
+            ("sigma_slow", "sigma_stop"),
+            ("cell_stop", "cell_slow"),
+        ):
             if getattr(self, low) >= getattr(self, high):
                 limit = getattr(self, high)
                 raise BridgeError(f"{low}: expected below {high} = {limit:g}")

@@ -97,3 +97,18 @@ def blank_picture(n_envs: int, n_cars: int) -> Picture:
         place=z((*own, 2)),
         place_sigma=z(own),
     )
+
+
+def largest_std(cov: F64) -> F64:
+    """Largest standard deviation in the plane; NaN where there is none.
+
+    Args:
+        cov: xx, yy, xy, (..., 3) [m2]
+
+    Returns:
+        (...) [m]
+    """
+    xx, yy, xy = cov[..., 0], cov[..., 1], cov[..., 2]
+    with np.errstate(invalid="ignore"):
+        std: F64 = np.sqrt(0.5 * (xx + yy) + np.hypot(0.5 * (xx - yy), xy))
+    return std

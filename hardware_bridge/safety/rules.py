@@ -29,6 +29,8 @@ DIRECTION = 1.0
 with more, cars beside each other could not part."""
 
 
+RECOVERED = 0.1
+"""[V] Above `cell_slow` a battery counts as charged again."""
 LONG_AGO = 60.0
 """[s] A range as old is none."""
 
@@ -53,6 +55,28 @@ def silence(m: Moment, p: SafetyParams) -> Verdict:
 def link(m: Moment, p: SafetyParams) -> Verdict:
     """The car's own port is lost."""
     return _held(~m.linked)
+
+
+def fault(m: Moment, p: SafetyParams) -> Verdict:
+    """The car's controller reports a fault."""
+    return _held(m.told.fault)
+
+
+def runaway(m: Moment, p: SafetyParams) -> Verdict:
+    """The car is faster than it was ever asked to be, by its own controller."""
+    return _held(m.told.over_for >= p.runaway_time)
+
+
+def deaf(m: Moment, p: SafetyParams) -> Verdict:
+    """The car obeys nothing: it answers no command, or stands although it is asked to drive."""
+    return _held((m.told.deaf_for >= p.answer_time) | (m.told.idle_for >= p.idle_time))
+
+
+def battery(m: Moment, p: SafetyParams) -> Verdict:
+    """The car's battery is nearly empty."""
+    limit = np.where(m.was_slow, p.cell_slow + RECOVERED, p.cell_slow)
+    low, empty = m.told.cell < limit, m.told.cell < p.cell_stop
+    return _capped(np.where(empty, 0.0, np.where(low, p.slow, FREE)), empty)
 
 
 def absent(m: Moment, p: SafetyParams) -> Verdict:
@@ -122,7 +146,7 @@ def separation(m: Moment, p: SafetyParams) -> Verdict:
     d = np.maximum(np.hypot(q.pos[..., 0], q.pos[..., 1]), 1e-9)
     towards = q.pos / d[..., None]
     room = d - p.separation - p.confidence * q.sigma
-    time = p.reaction + age_of(m) + np.where(m.linked, 0.0, p.deadman)
+    time = p.reaction + age_of(m) + np.where(m.linked, 0.0, m.told.watchdog)
     angle, _ = bearing(ahead[:, None, :], -towards)
     sure = (q.oriented == 1.0)[:, None, :]
     held = m.armed[:, None, :]
@@ -209,6 +233,20 @@ RULES = (
         "stops for good after `silence`",
     ),
     Rule("link", link, "the car's port is lost", "stops for good"),
+    Rule("fault", fault, "its controller reports a fault", "stops for good"),
+    Rule(
+        "runaway", runaway, "it is faster than it was asked to be",
+        "stops for good where it is by `runaway_speed` for `runaway_time`",
+    ),
+    Rule(
+        "deaf", deaf, "it does not do what it is told",
+        "stops for good without an answer for `answer_time` (controllers that answer), or when its "
+        "wheels stand for `idle_time` although it is asked to drive",
+    ),
+    Rule(
+        "battery", battery, "its battery is nearly empty",
+        "`slow` below `cell_slow`, stops for good below `cell_stop`",
+    ),
     Rule("absent", absent, "it takes no part", "stops for good"),
     Rule(
         "stale", stale, "its node was not heard, or nothing was estimated",

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -11,8 +13,10 @@ from hardware_bridge.safety.gate import Gate, GateOutput, reason_text
 from hardware_bridge.safety.messages import Decision, Message, Notice, Order, Report, Word
 from hardware_bridge.safety.params import SafetyParams
 from hardware_bridge.safety.picture import Picture, blank_picture
+from hardware_bridge.safety.telemetry import Telemetry
 from tracking.arrays import F64, I64, Bool
 
+NONE_KNOWN: Mapping[int, Any] = MappingProxyType({})
 HALF_A_TICK = 0.005
 """[s]"""
 LATE = 0.02
@@ -28,6 +32,9 @@ class Supervisor:
         n_cars: int,
         drivers: Mapping[int, CarDriver],
         names: Mapping[int, str],
+        *,
+        cells: Mapping[int, int] = NONE_KNOWN,
+        watchdog: Mapping[int, float] = NONE_KNOWN,
     ) -> None:
         """Begin with nothing armed.
 
@@ -36,7 +43,17 @@ class Supervisor:
             n_cars: Slots.
             drivers: Of the slots that have a car.
             names: What each of these is called in notices.
+            cells: Of the batteries of the slots where they are known.
+            watchdog: Of the slots where it is known [s]; else it is `SafetyParams.deadman`.
         """
+        slots = range(n_cars)
+        self._telemetry = Telemetry(
+            params,
+            n_cars,
+            cells=[cells.get(k, 0) for k in slots],
+            watchdog=[watchdog.get(k, params.deadman) for k in slots],
+            answers=[k in drivers and drivers[k].answers for k in slots],
+        )
         self._gate = Gate(params, 1, n_cars)
         self._drivers, self._names = dict(drivers), dict(names)
         self._picture: Picture = blank_picture(1, n_cars)
@@ -85,6 +102,10 @@ class Supervisor:
                 return [Notice(f"unknown order {what!r}")]
         return []
 
+    def hear(self, slot: int, data: bytes, now: float) -> None:
+        """Bytes that a car's controller sent [s]."""
+        self._telemetry.take(slot, self._drivers[slot].telemetry.feed(data), now)
+
     def abandon(self) -> None:
         """The deciding process is gone: nothing will move again."""
         self._gate.stop()
@@ -120,14 +141,15 @@ class Supervisor:
         for slot in self._drivers:
             self._taken[slot] = self._taken.get(slot, now) if slot in linked else now
         self._now[0] = now
-        out = self._gate.step(self._picture, self._now, self._word, self._heard, self._linked)
+        told = self._telemetry.told(now, self._gate.recent, self._gate.armed[0], self._linked[0])
+        out = self._gate.step(self._picture, self._now, self._word, self._heard, self._linked, told)
         self._output = out
-        told = {
+        said = {
             slot: self._bytes(slot, out) if self._is_due(slot, now, out) else b""
             for slot in self._drivers
         }
-        self._sent = [slot for slot, data in told.items() if data]
-        return told
+        self._sent = [slot for slot, data in said.items() if data]
+        return said
 
     def _is_linked(self, slot: int, now: float) -> bool:
         """Whether commands of an open port leave; a car that hears none has stopped by itself."""

@@ -66,9 +66,8 @@ class _Watch:
     def __init__(self, charge: Charge, talk: socket.socket) -> None:
         self._talk, self._n_cars, self._dry = talk, charge.n_cars, charge.dry
         self._deadman_ns = round(charge.params.deadman * 1e9)
-        boot = time.time_ns() // 1_000_000_000  # rises from start to start, as a MAC asks for
         self._drivers = {
-            slot: make_driver(car.driver, car.node, car.options, car.key, boot, _now_us)
+            slot: make_driver(car.driver, car.node, car.options, car.key, charge.boot, _now_us)
             for slot, car in charge.cars
         }
         self._slots = {car.port.name: slot for slot, car in charge.cars}
@@ -77,6 +76,8 @@ class _Watch:
             charge.n_cars,
             self._drivers,
             {slot: car.port.name for slot, car in charge.cars},
+            cells={slot: car.cells for slot, car in charge.cars},
+            watchdog={slot: car.watchdog for slot, car in charge.cars if car.watchdog},
         )
         specs = [car.port for _, car in charge.cars]
         self._links = Links(specs, time.monotonic_ns)
@@ -86,6 +87,7 @@ class _Watch:
         self._up: set[str] = set()
         self._asleep = asleep_ns()
         self._alone = False
+        self._failed: set[tuple[str, str]] = set()
 
     def abandon(self) -> None:
         """Let the cars stand for good, and end."""
@@ -97,6 +99,8 @@ class _Watch:
         while lingered < LINGER:
             left = deadline - time.monotonic_ns()
             for chunk in self._links.wait(max(left, 0) * 1e-9):
+                slot = self._slots[chunk.link]
+                self._supervisor.hear(slot, chunk.data, chunk.t_ns * 1e-9)
                 self._say([Telemetry(self._slots[chunk.link], chunk.t_ns, chunk.data)])
             decided = self._listen()
             now = time.monotonic_ns()
@@ -117,7 +121,7 @@ class _Watch:
     def close(self) -> None:
         """Let the cars stand, and release ports and socket."""
         for name, slot in self._slots.items():
-            self._send(name, self._drivers[slot].neutral)
+            self._send(name, "neutral", self._drivers[slot].neutral)
         self._links.close()
         self._talk.close()
 
@@ -125,7 +129,7 @@ class _Watch:
         """Tell every car what it may do now."""
         up = {name for name in self._slots if self._links.is_up(name)}
         for name in up - self._up:
-            self._send(name, self._drivers[self._slots[name]].opening)
+            self._send(name, "greeting", self._drivers[self._slots[name]].opening)
         self._up = up
         asleep = asleep_ns()
         if asleep - self._asleep > self._deadman_ns:
@@ -144,14 +148,18 @@ class _Watch:
 
     def _ask(self) -> None:
         for name, slot in self._slots.items():
-            self._send(name, self._drivers[slot].ask)
+            self._send(name, "question", self._drivers[slot].ask)
 
-    def _send(self, name: str, words: Callable[[], bytes]) -> None:
-        """Let a driver speak; one that cannot keeps none of the others from it."""
-        with contextlib.suppress(Exception):
+    def _send(self, name: str, what: str, words: Callable[[], bytes]) -> None:
+        """Let a driver speak; one that cannot is told of once, and keeps no other from it."""
+        try:
             data = words()
             if data:
                 self._links.send(name, data)
+        except Exception as error:  # of whatever kind, the other cars must be told
+            if (name, what) not in self._failed:
+                self._failed.add((name, what))
+                self._say([Notice(f"{name}: its driver cannot make the {what}: {error}")])
 
     def _listen(self) -> bool:
         """Take in what the deciding process said; whether a decision was among it."""
