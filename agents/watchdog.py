@@ -1,7 +1,7 @@
 """How long cars go on by themselves when they hear nothing.
 
-Measured with their wheels off the ground: a car is told to drive until its own telemetry says that it does, then it is told nothing, and the
-time until its wheels are at half that speed is taken.
+Measured with their wheels off the ground: a car is told to drive until its own telemetry says that
+it does, then it is told nothing, and the time until its wheels are at half that speed is taken.
 """
 
 from __future__ import annotations

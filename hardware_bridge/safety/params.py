@@ -92,7 +92,8 @@ class SafetyParams:
     runaway_time: float = 0.3
     """[s] For so long; then it is stopped for good."""
     idle_time: float = 3.0
-    """[s] A car whose wheels stand for so long although it is asked to drive is stopped for good."""
+    """[s] A car whose wheels stand for so long although it is asked to drive is stopped for
+    good."""
     answer_time: float = 0.5
     """[s] A car whose controller answers commands, and has answered none for so long, is stopped
     for good."""
