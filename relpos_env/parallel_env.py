@@ -151,10 +151,8 @@ class FormationEnv(CarsEnv):
         self.agents = []
         self._begun = False
 
-    def _begin(self, options: Mapping[str, Any] | None) -> None:
-        # The checkers of PettingZoo pass an option of that name.
-        known = {name: value for name, value in (options or {}).items() if name != "options"}
-        wishes = reset_options(known, self._parts)
+    def _begin(self, options: Mapping[str, Any]) -> None:
+        wishes = reset_options(options, self._parts)
         self._recording = recording = Recording() if self._record else None
         self._formation.begin([0], None if recording is None else recording.add_swarm, wishes)
         self._film.forget()

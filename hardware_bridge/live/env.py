@@ -23,6 +23,8 @@ class LiveFormationEnv(CarsEnv):
     the car is not armed, so that the transition is not the policy's.
     """
 
+    metadata = {**CarsEnv.metadata, "render_modes": []}  # noqa: RUF012
+
     def __init__(
         self,
         swarm: LiveSwarm,
@@ -66,7 +68,7 @@ class LiveFormationEnv(CarsEnv):
         self.agents = []
         self._begun = False
 
-    def _begin(self, options: Mapping[str, Any] | None) -> None:
+    def _begin(self, options: Mapping[str, Any]) -> None:
         if options:
             raise EnvError(f"options: expected none on real cars, got {', '.join(options)}")
         self.group.begin()

@@ -150,7 +150,8 @@ class CarsEnv(ParallelEnv, ABC):  # type: ignore[misc]
         if seed is not None or self._rng is None:
             self._rng = episode_rng(seed)
             self._group.seed(0, self._rng)
-        self._begin(options)
+        # The checkers of PettingZoo pass an option of that name.
+        self._begin({name: what for name, what in (options or {}).items() if name != "options"})
         self._begun = True
         active = self._group.active[0]
         self.agents = [a for a, n in self._numbers.items() if self._fixed or active[n]]
@@ -197,7 +198,7 @@ class CarsEnv(ParallelEnv, ABC):  # type: ignore[misc]
         )
 
     @abstractmethod
-    def _begin(self, options: Mapping[str, Any] | None) -> None:
+    def _begin(self, options: Mapping[str, Any]) -> None:
         """Begin an episode of the group."""
 
     def _infos(self, agents: list[str]) -> dict[str, Any]:

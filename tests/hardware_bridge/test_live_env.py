@@ -13,7 +13,7 @@ from agents.emulate.virtual import LAG, START_NS, VirtualBridge
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.ports import Chunk
 from hardware_bridge.live.env import LiveFormationEnv
-from hardware_bridge.live.replay import ReplayFeed
+from hardware_bridge.live.replay import APPLIED, ReplayFeed
 from hardware_bridge.live.start import StartParams, is_home, wriggle
 from hardware_bridge.recording import Header, Recorder, read_recording
 from hardware_bridge.recording import Kind as Record
@@ -101,7 +101,12 @@ def test_observations_are_inside_their_spaces(bridge, mode, history):
     for observations in seen:
         for agent, observation in observations.items():
             assert env.observation_space(agent).contains(observation)
-    assert {info["rewards_from"] for info in infos.values()} == {"estimates"}
+    for info in infos.values():
+        assert "collisions" not in info
+        assert info["tracking_error"] == np.inf
+        assert info["allowed_speed"] <= abs(info["asked_speed"]) + 1e-9
+        assert (info["gate"] != "") or not info["stopped"]
+    assert env.metadata["render_modes"] == []
 
 
 @pytest.mark.filterwarnings("ignore:Observation numpy array is all zeros:UserWarning")
@@ -158,6 +163,33 @@ def test_a_reset_arms_and_lets_cars_find_each_other():
     assert env.agents == []
     with pytest.raises(EnvError, match="must be reset first"):
         env.step({})
+    bridge.close()
+
+
+@pytest.mark.parametrize("person", [False, True])
+def test_only_the_first_start_arms_by_itself(person):
+    bridge = VirtualBridge(OPTIONS, wait=3.0)
+    env = bridge.env(max_cycles=5)
+    env.reset()
+    bridge.feed.order("disarm")
+    while env.agents:
+        env.step({agent: np.zeros(2, np.float32) for agent in env.agents})
+    decisions = iter(range(1, 1000))
+
+    def attend():
+        if person and next(decisions) == 5:
+            bridge.feed.order("arm")
+        return False
+
+    bridge.start.attend = attend
+    if person:
+        env.reset()
+        assert bridge.feed.report.armed.all()
+    else:
+        with pytest.raises(BridgeError, match="only a person arms them again"):
+            env.reset()
+        assert not bridge.feed.report.armed.any()
+    assert "stopped cars wait to be armed by a person" in [text for _, text in bridge.feed.notices]
     bridge.close()
 
 
@@ -229,7 +261,9 @@ def test_commands_pass_the_gate(armed):
     # The odometer of a car that stands is off by 0.02 m/s rms: its mean over two seconds tells.
     assert np.abs(np.mean(moves[10:], axis=0)).max() < 0.03
     armed.feed.order("clear")
+    armed.start.attend = lambda: armed.feed.order("arm")  # only a person arms them again
     env.reset()
+    armed.start.attend = None
     assert armed.feed.report.armed.all()
 
 
@@ -278,7 +312,7 @@ class Recorded:
         t_ns = self._feed.advance()
         report = self._feed.report
         if report is not None:
-            told = {key: getattr(report, key).tolist() for key in ("speed", "steering", "armed")}
+            told = {key: getattr(report, key).tolist() for key in APPLIED}
             self._recorder.add_event(t_ns, "applied", **told)
         self._recorder.add(Record.TICK, 0, t_ns)
         return t_ns

@@ -16,9 +16,15 @@ class Driver:
     """Says what it was asked for; may fail."""
 
     gap = 0.0
+    answers = False
 
     def __init__(self):
         self.fails, self.fails_neutral = False, False
+        self.telemetry = self
+        self.readings = []
+
+    def feed(self, data):
+        return self.readings
 
     def drive(self, speed, steering):
         if self.fails:
