@@ -31,8 +31,6 @@ from tracking.compiled import bind
 
 MOST_ENVS = 1 << 20
 NO_OPTIONS = ResetOptions()
-N_TRUTH = 8
-"""[-] Numbers of the truth about each car, see `Formation.truth`."""
 
 
 class Formation:
@@ -179,46 +177,6 @@ class Formation:
         """Time since the cars were let go, (env) [s]; written again at the next step."""
         np.subtract(self.loop.swarm.t, STAND_STILL, out=self._t)
         return self._t
-
-    def truth(self) -> F64:
-        """The truth for critics, (env, 8 car); zeros for absent cars.
-
-        Of each car: 1, x, y, cosine and sine of the heading, velocity x, y, yaw rate.
-        """
-        s = self.state
-        columns = [
-            np.ones_like(s.heading),
-            s.pos_w[..., 0],
-            s.pos_w[..., 1],
-            np.cos(s.heading),
-            np.sin(s.heading),
-            s.vel_w[..., 0],
-            s.vel_w[..., 1],
-            s.yaw_rate,
-        ]
-        rows = np.stack(columns, axis=-1) * s.present[..., None]
-        truth: F64 = rows.reshape(self.n_envs, -1)
-        return truth
-
-    def own_truth(self) -> F64:
-        """The truth as each car would put it, for critics of one car, (env, car, 8 car).
-
-        The car itself comes first, at its place in the room, then the others relative to it;
-        directions are in its frame; of each the numbers of `truth`. Zeros for absent cars.
-        """
-        n = self.parts.n_cars
-        s = self.truth().reshape(self.n_envs, n, N_TRUTH)
-        seen = s[:, (np.arange(n)[:, None] + np.arange(n)) % n]
-        own = s[:, :, None]
-        c, sn = own[..., 3], own[..., 4]
-        told = seen.copy()
-        offset = seen[..., 1:3] - own[..., 1:3]
-        for k, vector in ((1, offset), (3, seen[..., 3:5]), (5, seen[..., 5:7])):
-            x, y = vector[..., 0], vector[..., 1]
-            told[..., k], told[..., k + 1] = c * x + sn * y, c * y - sn * x
-        told[:, :, 0, 1:3] = s[..., 1:3]
-        truth: F64 = (told * seen[..., :1] * own[..., :1]).reshape(self.n_envs, n, -1)
-        return truth
 
     def tracking_error(self) -> F64:
         """Distance of believed from true relative positions, (env, car) [m].

@@ -168,7 +168,7 @@ class FormationGymEnv(gymnasium.Env[F32, Any]):
 
     def state(self) -> F32:
         """The truth, for critics; as in `FormationEnv.state`."""
-        state: F32 = truth_inside(self.formation, state_space(self._parts))[0]
+        state: F32 = truth_inside(self.formation.state, state_space(self._parts))[0]
         return state
 
     def render(self) -> Any:

@@ -121,7 +121,7 @@ class FormationEnv(CarsEnv):
 
         Of each car: 1, x, y, cosine and sine of the heading, velocity x, y, yaw rate.
         """
-        state: F32 = truth_inside(self.formation, self.state_space)[0]
+        state: F32 = truth_inside(self.formation.state, self.state_space)[0]
         return state
 
     def recorded_log(self, name: str) -> Log:

@@ -10,13 +10,14 @@ from gymnasium.spaces import Box
 
 from relpos_env.config import configure
 from relpos_env.errors import EnvError
-from relpos_env.formation import N_TRUTH, Formation
+from relpos_env.formation import Formation
 from relpos_env.interface.infos import car_infos
 from relpos_env.interface.observations import space_of
 from relpos_env.interface.observations.base import F32
 from relpos_env.render.film import Film, check_render_mode
 from relpos_env.sb3_seats import SharedSeats
 from relpos_env.seeding import episode_rng, seeds_of_batch
+from relpos_env.state_space import N_TRUTH, truth_of_each
 from relpos_env.tasks import reward_weights
 from relpos_env.tasks.options import flag
 from tracking.arrays import F64, Bool
@@ -49,7 +50,7 @@ class FormationVecEnv(SharedSeats):
             n_envs: How many.
             threads: The batch is stepped in so many parts at a time.
             render_mode: None, ``human`` or ``rgb_array``: pictures of the first environment.
-            with_truth: Every observation is followed by `Formation.own_truth`, for critics.
+            with_truth: Every observation is followed by `relpos_env.state_space.truth_of_each`, for critics.
             arguments: Fields of `relpos_env.config.FormationConfig`.
 
         Raises:
@@ -184,7 +185,9 @@ class FormationVecEnv(SharedSeats):
         """Observations of all seats, with the truth if it is wanted; a copy."""
         observations = observations.reshape(self.num_envs, -1)
         if self.with_truth:
-            truth = self.formation.own_truth().reshape(self.num_envs, -1).astype(np.float32)
+            truth = (
+                truth_of_each(self.formation.state).reshape(self.num_envs, -1).astype(np.float32)
+            )
             return np.concatenate([observations, truth], axis=1)
         return observations.copy()
 

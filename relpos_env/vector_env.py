@@ -165,7 +165,7 @@ class FormationVectorEnv(VectorEnv[F32, Any, Any]):
 
     def state(self) -> F32:
         """The truth, for critics, (env, 8 car); as in `FormationEnv.state`."""
-        return truth_inside(self.formation, self._state_space)
+        return truth_inside(self.formation.state, self._state_space)
 
     def render(self) -> tuple[Any, ...] | None:
         """A picture of every environment, or None without a render mode."""

@@ -18,8 +18,8 @@ from agents.train.environments import layout_of, weights_of
 from agents.train.hyperbolic import Tanh
 from agents.train.network import SwarmPolicy
 from agents.train.rooms import Rooms, observation_space
-from relpos_env.formation import N_TRUTH
 from relpos_env.interface.actions import ContinuousActions
+from relpos_env.state_space import N_TRUTH
 
 FALL = (0.5, 0.7)
 """[-] Shares of the run between which the bound on the noise of actions falls."""

@@ -13,11 +13,11 @@ from gymnasium.spaces import Box
 
 from agents.policy.layout import Layout
 from agents.policy.padding import Padding
-from relpos_env.formation import N_TRUTH
 from relpos_env.interface.observations import space_of
 from relpos_env.interface.observations.base import F32
 from relpos_env.sb3_seats import SharedSeats
 from relpos_env.sb3_vec_env import FormationVecEnv
+from relpos_env.state_space import N_TRUTH
 from tracking.arrays import Bool
 
 

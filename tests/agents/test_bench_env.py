@@ -50,7 +50,7 @@ def test_resets_are_spread_evenly_over_the_turns():
     assert batch.steps == 10
     began = []
     begin = batch.env.formation.begin
-    batch.env.formation.begin = lambda env: (began.append(env), begin(env))
+    batch.env.formation.begin = lambda envs, **more: (began.extend(envs), begin(envs, **more))
     batch.turn()
     assert began == [59]
     batch.turn()

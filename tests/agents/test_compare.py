@@ -265,7 +265,7 @@ def test_the_command_line_writes_a_report_and_rows(tmp_path):
     [
         (["magic"], "NAME: expected one of consensus"),
         ([], "Missing argument 'NAME...'"),
-        (["consensus", "--observation", "moon"], "--observation: expected names of estimate"),
+        (["consensus", "--observation", "moon"], "--observation: expected one of estimate"),
         (["consensus", "--scenario", "moon"], "scenario: expected one of"),
         (["consensus", "--task", "dance"], "task: expected one of"),
         (["consensus", "--level", "9"], "level: expected a whole number from 0 to 4"),

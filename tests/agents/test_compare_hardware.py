@@ -200,7 +200,7 @@ def test_drivers_with_beams_and_none_at_all_are_refused(monkeypatch):
         ({"arm": False}, "--arm: a comparison needs cars that move"),
         ({"drivers": ["magic"]}, "NAME: expected one of consensus"),
         ({"observations": ["truth"]}, "nothing to compare: .* real cars know no truth"),
-        ({"observations": ["moon"]}, "--observation: expected names of estimate"),
+        ({"observations": ["moon"]}, "--observation: expected one of estimate"),
         ({"episodes": 0}, "--episodes: expected 1 to"),
         ({"settle": 1.0}, "--settle: expected 0 to less"),
     ],

@@ -38,7 +38,7 @@ KEY = bytes(range(16))
 
 
 def formation_of(options):
-    formation = Formation(options.parts())
+    formation = Formation(options.parts(), physics="pymunk")
     formation.seed(0, seeding.np_random(options.seed)[0])
     formation.begin([0])
     return formation

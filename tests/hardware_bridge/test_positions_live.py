@@ -169,7 +169,8 @@ def test_it_sees_what_the_simulator_shows():
             for node in range(3)
         ]
         swarm.take(Chunk("links.mocap", t_ns, encoder.encode(poses)))
-        swarm.apply(view.speed[0], view.steering[0], np.ones(len(view.speed[0])))
+        ones = np.ones(len(view.speed[0]))
+        swarm.apply(view.speed[0], view.steering[0], ones, -ones)
         swarm.share(view.target, view.wanted, view.command)
         swarm.step(t_ns)
         mode.bind(swarm.view, out)()

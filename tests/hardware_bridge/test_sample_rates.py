@@ -118,7 +118,7 @@ def test_stamps_of_another_counter_do_not_decide_for_good(damaged):
 def test_a_tracker_that_hangs_is_not_believed_while_cars_drive(hangs, speed):
     text = '[links.a]\nport = "/dev/x"\nformat = "positions"\n[tracker]\nsource = "positions"\n'
     swarm = LiveSwarm(parsed(text), 0)
-    swarm.apply(np.array([speed, 0.0]), np.zeros(2), np.ones(2))
+    swarm.apply(np.array([speed, 0.0]), np.zeros(2), np.ones(2), -np.ones(2))
     heard = []
     for k in range(400):
         step = min(k, 200)

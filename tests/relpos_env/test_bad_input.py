@@ -21,7 +21,10 @@ BAD_ARGUMENTS = [
     ({"scenario": 7}, "scenario: expected a name, a path or a scenario, got 7"),
     ({"scenario": "hall", "task": "gap"}, "scenario: task 'gap' expected one with a gap"),
     ({"observation": "all"}, "observation: expected one of estimate, .* got 'all'"),
-    ({"actions": "smooth"}, "actions: expected one of continuous, discrete, got 'smooth'"),
+    (
+        {"actions": "smooth"},
+        "actions: expected one of continuous, discrete or package.module:Name, got 'smooth'",
+    ),
     ({"filter": "magic"}, "filter: expected one of"),
     ({"task": "none"}, "task: expected one of ring, .* got 'none'"),
     ({"task": "ring", "task_options": {"colour": 1}}, "colour: task 'ring' expected options among"),
@@ -45,9 +48,9 @@ BAD_ARGUMENTS = [
     ({"params": {"a": 1}}, "params: expected TrackerParams or None, got"),
     ({"operator": {}}, "operator: expected OperatorSimParams, got"),
     ({"end_on_collision": "no"}, "end_on_collision: expected bool, got 'no'"),
-    ({"task": ["ring"]}, "task: expected str, got"),
+    ({"task": ["ring"]}, "task: expected one of ring"),
     ({"observation": ["estimate"]}, "observation: expected one of estimate"),
-    ({"filter": ["joint"]}, "filter: expected str, got"),
+    ({"filter": ["joint"]}, "filter: expected one of joint"),
     ({"task": "travel", "task_options": {"closed": "no"}}, "closed: expected True or False"),
     ({"task": "travel", "task_options": {"turning": 1}}, "turning: expected True or False"),
     (

@@ -123,12 +123,12 @@ def test_sizes_out_of_range_are_named(name):
 @pytest.mark.parametrize("name", TASKS)
 def test_every_term_has_a_weight(name):
     task = make_task(name, 3, 1, ROOM)
-    weights = reward_weights(name, task.terms, {"collision": 7.0})
+    weights = reward_weights(name, task, {"collision": 7.0})
     assert weights.shape == (len(task.terms),)
     assert weights[task.terms.index("collision")] == 7.0
     assert set(task.terms) <= set(DEFAULT_WEIGHTS[name])
     with pytest.raises(EnvError, match="weights: expected terms among"):
-        reward_weights(name, task.terms, {"joy": 1.0})
+        reward_weights(name, task, {"joy": 1.0})
     if "time" in task.terms:
         # Being through is better than the best step before.
         best = DEFAULT_WEIGHTS[name]["formation"] + DEFAULT_WEIGHTS[name][task.terms[1]]

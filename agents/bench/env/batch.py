@@ -40,6 +40,7 @@ class Batch:
             threads=threads,
             max_cycles=EPISODE,
             physics=physics,
+            autoreset_mode="SameStep",
         )
         self.n_envs, self._drive = n_envs, drive
         self.steps = ceil(EPISODE * resets / n_envs)
