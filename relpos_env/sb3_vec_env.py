@@ -50,7 +50,8 @@ class FormationVecEnv(SharedSeats):
             n_envs: How many.
             threads: The batch is stepped in so many parts at a time.
             render_mode: None, ``human`` or ``rgb_array``: pictures of the first environment.
-            with_truth: Every observation is followed by `relpos_env.state_space.truth_of_each`, for critics.
+            with_truth: Every observation is followed by that of
+                `relpos_env.state_space.truth_of_each`, for critics.
             arguments: Fields of `relpos_env.config.FormationConfig`.
 
         Raises:

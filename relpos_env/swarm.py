@@ -15,6 +15,7 @@ from relpos_env._clearance_kernels import read_clearances
 from relpos_env._step_kernels import begin_decision, run_steps
 from relpos_env._vehicle_kernels import STEERING
 from relpos_env.bodies import Bodies, make_bodies, place_bodies
+from relpos_env.car_nodes import car_constellation
 from relpos_env.group import Group
 from relpos_env.interface.beams import beam_directions
 from relpos_env.scenarios import Scenario
@@ -31,25 +32,12 @@ from relpos_env.world import World
 from relpos_env.world_state import WorldState
 from tracking.arrays import F64, Bool
 from tracking.compiled import bind
-from tracking.constellation import Antenna, Constellation, NodeConfig
 from tracking.filters.joint.records import as_records
 from tracking.measurements import MeasurementBlock
 
 Physics = Literal["pymunk", "fast"]
 SPARE_BOXES = 8
 """[-] Shapes that can be added to a space and that sensors see."""
-
-
-def car_constellation(scenario: Scenario, n_cars: int) -> Constellation:
-    """The nodes that the cars carry: ids from 1, antenna on a mast over the tracker."""
-    ids = range(1, n_cars + 1)
-    height = scenario.radio.antenna_height
-    return Constellation(
-        nodes=tuple(NodeConfig(id=k, vehicle="car", imu_hz=1.0 / DT) for k in ids),
-        dimensions=2,
-        heading="magnetic",
-        antennas=tuple(Antenna(id=k, node=k, offset_b=(0.0, 0.0, height)) for k in ids),
-    )
 
 
 class Swarm:

@@ -23,7 +23,7 @@ BAD_ARGUMENTS = [
     ({"observation": "all"}, "observation: expected one of estimate, .* got 'all'"),
     (
         {"actions": "smooth"},
-        "actions: expected one of continuous, discrete or package.module:Name, got 'smooth'",
+        "actions: expected one of continuous, discrete or .*:Name, got 'smooth'",
     ),
     ({"filter": "magic"}, "filter: expected one of"),
     ({"task": "none"}, "task: expected one of ring, .* got 'none'"),
