@@ -19,6 +19,10 @@ CARRIED = ("hand", "drone", "none")
 """Vehicles that tilt, and accelerate for seconds."""
 
 
+SLOWEST_HZ, FASTEST_HZ = 1.0, 10_000.0
+"""[1/s] Rates of samples that an orientation can be filtered from."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Antenna:
     """An antenna that is not at the origin of its node's body."""
@@ -83,12 +87,14 @@ class Constellation:
                 f"got {node.vehicle!r}",
             )
             _expect(
-                0.0 < node.imu_hz < math.inf,
-                f"nodes.{node.id}.imu_hz: expected > 0, got {node.imu_hz}",
+                SLOWEST_HZ <= node.imu_hz <= FASTEST_HZ,
+                f"nodes.{node.id}.imu_hz: expected {SLOWEST_HZ:g} to {FASTEST_HZ:g}, "
+                f"got {node.imu_hz:g}",
             )
             _expect(
-                node.mag_hz is None or 0.0 < node.mag_hz < math.inf,
-                f"nodes.{node.id}.mag_hz: expected > 0, got {node.mag_hz}",
+                node.mag_hz is None or 0.0 < node.mag_hz <= FASTEST_HZ,
+                f"nodes.{node.id}.mag_hz: expected above 0 and at most {FASTEST_HZ:g}, "
+                f"got {node.mag_hz:g}",
             )
             _expect(
                 node.initial_heading is None or math.isfinite(node.initial_heading),

@@ -95,8 +95,14 @@ def drive(
     if as_json:
         emit_json([result.summary])
         return
-    rows = [[name, _text(value)] for name, value in result.summary.items() if name != "result"]
-    print_table("Drive", ["", "value"], rows)
+    figures = {name: value for name, value in result.summary.items() if name != "result"}
+    stops = figures.pop("stops")
+    print_table("Drive", ["", "value"], [[name, _text(value)] for name, value in figures.items()])
+    for stop in stops:
+        click.echo(stop)
+    if record is not None:
+        lost = result.recording_lost
+        click.echo(f"recorded: {record}" + (f", incomplete: {lost}" if lost else ""))
 
 
 class _Screen:
@@ -164,13 +170,16 @@ def _table(header: tuple[str, ...], rows: list[list[str]], notices: list[str], k
 
     table = Table(box=box.SIMPLE)
     for name in header:
-        table.add_column(escape(name))
+        # What does not fit is cut: the cars and the keys must stay in sight.
+        table.add_column(escape(name), no_wrap=True, overflow="ellipsis")
     for row in rows:
         table.add_row(*(escape(cell) for cell in row))
-    return Group(table, Text("\n".join(notices)), Text(keys, style="bold"))
+    told = [Text(notice, no_wrap=True, overflow="ellipsis") for notice in notices]
+    # A terminal that is too low cuts off the end.
+    return Group(Text(keys, style="bold"), table, *told)
 
 
 def _text(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.3g}"
-    return ", ".join(value) if isinstance(value, list) else str(value)
+    return str(value)

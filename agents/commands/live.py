@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from contextlib import ExitStack
 from pathlib import Path
@@ -39,6 +40,9 @@ def live(
     from hardware_bridge.config import read_config
 
     swarm = read_config(config)
+    # However it is ended from outside, the recording is closed.
+    for name in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(name, signal.default_int_handler)
     with ExitStack() as stack:
         viewer = None
         if view is not None:

@@ -25,6 +25,13 @@ if TYPE_CHECKING:
     help="joint, ekf-mds, ekf, paper-ekf-mds or paper-ekf; by default the one of the recording.",
 )
 @click.option(
+    "--keys",
+    type=Path,
+    metavar="SWARM.TOML",
+    help="For the keys of signed messages, which recordings do not hold; without, signatures are "
+    "not checked.",
+)
+@click.option(
     "--export",
     "exports",
     multiple=True,
@@ -46,6 +53,7 @@ def replay(
     speed: float | None,
     fast: bool,
     filter: str | None,
+    keys: Path | None,
     exports: tuple[str, ...],
     out: Path | None,
     truth: Path | None,
@@ -91,6 +99,7 @@ def replay(
             recording,
             speed=speed,
             filter=filter,
+            keys=keys,
             truth=truth,
             truth_offset=offset,
             skip=skip,

@@ -19,9 +19,8 @@ ALIVE = "."
 nothing."""
 PATIENCE = 1.0
 """[s] Without a word from it, all cars are stopped."""
-HELP = (
-    "space: emergency stop   c: clear it   a: arm   d: disarm   g: silent cars are gone   q: quit"
-)
+HELP = "space: emergency stop  c: clear it  a: arm  d: disarm  g: silent are gone  q: quit"
+"""In one line of 80 letters."""
 
 
 def check_stop_source(source: str) -> None:

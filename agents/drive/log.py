@@ -78,5 +78,6 @@ class DriveLog:
             decisions=self._n,
             late_decisions=self._bridge.feed.n_late - self._n_late,
             missed_ticks=report.missed if report is not None else 0,
+            recording_lost=self._bridge.recording_lost,
             stops=tuple(text for text in notices if STOPPED in text),
         )

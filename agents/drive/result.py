@@ -46,6 +46,8 @@ class DriveResult:
     """[-] That were due while the one before was still made."""
     missed_ticks: int
     """[-] Of the supervisor, more than 20 ms late."""
+    recording_lost: str | None
+    """Why records are missing in the recording; None if none are, or there is none."""
     stops: tuple[str, ...]
     """Why cars were stopped for good."""
 
@@ -72,5 +74,6 @@ class DriveResult:
             "gated_share": float(held.mean()) if self.armed and len(held) else None,
             "late_decisions": self.late_decisions,
             "missed_ticks": self.missed_ticks,
+            "recording_lost": self.recording_lost,
             "stops": list(self.stops),
         }

@@ -12,7 +12,7 @@ from hardware_bridge.safety.gate import reason_text
 from tracking.estimate import Status
 
 HEADER = ("car", "state", "asked [m/s]", "passed [m/s]", "error [m]", "sees", "why")
-LINES = 6
+LINES = 4
 """[-] Of notices below the table."""
 
 
@@ -53,7 +53,7 @@ def status_record(bridge: OpenBridge, env: LiveFormationEnv) -> dict[str, Any]:
     error = group.task.error[0, present]
     return {
         "result": "second",
-        "t": round(group.t_ns * 1e-9, 3),
+        "t": round(bridge.swarm.intake.seconds(group.t_ns), 3),
         "error": float(error.mean()) if present.any() else None,
         "present": int(present.sum()),
         "armed": int(np.sum(report.armed)) if report is not None else 0,

@@ -20,7 +20,9 @@ class Rates:
         self._n = n_nodes
         self._now = self._nothing()
         self._first: float | None = None
-        self._recent: deque[tuple[float, I64]] = deque()
+        self._closed = 0.0
+        self._recent: deque[tuple[float, float, I64]] = deque()
+        """Beginning and end of each step, and what came in it."""
         self.totals: dict[str, int] = {kind.name.lower(): 0 for kind in _COUNTED}
         """Measurements since the beginning, by kind."""
 
@@ -38,11 +40,11 @@ class Rates:
         """What was counted since the last call came up to this time [s]."""
         if self._first is None:
             # How long the first of it took to come is not known.
-            self._first, self._now = t, self._nothing()
+            self._first, self._closed, self._now = t, t, self._nothing()
             return
-        self._recent.append((t, self._now))
-        self._now = self._nothing()
-        while self._recent[0][0] <= t - WINDOW:
+        self._recent.append((self._closed, t, self._now))
+        self._closed, self._now = t, self._nothing()
+        while self._recent[0][1] <= t - WINDOW:
             self._recent.popleft()
 
     @property
@@ -50,8 +52,9 @@ class Rates:
         """Samples and ranges a second, (2, node) [1/s]; zeros before anything is known."""
         if not self._recent or self._first is None:
             return np.zeros((2, self._n))
-        elapsed = min(WINDOW, self._recent[-1][0] - self._first)
-        total = np.sum([counts for _, counts in self._recent], axis=0)
+        # From when the first of them began, which may be a little more than the window.
+        elapsed = self._recent[-1][1] - self._recent[0][0]
+        total = np.sum([counts for _, _, counts in self._recent], axis=0)
         hz: F64 = total / max(elapsed, 1e-3)
         return hz
 

@@ -15,7 +15,7 @@ from agents.live.text import NODE_HEADER, line, node_rows, pair_header, pair_row
 if TYPE_CHECKING:
     from rich.table import Table
 
-MOST_NOTICES = 8
+MOST_NOTICES = 4
 """The table shows the last so many."""
 EVERY = 2
 """The table is drawn at every so-manieth decision."""
@@ -109,15 +109,18 @@ class LiveTable:
         if monitor.decisions % EVERY:
             return
         snapshot = monitor.snapshot()
-        told = [Text(f"{t:7.1f} s  {text}") for t, text in self._notices]
+        told = [
+            Text(f"{t:7.1f} s  {text}", no_wrap=True, overflow="ellipsis")
+            for t, text in self._notices
+        ]
         usable = f"{snapshot.n_ok} of {len(snapshot.pairs)} pairs ok"
         head = f"{self._title}   {snapshot.t:.0f} s   {usable}"
         self._live.update(
             Group(
                 Text(head, style="bold"),
+                *told,
                 table(list(NODE_HEADER), node_rows(snapshot)),
                 table(pair_header(snapshot), pair_rows(snapshot), status=True),
-                *told,
             ),
             refresh=True,
         )

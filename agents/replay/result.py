@@ -48,6 +48,8 @@ class ReplayResult:
     """The recorded one."""
     calibration: Calibration | None
     """The recorded one, by which measurements were corrected."""
+    decisions: int
+    """How many there were."""
     t_ns: I64
     """Host time of the decisions, (decision) [ns]."""
     estimate: TeamEstimate
@@ -100,7 +102,7 @@ class ReplayResult:
             "filter": self.config.tracker.filter,
             "start_ns": r.header.monotonic_ns,
             "seconds": round(self.seconds, 6),
-            "decisions": len(self.t_ns),
+            "decisions": self.decisions,
             "records": r.n_records,
             "torn": r.torn,
             "damaged": r.damaged,

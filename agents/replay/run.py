@@ -11,6 +11,7 @@ from agents.live.monitor import Monitor
 from agents.live.run import Watch
 from agents.replay.result import ReplayResult
 from agents.replay.truth import score_replay, truth_of
+from hardware_bridge.config import SwarmConfig, read_config
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.live.replay import ReplayFeed
 from hardware_bridge.recording import Kind, Recording, read_recording
@@ -25,6 +26,7 @@ def replay(
     *,
     speed: float | None = None,
     filter: str | None = None,
+    keys: SwarmConfig | Path | str | None = None,
     truth: Log | Path | str | None = None,
     truth_offset: float | None = None,
     skip: float = 10.0,
@@ -39,6 +41,8 @@ def replay(
         recording: A file, or what `read_recording` made of one.
         speed: Times as fast as it happened; None is as fast as possible.
         filter: In place of the recorded one.
+        keys: The swarm.toml that it was made with, for the keys of signed messages, which a
+            recording does not hold; None does not check signatures.
         truth: A log with the truth, or its folder.
         truth_offset: Added to its times gives those of the recording, whose start is 0 [s]; None
             finds it, see `agents.replay.truth.find_offset`.
@@ -58,7 +62,9 @@ def replay(
         raise UsageError(f"speed: expected {SLOWEST:g} to {FASTEST:g}, got {speed:g}")
     read = recording if isinstance(recording, Recording) else read_recording(recording)
     pace = None if speed is None else _Pace(speed, read.header.monotonic_ns, clock, sleep)
-    feed = ReplayFeed(read, pace, filter=filter)
+    if keys is not None and not isinstance(keys, SwarmConfig):
+        keys = read_config(keys)
+    feed = ReplayFeed(read, pace, filter=filter, keys=keys)
     log = None
     if truth is not None:
         log = truth if isinstance(truth, Log) else read_log(truth)
@@ -78,6 +84,7 @@ def replay(
     return ReplayResult(
         recording=read,
         config=feed.config,
+        decisions=monitor.decisions,
         calibration=feed.calibration,
         t_ns=monitor.history.t_ns,
         estimate=estimate,
@@ -117,10 +124,12 @@ def _lost(recording: Recording) -> tuple[tuple[float, int, str], ...]:
     """What the recorder said it had to drop."""
     lost = []
     for record in recording:
-        event = record.event() if record.kind == Kind.EVENT else {}
+        event = recording.event(record) if record.kind == Kind.EVENT else {}
         if event.get("event") == "recording_lost":
             t = 1e-9 * (record.t_ns - recording.header.monotonic_ns)
-            lost.append((t, int(event.get("records", 0)), str(event.get("why", ""))))
+            records = event.get("records", 0)
+            n = records if isinstance(records, int) else 0
+            lost.append((t, n, str(event.get("why", ""))))
     return tuple(lost)
 
 

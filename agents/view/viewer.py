@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType, TracebackType
 from typing import Any
@@ -38,15 +40,16 @@ class Viewer:
             notices: Time [s] and text of what happened since the last.
         """
         rr, stream = self._rr, self._stream
-        if not self._styled:
-            style_plots(rr, stream, snapshot)
-            self._styled = True
-        for t, text in notices or ():
-            stream.set_time(TIME, duration=t)
-            stream.log("notices", rr.TextLog(text))
-        stream.set_time(TIME, duration=snapshot.t)
-        log_scene(rr, stream, snapshot)
-        log_numbers(rr, stream, snapshot)
+        with self._writing():
+            if not self._styled:
+                style_plots(rr, stream, snapshot)
+                self._styled = True
+            for t, text in notices or ():
+                stream.set_time(TIME, duration=t)
+                stream.log("notices", rr.TextLog(text))
+            stream.set_time(TIME, duration=snapshot.t)
+            log_scene(rr, stream, snapshot)
+            log_numbers(rr, stream, snapshot)
 
     def show_errors(self, estimate: TeamEstimate, errors: F64, known: Bool) -> None:
         """Draw how wrong a whole run was.
@@ -60,8 +63,23 @@ class Viewer:
 
     def close(self) -> None:
         """Write what waits and end it."""
-        self._stream.flush()
-        self._stream.disconnect()
+        with self._writing():
+            self._stream.flush()
+            self._stream.disconnect()
+
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        """What Rerun cannot write is an error that names the file, which is removed.
+
+        Raises:
+            UsageError: The disk is full, or the file cannot be written.
+        """
+        try:
+            yield
+        except Exception as error:  # of whatever kind Rerun raises
+            if self._file is not None:
+                self._file.unlink(missing_ok=True)
+            raise UsageError(f"--view: cannot be written: {error}") from error
 
     def __enter__(self) -> Viewer:
         return self

@@ -11,6 +11,9 @@ from tracking.constellation import Antenna, Constellation, NodeConfig
 from tracking.errors import ConfigError
 from tracking.tables import TableReader, Where
 
+FARTHEST = 10.0
+"""[m] From a node to its antenna."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class _Node:
@@ -57,6 +60,10 @@ def read_constellation(
     for key, table in tables_of(raw, "antennas", where):
         at = where.key("antennas").key(key)
         antenna = TableReader().read(_Antenna, table, at)
+        if any(not abs(x) <= FARTHEST for x in antenna.offset_m):
+            raise at.key("offset_m").error(
+                f"expected metres within {FARTHEST:g}, got {list(antenna.offset_m)}"
+            )
         antennas.append(Antenna(id=node_id(key, at), node=antenna.node, offset_b=antenna.offset_m))
     nodes.sort(key=lambda node: node.kind == "static")
     try:

@@ -14,6 +14,7 @@ from hardware_bridge.config.streams import read_cars, read_links
 from hardware_bridge.config.swarm import SwarmConfig, TaskConfig, TrackerConfig
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.safety.params import SafetyParams
+from hardware_bridge.wire.key import REMOVED_KEY
 from relpos_env.errors import EnvError
 from relpos_env.tasks import make_task
 from tracking.constellation import Constellation
@@ -26,6 +27,8 @@ SECTIONS = (
     "tracker", "safety",
 )  # fmt: skip
 MOST_SLOTS = 20
+LARGEST_ROOM = 1000.0
+"""[m]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,8 +60,7 @@ def read_config(path: Path | str) -> SwarmConfig:
     except UnicodeDecodeError as error:
         raise BridgeError(f"{path.name}: expected TOML, found bytes that are no text") from error
     config = parse_config(text, file=path.name, beside=path.parent)
-    keys = [link.key for link in config.links] + [car.key for car in config.cars]
-    return replace(config, marks=path.with_suffix(".marks.json")) if any(keys) else config
+    return replace(config, marks=path.with_suffix(".marks.json")) if any(config.keys) else config
 
 
 def parse_config(text: str, *, file: str, beside: Path, with_files: bool = True) -> SwarmConfig:
@@ -91,7 +93,7 @@ def parse_config(text: str, *, file: str, beside: Path, with_files: bool = True)
         name=head.name or Path(file).stem,
         constellation=constellation,
         links=tuple(read_links(raw, constellation, where, beside)),
-        cars=tuple(read_cars(raw, constellation, where)),
+        cars=tuple(read_cars(raw, constellation, where, beside)),
         calibration=calibration,
         uncalibrated_ranges=uncalibrated_ranges,
         task=_task(raw, constellation, where),
@@ -124,6 +126,10 @@ def _task(raw: Mapping[str, Any], group: Constellation, where: Where) -> TaskCon
     at = where.key("task")
     rest, options = without(raw.get("task", {}), "options", at)
     config = replace(TableReader().read(TaskConfig, rest, at), options=options)
+    if not all(0.0 < side <= LARGEST_ROOM for side in config.room):
+        raise at.key("room").error(
+            f"expected above 0 and at most {LARGEST_ROOM:g} m a side, got {list(config.room)}"
+        )
     n = int((~group.is_static).sum())
     if 2 <= n <= MOST_SLOTS:
         try:
@@ -173,7 +179,7 @@ def _check_keys(config: SwarmConfig, where: Where) -> None:
     """
     links = {link.key: link.port.name for link in config.links if link.key is not None}
     for car in config.cars:
-        if car.key in links:
+        if car.key in links and car.key != REMOVED_KEY:
             at = where.key(car.port.name).key("key")
             raise at.error(f"is that of {links[car.key]}, expected one that only cars have")
 

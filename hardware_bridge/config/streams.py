@@ -78,8 +78,10 @@ def read_links(
         )
 
 
-def read_cars(raw: Mapping[str, Any], group: Constellation, where: Where) -> list[CarConfig]:
-    """The cars, in the order of their nodes."""
+def read_cars(
+    raw: Mapping[str, Any], group: Constellation, where: Where, beside: Path
+) -> list[CarConfig]:
+    """The cars, in the order of their nodes; files are looked for beside."""
     from hardware_bridge.drivers import driver_entry, driver_options
 
     cars = []
@@ -104,7 +106,8 @@ def read_cars(raw: Mapping[str, Any], group: Constellation, where: Where) -> lis
         if not 0 <= car.cells <= MOST_CELLS:
             raise at.key("cells").error(f"expected 0 to {MOST_CELLS}, got {car.cells}")
         baud = _baud(car.baud, entry.baud, at)
-        spec = PortSpec(name=f"cars.{node}", port=car.port, baud=baud)
+        port = _placed(car.port, beside, at)
+        spec = PortSpec(name=f"cars.{node}", port=port, baud=baud)
         cars.append(
             CarConfig(
                 node=node,
@@ -127,6 +130,8 @@ def _baud(given: int | None, usual: int, where: Where) -> int:
 
 def _placed(port: str, beside: Path, where: Where) -> str:
     """A port; the path of a file starts from the folder of the configuration."""
+    if not port or "\0" in port:
+        raise where.key("port").error(f"expected the name of a port, got {port!r}")
     if not port.startswith("file:"):
         return port
     name = port.removeprefix("file:")

@@ -102,6 +102,11 @@ class SwarmConfig:
     """Keeps which signed messages are old, where any are signed; None keeps nothing."""
 
     @property
+    def keys(self) -> list[bytes | None]:
+        """Of all links and cars."""
+        return [link.key for link in self.links] + [car.key for car in self.cars]
+
+    @property
     def n_slots(self) -> int:
         """Moving nodes."""
         return int((~self.constellation.is_static).sum())

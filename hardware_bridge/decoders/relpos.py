@@ -9,6 +9,7 @@ from hardware_bridge.counts import Counts
 from hardware_bridge.readings import MICROSECONDS_32, Reading, Source
 from hardware_bridge.wire.codec import MOST_CODED, Batch, Codec
 from hardware_bridge.wire.conversion import AS_READING, made, name_of
+from hardware_bridge.wire.key import REMOVED_KEY
 
 
 class RelposDecoder:
@@ -22,13 +23,13 @@ class RelposDecoder:
         """Take the key.
 
         Args:
-            key: 16 bytes, or None: MACs are not checked.
+            key: 16 bytes; None and `REMOVED_KEY`: MACs are not checked.
 
         Raises:
             ValueError: It is not so long.
         """
         self.counts = Counts()
-        self._codec = Codec(key)
+        self._codec = Codec(None if key == REMOVED_KEY else key)
         self._batch = Batch()
         self._kept = b""
         self._lost = False  # in a frame that was too long, up to the next zero

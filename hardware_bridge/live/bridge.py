@@ -22,6 +22,7 @@ from hardware_bridge.pauses import short_pauses
 from hardware_bridge.recording import Header, Recorder
 from hardware_bridge.safety.charge import Charge
 from hardware_bridge.safety.process import SupervisorProcess
+from hardware_bridge.wire.key import REMOVED_KEY, without_keys
 from tracking.calibration.file import calibration_toml
 
 
@@ -55,6 +56,8 @@ class Bridge(OpenBridge):
             BridgeError: A port, a calibration or the recording cannot be used, or cars are to
                 move and their ranges were never calibrated.
         """
+        if REMOVED_KEY in config.keys:
+            raise BridgeError('key: "removed", expected the keys that a recording does not hold')
         if arm and not config.cars:
             raise BridgeError("cars: none in the configuration, nothing can be armed")
         measures = config.tracker.source == "measurements"
@@ -91,7 +94,7 @@ class Bridge(OpenBridge):
             if record is not None:
                 header = Header(
                     software=f"relpos-env {version('relpos-env')}",
-                    config=config.text,
+                    config=without_keys(config.text, config.keys),
                     links=tuple(self.swarm.intake.streams),
                     monotonic_ns=start_ns,
                     wall_ns=time.time_ns(),
@@ -125,6 +128,11 @@ class Bridge(OpenBridge):
             )
             self.start = Start(self.feed, arm=arm, params=StartParams(wait=wait))
             self._stack, self._is_open = stack.pop_all(), True
+
+    @property
+    def recording_lost(self) -> str | None:
+        """Why records are missing in the recording; None if none are, or there is none."""
+        return None if self.recorder is None else self.recorder.lost
 
     def close(self) -> None:
         """Let the cars stand and close everything."""

@@ -55,6 +55,11 @@ class OpenBridge(ABC):
             prepare=self.start.run,
         )
 
+    @property
+    def recording_lost(self) -> str | None:
+        """Why records are missing in the recording; None if none are, or there is none."""
+        return None
+
     @abstractmethod
     def close(self) -> None:
         """Let the cars stand and close everything."""

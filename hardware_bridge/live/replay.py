@@ -34,6 +34,7 @@ class ReplayFeed:
         pace: Callable[[int], None] | None = None,
         *,
         filter: str | None = None,
+        keys: SwarmConfig | None = None,
     ) -> None:
         """Open a recording.
 
@@ -42,6 +43,8 @@ class ReplayFeed:
             pace: Called with the time of every decision [ns]; it may wait. None is as fast as
                 possible.
             filter: In place of the recorded one; one of `tracking.filters.FILTERS`.
+            keys: The configuration that it was made with, for the keys: recordings hold none.
+                Without them signatures are not checked.
 
         Raises:
             BridgeError: Its configuration makes no sense here, or its calibration is damaged.
@@ -53,7 +56,8 @@ class ReplayFeed:
         if filter is not None:
             filter_builder(filter)
             config = replace(config, tracker=replace(config.tracker, filter=filter))
-        self.config: SwarmConfig = config
+        self.config: SwarmConfig = config if keys is None else with_keys_of(config, keys)
+        config = self.config
         self.calibration = _calibration(recording)
         """What the measurements were corrected with; None took them as they came."""
         if config.calibration and self.calibration is None:
@@ -76,7 +80,7 @@ class ReplayFeed:
                 if name in self.swarm.intake.streams:
                     self.swarm.take(Chunk(name, record.t_ns, record.payload))
             elif record.kind == Kind.EVENT:
-                event = record.event()
+                event = self.recording.event(record)
                 if event.get("event") == "applied":
                     self.swarm.apply(**self._applied(event))
                 elif event.get("event") == "notice":
@@ -132,9 +136,9 @@ def _calibration(recording: Recording) -> Calibration | None:
     for record in recording:
         if record.kind != Kind.EVENT:
             continue
-        event = record.event()
+        event = recording.event(record)
         if event.get("event") == "calibration":
-            return parse_calibration(str(event["text"]), recording.path.name)
+            return parse_calibration(str(event.get("text")), recording.path.name)
         if event.get("event") == "start":
             return None
     return None
@@ -144,9 +148,25 @@ def _marks(recording: Recording) -> Marks:
     """Which signed messages were old when it began."""
     for record in recording:
         if record.kind == Kind.EVENT:
-            event = record.event()
+            event = recording.event(record)
             if event.get("event") == "marks":
-                return parse_marks(event["known"])
+                try:
+                    return parse_marks(event["known"])
+                except (KeyError, ValueError, TypeError, AttributeError) as error:
+                    raise BridgeError(
+                        f"{recording.path.name}: a record 'marks' is damaged"
+                    ) from error
             if event.get("event") == "start":
                 break
     return {}
+
+
+def with_keys_of(config: SwarmConfig, keys: SwarmConfig) -> SwarmConfig:
+    """A configuration with the keys of another, by the names of links and cars."""
+    links = {link.name: link.key for link in keys.links}
+    cars = {car.node: car.key for car in keys.cars}
+    return replace(
+        config,
+        links=tuple(replace(link, key=links.get(link.name, link.key)) for link in config.links),
+        cars=tuple(replace(car, key=cars.get(car.node, car.key)) for car in config.cars),
+    )

@@ -211,6 +211,16 @@ def load_calibration(config: SwarmConfig) -> Calibration | None:
     if not config.calibration:
         return None
     calibration = merge(read_calibration(path) for path in config.calibration)
+    known = set(config.constellation.ids)
+    strange, without = (
+        sorted(set(calibration.nodes) - known),
+        sorted(known - set(calibration.nodes)),
+    )
+    if strange and without:
+        raise BridgeError(
+            f"calibration: has node {', '.join(map(str, strange))}, which is not in the group, and "
+            f"not node {', '.join(map(str, without))}"
+        )
     if calibration.ranges is not None:
         missing = set(config.constellation.ids) - set(calibration.ranges.offset)
         if missing:

@@ -64,8 +64,15 @@ class Record:
         Raises:
             ValueError: It is no JSON, so this is no EVENT.
         """
-        value = json.loads(self.payload)
+        try:
+            value = json.loads(self.payload)
+        except RecursionError as error:
+            raise ValueError("nested too deeply") from error
         return value if isinstance(value, dict) else {}
+
+
+LATEST = 1 << 62
+"""[ns] Later there is no time."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,6 +113,9 @@ class Header:
             for name in names:
                 if type(raw.get(name)) is not kind:
                     raise ValueError(f"{name}: expected {kind.__name__}")
+        for name in numbers:
+            if abs(raw[name]) > LATEST:
+                raise ValueError(f"{name}: expected nanoseconds, up to 2^62")
         fields = {name: raw[name] for name in (*text, *numbers)}
         return cls(links=tuple(links), **fields)
 

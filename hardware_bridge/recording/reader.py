@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.recording.format import (
@@ -47,6 +47,17 @@ class Recording:
     _start: int
     _end: int
     _marker: bytes
+
+    def event(self, record: Record) -> dict[str, Any]:
+        """What an EVENT of it says.
+
+        Raises:
+            BridgeError: It says nothing that can be read.
+        """
+        try:
+            return record.event()
+        except ValueError as error:
+            raise BridgeError(f"{self.path.name}: a damaged record of an event: {error}") from error
 
     def __iter__(self) -> Iterator[Record]:
         """Whole records in the order in which they were written."""

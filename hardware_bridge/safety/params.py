@@ -3,15 +3,43 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from math import isfinite
 
 import numpy as np
 
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.safety.polygon import area
 
-STEEPEST = 1.5
-"""[rad] Of wheels: more are degrees."""
+LIMITS = {
+    "max_speed": (0.05, 20.0),
+    "max_steering": (0.01, 1.5),
+    "max_accel": (0.1, 50.0),
+    "max_steering_rate": (0.1, 100.0),
+    "slow": (0.01, 5.0),
+    "silence": (0.02, 0.1),
+    "stale_slow": (0.02, 1.0),
+    "stale_stop": (0.03, 2.0),
+    "sigma_slow": (0.01, 2.0),
+    "sigma_stop": (0.02, 5.0),
+    "hysteresis": (0.1, 1.0),
+    "health": (0.1, 60.0),
+    "braking": (0.1, 20.0),
+    "hardest": (0.1, 50.0),
+    "reaction": (0.05, 2.0),
+    "turning_radius": (0.05, 20.0),
+    "turning_room": (0.01, 5.0),
+    "deadman": (0.05, 2.0),
+    "separation": (0.05, 20.0),
+    "confidence": (1.0, 10.0),
+    "range_error": (0.01, 5.0),
+    "range_limit": (0.1, 10.0),
+    "runaway_speed": (0.05, 5.0),
+    "runaway_time": (0.02, 2.0),
+    "idle_time": (0.2, 60.0),
+    "answer_time": (0.1, 5.0),
+    "cell_slow": (0.5, 5.0),
+    "cell_stop": (0.4, 5.0),
+}
+"""Least and most of each limit: beyond, a rule would be switched off, or no car would ever move."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,8 +138,9 @@ class SafetyParams:
             value = getattr(self, f.name)
             if f.name == "fence":
                 continue
-            if not (isfinite(value) and value > 0.0):
-                raise BridgeError(f"{f.name}: expected more than 0, got {value!r}")
+            least, most = LIMITS[f.name]
+            if not least <= value <= most:
+                raise BridgeError(f"{f.name}: expected {least:g} to {most:g}, got {value!r}")
         for low, high in (
             ("stale_slow", "stale_stop"),
             ("sigma_slow", "sigma_stop"),
@@ -120,14 +149,6 @@ class SafetyParams:
             if getattr(self, low) >= getattr(self, high):
                 limit = getattr(self, high)
                 raise BridgeError(f"{low}: expected below {high} = {limit:g}")
-        if self.hysteresis > 1.0:
-            raise BridgeError(f"hysteresis: expected at most 1, got {self.hysteresis:g}")
-        if self.silence > 0.1:
-            raise BridgeError(f"silence: expected at most 0.1 s, got {self.silence:g}")
-        if self.max_steering > STEEPEST:
-            raise BridgeError(
-                f"max_steering: expected at most {STEEPEST:g} rad, got {self.max_steering:g}"
-            )
         if self.hardest < self.braking:
             raise BridgeError(f"hardest: expected at least braking = {self.braking:g}")
         if self.slow > self.max_speed:

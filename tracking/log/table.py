@@ -14,6 +14,9 @@ import numpy as np
 from tracking.arrays import F64, I64, Bool
 from tracking.errors import LogError
 
+MOST_BYTES = 256 << 20
+"""Of one table, unpacked: hours of a large group. What is packed may be any number of times as
+large, and rows of text take some twenty times their bytes in memory."""
 MAX_SILENCE = 86400.0
 """[s] A longer jump between two rows is a broken clock."""
 
@@ -43,8 +46,12 @@ class Table:
             LogError: Not text, no header, a required column missing, or a ragged row.
         """
         try:
-            raw = path.read_bytes()
-            text = (gzip.decompress(raw) if path.suffix == ".gz" else raw).decode("utf-8-sig")
+            open_table = gzip.open if path.suffix == ".gz" else open
+            with open_table(path, "rb") as stream:
+                raw = stream.read(MOST_BYTES + 1)
+            if len(raw) > MOST_BYTES:
+                raise LogError(f"{path.name}: expected at most {MOST_BYTES >> 20} MiB of text")
+            text = raw.decode("utf-8-sig")
         except (OSError, EOFError, UnicodeDecodeError, zlib.error) as error:
             raise LogError(f"{path.name}: cannot be read ({error})") from error
         try:
