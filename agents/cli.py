@@ -76,3 +76,7 @@ def main() -> None:
     except (TrackingError, EnvError, BridgeError, UsageError, OSError) as error:
         click.echo(f"Error: {error}", err=True)
         sys.exit(2)
+
+
+if __name__ == "__main__":
+    main()

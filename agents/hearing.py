@@ -90,6 +90,10 @@ class Hearing:
                 self.decoders[name] = each.build(key if each.keyed else None)
             except BridgeError:
                 continue  # a format that cannot be read without its key is not tried
+        self._unchecked = {
+            name: each.build(None) for name, each in formats.items() if each.keyed and key
+        }
+        """Of the formats with a code, without a look at it."""
         self.voices: dict[str, dict[str | None, Voice]] = {name: {} for name in self.decoders}
         """Format to device to what it said; None is a device that does not give its name."""
         self.n_bytes = 0
@@ -110,6 +114,8 @@ class Hearing:
         self.silent_until(chunk.t_ns)
         self._last_ns = chunk.t_ns
         found = {}
+        for decoder in self._unchecked.values():
+            decoder.feed(chunk.data)
         for name, decoder in self.decoders.items():
             readings = decoder.feed(chunk.data)
             if readings:
@@ -117,6 +123,14 @@ class Hearing:
                 for reading in readings:
                     _count(self.voices[name], reading)
         return found
+
+    @property
+    def has_another_key(self) -> bool:
+        """Whether there are frames that are signed with another key than the one given."""
+        return any(
+            decoder.counts.frames > 0 and not self.frames(name)
+            for name, decoder in self._unchecked.items()
+        )
 
     def silent_until(self, t_ns: int) -> None:
         """Note the silence since the last bytes, at the end too."""
@@ -166,6 +180,8 @@ def why_nothing_fits(hearing: Hearing, baud: int, formats: Formats) -> str:
         if each.baud != baud:
             rates.setdefault(each.baud, []).append(name)
     usual = "; ".join(f"{rate} for {', '.join(names)}" for rate, names in sorted(rates.items()))
+    if hearing.has_another_key:
+        return f"{hearing.n_bytes} bytes that are signed with another key than the one given"
     return (
         f"{hearing.n_bytes} bytes and no frame of any format: the baud rate {baud} seems wrong"
         + (f" (usual are {usual})" if usual else "")

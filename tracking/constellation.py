@@ -19,6 +19,8 @@ CARRIED = ("hand", "drone", "none")
 """Vehicles that tilt, and accelerate for seconds."""
 
 
+MOST_NODES = 256
+"""[-] A filter of more takes gigabytes."""
 SLOWEST_HZ, FASTEST_HZ = 1.0, 10_000.0
 """[1/s] Rates of samples that an orientation can be filtered from."""
 
@@ -69,7 +71,7 @@ class Constellation:
 
     def __post_init__(self) -> None:
         ids = [node.id for node in self.nodes]
-        _expect(len(ids) >= 2, f"nodes: expected at least 2, got {len(ids)}")
+        _expect(2 <= len(ids) <= MOST_NODES, f"nodes: expected 2 to {MOST_NODES}, got {len(ids)}")
         _expect(len(set(ids)) == len(ids), f"nodes: ids must differ, got {ids}")
         _expect(self.dimensions in (2, 3), f"dimensions: expected 2 or 3, got {self.dimensions!r}")
         _expect(

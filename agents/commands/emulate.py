@@ -48,7 +48,11 @@ from agents.errors import UsageError
 @click.option(
     "--driver", default="relpos", show_default=True, help="Of the cars: relpos, vesc or pwm."
 )
-@click.option("--key", metavar="HEX", help="16 bytes that sign messages of the format relpos.")
+@click.option(
+    "--key",
+    metavar="HEX",
+    help="16 bytes that sign messages of the format relpos, or @FILE with them.",
+)
 @click.option("--no-operator", is_flag=True, help="Nobody holds a remote control.")
 @click.option("--faults", type=Path, help="What goes wrong, a TOML file; see docs/emulator.md.")
 @click.option(
@@ -125,9 +129,9 @@ def emulate(
 
 
 def _key(text: str | None) -> bytes | None:
-    from hardware_bridge.wire.key import parse_key
+    from hardware_bridge.wire.key import read_key
 
     try:
-        return parse_key(text)
+        return read_key(text)
     except ValueError as error:
         raise UsageError(f"--key: {error}") from error

@@ -13,7 +13,7 @@ from agents.errors import UsageError
 @click.option("--format", "format", help="A format of links; by default all are tried.")
 @click.option("--baud", type=int, help="By default that of the format, else 115200.")
 @click.option("--seconds", type=float, help="How long to listen; by default until Ctrl-C.")
-@click.option("--key", help="Of formats whose messages carry a code: 32 hex digits.")
+@click.option("--key", help="Of formats whose messages carry a code: 32 hex digits, or @FILE.")
 @click.option("--raw", is_flag=True, help="The bytes in hex, whatever they mean.")
 @click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
 def sniff(
@@ -72,9 +72,9 @@ def sniff(
 
 
 def _key(text: str | None) -> bytes | None:
-    from hardware_bridge.wire.key import parse_key
+    from hardware_bridge.wire.key import read_key
 
     try:
-        return parse_key(text)
+        return read_key(text)
     except ValueError as error:
         raise UsageError(f"--key: {error}") from error

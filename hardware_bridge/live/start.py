@@ -128,13 +128,21 @@ class Start:
                 f"cars: not armed within {self._params.wait:g} s, since a key had stopped or "
                 "disarmed them, and none has armed them"
             )
-        slot = next(k for k in slots if not feed.report.armed[k])
-        silent = not np.isfinite(group.swarm.heard()[slot])
-        why = "was not heard" if silent else reason_text(int(feed.report.reason[slot]))
-        raise BridgeError(
-            f"cars.{group.swarm.group.ids[slot]}: not well within {self._params.wait:g} s: {why}; "
-            "see `relpos doctor`"
-        )
+        raise BridgeError(f"{self._unwell(group, slots)}; see `relpos doctor`")
+
+    def _unwell(self, group: LiveGroup, slots: list[int]) -> str:
+        """Which node or car was not well all the time, and why; a silent node is in the way of all."""
+        report, swarm = self._feed.report, group.swarm
+        assert report is not None
+        ids, wait = swarm.group.ids, f"not well within {self._params.wait:g} s"
+        heard = swarm.heard()
+        silent = [k for k in range(len(heard)) if not np.isfinite(heard[k])]
+        if silent:
+            return f"node {ids[silent[0]]}: {wait}: it was not heard"
+        # A car that is only not armed waits for another.
+        unwell = [k for k in slots if not report.well_for[k] > swarm.config.safety.health]
+        slot = next(iter(unwell), next((k for k in slots if not report.armed[k]), slots[0]))
+        return f"cars.{ids[slot]}: {wait}: {reason_text(int(report.reason[slot]))}"
 
     def _rates_fit(self, group: LiveGroup, slots: list[int]) -> bool:
         """Whether it is known that samples come as often as configured.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from pathlib import Path
 
 KEY_BYTES = 16
 REMOVED = "removed"
@@ -44,3 +45,20 @@ def without_keys(text: str, keys: Iterable[bytes | None]) -> str:
             digits = r"\s*".join(key.hex())
             text = re.sub(digits, REMOVED, text, flags=re.IGNORECASE)
     return text
+
+
+def read_key(text: str | None) -> bytes | None:
+    """The key that a person gives: hex digits, or ``@`` and the name of a file that holds them.
+
+    Arguments of commands can be seen by everybody on a machine, files need not.
+
+    Raises:
+        ValueError: There is no such file, or it holds no key.
+    """
+    if text is None or not text.startswith("@"):
+        return parse_key(text)
+    path = Path(text[1:])
+    try:
+        return parse_key(path.read_text(encoding="utf-8").strip())
+    except (OSError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: cannot be read ({error})") from error

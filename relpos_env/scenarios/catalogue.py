@@ -119,6 +119,8 @@ def scenario_from(
 
 
 def _load(path: Path, depth: int) -> Scenario:
+    if path.exists() and not path.is_file():
+        raise EnvError(f"scenario: expected a file, got {str(path)!r}")
     try:
         with path.open("rb") as stream:
             table = tomllib.load(stream)
