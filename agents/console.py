@@ -24,7 +24,14 @@ def emit_json(records: Iterable[Mapping[str, Any]]) -> None:
 def progress_bar(label: str, *, shown: bool = True) -> Iterator[Callable[[float], None]]:
     """A bar on stderr, drawn only on a terminal; gives the function to report the share done."""
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TaskProgressColumn,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
 
     console = Console(stderr=True)
     columns = (
@@ -32,6 +39,8 @@ def progress_bar(label: str, *, shown: bool = True) -> Iterator[Callable[[float]
         BarColumn(),
         TaskProgressColumn(),
         TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
     )
     with Progress(*columns, console=console, disable=not shown or not console.is_terminal) as bar:
         task = bar.add_task(label, total=1.0)

@@ -51,7 +51,7 @@ from agents.errors import UsageError
 @click.option(
     "--key",
     metavar="HEX",
-    help="16 bytes that sign messages of the format relpos, or @FILE with them.",
+    help="16 bytes that sign messages of relpos, or @FILE.",
 )
 @click.option("--no-operator", is_flag=True, help="Nobody holds a remote control.")
 @click.option("--faults", type=Path, help="What goes wrong, a TOML file; see docs/emulator.md.")

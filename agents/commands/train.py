@@ -42,14 +42,19 @@ def train(out: Path | None, resume: Path | None, as_json: bool, **given: str | N
         raise UsageError(f"training needs {error.name}: pip install 'relpos-env[train]'") from error
     with progress_bar(f"training {folder.name}") as tell:
 
-        def report(share: float, row: dict[str, Any]) -> None:
+        def report(share: float, row: dict[str, Any] | None) -> None:
             tell(share)
+            if row is None:
+                return
             if as_json:
                 emit_json([row])
             else:
                 click.echo(_line(row), err=True)
 
-        result = train_policy(config if resume is None else None, folder, progress=report)
+        try:
+            result = train_policy(config if resume is None else None, folder, progress=report)
+        except KeyboardInterrupt as error:
+            raise UsageError(f"interrupted; relpos train --resume {folder} goes on") from error
     if as_json:
         emit_json([{"result": "policy", "path": str(result.policy), **result.best}])
         return

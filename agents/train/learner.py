@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -94,23 +95,48 @@ def make_policy(config: TrainConfig) -> SwarmPolicy:
     return SwarmPolicy(space, ContinuousActions().space(), lambda _: 0.0, **arguments)
 
 
-def run_leg(model: PPO, config: TrainConfig, leg: int) -> None:
-    """Learn for one leg, from new episodes on."""
+def run_leg(
+    model: PPO, config: TrainConfig, leg: int, tell: Callable[[int], None] | None = None
+) -> None:
+    """Learn for one leg, from new episodes on.
+
+    Args:
+        model: Learns.
+        config: How.
+        leg: Its number.
+        tell: Called with the frames of the run so far, after every rollout.
+    """
     seeds = np.random.SeedSequence([config.seed, leg]).generate_state(2)
     set_random_seed(int(seeds[0] >> 1))
     model.env.seed(int(seeds[1] >> 1))
     # Nothing observed yet: learning begins with a reset.
     model._last_obs = None
-    learn(model, config)
+    learn(model, config, tell)
 
 
-def learn(model: PPO, config: TrainConfig) -> None:
-    """Learn for the updates of a leg, from where the episodes are."""
+def learn(model: PPO, config: TrainConfig, tell: Callable[[int], None] | None = None) -> None:
+    """Learn for the updates of a leg, from where the episodes are; `tell` as of `run_leg`."""
     frames = config.leg * config.ppo.steps * model.n_envs
     callbacks: list[BaseCallback] = [_Threads(config.threads), _Noise(config)]
+    if tell is not None:
+        callbacks.append(_Tells(tell))
     if config.env.final_weights:
         callbacks.append(_Weights(config))
     model.learn(frames, callbacks, reset_num_timesteps=False, log_interval=config.leg)
+
+
+class _Tells(BaseCallback):  # type: ignore[misc]
+    """Says how far learning is."""
+
+    def __init__(self, tell: Callable[[int], None]) -> None:
+        super().__init__()
+        self._tell = tell
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_rollout_end(self) -> None:
+        self._tell(int(self.num_timesteps))
 
 
 class _Threads(BaseCallback):  # type: ignore[misc]

@@ -35,7 +35,7 @@ def train_policy(
     config: TrainConfig | None,
     folder: Path,
     *,
-    progress: Callable[[float, dict[str, Any]], None] | None = None,
+    progress: Callable[[float, dict[str, Any] | None], None] | None = None,
 ) -> PolicyResult:
     """Train, then write the policy that drives best and a report into the folder of the run.
 
@@ -45,7 +45,7 @@ def train_policy(
     Args:
         config: Of a new run; None to go on with the run in the folder.
         folder: New or empty, or that of the run.
-        progress: Called after every leg with the share done and what was measured.
+        progress: Called with the share done, and after every leg with what was measured, else None.
 
     Raises:
         UsageError: The folder does not fit, cannot be written to, or has a name that no policy can
@@ -57,10 +57,11 @@ def train_policy(
     config = RunFolder(folder).config() if config is None else config
     done = [0.0] * config.runs
 
-    def tell(k: int, share: float, row: dict[str, Any]) -> None:
+    def tell(k: int, share: float, row: dict[str, Any] | None) -> None:
         done[k] = share
         if progress is not None:
-            progress(sum(done) / len(done), {"seed": seeds[k], **row})
+            told = None if row is None else {"seed": seeds[k], **row}
+            progress(sum(done) / len(done), told)
 
     configs = [config.of_run(k) for k in range(config.runs)]
     seeds = [c.seed for c in configs]

@@ -21,7 +21,7 @@ from agents.train.run_folder import RunFolder
 from agents.train.train import TrainResult, train
 from relpos_env.errors import EnvError
 
-Progress = Callable[[int, float, dict[str, Any]], None]
+Progress = Callable[[int, float, dict[str, Any] | None], None]
 """Called after every leg with the number of the run, its share done and what was measured."""
 
 

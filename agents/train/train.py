@@ -46,14 +46,14 @@ def train(
     config: TrainConfig | None,
     folder: Path,
     *,
-    progress: Callable[[float, dict[str, Any]], None] | None = None,
+    progress: Callable[[float, dict[str, Any] | None], None] | None = None,
 ) -> TrainResult:
     """Train a policy, or go on with a run.
 
     Args:
         config: Of a new run; None to go on with the run in the folder.
         folder: New or empty, or that of the run.
-        progress: Called after every leg with the share done and what was measured.
+        progress: Called with the share done, and after every leg with what was measured, else None.
 
     Raises:
         UsageError: The folder does not fit, or cannot be written to.
@@ -71,6 +71,11 @@ def train(
     with run.writing():
         logger = Logger(None, [TensorBoardOutputFormat(str(folder / "tensorboard"))])
     learner: _Learner | None = None
+
+    def tell(frames: int) -> None:
+        if progress is not None:
+            progress(min(frames / config.frames, 1.0), None)
+
     while state.frames < config.frames:
         began = time.perf_counter()
         level = level_of(config, state.frames)
@@ -78,7 +83,7 @@ def train(
             learner = _Learner.begin(config, level, logger, tensors, state.frames, learner)
         with run.writing():
             try:
-                run_leg(learner.model, config, state.legs)
+                run_leg(learner.model, config, state.legs, tell)
             except ValueError as error:
                 # torch refuses distributions of what is no number.
                 if all(bool(p.isfinite().all()) for p in learner.model.policy.parameters()):

@@ -95,7 +95,7 @@ class Identities:
         elif verdict is Verdict.REBOOT:
             self._note(t_ns, node, "reboot", f"started anew, on link {link}")
         elif state.refused == MANY_OLD:
-            text = f"sends only old messages, on link {link}: refused; if it was restarted, start this anew"
+            text = f"sends only old messages, on link {link}: refused until this is started anew"
             self._note(t_ns, node, "old", text)
         return verdict
 

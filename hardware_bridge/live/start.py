@@ -131,7 +131,7 @@ class Start:
         raise BridgeError(f"{self._unwell(group, slots)}; see `relpos doctor`")
 
     def _unwell(self, group: LiveGroup, slots: list[int]) -> str:
-        """Which node or car was not well all the time, and why; a silent node is in the way of all."""
+        """Which node or car was not well all the time, and why; a silent node holds all."""
         report, swarm = self._feed.report, group.swarm
         assert report is not None
         ids, wait = swarm.group.ids, f"not well within {self._params.wait:g} s"
