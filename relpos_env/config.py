@@ -33,6 +33,7 @@ KINDS: dict[str, tuple[type, ...]] = {
     "operator": (OperatorSimParams,),
     "weights": (Mapping, type(None)),
     "end_on_collision": (bool,),
+    "gate": (bool,),
 }
 """What arguments that are no names or numbers have to be."""
 
@@ -81,6 +82,9 @@ class FormationConfig:
     reward: str | RewardTerm | None = None
     """A reward term of your own, ``(formation) -> (env, car)``, which is added to the others; infos
     have it as ``reward_own``."""
+    gate: bool = False
+    """Every command passes the safety gate of real cars, `hardware_bridge.safety.gate`, each step;
+    infos say what it allowed, and why."""
     max_cycles: int = 600
     """Steps of 0.1 s until truncation."""
     end_on_collision: bool = False

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from typing import Protocol
 
 import numpy as np
 
@@ -17,8 +18,9 @@ from relpos_env.errors import EnvError
 from relpos_env.interface.infos import Columns, car_columns
 from relpos_env.interface.observations import total_size
 from relpos_env.interface.observations.base import F32
-from relpos_env.interface.views import reveal
+from relpos_env.interface.views import View, reveal
 from relpos_env.loop import TrackedSwarm
+from relpos_env.registry import look_up
 from relpos_env.reset_options import ResetOptions
 from relpos_env.scenarios.episode import draw_episode
 from relpos_env.sensors.operator import Operator
@@ -31,6 +33,20 @@ from tracking.compiled import bind
 
 MOST_ENVS = 1 << 20
 NO_OPTIONS = ResetOptions()
+GATE = "hardware_bridge.safety.simulated:SimulatedGate"
+
+
+class CommandGate(Protocol):
+    """What commands pass on their way to the cars."""
+
+    def reset(self, env: int) -> None:
+        """Begin anew in one room."""
+
+    def allow(self, view: View, speed: F64, steering: F64) -> tuple[F64, F64]:
+        """Speed [m/s] and steering [rad] that the cars may do, each (env, car)."""
+
+    def infos(self) -> Columns:
+        """What infos say of it, (env, car)."""
 
 
 class Formation:
@@ -83,6 +99,9 @@ class Formation:
         """What came of the last step for all cars together, (env)."""
         self.own_reward: F64 = np.zeros((n_envs, n))
         """What the user's term added to it, (env, car)."""
+        # Found by its name: the simulation needs nothing of the hardware.
+        build = look_up({}, GATE, "gate", group="relpos_env.gates") if config.gate else None
+        self.gate: CommandGate | None = None if build is None else build(n_envs, n)
         self.active: Bool = np.zeros((n_envs, n), dtype=bool)
         """Cars that take part, (env, car): in the room, or away and to return."""
         self.left: Bool = np.zeros((n_envs, n), dtype=bool)
@@ -133,6 +152,8 @@ class Formation:
 
     def _begin_task(self, env: int, rng: np.random.Generator, options: ResetOptions) -> None:
         here = slice(env, env + 1)
+        if self.gate is not None:
+            self.gate.reset(env)
         seed = np.array([rng.integers(1 << 62)], dtype=np.uint64)
         self.task.reset(self.state, here, self.loop.swarm.boxes)
         if options.goals is not None:
@@ -153,6 +174,8 @@ class Formation:
             speed: (env, car) [m/s]; without effect where the car is not in the room yet.
             steering: (env, car) [rad]; likewise.
         """
+        if self.gate is not None:
+            speed, steering = self.gate.allow(self.loop.view, speed, steering)
         if self._pool is None:
             self.loop.step(speed, steering)
         else:
@@ -210,6 +233,8 @@ class Formation:
         )
         if self.parts.reward is not None:
             columns["reward_own"] = self.own_reward
+        if self.gate is not None:
+            columns |= self.gate.infos()
         return columns
 
     def close(self) -> None:

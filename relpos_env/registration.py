@@ -15,6 +15,9 @@ def register_environments() -> None:
         entry_point="relpos_env.gym_env:FormationGymEnv",
         vector_entry_point="relpos_env.vector_env:FormationVectorEnv",
     )
+    # Versions of PettingZoo before 1.27 have no registry; `formation_v0` is all they need.
+    if not hasattr(pettingzoo, "register"):
+        return
     module = "relpos_env.formation_v0"
     pettingzoo.register("parallel", "relpos_env/formation-v0", f"{module}:parallel_env")
     pettingzoo.register("aec", "relpos_env/formation-v0", f"{module}:env")

@@ -96,7 +96,7 @@ class Constellation:
             _expect(
                 node.mag_hz is None or 0.0 < node.mag_hz <= FASTEST_HZ,
                 f"nodes.{node.id}.mag_hz: expected above 0 and at most {FASTEST_HZ:g}, "
-                f"got {node.mag_hz:g}",
+                f"got {node.mag_hz}",
             )
             _expect(
                 node.initial_heading is None or math.isfinite(node.initial_heading),

@@ -88,6 +88,8 @@ def team_columns(columns: Columns) -> Columns:
             team[key] = column[:, 0]
         elif key == "tracked":
             team[key] = (column * present).sum(axis=1) / n_present
+        elif key in ("stopped", "gate"):
+            team[key] = column
         elif key.startswith("reward_"):
             team[key] = (column * active).sum(axis=1) / n_active
         else:

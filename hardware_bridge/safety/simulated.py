@@ -1,0 +1,84 @@
+"""The safety gate in the simulated loop: what it lets through is what the cars are told.
+
+It is asked once a decision, ten times as rarely as on real cars, and arms the cars whenever it may,
+as a person would.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hardware_bridge.safety.gate import Gate, reason_text
+from hardware_bridge.safety.params import SafetyParams
+from hardware_bridge.safety.picture import blank_picture, largest_std
+from relpos_env.interface.views import View
+from tracking.arrays import F64, Bool
+
+
+class SimulatedGate:
+    """Of a batch of rooms. Law: environment k of a batch is that environment alone."""
+
+    def __init__(self, n_envs: int, n_cars: int, params: SafetyParams | None = None) -> None:
+        """Stand at first.
+
+        Args:
+            n_envs: Rooms.
+            n_cars: Slots for cars.
+            params: Limits.
+        """
+        self._params = params or SafetyParams()
+        shape = (n_envs, n_cars)
+        self._gates = [Gate(self._params, 1, n_cars) for _ in range(n_envs)]
+        self._asked, self._speed, self._steering = (np.zeros(shape) for _ in range(3))
+        self._stopped: Bool = np.ones(shape, dtype=bool)
+        self._reason = np.zeros(shape, dtype=np.int64)
+
+    def reset(self, env: int) -> None:
+        """Begin anew in one room."""
+        self._gates[env] = Gate(self._params, 1, self._asked.shape[1])
+
+    def allow(self, view: View, speed: F64, steering: F64) -> tuple[F64, F64]:
+        """What the cars may do.
+
+        Args:
+            view: On which it was decided.
+            speed: Wanted, (env, car) [m/s].
+            steering: Wanted, (env, car) [rad].
+
+        Returns:
+            Speed [m/s] and steering [rad], each (env, car).
+        """
+        self._asked[:] = speed
+        for env, gate in enumerate(self._gates):
+            here = view.part(slice(env, env + 1))
+            now = here.now.copy()
+            q = blank_picture(1, speed.shape[1])
+            q.t[:] = now
+            q.speed_wanted[0], q.steering_wanted[0] = speed[env], steering[env]
+            q.present[:], q.oriented[:] = here.present, here.oriented
+            q.heading[:], q.speed[:] = here.heading, here.speed
+            q.status[:], q.pos[:], q.vel[:] = here.status, here.pos, here.vel
+            q.distance[:], q.ranged[:] = here.distance, here.heard
+            q.sigma[:] = largest_std(here.cov)
+            q.sound[:] = np.isfinite(q.sigma)
+            everyone = np.ones((1, speed.shape[1]), dtype=bool)
+            heard = np.repeat(now[:, None], speed.shape[1], axis=1)
+            out = gate.step(q, now, now, heard, everyone)
+            gate.arm(now, here.present)
+            self._speed[env], self._steering[env] = out.speed[0], out.steering[0]
+            self._stopped[env], self._reason[env] = ~out.armed[0], out.reason[0]
+        return self._speed, self._steering
+
+    def infos(self) -> dict[str, NDArray[Any]]:
+        """What infos say of it, (env, car); as on real cars."""
+        why = [[reason_text(code) for code in row] for row in self._reason.tolist()]
+        return {
+            "asked_speed": self._asked.copy(),
+            "allowed_speed": self._speed.copy(),
+            "allowed_steering": self._steering.copy(),
+            "stopped": self._stopped.copy(),
+            "gate": np.array(why, dtype=object),
+        }
