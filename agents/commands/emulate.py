@@ -53,6 +53,9 @@ from agents.errors import UsageError
     metavar="HEX",
     help="16 bytes that sign messages of relpos, or @FILE.",
 )
+@click.option(
+    "--deadman", type=float, help="Seconds after which cars stop by themselves; by default 0.2."
+)
 @click.option("--no-operator", is_flag=True, help="Nobody holds a remote control.")
 @click.option("--faults", type=Path, help="What goes wrong, a TOML file; see docs/emulator.md.")
 @click.option(

@@ -28,7 +28,8 @@ class Told(NamedTuple):
     idle_for: F64
     """Time for which its wheels have stood although it is asked to drive [s]."""
     deaf_for: F64
-    """Time since it answered a command; 0 for controllers that never do [s]."""
+    """Time since it answered a command, or told its speed, if it has ever done so [s]: what is sent
+    to it may wait in a server on the way."""
     fault: Bool
     """Its controller has a fault."""
     cell: F64
@@ -116,7 +117,10 @@ class Telemetry:
         return Told(
             np.maximum(now - self._over_since, 0.0)[None],
             np.maximum(now - self._idle_since, 0.0)[None],
-            np.where(self._answers, now - self._answered, 0.0)[None],
+            np.maximum(
+                np.where(self._answers, now - self._answered, 0.0),
+                np.where(linked & np.isfinite(self._said), now - self._said, 0.0),
+            )[None],
             self._fault[None].copy(),
             cell[None],
             self._watchdog[None],

@@ -109,9 +109,7 @@ def test_a_car_that_runs_away_is_stopped_for_good():
     drive.say(MotionReading(NOBODY, 8.0), n=20)
     assert drive.moves() == [False, True]
     assert "faster than it was asked" in drive.supervisor.stopped()[0].text
-    drive.say(MotionReading(NOBODY, 0.0), n=30)
-    assert drive.moves() == [False, True]
-    drive.tick(40)
+    drive.say(MotionReading(NOBODY, 0.0), n=70)
     assert drive.arm() == []
     assert drive.moves() == [True, True]
 
@@ -148,6 +146,16 @@ def test_a_car_whose_wheels_stand_although_it_is_asked_to_drive_is_stopped():
     drive.say(MotionReading(NOBODY, 0.0), n=290)
     assert drive.moves() == [True, True]
     drive.say(MotionReading(NOBODY, 0.0), n=60)
+    assert drive.moves() == [False, True]
+
+
+def test_a_car_that_tells_its_speed_no_more_is_stopped():
+    """What is sent to it may wait in a serial server, and come all at once."""
+    drive = ready()
+    drive.say(MotionReading(NOBODY, 1.0), n=20)
+    drive.tick(40)
+    assert drive.moves() == [True, True]
+    drive.tick(20)
     assert drive.moves() == [False, True]
 
 
