@@ -15,6 +15,7 @@ from pathlib import Path
 
 from hardware_bridge.emulator.ports import LineCounts
 from hardware_bridge.errors import BridgeError
+from hardware_bridge.systems import expect_posix
 
 READ_SIZE = 1 << 16
 """[bytes] Read at a time."""
@@ -127,6 +128,7 @@ class PtyPort:
         import tty
 
         try:
+            expect_posix("a pseudo terminal")
             device, host = os.openpty()
         except OSError as error:
             raise BridgeError(f"{self.link}: the system gives no pseudo terminal ({error})") from (

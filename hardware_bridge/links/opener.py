@@ -14,6 +14,7 @@ from typing import TypeAlias
 
 from hardware_bridge.links.ports import PortSpec
 from hardware_bridge.links.stream import Port
+from hardware_bridge.systems import expect_posix
 
 OpenPort: TypeAlias = Callable[[PortSpec], Port]
 
@@ -45,6 +46,7 @@ class Opener:
         self._lock = threading.Lock()
         self._closed = False
         self._done: list[tuple[str, Port | Exception]] = []
+        expect_posix("listening to ports")
         self._wake, self._waker = os.pipe()
         os.set_blocking(self._wake, False)
         os.set_blocking(self._waker, False)

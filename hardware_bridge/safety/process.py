@@ -15,6 +15,7 @@ from hardware_bridge.errors import BridgeError
 from hardware_bridge.safety.charge import ROOM, Charge
 from hardware_bridge.safety.messages import Message, Ready, pack, unpack
 from hardware_bridge.safety.watch import supervise
+from hardware_bridge.systems import expect_linux
 
 START = 60.0
 """[s] For the start of the process, which loads compiled code."""
@@ -30,6 +31,7 @@ class SupervisorProcess:
             BridgeError: A port of a car cannot be opened.
         """
         self._n_cars = charge.n_cars
+        expect_linux("driving cars")
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         for end in (ours, theirs):
             end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, ROOM)

@@ -68,9 +68,7 @@ def runaway(m: Moment, p: SafetyParams) -> Verdict:
 
 
 def deaf(m: Moment, p: SafetyParams) -> Verdict:
-    """The car obeys nothing: it answers no command, is not heard any more, or stands although it is
-    asked to drive.
-    """
+    """The car obeys nothing: it answers no command, says no more of its speed, or stands still."""
     return _held((m.told.deaf_for >= p.answer_time) | (m.told.idle_for >= p.idle_time))
 
 
@@ -242,8 +240,8 @@ RULES = (
     ),
     Rule(
         "deaf", deaf, "it does not do what it is told",
-        "stops for good without an answer, or a word of its speed, for `answer_time` (controllers that "
-        "give them), or when its wheels stand for `idle_time` although it is asked to drive",
+        "stops for good without an answer, or a word of its speed, for `answer_time` (controllers "
+        "that give them), or when its wheels stand for `idle_time` although it is asked to drive",
     ),
     Rule(
         "battery", battery, "its battery is nearly empty",
