@@ -8,19 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Protocol
 
 import numpy as np
 
 from relpos_env._result_kernels import TeamResults, judge, tracking_errors
+from relpos_env.command_gate import make_gate
 from relpos_env.config import Parts, RewardTerm, whole_number
 from relpos_env.errors import EnvError
-from relpos_env.interface.infos import Columns, car_columns
+from relpos_env.interface._info_kernels import write_figures
+from relpos_env.interface.infos import Columns, car_columns, make_figures
 from relpos_env.interface.observations import total_size
 from relpos_env.interface.observations.base import F32
-from relpos_env.interface.views import View, reveal
+from relpos_env.interface.views import reveal
 from relpos_env.loop import TrackedSwarm
-from relpos_env.registry import look_up
 from relpos_env.reset_options import ResetOptions
 from relpos_env.scenarios.episode import draw_episode
 from relpos_env.sensors.operator import Operator
@@ -33,20 +33,6 @@ from tracking.compiled import bind
 
 MOST_ENVS = 1 << 20
 NO_OPTIONS = ResetOptions()
-GATE = "hardware_bridge.safety.simulated:SimulatedGate"
-
-
-class CommandGate(Protocol):
-    """What commands pass on their way to the cars."""
-
-    def reset(self, env: int) -> None:
-        """Begin anew in one room."""
-
-    def allow(self, view: View, speed: F64, steering: F64) -> tuple[F64, F64]:
-        """Speed [m/s] and steering [rad] that the cars may do, each (env, car)."""
-
-    def infos(self) -> Columns:
-        """What infos say of it, (env, car)."""
 
 
 class Formation:
@@ -99,9 +85,7 @@ class Formation:
         """What came of the last step for all cars together, (env)."""
         self.own_reward: F64 = np.zeros((n_envs, n))
         """What the user's term added to it, (env, car)."""
-        # Found by its name: the simulation needs nothing of the hardware.
-        build = look_up({}, GATE, "gate", group="relpos_env.gates") if config.gate else None
-        self.gate: CommandGate | None = None if build is None else build(n_envs, n)
+        self.gate = make_gate(n_envs, n) if config.gate else None
         self.active: Bool = np.zeros((n_envs, n), dtype=bool)
         """Cars that take part, (env, car): in the room, or away and to return."""
         self.left: Bool = np.zeros((n_envs, n), dtype=bool)
@@ -110,6 +94,7 @@ class Formation:
         self.truncated: Bool = np.zeros(n_envs, dtype=bool)
         self.cycles: I64 = np.zeros(n_envs, dtype=np.int64)
         self._tracking_error: F64 = np.zeros((n_envs, n))
+        self._figures = make_figures(n_envs, n, len(self.task.terms))
         self._t: F64 = np.zeros(n_envs)
         self._rngs = [np.random.default_rng(k) for k in range(n_envs)]
         self._newest: F32 = self.observations
@@ -219,23 +204,10 @@ class Formation:
         return rows.reshape(self.n_envs, -1)
 
     def infos(self) -> Columns:
-        """What infos say of every car, see `relpos_env.interface.infos`."""
+        """What infos say of every car, see `relpos_env.interface.infos`; shares memory."""
         self._compare()
-        view, swarm = self.loop.view, self.loop.swarm
-        columns = car_columns(
-            self.task,
-            self.weights,
-            self.state.present,
-            self.active,
-            view.ok,
-            collisions=swarm.contacts,
-            tracking_error=self._tracking_error,
-        )
-        if self.parts.reward is not None:
-            columns["reward_own"] = self.own_reward
-        if self.gate is not None:
-            columns |= self.gate.infos()
-        return columns
+        self._figure()
+        return self._columns | ({} if self.gate is None else self.gate.infos())
 
     def close(self) -> None:
         """Release the threads."""
@@ -303,11 +275,20 @@ class Formation:
         )  # fmt: skip
         self._judge_all = bind(judge, 0, self.n_envs, *self._verdict)
         self._compare = bind(tracking_errors, swarm.body, view.pos, view.ok, self._tracking_error)
+        self._figure = bind(
+            write_figures, self.task.error, self._tracking_error, view.ok, self.state.present,
+            swarm.contacts, self.task.rewards, self.weights, self.task.done, self._figures,
+        )  # fmt: skip
+        columns = car_columns(self._figures, self.task.terms, self.state.present, self.active)
+        self._columns = columns | (
+            {} if self.parts.reward is None else {"reward_own": self.own_reward}
+        )
         self._pool = ThreadPoolExecutor(self._threads) if self._threads > 1 else None
 
     def __getstate__(self) -> dict[str, object]:
         """Threads and views stay behind."""
-        behind = ("_lanes", "_pool", "_write", "_verdict", "_judge_all", "_compare")
+        behind = {"_lanes", "_pool", "_write", "_verdict", "_judge_all", "_compare"}
+        behind |= {"_figure", "_columns"}
         return {k: v for k, v in self.__dict__.items() if k not in behind}
 
     def __setstate__(self, state: dict[str, object]) -> None:

@@ -15,7 +15,8 @@ from hardware_bridge.live.picture import draw_picture
 from hardware_bridge.live.swarm import LiveSwarm
 from hardware_bridge.safety.gate import reason_text
 from hardware_bridge.safety.picture import Picture
-from relpos_env.interface.infos import Columns, car_columns
+from relpos_env.interface._info_kernels import write_figures
+from relpos_env.interface.infos import Columns, car_columns, make_figures
 from relpos_env.interface.observations import ObservationMode, total_size
 from relpos_env.interface.observations.base import F32
 from relpos_env.tasks import make_task, reward_weights
@@ -72,6 +73,7 @@ class LiveGroup:
         self.task = make_task(config.task.name, n, 1, config.task.room, **config.task.options)
         self._weights = reward_weights(config.task.name, self.task)
         self.believed = Believed(n)
+        self._figures = make_figures(1, n, len(self.task.terms))
         self._command: F64 = np.zeros((1, n, 2))
         swarm.share(self.task.target, self.task.has_target, self._command)
         self._size, self._history, self._max_cycles = total_size(mode.fields), history, max_cycles
@@ -123,8 +125,13 @@ class LiveGroup:
     def infos(self) -> Columns:
         """What infos say of every car; errors and rewards are those of the estimates."""
         swarm = self.swarm
+        nobody = np.full((1, self.believed.present.shape[1]), np.nan)
+        write_figures(
+            self.task.error, nobody, swarm.view.ok, swarm.view.present, self._nobody,
+            self.task.rewards, self._weights, self.task.done, self._figures,
+        )  # fmt: skip
         columns = car_columns(
-            self.task, self._weights, swarm.view.present, self.active, swarm.view.ok
+            self._figures, self.task.terms, swarm.view.present, self.active, counted=False
         )
         why = [reason_text(code) for code in swarm.reasons.tolist()]
         columns |= {

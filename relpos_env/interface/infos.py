@@ -17,55 +17,67 @@ PettingZoo expect of two equal runs, and no perfect score.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from relpos_env.tasks.base import Task
-from tracking.arrays import F64, Bool
+from tracking.arrays import F64, I64, Bool
 
 Columns = dict[str, NDArray[Any]]
 """By key, arrays over (env, car) or (env)."""
 
 
+class Figures(NamedTuple):
+    """Of cars, arrays over (env, car)."""
+
+    formation_error: F64
+    tracking_error: F64
+    tracked: I64
+    collisions: I64
+    is_success: Bool
+    parts: F64
+    """Of the reward, (env, car, term)."""
+
+
+def make_figures(n_envs: int, n_cars: int, n_terms: int) -> Figures:
+    """Room for them."""
+    shape = n_envs, n_cars
+    return Figures(
+        np.zeros(shape),
+        np.zeros(shape),
+        np.zeros(shape, dtype=np.int64),
+        np.zeros(shape, dtype=np.int64),
+        np.zeros(shape, dtype=bool),
+        np.zeros((*shape, n_terms)),
+    )
+
+
 def car_columns(
-    task: Task,
-    weights: F64,
-    present: Bool,
-    active: Bool,
-    ok: Bool,
-    *,
-    collisions: F64 | None = None,
-    tracking_error: F64 | None = None,
+    figures: Figures, terms: Sequence[str], present: Bool, active: Bool, *, counted: bool = True
 ) -> Columns:
-    """The figures of cars, (env, car).
+    """The figures of cars by their keys; they share memory.
 
     Args:
-        task: With rewards and errors of now.
-        weights: Of its terms, (term).
+        figures: As `write_figures` leaves them.
+        terms: Of the task.
         present: (env, car)
         active: (env, car)
-        ok: Where an estimate can be used, (env, car, other).
-        collisions: Begun in the step, (env, car); None where nobody counts them.
-        tracking_error: (env, car) [m], NaN where unknown; None where nobody knows the truth.
+        counted: Whether anybody counts collisions.
     """
     columns: Columns = {
-        "formation_error": np.where(present, task.error, np.inf),
-        "tracking_error": np.full(present.shape, np.inf)
-        if tracking_error is None
-        else np.where(np.isnan(tracking_error), np.inf, tracking_error),
-        "tracked": ok.sum(axis=-1),
+        "formation_error": figures.formation_error,
+        "tracking_error": figures.tracking_error,
+        "tracked": figures.tracked,
+        "collisions": figures.collisions,
+        "present": present,
+        "active": active,
+        "is_success": figures.is_success,
     }
-    if collisions is not None:
-        columns["collisions"] = collisions.astype(np.int64)
-    columns["present"], columns["active"] = present, active
-    columns["is_success"] = np.repeat(task.done[:, None], present.shape[1], axis=1)
-    parts = task.rewards * weights
-    for k, term in enumerate(task.terms):
-        columns[f"reward_{term}"] = parts[..., k]
-    return columns
+    if not counted:
+        del columns["collisions"]
+    return columns | {f"reward_{term}": figures.parts[..., k] for k, term in enumerate(terms)}
 
 
 def car_infos(columns: Columns, env: int, cars: Iterable[int]) -> list[dict[str, Any]]:
@@ -85,7 +97,7 @@ def team_columns(columns: Columns) -> Columns:
         elif key == "collisions":
             team[key] = column.sum(axis=1)
         elif key == "is_success":
-            team[key] = column[:, 0]
+            team[key] = column[:, 0].copy()
         elif key == "tracked":
             team[key] = (column * present).sum(axis=1) / n_present
         elif key in ("stopped", "gate"):
