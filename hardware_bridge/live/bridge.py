@@ -83,9 +83,9 @@ class Bridge(OpenBridge):
             stack.enter_context(short_pauses())
             self.links = Links([link.port for link in config.links], now_ns)
             stack.callback(self.links.close)
-            start_ns = now_ns()
+            start_ns, wall_ns = now_ns(), time.time_ns()
+            wall_s = wall_ns // 1_000_000_000
             self.swarm = LiveSwarm(config, start_ns, calibration)
-            wall_s = time.time_ns() // 1_000_000_000
             self.marks: KeptMarks | None = None
             if config.marks is not None:
                 self.marks = KeptMarks(config.marks, self.swarm.intake, wall_s)
@@ -97,7 +97,7 @@ class Bridge(OpenBridge):
                     config=without_keys(config.text, config.keys),
                     links=tuple(self.swarm.intake.streams),
                     monotonic_ns=start_ns,
-                    wall_ns=time.time_ns(),
+                    wall_ns=wall_ns,
                 )
                 self.recorder = Recorder(record, header)
                 # One of a start that failed is none, and would take the name of the next. Once it

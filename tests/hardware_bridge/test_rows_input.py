@@ -67,7 +67,8 @@ def relpos(monkeypatch, capfd):
     monkeypatch.setattr(os, "setpriority", lambda *_: None)  # other tests share this process
 
     def run(*args):
-        monkeypatch.setattr(sys, "argv", ["relpos", *map(str, args)])
+        more = ["--stop-source", "stdin"] if "--arm" in args else []  # there is no terminal
+        monkeypatch.setattr(sys, "argv", ["relpos", *map(str, args), *more])
         with pytest.raises(SystemExit) as end:
             main()
         said = capfd.readouterr()
@@ -246,7 +247,7 @@ def test_stream_that_says_nothing_that_can_be_read(change, advice, tmp_path, mon
     own = RunningRig(tmp_path / "rig")
     try:
         path = written(tmp_path, own, change)
-        with pytest.raises(BridgeError, match=r"cars\.1: not well within 3 s: was not heard"):
+        with pytest.raises(BridgeError, match=r"node 1: not well within 3 s: it was not heard"):
             drive(config=path, arm=True, seconds=2.0, wait=3.0)
         # The ports of cars were opened, and they were told to stand.
         assert not own.moved
@@ -281,7 +282,7 @@ def test_wrong_baud_rate(tmp_path):
         path = written(
             tmp_path, own, lambda t: t.replace(str(tmp_path / "rig" / "n1"), str(noise.path))
         )
-        with pytest.raises(BridgeError, match=r"cars\.1: not well within 3 s: was not heard"):
+        with pytest.raises(BridgeError, match=r"node 1: not well within 3 s: it was not heard"):
             drive(config=path, arm=True, seconds=2.0, wait=3.0)
         assert not own.moved
     finally:
