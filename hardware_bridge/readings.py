@@ -98,6 +98,16 @@ class MotionReading(NamedTuple):
     """[rad] Of the front wheels, left is positive."""
 
 
+class NearReading(NamedTuple):
+    """What a distance sensor on a car measured."""
+
+    source: Source
+    bearing: float
+    """[rad] From the car's middle, 0 ahead, left is positive."""
+    distance: float | None
+    """[m] From the car's body to what is nearest in that direction; None where nothing is."""
+
+
 class StatusReading(NamedTuple):
     """How a device does."""
 
@@ -187,6 +197,7 @@ Reading: TypeAlias = (
     | StateReading
     | RangeReading
     | MotionReading
+    | NearReading
     | StatusReading
     | AckReading
     | HeartbeatReading

@@ -54,6 +54,9 @@ from agents.errors import UsageError
     help="16 bytes that sign messages of relpos, or @FILE.",
 )
 @click.option(
+    "--proximity", default=0, show_default=True, help="Beams of distance sensors round each car."
+)
+@click.option(
     "--deadman", type=float, help="Seconds after which cars stop by themselves; by default 0.2."
 )
 @click.option("--no-operator", is_flag=True, help="Nobody holds a remote control.")

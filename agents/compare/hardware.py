@@ -188,18 +188,19 @@ def _seat(
 ) -> tuple[list[_Seat], list[str]]:
     """All who can drive these cars, and why the others cannot."""
     seats, notes = [], []
-    for contender in line_up(drivers, observations, 0):
+    n_beams = config.task.proximity
+    for contender in line_up(drivers, observations, n_beams):
         entry = find_entry(contender.name)
         if contender.observation == "truth":
             why: str | None = "real cars know no truth"
-        elif entry.proximity:
-            why = "expected a driver without beams, real cars have none"
+        elif entry.proximity is not None and entry.proximity != n_beams:
+            why = f"expected {entry.proximity} beams, the cars have {n_beams}"
         else:
-            why = entry.refusal(contender.observation, config.n_slots, 0)
+            why = entry.refusal(contender.observation, config.n_slots, n_beams)
         if why is not None:
             notes.append(f"{contender.label} in {config.name}: {why}")
             continue
-        driver = entry.driver(contender.observation, config.n_slots, 0)
+        driver = entry.driver(contender.observation, config.n_slots, n_beams)
         seats.append(_Seat(contender, entry.trained_on, entry.history, driver))
     if not seats:
         raise UsageError("NAME: nothing to compare: " + "; ".join(notes))

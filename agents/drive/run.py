@@ -65,6 +65,7 @@ def drive(
     return drive_on(
         open_bridge,
         swarm.n_slots,
+        n_beams=swarm.task.proximity,
         name=name,
         observation=observation,
         arm=arm,
@@ -78,6 +79,7 @@ def drive_on(
     open_bridge: Callable[[], OpenBridge],
     n_slots: int,
     *,
+    n_beams: int = 0,
     name: str = CONTROLLER,
     observation: str | None = None,
     arm: bool = True,
@@ -90,6 +92,7 @@ def drive_on(
     Args:
         open_bridge: Opens it.
         n_slots: Slots of its swarm.
+        n_beams: Of the distance sensors of each car.
         name: As for `drive`, like all that follow.
         observation: What they see.
         arm: Whether the bridge arms the cars.
@@ -102,15 +105,18 @@ def drive_on(
         UsageError: Likewise.
     """
     entry = find_entry(name)
-    if entry.proximity:
-        raise UsageError(f"{name}: expected a driver without beams, real cars have none")
+    if entry.proximity is not None and entry.proximity != n_beams:
+        raise UsageError(
+            f"{name}: expected {entry.proximity} beams, the cars have {n_beams}: see proximity of "
+            "[task]"
+        )
     seen = observation or entry.trained_on or "estimate"
     if seen == "truth":
         raise UsageError("observation: real cars know no truth, expected estimate")
-    reason = entry.refusal(seen, n_slots, 0)
+    reason = entry.refusal(seen, n_slots, n_beams)
     if reason is not None:
         raise UsageError(f"{name}: {reason}")
-    driver = entry.driver(seen, n_slots, 0)
+    driver = entry.driver(seen, n_slots, n_beams)
     cycles = MOST_CYCLES if seconds is None else round(seconds / DECISION)
     with closing(open_bridge()) as bridge:
         env = bridge.env(observation=seen, history=entry.history, max_cycles=cycles)

@@ -15,6 +15,7 @@ from hardware_bridge.readings import ImuReading
 from hardware_bridge.wire.key import KEY_BYTES
 from relpos_env.config import FormationConfig, Parts, whole_number
 from relpos_env.errors import EnvError
+from relpos_env.interface.beams import MOST_BEAMS
 from relpos_env.scenarios import Scenario
 from relpos_env.timing import DECISION
 
@@ -51,6 +52,8 @@ class EmulateOptions:
     """What the nodes speak, see `hardware_bridge.emulator.formats`."""
     imu_format: str | None = None
     """What their second ports speak; by default `IMU_FORMAT` where it takes one, else none."""
+    proximity: int = 0
+    """Beams of distance sensors round each car, 0 to 32; cars with the driver ``relpos`` tell."""
     driver: str = "relpos"
     """Of the cars, one of `hardware_bridge.drivers.DRIVERS`."""
     driver_options: Mapping[str, Any] = field(default_factory=dict)
@@ -72,6 +75,7 @@ class EmulateOptions:
             object.__setattr__(self, "driver_options", SLOW_PWM)
         if not DECISION <= self.seconds <= LONGEST:
             raise EnvError(f"seconds: expected {DECISION:g} to {LONGEST:g}, got {self.seconds!r}")
+        whole_number("proximity", self.proximity, 0, MOST_BEAMS)
         whole_number("seed", self.seed, 0, (1 << 63) - 1)
         if self.key is not None and len(self.key) != KEY_BYTES:
             raise BridgeError(f"key: expected {KEY_BYTES} bytes, got {len(self.key)}")
@@ -104,6 +108,7 @@ class EmulateOptions:
             task=self.task,
             task_options=self.task_options,
             n_cars=self.cars,
+            proximity=self.proximity,
             max_cycles=self.cycles,
         ).resolve()
 

@@ -54,6 +54,7 @@ def swarm_toml(
             "name": parts.config.task,
             "room": list(parts.scenario.room),
             "command": "link" if options.operator else "plan",
+            "proximity": options.proximity,
             "options": _options(parts.task_options),
         },
         "tracker": {"filter": parts.config.filter, "delay": parts.params.horizon.delay},

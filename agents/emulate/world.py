@@ -39,7 +39,9 @@ class EmulatedWorld:
             record: Keep measurements and truth for `recording`.
         """
         self.parts = parts
-        self._swarm = Swarm(parts.scenario, parts.n_cars, n_steps=1)
+        self._swarm = Swarm(
+            parts.scenario, parts.n_cars, n_steps=1, proximity=parts.config.proximity
+        )
         self._task = parts.make_task(1)
         self._operator = Operator(parts.config.operator, parts.n_cars, 1)
         self.recording = Recording() if record else None
@@ -128,6 +130,11 @@ class EmulatedWorld:
         speed: F64 = self._swarm.odometer[0]
         steering: F64 = self._swarm.state.steering[0]
         return speed, steering
+
+    def near(self) -> F64:
+        """Distances by the cars' own sensors, (car, beam) [m]."""
+        near: F64 = self._swarm.proximity[0]
+        return near
 
     def _judge(self) -> None:
         """What task and operator say of now."""

@@ -16,6 +16,7 @@ from hardware_bridge.errors import BridgeError
 from hardware_bridge.safety.params import SafetyParams
 from hardware_bridge.wire.key import REMOVED_KEY
 from relpos_env.errors import EnvError
+from relpos_env.interface.beams import MOST_BEAMS
 from relpos_env.tasks import make_task
 from tracking.constellation import Constellation
 from tracking.errors import ConfigError
@@ -130,6 +131,8 @@ def _task(raw: Mapping[str, Any], group: Constellation, where: Where) -> TaskCon
         raise at.key("room").error(
             f"expected above 0 and at most {LARGEST_ROOM:g} m a side, got {list(config.room)}"
         )
+    if not 0 <= config.proximity <= MOST_BEAMS:
+        raise at.key("proximity").error(f"expected 0 to {MOST_BEAMS}, got {config.proximity}")
     n = int((~group.is_static).sum())
     if 2 <= n <= MOST_SLOTS:
         try:

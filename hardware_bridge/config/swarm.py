@@ -61,6 +61,8 @@ class TaskConfig:
     command: Literal["plan", "link"] = "plan"
     """Where the velocity comes from that cars are asked for: the plan alone, or the messages of
     an operator on a link, who sees the room."""
+    proximity: int = 0
+    """Beams of the distance sensors round each car, for policies that see them; 0 for none."""
     options: Mapping[str, Any] = field(default_factory=dict)
     """The task's own."""
 

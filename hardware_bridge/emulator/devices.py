@@ -16,11 +16,13 @@ from hardware_bridge.emulator.node_clock import NodeClock
 from hardware_bridge.readings import (
     MICROSECONDS_32,
     MotionReading,
+    NearReading,
     OperatorReading,
     Reading,
     Source,
     StatusReading,
 )
+from relpos_env.interface.beams import FARTHEST
 from tracking.arrays import F64, Bool
 
 TELEMETRY_EVERY = 0.02
@@ -113,7 +115,9 @@ class CarDevice:
             self._car.feed(t_ns, data)
         return self._car.command(t_ns)
 
-    def tell(self, t: float, t_ns: int, speed: float, steering: float) -> None:
+    def tell(
+        self, t: float, t_ns: int, speed: float, steering: float, near: Sequence[float] = ()
+    ) -> None:
         """Send what it says of its own motion, as often as it does.
 
         Args:
@@ -121,6 +125,7 @@ class CarDevice:
             t_ns: Now, of the host.
             speed: By its own wheels [m/s].
             steering: Of its front wheels [rad].
+            near: By its distance sensors, evenly round it, the first ahead [m].
         """
         frame = b""
         if t + SOON >= max(self._off_until, self._silent_until, self._next):
@@ -128,6 +133,11 @@ class CarDevice:
             ticks = self._clock.ticks(t, MICROSECONDS_32)
             source = Source(device=str(self.node), ticks=ticks, clock=MICROSECONDS_32)
             readings: list[Reading] = [MotionReading(source, speed, steering)]
+            turn = 2.0 * math.pi / max(len(near), 1)
+            readings += [
+                NearReading(source, k * turn, distance if distance < FARTHEST else None)
+                for k, distance in enumerate(near)
+            ]
             if t + SOON >= self._next_status:
                 self._next_status = t + STATUS_EVERY
                 readings.append(StatusReading(source, self._voltage))

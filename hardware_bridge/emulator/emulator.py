@@ -59,6 +59,9 @@ class World(Protocol):
     def motion(self) -> tuple[F64, F64]:
         """Speeds by the cars' own wheels [m/s] and steering angles of their servos [rad], (car)."""
 
+    def near(self) -> F64:
+        """Distances by the cars' own sensors, (car, beam) [m]."""
+
 
 class Emulator:
     """All devices of a group; it owns their lines."""
@@ -127,8 +130,10 @@ class Emulator:
             zip(self.nodes, by_node(block, len(self.nodes)), strict=True)
         ):
             device.step(t, t_ns, rows, bool(powered[k]))
-        for car, speed, steering in zip(self.cars, *world.motion(), strict=True):
-            car.tell(t, t_ns, float(speed), float(steering))
+        for car, speed, steering, near in zip(
+            self.cars, *world.motion(), world.near(), strict=True
+        ):
+            car.tell(t, t_ns, float(speed), float(steering), near.tolist())
         if self.operator is not None:
             self.operator.step(t, t_ns, world.command, world.present & (not world.at_rest))
         return block

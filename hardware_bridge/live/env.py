@@ -52,7 +52,7 @@ class LiveFormationEnv(CarsEnv):
             BridgeError: A mode that needs the truth.
         """
         n = swarm.config.n_slots
-        mode = observation_mode(observation, n)
+        mode = observation_mode(observation, n, swarm.config.task.proximity)
         self.group = LiveGroup(swarm, feed, mode, history=history, max_cycles=max_cycles)
         super().__init__(self.group, mode.fields, action_mode(actions), n_cars=n, history=history)
         self.render_mode = None

@@ -21,6 +21,7 @@ from hardware_bridge.identity.verdict import Mark
 from hardware_bridge.links.ports import Chunk
 from hardware_bridge.live.events import Events
 from hardware_bridge.live.naming import Naming
+from hardware_bridge.live.near import Near
 from hardware_bridge.live.other_tracker import OtherTracker
 from hardware_bridge.live.repeated import RepeatedSamples
 from hardware_bridge.live.sample_rates import SampleRates
@@ -30,6 +31,7 @@ from hardware_bridge.readings import (
     NOBODY,
     ImuReading,
     MotionReading,
+    NearReading,
     OperatorReading,
     PairReading,
     PoseReading,
@@ -70,6 +72,7 @@ class Intake:
         self.sensed_ns: dict[int, int] = {}
         """Host time of each node's last word of its own motion, by index. Others that measure
         ranges to a node do not say which way it turns."""
+        self.near = Near(config.n_slots, config.task.proximity)
         self.motion: dict[int, tuple[int, MotionReading]] = {}
         """What each car last said of its motion, with its host time [ns], by index."""
         self.trim: dict[int, tuple[int, tuple[float, float]]] = {}
@@ -172,6 +175,9 @@ class Intake:
         if source is not stream.source or source is NOBODY:
             self._judge(stream, source, node, arrival_ns)
         if not stream.verdict.accepted:
+            return
+        if isinstance(reading, NearReading):
+            self.near.take(node, reading.bearing, reading.distance, arrival_ns)
             return
         t_ns = stream.t_ns
         if self._use(stream, reading, node, t_ns, arrival_ns) and stream.name.startswith("links."):

@@ -39,6 +39,7 @@ class ReadyPerception:
         told: Told,
         block: MeasurementBlock,
         powered: Bool,
+        n_beams: int = 0,
     ) -> None:
         """Begin with nothing told.
 
@@ -48,6 +49,7 @@ class ReadyPerception:
             told: Filled by the caller before every step, emptied by it.
             block: Likewise; of it count who leaves, and ranges, which cars may see.
             powered: Which cars are there, (1, car), likewise.
+            n_beams: Of each car's distance sensors.
         """
         group, n_cars = constellation, powered.shape[1]
         self.constellation, self._params, self._told = group, params, told
@@ -57,7 +59,7 @@ class ReadyPerception:
         self._nodes = self._tracks(moves.astype(np.float64))
         self._pairs = self._tracks(ends)
         self._headings = Headings(group.n_nodes)
-        self.view: View = make_view(1, n_cars)
+        self.view: View = make_view(1, n_cars, n_beams)
         self.estimate = TeamEstimate.empty(group, np.zeros(1))
         """What is believed now, overwritten by every step."""
         self._turns: F64 = np.zeros((1, group.n_nodes))

@@ -12,11 +12,12 @@ from hardware_bridge.readings import (
     DeviceClock,
     HeartbeatReading,
     MotionReading,
+    NearReading,
     Source,
     StatusReading,
 )
 
-OF_A_CAR = (MotionReading, StatusReading, AckReading, HeartbeatReading)
+OF_A_CAR = (MotionReading, NearReading, StatusReading, AckReading, HeartbeatReading)
 """What a car's controller can say; nothing else is believed on its line."""
 
 

@@ -146,7 +146,10 @@ class LiveSwarm:
         tracker, group = self.config.tracker, self.group
         if tracker.source == "positions":
             told = self.intake.other.told
-            return ReadyPerception(group, tracker.positions, told, self._block, self._powered)
+            n_beams = self.config.task.proximity
+            return ReadyPerception(
+                group, tracker.positions, told, self._block, self._powered, n_beams
+            )
         params = TrackerParams(horizon=HorizonParams(delay=tracker.delay))
         return Perception(
             group,
@@ -155,6 +158,7 @@ class LiveSwarm:
             self._powered,
             filter=tracker.filter,
             room=self._room,
+            n_beams=self.config.task.proximity,
         )
 
     def _let_go(self, t_ns: int, now: float) -> None:
@@ -199,6 +203,7 @@ class LiveSwarm:
             asked = intake.trim.get(k)
             fresh = asked is not None and (t_ns - asked[0]) * 1e-9 <= SILENT
             self.trim[0, k] = asked[1] if fresh and asked is not None else 0.0
+        view.near[0] = np.where(view.present[0][:, None], intake.near.beams(t_ns), 0.0)
         intake.other.driving = frozenset(driving)
 
 

@@ -13,6 +13,7 @@ from hardware_bridge.readings import (
     HeartbeatReading,
     ImuReading,
     MotionReading,
+    NearReading,
     OperatorReading,
     RangeReading,
     Reading,
@@ -93,6 +94,11 @@ def _of_motion(r: MotionReading) -> Spoken:
     return wire.MOTION, (r.speed, r.steering or 0.0, r.steering is not None)
 
 
+def _of_near(r: NearReading) -> Spoken:
+    bearing = math.remainder(r.bearing, 2.0 * math.pi)
+    return wire.NEAR, (bearing, r.distance or 0.0, r.distance is not None)
+
+
 def _of_status(r: StatusReading) -> Spoken:
     return wire.STATUS, (word("fault", r.fault), r.voltage or 0.0, r.voltage is not None)
 
@@ -106,6 +112,7 @@ _OF: dict[type, Callable[[Any], Spoken]] = {
     StateReading: _of_state,
     RangeReading: _of_range,
     MotionReading: _of_motion,
+    NearReading: _of_near,
     StatusReading: _of_status,
     HeartbeatReading: lambda r: (wire.HEARTBEAT, ()),
     DriveReading: _of_drive,
@@ -155,6 +162,10 @@ def _as_motion(s: Source, v: Row) -> Reading:
     return MotionReading(s, v[0], v[1] if int(v[2]) & 1 else None)
 
 
+def _as_near(s: Source, v: Row) -> Reading:
+    return NearReading(s, v[0], v[1] if int(v[2]) & 1 else None)
+
+
 def _as_status(s: Source, v: Row) -> Reading:
     return StatusReading(s, v[1] if int(v[2]) & 1 else None, int(v[0]))
 
@@ -169,6 +180,7 @@ AS_READING: dict[int, Callable[[Source, Row], Reading | None]] = {
     wire.STATE.type: _as_state,
     wire.RANGES.type: _as_range,
     wire.MOTION.type: _as_motion,
+    wire.NEAR.type: _as_near,
     wire.STATUS.type: _as_status,
     wire.HEARTBEAT.type: lambda s, v: HeartbeatReading(s),
     wire.COMMAND.type: _as_drive,

@@ -154,6 +154,23 @@ MOTION = Message(
         Field(name="has", type="u8", bits=("steering",), meaning="whether that is there"),
     ),
 )  # fmt: skip
+NEAR = Message(
+    type=8, name="near", meaning="what distance sensors on a car measured at one time",
+    repeated=True,
+    fields=(
+        Field(
+            name="bearing", type="i16", steps=10_000, unit="rad",
+            meaning="in which direction from the car's middle, 0 ahead, left is positive",
+        ),
+        Field(
+            name="distance", type="u16", steps=1000, unit="m",
+            meaning="from the car's body to what is nearest there",
+        ),
+        Field(
+            name="has", type="u8", bits=("distance",), meaning="0 where the sensor sees nothing",
+        ),
+    ),
+)  # fmt: skip
 STATUS = Message(
     type=6, name="status", meaning="how a device does",
     fields=(
@@ -191,7 +208,7 @@ ACK = Message(
 )  # fmt: skip
 
 MESSAGES = (
-    IMU, IMU_MAG, STATE, RANGES, MOTION, STATUS, HEARTBEAT, COMMAND, REMOTE, ACK,
+    IMU, IMU_MAG, STATE, RANGES, MOTION, STATUS, HEARTBEAT, NEAR, COMMAND, REMOTE, ACK,
 )  # fmt: skip
 """Types that are not here are kept for later; receivers skip them."""
 

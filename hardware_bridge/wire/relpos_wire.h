@@ -103,6 +103,19 @@ typedef struct {
 /* a device is alive */
 #define RELPOS_HEARTBEAT 7u
 
+/* what distance sensors on a car measured at one time */
+#define RELPOS_NEAR 8u
+#define RELPOS_NEAR_HAS_DISTANCE 1u
+typedef struct {
+    int16_t bearing; /* [1/10000 rad] in which direction from the car's middle, 0 ahead, left is positive */
+    uint16_t distance; /* [1/1000 m] from the car's body to what is nearest there */
+    uint8_t has; /* 0 where the sensor sees nothing */
+} relpos_near_row;
+typedef struct {
+    uint8_t n;
+    relpos_near_row row[RELPOS_MOST_ROWS];
+} relpos_near;
+
 /* what a car is to do */
 #define RELPOS_COMMAND 16u
 #define RELPOS_COMMAND_FLAGS_BRAKE 1u
@@ -141,6 +154,7 @@ typedef struct {
         relpos_ranges ranges;
         relpos_motion motion;
         relpos_status status;
+        relpos_near near;
         relpos_command command;
         relpos_remote remote;
         relpos_ack ack;
@@ -521,6 +535,38 @@ static inline float relpos_status_voltage(const relpos_status *m) {
     return (float)m->voltage / 1000.0f;
 }
 
+#define RELPOS_NEAR_ROW_BYTES 5u
+static inline void relpos_near_row_put(const relpos_near_row *m, uint8_t *out) {
+    relpos_put(out + 0, (uint32_t)m->bearing, 2);
+    relpos_put(out + 2, (uint32_t)m->distance, 2);
+    relpos_put(out + 4, (uint32_t)m->has, 1);
+}
+static inline void relpos_near_row_get(relpos_near_row *m, const uint8_t *in) {
+    m->bearing = (int16_t)relpos_get_signed(in + 0, 2);
+    m->distance = (uint16_t)relpos_get(in + 2, 2);
+    m->has = (uint8_t)relpos_get(in + 4, 1);
+}
+/* [rad]; 0 and nothing is set if the value is not finite. */
+static inline int relpos_near_row_set_bearing(relpos_near_row *m, float value) {
+    int32_t number;
+    if (!relpos_scale(value, 10000.0f, -32767 - 1, 32767, &number)) return 0;
+    m->bearing = (int16_t)number;
+    return 1;
+}
+static inline float relpos_near_row_bearing(const relpos_near_row *m) {
+    return (float)m->bearing / 10000.0f;
+}
+/* [m]; 0 and nothing is set if the value is not finite. */
+static inline int relpos_near_row_set_distance(relpos_near_row *m, float value) {
+    int32_t number;
+    if (!relpos_scale(value, 1000.0f, 0, 65535, &number)) return 0;
+    m->distance = (uint16_t)number;
+    return 1;
+}
+static inline float relpos_near_row_distance(const relpos_near_row *m) {
+    return (float)m->distance / 1000.0f;
+}
+
 #define RELPOS_COMMAND_BYTES 7u
 static inline void relpos_command_put(const relpos_command *m, uint8_t *out) {
     relpos_put(out + 0, (uint32_t)m->to, 2);
@@ -612,6 +658,12 @@ static inline int relpos_pack(const relpos_frame *f, uint8_t *out) {
         return 7;
     case RELPOS_HEARTBEAT:
         return 0;
+    case RELPOS_NEAR:
+        if (f->of.near.n > RELPOS_MOST_ROWS) return -1;
+        out[0] = f->of.near.n;
+        for (size_t k = 0; k < f->of.near.n; k++)
+            relpos_near_row_put(&f->of.near.row[k], out + 1 + 5 * k);
+        return 1 + 5 * f->of.near.n;
     case RELPOS_COMMAND:
         relpos_command_put(&f->of.command, out);
         return 7;
@@ -657,6 +709,13 @@ static inline int relpos_unpack(relpos_frame *f, const uint8_t *in, size_t n) {
         return 1;
     case RELPOS_HEARTBEAT:
         return n == 0;
+    case RELPOS_NEAR:
+        if (n < 1 || in[0] > RELPOS_MOST_ROWS) return 0;
+        if (n != 1 + 5 * (size_t)in[0]) return 0;
+        f->of.near.n = in[0];
+        for (size_t k = 0; k < f->of.near.n; k++)
+            relpos_near_row_get(&f->of.near.row[k], in + 1 + 5 * k);
+        return 1;
     case RELPOS_COMMAND:
         if (n != 7) return 0;
         relpos_command_get(&f->of.command, in);

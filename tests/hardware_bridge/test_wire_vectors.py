@@ -15,6 +15,7 @@ from hardware_bridge.readings import (
     HeartbeatReading,
     ImuReading,
     MotionReading,
+    NearReading,
     OperatorReading,
     RangeReading,
     Source,
@@ -33,7 +34,7 @@ def at(time, node=3, boot=7, sequence=0):
     return Source(str(node), boot, sequence, time, MICROSECONDS_32)
 
 
-V0, V1, V2, V3, V4, V5, V6, V7, V8, V9 = (at(1000 * k, sequence=k) for k in range(10))
+V0, V1, V2, V3, V4, V5, V6, V7, V8, V9, V10 = (at(1000 * k, sequence=k) for k in range(11))
 IMU_ROW = [1000, -2000, 3000, 0, 0, 98100]
 VECTORS = [
     ([HeartbeatReading(V0)], wire.HEARTBEAT, [[]]),
@@ -49,6 +50,8 @@ VECTORS = [
     ([OperatorReading(V7, "4", (1.0, -0.5))], wire.REMOTE, [[4, 1000, -500]]),
     ([AckReading(V8, 300)], wire.ACK, [[300]]),
     ([DriveReading(V9, "4", 1.5, -0.42, False)], wire.COMMAND, [[4, 1500, -4200, 0]]),
+    ([NearReading(V10, 0.5, 1.25), NearReading(V10, -1.0, None)], wire.NEAR,
+     [[5000, 1250, 1], [-10000, 0, 0]]),
 ]  # fmt: skip
 """Readings of node 3 and boot 7, their message and the numbers of its rows."""
 
