@@ -106,6 +106,9 @@ class LiveGroup:
         self.active[:] = True
         self.terminated[:] = self.truncated[:] = False
         self.observations[:] = 0.0
+        if self.t_ns:
+            # What was decided last grows old meanwhile; cars that wait stand.
+            self.let_stand()
         self._look(first=True)
 
     def step(self, speed: F64, steering: F64) -> None:

@@ -77,7 +77,7 @@ def read_recording(path: Path | str) -> Recording:
     path = Path(path)
     try:
         if path.exists() and not path.is_file():
-            raise BridgeError(f"{path}: expected a file")
+            raise BridgeError(f"{path}: cannot be read (expected a file)")
         with open(path, "rb") as file:
             return _read(path, file)
     except OSError as error:
