@@ -14,14 +14,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from hardware_bridge.config import SwarmConfig, parse_config
 from hardware_bridge.config.swarm import CarConfig
 from hardware_bridge.drivers import make_driver
 from hardware_bridge.drivers.base import CarDriver
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.links import Links
+from hardware_bridge.live.intake import Intake
+from hardware_bridge.live.marks import KeptMarks
 from hardware_bridge.readings import MotionReading
 from hardware_bridge.safe_file import write_safely
+from hardware_bridge.wire.key import REMOVED_KEY
 
 SPEED = 0.5
 """[m/s] Asked of the wheels, or what the car needs at least."""
@@ -32,6 +37,10 @@ STEP = 0.02
 SECOND_NS = 1_000_000_000
 GRAIN = 0.05
 """[s] What is measured is rounded up to multiples of it."""
+STEADY = 0.5
+"""[s] For which the wheels turn before the car is told nothing."""
+IN_A_ROW = 3
+"""[-] So many words of a car that its wheels are slow are believed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,15 +75,17 @@ def measure_watchdogs(
         tell: Called with a line before each of them.
 
     Raises:
-        BridgeError: There are no cars.
+        BridgeError: There are no cars, or keys are those of a recording.
     """
+    if REMOVED_KEY in config.keys:
+        raise BridgeError('key: "removed", expected the keys that a recording does not hold')
     if not config.cars:
         raise BridgeError("cars: none in the configuration")
-    found = []
+    found, boot = [], _boot(config)
     for car in config.cars:
         if tell is not None:
             tell(f"{car.port.name}: its wheels turn for up to {SPIN_UP + LONGEST:g} s")
-        found.append(_measure(car))
+        found.append(_measure(car, boot))
     return found
 
 
@@ -120,10 +131,18 @@ def _set(text: str, car: int, seconds: float) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _measure(car: CarConfig) -> Watchdog:
+def _boot(config: SwarmConfig) -> int:
+    """Of what the cars are told: higher than that of any start before."""
+    wall_s = time.time_ns() // SECOND_NS
+    if config.marks is None:
+        return wall_s
+    return KeptMarks(config.marks, Intake(config, 0), wall_s).boot
+
+
+def _measure(car: CarConfig, boot: int) -> Watchdog:
     began = time.monotonic_ns()
     driver = make_driver(
-        car.driver, car.node, car.options, car.key, time.time_ns() // SECOND_NS,
+        car.driver, car.node, car.options, car.key, boot,
         lambda: (time.monotonic_ns() - began) // 1000,
     )  # fmt: skip
     links = Links([car.port], time.monotonic_ns)
@@ -138,7 +157,9 @@ class _Trial:
 
     def __init__(self, car: CarConfig, driver: CarDriver, links: Links) -> None:
         self._car, self._driver, self._links = car, driver, links
-        self._speed, self._said = 0.0, False
+        self._speeds: list[tuple[float, float]] = []
+        """When [s] its wheels turned how fast [m/s], by its own word."""
+        self._told_at = 0.0
 
     def run(self) -> Watchdog:
         """Spin up, fall silent, listen."""
@@ -146,25 +167,39 @@ class _Trial:
         if not self._wait(lambda: self._links.is_up(name), 3.0):
             return self._result(None, "its port cannot be opened")
         self._links.send(name, driver.opening())
-        speed = max(SPEED, 1.2 * driver.slowest)
-        turns = self._wait(lambda: abs(self._speed) > 0.5 * speed, SPIN_UP, speed)
-        turns = turns and self._wait(lambda: False, 0.5, speed) is False
-        last, reached = time.monotonic(), abs(self._speed)
-        if not self._said:
+        try:
+            return self._measure(max(SPEED, 1.2 * driver.slowest))
+        finally:
+            # Nobody knows whether it stops by itself, whatever ended this.
             self._stop()
+
+    def _measure(self, speed: float) -> Watchdog:
+        """With wheels asked for a speed [m/s]."""
+        turns = self._wait(lambda: self._speeds != [] and self._at() > 0.5 * speed, SPIN_UP, speed)
+        if turns:
+            self._wait(lambda: False, STEADY, speed)
+        if not self._speeds:
             return self._result(
                 None,
                 "it says nothing of its speed: watch its wheels, and write watchdog into its table",
             )
+        since = time.monotonic() - STEADY
+        reached = float(np.median([abs(v) for t, v in self._speeds if t >= since] or [0.0]))
         if not turns or reached < 0.3 * speed:
-            self._stop()
             return self._result(None, "its wheels do not turn")
-        stopped = self._wait(lambda: abs(self._speed) < 0.5 * reached, LONGEST)
-        seconds = time.monotonic() - last
-        self._stop()
-        if not stopped:
+        self._speeds.clear()
+
+        def slow() -> list[bool]:
+            return [abs(v) < 0.5 * reached for _, v in self._speeds[-IN_A_ROW:]]
+
+        if not self._wait(lambda: len(slow()) == IN_A_ROW and all(slow()), LONGEST):
             return self._result(None, f"it went on for {LONGEST:g} s: set its controller's timeout")
+        seconds = self._speeds[-IN_A_ROW][0] - self._told_at
         return self._result(math.ceil(seconds / GRAIN) * GRAIN, "")
+
+    def _at(self) -> float:
+        """[m/s] Its last word, without sign."""
+        return abs(self._speeds[-1][1])
 
     def _wait(self, is_so: Callable[[], bool], seconds: float, speed: float | None = None) -> bool:
         """Listen until something is so, driving meanwhile if a speed [m/s] is given."""
@@ -175,11 +210,12 @@ class _Trial:
                 name = self._car.port.name
                 if speed is not None:
                     self._links.send(name, self._driver.drive(speed, 0.0))
+                    self._told_at = now
                 self._links.send(name, self._driver.ask())
             for chunk in self._links.wait(STEP / 4):
                 for reading in self._driver.telemetry.feed(chunk.data):
                     if isinstance(reading, MotionReading):
-                        self._speed, self._said = reading.speed, True
+                        self._speeds.append((time.monotonic(), reading.speed))
             if is_so():
                 return True
         return False

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from contextlib import suppress
+import tempfile
 from pathlib import Path
 
 
@@ -18,13 +18,16 @@ def write_safely(path: Path, text: str, mode: int = 0o644) -> None:
     Raises:
         OSError: It cannot be written; then it is as it was.
     """
-    scratch = path.with_name(f".{path.name}.new")
-    with suppress(FileNotFoundError):
-        scratch.unlink()
-    descriptor = os.open(scratch, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
-    with os.fdopen(descriptor, "w", encoding="utf-8") as stream:
-        stream.write(text)
-        stream.flush()
-        # Without this the name may be on the disk before the text.
-        os.fsync(stream.fileno())
-    scratch.replace(path)
+    # A name of its own: of two who write at once, each writes a whole file.
+    descriptor, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".new", dir=path.parent)
+    try:
+        with os.fdopen(descriptor, "w", encoding="utf-8") as stream:
+            os.fchmod(stream.fileno(), mode)
+            stream.write(text)
+            stream.flush()
+            # Without this the name may be on the disk before the text.
+            os.fsync(stream.fileno())
+        Path(name).replace(path)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise

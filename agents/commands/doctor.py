@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -73,6 +74,9 @@ def _measure(
         raise UsageError(
             "--watchdog: expected --wheels-up as well, once all wheels are off the ground"
         )
+    # However it is ended from outside, the car is told to stand.
+    for name in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(name, signal.default_int_handler)
     found = measure_watchdogs(swarm, tell=lambda line: click.echo(line, err=True))
     if write:
         with_watchdogs(path, found)

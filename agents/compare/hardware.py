@@ -96,7 +96,10 @@ def compare_hardware(
                 raise
             remarks.append(f"Ended early: {error}")
         finally:
-            bridge.feed.order("quit")
+            try:
+                bridge.feed.order("quit")
+            except BridgeError as error:
+                remarks.append(str(error))
         remarks += [text for _, text in bridge.feed.notices if STOPPED in text]
     rounds = min(len(seat.rounds) for seat in seats)
     if rounds == 0:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import TypeAlias
 
@@ -15,6 +15,7 @@ from agents.drive.result import DriveResult
 from agents.driver import Driver
 from agents.errors import UsageError
 from hardware_bridge.config import SwarmConfig, read_config
+from hardware_bridge.errors import BridgeError
 from hardware_bridge.live.bridge import Bridge
 from hardware_bridge.live.env import LiveFormationEnv
 from hardware_bridge.live.opened import OpenBridge
@@ -129,8 +130,12 @@ def drive_on(
             _drive(env, driver, log, lambda: orders.show(env, watch))
         except KeyboardInterrupt:
             pass
-        finally:
-            bridge.feed.order("quit")
+        except BaseException:
+            # What is wrong is not that a supervisor that has ended takes no more orders.
+            with suppress(BridgeError):
+                bridge.feed.order("quit")
+            raise
+        bridge.feed.order("quit")
         return log.result(arm)
 
 

@@ -17,10 +17,10 @@ from hardware_bridge.safety.params import SafetyParams
 from hardware_bridge.wire.key import REMOVED_KEY
 from relpos_env.errors import EnvError
 from relpos_env.interface.beams import MOST_BEAMS
-from relpos_env.tasks import make_task
+from relpos_env.tasks import TASKS, make_task
 from tracking.constellation import Constellation
 from tracking.errors import ConfigError
-from tracking.filters import filter_builder
+from tracking.filters import FILTERS, filter_builder
 from tracking.tables import TableReader, Where
 
 SECTIONS = (
@@ -71,7 +71,8 @@ def parse_config(text: str, *, file: str, beside: Path, with_files: bool = True)
         text: Of a swarm.toml.
         file: Its name, for messages.
         beside: The folder that relative paths in it start from.
-        with_files: Whether the files that it names must be there.
+        with_files: Whether the files that it names must be there, and modules of others may be
+            imported that it names; not so of what a recording holds.
 
     Raises:
         BridgeError: As for `read_config`.
@@ -97,12 +98,12 @@ def parse_config(text: str, *, file: str, beside: Path, with_files: bool = True)
         cars=tuple(read_cars(raw, constellation, where, beside)),
         calibration=calibration,
         uncalibrated_ranges=uncalibrated_ranges,
-        task=_task(raw, constellation, where),
+        task=_task(raw, constellation, where, with_files),
         tracker=reader.read(TrackerConfig, raw.get("tracker", {}), where.key("tracker")),
         safety=reader.read(SafetyParams, raw.get("safety", {}), where.key("safety")),
         text=text,
     )
-    _check(config, where)
+    _check(config, where, with_files)
     return config
 
 
@@ -123,7 +124,9 @@ def _calibration(
     return files, table.uncalibrated_ranges
 
 
-def _task(raw: Mapping[str, Any], group: Constellation, where: Where) -> TaskConfig:
+def _task(
+    raw: Mapping[str, Any], group: Constellation, where: Where, with_files: bool
+) -> TaskConfig:
     at = where.key("task")
     rest, options = without(raw.get("task", {}), "options", at)
     config = replace(TableReader().read(TaskConfig, rest, at), options=options)
@@ -133,6 +136,8 @@ def _task(raw: Mapping[str, Any], group: Constellation, where: Where) -> TaskCon
         )
     if not 0 <= config.proximity <= MOST_BEAMS:
         raise at.key("proximity").error(f"expected 0 to {MOST_BEAMS}, got {config.proximity}")
+    if not (with_files or config.name in TASKS):
+        raise at.key("name").error(f"expected one of {', '.join(TASKS)}, got {config.name!r}")
     n = int((~group.is_static).sum())
     if 2 <= n <= MOST_SLOTS:
         try:
@@ -142,7 +147,7 @@ def _task(raw: Mapping[str, Any], group: Constellation, where: Where) -> TaskCon
     return config
 
 
-def _check(config: SwarmConfig, where: Where) -> None:
+def _check(config: SwarmConfig, where: Where, with_files: bool) -> None:
     """What no section can see alone."""
     n = config.n_slots
     if not 2 <= n <= MOST_SLOTS:
@@ -158,8 +163,12 @@ def _check(config: SwarmConfig, where: Where) -> None:
                 .error(f"{spec.port} is that of {ports[spec.port]} already")
             )
         ports[spec.port] = spec.name
+    name = config.tracker.filter
+    if not (with_files or name in FILTERS):
+        at = where.key("tracker").key("filter")
+        raise at.error(f"expected one of {', '.join(FILTERS)}, got {name!r}")
     try:
-        filter_builder(config.tracker.filter)
+        filter_builder(name)
     except ConfigError as error:
         raise where.key("tracker").error(str(error)) from error
     if not 0.0 <= config.tracker.delay <= 1.0:

@@ -137,6 +137,7 @@ class PwmDriver:
     baud = 115200
     gap = 0.03
     answers = False
+    sequence = 0
 
     def __init__(self, options: PwmOptions) -> None:
         self.options = options

@@ -137,6 +137,7 @@ class VescDriver:
     baud = 115200
     gap = 0.0
     answers = False
+    sequence = 0
 
     def __init__(self, options: VescOptions) -> None:
         self.options = options

@@ -115,7 +115,14 @@ class Bridge(OpenBridge):
                 cars = tuple((config.slot_of(car), car) for car in config.cars)
                 dry = () if arm else tuple(slot for slot, _ in cars)
                 boot = wall_s if self.marks is None else self.marks.boot
-                charge = Charge(config.safety, config.n_slots, cars if arm else (), boot, dry)
+                charge = Charge(
+                    config.safety,
+                    config.n_slots,
+                    cars if arm else (),
+                    boot,
+                    dry,
+                    {} if self.marks is None else self.marks.known,
+                )
                 self.supervisor = SupervisorProcess(charge)
                 stack.callback(self.supervisor.close)
             self.feed = LiveFeed(

@@ -1,7 +1,7 @@
 """Cars that have fallen silent: they may stand in the way of the others until a person says not.
 
-Their last places relative to the others are kept, moved on by how far these have driven since, and
-grow uncertain. Only the safety gate looks at them.
+The last place of each that was known well, relative to the others, is moved on by how far cars have
+driven since, and grows uncertain. Only the safety gate looks at it, once the car has left.
 """
 
 from __future__ import annotations
@@ -29,18 +29,21 @@ class SilentCars:
         self._sigma: F64 = np.full((n_slots, n_slots), np.inf)
         self._t = -np.inf
 
-    def keep(self, slot: int, view: View, sigma: F64) -> None:
-        """Note where one was that has just left.
+    def note(self, view: View, sigma: F64, heard: Bool) -> None:
+        """Note where those are that are heard and known to be there.
 
         Args:
-            slot: Which.
-            view: The last in which it was there; of one environment.
+            view: Of one environment.
             sigma: Largest standard deviation of where each is to each, (slot, slot) [m].
+            heard: Which were heard just now, (slot).
         """
+        known = view.ok[0] & np.isfinite(sigma) & heard
+        self._pos[known] = view.pos[0][known]
+        self._sigma[known] = sigma[known]
+
+    def keep(self, slot: int) -> None:
+        """One has left."""
         self.here[slot] = True
-        known = view.ok[0, :, slot] & np.isfinite(sigma[:, slot])
-        self._pos[:, slot] = view.pos[0, :, slot]
-        self._sigma[:, slot] = np.where(known, sigma[:, slot], np.inf)
 
     def forget(self, slot: int) -> None:
         """One is heard again."""
@@ -51,10 +54,11 @@ class SilentCars:
         self.here[:] = False
 
     def move(self, view: View, t: float) -> None:
-        """Move on to the time of a view [s]: the others have driven."""
+        """Move on to the time of a view [s], by what cars say of their own driving."""
         elapsed = t - self._t if np.isfinite(self._t) else 0.0
         self._t = t
-        self._pos -= elapsed * _velocities(view)[:, None, :]
+        own = _velocities(view)
+        self._pos += elapsed * (own - own[:, None])
         self._sigma += elapsed * GROWTH
 
     def write(self, q: Picture, view: View) -> None:

@@ -130,6 +130,7 @@ class LiveSwarm:
         self.view.now[0] = now
         self._perception.step()
         self.silent.move(self.view, now)
+        self.silent.note(self.view, largest_std(self.view.cov[0]), self._heard_since(t_ns, SILENT))
 
     def heard(self, never: float = -np.inf) -> F64:
         """When each car's node last told of its motion, by the host's clock, (slot) [s]."""
@@ -141,6 +142,11 @@ class LiveSwarm:
     @property
     def _slots(self) -> range:
         return range(self.config.n_slots)
+
+    def _heard_since(self, t_ns: int, seconds: float) -> Bool:
+        """Which cars were heard in so long before a time, (slot)."""
+        heard_ns, since = self.intake.heard_ns, t_ns - seconds * 1e9
+        return np.array([heard_ns.get(k, -np.inf) >= since for k in self._slots])
 
     def _make_perception(self) -> Perception | ReadyPerception:
         tracker, group = self.config.tracker, self.group
@@ -163,7 +169,8 @@ class LiveSwarm:
 
     def _let_go(self, t_ns: int, now: float) -> None:
         """Nodes that are heard join; those that have fallen silent leave."""
-        recent = {k for k, t in self.intake.heard_ns.items() if (t_ns - t) * 1e-9 <= GONE}
+        heard_ns = self.intake.heard_ns
+        recent = {k for k, t in heard_ns.items() if (t_ns - t) * 1e-9 <= GONE}
         for node in sorted(recent - self._here):
             self.intake.events.add(now, Kind.JOIN, node, ())
             if node in self._slots:
@@ -171,7 +178,7 @@ class LiveSwarm:
         for node in sorted(self._here - recent):
             self.intake.events.add(now, Kind.LEAVE, node, ())
             if node in self._slots:
-                self.silent.keep(node, self.view, largest_std(self.view.cov[0]))
+                self.silent.keep(node)
         self._here = recent
 
     def _make_room(self, n: int) -> None:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from hardware_bridge.config.swarm import CarConfig
+from hardware_bridge.identity import Mark
 from hardware_bridge.safety.params import SafetyParams
 
 TICK_NS = 10_000_000
@@ -27,3 +29,5 @@ class Charge:
     """Of this start, for what is signed; higher than that of any start before."""
     dry: tuple[int, ...] = ()
     """Slots of cars in a dry run: no port is opened, and the gate tells what it would allow."""
+    marks: Mapping[str, Mapping[int, Mark]] = field(default_factory=dict)
+    """Newest signed messages of starts before, by car: nothing as old is believed."""

@@ -90,7 +90,12 @@ class SupervisorProcess:
         return self.process.is_alive()
 
     def close(self) -> None:
-        """Let the cars stand and end it; by closing the socket, if it does not listen."""
+        """Let the cars stand and end it; by closing the socket, if it does not listen.
+
+        The second time nothing is left to do.
+        """
+        if self._socket.fileno() < 0:
+            return
         self._socket.close()
         self.process.join(timeout=2.0)
         if self.process.is_alive():

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from hardware_bridge.drivers.base import CarDriver
+from hardware_bridge.readings import Reading
+from hardware_bridge.safety.believed import Believed
 from hardware_bridge.safety.gate import Gate, GateOutput, reason_text
 from hardware_bridge.safety.messages import Decision, Message, Notice, Order, Report, Word
 from hardware_bridge.safety.params import SafetyParams
@@ -35,6 +37,7 @@ class Supervisor:
         *,
         cells: Mapping[int, int] = NONE_KNOWN,
         watchdog: Mapping[int, float] = NONE_KNOWN,
+        believed: Mapping[int, Believed] = NONE_KNOWN,
     ) -> None:
         """Begin with nothing armed.
 
@@ -45,6 +48,7 @@ class Supervisor:
             names: What each of these is called in notices.
             cells: Of the batteries of the slots where they are known.
             watchdog: Of the slots where it is known [s]; else it is `SafetyParams.deadman`.
+            believed: Of the slots whose words are checked; of the others all are believed.
         """
         slots = range(n_cars)
         self._telemetry = Telemetry(
@@ -53,9 +57,10 @@ class Supervisor:
             cells=[cells.get(k, 0) for k in slots],
             watchdog=[watchdog.get(k, params.deadman) for k in slots],
             answers=[k in drivers and drivers[k].answers for k in slots],
+            slowest=[drivers[k].slowest if k in drivers else 0.0 for k in slots],
         )
         self._gate = Gate(params, 1, n_cars)
-        self._drivers, self._names = dict(drivers), dict(names)
+        self._drivers, self._names, self._believed = dict(drivers), dict(names), dict(believed)
         self._picture: Picture = blank_picture(1, n_cars)
         self._word = np.full(1, -np.inf)
         self._heard: F64 = np.full((1, n_cars), -np.inf)
@@ -104,7 +109,10 @@ class Supervisor:
 
     def hear(self, slot: int, data: bytes, now: float) -> None:
         """Bytes that a car's controller sent [s]."""
-        self._telemetry.take(slot, self._drivers[slot].telemetry.feed(data), now)
+        readings: Iterable[Reading] = self._drivers[slot].telemetry.feed(data)
+        if slot in self._believed:
+            readings = self._believed[slot].sift(readings, round(now * 1e9))
+        self._telemetry.take(slot, readings, now)
 
     def abandon(self) -> None:
         """The deciding process is gone: nothing will move again."""
@@ -191,6 +199,7 @@ class Supervisor:
         for slot in self._sent:
             if slot in taken:
                 self._taken[slot] = now
+                self._telemetry.sent(slot, self._drivers[slot].sequence - 1, now)
             else:
                 self._told.pop(slot, None)  # it was not
         t = float(self._picture.t[0])

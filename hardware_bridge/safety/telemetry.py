@@ -17,7 +17,11 @@ OLD = 0.5
 SAG = 2.0
 """[s] Time constant of the mean voltage: a motor that starts lets it sag for a moment."""
 STANDS, DRIVES = 0.05, 0.2
-"""[m/s] A wheel as slow stands; a car that is asked for as much should not."""
+"""[m/s] A wheel as slow stands; a car that is asked for as much should not, if it can go as slow."""
+MARGIN = 1.1
+"""[-] Times the slowest that a car can go."""
+COMMANDS = 1000
+"""[-] Commands of each car whose answers are waited for; more than it is sent until it is deaf."""
 
 
 class Told(NamedTuple):
@@ -28,8 +32,8 @@ class Told(NamedTuple):
     idle_for: F64
     """Time for which its wheels have stood although it is asked to drive [s]."""
     deaf_for: F64
-    """Time since it answered a command, or told its speed, if it has ever done so [s]: what is sent
-    to it may wait in a server on the way."""
+    """Time since the newest command was sent that it answered, and since it told its speed, if it
+    has ever done so [s]: what is sent to it may wait in a server on the way."""
     fault: Bool
     """Its controller has a fault."""
     cell: F64
@@ -58,6 +62,7 @@ class Telemetry:
         cells: Sequence[int],
         watchdog: Sequence[float],
         answers: Sequence[bool],
+        slowest: Sequence[float],
     ) -> None:
         """Begin with nothing said.
 
@@ -67,11 +72,15 @@ class Telemetry:
             cells: Of each car's battery; 0 where its voltage is not looked at.
             watchdog: Of each car [s].
             answers: Whether its controller answers every command.
+            slowest: Asked for less it stands, of each car [m/s].
         """
         self._params = params
         self._cells = np.array(cells, dtype=np.float64)
         self._watchdog = np.array(watchdog, dtype=np.float64)
         self._answers = np.array(answers, dtype=bool)
+        self._drives = np.maximum(DRIVES, MARGIN * np.array(slowest, dtype=np.float64))
+        self._sent: list[dict[int, float]] = [{} for _ in range(n_cars)]
+        """When each command was sent that is not answered yet, by its number [s]."""
         self._speed = np.zeros(n_cars)
         self._said = np.full(n_cars, -np.inf)
         self._answered = np.full(n_cars, -np.inf)
@@ -81,14 +90,23 @@ class Telemetry:
         self._over_since = np.full(n_cars, np.inf)
         self._idle_since = np.full(n_cars, np.inf)
 
+    def sent(self, slot: int, command: int, now: float) -> None:
+        """A command was handed to a car's port, of this number [s]."""
+        waiting = self._sent[slot]
+        waiting[command] = now
+        if len(waiting) > COMMANDS:
+            del waiting[next(iter(waiting))]
+
     def take(self, slot: int, readings: Iterable[Reading], now: float) -> None:
         """What a car's controller said just now [s]."""
         for reading in readings:
             match reading:
                 case MotionReading(speed=speed):
                     self._speed[slot], self._said[slot] = speed, now
-                case AckReading():
-                    self._answered[slot] = now
+                case AckReading(command=command):
+                    # Of a command that it answers late it was told no sooner; it answers once.
+                    then = self._sent[slot].pop(command, -np.inf)
+                    self._answered[slot] = max(self._answered[slot], then)
                 case StatusReading(voltage=voltage, fault=fault):
                     self._fault[slot] = fault != 0
                     if voltage is not None:
@@ -108,7 +126,7 @@ class Telemetry:
         beyond = np.maximum(self._speed - forward, -self._speed - backward) > p.runaway_speed
         self._over_since = _since(self._over_since, fresh & beyond, now)
         stands = fresh & (np.abs(self._speed) < STANDS)
-        idle = moving & stands & (np.abs(recent.speed[0]) >= DRIVES)
+        idle = moving & stands & (np.abs(recent.speed[0]) >= self._drives)
         self._idle_since = _since(self._idle_since, idle, now)
         # It may answer from when its port is open on.
         self._answered = np.where(linked & np.isfinite(self._answered), self._answered, now)

@@ -13,6 +13,7 @@ from hardware_bridge.drivers import make_driver
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.links import Links
 from hardware_bridge.pauses import short_pauses
+from hardware_bridge.safety.believed import Believed
 from hardware_bridge.safety.charge import REPORT_EVERY, ROOM, TICK_NS, Charge
 from hardware_bridge.safety.messages import (
     Decision,
@@ -78,6 +79,9 @@ class _Watch:
             {slot: car.port.name for slot, car in charge.cars},
             cells={slot: car.cells for slot, car in charge.cars},
             watchdog={slot: car.watchdog for slot, car in charge.cars if car.watchdog},
+            believed={
+                slot: Believed(car, charge.marks.get(car.port.name, {})) for slot, car in charge.cars
+            },
         )
         specs = [car.port for _, car in charge.cars]
         self._links = Links(specs, time.monotonic_ns)

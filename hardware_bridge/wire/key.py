@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
+
+from hardware_bridge.errors import BridgeError
 
 KEY_BYTES = 16
 REMOVED = "removed"
@@ -38,13 +42,34 @@ def without_keys(text: str, keys: Iterable[bytes | None]) -> str:
     Args:
         text: Of a swarm.toml.
         keys: All that are in it.
+
+    Raises:
+        BridgeError: A key is written so that it cannot be found in the text.
     """
     for key in keys:
         if key is not None and key != REMOVED_KEY:
             # Hex digits as people write them: in any case, with or without space between.
             digits = r"\s*".join(key.hex())
             text = re.sub(digits, REMOVED, text, flags=re.IGNORECASE)
+    try:
+        left = [name for name, written in _keys_in(tomllib.loads(text)) if written != REMOVED]
+    except tomllib.TOMLDecodeError:
+        left = ["key"]  # one with an escape, of which a part was removed
+    if left:
+        raise BridgeError(
+            f"{left[0]}: cannot be kept out of the recording as it is written; "
+            f"expected {2 * KEY_BYTES} hex digits on one line"
+        )
     return text
+
+
+def _keys_in(table: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, object]]:
+    """All fields `key` of a table and of those in it, by their full names."""
+    for name, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _keys_in(value, f"{path}{name}.")
+        elif name == "key":
+            yield f"{path}{name}", value
 
 
 def read_key(text: str | None) -> bytes | None:

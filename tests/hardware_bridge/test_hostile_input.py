@@ -5,6 +5,7 @@ import json
 import os
 from dataclasses import fields
 from pathlib import Path
+from threading import Thread
 
 import numpy as np
 import pytest
@@ -60,6 +61,29 @@ def test_a_recording_holds_no_keys_and_is_still_a_configuration():
         known = config_of(shared)
         assert set(known.keys) <= {None, REMOVED_KEY}
         assert with_keys_of(known, config).keys == config.keys
+
+
+@pytest.mark.parametrize("cut", ['"""{0}\\\n  {1}"""', '"\\u0030{0}{1}"'])
+def test_a_key_that_cannot_be_found_is_not_recorded(cut):
+    key = bytes(range(0x0F, 0x1F))
+    text = swarm_text(key=key)
+    digits = key.hex()
+    whole = digits if cut.startswith('"""') else digits[1:]
+    written = text.replace(f'"{digits}"', cut.format(whole[:9], whole[9:]))
+    keys = config_of(written).keys
+    assert key in keys
+    with pytest.raises(BridgeError, match="key: cannot be kept out of the recording"):
+        without_keys(written, keys)
+
+
+@pytest.mark.parametrize(("table", "name"), [("tracker", "filter"), ("task", "name")])
+def test_a_recording_imports_nothing(tmp_path, monkeypatch, table, name):
+    (tmp_path / "foreign.py").write_text("raise SystemExit('imported')")
+    monkeypatch.syspath_prepend(tmp_path)
+    text = swarm_text().split("[task]")[0]
+    text += f'\n[{table}]\n{name} = "foreign:Thing"\n'
+    with pytest.raises(BridgeError, match=f"{name}: expected one of"):
+        parse_config(text, file="a", beside=Path(), with_files=False)
 
 
 def test_a_key_may_stand_in_a_file(tmp_path):
@@ -172,6 +196,26 @@ def test_a_file_is_whole_and_of_its_mode(tmp_path):
     write_safely(path, "two", mode=0o600)
     assert path.read_text() == "two"
     assert path.stat().st_mode & 0o777 == 0o600
+    assert os.listdir(tmp_path) == ["a.json"]
+
+
+def test_of_two_writers_each_writes_a_whole_file(tmp_path):
+    path, failed = tmp_path / "a.json", []
+
+    def write(letter):
+        try:
+            for _ in range(50):
+                write_safely(path, letter * 1000)
+        except OSError as error:
+            failed.append(error)
+
+    writers = [Thread(target=write, args=(letter,)) for letter in "ab"]
+    for writer in writers:
+        writer.start()
+    for writer in writers:
+        writer.join()
+    assert not failed
+    assert path.read_text() in ("a" * 1000, "b" * 1000)
     assert os.listdir(tmp_path) == ["a.json"]
 
 

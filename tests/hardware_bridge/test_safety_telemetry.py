@@ -9,10 +9,13 @@ from test_safety_supervisor import NEUTRAL, Drive
 
 from agents.emulate.options import EmulateOptions
 from agents.emulate.virtual import VirtualBridge
+from hardware_bridge.config.swarm import CarConfig
 from hardware_bridge.errors import BridgeError
+from hardware_bridge.links.ports import PortSpec
 from hardware_bridge.live.marks import KeptMarks
 from hardware_bridge.live.silent_cars import GROWTH, SILENT, SilentCars
-from hardware_bridge.readings import NOBODY, AckReading, MotionReading, StatusReading
+from hardware_bridge.readings import NOBODY, AckReading, MotionReading, Source, StatusReading
+from hardware_bridge.safety.believed import Believed
 from hardware_bridge.safety.params import SafetyParams
 from hardware_bridge.safety.picture import blank_picture
 from hardware_bridge.safety.supervisor import Supervisor
@@ -73,10 +76,10 @@ def test_a_slow_watchdog_counts_as_a_longer_reaction():
 class Telling(Drive):
     """Two cars that say how fast they are."""
 
-    def __init__(self, answers=False, cells=0):
+    def __init__(self, answers=False, cells=0, slowest=0.0):
         super().__init__()
         for driver in self.drivers.values():
-            driver.answers = answers
+            driver.answers, driver.slowest = answers, slowest
         self.supervisor = Supervisor(
             SafetyParams(), 2, self.drivers, {0: "cars.1", 1: "cars.2"}, cells={0: cells, 1: cells}
         )
@@ -87,6 +90,11 @@ class Telling(Drive):
             self.supervisor.hear(0, b"", self.now)
             sent = self.tick()
         return sent
+
+    def answer(self, n, late=0):
+        """Of car 0, to the last command or one so much older."""
+        for _ in range(n):
+            self.say(AckReading(NOBODY, self.drivers[0].sequence - 1 - late))
 
     def moves(self):
         return [data != NEUTRAL for data in self.tick().values()]
@@ -134,11 +142,23 @@ def test_a_car_that_answers_nothing_is_never_armed_and_one_that_stops_answering_
         "cars.1 not armed: it does not do what it is told",
         "cars.2 not armed: it does not do what it is told",
     ]
-    drive.say(AckReading(NOBODY, 1), n=100)
+    drive.answer(100)
     assert len(drive.arm()) == 1
     assert drive.moves() == [True, False]
-    drive.tick(60)
+    drive.say(AckReading(NOBODY, drive.drivers[0].sequence - 1), n=60)  # one that was recorded
     assert drive.moves() == [False, False]
+
+
+def test_a_car_that_answers_late_was_told_late():
+    """A serial server keeps commands while its network is gone, and passes on all of them."""
+    drive = Telling(answers=True)
+    drive.tick(60)
+    drive.answer(120, late=40)
+    assert len(drive.arm()) == 1
+    drive = Telling(answers=True)
+    drive.tick(60)
+    drive.answer(120, late=52)
+    assert len(drive.arm()) == 2
 
 
 def test_a_car_whose_wheels_stand_although_it_is_asked_to_drive_is_stopped():
@@ -146,6 +166,37 @@ def test_a_car_whose_wheels_stand_although_it_is_asked_to_drive_is_stopped():
     drive.say(MotionReading(NOBODY, 0.0), n=290)
     assert drive.moves() == [True, True]
     drive.say(MotionReading(NOBODY, 0.0), n=60)
+    assert drive.moves() == [False, True]
+
+
+def test_a_car_that_cannot_go_as_slow_as_it_is_asked_may_stand():
+    drive = Telling(slowest=1.5)
+    drive.tick(60)
+    drive.arm()
+    drive.say(MotionReading(NOBODY, 0.0), n=350)
+    assert drive.moves() == [True, True]
+
+
+def test_words_of_others_and_old_ones_are_not_listened_to():
+    def status(number, fault, device="1", boot=5):
+        return StatusReading(Source(device, boot, number), 7.6, fault)
+
+    port = PortSpec(name="cars.1", port="/dev/null")
+    car = CarConfig(node=1, port=port, driver="relpos", key=bytes(16))
+    believed = Believed(car, {1: (5, 2)})
+    said = [status(2, 0), status(3, 1), status(3, 0), status(4, 0, device="7"), status(1, 0, boot=4)]
+    assert [reading.fault for reading in believed.sift(said, 0)] == [1]
+    drive = ready()
+    drive.supervisor = Supervisor(
+        SafetyParams(), 2, drive.drivers, {0: "cars.1", 1: "cars.2"}, believed={0: believed}
+    )
+    drive.tick(60)
+    drive.arm()
+    drive.tick(5)
+    assert drive.moves() == [True, True]
+    drive.say(status(9, 3, device="7"))
+    assert drive.moves() == [True, True]
+    drive.say(status(10, 3))
     assert drive.moves() == [False, True]
 
 
@@ -166,7 +217,10 @@ def test_a_silent_car_stays_where_it_was_until_it_is_dismissed():
     view.pos[0, :, 2] = [[2.0, 0.0], [0.0, 1.0], [0.0, 0.0]]
     view.speed[0] = [0.5, 0.0, 0.0]  # car 0 drives along x
     silent.move(view, 0.0)
-    silent.keep(2, view, np.full((3, 3), 0.1))
+    silent.note(view, np.full((3, 3), 0.1), np.ones(3, dtype=bool))
+    view.ok[0, :, 2] = False  # what is known of it then is not worth noting
+    silent.note(view, np.full((3, 3), 9.0), np.array([True, True, False]))
+    silent.keep(2)
     view.present[0, 2] = False
     for k in range(1, 11):
         silent.move(view, 0.1 * k)
@@ -183,16 +237,36 @@ def test_a_silent_car_stays_where_it_was_until_it_is_dismissed():
     assert not q.present.any()
 
 
-def test_the_gate_keeps_cars_away_from_one_that_has_fallen_silent():
-    """It used to be forgotten after five seconds, and passed as if it were not there."""
+def test_the_gate_knows_where_a_car_is_that_has_fallen_silent():
+    """Though the trackers lose it long before it counts as gone."""
     bridge = VirtualBridge(EmulateOptions(scenario="ring-los", task="hold", cars=3, seconds=60.0))
-    env = bridge.env(max_cycles=200)
+    env, swarm = bridge.env(max_cycles=400), bridge.swarm
     env.reset()
+    agents = list(env.agents)
+    stand = {agent: np.zeros(2, np.float32) for agent in agents}
     for _ in range(20):
-        env.step({agent: np.zeros(2, np.float32) for agent in env.agents})
-    swarm = bridge.swarm
-    swarm.silent.keep(2, swarm.view, np.full((3, 3), 0.05))
+        env.step(stand)
+    assert swarm.view.ok[0, :2, 2].all()
+    before = swarm.view.pos[0, :2, 2].copy()
+    heard = swarm.intake.heard_ns
+
+    class Silenced(dict):
+        """Node 2 is heard no more."""
+
+        def __setitem__(self, node, t_ns):
+            if node != 2:
+                super().__setitem__(node, t_ns)
+
+    swarm.intake.heard_ns = Silenced(heard)
+    take = swarm.intake.events.add_range
+    swarm.intake.events.add_range = lambda t, pair, *rest: 2 in pair or take(t, pair, *rest)
+    for _ in range(60):
+        env.step({agent: action for agent, action in stand.items() if agent in env.agents})
     assert swarm.silent.here.tolist() == [False, False, True]
+    picture = blank_picture(1, 3)
+    swarm.silent.write(picture, swarm.view)
+    assert (picture.sigma[0, :2, 2] < 0.6).all()
+    assert (np.linalg.norm(picture.pos[0, :2, 2] - before, axis=-1) < 0.4).all()
     bridge.feed.order("gone")
     assert not swarm.silent.here.any()
     bridge.close()

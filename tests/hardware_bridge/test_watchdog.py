@@ -13,6 +13,7 @@ from agents.emulate.rig import STEP_NS, EmulatedRig
 from agents.errors import UsageError
 from agents.watchdog import measure_watchdogs
 from hardware_bridge.config import read_config
+from hardware_bridge.decoders.relpos import RelposDecoder
 from hardware_bridge.errors import BridgeError
 
 pytestmark = pytest.mark.realtime
@@ -72,4 +73,49 @@ def test_the_command_writes_into_the_file(tmp_path):
     assert written == [record["seconds"] for record in records]
     assert all(0.5 <= seconds < 1.1 for seconds in written)
     with pytest.raises(BridgeError, match="cars: none"):
-        measure_watchdogs(type("None", (), {"cars": ()})())
+        measure_watchdogs(type("None", (), {"cars": (), "keys": []})())
+
+
+class Interrupted:
+    """Links that are interrupted once the car says that it drives."""
+
+    def __init__(self, ports, now_ns):
+        self.sent = []
+        Interrupted.last = self
+
+    def is_up(self, name):
+        return True
+
+    def send(self, name, data):
+        self.sent.append(data)
+
+    def wait(self, seconds):
+        if len(self.sent) > 20:
+            raise KeyboardInterrupt
+        return []
+
+    def close(self):
+        self.sent.append("closed")
+
+
+def test_whatever_ends_it_the_car_is_told_to_stand(tmp_path, monkeypatch):
+    with Emulation(tmp_path):
+        config = read_config(tmp_path / "swarm.toml")
+    monkeypatch.setattr("agents.watchdog.Links", Interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        measure_watchdogs(config)
+    decoder = DriveDecoder(config.cars[0])
+    *sent, last, closed = Interrupted.last.sent
+    assert closed == "closed"
+    assert any(decoder.speed(data) for data in sent)
+    assert decoder.speed(last) == 0.0
+
+
+class DriveDecoder:
+    """Reads commands as the car does."""
+
+    def __init__(self, car):
+        self._decoder = RelposDecoder(car.key)
+
+    def speed(self, data):
+        return next((r.speed for r in self._decoder.feed(data)), None)
