@@ -149,6 +149,7 @@ class Formation:
         self.active[env] = False
         self.terminated[env] = self.truncated[env] = False
         self._judge(here)
+        self.own_reward[env] = 0.0
         self.left[env] = False
         self.observations[env] = 0.0
 
@@ -173,6 +174,8 @@ class Formation:
         everything = slice(0, self.n_envs)
         self.cycles += 1
         self._judge(everything)
+        if self.parts.reward is not None:
+            self._add_own_reward(self.parts.reward)
         self._observe(everything)
 
     @property
@@ -223,22 +226,20 @@ class Formation:
             self._judge_all()
         else:
             judge(envs.start, envs.stop, *self._verdict)
-        if self.parts.reward is not None:
-            self._add_own_reward(self.parts.reward, envs)
 
-    def _add_own_reward(self, term: RewardTerm, envs: slice) -> None:
+    def _add_own_reward(self, term: RewardTerm) -> None:
         """Add the user's term to the rewards of the cars in the room.
 
         Raises:
             EnvError: It gives no finite number for each car.
         """
         own = np.asarray(term(self), dtype=np.float64)
-        if own.shape != self.rewards.shape or not np.isfinite(own[envs]).all():
+        if own.shape != self.rewards.shape or not np.isfinite(own).all():
             raise EnvError(f"reward: expected finite numbers {self.rewards.shape}, got {own!r}")
-        self.own_reward[envs] = np.where(self.state.present[envs], own[envs], 0.0)
-        self.rewards[envs] += self.own_reward[envs]
-        n = np.maximum(self.active[envs].sum(axis=1), 1)
-        self.team.reward[envs] += self.own_reward[envs].sum(axis=1) / n
+        self.own_reward[:] = np.where(self.state.present, own, 0.0)
+        self.rewards += self.own_reward
+        n = np.maximum(self.active.sum(axis=1), 1)
+        self.team.reward[:] += self.own_reward.sum(axis=1) / n
 
     def _observe(self, envs: slice | Sequence[int]) -> None:
         """Write the observations of some environments; those of the others stay what they are.

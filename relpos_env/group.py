@@ -99,6 +99,7 @@ class Group:
         disconnect(solver, env)
         if not self.world.is_open:
             self.world.put(b, env)
+            self.world.reindex()
             self.world.is_open = True
         return self.world
 
@@ -160,6 +161,8 @@ class Group:
         elif self.world is not None and b.present[env, car]:
             self.world.add_car(car)
             self.world.put(b, env)
+            if self.world.is_open:
+                self.world.reindex()
         elif self.world is not None:
             self.world.remove_car(car)
 

@@ -138,6 +138,7 @@ class FormationGymEnv(gymnasium.Env[F32, Any]):
             # Episodes have a generator of their own, so that `np_random` is the user's.
             self._formation.seed(0, episode_rng(seed))
             self._seeded = True
+        self._begun = False  # until all wishes are fulfilled
         self._formation.begin([0], options=wishes)
         self._begun, self._over = True, False
         self._film.forget()

@@ -34,7 +34,8 @@ class ResetOptions:
     """Where the cars shall stand, (car, 2) [m], if the task is `hold`; where they shall meet, (2),
     if it is `rendezvous`; chosen by the task if None."""
     scenario: Scenario | None = None
-    """In place of that of the environment; of the same room and protocol, with no more boxes."""
+    """In place of that of the environment; of the same room, protocol, antennas, magnetic waves
+    and furnishing, with no more boxes."""
 
     def placed(self, episode: Episode, size: tuple[float, float]) -> Episode:
         """The episode with its first cars where they are wanted.
@@ -115,4 +116,11 @@ def _fitting(wanted: Scenario, parts: Parts) -> Scenario:
         )
     if wanted.radio.session != made.radio.session:
         raise EnvError("scenario: expected the radio protocol of the environment, got another")
+    for name, ours, theirs in (
+        ("height of the antennas", made.radio.antenna_height, wanted.radio.antenna_height),
+        ("number of magnetic waves", made.mag.n_waves, wanted.mag.n_waves),
+        ("furnish", made.furnish, wanted.furnish),
+    ):
+        if ours != theirs:
+            raise EnvError(f"scenario: expected the {name} of the environment, got another")
     return wanted.with_cars(min(parts.n_cars, wanted.n_cars_range[1]))

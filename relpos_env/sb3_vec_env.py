@@ -15,6 +15,7 @@ from relpos_env.interface.infos import car_infos
 from relpos_env.interface.observations import space_of
 from relpos_env.interface.observations.base import F32
 from relpos_env.render.film import Film, check_render_mode
+from relpos_env.reset_options import reset_options
 from relpos_env.sb3_seats import SharedSeats
 from relpos_env.seeding import episode_rng, seeds_of_batch
 from relpos_env.state_space import N_TRUTH, truth_of_each
@@ -111,11 +112,26 @@ class FormationVecEnv(SharedSeats):
         self.formation.weights[:] = reward_weights(task, self.formation.task, weights)
 
     def reset(self) -> F32:
-        """Begin an episode in every environment; observations, (seat, size)."""
+        """Begin an episode in every environment; observations, (seat, size).
+
+        The options of `set_options` are those of the first seat of each room; see
+        `relpos_env.reset_options`.
+
+        Raises:
+            EnvError: An unknown option, or one that cannot be fulfilled.
+        """
+        rooms = range(self.formation.n_envs)
         for env, seed in enumerate(self._next_seeds):
             if seed is not None or not self._begun:
                 self.formation.seed(env, episode_rng(seed))
-        self.formation.begin(range(self.formation.n_envs))
+        self._begun = False  # until all wishes are fulfilled
+        wishes = [reset_options(self._options[k * self.n_cars], self._parts) for k in rooms]
+        if not any(self._options):
+            self.formation.begin(rooms)
+        else:
+            for env, wish in zip(rooms, wishes, strict=True):
+                self.formation.begin([env], options=wish)
+        self._reset_options()
         self._next_seeds = [None] * self.formation.n_envs
         self._begun = True
         self.reset_infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]

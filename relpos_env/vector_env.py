@@ -32,7 +32,8 @@ class FormationVectorEnv(VectorEnv[F32, Any, Any]):
     It keeps the contract of `gymnasium.vector.VectorEnv`: with a mode of resets it gives what
     `SyncVectorEnv` gives of single environments, infos included.
 
-    Law: environment k with seed s is the single environment with seed s + k, bit for bit.
+    Law: environment k with seed s is the single environment with seed s + k and the same `physics`,
+    bit for bit.
     """
 
     metadata = {  # noqa: RUF012
@@ -157,10 +158,12 @@ class FormationVectorEnv(VectorEnv[F32, Any, Any]):
         terminated, truncated = formation.terminated.copy(), formation.truncated.copy()
         infos = self._infos()
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._over.any():
+            resets = self._over.copy()
             infos = self._begin_at_once(self._over.copy())
         if self.render_mode is not None:
-            for film in self._films:
-                film.add(formation)
+            for film, was_begun in zip(self._films, resets, strict=True):
+                if not was_begun:
+                    film.add(formation)
         return self._observations(), rewards, terminated, truncated, infos
 
     def state(self) -> F32:
@@ -182,6 +185,7 @@ class FormationVectorEnv(VectorEnv[F32, Any, Any]):
     def _begin(self, envs: Bool, wishes: ResetOptions = NO_OPTIONS) -> None:
         """Begin an episode in some environments, (env)."""
         which = np.flatnonzero(envs).tolist()
+        self._begun[envs] = False  # until all wishes are fulfilled
         self.formation.begin(which, options=wishes)
         self._begun[envs], self._over[envs] = True, False
         if self.render_mode is not None:

@@ -3,7 +3,7 @@
 `World.space` is an ordinary `pymunk.Space`. What is added to it (bodies, joints, shapes, collision
 handlers) moves and collides with the cars. Radios, distance sensors and pictures see each shape
 that is no sensor as a box: a polygon as the smallest rectangle around it, a circle as the square
-of its area.
+of its area. Shapes on the body of a car are part of it, and not seen.
 """
 
 from __future__ import annotations
@@ -33,6 +33,8 @@ BOX_FRICTION = 0.4
 BOX_DENSITY = 8.0
 """[kg/m2] Of a movable box, over its floor area: cardboard with little in it. The motor of a car
 moves one of up to 0.4 m; what is larger yields to a blow only."""
+MOST_KNOWN = 100
+"""[-] So many rectangles are kept."""
 REST = 1e-4
 """[m/s, rad/s] A box that is slower stands."""
 
@@ -82,7 +84,7 @@ class World:
         self._own = set(space.shapes)
         self.is_open = False
         """True from when somebody else has the space."""
-        self._rectangles: dict[pymunk.Shape, Rectangle] = {}
+        self._rectangles: dict[tuple[Any, ...], Rectangle] = {}
 
     def add_car(self, n: int) -> None:
         """Put a car into the space; `put` says where."""
@@ -120,10 +122,21 @@ class World:
             raise EnvError(f"world.space: expected at most {room} added shapes, got {len(added)}")
         rows = b.boxes[env, self._n_obstacles :]
         rows[:] = NO_BOX
+        known = self._rectangles
+        if len(known) > MOST_KNOWN:
+            known.clear()
         for k, shape in enumerate(added):
-            x, y, width, height, angle = self._rectangles.setdefault(shape, rectangle_of(shape))
+            key = _geometry(shape)
+            if key not in known:
+                known[key] = rectangle_of(shape)
+            x, y, width, height, angle = known[key]
             centre = shape.body.local_to_world((x, y))
             rows[k] = box_row(centre.x, centre.y, width, height, shape.body.angle + angle)
+
+    def reindex(self) -> None:
+        """Let queries find shapes where `put` has moved their bodies to."""
+        for body in (*self.cars.values(), *self.boxes.values()):
+            self.space.reindex_shapes_for_body(body)
 
     def step(self, b: Bodies, env: int, dt: float) -> None:
         """Make one step by the interface of pymunk.
@@ -198,6 +211,16 @@ def rectangle_of(shape: pymunk.Shape) -> Rectangle:
         if width * height < least:
             best, least = (float(x), float(y), float(width), float(height), angle), width * height
     return best
+
+
+def _geometry(shape: pymunk.Shape) -> tuple[Any, ...]:
+    """What its rectangle depends on; users may change it."""
+    if isinstance(shape, pymunk.Circle):
+        return shape.radius, shape.offset
+    if isinstance(shape, pymunk.Segment):
+        return shape.radius, shape.a, shape.b
+    assert isinstance(shape, pymunk.Poly)
+    return shape.radius, *shape.get_vertices()
 
 
 def _count(arbiter: pymunk.Arbiter, contacts: Any, car: int) -> None:

@@ -22,6 +22,7 @@ class CarDriver(Protocol):
     """[m/s] Asked for less it stands, one way or the other."""
     answers: bool
     """Whether every command is answered by an `AckReading`."""
+
     @property
     def sequence(self) -> int:
         """Number of the next command; 0 where commands have none."""

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hardware_bridge.safety.gate import Gate, reason_text
+from hardware_bridge.safety.gate import NOT_ARMED, Gate, reason_text
 from hardware_bridge.safety.params import SafetyParams
 from hardware_bridge.safety.picture import blank_picture, largest_std
 from relpos_env.interface.views import View
@@ -34,11 +34,13 @@ class SimulatedGate:
         self._gates = [Gate(self._params, 1, n_cars) for _ in range(n_envs)]
         self._asked, self._speed, self._steering = (np.zeros(shape) for _ in range(3))
         self._stopped: Bool = np.ones(shape, dtype=bool)
-        self._reason = np.zeros(shape, dtype=np.int64)
+        self._reason = np.full(shape, NOT_ARMED)
 
     def reset(self, env: int) -> None:
         """Begin anew in one room."""
         self._gates[env] = Gate(self._params, 1, self._asked.shape[1])
+        self._asked[env] = self._speed[env] = self._steering[env] = 0.0
+        self._stopped[env], self._reason[env] = True, NOT_ARMED
 
     def allow(self, view: View, speed: F64, steering: F64) -> tuple[F64, F64]:
         """What the cars may do.

@@ -17,7 +17,7 @@ OLD = 0.5
 SAG = 2.0
 """[s] Time constant of the mean voltage: a motor that starts lets it sag for a moment."""
 STANDS, DRIVES = 0.05, 0.2
-"""[m/s] A wheel as slow stands; a car that is asked for as much should not, if it can go as slow."""
+"""[m/s] A wheel as slow stands; a car that is asked for as much, and can go as slow, should not."""
 MARGIN = 1.1
 """[-] Times the slowest that a car can go."""
 COMMANDS = 1000

@@ -80,7 +80,8 @@ class _Watch:
             cells={slot: car.cells for slot, car in charge.cars},
             watchdog={slot: car.watchdog for slot, car in charge.cars if car.watchdog},
             believed={
-                slot: Believed(car, charge.marks.get(car.port.name, {})) for slot, car in charge.cars
+                slot: Believed(car, charge.marks.get(car.port.name, {}))
+                for slot, car in charge.cars
             },
         )
         specs = [car.port for _, car in charge.cars]

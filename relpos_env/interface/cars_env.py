@@ -150,6 +150,7 @@ class CarsEnv(ParallelEnv, ABC):  # type: ignore[misc]
         if seed is not None or self._rng is None:
             self._rng = episode_rng(seed)
             self._group.seed(0, self._rng)
+        self._begun = False  # until all wishes are fulfilled
         # The checkers of PettingZoo pass an option of that name.
         self._begin({name: what for name, what in (options or {}).items() if name != "options"})
         self._begun = True

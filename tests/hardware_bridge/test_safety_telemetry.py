@@ -184,7 +184,13 @@ def test_words_of_others_and_old_ones_are_not_listened_to():
     port = PortSpec(name="cars.1", port="/dev/null")
     car = CarConfig(node=1, port=port, driver="relpos", key=bytes(16))
     believed = Believed(car, {1: (5, 2)})
-    said = [status(2, 0), status(3, 1), status(3, 0), status(4, 0, device="7"), status(1, 0, boot=4)]
+    said = [
+        status(2, 0),
+        status(3, 1),
+        status(3, 0),
+        status(4, 0, device="7"),
+        status(1, 0, boot=4),
+    ]
     assert [reading.fault for reading in believed.sift(said, 0)] == [1]
     drive = ready()
     drive.supervisor = Supervisor(

@@ -1,5 +1,7 @@
 """What the interfaces promise beyond their libraries' checkers."""
 
+from dataclasses import replace
+
 import gymnasium
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from runs import busy
 from relpos_env.errors import EnvError, UnknownArgument
 from relpos_env.formation_v0 import parallel_env
 from relpos_env.gym_env import FormationGymEnv
+from relpos_env.sb3_vec_env import FormationVecEnv
 from relpos_env.scenarios import SCENARIOS
 from relpos_env.vector_env import FormationVectorEnv
 
@@ -186,3 +189,54 @@ def test_a_scenario_with_a_gap_is_no_other_room():
     env = parallel_env(scenario="gap", task="gap")
     with pytest.raises(EnvError, match="scenario: expected"):
         env.reset(options={"scenario": SCENARIOS["hall"]})
+
+
+@pytest.mark.parametrize("name", ["furnish", "n_waves", "antenna_height"])
+def test_an_episode_has_no_other_scenario_in_parts(name):
+    made = SCENARIOS["ring-los"]
+    wished = {
+        "furnish": lambda: replace(made, furnish=lambda world, rng: None),
+        "n_waves": lambda: replace(made, mag=replace(made.mag, n_waves=24)),
+        "antenna_height": lambda: replace(made, radio=replace(made.radio, antenna_height=1.5)),
+    }[name]()
+    env = parallel_env(scenario="ring-los")
+    with pytest.raises(EnvError, match="scenario: expected the .* of the environment"):
+        env.reset(options={"scenario": wished})
+
+
+@pytest.mark.parametrize("make", [FormationGymEnv, parallel_env])
+def test_after_a_wish_that_cannot_be_there_is_no_episode(make):
+    env = make(scenario="ring-los", task="hold")
+    env.reset(seed=1)
+    with pytest.raises(EnvError, match="goals"):
+        env.reset(options={"goals": [[0.0, 0.0]]})
+    with pytest.raises(EnvError, match="must be reset first"):
+        env.step({} if make is parallel_env else np.zeros(env.action_space.shape, np.float32))
+
+
+def test_seats_of_sb3_take_options():
+    env = FormationVecEnv(scenario="ring-los", n_envs=2)
+    poses = [[x, 0.0, 0.0] for x in (-1.0, 0.0, 1.0)]
+    env.set_options({"poses": poses})
+    env.reset()
+    state = env.formation.state
+    assert np.allclose(state.pos_w[:, :3, 0], [-1.0, 0.0, 1.0], atol=0.05)
+    env.reset()
+    assert not np.allclose(state.pos_w[:, :3, 0], [-1.0, 0.0, 1.0], atol=0.05)
+    env.set_options({"nonsense": 1})
+    with pytest.raises(EnvError, match="options: expected names among"):
+        env.reset()
+
+
+def test_a_reward_term_is_asked_after_steps_alone():
+    asked = []
+
+    def term(formation):
+        asked.append(formation.cycles.copy())
+        return np.ones((formation.n_envs, formation.parts.n_cars)) / formation.cycles[:, None]
+
+    env = FormationVectorEnv(2, scenario="ring-los", reward=term)
+    env.reset(seed=1)
+    assert asked == []
+    env.step(env.action_space.sample())
+    assert len(asked) == 1

@@ -78,3 +78,14 @@ def test_the_checker_of_gymnasium_passes():
     check_env(FormationGymEnv(gate=True, max_cycles=10), skip_render_check=True)
     with pytest.raises(EnvError, match="gate: expected bool, got 1"):
         FormationGymEnv(gate=1)
+
+
+def test_an_episode_knows_nothing_of_the_one_before():
+    env = FormationGymEnv(scenario="ring-los", gate=True)
+    _, first = env.reset(seed=3)
+    for _ in range(15):
+        env.step(env.action_space.sample())
+    _, again = env.reset(seed=3)
+    for name in ("asked_speed", "allowed_speed", "allowed_steering", "stopped", "gate"):
+        np.testing.assert_array_equal(first[name], again[name], err_msg=name)
+    assert set(np.ravel(first["gate"])) == {"not armed"}

@@ -8,6 +8,7 @@ import pytest
 from runs import busy, drive, placed
 
 from relpos_env import group as group_module
+from relpos_env.bodies import NO_BOX
 from relpos_env.errors import EnvError
 from relpos_env.formation_v0 import parallel_env
 from relpos_env.gym_env import FormationGymEnv
@@ -195,3 +196,32 @@ def test_a_floor_plan_is_read_from_a_table(tmp_path):
     plan.unlink()
     with pytest.raises(EnvError, match="office.toml: floor_plan: cannot read 'office.csv'"):
         load_scenario(file)
+
+
+def test_queries_of_a_scenario_find_the_cars():
+    found = []
+
+    def look(world, rng):
+        for body in world.cars.values():
+            hits = world.space.point_query(body.position, 0.0, pymunk.ShapeFilter())
+            found.append(any(hit.shape.body is body for hit in hits))
+
+    env = parallel_env(scenario=replace(SCENARIOS["open"], furnish=look))
+    env.reset(seed=1)
+    assert found
+    assert all(found)
+
+
+def test_a_shape_is_seen_as_it_is_now_and_forgotten_once_it_is_gone():
+    env = parallel_env(scenario="open")
+    env.reset(seed=1)
+    swarm, space = env.formation.loop.swarm, env.unwrapped.world.space
+    ball = add_ball(space, (3.0, 3.0))
+    (shape,) = ball.shapes
+    for radius in (0.15, 0.5):
+        shape.unsafe_set_radius(radius)
+        env.step({agent: STILL for agent in env.agents})
+        assert np.isclose(2.0 * swarm.boxes[0, 0, 2], np.sqrt(np.pi) * radius)
+    space.remove(ball, shape)
+    env.step({agent: STILL for agent in env.agents})
+    np.testing.assert_array_equal(swarm.boxes[0, 0], NO_BOX)

@@ -135,8 +135,9 @@ def test_what_cannot_be_found_is_named(arguments, message):
 
 def test_a_reward_of_the_wrong_shape_is_refused():
     env = parallel_env(reward=lambda formation: np.zeros(7))
+    env.reset(seed=0)
     with pytest.raises(EnvError, match=r"reward: expected finite numbers \(1, 3\)"):
-        env.reset(seed=0)
+        env.step({agent: np.zeros(2, np.float32) for agent in env.agents})
 
 
 def test_entry_points_of_an_installed_package_are_names(tmp_path, monkeypatch):
