@@ -6,12 +6,13 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from tracking.constellation import Antenna, Constellation, NodeConfig
 from tracking.errors import LogError
 from tracking.log import Log, Truth, read_log, write_log
+from tracking.log.inertial import with_rates
 from tracking.measurements import Kind, MeasurementBlock
 
 META = """format = 1
@@ -209,6 +210,7 @@ finite = st.floats(-1e3, 1e3)
     st.booleans(),
     st.booleans(),
 )
+@example([0.0, 1.0, 3.0], 1.0, 0.0, False, False)
 def test_round_trip_is_exact(tmp_path_factory, times, distance, number, power, mag):
     t = np.sort(np.array(times))
     n = len(t)
@@ -263,3 +265,14 @@ def test_an_existing_folder_is_not_touched(folder):
     with pytest.raises(LogError, match="exists already"):
         write_log(folder, read_log(folder))
     assert sorted(folder.iterdir()) == before
+
+
+@pytest.mark.parametrize("period", [1.5, 1000.0, 1e-6])
+def test_samples_too_rare_or_too_frequent_are_refused(period):
+    block = MeasurementBlock.of_kind(
+        Kind.IMU, period * np.arange(40), np.zeros(40, dtype=np.int64), np.zeros((40, 6))
+    )
+    nodes = (NodeConfig(id=4, initial_heading=0.0), NodeConfig(id=7, initial_heading=0.0))
+    group = Constellation(nodes=nodes, dimensions=2, heading="initial")
+    with pytest.raises(LogError, match="samples a second of node 4, expected 1 to 10000"):
+        with_rates(group, block)

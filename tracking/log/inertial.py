@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tracking.arrays import F64
-from tracking.constellation import Constellation
+from tracking.constellation import FASTEST_HZ, SLOWEST_HZ, Constellation
 from tracking.errors import LogError
 from tracking.measurements import Kind, MeasurementBlock
 
@@ -64,11 +64,24 @@ def _check_times(
 
 
 def with_rates(constellation: Constellation, block: MeasurementBlock) -> Constellation:
-    """The constellation with the sensor rates that the recording shows."""
+    """The constellation with the sensor rates that the recording shows.
+
+    Raises:
+        LogError: Samples of a node come more rarely or more often than any tracker takes them.
+    """
     nodes = []
     for n, config in enumerate(constellation.nodes):
         mine = block.i[0] == n
-        imu_hz = _rate(block.t[0, mine & (block.kind[0] == Kind.IMU)]) or config.imu_hz
+        samples = block.t[0, mine & (block.kind[0] == Kind.IMU)]
+        imu_hz = _rate(samples)
+        is_known = imu_hz is not None and SLOWEST_HZ <= imu_hz <= FASTEST_HZ
+        if imu_hz is None or (len(samples) < FEW and not is_known):
+            imu_hz = config.imu_hz
+        elif not is_known:
+            raise LogError(
+                f"imu.csv, t_s: {imu_hz:g} samples a second of node {config.id}, expected "
+                f"{SLOWEST_HZ:g} to {FASTEST_HZ:g}"
+            )
         mag_hz = _rate(block.t[0, mine & (block.kind[0] == Kind.MAG)])
         nodes.append(
             replace(config, imu_hz=imu_hz, mag_hz=None if mag_hz in (0.0, imu_hz) else mag_hz)
