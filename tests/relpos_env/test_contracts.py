@@ -12,7 +12,6 @@ from runs import busy
 from relpos_env.errors import EnvError, UnknownArgument
 from relpos_env.formation_v0 import parallel_env
 from relpos_env.gym_env import FormationGymEnv
-from relpos_env.sb3_vec_env import FormationVecEnv
 from relpos_env.scenarios import SCENARIOS
 from relpos_env.vector_env import FormationVectorEnv
 
@@ -212,20 +211,6 @@ def test_after_a_wish_that_cannot_be_there_is_no_episode(make):
         env.reset(options={"goals": [[0.0, 0.0]]})
     with pytest.raises(EnvError, match="must be reset first"):
         env.step({} if make is parallel_env else np.zeros(env.action_space.shape, np.float32))
-
-
-def test_seats_of_sb3_take_options():
-    env = FormationVecEnv(scenario="ring-los", n_envs=2)
-    poses = [[x, 0.0, 0.0] for x in (-1.0, 0.0, 1.0)]
-    env.set_options({"poses": poses})
-    env.reset()
-    state = env.formation.state
-    assert np.allclose(state.pos_w[:, :3, 0], [-1.0, 0.0, 1.0], atol=0.05)
-    env.reset()
-    assert not np.allclose(state.pos_w[:, :3, 0], [-1.0, 0.0, 1.0], atol=0.05)
-    env.set_options({"nonsense": 1})
-    with pytest.raises(EnvError, match="options: expected names among"):
-        env.reset()
 
 
 def test_a_reward_term_is_asked_after_steps_alone():

@@ -11,6 +11,7 @@ from stable_baselines3.common.env_checker import check_env
 from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.vec_env import SubprocVecEnv, VecMonitor, VecNormalize
 
+from relpos_env.errors import EnvError
 from relpos_env.formation_v0 import parallel_env
 from relpos_env.gym_env import FormationGymEnv
 from relpos_env.interface.actions import ACTIONS
@@ -137,3 +138,17 @@ def test_in_processes_of_its_own():
         if dones[1]:
             observation, _ = single.reset()
     env.close()
+
+
+def test_seats_take_options_for_their_rooms():
+    env = FormationVecEnv(scenario="ring-los", n_envs=2)
+    poses = [[x, 0.0, 0.0] for x in (-1.0, 0.0, 1.0)]
+    env.set_options({"poses": poses})
+    env.reset()
+    state = env.formation.state
+    assert np.allclose(state.pos_w[:, :3, 0], [-1.0, 0.0, 1.0], atol=0.05)
+    env.reset()
+    assert not np.allclose(state.pos_w[:, :3, 0], [-1.0, 0.0, 1.0], atol=0.05)
+    env.set_options({"nonsense": 1})
+    with pytest.raises(EnvError, match="options: expected names among"):
+        env.reset()
