@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
-.PHONY: demo demo-hardware test check format clean
+.PHONY: demo demo-hardware test check lowest format clean
 
 demo: $(VENV)/.core
 	$(BIN)/relpos demo --out demo
@@ -22,6 +22,16 @@ check: $(VENV)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# Whether everything imports with the lowest versions that pyproject.toml admits.
+lowest: .venv-lowest/.installed
+	.venv-lowest/bin/python tests/lowest_versions.py import
+
+.venv-lowest/.installed: pyproject.toml
+	@echo "installing the lowest versions into .venv-lowest ..."
+	$(PYTHON) -m venv .venv-lowest
+	.venv-lowest/bin/python -m pip --disable-pip-version-check --quiet install $$($(PYTHON) tests/lowest_versions.py)
+	@touch $@
 
 format: $(VENV)/.dev
 	$(BIN)/ruff format .
@@ -48,5 +58,5 @@ $(VENV)/.hardware: pyproject.toml constraints.txt | $(BIN)/python
 	@touch $@ $(VENV)/.core
 
 clean:
-	rm -rf $(VENV) demo demo-hardware .mypy_cache .ruff_cache .pytest_cache .import_linter_cache
+	rm -rf $(VENV) .venv-lowest demo demo-hardware .mypy_cache .ruff_cache .pytest_cache .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
