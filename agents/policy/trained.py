@@ -15,7 +15,7 @@ from agents.policy.find import MOST_CARD, MOST_NETWORK, find_policy, read_bounde
 from agents.policy.layout import Layout
 from agents.policy.network import Network
 from agents.policy.padding import PaddedDriver
-from agents.policy.trial import try_network
+from agents.policy.trial import SLACK, try_network
 from relpos_env.interface.actions import MAX_SPEED, MAX_STEERING
 from relpos_env.interface.observations.base import F32
 from relpos_env.timing import DECISION
@@ -58,9 +58,11 @@ class TrainedPolicy:
         if not prod(lead):
             return np.zeros((*lead, 2), dtype=np.float32)
         actions = self._network(np.ascontiguousarray(rows.reshape(-1, self._size)))
-        # The sum is finite unless one of them is not: they are within -1 and 1.
-        if not np.isfinite(actions.sum()):
-            raise PolicyError(self.card.name, "actions: expected finite numbers, got others")
+        if not (largest := np.abs(actions).max()) <= 1.0 + SLACK:
+            wrong = f"{largest:g}" if np.isfinite(largest) else "others"
+            raise PolicyError(
+                self.card.name, f"actions: expected finite numbers from -1 to 1, got {wrong}"
+            )
         return actions.reshape(*lead, 2)
 
     def driver(self, layout: Layout, *, decision: float = DECISION) -> Driver:
