@@ -62,8 +62,36 @@ def bind(kernel: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
     if config.DISABLE_JIT:
         return partial(kernel, *arguments)
     compiled: Any = kernel
-    entry = compiled.compile(tuple(typeof(argument) for argument in arguments))
+    entry = compiled.compile(tuple(_type_of(argument) for argument in arguments))
     return partial(entry, *arguments)
+
+
+_types: dict[Any, Any] = {}
+"""Numba's types by what they depend on: parts of a batch are bound again and again."""
+
+
+def _type_of(value: Any) -> Any:
+    kind = _kind_of(value)
+    if kind is None:
+        return typeof(value)
+    if kind not in _types:
+        _types[kind] = typeof(value)
+    return _types[kind]
+
+
+def _kind_of(value: Any) -> tuple[Any, ...] | None:
+    """What the type of an array, a number or a tuple of them depends on; None for all else."""
+    if type(value) is np.ndarray:
+        flags, dtype = value.flags, value.dtype
+        layout = flags.c_contiguous, flags.f_contiguous, flags.writeable, flags.aligned
+        return dtype, dtype.isalignedstruct, value.ndim, *layout
+    if isinstance(value, tuple):
+        kinds = [_kind_of(each) for each in value]
+        return None if any(kind is None for kind in kinds) else (type(value), *kinds)
+    if type(value) is int:
+        bits = value.bit_length()
+        return (int, bits < 31) if bits < 63 else None
+    return (type(value),) if type(value) in (bool, float, np.float64) else None
 
 
 def fingerprint(kernel: Any) -> str:

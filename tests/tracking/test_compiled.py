@@ -2,9 +2,13 @@
 
 import subprocess
 import sys
+from typing import NamedTuple
 
+import numpy as np
 import pytest
-from numba import config
+from numba import config, typeof
+
+from tracking.compiled import _type_of
 
 KERNEL = """
 from tracking.compiled import kernel
@@ -107,3 +111,30 @@ def test_a_cache_that_cannot_be_read_is_replaced(folder, damage):
             path.write_bytes(path.read_bytes()[:-20])
     assert results(folder) == "2 0"
     assert results(folder) == "2 1"
+
+
+class Pair(NamedTuple):
+    a: object
+    b: object
+
+
+def of_types():
+    plain = np.zeros((3, 4))
+    fixed = plain.copy()
+    fixed.flags.writeable = False
+    record = np.dtype([("x", np.float64), ("n", np.int8)])
+    aligned = np.dtype([("x", np.float64), ("n", np.int8)], align=True)
+    arrays = [
+        plain, plain.T, plain[:, ::2], plain[0], plain[:1, :1], fixed, plain.astype(np.float32),
+        np.zeros(3, record), np.zeros(3, aligned), np.zeros(24, np.uint8)[1:17].view(np.float64),
+    ]  # fmt: skip
+    numbers = [True, 1, -1, 1 << 30, -(1 << 31), 1 << 40, (1 << 62) + 1, (1 << 63) + 1, 1.5]
+    numbers += [np.float64(1.0), np.float32(1.0), np.int64(3), np.bool_(True), None]
+    rest = [(plain, 1), (plain, 1 << 40), Pair(plain, fixed), Pair(fixed, plain), ("a", plain), ()]
+    return [*arrays, *numbers, *rest]
+
+
+def test_remembered_types_are_those_of_numba():
+    for _ in range(2):
+        for value in of_types():
+            assert _type_of(value) == typeof(value), value
