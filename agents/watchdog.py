@@ -1,7 +1,7 @@
-"""How long cars go on by themselves when they hear nothing.
+"""Measure the watchdog of each car: the time from its last command until its wheels slow down.
 
-Measured with their wheels off the ground: a car is told to drive until its own telemetry says that
-it does, then it is told nothing, and the time until its wheels are at half that speed is taken.
+The wheels are off the ground. Commands are sent until the telemetry reports the speed, then no
+more, and the time until the telemetry reports half that speed is the result.
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ SECOND_NS = 1_000_000_000
 GRAIN = 0.05
 """[s] What is measured is rounded up to multiples of it."""
 STEADY = 0.5
-"""[s] For which the wheels turn before the car is told nothing."""
+"""[s] Time at speed before the last command."""
 IN_A_ROW = 3
-"""[-] So many words of a car that its wheels are slow are believed."""
+"""[-] Consecutive slow readings that end a measurement."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +132,7 @@ def _set(text: str, car: int, seconds: float) -> str:
 
 
 def _boot(config: SwarmConfig) -> int:
-    """Of what the cars are told: higher than that of any start before."""
+    """Return the boot number of the commands, higher than that of any earlier start."""
     wall_s = time.time_ns() // SECOND_NS
     if config.marks is None:
         return wall_s
@@ -170,7 +170,7 @@ class _Trial:
         try:
             return self._measure(max(SPEED, 1.2 * driver.slowest))
         finally:
-            # Nobody knows whether it stops by itself, whatever ended this.
+            # The watchdog is unknown: only this stops the car, also after an exception.
             self._stop()
 
     def _measure(self, speed: float) -> Watchdog:

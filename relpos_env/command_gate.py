@@ -18,7 +18,7 @@ class CommandGate(Protocol):
     """Of a batch of rooms."""
 
     def reset(self, env: int) -> None:
-        """Begin anew in one room."""
+        """Reset one room."""
 
     def allow(self, view: View, speed: F64, steering: F64) -> tuple[F64, F64]:
         """Speed [m/s] and steering [rad] that the cars may do, each (env, car)."""

@@ -104,7 +104,7 @@ class TrackedSwarm:
         rngs: Sequence[np.random.Generator],
         watch: Callable[[Swarm], None] | None = None,
     ) -> None:
-        """Begin some groups anew and let them stand while their trackers are switched on.
+        """Reset some groups and let them stand while their trackers are switched on.
 
         Args:
             envs: Which, ascending.

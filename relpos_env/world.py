@@ -34,7 +34,7 @@ BOX_DENSITY = 8.0
 """[kg/m2] Of a movable box, over its floor area: cardboard with little in it. The motor of a car
 moves one of up to 0.4 m; what is larger yields to a blow only."""
 MOST_KNOWN = 100
-"""[-] So many rectangles are kept."""
+"""[-] Largest number of cached rectangles."""
 REST = 1e-4
 """[m/s, rad/s] A box that is slower stands."""
 

@@ -74,7 +74,7 @@ def _measure(
         raise UsageError(
             "--watchdog: expected --wheels-up as well, once all wheels are off the ground"
         )
-    # However it is ended from outside, the car is told to stand.
+    # A termination signal must still send neutral to the car.
     for name in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(name, signal.default_int_handler)
     found = measure_watchdogs(swarm, tell=lambda line: click.echo(line, err=True))

@@ -239,7 +239,7 @@ RULES = (
         "stops for good where it is by `runaway_speed` for `runaway_time`",
     ),
     Rule(
-        "deaf", deaf, "it does not do what it is told",
+        "deaf", deaf, "it does not execute commands",
         "stops for good without an answer, or a word of its speed, for `answer_time` (controllers "
         "that give them), or when its wheels stand for `idle_time` although it is asked to drive",
     ),

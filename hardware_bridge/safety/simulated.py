@@ -37,7 +37,7 @@ class SimulatedGate:
         self._reason = np.full(shape, NOT_ARMED)
 
     def reset(self, env: int) -> None:
-        """Begin anew in one room."""
+        """Reset one room."""
         self._gates[env] = Gate(self._params, 1, self._asked.shape[1])
         self._asked[env] = self._speed[env] = self._steering[env] = 0.0
         self._stopped[env], self._reason[env] = True, NOT_ARMED

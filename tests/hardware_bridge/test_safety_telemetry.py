@@ -139,8 +139,8 @@ def test_a_car_that_answers_nothing_is_never_armed_and_one_that_stops_answering_
     drive = Telling(answers=True)
     drive.tick(120)
     assert [n.text.split(";")[0] for n in drive.arm()] == [
-        "cars.1 not armed: it does not do what it is told",
-        "cars.2 not armed: it does not do what it is told",
+        "cars.1 not armed: it does not execute commands",
+        "cars.2 not armed: it does not execute commands",
     ]
     drive.answer(100)
     assert len(drive.arm()) == 1
