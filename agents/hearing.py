@@ -39,6 +39,14 @@ class Format(Protocol):
         """[1/s] Of the device as it is usually set."""
 
     @property
+    def request(self) -> bytes:
+        """Sent when the port comes up."""
+
+    @property
+    def dtr(self) -> bool:
+        """The line DTR."""
+
+    @property
     def keyed(self) -> bool:
         """Whether messages may carry a code."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from agents.errors import UsageError
@@ -86,6 +86,8 @@ def sniff(
     if baud is None:
         baud = formats[format].baud if format is not None else USUAL_BAUD
     spec = PortSpec(name="port", port=port, baud=baud)
+    if format is not None:
+        spec = replace(spec, request=formats[format].request, dtr=formats[format].dtr)
     Hearing.get_ready(formats)
     hearing = Hearing(formats, key)
     chooser = _Chooser(hearing, format, show)

@@ -108,6 +108,16 @@ class NearReading(NamedTuple):
     """[m] From the car's body to what is nearest in that direction; None where nothing is."""
 
 
+class ScanReading(NamedTuple):
+    """What a scanner of its own port measured, from where it is on the car."""
+
+    source: Source
+    bearing: float
+    """[rad] From the scanner's front, left is positive."""
+    distance: float | None
+    """[m] From the scanner; None where nothing was measured."""
+
+
 class StatusReading(NamedTuple):
     """How a device does."""
 
@@ -198,6 +208,7 @@ Reading: TypeAlias = (
     | RangeReading
     | MotionReading
     | NearReading
+    | ScanReading
     | StatusReading
     | AckReading
     | HeartbeatReading

@@ -11,6 +11,8 @@ from hardware_bridge.config.keys import check_node, node_id, tables_of, without
 from hardware_bridge.config.swarm import CarConfig, LinkConfig
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.ports import PortSpec
+from hardware_bridge.live.scanner import ScannerMount
+from hardware_bridge.readings import ScanReading
 from hardware_bridge.wire.key import parse_key
 from tracking.constellation import Constellation
 from tracking.tables import TableReader, Where
@@ -27,6 +29,7 @@ class _Link:
     baud: int | None = None
     node: int | None = None
     key: str | None = None
+    scanner: ScannerMount = ScannerMount()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,17 +67,25 @@ def read_links(
             check_node(link.node, group, at.key("node"))
         elif not (entry.names_itself or entry.tells_of_others):
             raise at.key("node").error(f"missing: {link.format} does not say who speaks")
+        is_scanner = ScanReading in entry.tells
+        if "scanner" in table and not is_scanner:
+            raise at.key("scanner").error(f"{link.format} is no scanner, leave it out")
+        if not (0.01 <= link.scanner.length <= 5.0 and 0.01 <= link.scanner.width <= 5.0):
+            raise at.key("scanner").error("expected a length and a width of 0.01 to 5 m")
         yield LinkConfig(
             name=key,
             port=PortSpec(
                 name=f"links.{key}",
                 port=_placed(link.port, beside, at),
                 baud=_baud(link.baud, entry.baud, at),
+                request=entry.request,
+                dtr=entry.dtr,
             ),
             format=link.format,
             node=link.node,
             ids=named,
             key=_key(link.key, at),
+            scanner=link.scanner if is_scanner else None,
         )
 
 

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from hardware_bridge.links.ports import PortSpec
 from hardware_bridge.live.ready_params import ReadyParams
+from hardware_bridge.live.scanner import ScannerMount
 from hardware_bridge.safety.params import SafetyParams
 from tracking.constellation import Constellation
 from tracking.filters import DEFAULT_FILTER
@@ -28,6 +29,8 @@ class LinkConfig:
     """Device id, as `Source.device` has it, to node."""
     key: bytes | None = None
     """Of the MAC, 16 bytes; None takes messages without one."""
+    scanner: ScannerMount | None = None
+    """Where it is on its car, if the stream is a scanner's."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -14,6 +14,7 @@ from hardware_bridge.decoders.dwm1001 import dwm1001_decoder
 from hardware_bridge.decoders.linktrack import linktrack_decoder
 from hardware_bridge.decoders.positions import positions_decoder
 from hardware_bridge.decoders.relpos import RelposDecoder
+from hardware_bridge.decoders.rplidar import REQUEST, RplidarDecoder
 from hardware_bridge.decoders.uwb_core import uwb_core_decoder
 from hardware_bridge.decoders.witmotion import witmotion_decoder
 from hardware_bridge.errors import BridgeError
@@ -26,6 +27,7 @@ from hardware_bridge.readings import (
     PairReading,
     PoseReading,
     RangeReading,
+    ScanReading,
     StateReading,
     StatusReading,
 )
@@ -53,6 +55,10 @@ class DecoderEntry:
     """Messages carry a code that only holders of the key can make."""
     checked: bool = False
     """Frames carry a check sum; else a damaged digit can pass."""
+    request: bytes = b""
+    """Sent when the port comes up, to a device that measures only then."""
+    dtr: bool = True
+    """The line DTR; off for a device whose motor it stops."""
 
 
 DECODERS: dict[str, DecoderEntry] = {
@@ -104,6 +110,13 @@ DECODERS: dict[str, DecoderEntry] = {
         build=lambda key: witmotion_decoder(),
         tells=(ImuReading,),
         checked=True,
+    ),
+    "rplidar": DecoderEntry(
+        device="Slamtec RPLidar, standard scan",
+        build=lambda key: RplidarDecoder(),
+        tells=(ScanReading,),
+        request=REQUEST,
+        dtr=False,
     ),
     "positions": DecoderEntry(
         device="any tracker that writes lines of positions",

@@ -21,7 +21,8 @@ class Links:
     """The ports of one process, used by one thread.
 
     Laws: no byte is lost or doubled while a port is up; whatever one port does, the others go on;
-    nothing is ever sent that was not asked for by `send` since the port came up.
+    nothing is ever sent but the port's own request when it comes up, and what was asked for by
+    `send` since then.
     """
 
     def __init__(
@@ -217,6 +218,8 @@ class Links:
         link.reason, link.since_ns, link.retry_ns = "", self._now_ns(), None
         self._by_fd[fd] = link
         self._notices.append(LinkNotice(link.spec.name, link.since_ns, up=True))
+        if link.spec.request:
+            self.send(link.spec.name, link.spec.request)
 
     def _lose(self, link: LinkState, error: Exception) -> None:
         """A port that was open failed."""

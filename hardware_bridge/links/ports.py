@@ -16,6 +16,10 @@ class PortSpec:
     number of an adapter, ``tcp:host:port``, or ``file:path`` for a file that may still grow."""
     baud: int = 115200
     """[1/s] Without meaning for TCP and files."""
+    request: bytes = b""
+    """Sent each time the port comes up, to a device that measures only when it is asked."""
+    dtr: bool = True
+    """The line DTR of a serial port while it is open."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,6 +37,7 @@ from hardware_bridge.readings import (
     PoseReading,
     RangeReading,
     Reading,
+    ScanReading,
     Source,
     StateReading,
     StatusReading,
@@ -142,7 +143,8 @@ class Intake:
 
     def _stream(self, link: LinkConfig, identities: Identities) -> Stream:
         decoder = make_decoder(link.format, link.key)
-        return Stream(link.port.name, decoder, link.node, dict(link.ids), identities)
+        args = link.port.name, decoder, link.node, dict(link.ids), identities
+        return Stream(*args, scanner=link.scanner)
 
     def _telemetry(self, car: CarConfig) -> Stream:
         driver = make_driver(car.driver, car.node, car.options, car.key, 0, lambda: 0)
@@ -175,6 +177,9 @@ class Intake:
         if source is not stream.source or source is NOBODY:
             self._judge(stream, source, node, arrival_ns)
         if not stream.verdict.accepted:
+            return
+        if isinstance(reading, ScanReading):
+            self.near.take_scan(node, reading, stream.scanner, arrival_ns)
             return
         if isinstance(reading, NearReading):
             self.near.take(node, reading.bearing, reading.distance, arrival_ns)
@@ -246,14 +251,11 @@ class Intake:
     def _use_range(
         self, stream: Stream, reading: RangeReading, node: int, t_ns: int, arrival_ns: int
     ) -> bool:
-        near = node
+        near: int | None = node
         if reading.nearer is not None:
-            end = self._naming.index(stream, reading.nearer, arrival_ns)
-            if end is None:
-                return False
-            near = end
+            near = self._naming.index(stream, reading.nearer, arrival_ns)
         far = self._naming.index(stream, reading.to, arrival_ns, named=True)
-        if far is None or far == near:
+        if near is None or far is None or far == near:
             return False
         if not self.plausibility.allows_range(near, far, reading.distance, t_ns):
             return False
@@ -279,17 +281,15 @@ class Intake:
         if not stream.verdict.accepted:
             return
         node = self._naming.index(stream, reading.to, arrival_ns, named=True)
-        x, y = reading.velocity
-        if node is not None and np.isfinite(x) and np.isfinite(y):
-            self.trim[node] = arrival_ns, (x, y)
+        if node is not None and np.isfinite(reading.velocity).all():
+            self.trim[node] = arrival_ns, reading.velocity
 
     def _note_fault(self, stream: Stream, node: int, fault: int, arrival_ns: int) -> None:
         if fault == self.fault.get((stream.name, node), 0):
             return
         self.fault[stream.name, node] = fault
         what = f"reports fault {fault}" if fault else "reports no fault any more"
-        text = f"{stream.name}: node {self.group.ids[node]} {what}"
-        self.notices.append((arrival_ns, text))
+        self.notices.append((arrival_ns, f"{stream.name}: node {self.group.ids[node]} {what}"))
 
 
 def _only_antenna(group: Constellation, node: int) -> int:

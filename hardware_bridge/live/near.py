@@ -6,6 +6,8 @@ import math
 
 import numpy as np
 
+from hardware_bridge.live.scanner import ScannerMount
+from hardware_bridge.readings import ScanReading
 from relpos_env.interface.beams import FARTHEST
 from tracking.arrays import F64, I64
 
@@ -44,6 +46,16 @@ class Near:
         is_old = t_ns - self._t_ns[slot, beam] > LASTS * 1e9
         if is_old or seen <= self._distance[slot, beam]:
             self._distance[slot, beam], self._t_ns[slot, beam] = seen, t_ns
+
+    def take_scan(
+        self, slot: int, reading: ScanReading, mount: ScannerMount | None, t_ns: int
+    ) -> None:
+        """What a scanner measured; a direction without a distance tells nothing."""
+        if reading.distance is None or mount is None:
+            return
+        seen = mount.seen(reading.bearing, reading.distance)
+        if seen is not None:
+            self.take(slot, *seen, t_ns)
 
     def beams(self, t_ns: int) -> F64:
         """Distances now, (slot, beam) [m]; 0, a touch, where nothing was measured of late."""

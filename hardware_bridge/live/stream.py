@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from hardware_bridge.clocks import DeviceTime, EvenTime, HostTime, StreamTime
 from hardware_bridge.decoders.base import Decoder
 from hardware_bridge.identity import Identities, Verdict
+from hardware_bridge.live.scanner import ScannerMount
 from hardware_bridge.readings import (
     AckReading,
     DeviceClock,
@@ -33,6 +34,8 @@ class Stream:
     identities: Identities
     is_car: bool = False
     """Of a car's controller: nobody else speaks there."""
+    scanner: ScannerMount | None = None
+    """Where it is on its car, if it is one."""
     times: dict[int, StreamTime] = field(default_factory=dict)
     """By node index."""
     clocks: dict[int, DeviceClock] = field(default_factory=dict)

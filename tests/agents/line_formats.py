@@ -54,6 +54,8 @@ class LineFormat:
     name: str
     baud: int
     keyed: bool = False
+    request: bytes = b""
+    dtr: bool = True
 
     def build(self, key):
         assert key is None or self.keyed

@@ -355,7 +355,8 @@ def said_by(encoder, device, to):
         imu = ImuReading(source, (0.01 * k, 0.0, 0.0), (0.0, 0.0, 9.8))
         ranging = RangeReading(source, to, 3.0 + k / 100, rx_power=-80.0, fp_power=-82.0)
         pose = PoseReading(source, device, (3.0, 0.0, 0.0))
-        said.append(encoder.encode([imu, ranging, pose]))
+        scan = ScanReading(source, -0.05 * k, 2.0)
+        said.append(encoder.encode([imu, ranging, pose, scan]))
     return said
 
 

@@ -6,7 +6,7 @@ from random import Random
 from decoder_samples import SAMPLES, decoder_of
 
 from hardware_bridge.decoders.base import MOST_WAITING
-from hardware_bridge.readings import ImuReading, RangeReading
+from hardware_bridge.readings import ImuReading, RangeReading, ScanReading
 
 
 def flip_bit(rng, frame, other):
@@ -92,7 +92,8 @@ def fuzz(name, chunks, seed=0, check_every=4):
 
 def wrongly_accepted(name, kind, trials, seed=0):
     """Of how many damaged frames comes a reading that nobody sent, and of how many a wrong
-    distance to a device that is known: an unknown one is refused by the configuration."""
+    distance, of a scanner or to a device that is known: an unknown one is refused by the
+    configuration."""
     rng = Random(seed)
     frames = [f for f in SAMPLES[name].all_frames if decoder_of(name).feed(f)]
     true = {f: decoder_of(name).feed(f) for f in frames}
@@ -110,5 +111,8 @@ def wrongly_accepted(name, kind, trials, seed=0):
         told = {(r.to, r.distance) for r in sent if isinstance(r, RangeReading)}
         known = {to for to, _ in told}
         ranges = [r for r in strange if isinstance(r, RangeReading)]
-        wrong_distance += any(r.to in known and (r.to, r.distance) not in told for r in ranges)
+        far = {r.distance for r in sent if isinstance(r, ScanReading)}
+        wrong_distance += any(
+            r.to in known and (r.to, r.distance) not in told for r in ranges
+        ) or any(r.distance not in far for r in strange if isinstance(r, ScanReading))
     return wrong, wrong_distance

@@ -144,6 +144,30 @@ def relpos_frames():
 KEY = bytes(range(16))
 RELPOS = relpos_frames()
 
+
+def scanned(*samples):
+    """Samples of an RPLidar, bit by bit: angle [1/64 deg] and distance [1/4 mm]."""
+    frames = [
+        bytes(
+            (
+                0xBE if k else 0xBD,
+                angle % 128 << 1 | 1,
+                angle // 128,
+                distance % 256,
+                distance // 256,
+            )
+        )
+        for k, (angle, distance) in enumerate(samples)
+    ]
+    return b"".join(frames)
+
+
+RPLIDAR = (
+    scanned(*((64 * k, 4000 + 40 * k) for k in range(12))),
+    scanned(*((23039 - 64 * k, 0 if k % 3 else 65535) for k in range(11, -1, -1))),
+    scanned(*((9000 + 57 * k, 700 + 9 * k) for k in range(10))),
+)
+
 SAMPLES = {
     "relpos": Sample(
         unit=RELPOS[0],
@@ -183,6 +207,12 @@ SAMPLES = {
         tokens=(b'{"time": ', b'"i": 1, "j": 2, ', b'"pos": [', b'"cov": [[', b'"q": [', b"NaN",
                 b"null", b"1e999", b"9" * 900, b"[" * 900, b"\n", b'"node": "', b"\\u0664",
                 b"true"),
+    ),
+    "rplidar": Sample(
+        unit=RPLIDAR[0],
+        frames=RPLIDAR[1:],
+        tokens=(b"\xbd", b"\xbe", b"\xa5\x5a\x05\0\0\x40\x81", b"\xbe\x01\x2d\0\0"),
+        end=b"\xa5\x5a\x05\0\0\x40\x81",
     ),
     "witmotion": Sample(
         unit=ACC + GYR + MAG,

@@ -1,11 +1,14 @@
 """What the devices' ends write is what the decoders read, within the resolution of the format."""
 
+import math
+
 import pytest
 from decoder_samples import decoder_of
 from hypothesis import given
 from hypothesis import strategies as st
 
 from hardware_bridge.decoders import DECODERS
+from hardware_bridge.decoders.rplidar import LOCK
 from hardware_bridge.emulator.encoders import ENCODERS, make_encoder
 from hardware_bridge.emulator.encoders.ticks import ticks_on
 from hardware_bridge.errors import BridgeError
@@ -18,6 +21,7 @@ from hardware_bridge.readings import (
     HeartbeatReading,
     ImuReading,
     RangeReading,
+    ScanReading,
     Source,
     StatusReading,
 )
@@ -127,6 +131,32 @@ def test_witmotion(samples, has_mag):
         assert (ours.mag is None) == (theirs.mag is None)
         assert ours.mag is None or ours.mag == pytest.approx(theirs.mag, abs=0.051)
     assert len(got) >= len(sent)
+
+
+@given(
+    metres=st.lists(st.floats(0.01, 16.0) | st.none(), min_size=8, max_size=400),
+    first=st.floats(-math.pi, math.pi),
+    step=st.floats(0.003, 0.3),
+)
+def test_rplidar(metres, first, step):
+    sent = [ScanReading(NOBODY, first - k * step, m) for k, m in enumerate(metres)]
+    got = decoded("rplidar", "scanner", sent)
+    sent = [reading for reading in sent if reading.distance is not None]
+    for ours, theirs in zip(got, sent, strict=True):
+        turn = math.remainder(ours.bearing - theirs.bearing, 2.0 * math.pi)
+        assert turn == pytest.approx(0.0, abs=0.00014)
+        assert ours.distance == pytest.approx(theirs.distance, abs=0.00013)
+
+
+def test_rplidar_is_not_read_before_enough_samples_follow_each_other():
+    encoder, decoder = make_encoder("rplidar", ""), decoder_of("rplidar")
+    sent = [ScanReading(NOBODY, -0.02 * k, 1.0) for k in range(20)]
+    counts = [len(decoder.feed(encoder.encode([reading]))) for reading in sent]
+    assert counts == [0] * (LOCK - 1) + [LOCK] + [1] * (20 - LOCK)
+    jump = encoder.encode([ScanReading(NOBODY, -0.02 * 20 - 1.5, 1.0)])
+    assert decoder.feed(jump) == []
+    still = decoder_of("rplidar")
+    assert still.feed(encoder.encode([ScanReading(NOBODY, 1.0, 1.0)]) * 30) == []
 
 
 def test_witmotion_stops_at_its_limits():

@@ -12,6 +12,7 @@ from hardware_bridge.emulator.encoders.dw1000 import Dw1000Encoder
 from hardware_bridge.emulator.encoders.dwm1001 import Dwm1001Encoder
 from hardware_bridge.emulator.encoders.linktrack import LinkTrackEncoder
 from hardware_bridge.emulator.encoders.positions import PositionsEncoder
+from hardware_bridge.emulator.encoders.rplidar import RplidarEncoder
 from hardware_bridge.emulator.encoders.uwb_core import UwbCoreEncoder
 from hardware_bridge.emulator.encoders.witmotion import WitMotionEncoder
 from hardware_bridge.errors import BridgeError
@@ -22,6 +23,7 @@ ENCODERS: dict[str, Callable[[str], Encoder]] = {
     "dw1000": Dw1000Encoder,
     "dwm1001": Dwm1001Encoder,
     "witmotion": WitMotionEncoder,
+    "rplidar": RplidarEncoder,
     "positions": PositionsEncoder,
 }
 """Name of the format to what builds the encoder of the device of that name."""

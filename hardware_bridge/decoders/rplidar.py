@@ -1,0 +1,117 @@
+"""Slamtec RPLidar and those that speak like it, standard scan: five bytes a sample [1].
+
+    quality << 2 | not start << 1 | start, angle << 1 | 1, angle >> 7, distance low, distance high
+
+The angle counts 1/64 degree, clockwise from the scanner's front; the distance counts quarters of
+a millimetre, and 0 is a direction in which nothing was measured, which tells nothing.
+
+There is no check sum. So samples are believed once `LOCK` of them follow each other: the two bits
+contradict each other, the third is set, and the angle goes on as that of something that turns. A
+scanner corrects each angle for its parallax, so neighbours may also go back a little.
+
+References:
+    [1] Slamtec, RPLIDAR Interface Protocol and Application Notes, v2.2, section 4, "SCAN" and
+        section 5, "MOTOR_PWM".
+"""
+
+from __future__ import annotations
+
+import struct
+from math import pi
+
+from hardware_bridge.counts import Counts
+from hardware_bridge.readings import Reading, ScanReading, Source
+
+SAMPLE = struct.Struct("<BHH")
+ANGLE_UNIT = pi / 180.0 / 64.0
+"""[rad]"""
+TURN = 360 * 64
+"""[1/64 deg]"""
+DISTANCE_UNIT = 0.00025
+"""[m]"""
+LOCK = 8
+"""[-] So many samples in a row make sure where samples begin."""
+FARTHEST_STEP = 20 * 64
+"""[1/64 deg] From one sample to the next: a slow scanner that turns fast makes 5 deg."""
+LEAST_TURN = 32
+"""[1/64 deg] Over `LOCK` samples; the densest scanner makes 0.8 deg."""
+REQUEST = bytes.fromhex("a5f0029402c1 a520")
+"""Turn the motor, where the adapter has a line for that, and scan; others ignore the first."""
+
+
+class RplidarDecoder:
+    """The decoder of one port."""
+
+    def __init__(self) -> None:
+        self.counts = Counts()
+        self._kept = bytearray()
+        self._run: list[Reading | None] = []
+        """Of samples that follow each other and are not believed yet; None without a distance."""
+        self._n_run = 0
+        """Samples in a row, `LOCK` where they are believed."""
+        self._angle = self._turned = 0
+        """Of the last sample, and since the first of the run [1/64 deg]."""
+
+    @property
+    def waiting(self) -> int:
+        """Bytes of samples that are not believed yet."""
+        return len(self._kept)
+
+    def feed(self, data: bytes) -> list[Reading]:
+        """Take bytes as they come and return what they complete, in order."""
+        self.counts.n_bytes += len(data)
+        kept, source = self._kept, Source()
+        kept += data
+        readings: list[Reading] = []
+        begin, at = 0, self._unbelieved * SAMPLE.size
+        while at + SAMPLE.size <= len(kept):
+            head, angle, distance = SAMPLE.unpack_from(kept, at)
+            if self._follows(head, angle):
+                at += SAMPLE.size
+                reading = None
+                if distance:
+                    bearing = -(angle >> 1) * ANGLE_UNIT
+                    reading = ScanReading(source, bearing, distance * DISTANCE_UNIT)
+                self._run.append(reading)
+                if self._n_run < LOCK:
+                    continue
+                begin = at
+                self._release(readings)
+            elif self._n_run:
+                # A believed sample is done with; of others any byte may begin the first.
+                at = begin if self._n_run == LOCK else begin + 1
+                self.counts.strange += at - begin
+                begin = at
+                self._n_run = 0
+                self._run.clear()
+            else:
+                begin = at = at + 1
+                self.counts.strange += 1
+        del kept[:begin]
+        return readings
+
+    @property
+    def _unbelieved(self) -> int:
+        return 0 if self._n_run == LOCK else self._n_run
+
+    def _follows(self, head: int, angle: int) -> bool:
+        """Take a sample into the run, if it can be one and be the next."""
+        if (head ^ head >> 1) & angle & 1 == 0 or angle >> 1 >= TURN:
+            return False
+        angle >>= 1
+        step = (angle - self._angle + TURN // 2) % TURN - TURN // 2
+        if self._n_run == 0:
+            step = self._turned = 0
+        turned = self._turned + step
+        if abs(step) > FARTHEST_STEP or (self._n_run == LOCK - 1 and turned < LEAST_TURN):
+            return False
+        self._angle, self._turned = angle, turned
+        self._n_run = min(self._n_run + 1, LOCK)
+        return True
+
+    def _release(self, readings: list[Reading]) -> None:
+        measured = [reading for reading in self._run if reading is not None]
+        self.counts.frames += len(measured)
+        self.counts.skipped += len(self._run) - len(measured)
+        readings += measured
+        self._run.clear()
