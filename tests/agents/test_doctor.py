@@ -18,7 +18,15 @@ from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.port_list import SerialPortInfo
 from hardware_bridge.links.port_users import port_users
 from hardware_bridge.links.ports import Chunk, PortSpec
-from hardware_bridge.readings import MICROSECONDS_32, ImuReading, PoseReading, RangeReading, Source
+from hardware_bridge.readings import (
+    MICROSECONDS_32,
+    ImuReading,
+    PoseReading,
+    RangeReading,
+    ScanReading,
+    ScanReading,
+    Source,
+)
 
 
 def link(port="p", format="alpha", name="left", baud=115200, node=None, ids=None, key=None):
