@@ -24,7 +24,6 @@ from hardware_bridge.readings import (
     PoseReading,
     RangeReading,
     ScanReading,
-    ScanReading,
     Source,
 )
 
