@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
 SIMULATED = {
     "scenarios": "--scenario", "task": "--task", "cars": "--cars", "proximity": "--proximity",
-    "level": "--level", "first_seed": "--first-seed", "jobs": "--jobs", "engine": "--engine",
+    "level": "--level", "operator": "--operator", "first_seed": "--first-seed",
+    "jobs": "--jobs", "engine": "--engine",
     "address": "--address",
 }  # fmt: skip
 """Options that real cars do not have, by parameter."""
@@ -52,6 +53,9 @@ WHY = "which has its own cars and task; they drive one after the other"
     help="Beams that measure distances round each car, 0 to 32; default: as the policies.",
 )
 @click.option("--level", type=int, help="Randomisation of a level, 0 to 4, in every scenario.")
+@click.option(
+    "--operator", default=1.0, show_default=True, help="Share of episodes with an operator, 0 to 1."
+)
 @click.option("--episodes", type=int, help="Of each of them; default: 100, on real cars 10.")
 @click.option("--first-seed", default=1000, show_default=True, help="Of the first episode.")
 @click.option("--seconds", default=60.0, show_default=True, help="Length of an episode, to 3600.")

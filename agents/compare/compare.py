@@ -32,6 +32,7 @@ def compare(
     task_options: Mapping[str, Any] | None = None,
     cars: int | None = None,
     level: int | None = None,
+    operator: float = 1.0,
     proximity: int | None = None,
     episodes: int = 100,
     first_seed: int = FIRST_SEED,
@@ -56,6 +57,8 @@ def compare(
         task_options: The task's own options, by name.
         cars: Slots for cars; by default as many as the scenario can have.
         level: Randomisation of a level of the curriculum, 0 to 4.
+        operator: Share of episodes with an operator; in the others cars are told the plan alone,
+            as real cars without a remote control are.
         proximity: Beams that measure distances round each car; by default those that each policy
             was trained with, and of controllers as many as any policy has, or none.
         episodes: Of each driver, mode and scenario, seeds from `first_seed` on.
@@ -73,6 +76,8 @@ def compare(
         EnvError: A scenario, task or number of cars that does not exist or fit.
     """
     check_numbers(episodes, first_seed, seconds, settle)
+    if not 0.0 <= operator <= 1.0:
+        raise UsageError(f"--operator: expected 0 to 1, got {operator:g}")
     check_jobs(jobs)
     work = find_engine(engine, address)
     settings = [
@@ -82,6 +87,7 @@ def compare(
             task_options=dict(task_options or {}),
             cars=cars,
             level=level,
+            operator=operator,
             seconds=seconds,
             settle=settle,
         )

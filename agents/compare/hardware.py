@@ -73,7 +73,12 @@ def compare_hardware(
     if not arm:
         raise UsageError("--arm: a comparison needs cars that move; give it when they may")
     config = swarm if isinstance(swarm, SwarmConfig) else read_config(swarm)
-    setting = Setting(task=config.task.name, seconds=seconds, settle=settle)
+    setting = Setting(
+        task=config.task.name,
+        operator=float(config.task.command == "link"),
+        seconds=seconds,
+        settle=settle,
+    )
     seats, notes = _seat(each_once("NAME", drivers), modes(observations), config)
     orders, remarks = _Orders(), []
 

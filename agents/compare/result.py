@@ -147,6 +147,7 @@ class CompareResult:
             "scenario": row.scenario,
             "task": row.setting.task,
             "level": row.setting.level,
+            "operator": row.setting.operator,
             "cars": row.cars,
             "episodes": len(row.episodes),
             "errors_from": self.errors_from,

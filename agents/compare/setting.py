@@ -9,6 +9,7 @@ from typing import Any
 
 from agents.demo import SETTLE
 from relpos_env.config import Parts, configure
+from relpos_env.sensors.operator import OperatorSimParams
 from relpos_env.timing import DECISION
 
 
@@ -26,6 +27,8 @@ class Setting:
     """[-] Slots for cars; by default as many as the scenario can have."""
     level: int | None = None
     """Randomisation of a level of the curriculum, 0 to 4, in place of the scenario's own."""
+    operator: float = 1.0
+    """[-] Share of episodes with an operator; in the others cars are told the plan alone."""
     seconds: float = 60.0
     """[s] Length of an episode, less where the task is done before."""
     settle: float = SETTLE
@@ -59,6 +62,7 @@ class Setting:
                 "task_options": self.task_options,
                 "n_cars": self.cars,
                 "level": self.level,
+                "operator": OperatorSimParams(share=self.operator),
                 "observation": observation,
                 "history": history,
                 "proximity": proximity,

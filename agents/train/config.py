@@ -9,7 +9,7 @@ from agents.settings import number
 
 MOST_SEED = 2147483647
 """Seeds have 31 bits."""
-FORMAT = 8
+FORMAT = 9
 """Version of the run folder; another one is refused."""
 
 
@@ -30,6 +30,9 @@ class EnvSetup:
     cars: int = number(6, 2, 20)
     """Slots for cars, 2 to 20: the policy drives groups of up to so many, at least those of the
     scenarios."""
+    operator: float = number(0.5, 0, 1)
+    """Share of episodes with an operator, whose trims come from true positions. In the others
+    cars are told the plan alone, as real cars without a remote control are."""
     levels: tuple[int, ...] = field(default=(), metadata={"low": 0, "high": 4})
     """Levels of randomisation, 0 to 4, gone through one after the other in equal shares of the
     training; none keeps what the scenarios say."""

@@ -13,6 +13,7 @@ from agents.train.config import MOST_SEED, TrainConfig
 from agents.train.rooms import Rooms
 from relpos_env.config import FormationConfig, Parts
 from relpos_env.sb3_vec_env import FormationVecEnv
+from relpos_env.sensors.operator import OperatorSimParams
 from relpos_env.tasks import DEFAULT_WEIGHTS
 from relpos_env.timing import DECISION
 
@@ -46,6 +47,7 @@ def env_arguments(
         "history": env.history,
         "weights": weights_of(config, done),
         "proximity": env.proximity,
+        "operator": OperatorSimParams(share=env.operator),
         "max_cycles": round(env.seconds / DECISION),
     }
 

@@ -7,13 +7,24 @@ import math
 import numpy as np
 
 from relpos_env.sensors.radio._normal_kernels import normal
-from relpos_env.sensors.radio._random_kernels import draw_key
+from relpos_env.sensors.radio._random_kernels import draw_key, uniform
 from tracking.compiled import kernel
+
+_WHO = np.uint64(0xFFFFFFFFFFFFFFFF)
+"""Counts no sample: the draw of whether there is an operator."""
+
+
+@kernel
+def draw_gains(seeds, gain, share, gains):
+    """Gains of episodes, (env) [1/s], written: 0 where nobody trims, as often as share says."""
+    for env in range(seeds.shape[0]):
+        trims = uniform(draw_key(seeds[env], _WHO), 0) < share
+        gains[env] = gain if trims else 0.0
 
 
 @kernel
 def operate(
-    start, stop, pos, present, plan, goal, seeds, counts, offset, seen, limits, command
+    start, stop, pos, present, plan, goal, seeds, counts, offset, seen, gains, limits, command
 ):  # fmt: skip
     """Velocities asked of the cars of the environments from start to stop.
 
@@ -28,11 +39,12 @@ def operate(
         counts: Samples since the start of the episode, (env), updated.
         offset: Error of the operator's eye, (env, 2) [m], updated.
         seen: How far off the group was at the last samples, (env, slot, 2) [m], updated.
-        limits: Gain [1/s], largest trim [m/s], largest speed [m/s], standard deviation of the
-            eye's error [m], and its correlation from sample to sample [-].
+        gains: (env) [1/s].
+        limits: Largest trim [m/s], largest speed [m/s], standard deviation of the eye's error
+            [m], and its correlation from sample to sample [-].
         command: (env, car, 2) [m/s], written; 0 of absent cars.
     """
-    gain, max_trim, max_speed, std, keep = limits
+    max_trim, max_speed, std, keep = limits
     depth = seen.shape[1]
     for env in range(start, stop):
         count = counts[env]
@@ -54,7 +66,7 @@ def operate(
         seen[env, slot, 1] = y / max(n, 1) + offset[env, 1]
         # The oldest there is: the slot that is written next or, before all are, the first.
         late = (count + 1) % depth if count + 1 >= depth else 0
-        trim_x, trim_y = -gain * seen[env, late, 0], -gain * seen[env, late, 1]
+        trim_x, trim_y = -gains[env] * seen[env, late, 0], -gains[env] * seen[env, late, 1]
         length = math.hypot(trim_x, trim_y)
         if length > max_trim:
             trim_x, trim_y = trim_x * max_trim / length, trim_y * max_trim / length

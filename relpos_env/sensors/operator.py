@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relpos_env.errors import EnvError
-from relpos_env.sensors._operator_kernels import operate
+from relpos_env.sensors._operator_kernels import draw_gains, operate
 from tracking.arrays import F64, Bool
 
 CONTROL_STEP = 0.1
@@ -46,6 +46,9 @@ class OperatorSimParams:
     """[m/s] Largest trim."""
     max_speed: float = 2.0
     """[m/s] Largest velocity asked of a car."""
+    share: float = 1.0
+    """[-] Of episodes that have an operator. In the others the plan alone is asked for, as on
+    real cars without a remote control."""
 
     def __post_init__(self) -> None:
         for name in ("gain", "reaction", "position_std", "max_trim"):
@@ -56,6 +59,8 @@ class OperatorSimParams:
             value = getattr(self, name)
             if not (_is_number(value) and value > 0.0):
                 raise EnvError(f"operator {name}: expected more than 0, finite, got {value!r}")
+        if not (_is_number(self.share) and 0.0 <= self.share <= 1.0):
+            raise EnvError(f"operator share: expected 0 to 1, got {self.share!r}")
         if self.reaction > 5.0:
             raise EnvError(f"operator reaction: expected at most 5 s, got {self.reaction:g}")
 
@@ -105,8 +110,8 @@ class Operator:
         """
         depth = round(params.reaction / CONTROL_STEP) + 1
         keep = float(np.exp(-CONTROL_STEP / params.position_time))
+        self._gain, self._share = float(params.gain), float(params.share)
         self._limits = (
-            float(params.gain),
             float(params.max_trim),
             float(params.max_speed),
             float(params.position_std),
@@ -115,7 +120,7 @@ class Operator:
         self.command: F64 = np.zeros((n_envs, n_cars, 2))
         """Velocity asked of each car in the world frame, (env, car, 2) [m/s]."""
         self._seeds = np.zeros(n_envs, dtype=np.uint64)
-        self._counts = np.zeros(n_envs, dtype=np.int64)
+        self._counts, self._gains = np.zeros(n_envs, dtype=np.int64), np.zeros(n_envs)
         self._offset, self._seen = np.zeros((n_envs, 2)), np.zeros((n_envs, depth, 2))
         self._n_envs = n_envs
 
@@ -127,6 +132,7 @@ class Operator:
             envs: Which begin.
         """
         self._seeds[envs] = seeds
+        draw_gains(self._seeds[envs], self._gain, self._share, self._gains[envs])
         self._counts[envs] = 0
         self._offset[envs] = 0.0
         self._seen[envs] = 0.0
@@ -160,6 +166,7 @@ class Operator:
             self._counts,
             self._offset,
             self._seen,
+            self._gains,
             self._limits,
             self.command,
         )

@@ -45,7 +45,7 @@ KEYS = {
     "policy", "trained_on", "observation", "scenario", "episodes", "formation_error", "ci95",
     "collisions_per_min", "tracking_error", "contact_time",
     "time_in_formation", "energy", "seconds",
-    "done_share", "cars", "task", "level",
+    "done_share", "cars", "task", "level", "operator",
 }  # fmt: skip
 
 

@@ -148,3 +148,20 @@ def test_commands_are_within_their_limits(gain, reaction, std, max_trim, max_spe
 def test_bad_params_are_named(name, value):
     with pytest.raises(EnvError, match=f"operator {name}"):
         OperatorSimParams(**{name: value})
+
+
+def test_some_episodes_have_no_operator_by_their_seeds_alone():
+    r = room(400, 2)
+    seeds = np.random.default_rng(3).integers(1 << 62, size=400, dtype=np.uint64)
+    alone = begun(r, gain=0.0, max_speed=1e9).sample(r, r, ALL)
+    both = begun(r, seeds, share=0.3, max_speed=1e9).sample(r, r, ALL)
+    always = begun(r, seeds, max_speed=1e9).sample(r, r, ALL)
+    trims = (both != alone).any(axis=(1, 2))
+    assert 0.22 < trims.mean() < 0.38
+    assert np.array_equal(both, np.where(trims[:, None, None], always, alone))
+    some = begun(room(5, 2), seeds[:5], share=0.3, max_speed=1e9)
+    some.reset(seeds[200:202], slice(2, 4))
+    r.present[:5] = True
+    few = Room(*(a[:5] for a in vars(r).values()))
+    trimmed = (some.sample(few, few, ALL) != few.plan).any(axis=(1, 2))
+    assert np.array_equal(trimmed, trims[[0, 1, 200, 201, 4]])
