@@ -13,12 +13,16 @@ import onnxruntime  # noqa: E402
 
 from agents.policy.errors import PolicyError  # noqa: E402
 from agents.policy.graph import check_graph  # noqa: E402
+from agents.policy.patience import Patience  # noqa: E402
 from relpos_env.interface.observations.base import F32  # noqa: E402
 
 INPUT, OUTPUT = "observations", "actions"
 N_ACTIONS = 2
-MOST_MEMORY = 1 << 30
-"""[byte] All networks of a process together use no more; a small file can ask for any amount."""
+MOST_MEMORY = 128 << 20
+"""[byte] All networks of a process together use no more; a small file can ask for any amount. With
+this one product of matrices takes some 3 s at most, and no run can be ended within one."""
+PATIENCE = Patience(1.0)
+"""A step takes less than a millisecond."""
 SILENT = 4
 """Log nothing: errors are told once, by ourselves."""
 
@@ -50,6 +54,8 @@ class Network:
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = options.inter_op_num_threads = 1
         options.execution_mode = onnxruntime.ExecutionMode.ORT_SEQUENTIAL
+        # Else constants are folded while it is opened, without any bound.
+        options.graph_optimization_level = onnxruntime.GraphOptimizationLevel.ORT_DISABLE_ALL
         options.log_severity_level = SILENT
         options.add_session_config_entry("session.use_env_allocators", "1")
         # The file was read as ONNX, and must not be taken for anything else.
@@ -76,11 +82,16 @@ class Network:
             observations: (batch, size), contiguous.
 
         Raises:
-            PolicyError: onnxruntime fails.
+            PolicyError: onnxruntime fails, or it takes longer than `PATIENCE`.
         """
+        run = onnxruntime.RunOptions()
         try:
-            (actions,) = self._session.run(self._names, {INPUT: observations})
+            with PATIENCE.over(run):
+                (actions,) = self._session.run(self._names, {INPUT: observations}, run)
         except Exception as error:
+            if run.terminate:
+                why = f"a step takes longer than {PATIENCE.seconds:g} s"
+                raise PolicyError(self._where, why) from error
             raise PolicyError(self._where, f"cannot be run: {_first_line(error)}") from error
         return actions  # type: ignore[no-any-return]
 
