@@ -28,6 +28,7 @@ from agents.demo import SETTLE
 from agents.drive import DriveResult, drive, drive_on
 from agents.emulate import EmulateOptions, emulate
 from agents.emulate.virtual import START_NS, VirtualBridge
+from agents.emulate.world import EmulatedWorld
 from agents.errors import UsageError
 from relpos_env.timing import DECISION
 from tracking.arrays import F64
@@ -54,6 +55,8 @@ class HardwareDemoResult:
     """Formation error by the truth, mean over the cars, (decision) [m]."""
     simulated: F64
     """That of the same driver in the same room of the simulator, (decision) [m]."""
+    boxes: F64
+    """What stood in the room at the start, (box, 6), as `relpos_env.swarm.Swarm.boxes`."""
     contacts: int
     """[-] That cars began, start included."""
     simulated_contacts: int
@@ -151,6 +154,7 @@ def hardware_demo(
         t=t - t[0] + DECISION if len(t) else t,
         error=true_error(result, log, t),
         simulated=twin.error,
+        boxes=EmulatedWorld(options.parts(), options.seed).swarm.boxes[0].copy(),
         contacts=drove.contacts,
         simulated_contacts=round(twin.collisions_per_min * twin.seconds / 60.0),
         late_steps=drove.late_steps,

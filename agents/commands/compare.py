@@ -140,15 +140,17 @@ def _on_cars(
 ) -> CompareResult:
     """The comparison with real cars."""
     from agents.compare.hardware import compare_hardware
-    from agents.drive.keys import key_by_key, read_orders
+    from agents.drive.keys import TerminalKeys, key_by_key
 
     context = click.get_current_context()
     for name, option in SIMULATED.items():
         if context.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT:
             raise UsageError(f"{option}: expected without --swarm, {WHY}")
 
+    keys = TerminalKeys()
+
     def attend(order: Callable[[str], None]) -> None:
-        for what in read_orders():
+        for what in keys.read_orders():
             order(what)
 
     given = {k: options[k] for k in ("episodes", "seconds", "settle") if k in options}

@@ -109,10 +109,10 @@ class _Screen:
     """What is shown and asked for while it lasts."""
 
     def __init__(self, as_json: bool, stop_source: str) -> None:
-        from agents.drive.keys import PipedKeys, read_orders
+        from agents.drive.keys import PipedKeys, TerminalKeys
 
         self._json, self._n, self._told = as_json, 0, 0
-        self._read = PipedKeys().read_orders if stop_source == "stdin" else read_orders
+        self._source = PipedKeys() if stop_source == "stdin" else TerminalKeys()
         self._live: Any = None
         self._keys: Any = None
 
@@ -137,7 +137,7 @@ class _Screen:
 
     def attend(self, order: Any) -> None:
         """Pass on what was pressed."""
-        for what in self._read():
+        for what in self._source.read_orders():
             order(what)
 
     def show(self, bridge: OpenBridge, env: LiveFormationEnv) -> None:
@@ -147,10 +147,11 @@ class _Screen:
         notices = [text for _, text in bridge.feed.notices]
         self._n += 1
         if self._live is not None:
-            from agents.drive.keys import HELP
+            from agents.drive.keys import HELP, NO_KEYS
             from agents.drive.status import LINES
 
-            self._live.update(_table(HEADER, car_rows(bridge, env), notices[-LINES:], HELP))
+            keys = NO_KEYS if self._source.lost else HELP
+            self._live.update(_table(HEADER, car_rows(bridge, env), notices[-LINES:], keys))
             self._live.refresh()
             return
         for text in notices[self._told :]:

@@ -21,6 +21,8 @@ PATIENCE = 1.0
 """[s] Without a word from it, all cars are stopped."""
 HELP = "space: emergency stop  c: clear it  a: arm  d: disarm  g: silent are gone  q: quit"
 """In one line of 80 letters."""
+NO_KEYS = "no keys: another program has the terminal, cars are stopped; fg brings this one back"
+"""Likewise."""
 
 
 def check_stop_source(source: str) -> None:
@@ -32,10 +34,10 @@ def check_stop_source(source: str) -> None:
     Raises:
         UsageError: There is no terminal.
     """
-    if source == "terminal" and not _is_terminal():
+    if source == "terminal" and (not _is_terminal() or in_background()):
         raise UsageError(
-            "--arm: expected a terminal, on which space stops the cars; a program that stops them "
-            "writes keys to standard input, see --stop-source"
+            "--arm: expected a terminal, on which space stops the cars, and to be in its "
+            "foreground; a program that stops them writes keys to standard input, see --stop-source"
         )
     if source == "stdin" and (sys.stdin is None or sys.stdin.closed):
         raise UsageError("--stop-source: expected standard input to be open")
@@ -56,6 +58,8 @@ def key_by_key() -> Iterator[None]:
     before = termios.tcgetattr(sys.stdin)
 
     def set_up(*_: object) -> None:
+        if in_background():  # the system would halt this program, and the cars with it
+            return
         mode = termios.tcgetattr(sys.stdin)
         mode[0] &= ~(termios.IXON | termios.IXOFF)
         mode[3] &= ~(termios.ICANON | termios.ECHO)
@@ -70,7 +74,16 @@ def key_by_key() -> Iterator[None]:
     finally:
         signal.signal(signal.SIGCONT, resumed)
         with contextlib.suppress(termios.error):  # it was closed
-            termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
+            if not in_background():
+                termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
+
+
+def in_background() -> bool:
+    """Whether the terminal's keys go to another program, as after `kill -STOP` and `-CONT`."""
+    try:
+        return os.tcgetpgrp(sys.stdin.fileno()) != os.getpgrp()
+    except (OSError, AttributeError):  # not the terminal that rules this program, or none
+        return False
 
 
 class PipedKeys:
@@ -78,6 +91,8 @@ class PipedKeys:
 
     def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
         self._now, self._heard, self._is_open = now, now(), True
+        self.lost = False
+        """Never by another program, see `TerminalKeys`."""
 
     def read_orders(self) -> list[str]:
         """What came since the last look, in order; a stop when nothing did for `PATIENCE`."""
@@ -97,19 +112,29 @@ class PipedKeys:
         return []
 
 
-def read_orders() -> list[str]:
-    """What was pressed since the last look, in order; a stop alone where one is among it.
+class TerminalKeys:
+    """Keys of the terminal; when they begin to go to another program, the cars are stopped."""
 
-    The descriptor itself is read: text streams keep what they have read ahead, and no `select`
-    tells of it.
-    """
-    pressed = b""
-    while _is_terminal() and select.select([sys.stdin], [], [], 0.0)[0]:
-        keys = os.read(sys.stdin.fileno(), 1024)
-        if not keys:
-            break
-        pressed += keys
-    return orders_of(pressed.decode(errors="replace"))
+    def __init__(self) -> None:
+        self.lost = False
+        """Whether they go to another program."""
+
+    def read_orders(self) -> list[str]:
+        """What was pressed since the last look, in order; a stop alone where one is among it.
+
+        The descriptor itself is read: text streams keep what they have read ahead, and no `select`
+        tells of it.
+        """
+        had_them, self.lost = not self.lost, in_background()
+        if self.lost:
+            return ["stop"] if had_them else []
+        pressed = b""
+        while _is_terminal() and select.select([sys.stdin], [], [], 0.0)[0]:
+            keys = os.read(sys.stdin.fileno(), 1024)
+            if not keys:
+                break
+            pressed += keys
+        return orders_of(pressed.decode(errors="replace"))
 
 
 def orders_of(pressed: str) -> list[str]:

@@ -76,7 +76,8 @@ def hardware_report(results: Sequence[HardwareDemoResult], room: tuple[float, fl
     )
     page.table(HEADER, demo_rows(results))
     for result in results:
-        page.figure(drive_figure(result, room), f"Seed {result.seed}.")
+        text = f"Seed {result.seed}. Dots: where cars began. Grey: obstacles at that time."
+        page.figure(drive_figure(result, room), text)
     return page.render()
 
 
@@ -110,5 +111,8 @@ def _ways(axes: Axes, result: HardwareDemoResult, room: tuple[float, float]) -> 
     width, depth = room
     x, y = 0.5 * width, 0.5 * depth
     axes.plot([-x, x, x, -x, -x], [-y, -y, y, y, -y], color="black")
+    for x, y, *half, c, s in result.boxes[result.boxes[:, 2] > 0.0].tolist():
+        corners = np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)]) * half
+        axes.fill(x + corners @ (c, -s), y + corners @ (s, c), color="0.6", zorder=0)
     axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
-    axes.legend(fontsize=7)
+    axes.legend(fontsize=7, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, frameon=False)

@@ -90,7 +90,7 @@ def scenario_from(
         if not is_path(wanted):
             base = look_up(SHIPPED, wanted, "extends")
         elif depth < DEEPEST:
-            base = _load((beside or Path()) / wanted, depth + 1)
+            base = _load(_within(beside, wanted), depth + 1)
         else:
             raise EnvError(f"expected files that extend each other at most {DEEPEST} deep")
         inherited.append(base.gap)
@@ -105,7 +105,7 @@ def scenario_from(
         if furnish is not None:
             read = replace(read, furnish=look_up({}, furnish, "furnish", group="relpos_env.worlds"))
         if plan is not None:
-            walls = read_floor_plan((beside or Path()) / str(plan))
+            walls = read_floor_plan(_within(beside, str(plan)))
             read = replace(read, obstacles=read.obstacles + walls)
     except EnvError as error:
         raise where.error(str(error)) from error
@@ -116,6 +116,19 @@ def scenario_from(
         return read if gap is None else read.with_gap(gap)
     except EnvError as error:
         raise where.error(str(error)) from error
+
+
+def _within(beside: Path | None, wanted: str) -> Path:
+    """A file that a scenario names: in its own folder or below, since scenarios are shared.
+
+    Raises:
+        EnvError: It is elsewhere.
+    """
+    folder = beside or Path()
+    path = folder / wanted
+    if not path.resolve().is_relative_to(folder.resolve()):
+        raise EnvError(f"expected a file in the folder of the scenario, got {wanted!r}")
+    return path
 
 
 def _load(path: Path, depth: int) -> Scenario:

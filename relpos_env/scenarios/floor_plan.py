@@ -26,6 +26,8 @@ def read_floor_plan(path: str | Path) -> tuple[Obstacle, ...]:
         EnvError: No such file, or a line that is no wall; names the file and the line.
     """
     path = Path(path)
+    if path.exists() and not path.is_file():
+        raise EnvError(f"floor_plan: expected a file, got {path.name!r}")
     try:
         with path.open(encoding="utf-8-sig", newline="") as stream:
             rows = list(csv.reader(stream))

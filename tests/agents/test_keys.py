@@ -2,11 +2,12 @@
 
 import os
 import pty
+import subprocess
 import sys
 
 import pytest
 
-from agents.drive.keys import key_by_key, orders_of, read_orders
+from agents.drive.keys import TerminalKeys, key_by_key, orders_of
 
 
 @pytest.fixture
@@ -26,10 +27,11 @@ def keyboard(monkeypatch):
     (b"\x1b[C", ["stop"]), ("\u00e4".encode(), ["stop"]), (b"\xff", ["stop"]),
 ])  # fmt: skip
 def test_keys_that_are_hit_together_are_all_heard_at_once(keyboard, keys, orders):
-    assert read_orders() == []
+    source = TerminalKeys()
+    assert source.read_orders() == []
     keyboard(keys)
-    assert read_orders() == orders
-    assert read_orders() == []
+    assert source.read_orders() == orders
+    assert source.read_orders() == []
 
 
 def test_nothing_beside_a_stop_counts():
@@ -44,4 +46,56 @@ def test_nothing_counts_after_a_quit():
 def test_without_any_input_no_key_is_pressed(monkeypatch):
     monkeypatch.setattr(sys, "stdin", None)  # as where a shell has closed it
     with key_by_key():
-        assert read_orders() == []
+        assert TerminalKeys().read_orders() == []
+
+
+BACKGROUND = """
+import fcntl, os, signal, sys, termios, time
+from agents.drive.keys import TerminalKeys, check_stop_source, key_by_key
+from agents.errors import UsageError
+
+os.setsid()
+sys.stdin = os.fdopen(os.open(sys.argv[1], os.O_RDWR), "r")
+fcntl.ioctl(sys.stdin, termios.TIOCSCTTY, 0)
+other = os.fork()
+if other == 0:
+    os.setpgid(0, 0)
+    time.sleep(60)
+os.setpgid(other, other)
+by_line = lambda: bool(termios.tcgetattr(sys.stdin)[3] & termios.ICANON)
+signal.signal(signal.SIGTTOU, signal.SIG_IGN)
+keys = TerminalKeys()
+with key_by_key():
+    assert keys.read_orders() == [] and not by_line()
+    os.tcsetpgrp(sys.stdin.fileno(), other)  # a shell gives it to another
+    mode = termios.tcgetattr(sys.stdin)
+    mode[3] |= termios.ICANON
+    termios.tcsetattr(sys.stdin, termios.TCSANOW, mode)
+    signal.signal(signal.SIGTTOU, signal.SIG_DFL)
+    assert keys.read_orders() == ["stop"] and keys.lost
+    assert keys.read_orders() == []
+    os.kill(os.getpid(), signal.SIGCONT)
+    assert by_line()
+    try:
+        check_stop_source("terminal")
+        sys.exit("armed in the background")
+    except UsageError:
+        pass
+    signal.signal(signal.SIGTTOU, signal.SIG_IGN)
+    os.tcsetpgrp(sys.stdin.fileno(), os.getpgrp())  # fg
+    os.kill(os.getpid(), signal.SIGCONT)
+    assert not by_line()
+    assert keys.read_orders() == [] and not keys.lost
+os.kill(other, signal.SIGKILL)
+"""
+
+
+def test_a_terminal_that_another_program_has_stops_the_cars_and_comes_back():
+    ours, theirs = pty.openpty()
+    done = subprocess.run(
+        [sys.executable, "-c", BACKGROUND, os.ttyname(theirs)],
+        capture_output=True, text=True, timeout=60, check=False,
+    )  # fmt: skip
+    os.close(ours)
+    os.close(theirs)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
