@@ -60,7 +60,7 @@ def sniff(
     formats: Formats | None = None,
     now_ns: Callable[[], int] = time.monotonic_ns,
 ) -> Sniffed:
-    """Listen to a port; nothing is written to it.
+    """Listen to a port; nothing is written to it but the request of a format that is named.
 
     Args:
         port: As in `PortSpec.port`.
@@ -79,15 +79,9 @@ def sniff(
         UsageError: No such format, or a number out of range.
     """
     formats = known_formats() if formats is None else formats
-    if format is not None and format not in formats:
-        raise UsageError(f"--format: expected one of {', '.join(formats)}, got {format!r}")
+    spec = _port_spec(port, format, baud, formats)
     if seconds is not None and not 0.1 <= seconds <= 86400.0:
         raise UsageError(f"--seconds: expected 0.1 to 86400, got {seconds:g}")
-    if baud is None:
-        baud = formats[format].baud if format is not None else USUAL_BAUD
-    spec = PortSpec(name="port", port=port, baud=baud)
-    if format is not None:
-        spec = replace(spec, request=formats[format].request, dtr=formats[format].dtr)
     Hearing.get_ready(formats)
     hearing = Hearing(formats, key)
     chooser = _Chooser(hearing, format, show)
@@ -110,8 +104,26 @@ def sniff(
         listened = (now_ns() - start) / 1e9
     sniffed = _sniffed(hearing, chooser, listened)
     if show_chunk is None:
-        _check(hearing, format, baud, formats, port)
+        _check(hearing, format, spec.baud, formats, port)
     return sniffed
+
+
+def _port_spec(port: str, format: str | None, baud: int | None, formats: Formats) -> PortSpec:
+    """The port as it is to be opened.
+
+    Raises:
+        UsageError: No name of a port, or no such format.
+    """
+    if not port or "\0" in port:
+        raise UsageError(f"PORT: expected the name of a port, got {port!r}")
+    spec = PortSpec(name="port", port=port, baud=USUAL_BAUD if baud is None else baud)
+    if format is None:
+        return spec
+    if format not in formats:
+        raise UsageError(f"--format: expected one of {', '.join(formats)}, got {format!r}")
+    entry = formats[format]
+    baud = entry.baud if baud is None else baud
+    return replace(spec, baud=baud, request=entry.request, dtr=entry.dtr)
 
 
 class _Chooser:

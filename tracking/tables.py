@@ -160,7 +160,8 @@ def _scalar(hint: Any, value: object, where: Where) -> Any:
         finite = isinstance(value, int) or math.isfinite(value)  # type: ignore[arg-type]
         if finite and abs(value) <= LARGEST:  # type: ignore[arg-type]
             return float(value)  # type: ignore[arg-type]
-        raise where.error(f"expected a finite number, got {_described(value)}")
+        within = f"a number within {LARGEST:g}" if finite else "a finite number"
+        raise where.error(f"expected {within}, got {_described(value)}")
     if hint is int and number and isinstance(value, int):
         if abs(value) <= LARGEST:
             return value

@@ -124,6 +124,10 @@ def emulate(
         ["line", *names],
         [[line["line"], *(str(line[name]) for name in names)] for line in result.lines],
     )
+    click.echo(
+        "frames: said by the devices; lost, damaged: on the way, as --faults asks; dropped: "
+        "no room;\nunheard: bytes while nothing had the port open; read: bytes of commands"
+    )
     late = result.lateness
     error = result.summary["formation_error"]
     click.echo(

@@ -75,7 +75,7 @@ def replay(
     if fast and speed is not None:
         raise UsageError("--fast: expected either it or --speed")
     if bool(exports) != (out is not None):
-        raise UsageError("--export: expected together with --out, which is its folder")
+        raise UsageError("--export, --out: expected together, what is written and its folder")
     if not 0.0 <= skip < float("inf"):
         raise UsageError(f"--skip: expected 0 or more seconds, got {skip:g}")
     offset = _offset(truth_offset)
@@ -145,6 +145,8 @@ def print_replay(result: ReplayResult) -> None:
             f"against the truth, {result.scored.offset:+.3f} s later: {text}, "
             f"status ok {percent(score.ok_share)} of the time"
         )
+        if score.rmse is None:
+            click.echo("nothing to compare: no estimate at a time of the truth behind --skip")
 
 
 def _offset(text: str) -> float | None:

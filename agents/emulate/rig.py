@@ -70,7 +70,11 @@ class EmulatedRig:
         # Links must mean the same wherever somebody else stands.
         self.folder = None if folder is None else folder.resolve()
         if self.folder is not None:
-            self.folder.mkdir(parents=True, exist_ok=True)
+            try:
+                self.folder.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                why = error.strerror
+                raise BridgeError(f"--folder {folder}: cannot be made ({why})") from error
             _check_ours(self.folder / SWARM_FILE)
         self._make_port = ports or _ports_in(self.folder)
         self.ports: dict[str, DevicePort] = {}

@@ -31,6 +31,8 @@ class TcpPort:
         host, port = tcp_address(spec)
         try:
             self._socket = socket.create_connection((host, port), timeout=CONNECT_TIME)
+        except UnicodeError as error:
+            raise BridgeError(f"{spec.name}: {host!r} is no name of a host") from error
         except OSError as error:
             raise BridgeError(
                 f"{spec.name}: cannot connect to {host} port {port}: {reason_of(error)}; "
@@ -80,7 +82,7 @@ def tcp_address(spec: PortSpec) -> tuple[str, int]:
     host = host.removeprefix("[").removesuffix("]")
     number = int(digits) if digits.isascii() and digits.isdigit() and len(digits) < 6 else 0
     if not host or not 0 < number < 65536:
-        raise BridgeError(f"{spec.name}: port: expected tcp:host:port, got {spec.port!r}")
+        raise BridgeError(f"{spec.name}: expected tcp:host:port, got {spec.port!r}")
     return host, number
 
 

@@ -70,6 +70,8 @@ class Supervisor:
         self._armed: Bool = np.zeros(n_cars, dtype=bool)
         self._late, self._missed = 0.0, 0
         self._lag, self._decided = 0.0, -np.inf
+        self._ended = ""
+        """Why it is over for all cars."""
         self._broken: dict[int, str] = {}
         self._told: dict[int, tuple[float, bool]] = {}
         """When each car was last told something, and whether it was to move."""
@@ -114,10 +116,10 @@ class Supervisor:
             readings = self._believed[slot].sift(readings, round(now * 1e9))
         self._telemetry.take(slot, readings, now)
 
-    def abandon(self) -> None:
-        """The deciding process is gone: nothing will move again."""
+    def abandon(self, why: str) -> None:
+        """The deciding process is gone, or this one is ended: nothing will move again."""
         self._gate.stop()
-        self.quit = True
+        self.quit, self._ended = True, why
 
     def interrupt(self) -> None:
         """Nobody was watching for longer than cars go on by themselves: they stand by now.
@@ -216,7 +218,9 @@ class Supervisor:
 
     def _why(self, slot: int, reason: I64) -> str:
         broken = self._broken.get(slot)
-        return reason_text(int(reason[slot])) if broken is None else f"its driver failed: {broken}"
+        if broken is not None:
+            return f"its driver failed: {broken}"
+        return self._ended or reason_text(int(reason[slot]))
 
     def report(self) -> Report:
         """What the gate did at the last tick."""

@@ -8,6 +8,7 @@ import signal
 import socket
 import time
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 from hardware_bridge.drivers import make_driver
 from hardware_bridge.errors import BridgeError
@@ -45,6 +46,8 @@ def supervise(charge: Charge, talk: socket.socket) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
     _hurry()
+    with contextlib.suppress(OSError):  # for who looks at what has a port open
+        Path("/proc/self/comm").write_text("relpos-gate")
     talk.setblocking(False)
     try:
         watch = _Watch(charge, talk)
@@ -52,7 +55,7 @@ def supervise(charge: Charge, talk: socket.socket) -> None:
         talk.send(pack(Ready(str(error))))
         talk.close()
         return
-    signal.signal(signal.SIGTERM, lambda *_: watch.abandon())
+    signal.signal(signal.SIGTERM, lambda *_: watch.abandon("the supervisor was ended"))
     try:
         with short_pauses():
             talk.send(pack(Ready()))
@@ -94,9 +97,9 @@ class _Watch:
         self._alone = False
         self._failed: set[tuple[str, str]] = set()
 
-    def abandon(self) -> None:
+    def abandon(self, why: str) -> None:
         """Let the cars stand for good, and end."""
-        self._supervisor.abandon()
+        self._supervisor.abandon(why)
 
     def run(self) -> None:
         """Tick after tick."""
@@ -183,7 +186,7 @@ class _Watch:
                 # It would be readable from here on.
                 self._links.unwatch(self._talk.fileno())
                 if not self._supervisor.quit:
-                    self.abandon()
+                    self.abandon("the deciding process is gone")
                 return True
             try:
                 message = unpack(data, self._n_cars)

@@ -16,6 +16,7 @@ from agents.emulate.rig import EmulatedRig
 from agents.errors import UsageError
 from agents.hearing import Hearing, known_formats, why_nothing_fits
 from agents.live.rates import Rates
+from agents.sniff import sniff
 from agents.watchdog import Watchdog, with_watchdogs
 from hardware_bridge.config import parse_config
 from hardware_bridge.errors import BridgeError
@@ -255,3 +256,18 @@ def test_watchdogs_are_written_into_the_tables_of_the_cars(tmp_path):
         with_watchdogs(path, [Watchdog(9, 0.3, "")])
     with pytest.raises(BridgeError, match=r"cars.1.watchdog: expected above 0 and at most 2 s"):
         config_of(path.read_text().replace("watchdog = 0.25", "watchdog = 10.0"))
+
+
+@pytest.mark.parametrize(
+    ("port", "message"),
+    [
+        ("", "PORT: expected the name of a port, got ''"),
+        ("tcp:here", "port: expected tcp:host:port, got 'tcp:here'"),
+        ("tcp:" + "x" * 70 + ":80", "is no name of a host"),
+    ],
+)
+def test_what_is_no_port_is_said_once(port, message):
+    with pytest.raises((BridgeError, UsageError)) as error:
+        sniff(port, seconds=0.1)
+    assert message in str(error.value)
+    assert str(error.value).count("port: port:") == 0

@@ -183,7 +183,7 @@ def test_unknown_orders_move_nothing_and_are_told(drive):
 
 
 def test_left_alone_nothing_moves_again(drive):
-    drive.supervisor.abandon()
+    drive.supervisor.abandon("it was ended")
     assert stands(drive.tick(100)) == [True, True]
     drive.arm()
     assert stands(drive.tick(5)) == [True, True]

@@ -1,6 +1,7 @@
 """The log folder: what is written is read back, and every fault is named."""
 
 import csv
+import gzip
 import io
 from dataclasses import fields
 
@@ -144,6 +145,20 @@ def test_another_clock_is_an_error(folder):
         read_log(folder)
     imu.write_text(head + "\n")
     with pytest.raises(LogError, match=r"imu.csv: no rows"):
+        read_log(folder)
+
+
+def test_a_table_that_is_there_twice_is_an_error(folder):
+    packed = gzip.compress((folder / "ranges.csv").read_bytes())
+    (folder / "ranges.csv.gz").write_bytes(packed)
+    with pytest.raises(LogError, match=r"both ranges.csv and ranges.csv.gz, expected one of them"):
+        read_log(folder)
+
+
+def test_an_empty_row_is_named(folder):
+    rows = (folder / "ranges.csv").read_text().splitlines()
+    (folder / "ranges.csv").write_text("\n".join([*rows[:3], "", *rows[3:]]))
+    with pytest.raises(LogError, match=r"ranges.csv row 4: empty, expected \d+ fields"):
         read_log(folder)
 
 

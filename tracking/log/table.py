@@ -22,12 +22,16 @@ MAX_SILENCE = 86400.0
 
 
 def find_table(folder: Path, stem: str) -> Path | None:
-    """The file of a table, plain or gzip-compressed."""
-    for suffix in (".csv", ".csv.gz"):
-        path = folder / (stem + suffix)
-        if path.exists() or path.is_symlink():
-            return path
-    return None
+    """The file of a table, plain or gzip-compressed.
+
+    Raises:
+        LogError: Both are there, and may differ.
+    """
+    paths = [folder / (stem + suffix) for suffix in (".csv", ".csv.gz")]
+    found = [path for path in paths if path.exists() or path.is_symlink()]
+    if len(found) > 1:
+        raise LogError(f"{folder}: both {found[0].name} and {found[1].name}, expected one of them")
+    return found[0] if found else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +76,8 @@ class Table:
                 f"{path.name}: column {missing[0]!r} is missing, found {', '.join(header)}"
             )
         for k, row in enumerate(rows[1:], start=2):
+            if not row:
+                raise LogError(f"{path.name} row {k}: empty, expected {len(header)} fields")
             if len(row) != len(header):
                 raise LogError(
                     f"{path.name} row {k}: expected {len(header)} fields, found {len(row)}"
@@ -131,15 +137,15 @@ class Table:
         if len(back):
             k = int(back[0]) + 1
             raise LogError(
-                f"{self.path.name} row {k + 2}, t_s: time goes back from {t[k - 1]:g} to "
-                f"{t[k]:g} s, expected rows in time order"
+                f"{self.path.name} row {k + 2}, t_s: time goes back from {t[k - 1]:.12g} to "
+                f"{t[k]:.12g} s, expected rows in time order"
             )
         jump = np.nonzero(np.diff(t) > MAX_SILENCE)[0]
         if len(jump):
             k = int(jump[0]) + 1
             raise LogError(
-                f"{self.path.name} row {k + 2}, t_s: jumps from {t[k - 1]:g} to {t[k]:g} s, "
-                f"expected seconds on one clock"
+                f"{self.path.name} row {k + 2}, t_s: jumps by {t[k] - t[k - 1]:g} s from "
+                f"{t[k - 1]:.12g} s, expected seconds on one clock"
             )
         return t
 
