@@ -7,7 +7,6 @@ The tracker gets nothing but measurements.
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
@@ -80,7 +79,7 @@ class TrackedSwarm:
 
     def part(self, envs: slice) -> TrackedSwarm:
         """Some of the groups; shares their memory."""
-        part = copy.copy(self)
+        part = TrackedSwarm.__new__(TrackedSwarm)  # a copy would bind the whole once more
         part.swarm = self.swarm.part(envs)
         part.perception = self.perception.part(envs, part.swarm.block, part.swarm.powered)
         part._singles = {}

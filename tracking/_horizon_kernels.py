@@ -1,9 +1,10 @@
 """The queue of measurements that wait, one an environment, kept in handling order.
 
-Events lie in slots that never move; `order` lists the slots, as a ring: from `head` on those that
-wait, in order, then the free ones. An event that comes is put at the end and moved forward past
-those that come after it, which is one comparison for one that arrives in order. Only what devices
-send is kept: what the tracker's own orientations tell beside comes behind the horizon.
+Events lie in slots that never move; `order` lists the slots: those that wait, in order, then the
+free ones, the last freed first, since they are still in the cache. An event that comes is put at
+the end and moved forward past those that come after it, which is one comparison for one that
+arrives in order. Only what devices send is kept: what the tracker's own orientations tell beside
+comes behind the horizon.
 """
 
 from __future__ import annotations
@@ -54,18 +55,35 @@ def put_in_slot(s, e, slot, block, k):
 @small_kernel
 def enqueue(s, e, slot):
     """Move the event in the first free slot to its place; False if it is there already."""
-    mask = s.order.shape[1] - 1
-    end = s.head[e] + s.n_waiting[e]
+    end = s.n_waiting[e]
     place = end
-    while place > s.head[e] and is_before(s, e, slot, s.order[e, (place - 1) & mask]):
+    while place > 0 and is_before(s, e, slot, s.order[e, place - 1]):
         place -= 1
-    if place > s.head[e] and is_same(s, e, slot, s.order[e, (place - 1) & mask]):
+    if place > 0 and is_same(s, e, slot, s.order[e, place - 1]):
         return False
     for at in range(end, place, -1):
-        s.order[e, at & mask] = s.order[e, (at - 1) & mask]
-    s.order[e, place & mask] = slot
+        s.order[e, at] = s.order[e, at - 1]
+    s.order[e, place] = slot
     s.n_waiting[e] += 1
     return True
+
+
+@small_kernel
+def turn_round(order, e, start, stop):
+    """Reverse a stretch of an order."""
+    for k in range((stop - start) // 2):
+        a, b = start + k, stop - 1 - k
+        order[e, a], order[e, b] = order[e, b], order[e, a]
+
+
+@small_kernel
+def free_first(s, e, n):
+    """Put the first n slots behind all others that wait, as the first that are free."""
+    waiting = s.n_waiting[e]
+    turn_round(s.order, e, 0, n)
+    turn_round(s.order, e, n, waiting)
+    turn_round(s.order, e, 0, waiting)
+    s.n_waiting[e] = waiting - n
 
 
 @kernel
@@ -82,7 +100,6 @@ def take_in(s, block):
         How many events were left out for want of slots.
     """
     t, valid = block[0], block[8]
-    mask = s.order.shape[1] - 1
     n_refused = 0
     for e in range(t.shape[0]):
         for k in range(t.shape[1]):
@@ -91,10 +108,10 @@ def take_in(s, block):
             if not t[e, k] > s.released[e]:
                 s.n_late[e] += 1
                 continue
-            if s.n_waiting[e] > mask:
+            if s.n_waiting[e] == s.order.shape[1]:
                 n_refused += 1
                 continue
-            slot = s.order[e, (s.head[e] + s.n_waiting[e]) & mask]
+            slot = s.order[e, s.n_waiting[e]]
             put_in_slot(s, e, slot, block, k)
             if not enqueue(s, e, slot):
                 s.n_doubled[e] += 1
@@ -104,13 +121,12 @@ def take_in(s, block):
 @kernel
 def count_due(s, until):
     """Most events that any environment has up to a time, (env) [s]."""
-    mask = s.order.shape[1] - 1
     most = 0
     for e in range(until.shape[0]):
         low, high = 0, s.n_waiting[e]
         while low < high:
             middle = (low + high) // 2
-            if s.slots[e, s.order[e, (s.head[e] + middle) & mask], TIME] <= until[e]:
+            if s.slots[e, s.order[e, middle], TIME] <= until[e]:
                 low = middle + 1
             else:
                 high = middle
@@ -131,11 +147,10 @@ def hand_on(s, until, remove, out):
     """
     t, kind, i, j, antenna_i, antenna_j, values, has_power, valid = out
     slots = s.slots
-    mask = s.order.shape[1] - 1
     for e in range(t.shape[0]):
         n = 0
         while n < s.n_waiting[e]:
-            slot = s.order[e, (s.head[e] + n) & mask]
+            slot = s.order[e, n]
             if slots[e, slot, TIME] > until[e]:
                 break
             t[e, n], kind[e, n] = slots[e, slot, TIME], int(slots[e, slot, KIND])
@@ -151,8 +166,7 @@ def hand_on(s, until, remove, out):
         for k in range(n, t.shape[1]):
             valid[e, k] = False
         if remove:
-            s.head[e] = (s.head[e] + n) & mask
-            s.n_waiting[e] -= n
+            free_first(s, e, n)
             s.released[e] = max(s.released[e], until[e])
 
 
@@ -166,12 +180,11 @@ def sum_turns(s, kind, dt, out):
         dt: Time between two of them, (node) [s].
         out: (env, node) [rad], written.
     """
-    mask = s.order.shape[1] - 1
     for e in range(out.shape[0]):
         for n in range(out.shape[1]):
             out[e, n] = 0.0
         for k in range(s.n_waiting[e]):
-            slot = s.order[e, (s.head[e] + k) & mask]
+            slot = s.order[e, k]
             if s.slots[e, slot, KIND] == kind:
                 i = int(s.slots[e, slot, NODE_I])
                 out[e, i] += s.slots[e, slot, VALUES + 2] * dt[i]

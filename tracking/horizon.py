@@ -38,14 +38,12 @@ class HorizonParams:
 
 
 class HorizonState(NamedTuple):
-    """What waits, and what was counted; the slots are as many as a power of two."""
+    """What waits, and what was counted."""
 
     slots: F64
     """Events, in columns that `_horizon_kernels` names, (env, slot, N_COLUMNS)."""
     order: I64
-    """Slots, a ring: from `head` on those that wait, in order, then the free ones, (env, slot)."""
-    head: I64
-    """Where it begins, (env)."""
+    """Slots: those that wait, in order, then the free ones, (env, slot)."""
     n_waiting: I64
     """Events that wait, (env)."""
     released: F64
@@ -62,7 +60,7 @@ class HorizonState(NamedTuple):
 
 
 def make_state(n_envs: int, n_slots: int = 64) -> HorizonState:
-    """Nothing waits; `n_slots` is a power of two."""
+    """Nothing waits."""
 
     def ints(*shape: int) -> I64:
         return np.zeros((n_envs, *shape), dtype=np.int64)
@@ -70,7 +68,6 @@ def make_state(n_envs: int, n_slots: int = 64) -> HorizonState:
     return HorizonState(
         slots=np.zeros((n_envs, n_slots, N_COLUMNS)),
         order=np.tile(np.arange(n_slots), (n_envs, 1)),
-        head=ints(),
         n_waiting=ints(),
         released=np.full(n_envs, -np.inf),
         n_late=ints(),
@@ -193,7 +190,7 @@ class Horizon:
         """Some of the environments; shares their memory. There is as much room as there is now."""
         part = copy.copy(self)
         part.state = self.state.of(envs)
-        part._n_envs, part._whole = len(part.state.head), self._whole or (self, self.state)
+        part._n_envs, part._whole = len(part.state.n_waiting), self._whole or (self, self.state)
         return part
 
     def flush(self) -> MeasurementBlock:
@@ -231,14 +228,11 @@ class Horizon:
             return
         if self._whole is not None:
             raise ConfigError(f"horizon: a part has room for {old} measurements, needs {needed}")
-        n_slots = 1 << (needed - 1).bit_length()
-        grown = make_state(self._n_envs, n_slots)
+        # At least twice as many: room that is made often must not be made each time.
+        grown = make_state(self._n_envs, max(needed, 2 * old))
         for name in HorizonState._fields:
             array, before = getattr(grown, name), getattr(self.state, name)
             array[(slice(None), slice(old), ...)[: array.ndim]] = before
-        ring = (self.state.head[:, None] + np.arange(old)) % old
-        grown.order[:, :old] = np.take_along_axis(self.state.order, ring, axis=1)
-        grown.head[:] = 0
         self.state = grown
 
     def _release(self, until: F64, out: MeasurementBlock | None) -> MeasurementBlock:
