@@ -8,6 +8,7 @@ changes those, which is what the variance of a sum over time needs.
 from __future__ import annotations
 
 from tracking.compiled import kernel, small_kernel
+from tracking.filters.joint._alignment_kernels import FILTERED, NONE
 from tracking.filters.joint._antenna_kernels import antenna_offset
 from tracking.filters.joint._carrier_kernels import centre, hold_nodes
 from tracking.filters.joint._linear_kernels import absorb, project, settle
@@ -37,7 +38,7 @@ def begin(c, s, t):
     for p in range(s.pairs.shape[0]):
         begin_pair(c, s, 0, p, 0.0)
     group = s.group[0]
-    group.started, group.n_alive = True, 1
+    group.alignment, group.n_alive = FILTERED, 1
     group.t, group.t_carrier, group.t_gauge = t, t, t
 
 
@@ -93,7 +94,7 @@ def run_bound(coefficients, layout, s, scratch, block, hidden, truth, turn_var, 
             take_state(c, s.nodes, s.held, s.pre, node_i[0, k], now, values, 0, k)
         if what not in (RANGE, SURVEY):
             continue
-        if not group.started:
+        if group.alignment == NONE:
             begin(c, s, now)
             put_on_truth(c, s, truth, k)
             if turn_var > 0.0:

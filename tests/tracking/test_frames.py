@@ -17,6 +17,7 @@ from tracking.filters.joint import (
     _peak_kernels,
     _range_kernels,
 )
+from tracking.filters.joint.alignment import Alignment
 from tracking.filters.joint.state import JointState
 
 
@@ -42,7 +43,7 @@ def open_bank(n_hyps=3):
     A = np.random.default_rng(5).standard_normal((n, n))
     s.P[0] = A @ A.T / n + 0.1 * np.eye(n)
     _open_kernels.open_frame(c, s, layout, 0)
-    s.group["parted"] = True
+    s.group["alignment"] = Alignment.MODES
     return c, s, scratch, layout
 
 
@@ -118,11 +119,12 @@ def test_every_turn_that_may_be_has_a_frame():
 def test_frames_that_have_come_together_are_one(parted):
     """Nearer to each other than two peaks can be."""
     c, s, _, _ = open_bank()
-    s.group["parted"], s.group["t"], s.group["best"] = parted, 100.0, 0
+    s.group["t"], s.group["best"] = 100.0, 0
+    s.group["alignment"] = Alignment.MODES if parted else Alignment.LINEAR
     s.information[0], s.score[0] = told(np.random.default_rng(3), np.eye(3), 10.0)
     turns = np.array([np.eye(3), Rotation.from_rotvec([0.0, 0.0, 0.25]).as_matrix()])
     _frame_kernels.follow_turns(c, s, 0, turns, np.zeros(2))
-    s.group["open"] = parted
+    s.group["alignment"] = Alignment.MODES if parted else Alignment.FILTERED
     _bank_kernels.prune_bank(c, s)
     assert s.alive.sum() == (1 if parted else 2)
 
@@ -131,7 +133,8 @@ def test_frames_that_have_come_together_are_one(parted):
 def test_a_frame_is_not_likelier_for_being_surer(parted):
     """As far as all is linear each is as sure as the others; wrong ones are bent and look surer."""
     c, s, scratch, _ = open_bank()
-    s.group["parted"], s.group["n_alive"] = parted, 2
+    s.group["alignment"] = Alignment.MODES if parted else Alignment.LINEAR
+    s.group["n_alive"] = 2
     p, gained = 0, []
     for scale in (1.0, 0.01):
         s.P[1], s.x[1], s.slope[1], s.nlos[1] = scale * s.P[0], s.x[0], s.slope[0], s.nlos[0]
@@ -155,7 +158,7 @@ def test_a_frame_is_not_likelier_for_being_surer(parted):
 def test_the_nis_is_over_the_variance_that_the_correction_used():
     """From how much the correction narrows the range: its variance goes from v to v - v^2 / S."""
     c, s, scratch, _ = open_bank()
-    s.group["n_alive"], s.group["open"], s.group["parted"] = 1, False, False
+    s.group["n_alive"], s.group["alignment"] = 1, Alignment.FILTERED
     h, p, levers = 0, 0, np.zeros(6)
     sight = (0.0, c["enter_rate"], c["leave_rate"])
 

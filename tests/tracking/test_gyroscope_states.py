@@ -10,6 +10,7 @@ from test_upright import walk
 from tracking.filters.joint import _gyroscope_kernels as gyroscope
 from tracking.filters.joint import _motion_kernels
 from tracking.filters.joint._rest_kernels import learn_at_rest
+from tracking.filters.joint.alignment import Alignment
 from tracking.filters.joint.params import CARRIERS
 from tracking.measurements import GYRO_BIAS, GYRO_VAR, N_VALUES, TOLD
 
@@ -30,7 +31,7 @@ def group(open_turn=False):
     """Three nodes in hands, of which the first has just told of its gyroscope."""
     c, s, scratch, layout = running(3, "hand")
     s.nodes["told"], s.pre[:] = True, 0.0
-    s.group["open"] = open_turn
+    s.group["alignment"] = Alignment.LINEAR if open_turn else Alignment.FILTERED
     at = s.nodes["at_g"][0] + np.arange(3)
     s.x[0, at], s.P[0] = 0.0, np.eye(s.x.shape[1])
     s.P[0, at, at] = START_STD**2

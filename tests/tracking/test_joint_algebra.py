@@ -26,6 +26,7 @@ from tracking.filters.joint._step_kernels import (
     add_to_rows,
     add_to_rows_plainly,
 )
+from tracking.filters.joint.alignment import Alignment
 from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.records import as_records
@@ -126,7 +127,7 @@ def test_while_every_turn_is_open_layouts_are_the_same_whose_shapes_are(seed):
     found = np.eye(3)
     turn_between(c, s, 0, 1, found)
     assert are_same(c, s, 0, 1, found) == (np.trace(M) > 1.0 + 2.0 * np.cos(SAME_TURN))
-    s.group["open"] = True
+    s.group["alignment"] = Alignment.LINEAR
     turn_between(c, s, 0, 1, found)
     assert are_same(c, s, 0, 1, found)
     np.testing.assert_allclose(found, M.T, atol=1e-9)

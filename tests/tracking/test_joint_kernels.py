@@ -15,6 +15,7 @@ from tracking.filters.joint import (
     _sample_kernels,
 )
 from tracking.filters.joint._range_kernels import range_model
+from tracking.filters.joint.alignment import Alignment
 from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.records import as_records
@@ -38,7 +39,7 @@ def running(dimensions, vehicle="car", seed=0, static=()):
     n = int(c[0]["n"])
     s.x[0] = rng.uniform(-2.0, 2.0, n)
     s.nodes["present"], s.alive[0] = True, True
-    s.group["n_alive"], s.group["started"] = 1, True
+    s.group["n_alive"], s.group["alignment"] = 1, Alignment.FILTERED
     for k in range(3):
         if not s.nodes["static"][k]:
             s.x[0, s.nodes["at_h"][k]] *= 0.05

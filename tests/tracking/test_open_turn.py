@@ -21,6 +21,7 @@ from tracking.filters.joint._flatness_kernels import flatness
 from tracking.filters.joint._range_kernels import range_model
 from tracking.filters.joint._sample_kernels import sum_inertial
 from tracking.filters.joint._upright_kernels import GAIN
+from tracking.filters.joint.alignment import Alignment
 from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.records import as_records
@@ -118,7 +119,7 @@ def drive(c, s, scratch, turn, steps=12):
             if not s.nodes["static"][i]:
                 sum_inertial(c, s.nodes, s.held, s.pre, i, 0.05 * (k + 1))
         _motion_kernels.predict(c, s, 0, 0.05, scratch)
-        if s.group["open"][0]:
+        if s.group["alignment"][0] == Alignment.LINEAR:
             _open_kernels.carry_slope(c, s, 0, scratch)
         for i in range(3):
             if not s.nodes["static"][i]:
@@ -159,7 +160,7 @@ def test_one_filter_gives_the_states_and_likelihoods_of_all_turns(static):
         other = JointState._make(a.copy() for a in begun)
         # As records, like those of the filter.
         other = other._replace(nodes=begun.nodes.copy(), group=begun.group.copy())
-        other.group["open"] = False
+        other.group["alignment"] = Alignment.FILTERED
         d = (turn - np.eye(3)).ravel()
         other.x[0] += d @ begun.slope[0]  # what was found of biases is turned as well
         total = drive(c, other, scratch, turn)
@@ -374,5 +375,5 @@ def test_groups_of_three_are_followed_one_turn_each(make_group, n):
     tracker = Tracker(group.constellation)
     tracker.step(group.block, group.t[-1])
     state = tracker.save()["filter"]
-    assert not state.group["open"].any()
+    assert (state.group["alignment"] == Alignment.FILTERED).all()
     assert state.alive.sum() > 1

@@ -12,6 +12,7 @@ from tracking.filters.joint._sleep_kernels import wake_turn
 from tracking.filters.joint._start_kernels import add_node
 from tracking.filters.joint._survey_kernels import fuse_survey
 from tracking.filters.joint._turn_kernels import note_turn, spread_turn
+from tracking.filters.joint.alignment import Alignment
 from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.records import as_records
@@ -34,7 +35,7 @@ def four(static=(), seed=0, *, dimensions=2):
     batch = make_state(constellation, params, 1, 1)
     s = JointState._make(as_records(a[0]) if a.dtype.names else a[0] for a in batch)
     s.nodes["present"], s.alive[0] = True, True
-    s.group["n_alive"], s.group["started"] = 1, True
+    s.group["n_alive"], s.group["alignment"] = 1, Alignment.FILTERED
     s.x[0] = np.random.default_rng(seed).uniform(-4.0, 4.0, s.x.shape[1])
     s.P[0] = 1e-4 * np.eye(len(s.x[0]))
     return c, s, make_layout(constellation, params)
@@ -205,7 +206,7 @@ def test_standing_does_not_tell_how_a_group_is_turned():
     t = log.block.t[0]
     tracker.step(log.block.take(t <= STAND_STILL - 0.1), STAND_STILL - 0.1)
     group = tracker.save()["filter"].group[0, 0]
-    assert group["asleep"]
+    assert group["alignment"] == Alignment.STATIC
     assert np.sqrt(group["turn_var"]) > 0.05
     until = STAND_STILL + 2.0
     estimate = tracker.step(log.block.take((t > STAND_STILL - 0.1) & (t <= until)), until)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from tracking.compiled import allocating_kernel, kernel, small_kernel
+from tracking.filters.joint._alignment_kernels import CHALLENGED, STATIC, has_modes
 from tracking.filters.joint._open_kernels import can_open
 from tracking.filters.joint._peak_kernels import APART
 
@@ -30,7 +31,7 @@ def are_same(c, s, a, b, turn):
         turn: by this, orthogonal, (d, d).
     """
     # Those that come from one filter, turned, are bent by that.
-    limit = c.merge_distance * (2.0 if s.group[0].parted else 1.0)
+    limit = c.merge_distance * (2.0 if has_modes(s.group[0]) else 1.0)
     way, pace = centre_of(c, s, b, False), centre_of(c, s, b, True)
     way_a, pace_a = centre_of(c, s, a, False), centre_of(c, s, a, True)
     for i in range(s.nodes.shape[0]):
@@ -69,14 +70,14 @@ def turn_between(c, s, a, b, turn):
                 for k in range(c.d):
                     scatter[r, k] += (s.x[a, at + r] - way_a[r]) * (s.x[b, at + k] - way_b[k])
     u, _, v = np.linalg.svd(scatter)
-    if can_open(c, s) and (s.group[0].asleep or (s.group[0].open and not s.group[0].parted)):
+    if can_open(c, s) and STATIC <= s.group[0].alignment <= CHALLENGED:
         turn[:] = u @ v
         return
     if np.linalg.det(u) * np.linalg.det(v) < 0.0:
         u[:, c.d - 1] *= -1.0
     nearest = u @ v
     # The trace is 2 cos in the plane, 1 + 2 cos in space.
-    limit = APART if s.group[0].parted else SAME_TURN
+    limit = APART if has_modes(s.group[0]) else SAME_TURN
     if np.trace(nearest) > (c.d - 2) + 2.0 * math.cos(limit):
         turn[:] = nearest
 

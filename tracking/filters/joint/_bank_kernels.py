@@ -17,6 +17,7 @@ from tracking._exponential_kernels import decay
 from tracking.compiled import allocating_kernel, kernel, small_kernel
 from tracking.filters._shape_kernels import forget_first
 from tracking.filters.joint._agreement_kernels import are_same, turn_between
+from tracking.filters.joint._alignment_kernels import CANDIDATES, FILTERED, NONE, STATIC, has_modes
 from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_hypothesis
 from tracking.filters.joint._flatness_kernels import flatness, least_axis, scatter_of
 from tracking.filters.joint._frame_kernels import doubt_turn
@@ -73,7 +74,7 @@ def watch_rotation(c, s, layout, dt):
     group = s.group[0]
     group.strain += (1.0 - decay(dt / STRAIN_TAU)) * (group.misfit - group.strain)
     group.strain_limit += (1.0 - decay(dt / LIMIT_TAU)) * (c.strained - group.strain_limit)
-    watched = group.n_alive == 1 and not (group.asleep or group.open)
+    watched = group.n_alive == 1 and group.alignment >= CANDIDATES
     if not watched or group.strain < group.strain_limit:
         return
     n_doubted = 0
@@ -110,13 +111,13 @@ def watch_rotation(c, s, layout, dt):
 def watch_mirror(c, s):
     """Bring the mirror image up where it can no longer be excluded."""
     group = s.group[0]
-    if group.n_alive != 1 or group.asleep or group.open:
+    if group.n_alive != 1 or group.alignment < CANDIDATES:
         return
     ratio = flatness(c, s, group.best, True)
     if ratio < FLAT:
-        group.flat = group.flat or flatness(c, s, group.best, False) < FLAT
-    elif group.flat and ratio > OPEN:
-        group.flat = False
+        group.degenerate = group.degenerate or flatness(c, s, group.best, False) < FLAT
+    elif group.degenerate and ratio > OPEN:
+        group.degenerate = False
         add_mirror_image(c, s)
 
 
@@ -125,10 +126,11 @@ def prune_bank(c, s):
     """Drop hypotheses that are unlikely or the same as a better one; choose the best."""
     group = s.group[0]
     if group.n_alive < 2:
-        group.parted = group.parted and group.open
+        if group.alignment == CANDIDATES:
+            group.alignment = FILTERED
         return
     n_hyps = s.alive.shape[0]
-    if not group.asleep and group.t < group.t_patient - TIE:
+    if group.alignment != STATIC and group.t < group.t_patient - TIE:
         for h in range(n_hyps):
             s.loglik[h] = 0.0
     best = -1
@@ -153,7 +155,7 @@ def prune_bank(c, s):
             if a == b or b == group.best or not (s.alive[a] and s.alive[b] and better):
                 continue
             turn[:] = np.eye(c.d)
-            if a == group.best or group.parted:
+            if a == group.best or has_modes(group):
                 turn_between(c, s, a, b, turn)
             if are_same(c, s, a, b, turn):
                 s.alive[b] = False
@@ -207,7 +209,7 @@ def remove_node(c, s, layout, i):
             s.nodes[k].astray, s.nodes[k].doubted = 0.0, False
         s.alive[:] = False
         s.group[0].n_alive = 0
-        s.group[0].started, s.group[0].open = False, False
+        s.group[0].alignment = NONE
 
 
 @kernel

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 from tracking.compiled import small_kernel
+from tracking.filters.joint._alignment_kernels import is_linear
 from tracking.filters.joint._linear_kernels import absorb, covariance, project, settle, symmetrise
 from tracking.filters.joint._open_kernels import tell_turn, turn_gradient
 from tracking.filters.joint._sleep_kernels import rests
@@ -50,7 +51,7 @@ def hold_nodes(c, s, h, t, scratch):
                 continue
             for k in range(c.d):
                 scratch.idx[0], scratch.val[0] = node.at_v + k, 1.0
-                if s.group[0].open:
+                if is_linear(s.group[0]):
                     scratch.direct[:] = 0.0
                 judge(c, s, h, -s.x[h, node.at_v + k], 1, c.rest_var, scratch)
         elif node.sideways_var > 0.0:
@@ -76,7 +77,7 @@ def glides(c, s, h, i):
 def judge(c, s, h, nu, m, variance, scratch):
     """Correct with a constraint, and let it speak for or against the hypothesis."""
     S, open_var = project(s, h, m, scratch) + variance, 0.0
-    if s.group[0].open:
+    if is_linear(s.group[0]):
         open_var = turn_gradient(s, h, m, scratch)
         tell_turn(s, h, scratch, nu, max(S, nu * nu / 25.0))
     if s.group[0].n_alive > 1:
@@ -106,12 +107,12 @@ def hold_on_wheels(c, s, h, i, scratch):
     val[0], val[1] = -sin_y + gain * cos_y, cos_y + gain * sin_y
     val[2] = -forward + gain * sideways
     nu = node.rear_axle * node.yaw_rate - outwards * forward - sideways
-    if s.group[0].open:
+    if is_linear(s.group[0]):
         note_direct(s, h, node.at_v, val[0], val[1], 0.0, scratch)
     judge(c, s, h, nu, 3, node.sideways_var, scratch)
     if c.d == 3:
         idx[0], val[0] = node.at_v + 2, 1.0
-        if s.group[0].open:
+        if is_linear(s.group[0]):
             note_direct(s, h, node.at_v, 0.0, 0.0, 1.0, scratch)
         judge(c, s, h, -s.x[h, node.at_v + 2], 1, node.sideways_var, scratch)
 
@@ -148,7 +149,7 @@ def hold_speed(c, s, h, dt, scratch):
                 mean += s.x[h, at] / m
                 a += 1
         S = project(s, h, m, scratch) + variance
-        if s.group[0].open:
+        if is_linear(s.group[0]):
             scratch.direct[:] = 0.0
             turn_gradient(s, h, m, scratch)
             tell_turn(s, h, scratch, -mean, S)

@@ -72,7 +72,7 @@ def watch_nodes(c, s, layout, t):
         elif worst < 0 or node.astray > s.nodes[worst].astray:
             worst = i
     blames = worst >= 0 and others_fit(c, s, worst, t)
-    group.lost = group.fit < LOST and not blames
+    group.diverged = group.fit < LOST and not blames
     for i in range(s.nodes.shape[0]):
         node = s.nodes[i]
         if not node.present:

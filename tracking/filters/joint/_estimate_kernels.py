@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from tracking.compiled import kernel
 from tracking.filters._clear_kernels import clear_estimate, is_heard
+from tracking.filters.joint._alignment_kernels import LINEAR, MODES, NONE, STATIC
 from tracking.filters.joint._doubt_kernels import MISSED
 from tracking.filters.joint._motion_kernels import predict
 from tracking.filters.joint._product_kernels import take_off
@@ -25,7 +26,7 @@ def write_estimate(c, s, scratch, t, e, o, out):
         has_q[e, o, i] = s.nodes[i].has_state
         for k in range(4):
             q_wb[e, o, i, k] = s.held[i, k]
-    if group.started:
+    if group.alignment != NONE:
         look_ahead(c, s, scratch, t)
     x, P = scratch.x[0], scratch.P[0]
     for p in range(s.pairs.shape[0]):
@@ -53,7 +54,7 @@ def write_estimate(c, s, scratch, t, e, o, out):
                 cov[e, o, p, q, r] = v
             if a < d:
                 worst = max(worst, cov[e, o, p, a, a])
-        if group.n_alive > 1 or group.asleep or (group.open and not group.held):
+        if group.n_alive > 1 or group.alignment in (STATIC, LINEAR, MODES):
             status[e, o, p] = AMBIGUOUS
         elif node_i.static and node_j.static:
             status[e, o, p] = OK

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from tracking.compiled import kernel, small_kernel
 from tracking.filters._shape_kernels import collect
+from tracking.filters.joint._alignment_kernels import NONE, STATIC, is_linear
 from tracking.filters.joint._antenna_kernels import antenna_offset
 from tracking.filters.joint._bank_kernels import (
     bank_range,
@@ -127,7 +128,7 @@ def advance_all(coefficients, layout, state, scratch, t):
     """Carry every environment to its time t, (env) [s]."""
     for e in range(t.shape[0]):
         s = one_env(state, e)
-        if s.group[0].started:
+        if s.group[0].alignment != NONE:
             advance(coefficients[0], s, layout, scratch, t[e], True)
             settle_all(s)
 
@@ -139,11 +140,11 @@ def hear(c, s, layout, scratch, i, j, a_i, a_j, t, distance, sight, is_survey):
     if not is_survey and is_stuck(c, s, p, t, distance):
         return
     node_i, node_j = s.nodes[i], s.nodes[j]
-    if s.group[0].started and t - s.group[0].t_check > c.leave_after:
+    if s.group[0].alignment != NONE and t - s.group[0].t_check > c.leave_after:
         # Nobody was heard: whoever speaks first has been away as long as the others.
         settle_all(s)
         remove_silent(c, s, layout, t)
-    if s.group[0].started and (was_silent(c, node_i, t) or was_silent(c, node_j, t)):
+    if s.group[0].alignment != NONE and (was_silent(c, node_i, t) or was_silent(c, node_j, t)):
         advance(c, s, layout, scratch, t, True)
         settle_all(s)
         remove_faded(c, s, layout, t)
@@ -152,7 +153,7 @@ def hear(c, s, layout, scratch, i, j, a_i, a_j, t, distance, sight, is_survey):
     if not is_survey:
         node_i.antenna, node_j.antenna = a_i, a_j
     runs = node_i.present and node_j.present
-    if s.group[0].started:
+    if s.group[0].alignment != NONE:
         advance(c, s, layout, scratch, t, not runs)
         for k in (i, j):
             if moves(s.nodes[k]):
@@ -174,7 +175,7 @@ def advance(c, s, layout, scratch, t, at_once):
     (`_range_kernels.range_model`): only the noise of so short a time comes after them, not before.
     """
     group = s.group[0]
-    if group.asleep and not none_moved(c, s, t):
+    if group.alignment == STATIC and not none_moved(c, s, t):
         settle_all(s)
         wake_up(c, s, layout, scratch)
     carriers_due = t - group.t_carrier + SAME >= c.carrier_period
@@ -208,7 +209,7 @@ def carry(c, s, scratch, t):
             follow_rotation(c, s, h, scratch)
             carry_moves(c, s, h)
             predict(c, s, h, t - group.t, scratch)
-            if group.open:
+            if is_linear(group):
                 carry_slope(c, s, h, scratch)
             for i in range(s.nodes.shape[0]):
                 if moves(s.nodes[i]) and s.nodes[i].told:
@@ -268,12 +269,12 @@ def take_first_range(c, s, layout, scratch, i, j, p, t, distance, sight, is_surv
     if not is_survey:
         s.pairs[p].start_sight += sight[0]
     settle_all(s)
-    if not s.group[0].started:
+    if s.group[0].alignment == NONE:
         if try_start(c, s, layout, t):
             for a in range(s.nodes.shape[0]):
                 use_surveys(c, s, layout, scratch, a, a)
         return
-    if s.group[0].asleep and may_move(s, t):
+    if s.group[0].alignment == STATIC and may_move(s, t):
         return
     for new in (i, j):
         if not s.nodes[new].present and try_join(c, s, layout, new, t):
@@ -285,7 +286,7 @@ def look_at_group(c, s, layout, t):
     """From time to time: who left, and which hypotheses are worth their time."""
     settle_all(s)
     remove_silent(c, s, layout, t)
-    if s.group[0].open:
+    if is_linear(s.group[0]):
         watch_turns(c, s, layout)
     prune_bank(c, s)
     note_turn(c, s)
@@ -293,6 +294,6 @@ def look_at_group(c, s, layout, t):
     watch_rotation(c, s, layout, t - s.group[0].t_check)
     watch_places(c, s, layout, t)
     watch_nodes(c, s, layout, t)
-    if s.group[0].lost:
+    if s.group[0].diverged:
         open_up(c, s, t - s.group[0].t_check)
     s.group[0].t_check = t

@@ -21,6 +21,13 @@ import math
 import numpy as np
 
 from tracking.compiled import allocating_kernel
+from tracking.filters.joint._alignment_kernels import (
+    CANDIDATES,
+    CHALLENGED,
+    FILTERED,
+    LINEAR,
+    MODES,
+)
 from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_part
 from tracking.filters.joint._open_kernels import NEAR, near_turns, note_spread, open_frame
 from tracking.filters.joint._peak_kernels import (
@@ -56,7 +63,7 @@ def doubt_turn(c, s, layout, h):
     for k in range(9):
         s.information[h, k, k] += 0.5 * c.head_start
     note_spread(s, h)
-    s.group[0].held = True
+    s.group[0].alignment = CHALLENGED
 
 
 @allocating_kernel
@@ -69,12 +76,12 @@ def watch_turns(c, s, layout):
             if was_alive[h]:
                 open_frame(c, s, layout, h)
         return
-    if group.held and group.n_alive == 1:
+    if group.alignment == CHALLENGED and group.n_alive == 1:
         watch_doubt(c, s, layout)
-    elif group.parted:
+    elif group.alignment == MODES:
         watch_near(c, s)
     else:
-        group.held = False
+        group.alignment = LINEAR
         watch_all(c, s, layout)
 
 
@@ -89,9 +96,9 @@ def watch_doubt(c, s, layout):
     if value < CLEARER or is_near(R, np.eye(3)):
         # One that is near is what these seconds tell; the filter knows it better from before.
         if len(values) == 1 or group.t - group.t_open > LONG:
-            group.open = False
+            group.alignment = FILTERED
         return
-    group.held, group.parted = False, True
+    group.alignment = MODES
     follow_turns(c, s, group.best, turns, values)
 
 
@@ -114,7 +121,7 @@ def watch_all(c, s, layout):
         note_spread(s, h)
     if not known:
         return
-    s.group[0].parted = True
+    s.group[0].alignment = MODES
     for h in range(s.alive.shape[0]):
         if was_alive[h]:
             turns, values = likely_turns(c, s, layout, h)
@@ -153,7 +160,7 @@ def watch_near(c, s):
             note_spread(s, h)
     if not known:
         return
-    s.group[0].open = False
+    s.group[0].alignment = CANDIDATES
     for h in range(s.alive.shape[0]):
         if s.alive[h]:
             spread_frame(c, s, h)

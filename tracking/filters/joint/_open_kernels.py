@@ -25,6 +25,7 @@ from __future__ import annotations
 import numpy as np
 
 from tracking.compiled import allocating_kernel, kernel, small_kernel
+from tracking.filters.joint._alignment_kernels import LINEAR, has_modes
 from tracking.filters.joint._antenna_kernels import turn_with_world
 from tracking.filters.joint._gyroscope_kernels import STEP, lean_slope
 from tracking.filters.joint._motion_kernels import moves, states_behind
@@ -68,14 +69,14 @@ def open_frame(c, s, layout, h):
                 for q in range(3):
                     s.information[h, 3 * r + 2, 3 * q + 2] += out[r] * out[q] / c.height_var
     group = s.group[0]
-    group.open, group.held, group.parted, group.t_open = True, False, False, group.t
+    group.alignment, group.t_open = LINEAR, group.t
     note_spread(s, h)
 
 
 @allocating_kernel
 def note_spread(s, h):
     """Work out how uncertain the elements of the turn are: those of any, or of one that is near."""
-    if s.group[0].parted:
+    if has_modes(s.group[0]):
         J = near_turns()
         H = J @ (s.information[h] @ J.T.copy()) + np.eye(3) / NEAR**2
         s.spread[h] = J.T.copy() @ (np.linalg.inv(H) @ J)

@@ -15,6 +15,7 @@ import math
 
 from tracking._angle_kernels import cosine_sine
 from tracking.compiled import small_kernel
+from tracking.filters.joint._alignment_kernels import is_linear
 from tracking.filters.joint._antenna_kernels import note_levers
 from tracking.filters.joint._linear_kernels import absorb, project
 from tracking.filters.joint._motion_kernels import time_since, way_since
@@ -171,7 +172,7 @@ def fuse_range(c, s, h, p, dt, distance, levers, sight, scratch):
     nu = distance - predicted
     variance = project(s, h, m, scratch)
     open_var = 0.0
-    if s.group[0].open:
+    if is_linear(s.group[0]):
         note_levers(levers, scratch)
         open_var = turn_gradient(s, h, m, scratch)
     bent = bend_variance(c, s, h, p, scratch.val)
@@ -190,7 +191,7 @@ def fuse_range(c, s, h, p, dt, distance, levers, sight, scratch):
         predicted, m = range_model(c, s, h, p, levers[:3], levers[3:], scratch.idx, scratch.val)
         nu = distance - predicted
         variance = project(s, h, m, scratch)
-        if s.group[0].open:
+        if is_linear(s.group[0]):
             open_var = turn_gradient(s, h, m, scratch)
     R = c.white_var + bent + s.nlos[h, p] * c.excess_white_var
     nis = nu * nu / (variance + open_var + R)
@@ -198,10 +199,10 @@ def fuse_range(c, s, h, p, dt, distance, levers, sight, scratch):
     # contradict the filter, it is the filter that is wrong.
     doubt = s.pairs[p].misfit / (0.7 * c.doubt)
     trust = sane
-    if doubt > 1.0 and not s.group[0].lost:
+    if doubt > 1.0 and not s.group[0].diverged:
         trust /= doubt * doubt * doubt * doubt
     if trust > 1e-3:
-        if s.group[0].open:
+        if is_linear(s.group[0]):
             tell_turn(s, h, scratch, nu, variance + R / trust)
         absorb(s, h, scratch.w, nu, variance + R / trust)
     return before, misfit, nis, sane

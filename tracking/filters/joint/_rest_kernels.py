@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from tracking.compiled import small_kernel
+from tracking.filters.joint._alignment_kernels import is_linear
 from tracking.filters.joint._gyroscope_kernels import KNOWN, REST
 from tracking.filters.joint._linear_kernels import absorb, project
 from tracking.filters.joint._open_kernels import tell_turn, turn_gradient
@@ -19,7 +20,7 @@ def learn_at_rest(s, h, i, scratch):
         scratch.idx[0], scratch.val[0] = node.at_g + k, 1.0
         S = project(s, h, 1, scratch) + R
         nu = pre[i, REST + k] * R - taken[k] - s.x[h, node.at_g + k]
-        if s.group[0].open:
+        if is_linear(s.group[0]):
             scratch.direct[:] = 0.0
             turn_gradient(s, h, 1, scratch)
             tell_turn(s, h, scratch, nu, S)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from tracking.compiled import allocating_kernel, kernel, small_kernel
+from tracking.filters.joint._alignment_kernels import FILTERED
 from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_hypothesis
 from tracking.filters.joint._linear_kernels import decouple
 from tracking.filters.joint._open_kernels import can_open, open_frame
@@ -66,7 +67,7 @@ def wake_up(c, s, layout, scratch):
     room for a few rotations of the second.
     """
     group = s.group[0]
-    group.asleep = False
+    group.alignment = FILTERED
     if group.t > group.t_patient - PATIENCE + STOOD + TIE:
         group.t_patient = group.t
     was_alive = s.alive.copy()

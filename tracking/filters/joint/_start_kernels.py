@@ -22,6 +22,7 @@ from tracking.filters._shape_kernels import (
     is_ready,
     start_distance,
 )
+from tracking.filters.joint._alignment_kernels import FILTERED, STATIC
 from tracking.filters.joint._carrier_kernels import CENTRE_VAR
 from tracking.filters.joint._copy_kernels import copy_hypothesis
 from tracking.filters.joint._linear_kernels import decouple
@@ -76,9 +77,8 @@ def try_start(c, s, layout, t):
         begin_ranging(s.pairs[p], t)
         forget_fits(s.pairs[p])
     group = s.group[0]
-    group.started = True
-    group.flat = False
-    group.asleep, group.open, group.parted = asleep, False, False
+    group.alignment = STATIC if asleep else FILTERED
+    group.degenerate = False
     if opens:
         open_frame(c, s, layout, 0)
     group.n_alive = n_first
@@ -89,7 +89,7 @@ def try_start(c, s, layout, t):
         if s.nodes[members[a]].sideways_var > 0.0:
             group.t_patient = t + PATIENCE
     group.turn_var = c.rotation_var if c.d == 2 else 0.0
-    group.misfit, group.fit, group.lost = 1.0, 1.0, False
+    group.misfit, group.fit, group.diverged = 1.0, 1.0, False
     group.strain, group.strain_limit = 0.0, c.strained
     return True
 

@@ -7,6 +7,7 @@ is used once more when they do. It is remembered while a node is away.
 from __future__ import annotations
 
 from tracking.compiled import kernel, small_kernel
+from tracking.filters.joint._alignment_kernels import is_linear
 from tracking.filters.joint._linear_kernels import absorb, project, settle_all
 from tracking.filters.joint._open_kernels import tell_turn, turn_gradient
 from tracking.filters.joint._range_kernels import range_model
@@ -38,7 +39,7 @@ def fuse_survey(c, s, h, p, distance, is_news, scratch):
             s.x[h, r] += scratch.w[r] * share
             s.moved[h, r] += scratch.w[r] * share
         return
-    if s.group[0].open:
+    if is_linear(s.group[0]):
         scratch.direct[:] = 0.0
         open_var = turn_gradient(s, h, m, scratch)
         tell_turn(s, h, scratch, distance - predicted, variance + c.survey_var)

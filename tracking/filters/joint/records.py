@@ -105,12 +105,8 @@ PAIR = np.dtype(
 )
 GROUP = np.dtype(
     [
-        ("started", "?"),
-        ("open", "?"),  # in space: nothing has told yet how it is turned
-        ("parted", "?"),  # each hypothesis is a turn of the same group, or those near it
-        ("held", "?"),  # open, but reported as it is until another turn is likelier
-        ("asleep", "?"),  # nothing has moved yet, and one rotation stands for all
-        ("flat", "?"),  # the layout was too flat to tell its mirror image
+        ("alignment", "i8"),  # see `alignment.Alignment`
+        ("degenerate", "?"),  # the layout was too flat to tell its mirror image
         ("n_alive", "i8"),
         ("best", "i8"),
         ("t", "f8"),  # time of the states [s]
@@ -124,7 +120,7 @@ GROUP = np.dtype(
         ("strain", "f8"),  # slow running mean of the misfit [-]
         ("strain_limit", "f8"),  # how much of it brings up other rotations [-]
         ("fit", "f8"),  # running share of ranges that fit [-]
-        ("lost", "?"),  # most ranges do not fit, and no single node is to blame
+        ("diverged", "?"),  # most ranges do not fit, and no single node is to blame
         ("nis_sum", "f8"),
         ("nis_n", "i8"),
     ]

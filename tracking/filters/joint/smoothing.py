@@ -17,6 +17,7 @@ import numpy as np
 
 from tracking.arrays import F64, aligned, whole_lines
 from tracking.estimate import Status, TeamEstimate
+from tracking.filters.joint.alignment import Alignment
 from tracking.filters.joint.records import Records
 from tracking.filters.joint.state import JointState, room_to_wait
 
@@ -39,7 +40,9 @@ def with_clones(state: JointState, coefficients: Records) -> tuple[JointState, R
     width = whole_lines(len(every))
     group = state.group.copy()
     group["best"], group["n_alive"] = 0, np.minimum(group["n_alive"], 1)
-    group["open"] = False  # the reported turn is taken as it is
+    # The reported rotation is taken as it is.
+    linear = group["alignment"] >= Alignment.LINEAR
+    group["alignment"] = np.where(linear, Alignment.FILTERED, group["alignment"])
     wider = coefficients.copy()
     wider["n"] = width
     clones = JointState(
