@@ -137,16 +137,17 @@ def diagnose_car(
 
 
 def share_a_device(reports: list[LinkReport]) -> None:
-    """Note nodes that speak on two links."""
-    first: dict[str, LinkReport] = {}
+    """Note nodes whose samples, or whose ranges, come on two links."""
+    first: dict[tuple[str, str], LinkReport] = {}
     for report in reports:
         for node in report.nodes:
             if not node.known or node.positions_hz:
                 continue  # who is told of does not speak
-            other = first.setdefault(node.node, report)
-            if other is not report:
+            says = {"samples": node.imu_hz > 0.0, "ranges": bool(node.ranges_hz)}
+            others = {first.setdefault((node.node, k), report).name for k, v in says.items() if v}
+            for name in sorted(others - {report.name}):
                 report.problems.append(
-                    f"node {node.node} speaks on {other.name} too: give the devices ids of their "
+                    f"node {node.node} speaks on {name} too: give the devices ids of their "
                     "own, or correct `ids` and `node` of the two links"
                 )
 

@@ -6,37 +6,28 @@ truth scores the drive, which knows nothing of it.
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-import signal
 import tempfile
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
-from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from agents.child import end_with_parent
 from agents.compare.contender import Contender, find_entry
 from agents.compare.episode import run_episodes
 from agents.compare.setting import Setting
 from agents.compare.statistics import Interval, ratio
 from agents.demo import SETTLE
 from agents.drive import DriveResult, drive, drive_on
-from agents.emulate import EmulateOptions, emulate
+from agents.emulate import EmulateOptions
+from agents.emulate.process import LONGEST_START, EmulationProcess
 from agents.emulate.virtual import START_NS, VirtualBridge
 from agents.emulate.world import EmulatedWorld
-from agents.errors import UsageError
 from relpos_env.timing import DECISION
 from tracking.arrays import F64
 from tracking.log import Log, read_log
 from tracking.short_repr import short_repr
-
-LONGEST_START = 120.0
-"""[s] From the first byte to cars that drive."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -137,6 +128,7 @@ def hardware_demo(
         task=options.task,
         task_options=options.task_options,
         cars=options.cars,
+        operator=float(options.operator),
         seconds=options.seconds,
     )
     twin = run_episodes(contender, setting, [options.seed])[0]
@@ -198,7 +190,7 @@ def _drive_ports(
     options: EmulateOptions, name: str, place: Path, progress: Callable[[float], None] | None
 ) -> _Drove:
     """In real time, with ports in a folder."""
-    with _Emulation(options, place) as emulation:
+    with EmulationProcess(options, place) as emulation:
         result = drive(
             config=place / "swarm.toml",
             name=name,
@@ -244,57 +236,3 @@ def _teller(
             progress(min(env.group.cycles / options.cycles, 1.0))
 
     return tell
-
-
-class _Emulation:
-    """The emulator's process, for as long as the drive needs it."""
-
-    start_ns = 0
-    contacts = 0
-    late_steps = 0
-
-    def __init__(self, options: EmulateOptions, place: Path) -> None:
-        spawn = multiprocessing.get_context("spawn")
-        self._pipe, theirs = spawn.Pipe()
-        self._process = spawn.Process(target=_emulate, args=(options, place, theirs))
-
-    def __enter__(self) -> _Emulation:
-        self._process.start()
-        said = self._pipe.recv() if self._pipe.poll(LONGEST_START) else None
-        if said != "ready":
-            self._process.kill()
-            raise said if isinstance(said, Exception) else TimeoutError("emulator: did not start")
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        if self._process.pid is not None and self._process.is_alive():
-            os.kill(self._process.pid, signal.SIGINT)
-        said = None
-        with suppress(EOFError):  # it was killed
-            said = self._pipe.recv() if self._pipe.poll(LONGEST_START) else None
-        self._process.join(timeout=LONGEST_START)
-        self._process.close()
-        if isinstance(said, tuple):
-            self.start_ns, self.contacts, self.late_steps = said
-        elif error[0] is None:
-            # What went wrong with the drive itself is the more telling.
-            why = said if isinstance(said, Exception) else "its process was ended from outside"
-            raise UsageError(f"emulator: it failed: {why}")
-
-
-def _emulate(options: EmulateOptions, place: Path, pipe: Connection) -> None:
-    """What that process does, until it is interrupted."""
-    end_with_parent()
-    try:
-        result = emulate(
-            folder=place,
-            options=options,
-            wait=LONGEST_START,
-            seconds=options.seconds + LONGEST_START,
-            log=place / "truth",
-            ready=lambda rig: pipe.send("ready"),
-        )
-    except Exception as error:
-        pipe.send(error)
-        return
-    pipe.send((result.start_ns, result.contacts, result.lateness.late))

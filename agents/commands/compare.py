@@ -140,18 +140,23 @@ def _on_cars(
 ) -> CompareResult:
     """The comparison with real cars."""
     from agents.compare.hardware import compare_hardware
-    from agents.drive.keys import TerminalKeys, key_by_key
+    from agents.drive.keys import NO_KEYS, TerminalKeys, check_stop_source, key_by_key
 
     context = click.get_current_context()
     for name, option in SIMULATED.items():
         if context.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT:
             raise UsageError(f"{option}: expected without --swarm, {WHY}")
 
+    if arm:
+        check_stop_source("terminal")
     keys = TerminalKeys()
 
     def attend(order: Callable[[str], None]) -> None:
+        had_them = not keys.lost
         for what in keys.read_orders():
             order(what)
+        if keys.lost and had_them:
+            click.echo(NO_KEYS, err=True)
 
     given = {k: options[k] for k in ("episodes", "seconds", "settle") if k in options}
     with progress_bar("compare") as tell, key_by_key():

@@ -137,8 +137,13 @@ class _Screen:
 
     def attend(self, order: Any) -> None:
         """Pass on what was pressed."""
+        from agents.drive.keys import NO_KEYS
+
+        had_them = not self._source.lost
         for what in self._source.read_orders():
             order(what)
+        if self._source.lost and had_them and self._live is None:
+            click.echo(NO_KEYS, err=True)
 
     def show(self, bridge: OpenBridge, env: LiveFormationEnv) -> None:
         """After every decision."""

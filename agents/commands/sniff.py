@@ -25,7 +25,7 @@ def sniff(
     raw: bool,
     as_json: bool,
 ) -> None:
-    """Show what a device at PORT says; nothing is sent to it.
+    """Show what a device at PORT says; nothing is sent but the request of a --format rplidar.
 
     PORT is a path, serial:NUMBER, tcp:host:port or file:path.
     """

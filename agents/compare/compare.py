@@ -57,8 +57,8 @@ def compare(
         task_options: The task's own options, by name.
         cars: Slots for cars; by default as many as the scenario can have.
         level: Randomisation of a level of the curriculum, 0 to 4.
-        operator: Share of episodes with an operator; in the others cars are told the plan alone,
-            as real cars without a remote control are.
+        operator: Share of episodes with an operator; in the others cars follow the plan alone,
+            as real cars without a remote control do.
         proximity: Beams that measure distances round each car; by default those that each policy
             was trained with, and of controllers as many as any policy has, or none.
         episodes: Of each driver, mode and scenario, seeds from `first_seed` on.

@@ -28,7 +28,7 @@ class Setting:
     level: int | None = None
     """Randomisation of a level of the curriculum, 0 to 4, in place of the scenario's own."""
     operator: float = 1.0
-    """[-] Share of episodes with an operator; in the others cars are told the plan alone."""
+    """[-] Share of episodes with an operator; in the others cars follow the plan alone."""
     seconds: float = 60.0
     """[s] Length of an episode, less where the task is done before."""
     settle: float = SETTLE

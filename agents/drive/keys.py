@@ -19,10 +19,10 @@ ALIVE = "."
 nothing."""
 PATIENCE = 1.0
 """[s] Without a word from it, all cars are stopped."""
-HELP = "space: emergency stop  c: clear it  a: arm  d: disarm  g: silent are gone  q: quit"
+HELP = "space: emergency stop  c: clear  a: arm  d: disarm  g: silent are gone  q: quit"
 """In one line of 80 letters."""
-NO_KEYS = "no keys: another program has the terminal, cars are stopped; fg brings this one back"
-"""Likewise."""
+NO_KEYS = "no keys, cars are stopped: another program has the terminal, fg takes it back"
+"""In one line, too."""
 
 
 def check_stop_source(source: str) -> None:
@@ -56,19 +56,8 @@ def key_by_key() -> Iterator[None]:
     import termios
 
     before = termios.tcgetattr(sys.stdin)
-
-    def set_up(*_: object) -> None:
-        if in_background():  # the system would halt this program, and the cars with it
-            return
-        mode = termios.tcgetattr(sys.stdin)
-        mode[0] &= ~(termios.IXON | termios.IXOFF)
-        mode[3] &= ~(termios.ICANON | termios.ECHO)
-        for key in (termios.VSUSP, termios.VQUIT):
-            mode[6][key] = b"\0"
-        termios.tcsetattr(sys.stdin, termios.TCSANOW, mode)
-
-    set_up()
-    resumed = signal.signal(signal.SIGCONT, set_up)  # a shell that took the terminal has changed it
+    _take_keys()
+    resumed = signal.signal(signal.SIGCONT, _take_keys)
     try:
         yield
     finally:
@@ -76,6 +65,20 @@ def key_by_key() -> Iterator[None]:
         with contextlib.suppress(termios.error):  # it was closed
             if not in_background():
                 termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
+
+
+def _take_keys(*_: object) -> None:
+    """Set the terminal to single keys, as a shell that had it meanwhile has changed that."""
+    import termios
+
+    if in_background():  # the system would halt this program, and the cars with it
+        return
+    mode = termios.tcgetattr(sys.stdin)
+    mode[0] &= ~(termios.IXON | termios.IXOFF)
+    mode[3] &= ~(termios.ICANON | termios.ECHO)
+    for key in (termios.VSUSP, termios.VQUIT):
+        mode[6][key] = b"\0"
+    termios.tcsetattr(sys.stdin, termios.TCSANOW, mode)
 
 
 def in_background() -> bool:
@@ -128,6 +131,8 @@ class TerminalKeys:
         had_them, self.lost = not self.lost, in_background()
         if self.lost:
             return ["stop"] if had_them else []
+        if not had_them:
+            _take_keys()  # a shell that counts this program as running sends no signal
         pressed = b""
         while _is_terminal() and select.select([sys.stdin], [], [], 0.0)[0]:
             keys = os.read(sys.stdin.fileno(), 1024)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 from collections.abc import Iterator
@@ -29,15 +30,16 @@ class Patience:
         """
         self.seconds = seconds
         self._runs: dict[int, tuple[float, Run]] = {}
-        """By thread: when it has to be over, and how it is told."""
-        self._watcher: threading.Thread | None = None
+        """By thread: when it has to be over, and the run to end."""
+        self._watched_by = 0
+        """Process that has the thread: a fork has none of its parent's."""
 
     @contextmanager
     def over(self, run: Run) -> Iterator[None]:
         """End the run if it lasts too long."""
-        if self._watcher is None:
-            self._watcher = threading.Thread(target=self._watch, name="patience", daemon=True)
-            self._watcher.start()
+        if self._watched_by != os.getpid():
+            self._watched_by, self._runs = os.getpid(), {}
+            threading.Thread(target=self._watch, name="patience", daemon=True).start()
         me = threading.get_ident()
         self._runs[me] = time.monotonic() + self.seconds, run
         try:

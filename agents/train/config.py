@@ -32,7 +32,7 @@ class EnvSetup:
     scenarios."""
     operator: float = number(0.5, 0, 1)
     """Share of episodes with an operator, whose trims come from true positions. In the others
-    cars are told the plan alone, as real cars without a remote control are."""
+    cars follow the plan alone, as real cars without a remote control do."""
     levels: tuple[int, ...] = field(default=(), metadata={"low": 0, "high": 4})
     """Levels of randomisation, 0 to 4, gone through one after the other in equal shares of the
     training; none keeps what the scenarios say."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from math import pi
 from pathlib import Path
 from typing import Any
 
@@ -68,10 +69,10 @@ def read_links(
         elif not (entry.names_itself or entry.tells_of_others):
             raise at.key("node").error(f"missing: {link.format} does not say who speaks")
         is_scanner = ScanReading in entry.tells
-        if "scanner" in table and not is_scanner:
+        if is_scanner:
+            _check_scanner(link, named, raw, group, at)
+        elif "scanner" in table:
             raise at.key("scanner").error(f"{link.format} is no scanner, leave it out")
-        if not (0.01 <= link.scanner.length <= 5.0 and 0.01 <= link.scanner.width <= 5.0):
-            raise at.key("scanner").error("expected a length and a width of 0.01 to 5 m")
         yield LinkConfig(
             name=key,
             port=PortSpec(
@@ -86,6 +87,32 @@ def read_links(
             ids=named,
             key=_key(link.key, at),
             scanner=link.scanner if is_scanner else None,
+        )
+
+
+def _check_scanner(
+    link: _Link, ids: Mapping[str, int], raw: Mapping[str, Any], group: Constellation, where: Where
+) -> None:
+    """Refuse a scanner that nothing would come of, or that cannot be where it is said to be."""
+    at, mount = where.key("scanner"), link.scanner
+    for name, most in (("length", 5.0), ("width", 5.0)):
+        if not 0.01 <= getattr(mount, name) <= most:
+            value = getattr(mount, name)
+            raise at.key(name).error(f"expected 0.01 to {most:g} m, got {value:g}")
+    for name, most in (("x", mount.length), ("y", mount.width), ("yaw", 2.0 * pi)):
+        if not abs(getattr(mount, name)) <= most:
+            unit, value = "rad" if name == "yaw" else "m", getattr(mount, name)
+            raise at.key(name).error(f"expected -{most:g} to {most:g} {unit}, got {value:g}")
+    if ids:
+        raise where.key("ids").error("a scanner names nothing, leave it out")
+    if link.node is not None and group.is_static[group.index_of[link.node]]:
+        raise where.key("node").error(f"node {link.node} is static, expected that of a car")
+    if not raw.get("task", {}).get("proximity"):
+        raise (
+            Where(where.file, raises=BridgeError)
+            .key("task")
+            .key("proximity")
+            .error("expected the number of beams that a scanner fills, 1 to 32")
         )
 
 

@@ -56,7 +56,7 @@ class DecoderEntry:
     checked: bool = False
     """Frames carry a check sum; else a damaged digit can pass."""
     request: bytes = b""
-    """Sent when the port comes up, to a device that measures only then."""
+    """See `hardware_bridge.links.ports.PortSpec`."""
     dtr: bool = True
     """The line DTR; off for a device whose motor it stops."""
 

@@ -35,6 +35,8 @@ FARTHEST_STEP = 20 * 64
 """[1/64 deg] From one sample to the next: a slow scanner that turns fast makes 5 deg."""
 LEAST_TURN = 32
 """[1/64 deg] Over `LOCK` samples; the densest scanner makes 0.8 deg."""
+WATCH = 8 * LOCK
+"""[-] Once believed, the turn is looked at over so many: parallax may take some of it back."""
 REQUEST = bytes.fromhex("a5f0029402c1 a520")
 """Turn the motor, where the adapter has a line for that, and scan; others ignore the first."""
 
@@ -49,8 +51,8 @@ class RplidarDecoder:
         """Of samples that follow each other and are not believed yet; None without a distance."""
         self._n_run = 0
         """Samples in a row, `LOCK` where they are believed."""
-        self._angle = self._turned = 0
-        """Of the last sample, and since the first of the run [1/64 deg]."""
+        self._angle = self._turned = self._watched = 0
+        """Of the last sample; since the first of those that are looked at [1/64 deg]; how many."""
 
     @property
     def waiting(self) -> int:
@@ -101,17 +103,22 @@ class RplidarDecoder:
         angle >>= 1
         step = (angle - self._angle + TURN // 2) % TURN - TURN // 2
         if self._n_run == 0:
-            step = self._turned = 0
+            step = self._turned = self._watched = 0
+        self._watched += 1
         turned = self._turned + step
-        if abs(step) > FARTHEST_STEP or (self._n_run == LOCK - 1 and turned < LEAST_TURN):
+        believed = self._n_run == LOCK
+        if abs(step) > FARTHEST_STEP:
             return False
+        if self._watched == (WATCH if believed else LOCK):
+            if turned < LEAST_TURN * self._watched // LOCK:
+                return False
+            turned = self._watched = 0
         self._angle, self._turned = angle, turned
         self._n_run = min(self._n_run + 1, LOCK)
         return True
 
     def _release(self, readings: list[Reading]) -> None:
         measured = [reading for reading in self._run if reading is not None]
-        self.counts.frames += len(measured)
-        self.counts.skipped += len(self._run) - len(measured)
+        self.counts.frames += len(self._run)
         readings += measured
         self._run.clear()

@@ -15,6 +15,10 @@ SOONEST = 100_000_000
 LATEST = 2_000_000_000
 """[ns] Between two attempts. A port that was open for so long starts from `SOONEST` again."""
 
+ASK_AGAIN = 1_000_000_000
+"""[ns] Of silence, after which a device that measures only when it is asked is asked again: it was
+still starting, or has lost its power alone."""
+
 
 @dataclass(frozen=True, slots=True)
 class LinkNotice:
@@ -46,6 +50,8 @@ class LinkState:
     """When to open it; None while it is open or being opened."""
     waits_to_write: bool = False
     """Part of a message is left, for which there was no room."""
+    asked_ns: int = 0
+    """When its request was sent last, or bytes came last [ns]."""
 
     def back_off(self, now: int) -> None:
         """Set when to try again, and wait twice as long the next time."""

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.failures import lost_by, reason_of
-from hardware_bridge.links.link_state import LinkNotice, LinkState, check_distinct
+from hardware_bridge.links.link_state import ASK_AGAIN, LinkNotice, LinkState, check_distinct
 from hardware_bridge.links.opener import Opener, OpenPort, open_port
 from hardware_bridge.links.ports import Chunk, PortSpec
 from hardware_bridge.links.stream import Port
@@ -21,8 +21,8 @@ class Links:
     """The ports of one process, used by one thread.
 
     Laws: no byte is lost or doubled while a port is up; whatever one port does, the others go on;
-    nothing is ever sent but the port's own request when it comes up, and what was asked for by
-    `send` since then.
+    nothing is ever sent but what was asked for by `send` since the port came up, and the port's own
+    request, as it comes up and while the device is silent.
     """
 
     def __init__(
@@ -76,6 +76,9 @@ class Links:
             At most one chunk a link, stamped right after it was read.
         """
         self._retry()
+        for each in self._links.values():
+            if each.spec.request and self._now_ns() - each.asked_ns >= ASK_AGAIN:
+                self._request(each)
         chunks, opened = [], False
         for key, events in self._selector.select(self._patience(timeout)):
             link = self._by_fd.get(key.fd)
@@ -165,6 +168,8 @@ class Links:
         except Exception as error:
             self._lose(link, error)
             return None
+        if data:
+            link.asked_ns = t_ns
         return Chunk(link.spec.name, t_ns, data) if data else None
 
     def _flush(self, link: LinkState) -> None:
@@ -194,6 +199,12 @@ class Links:
                 except RuntimeError as error:  # no more threads
                     self._failed(link, error)
 
+    def _request(self, link: LinkState) -> None:
+        """Ask a device to measure that does not by itself."""
+        if link.spec.request and link.port is not None:
+            link.asked_ns = self._now_ns()
+            self.send(link.spec.name, link.spec.request)
+
     def _take_opened(self) -> None:
         for name, result in self._opener.done():
             link = self._links[name]
@@ -218,8 +229,7 @@ class Links:
         link.reason, link.since_ns, link.retry_ns = "", self._now_ns(), None
         self._by_fd[fd] = link
         self._notices.append(LinkNotice(link.spec.name, link.since_ns, up=True))
-        if link.spec.request:
-            self.send(link.spec.name, link.spec.request)
+        self._request(link)
 
     def _lose(self, link: LinkState, error: Exception) -> None:
         """A port that was open failed."""

@@ -17,7 +17,7 @@ class PortSpec:
     baud: int = 115200
     """[1/s] Without meaning for TCP and files."""
     request: bytes = b""
-    """Sent each time the port comes up, to a device that measures only when it is asked."""
+    """Sent as the port comes up, and again while it is silent, to a device that must be asked."""
     dtr: bool = True
     """The line DTR of a serial port while it is open."""
 

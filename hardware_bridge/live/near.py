@@ -11,8 +11,10 @@ from hardware_bridge.readings import ScanReading
 from relpos_env.interface.beams import FARTHEST
 from tracking.arrays import F64, I64
 
-LASTS = 0.3
-"""[s] A measurement counts for so long: a ring is read several times as often."""
+LASTS, N_SPANS = 0.3, 6
+"""[s, -] A measurement counts for so long, in so many spans: less one span, that is more than a
+turn of a slow scanner."""
+SPAN_NS = round(LASTS * 1e9) // N_SPANS
 
 
 class Near:
@@ -25,9 +27,11 @@ class Near:
             n_slots: Cars.
             n_beams: Round each of them; 0 for none.
         """
-        shape = n_slots, n_beams
+        shape = n_slots, n_beams, N_SPANS
         self._distance: F64 = np.zeros(shape)
-        self._t_ns: I64 = np.full(shape, -(1 << 62), dtype=np.int64)
+        """Nearest of a span of time, the spans a ring [m]."""
+        self._span: I64 = np.full(shape, -N_SPANS, dtype=np.int64)
+        """Which span that was."""
 
     def take(self, slot: int, bearing: float, distance: float | None, t_ns: int) -> None:
         """One measurement.
@@ -38,14 +42,15 @@ class Near:
             distance: [m] None where nothing is.
             t_ns: When it came [ns].
         """
-        n_slots, n_beams = self._distance.shape
+        n_slots, n_beams, _ = self._distance.shape
         if not (n_beams and slot < n_slots and math.isfinite(bearing)):
             return
         beam = round(bearing / (2.0 * math.pi) * n_beams) % n_beams
         seen = FARTHEST if distance is None else min(max(distance, 0.0), FARTHEST)
-        is_old = t_ns - self._t_ns[slot, beam] > LASTS * 1e9
-        if is_old or seen <= self._distance[slot, beam]:
-            self._distance[slot, beam], self._t_ns[slot, beam] = seen, t_ns
+        span = t_ns // SPAN_NS
+        at = slot, beam, span % N_SPANS
+        if span != self._span[at] or seen < self._distance[at]:
+            self._distance[at], self._span[at] = seen, span
 
     def take_scan(
         self, slot: int, reading: ScanReading, mount: ScannerMount | None, t_ns: int
@@ -59,6 +64,7 @@ class Near:
 
     def beams(self, t_ns: int) -> F64:
         """Distances now, (slot, beam) [m]; 0, a touch, where nothing was measured of late."""
-        fresh = t_ns - self._t_ns <= LASTS * 1e9
-        distances: F64 = np.where(fresh, self._distance, 0.0)
+        fresh = self._span > t_ns // SPAN_NS - N_SPANS
+        nearest = np.where(fresh, self._distance, np.inf).min(axis=-1)
+        distances: F64 = np.where(np.isfinite(nearest), nearest, 0.0)
         return distances

@@ -90,7 +90,7 @@ def scenario_from(
         if not is_path(wanted):
             base = look_up(SHIPPED, wanted, "extends")
         elif depth < DEEPEST:
-            base = _load(_within(beside, wanted), depth + 1)
+            base = _load(_within(beside, wanted, ""), depth + 1)
         else:
             raise EnvError(f"expected files that extend each other at most {DEEPEST} deep")
         inherited.append(base.gap)
@@ -105,7 +105,7 @@ def scenario_from(
         if furnish is not None:
             read = replace(read, furnish=look_up({}, furnish, "furnish", group="relpos_env.worlds"))
         if plan is not None:
-            walls = read_floor_plan(_within(beside, str(plan)))
+            walls = read_floor_plan(_within(beside, str(plan), "floor_plan: "))
             read = replace(read, obstacles=read.obstacles + walls)
     except EnvError as error:
         raise where.error(str(error)) from error
@@ -118,16 +118,25 @@ def scenario_from(
         raise where.error(str(error)) from error
 
 
-def _within(beside: Path | None, wanted: str) -> Path:
+def _within(beside: Path | None, wanted: str, key: str) -> Path:
     """A file that a scenario names: in its own folder or below, since scenarios are shared.
 
+    Args:
+        beside: The folder of the scenario.
+        wanted: What it says.
+        key: Begins the messages of errors.
+
     Raises:
-        EnvError: It is elsewhere.
+        EnvError: It is elsewhere, or no name of a file.
     """
     folder = beside or Path()
     path = folder / wanted
-    if not path.resolve().is_relative_to(folder.resolve()):
-        raise EnvError(f"expected a file in the folder of the scenario, got {wanted!r}")
+    try:
+        inside = path.resolve().is_relative_to(folder.resolve())
+    except (ValueError, RuntimeError, OSError):  # a zero in it, a loop of links
+        inside = False
+    if not inside or path.is_dir():
+        raise EnvError(f"{key}expected a file in the folder of the scenario, got {wanted!r}")
     return path
 
 

@@ -16,7 +16,7 @@ _WHO = np.uint64(0xFFFFFFFFFFFFFFFF)
 
 @kernel
 def draw_gains(seeds, gain, share, gains):
-    """Gains of episodes, (env) [1/s], written: 0 where nobody trims, as often as share says."""
+    """Write the gains of episodes, (env) [1/s]: 0 in the share of them without an operator."""
     for env in range(seeds.shape[0]):
         trims = uniform(draw_key(seeds[env], _WHO), 0) < share
         gains[env] = gain if trims else 0.0

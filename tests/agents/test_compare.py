@@ -313,3 +313,19 @@ def test_no_bar_is_cut_off():
     for name in ("contact_time", "time_in_formation"):
         assert _limits(name, found)[1] >= 100.0 * 0.01
     assert _limits("formation_error", found)[1] < 0.02
+
+
+@pytest.mark.parametrize("share", [-0.1, 1.5, float("nan")])
+def test_a_share_of_episodes_with_an_operator_is_checked(share):
+    with pytest.raises(UsageError, match="--operator: expected 0 to 1"):
+        compare(drivers=["consensus"], operator=share, episodes=1)
+
+
+def test_without_an_operator_cars_follow_the_plan_alone():
+    """Which stands still where a formation is to be held."""
+    for share in (0.0, 1.0):
+        parts = replace(SHORT, task="hold", operator=share).parts("estimate", 1)
+        formation = Simulated(parts, [1000, 1001]).formation
+        moves = np.abs(formation.operator.command - formation.task.plan).max(axis=(1, 2)) > 0.0
+        assert moves.all() == bool(share)
+        assert moves.any() == bool(share)

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from agents.drive.keys import TerminalKeys, key_by_key, orders_of
+from agents.drive.keys import HELP, NO_KEYS, TerminalKeys, key_by_key, orders_of
 
 
 @pytest.fixture
@@ -82,10 +82,10 @@ with key_by_key():
     except UsageError:
         pass
     signal.signal(signal.SIGTTOU, signal.SIG_IGN)
-    os.tcsetpgrp(sys.stdin.fileno(), os.getpgrp())  # fg
-    os.kill(os.getpid(), signal.SIGCONT)
-    assert not by_line()
+    os.tcsetpgrp(sys.stdin.fileno(), os.getpgrp())  # fg, of a program that runs: no signal
+    assert by_line()
     assert keys.read_orders() == [] and not keys.lost
+    assert not by_line()
 os.kill(other, signal.SIGKILL)
 """
 
@@ -99,3 +99,7 @@ def test_a_terminal_that_another_program_has_stops_the_cars_and_comes_back():
     os.close(ours)
     os.close(theirs)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+def test_what_keys_do_is_said_in_a_line_of_a_small_terminal():
+    assert max(len(HELP), len(NO_KEYS)) <= 80

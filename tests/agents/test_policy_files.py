@@ -3,9 +3,11 @@
 import io
 import os
 import pickle
+import time
 import zipfile
 from contextlib import suppress
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import onnx
@@ -27,6 +29,7 @@ from policy_files import (
 from agents.errors import UsageError
 from agents.policy import Layout, PolicyError, find, load_policy, shipped_names, write_policy
 from agents.policy.graph import check_graph
+from agents.policy.patience import Patience
 from agents.policy.trained import check_policy
 
 GOOD = good_model().SerializeToString()
@@ -459,3 +462,15 @@ def test_a_card_too_large_to_be_loaded_is_not_written(tmp_path):
     with pytest.raises(PolicyError, match="the card has .* bytes, expected"):
         write_policy(tmp_path, "large", GOOD, replace(card_of(GOOD), results=results))
     assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("slow", [False, True])
+def test_only_a_run_that_lasts_is_ended(slow):
+    patience, run = Patience(0.15), SimpleNamespace(terminate=False)
+    with patience.over(run):
+        for _ in range(400 if slow else 1):
+            if run.terminate:
+                break
+            time.sleep(0.01)
+    time.sleep(0.0 if slow else 0.4)
+    assert run.terminate == slow

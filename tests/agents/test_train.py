@@ -423,3 +423,8 @@ def test_a_card_gets_the_summaries_of_its_own_policy_alone(tmp_path):
     assert read_results(path, {"mine", "other"}) == rows[:1]
     with pytest.raises(UsageError, match="expected lines of other, got those of consensus, mine"):
         read_results(path, ["other"])
+
+
+def test_the_share_of_episodes_with_an_operator_reaches_the_environments():
+    config = small(operator="0.25")
+    assert make_rooms(config, None).parts[0].formation.parts.config.operator.share == 0.25

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hardware_bridge.decoders import DECODERS
-from hardware_bridge.decoders.rplidar import LOCK
+from hardware_bridge.decoders.rplidar import LOCK, WATCH
 from hardware_bridge.emulator.encoders import ENCODERS, make_encoder
 from hardware_bridge.emulator.encoders.ticks import ticks_on
 from hardware_bridge.errors import BridgeError
@@ -157,6 +157,12 @@ def test_rplidar_is_not_read_before_enough_samples_follow_each_other():
     assert decoder.feed(jump) == []
     still = decoder_of("rplidar")
     assert still.feed(encoder.encode([ScanReading(NOBODY, 1.0, 1.0)]) * 30) == []
+    # One that stands after it has turned is soon not believed, nor one that turns back.
+    for step in (0.0, 0.02):
+        turned, scanner = decoder_of("rplidar"), make_encoder("rplidar", "")
+        turned.feed(scanner.encode(sent))
+        later = [ScanReading(NOBODY, -0.38 + step * k, 1.0) for k in range(1000)]
+        assert len(turned.feed(scanner.encode(later))) < 2 * WATCH
 
 
 def test_witmotion_stops_at_its_limits():

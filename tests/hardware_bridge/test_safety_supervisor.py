@@ -183,11 +183,21 @@ def test_unknown_orders_move_nothing_and_are_told(drive):
 
 
 def test_left_alone_nothing_moves_again(drive):
-    drive.supervisor.abandon("it was ended")
+    drive.supervisor.abandon("the supervisor was ended")
     assert stands(drive.tick(100)) == [True, True]
     drive.arm()
     assert stands(drive.tick(5)) == [True, True]
     assert drive.supervisor.quit
+
+
+def test_that_it_was_ended_is_told_of_every_car(drive):
+    drive.arm()
+    drive.tick(5)
+    drive.supervisor.abandon("the supervisor was ended")
+    drive.tick(1)
+    told = [notice.text for notice in drive.supervisor.stopped()]
+    assert len(told) == 2
+    assert all(text.endswith("stopped: the supervisor was ended") for text in told)
 
 
 def test_a_controller_that_is_slow_to_take_commands_is_not_swamped():

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import serial
 from hypothesis import given
 from hypothesis import strategies as st
 from terminals import FakeDevice, until
@@ -15,8 +16,9 @@ from hardware_bridge.decoders.rplidar import REQUEST
 from hardware_bridge.emulator.encoders import make_encoder
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.links import Links
-from hardware_bridge.links.ports import Chunk
-from hardware_bridge.live.near import LASTS
+from hardware_bridge.links.ports import Chunk, PortSpec
+from hardware_bridge.links.serial_port import SerialPort
+from hardware_bridge.live.near import LASTS, Near
 from hardware_bridge.live.scanner import ScannerMount
 from hardware_bridge.live.swarm import LiveSwarm
 from hardware_bridge.readings import NOBODY, ScanReading
@@ -116,16 +118,68 @@ def test_it_is_asked_whenever_its_port_comes_up(tmp_path):
             until(links, lambda _: not links.is_up("links.scanner"))
             scanner.plug()
         assert other.heard() == b""
+        # One that was still starting is asked again; one that speaks is not.
+        until(links, lambda _: links.is_up("links.scanner"))
+        asked = until_heard(scanner, links) + until_heard(scanner, links)
+        assert asked == 2 * REQUEST
+        scanner.say(b"\xbe")
+        until(links, bool)
+        assert scanner.heard() == b""
     scanner.unplug()
     other.unplug()
+
+
+def until_heard(device, links):
+    """What a device hears next, while the host reads its ports."""
+    for _ in range(3000):
+        links.wait(0.001)
+        if said := device.heard():
+            return said
+    return b""
+
+
+def test_its_motor_is_let_run(monkeypatch, tmp_path):
+    lines = []
+    monkeypatch.setattr(serial.Serial, "dtr", property(None, lambda _, level: lines.append(level)))
+    device = FakeDevice(tmp_path / "scanner")
+    for dtr in (True, False):
+        SerialPort(PortSpec(name="links.a", port=str(device.path), dtr=dtr)).close()
+    assert lines == [False]
+    device.unplug()
+
+
+def test_beams_have_no_gaps_while_the_scanner_turns_slowly():
+    """A box in front at 1 m, with noise and a wall far behind it, seen once a turn."""
+    near, rng, n = Near(1, 8), np.random.default_rng(1), 40
+    for k in range(60 * n):
+        t_ns = round(0.18e9 * k / n)
+        bearing = -2.0 * math.pi * (k % n) / n
+        ahead = abs(math.remainder(bearing, 2.0 * math.pi)) < 0.1
+        distance = (1.0 if ahead else 2.9) + rng.normal(scale=0.005)
+        near.take(0, bearing, distance, t_ns)
+        if t_ns > 0.2e9:
+            assert near.beams(t_ns)[0, 0] == pytest.approx(1.0, abs=0.03)
+            assert near.beams(t_ns)[0, 4] == pytest.approx(2.9, abs=0.03)
+
+
+HERE = "node = 2\n"
 
 
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("node = 2\n", "", "links.scanner.node: missing: rplidar does not say who speaks"),
-        ("node = 2\n", "node = 2\nscanner.hight = 1.0\n", "links.scanner.scanner.hight: unknown"),
-        ("node = 2\n", "node = 2\nscanner.width = 0.0\n", "scanner: expected a length and a width"),
+        (HERE, "", "links.scanner.node: missing: rplidar does not say who speaks"),
+        (HERE, HERE + "scanner.hight = 1.0\n", "links.scanner.scanner.hight: unknown"),
+        (HERE, HERE + "scanner.width = 0.0\n", "scanner.width: expected 0.01 to 5 m, got 0"),
+        (HERE, HERE + "scanner.x = 50.0\n", "scanner.x: expected -0.42 to 0.42 m, got 50"),
+        (HERE, HERE + "scanner.yaw = 90.0\n", "scanner.yaw: expected -6.28.* rad, got 90"),
+        (HERE, HERE + 'ids = { "7" = 1 }\n', "links.scanner.ids: a scanner names nothing"),
+        (
+            'nodes.2.vehicle = "car"',
+            'nodes.2.kind = "static"\nnodes.3.vehicle = "car"',
+            "links.scanner.node: node 2 is static",
+        ),
+        ("task.proximity = 8\n", "", "task.proximity: expected the number of beams"),
         ('"1" = 2 }\n', '"1" = 2 }\nscanner.x = 0.1\n', "linktrack is no scanner, leave it out"),
     ],
 )

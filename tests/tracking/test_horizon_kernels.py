@@ -69,7 +69,7 @@ def assert_events(block, e, expected):
 @settings(max_examples=40)
 @given(seed=st.integers(0, 2**31), n_envs=st.integers(1, 3), largest=st.sampled_from([3, 40, 150]))
 def test_it_is_a_sorted_list(seed, n_envs, largest):
-    """What comes out, waits, and is counted, while the ring turns and grows."""
+    """What comes out, waits, and is counted, while slots are freed and room grows."""
     rng = np.random.default_rng(seed)
     horizon, twins = Horizon(HorizonParams(delay=DELAY), n_envs), [Twin() for _ in range(n_envs)]
     for now in np.cumsum(rng.uniform(0.0, 0.4, 12)):
