@@ -37,6 +37,7 @@ from relpos_env.scenarios import LEVELS, SCENARIOS, Scenario
 from relpos_env.sensors.radio.channel import CHANNELS
 from relpos_env.tasks import DEFAULT_WEIGHTS, TASKS
 from relpos_env.tasks.needs import DEFAULT_SCENARIO
+from tracking.filters.joint.alignment import TRANSITIONS, Alignment
 
 DOCS = Path(__file__).resolve().parent
 CARS = 3
@@ -153,15 +154,16 @@ def default_of(f: Field[Any]) -> str:
 
 
 def docstrings(cls: type) -> dict[str, str]:
-    """The strings under the fields of a dataclass, each in one line."""
+    """The strings under the fields of a dataclass or enum, each in one line."""
     (body,) = ast.parse(inspect.getsource(cls)).body
     assert isinstance(body, ast.ClassDef)
     told = {}
     for line, below in zip(body.body, body.body[1:], strict=False):
-        if not isinstance(line, ast.AnnAssign) or not isinstance(below, ast.Expr):
+        if not isinstance(line, ast.Assign | ast.AnnAssign) or not isinstance(below, ast.Expr):
             continue
-        if isinstance(line.target, ast.Name) and isinstance(below.value, ast.Constant):
-            told[line.target.id] = " ".join(str(below.value.value).split())
+        target = line.target if isinstance(line, ast.AnnAssign) else line.targets[0]
+        if isinstance(target, ast.Name) and isinstance(below.value, ast.Constant):
+            told[target.id] = " ".join(str(below.value.value).split())
     return told
 
 
@@ -241,7 +243,17 @@ def safety_limits() -> str:
     return markdown(("limit", "default", "meaning"), rows)
 
 
+def alignment() -> str:
+    """The states of a group's alignment, and what follows each of them and why."""
+    rows = []
+    for state, following in TRANSITIONS.items():
+        then = "; ".join(f"{why}: `{after.name}`" for after, why in following.items())
+        rows.append([f"`{state.name}`", docstrings(Alignment)[state.name], then])
+    return markdown(("state", "what it is", "then"), rows)
+
+
 TABLES: dict[str, Callable[[], str]] = {
+    "alignment": alignment,
     "sizes": sizes,
     **{f"observation-{mode}": partial(observations, mode) for mode in OBSERVATIONS},
     "actions-continuous": continuous,

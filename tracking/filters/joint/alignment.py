@@ -22,7 +22,7 @@ class Alignment(IntEnum):
     LINEAR = 2
     """One filter with sensitivities to the rotation stands for all rotations."""
     CHALLENGED = 3
-    """Likewise, beside a rotation that is reported until another one is clearly likelier."""
+    """A rotation is reported until another one is clearly likelier; sensitivities as for `LINEAR`."""
     MODES = 4
     """Each hypothesis is a mode of the rotation, with sensitivities to rotations near it."""
     CANDIDATES = 5
@@ -49,12 +49,12 @@ TRANSITIONS: dict[Alignment, dict[Alignment, str]] = {
     Alignment.CHALLENGED: {
         Alignment.MODES: "another rotation is clearly likelier",
         Alignment.FILTERED: "no other rotation is likelier",
-        Alignment.LINEAR: "nothing counts yet, as wheels are not believed",
+        Alignment.LINEAR: "the group has just started on wheels in motion",
         Alignment.NONE: "fewer than two nodes are left",
     },
     Alignment.MODES: {
         Alignment.CANDIDATES: "each mode is known to 0.2 rad",
-        Alignment.LINEAR: "nothing counts yet, as wheels are not believed",
+        Alignment.LINEAR: "the group has just started on wheels in motion",
         Alignment.NONE: "fewer than two nodes are left",
     },
     Alignment.CANDIDATES: {
