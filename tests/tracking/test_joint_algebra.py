@@ -11,7 +11,7 @@ from tracking import Constellation, NodeConfig
 from tracking.arrays import aligned
 from tracking.filters._level_kernels import angle_between, direction
 from tracking.filters.joint import _vector_kernels
-from tracking.filters.joint._agreement_kernels import SAME_TURN, are_same, turn_between
+from tracking.filters.joint._agreement_kernels import are_same, turn_between
 from tracking.filters.joint._copy_kernels import turn_hypothesis
 from tracking.filters.joint._flatness_kernels import least_axis
 from tracking.filters.joint._mirror_kernels import mirror, mirror_plainly
@@ -31,9 +31,11 @@ from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.records import as_records
 from tracking.filters.joint.state import JointState, make_state
+from tracking.filters.joint.supervision_params import AlignmentParams
 from tracking.geometry import quat_from_yaw
 
 angles = st.floats(-3.1, 3.1)
+SAME_TURN = AlignmentParams().same_rotation
 
 
 def bank(dimensions, kinds=("moving", "moving", "moving"), n_hyps=2, seed=0):

@@ -11,10 +11,6 @@ from tracking.filters.joint._alignment_kernels import CHALLENGED, STATIC, has_mo
 from tracking.filters.joint._open_kernels import can_open
 from tracking.filters.joint._peak_kernels import APART
 
-SAME_TURN = 0.15
-"""[rad] Hypotheses that differ by a smaller turn of the group only are one. The rotations that are
-tried in the plane are 0.39 rad apart."""
-
 
 @kernel
 def are_same(c, s, a, b, turn):
@@ -77,7 +73,7 @@ def turn_between(c, s, a, b, turn):
         u[:, c.d - 1] *= -1.0
     nearest = u @ v
     # The trace is 2 cos in the plane, 1 + 2 cos in space.
-    limit = APART if has_modes(s.group[0]) else SAME_TURN
+    limit = APART if has_modes(s.group[0]) else c.same_rotation
     if np.trace(nearest) > (c.d - 2) + 2.0 * math.cos(limit):
         turn[:] = nearest
 

@@ -27,18 +27,6 @@ from tracking.filters.joint._open_kernels import can_open
 from tracking.filters.joint._sleep_kernels import TIE, turn_all_ways
 from tracking.filters.joint._start_kernels import begin_pair, forget_fits
 
-FLAT, OPEN = 2.5, 4.0
-"""Extent of a layout across itself, in standard deviations: less is flat, more is open again."""
-STRAIN_TAU = 3.3
-"""[s] Time over which a layout's misfit is averaged before it counts as strained."""
-RAISED, LIMIT_TAU = 1.5, 60.0
-"""[-, s] After a search, only so much more begins another, until that is forgotten: where noise is
-larger than believed, ranges fit badly for ever."""
-LOOSE_POSITION, LOOSE_SPEED = 0.2, 0.5
-"""[m, m/s] What is added to the standard deviations then."""
-LOST_SPEED = 0.7
-"""[m/sqrt(s), m/s/sqrt(s)] How fast a lost filter forgets positions and velocities."""
-
 
 @small_kernel
 def bank_range(s):
@@ -72,8 +60,8 @@ def add_mirror_image(c, s):
 def watch_rotation(c, s, layout, dt):
     """Follow all rotations and mirror images again where ranges have fitted badly for long."""
     group = s.group[0]
-    group.strain += (1.0 - decay(dt / STRAIN_TAU)) * (group.misfit - group.strain)
-    group.strain_limit += (1.0 - decay(dt / LIMIT_TAU)) * (c.strained - group.strain_limit)
+    group.strain += (1.0 - decay(dt / c.misfit_time)) * (group.misfit - group.strain)
+    group.strain_limit += (1.0 - decay(dt / c.challenge_time)) * (c.strained - group.strain_limit)
     watched = group.n_alive == 1 and group.alignment >= CANDIDATES
     if not watched or group.strain < group.strain_limit:
         return
@@ -90,14 +78,14 @@ def watch_rotation(c, s, layout, dt):
         group.strain = 0.0
         doubt_turn(c, s, layout, h)
         return
-    group.strain_limit = RAISED * max(group.strain, group.strain_limit)
+    group.strain_limit = c.challenge_raise * max(group.strain, group.strain_limit)
     group.strain = 0.0
     for i in range(s.nodes.shape[0]):
         node = s.nodes[i]
         if node.present and not node.static:
             for k in range(c.d):
-                s.P[h, node.at_p + k, node.at_p + k] += LOOSE_POSITION**2
-                s.P[h, node.at_v + k, node.at_v + k] += LOOSE_SPEED**2
+                s.P[h, node.at_p + k, node.at_p + k] += c.challenge_position**2
+                s.P[h, node.at_v + k, node.at_v + k] += c.challenge_speed**2
     for p in range(s.pairs.shape[0]):
         if s.nodes[s.pairs[p].i].present and s.nodes[s.pairs[p].j].present:
             begin_pair(c, s, h, p, s.nlos[h, p])
@@ -114,9 +102,9 @@ def watch_mirror(c, s):
     if group.n_alive != 1 or group.alignment < CANDIDATES:
         return
     ratio = flatness(c, s, group.best, True)
-    if ratio < FLAT:
-        group.degenerate = group.degenerate or flatness(c, s, group.best, False) < FLAT
-    elif group.degenerate and ratio > OPEN:
+    if ratio < c.degenerate:
+        group.degenerate = group.degenerate or flatness(c, s, group.best, False) < c.degenerate
+    elif group.degenerate and ratio > c.regular:
         group.degenerate = False
         add_mirror_image(c, s)
 
@@ -174,8 +162,8 @@ def open_up(c, s, dt):
                 node = s.nodes[i]
                 if node.present and not node.static:
                     for k in range(c.d):
-                        s.P[h, node.at_p + k, node.at_p + k] += LOST_SPEED**2 * dt
-                        s.P[h, node.at_v + k, node.at_v + k] += LOST_SPEED**2 * dt
+                        s.P[h, node.at_p + k, node.at_p + k] += c.divergence_rate**2 * dt
+                        s.P[h, node.at_v + k, node.at_v + k] += c.divergence_rate**2 * dt
 
 
 @kernel

@@ -18,45 +18,21 @@ import math
 from tracking.compiled import kernel, small_kernel
 from tracking.filters.joint._sight_kernels import MIN_PROB
 
-RECENT = 0.02
-"""[-] Weight of a range in the share of a node's ranges that do not fit."""
-LATELY = 0.1
-"""[-] The same of what it ranges beyond what is predicted."""
-FAR = 1.0
-"""[m] A single range pulls no further than this."""
-FAST = 10.0
-"""[m/s] Ranges that change faster jump."""
-STAYS = 0.5
-"""[-] It remains one down to this part of it."""
-MISSED = 3.0
-"""[-] A pair ranges no longer after so many of its usual intervals, if these are long."""
-HELD = 2.0
-"""[s] A node is doubted until nothing has been found for so long."""
-ASTRAY, LOST = 0.6, 0.4
-"""[-] Share of a node's ranges that do not fit from which on it is astray; share of all ranges
-that do, below which the filter is lost."""
-SPEED = 0.7
-"""[m/sqrt(s), m/s/sqrt(s)] How fast position and velocity of a node that is astray may become
-others."""
-JUMP, WANDER = 0.7, 1.0
-"""[m, m/sqrt(s)] What the offset of a doubted node's ranges may be at first, and how fast it may
-become another."""
-
 
 @small_kernel
-def note_fit(s, p, dt, distance, fits, nu):
+def note_fit(c, s, p, dt, distance, fits, nu):
     """Count a range [m] of pair p, dt after its last [s]: fits, 1, or not, 0; nu too long [m]."""
     pair = s.pairs[p]
     if pair.n_ranges > 0:
-        jump = max(abs(distance - pair.last_used) - FAST * dt, 0.0)
-        pair.jumps += LATELY * (min(jump, FAR) - pair.jumps)
+        jump = max(abs(distance - pair.last_used) - c.fastest * dt, 0.0)
+        pair.jumps += c.residual_gain * (min(jump, c.residual_clip) - pair.jumps)
     pair.last_used = distance
-    pair.residual += LATELY * (nu - pair.residual)
-    off = min(max(nu - pair.beyond, -FAR), FAR)
-    pair.beyond += LATELY * off
-    pair.scatter += LATELY * (abs(off) - pair.scatter)
+    pair.residual += c.residual_gain * (nu - pair.residual)
+    off = min(max(nu - pair.beyond, -c.residual_clip), c.residual_clip)
+    pair.beyond += c.residual_gain * off
+    pair.scatter += c.residual_gain * (abs(off) - pair.scatter)
     for i in (pair.i, pair.j):
-        s.nodes[i].astray += RECENT * (1.0 - fits - s.nodes[i].astray)
+        s.nodes[i].astray += c.outlier_gain * (1.0 - fits - s.nodes[i].astray)
 
 
 @kernel
@@ -72,23 +48,25 @@ def watch_nodes(c, s, layout, t):
         elif worst < 0 or node.astray > s.nodes[worst].astray:
             worst = i
     blames = worst >= 0 and others_fit(c, s, worst, t)
-    group.diverged = group.fit < LOST and not blames
+    group.diverged = group.fit < c.least_inliers and not blames
     for i in range(s.nodes.shape[0]):
         node = s.nodes[i]
         if not node.present:
             continue
         n, offset = common_error(c, s, layout, i, t)
-        astray = i == worst and blames and node.astray > ASTRAY
-        limit = c.common_error / math.sqrt(max(n, 1)) * (STAYS if node.doubted else 1.0)
+        astray = i == worst and blames and node.astray > c.outlier_ratio
+        limit = (
+            c.common_error / math.sqrt(max(n, 1)) * (c.fault_hysteresis if node.doubted else 1.0)
+        )
         if n >= 2 and (astray or offset > limit):
             if not node.doubted:
-                free_offset(s, layout, i, JUMP**2)
+                free_offset(s, layout, i, c.offset_std**2)
             else:
-                free_offset(s, layout, i, WANDER**2 * dt)
+                free_offset(s, layout, i, c.offset_rate**2 * dt)
                 if astray:
-                    open_node(c, s, i, SPEED**2 * dt)
+                    open_node(c, s, i, c.fault_rate**2 * dt)
             node.doubted, node.t_doubted = True, t
-        elif node.doubted and t - node.t_doubted > HELD:
+        elif node.doubted and t - node.t_doubted > c.fault_time:
             node.doubted = False
 
 
@@ -110,7 +88,7 @@ def ranges_now(c, s, p, t):
     """True if both nodes of pair p are there and it was ranged lately."""
     pair = s.pairs[p]
     both = s.nodes[pair.i].present and s.nodes[pair.j].present
-    waits = max(c.lost_after, MISSED * pair.interval)
+    waits = max(c.lost_after, c.missed_intervals * pair.interval)
     return both and pair.n_ranges > 0 and t - pair.t_range < waits
 
 

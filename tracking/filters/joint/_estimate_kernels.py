@@ -5,7 +5,6 @@ from __future__ import annotations
 from tracking.compiled import kernel
 from tracking.filters._clear_kernels import clear_estimate, is_heard
 from tracking.filters.joint._alignment_kernels import LINEAR, MODES, NONE, STATIC
-from tracking.filters.joint._doubt_kernels import MISSED
 from tracking.filters.joint._motion_kernels import predict
 from tracking.filters.joint._product_kernels import take_off
 from tracking.filters.joint._sample_kernels import sum_inertial
@@ -58,7 +57,9 @@ def write_estimate(c, s, scratch, t, e, o, out):
             status[e, o, p] = AMBIGUOUS
         elif node_i.static and node_j.static:
             status[e, o, p] = OK
-        elif age[e, o, p] > max(c.lost_after, MISSED * pair.interval) or worst > c.ok_var:
+        elif (
+            age[e, o, p] > max(c.lost_after, c.missed_intervals * pair.interval) or worst > c.ok_var
+        ):
             status[e, o, p] = LOST
         elif pair.misfit > c.doubt or node_i.doubted or node_j.doubted:
             status[e, o, p] = DOUBTFUL

@@ -148,8 +148,8 @@ def hear(c, s, layout, scratch, i, j, a_i, a_j, t, distance, sight, is_survey):
         advance(c, s, layout, scratch, t, True)
         settle_all(s)
         remove_faded(c, s, layout, t)
-    note_heard(node_i, t)
-    note_heard(node_j, t)
+    note_heard(c, node_i, t)
+    note_heard(c, node_j, t)
     if not is_survey:
         node_i.antenna, node_j.antenna = a_i, a_j
     runs = node_i.present and node_j.present
@@ -246,7 +246,7 @@ def take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, sight, is_survey
             pair.misfit += 0.05 * (capped - pair.misfit)
             fits = 1.0 if weight > 0.5 and misfit < 6.0 else 0.0
             group.fit += 0.01 * (fits - group.fit)
-            note_fit(s, p, dt, distance, fits, nu)
+            note_fit(c, s, p, dt, distance, fits, nu)
             if not (s.nodes[pair.i].doubted or s.nodes[pair.j].doubted):
                 group.misfit += 0.01 * (weight * capped - group.misfit)
             if weight > 0.5:
@@ -255,7 +255,7 @@ def take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, sight, is_survey
                 pair.t_used = t
             else:
                 pair.n_rejected += 1
-    note_interval(pair, dt)
+    note_interval(c, pair, dt)
     pair.t_range = t
     pair.n_ranges += 1
 
@@ -274,7 +274,7 @@ def take_first_range(c, s, layout, scratch, i, j, p, t, distance, sight, is_surv
             for a in range(s.nodes.shape[0]):
                 use_surveys(c, s, layout, scratch, a, a)
         return
-    if s.group[0].alignment == STATIC and may_move(s, t):
+    if s.group[0].alignment == STATIC and may_move(c, s, t):
         return
     for new in (i, j):
         if not s.nodes[new].present and try_join(c, s, layout, new, t):

@@ -29,7 +29,7 @@ from tracking.filters.joint._alignment_kernels import (
     MODES,
 )
 from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_part
-from tracking.filters.joint._open_kernels import NEAR, near_turns, note_spread, open_frame
+from tracking.filters.joint._open_kernels import near_turns, note_spread, open_frame
 from tracking.filters.joint._peak_kernels import (
     climb,
     curvature,
@@ -42,15 +42,8 @@ from tracking.filters.joint._peak_kernels import (
 )
 from tracking.filters.joint._sleep_kernels import TIE
 
-CLEAR, CLEARER = 1.0, 5.0
-"""[-] By so much another turn has to be likelier (log-likelihood) before it is reported; where one
-was known and is doubted by more: noise that lasts makes some other look a little likelier."""
-KNOWN = 0.2
-"""[rad] Turns that are known so well are left to filters that are linear about each of them."""
 SMALL = 0.02
 """[rad] A frame is not turned by less."""
-LONG = 20.0
-"""[s] After so long without a likelier turn it is kept."""
 
 
 @allocating_kernel
@@ -62,7 +55,7 @@ def doubt_turn(c, s, layout, h):
     open_frame(c, s, layout, h)
     for k in range(9):
         s.information[h, k, k] += 0.5 * c.head_start
-    note_spread(s, h)
+    note_spread(c, s, h)
     s.group[0].alignment = CHALLENGED
 
 
@@ -91,11 +84,11 @@ def watch_doubt(c, s, layout):
     group, R, H = s.group[0], np.eye(3), np.zeros((3, 3))
     value = climb(s.information[group.best], s.score[group.best], R, H)
     turns, values = likely_turns(c, s, layout, group.best)
-    if values[0] > value + CLEARER:
+    if values[0] > value + c.challenger_lead:
         R[:], value = turns[0], values[0]
-    if value < CLEARER or is_near(R, np.eye(3)):
+    if value < c.challenger_lead or is_near(R, np.eye(3)):
         # One that is near is what these seconds tell; the filter knows it better from before.
-        if len(values) == 1 or group.t - group.t_open > LONG:
+        if len(values) == 1 or group.t - group.t_open > c.challenge_longest:
             group.alignment = FILTERED
         return
     group.alignment = MODES
@@ -112,13 +105,13 @@ def watch_all(c, s, layout):
         R = np.eye(3)
         value = climb(s.information[h], s.score[h], R, H)
         turns, values = likely_turns(c, s, layout, h)
-        if values[0] > value + CLEAR:
+        if values[0] > value + c.mode_lead:
             R[:] = turns[0]
         for a in range(len(values)):
             climb(s.information[h], s.score[h], turns[a], H)
-            known = known and least_curvature(H) > NEAR**-2
+            known = known and least_curvature(H) > c.mode_std**-2
         turn_frame(c, s, h, R)
-        note_spread(s, h)
+        note_spread(c, s, h)
     if not known:
         return
     s.group[0].alignment = MODES
@@ -147,7 +140,7 @@ def follow_turns(c, s, h, turns, values):
         if target >= 0:
             s.loglik[target] += values[a]
             turn_frame(c, s, target, turns[a].copy())
-            note_spread(s, target)
+            note_spread(c, s, target)
 
 
 @allocating_kernel
@@ -157,7 +150,7 @@ def watch_near(c, s):
     for h in range(s.alive.shape[0]):
         if s.alive[h]:
             known = turn_to_peak(c, s, h) and known
-            note_spread(s, h)
+            note_spread(c, s, h)
     if not known:
         return
     s.group[0].alignment = CANDIDATES
@@ -171,16 +164,16 @@ def turn_to_peak(c, s, h):
     """Turn the frame of hypothesis h to the likeliest turn near it; true once that is known."""
     g, w, H, J = np.zeros(9), np.zeros(3), np.zeros((3, 3)), near_turns()
     curvature(s.information[h], np.eye(3), s.score[h], w, H)
-    known = least_curvature(H) > KNOWN**-2
+    known = least_curvature(H) > c.candidate_std**-2
     # Only about axes of which more is known than which of the frames it is.
     values, axes = np.linalg.eigh(J @ (s.information[h] @ J.T.copy()))
     move = np.zeros(3)
     for a in range(3):
-        if values[a] > NEAR**-2:
+        if values[a] > c.mode_std**-2:
             axis = axes[:, a].copy()
             move += axis * (np.sum(axis * w) / values[a])
     length = math.sqrt(np.sum(move * move))
-    R = turned_by(move * min(1.0, NEAR / max(length, SMALL)))
+    R = turned_by(move * min(1.0, c.mode_std / max(length, SMALL)))
     if length > SMALL and gain(s.information[h], s.score[h], R, g) > 0.0:
         turn_frame(c, s, h, R)
     return known
@@ -224,7 +217,7 @@ def spread_frame(c, s, h):
     climb(s.information[h], s.score[h], np.eye(3), H)
     least = least_curvature(H)
     for a in range(3):
-        H[a, a] += max(KNOWN**-2 - least, 0.0)
+        H[a, a] += max(c.candidate_std**-2 - least, 0.0)
     J, cov = np.zeros((3, c.n)), np.zeros((3, 3))
     inverse(H, cov)
     for a in range(3):

@@ -23,26 +23,11 @@ from tracking.filters.joint._doubt_kernels import ranges_now
 from tracking.filters.joint._place_kernels import SHORT, best_place, misfit, sum_of_misfits
 from tracking.filters.joint._start_kernels import add_node
 
-SETTLED = 10
-"""[-] Ranges after which the running mean of what a pair ranges beyond its prediction counts."""
-STEADY = 0.25
-"""[m] Those that scatter more about it mean nothing."""
-AWAY = 1.5
-"""[m] Where most of a node's ranges err by more, some of them too short, it is elsewhere: no
-obstacle shortens a range, and no calibration by so much."""
-SMOOTH = 0.25
-"""[m] Ranges that mean something jump by less."""
-CONTRADICTED = 24.0
-"""[-] Sum of misfits of a node's ranges from which on another place is looked for: more than one
-range has to be wrong, for which the other end may be to blame."""
-BETTER = 0.25
-"""[-] Another place has to bring the sum below this part of it."""
-
 
 @kernel
 def watch_places(c, s, layout, t):
     """Look for another place for the node that its ranges contradict most."""
-    worst, most, worst_is_away = -1, CONTRADICTED, False
+    worst, most, worst_is_away = -1, c.position_misfit, False
     for i in range(s.nodes.shape[0]):
         if s.nodes[i].present:
             total, is_away = contradiction(c, s, layout, i, t)
@@ -67,9 +52,9 @@ def contradiction(c, s, layout, i, t):
             total += misfit(error)
             least, greatest = min(least, error), max(greatest, error)
             n += 1
-            n_far += is_far_off(s.pairs[layout.pair_index[i, k]])
+            n_far += is_far_off(c, s.pairs[layout.pair_index[i, k]])
     # In the plane a layout that is turned the wrong way looks like it, and is found as such.
-    if c.d == 3 and n >= c.d and 2 * n_far > n and least < -AWAY:
+    if c.d == 3 and n >= c.d and 2 * n_far > n and least < -c.far_residual:
         return total, True
     return total if n > c.d and least < -SHORT and greatest > SHORT else 0.0, False
 
@@ -79,22 +64,22 @@ def tells_place(c, s, layout, i, k, t):
     """True if nodes i and k range with each other, have for a while, and mean something by it."""
     p = layout.pair_index[i, k]
     pair = s.pairs[p]
-    if not ranges_now(c, s, p, t) or pair.n_ranges < SETTLED:
+    if not ranges_now(c, s, p, t) or pair.n_ranges < c.settled_ranges:
         return False
-    return pair.scatter < STEADY or is_far_off(pair)
+    return pair.scatter < c.largest_scatter or is_far_off(c, pair)
 
 
 @small_kernel
-def is_far_off(pair):
+def is_far_off(c, pair):
     """True if plausible ranges have the ends of a pair metres from where they are."""
-    return abs(pair.beyond) > AWAY and pair.jumps < SMOOTH
+    return abs(pair.beyond) > c.far_residual and pair.jumps < c.largest_jump
 
 
 @small_kernel
 def slow_error(c, s, p):
     """By how much pair p lately ranges more than its distance [m], in the best hypothesis."""
     pair, h = s.pairs[p], s.group[0].best
-    if is_far_off(pair):
+    if is_far_off(c, pair):
         at_i, at_j, squared = s.nodes[pair.i].at_p, s.nodes[pair.j].at_p, 0.0
         for k in range(c.d):
             squared += (s.x[h, at_j + k] - s.x[h, at_i + k]) ** 2
@@ -140,7 +125,10 @@ def replace_node(c, s, layout, i, is_away, t):
         if s.alive[h]:
             read_places(c, s, h, i, others, known, pos)
             before = sum_of_misfits(known, distance, pos)
-            if before > CONTRADICTED and best_place(c.d, known, distance, pos) < BETTER * before:
+            if (
+                before > c.position_misfit
+                and best_place(c.d, known, distance, pos) < c.position_gain * before
+            ):
                 if is_away:
                     remove_node(c, s, layout, i)
                     return

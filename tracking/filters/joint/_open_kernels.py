@@ -33,8 +33,6 @@ from tracking.filters.joint._step_kernels import STATES
 
 LOOSE = 3.0
 """[-] Each element of M has a variance of a third, over all rotations."""
-NEAR = 0.7
-"""[rad] How far a frame may be from the turn that it is followed for."""
 
 
 @small_kernel
@@ -70,15 +68,15 @@ def open_frame(c, s, layout, h):
                     s.information[h, 3 * r + 2, 3 * q + 2] += out[r] * out[q] / c.height_var
     group = s.group[0]
     group.alignment, group.t_open = LINEAR, group.t
-    note_spread(s, h)
+    note_spread(c, s, h)
 
 
 @allocating_kernel
-def note_spread(s, h):
+def note_spread(c, s, h):
     """Work out how uncertain the elements of the turn are: those of any, or of one that is near."""
     if has_modes(s.group[0]):
         J = near_turns()
-        H = J @ (s.information[h] @ J.T.copy()) + np.eye(3) / NEAR**2
+        H = J @ (s.information[h] @ J.T.copy()) + np.eye(3) / c.mode_std**2
         s.spread[h] = J.T.copy() @ (np.linalg.inv(H) @ J)
     else:
         s.spread[h] = np.linalg.inv(s.information[h] + LOOSE * np.eye(9))

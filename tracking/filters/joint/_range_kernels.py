@@ -22,7 +22,6 @@ from tracking.filters.joint._motion_kernels import time_since, way_since
 from tracking.filters.joint._open_kernels import tell_turn, turn_gradient
 from tracking.filters.joint._rotation_kernels import follow_rotation
 from tracking.filters.joint._sight_kernels import change_sight, judge_sight
-from tracking.filters.joint._turn_kernels import UNSURE
 
 MIN_DISTANCE = 0.01
 """[m] Closer than this a direction has no meaning."""
@@ -166,7 +165,7 @@ def fuse_range(c, s, h, p, dt, distance, levers, sight, scratch):
         Innovation [m] and its square over the variance it was expected to have, its square over
         the variance that the correction used, and the probability that the range meant anything.
     """
-    if s.group[0].turn_var > UNSURE * UNSURE:
+    if s.group[0].turn_var > c.gauge_std * c.gauge_std:
         follow_rotation(c, s, h, scratch)
     predicted, m = range_model(c, s, h, p, levers[:3], levers[3:], scratch.idx, scratch.val)
     nu = distance - predicted

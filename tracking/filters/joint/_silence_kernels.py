@@ -14,36 +14,30 @@ import numpy as np
 
 from tracking.compiled import allocating_kernel, kernel, small_kernel
 from tracking.filters.joint._bank_kernels import remove_node
-from tracking.filters.joint._doubt_kernels import MISSED
 
 SAME = 1e-5
 """[s] Ranges of one message differ by their rounding only."""
-RECENT, SLOWEST = 0.1, 5.0
-"""[-, s] Weight of a time between two ranges in its running mean; longer ones are gaps."""
-FADED = 0.5
-"""[-] Share of the variance of a pair that is not ok from which on a distance is open: by then the
-line of sight at 2 m may be off by 20 degrees."""
 
 
 @small_kernel
-def note_heard(node, t):
+def note_heard(c, node, t):
     """Note that a node takes part in a range, and how often it does."""
     if node.heard:
-        note_interval(node, t - node.t_heard)
+        note_interval(c, node, t - node.t_heard)
     node.heard, node.t_heard = True, t
 
 
 @small_kernel
-def note_interval(record, dt):
+def note_interval(c, record, dt):
     """Count a time between two ranges of a node or a pair [s]; those of one round are one."""
     if dt > SAME:
-        record.interval += RECENT * (min(dt, SLOWEST) - record.interval)
+        record.interval += c.interval_gain * (min(dt, c.longest_interval) - record.interval)
 
 
 @small_kernel
 def was_silent(c, node, t):
     """True for a node of the group that moves and was not heard lately."""
-    waits = max(c.silent_after, MISSED * node.interval)
+    waits = max(c.silent_after, c.missed_intervals * node.interval)
     return node.present and not node.static and t - node.t_heard > waits
 
 
@@ -81,6 +75,6 @@ def has_faded(c, s, i):
                 across = s.P[h, at + a, other + b] + s.P[h, other + a, at + b]
                 apart = s.P[h, at + a, at + b] + s.P[h, other + a, other + b] - across
                 along += off * (s.x[h, other + b] - s.x[h, at + b]) * apart
-        if along <= FADED * c.ok_var * squared:
+        if along <= c.stale_share * c.ok_var * squared:
             return False
     return True

@@ -17,12 +17,6 @@ from tracking.filters.joint._open_kernels import can_open, open_frame
 from tracking.filters.joint._rotation_kernels import turn_covariance
 from tracking.filters.joint._turn_kernels import spread_turn, turn_variance
 
-SETTLE, ORIENTED = 0.5, 1.5
-"""[s] The first samples of a node look like motion: its orientation is still being found. That it
-turns means nothing for longer; but nobody starts without being shaken."""
-PATIENCE, STOOD = 4.0, 1.0
-"""[s] A group on wheels that starts while it moves, and has not stood first, knows nothing of its
-velocities: for so long wheels speak against the right rotation as well."""
 TIE = 1e-6
 """[s] Times that differ by less are equal, whatever the clock began with."""
 
@@ -44,17 +38,17 @@ def none_moved(c, s, t):
             continue
         if not node.has_state or t - node.t_state > c.unaided_after:
             return False
-        if node.t_shaken - node.t_first > SETTLE or node.t_moved - node.t_first > ORIENTED:
+        if node.t_shaken - node.t_first > c.settling or node.t_moved - node.t_first > c.orienting:
             return False
     return True
 
 
 @small_kernel
-def may_move(s, t):
+def may_move(c, s, t):
     """True while it is too early to know whether the present nodes move."""
     for i in range(s.nodes.shape[0]):
         node = s.nodes[i]
-        if node.present and not node.static and t - node.t_first <= SETTLE:
+        if node.present and not node.static and t - node.t_first <= c.settling:
             return True
     return False
 
@@ -68,7 +62,7 @@ def wake_up(c, s, layout, scratch):
     """
     group = s.group[0]
     group.alignment = FILTERED
-    if group.t > group.t_patient - PATIENCE + STOOD + TIE:
+    if group.t > group.t_patient - c.wheels_after + c.stood_for + TIE:
         group.t_patient = group.t
     was_alive = s.alive.copy()
     for h in range(s.alive.shape[0]):

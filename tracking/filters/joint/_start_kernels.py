@@ -29,7 +29,7 @@ from tracking.filters.joint._linear_kernels import decouple
 from tracking.filters.joint._motion_kernels import unsettled_var
 from tracking.filters.joint._open_kernels import can_open, open_frame
 from tracking.filters.joint._place_kernels import best_sides
-from tracking.filters.joint._sleep_kernels import ORIENTED, PATIENCE, SETTLE, none_moved, rests
+from tracking.filters.joint._sleep_kernels import none_moved, rests
 from tracking.filters.joint._turn_kernels import read_turn, spread_turn
 
 
@@ -39,7 +39,7 @@ def try_start(c, s, layout, t):
     n = s.nodes.shape[0]
     members = np.empty(n, np.int64)
     m = choose_members(c, s, layout, members, t)
-    if m == 0 or not_known_to_rest(s, members, m, t):
+    if m == 0 or not_known_to_rest(c, s, members, m, t):
         return False
     X = first_shape(c, s, layout, members, m)
     for a in range(m):
@@ -87,7 +87,7 @@ def try_start(c, s, layout, t):
     group.t_patient = t
     for a in range(m):
         if s.nodes[members[a]].sideways_var > 0.0:
-            group.t_patient = t + PATIENCE
+            group.t_patient = t + c.wheels_after
     group.turn_var = c.rotation_var if c.d == 2 else 0.0
     group.misfit, group.fit, group.diverged = 1.0, 1.0, False
     group.strain, group.strain_limit = 0.0, c.strained
@@ -95,7 +95,7 @@ def try_start(c, s, layout, t):
 
 
 @kernel
-def not_known_to_rest(s, members, m, t):
+def not_known_to_rest(c, s, members, m, t):
     """True while a node's samples are too few to tell whether it moves.
 
     Nodes at rest are followed in one rotation that stands for all; of nodes that move it would use
@@ -103,7 +103,7 @@ def not_known_to_rest(s, members, m, t):
     """
     for a in range(m):
         node = s.nodes[members[a]]
-        if node.has_state and not node.static and t - node.t_first <= SETTLE:
+        if node.has_state and not node.static and t - node.t_first <= c.settling:
             return True
     return False
 
@@ -142,7 +142,7 @@ def begin_node(c, s, h, i, t):
         return
     still = rests(c, node, t)
     # What its compass reads where it stood when it was switched on counts less as it drives.
-    drove = max(node.t_moved - node.t_first - ORIENTED, 0.0)
+    drove = max(node.t_moved - node.t_first - c.orienting, 0.0)
     stood = decay(drove / node.heading_tau)
     heading_var = node.heading_var + stood * (node.first_heading_var - node.heading_var)
     for k in range(c.d):

@@ -13,13 +13,6 @@ import math
 from tracking.compiled import small_kernel
 from tracking.filters.joint._sleep_kernels import rests
 
-MANY = 5
-"""[-] Equal ranges after the first that may be chance."""
-FAR = 0.3
-"""[m] Way of both ends over which a range cannot stay the same to the last digit."""
-SLOW = 0.1
-"""[m/s] A node that is slower may stand."""
-
 
 @small_kernel
 def is_stuck(c, s, p, t, distance):
@@ -37,7 +30,7 @@ def is_stuck(c, s, p, t, distance):
         sure_speed(c, s, s.nodes[pair.i], t) + sure_speed(c, s, s.nodes[pair.j], t)
     )
     pair.t_last = t
-    return pair.n_same > MANY and pair.way > FAR
+    return pair.n_same > c.frozen_ranges and pair.way > c.frozen_distance
 
 
 @small_kernel
@@ -51,4 +44,4 @@ def sure_speed(c, s, node, t):
     for k in range(c.d):
         squared += s.x[h, node.at_v + k] ** 2
     speed = math.sqrt(squared)
-    return speed if speed > SLOW else 0.0
+    return speed if speed > c.frozen_speed else 0.0

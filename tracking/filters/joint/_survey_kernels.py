@@ -12,10 +12,6 @@ from tracking.filters.joint._linear_kernels import absorb, project, settle_all
 from tracking.filters.joint._open_kernels import tell_turn, turn_gradient
 from tracking.filters.joint._range_kernels import range_model
 from tracking.filters.joint._rotation_kernels import follow_rotation
-from tracking.filters.joint._turn_kernels import UNSURE
-
-CONTRADICTS = 6.6
-"""[-] NIS of one in a hundred. The same distance again is no news: only what contradicts counts."""
 
 
 @small_kernel
@@ -28,7 +24,7 @@ def fuse_survey(c, s, h, p, distance, is_news, scratch):
     A hypothesis that puts a newcomer on the wrong side of the others is told so by the next of
     them, long before anybody moves.
     """
-    if s.group[0].turn_var > UNSURE * UNSURE:
+    if s.group[0].turn_var > c.gauge_std * c.gauge_std:
         follow_rotation(c, s, h, scratch)
     none = scratch.none
     predicted, m = range_model(c, s, h, p, none, none, scratch.idx, scratch.val)
@@ -45,7 +41,7 @@ def fuse_survey(c, s, h, p, distance, is_news, scratch):
         tell_turn(s, h, scratch, distance - predicted, variance + c.survey_var)
     nu, S = distance - predicted, variance + c.survey_var
     nis = nu * nu / (S + open_var)
-    if s.group[0].n_alive > 1 and nis > CONTRADICTS:
+    if s.group[0].n_alive > 1 and nis > c.survey_nis:
         s.loglik[h] -= 0.5 * min(nis, c.max_nis)
     absorb(s, h, scratch.w, nu, S)
 

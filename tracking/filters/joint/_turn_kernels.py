@@ -14,9 +14,6 @@ import numpy as np
 
 from tracking.compiled import allocating_kernel, kernel
 
-UNSURE = 0.05
-"""[rad] A turn that is less certain than this is looked after at every range."""
-
 
 @allocating_kernel
 def read_turn(s, h, but, A):

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import numpy as np
 
 from tracking.arrays import Bool, whole_lines
 from tracking.constellation import Constellation
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.records import Records
+from tracking.filters.joint.supervision_params import AlignmentParams, SupervisionParams
 
 _NUMBERS = (
     "bend_gain",
@@ -64,13 +67,14 @@ _NUMBERS = (
     "doubt",
     "common_error",
 )
+_DECISIONS = tuple(f.name for kind in (SupervisionParams, AlignmentParams) for f in fields(kind))
 COEFFICIENTS = np.dtype(
     [
         ("d", "i8"),
         ("n", "i8"),
         ("n_own", "i8"),
         ("n_motion", "i8"),
-        *((name, "f8") for name in _NUMBERS),
+        *((name, "f8") for name in (*_NUMBERS, *_DECISIONS)),
     ]
 )
 """Constants derived once from `JointParams`, under the same names; ``_var`` and ``2``: squared."""
@@ -110,8 +114,9 @@ def make_coefficients(constellation: Constellation, params: JointParams) -> Reco
     c["d"] = constellation.dimensions
     c["n"] = c["n_own"] = count_rows(constellation, params)
     c["n_motion"] = count_motion(constellation)
-    for name in _NUMBERS:
-        sources = [p for p in (e, v, s, params) if hasattr(p, name)]
+    for name in (*_NUMBERS, *_DECISIONS):
+        every = (e, v, s, params, params.supervision, params.alignment)
+        sources = [p for p in every if hasattr(p, name)]
         c[name] = values[name] if name in values else getattr(sources[0], name)
     return c
 

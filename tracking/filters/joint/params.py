@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from tracking.errors import ConfigError
+from tracking.filters.joint.supervision_params import AlignmentParams, SupervisionParams
 from tracking.numbers import check_numbers
 
 
@@ -237,6 +238,8 @@ class JointParams:
     """In the plane."""
     nlos_in_space: NlosParams = NLOS_IN_SPACE
     start: JointStartParams = field(default_factory=JointStartParams)
+    alignment: AlignmentParams = field(default_factory=AlignmentParams)
+    supervision: SupervisionParams = field(default_factory=SupervisionParams)
     initial_heading_std: float = 0.1
     """[rad] Error of headings that start from `NodeConfig.initial_heading`."""
     initial_heading_tau: float = 300.0
