@@ -31,9 +31,9 @@ from tracking.constellation import Constellation
 from tracking.errors import LogError
 from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.params import JointParams
-from tracking.filters.joint.records import Records, as_records
 from tracking.filters.joint.scratch import make_scratch
 from tracking.filters.joint.state import JointState, make_layout, make_state, room_to_wait
+from tracking.filters.records import Records, as_records
 from tracking.geometry import quat_conjugate, quat_multiply, yaw_of
 from tracking.log import Log
 from tracking.measurements import Kind, MeasurementBlock

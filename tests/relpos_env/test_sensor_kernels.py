@@ -18,7 +18,7 @@ from relpos_env.sensors.imu import IMU, ImuSimParams, fill_imu
 from relpos_env.sensors.magnetometer import MAG, MagSimParams, fill_mag
 from relpos_env.sensors.odometer import ODOMETER, OdometerSimParams
 from tracking._angle_kernels import cosine_sine
-from tracking.filters.joint.records import as_records
+from tracking.filters.records import as_records
 from tracking.geometry import GRAVITY, quat_conjugate, quat_from_yaw, quat_multiply, rotate
 
 SEED = np.uint64(7)

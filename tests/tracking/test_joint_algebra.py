@@ -29,9 +29,9 @@ from tracking.filters.joint._step_kernels import (
 from tracking.filters.joint.alignment import Alignment
 from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.params import JointParams
-from tracking.filters.joint.records import as_records
 from tracking.filters.joint.state import JointState, make_state
 from tracking.filters.joint.supervision_params import AlignmentParams
+from tracking.filters.records import as_records
 from tracking.geometry import quat_from_yaw
 
 angles = st.floats(-3.1, 3.1)

@@ -15,8 +15,8 @@ from tracking.filters.joint._sample_kernels import take_state
 from tracking.filters.joint._start_kernels import begin_node, begin_pair, first_sight
 from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.params import CARRIERS, JointParams, NlosParams
-from tracking.filters.joint.records import as_records
 from tracking.filters.joint.state import JointState, make_state
+from tracking.filters.records import as_records
 from tracking.measurements import N_VALUES
 
 

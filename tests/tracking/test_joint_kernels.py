@@ -18,9 +18,9 @@ from tracking.filters.joint._range_kernels import range_model
 from tracking.filters.joint.alignment import Alignment
 from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.params import JointParams
-from tracking.filters.joint.records import as_records
 from tracking.filters.joint.scratch import make_scratch
 from tracking.filters.joint.state import JointState, make_layout, make_state
+from tracking.filters.records import as_records
 from tracking.geometry import GRAVITY
 
 

@@ -24,8 +24,8 @@ from tracking.filters.joint._upright_kernels import GAIN
 from tracking.filters.joint.alignment import Alignment
 from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.params import JointParams
-from tracking.filters.joint.records import as_records
 from tracking.filters.joint.state import JointState, make_state
+from tracking.filters.records import as_records
 from tracking.filters.rotations import starting_rotations
 from tracking.measurements import Kind
 

@@ -15,10 +15,10 @@ from tracking.filters.joint._turn_kernels import note_turn, spread_turn
 from tracking.filters.joint.alignment import Alignment
 from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.params import JointParams
-from tracking.filters.joint.records import as_records
 from tracking.filters.joint.scratch import make_scratch
 from tracking.filters.joint.smoothing import with_clones
 from tracking.filters.joint.state import JointState, make_layout, make_state
+from tracking.filters.records import as_records
 from tracking.geometry import best_rotation
 
 N = 4

@@ -9,8 +9,8 @@ import numpy as np
 from tracking.arrays import Bool, whole_lines
 from tracking.constellation import Constellation
 from tracking.filters.joint.params import JointParams
-from tracking.filters.joint.records import Records
 from tracking.filters.joint.supervision_params import AlignmentParams, SupervisionParams
+from tracking.filters.records import Records
 
 _NUMBERS = (
     "bend_gain",

@@ -2,13 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numba import config
-from numpy.typing import NDArray
-
-Records = NDArray[Any]
 
 NODE = np.dtype(
     [
@@ -125,8 +119,3 @@ GROUP = np.dtype(
         ("nis_n", "i8"),
     ]
 )
-
-
-def as_records(array: Records) -> Records:
-    """An array of records whose fields the interpreter, too, finds under their names."""
-    return array.view(np.recarray) if config.DISABLE_JIT else array

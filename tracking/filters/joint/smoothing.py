@@ -18,8 +18,8 @@ import numpy as np
 from tracking.arrays import F64, aligned, whole_lines
 from tracking.estimate import Status, TeamEstimate
 from tracking.filters.joint.alignment import Alignment
-from tracking.filters.joint.records import Records
 from tracking.filters.joint.state import JointState, room_to_wait
+from tracking.filters.records import Records
 
 
 def with_clones(state: JointState, coefficients: Records) -> tuple[JointState, Records]:

@@ -28,7 +28,8 @@ from tracking.filters.joint.coefficients import (
     moving_pairs,
 )
 from tracking.filters.joint.params import JointParams
-from tracking.filters.joint.records import GROUP, NODE, PAIR, Records
+from tracking.filters.joint.records import GROUP, NODE, PAIR
+from tracking.filters.records import Records
 from tracking.filters.rotations import starting_rotations
 
 N_PRE = 39

@@ -8,15 +8,14 @@ arrays in place.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numba import config
-from numpy.typing import NDArray
 
 from tracking.arrays import F64, I64, Bool
 from tracking.constellation import WHEELED, Constellation
 from tracking.filters.pair.params import PairEkfParams
+from tracking.filters.records import Records
 from tracking.filters.rotations import starting_rotations
 
 SPEED_MODELS = {"none": 0, "range-rate": 1, "speed-norm": 2}
@@ -124,8 +123,6 @@ COEFFICIENTS = np.dtype(
 )
 """Constants derived once from `PairEkfParams`, under the same names and units."""
 
-Records = NDArray[Any]
-
 
 class FilterState(NamedTuple):
     """Everything that evolves."""
@@ -163,11 +160,6 @@ class Layout(NamedTuple):
     """(antenna, 3) [m]"""
     rotations: F64
     """Starting rotations and mirror images, (hyp, 3, 3)."""
-
-
-def as_records(array: Records) -> Records:
-    """An array of records whose fields the interpreter, too, finds under their names."""
-    return array.view(np.recarray) if config.DISABLE_JIT else array
 
 
 def make_coefficients(

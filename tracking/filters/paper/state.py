@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numba import config
-from numpy.typing import NDArray
 
 from tracking.arrays import F64, I64
 from tracking.constellation import Constellation
 from tracking.filters.paper.params import CHOICES, PaperParams
-
-Records = NDArray[Any]
+from tracking.filters.records import Records
 
 NODE = np.dtype(
     [
@@ -94,11 +91,6 @@ class Layout(NamedTuple):
     """(node, node)"""
     first: F64
     """Positions that the first MDS is aligned to, (node, 3) [m]."""
-
-
-def as_records(array: Records) -> Records:
-    """An array of records whose fields the interpreter, too, finds under their names."""
-    return array.view(np.recarray) if config.DISABLE_JIT else array
 
 
 def make_constants(constellation: Constellation, params: PaperParams) -> Records:

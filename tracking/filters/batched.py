@@ -1,0 +1,83 @@
+"""What filters over a batch of groups have in common: a state of arrays with a leading env axis."""
+
+from __future__ import annotations
+
+import copy
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from tracking.arrays import F64
+from tracking.compiled import bind
+from tracking.constellation import Constellation
+from tracking.estimate import TeamEstimate
+from tracking.measurements import MeasurementBlock
+
+
+class BatchedFilter(ABC):
+    """A `Filter` whose state is a tuple of arrays, (env, ...).
+
+    Among them are the records ``nodes``, ``pairs`` and ``group`` and the states ``x``.
+    """
+
+    follows_bias: bool
+    kernel: ClassVar[Callable[..., None]]
+    """Handles the events; takes what `_arguments` gives."""
+
+    def __init__(self, constellation: Constellation, state: Any, blank: Any) -> None:
+        """Keep the arrays.
+
+        Args:
+            constellation: The nodes.
+            state: Of all environments.
+            blank: Of one before any measurement, arrays (1, ...) that broadcast to `state`.
+        """
+        self._constellation, self._state, self._blank = constellation, state, blank
+
+    @abstractmethod
+    def _arguments(self, events: tuple[Any, ...], estimate: TeamEstimate) -> tuple[Any, ...]:
+        """What the kernel takes."""
+
+    def run(self, block: MeasurementBlock, t_out: F64) -> TeamEstimate:
+        """Handle the events and report at the given times; see `Filter.run`."""
+        t_out = np.ascontiguousarray(t_out, dtype=np.float64)
+        estimate = TeamEstimate.empty(self._constellation, t_out)
+        type(self).kernel(*self._arguments(block.arrays, estimate))
+        return estimate
+
+    def bind(self, block: MeasurementBlock, estimate: TeamEstimate) -> Callable[[], None]:
+        """`run` for arrays that stay where they are; see `Filter.bind`."""
+        return bind(type(self).kernel, *self._arguments(block.in_place, estimate))
+
+    def reset(self, env: int) -> None:
+        """Forget everything of one environment."""
+        for array, blank in zip(self._state, self._blank, strict=True):
+            array[env] = blank[0]
+
+    def part(self, envs: slice) -> Self:
+        """Some of the environments; shares their memory."""
+        part = copy.copy(self)
+        part._state = type(self._state)._make(array[envs] for array in self._state)
+        return part
+
+    def save(self) -> Any:
+        """A copy of everything that evolves."""
+        return type(self._state)._make(array.copy() for array in self._state)
+
+    def restore(self, saved: Any) -> None:
+        """Go on from a saved copy."""
+        for array, old in zip(self._state, saved, strict=True):
+            array[...] = old
+
+    def mean_nis(self) -> F64:
+        """Mean NIS over all accepted ranges, (env) [-]; NaN before the first."""
+        group = self._state.group[:, 0]
+        n = group["nis_n"]
+        mean: F64 = np.where(n > 0, group["nis_sum"] / np.maximum(n, 1), np.nan)
+        return mean
+
+    def n_rejected(self) -> F64:
+        """Ranges refused as outliers, (env)."""
+        return np.asarray(self._state.pairs["n_rejected"].sum(axis=1), dtype=np.float64)
