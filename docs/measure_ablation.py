@@ -49,7 +49,7 @@ def part(name: str, **values: Any) -> Callable[[JointParams], JointParams]:
 def vehicles(**values: Any) -> Callable[[JointParams], JointParams]:
     """Parameters with those of every vehicle changed."""
     return lambda p: replace(
-        p, carriers={name: replace(v, **values) for name, v in p.carriers.items()}
+        p, vehicles={name: replace(v, **values) for name, v in p.vehicles.items()}
     )
 
 

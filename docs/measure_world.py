@@ -17,10 +17,10 @@ import numpy as np
 
 from agents.simulate import simulate
 from relpos_env.scenarios import scenario as look_up
-from tracking.filters.joint.params import CARRIERS
 from tracking.geometry import GRAVITY, yaw_of
 from tracking.log.folder import Log
 from tracking.measurements import Kind
+from tracking.vehicles import VEHICLES
 
 SECONDS = 120.0
 PERIOD = 0.05
@@ -65,7 +65,7 @@ def slips(log: Log, slip: float) -> list[np.ndarray]:
         vx, vy, rate = (np.gradient(of, at) for of in (x, y, yaw))
         forward = np.cos(yaw) * vx + np.sin(yaw) * vy
         left = np.cos(yaw) * vy - np.sin(yaw) * vx
-        rest = left - (CARRIERS["car"].rear_axle - slip * forward**2) * rate
+        rest = left - (VEHICLES["car"].rear_axle - slip * forward**2) * rate
         for means, span in zip(out, SPANS, strict=True):
             n = round(span / PERIOD)
             means.append(rest[: len(rest) // n * n].reshape(-1, n).mean(axis=1))

@@ -18,7 +18,6 @@ from relpos_env.scenarios import HumanScenario, Scenario
 from relpos_env.sensors.radio.channel import ChannelParams
 from relpos_env.timing import DT
 from tracking.filters.joint.params import (
-    CARRIERS,
     JointParams,
     JointStartParams,
     NlosParams,
@@ -26,6 +25,7 @@ from tracking.filters.joint.params import (
 )
 from tracking.geometry import GRAVITY
 from tracking.ranging.timestamps import SPEED_OF_LIGHT
+from tracking.vehicles import VEHICLES
 
 STAMPS = 0.61
 """[-] White noise of a range over that of its three receive stamps' worth of way."""
@@ -47,7 +47,7 @@ def matched_params(scenario: Scenario | HumanScenario) -> JointParams:
     hidden = can_hide(scenario)
     gap_los_std, gap_nlos_std = (math.hypot(x, channel.gap_noise) for x in channel.gap_place)
     white = STAMPS * channel.stamp_std * SPEED_OF_LIGHT
-    carriers = dict(CARRIERS)
+    carriers = dict(VEHICLES)
     if isinstance(scenario, HumanScenario):
         carriers["human"] = replace(
             carriers["human"],
@@ -90,7 +90,7 @@ def matched_params(scenario: Scenario | HumanScenario) -> JointParams:
         outlier_prob=NEVER,
     )
     return JointParams(
-        carriers=carriers,
+        vehicles=carriers,
         range_error=RangeErrorParams(
             white_std=max(white, 1e-3),
             fast_std=max(channel.fast, 1e-4),

@@ -3,8 +3,8 @@
 import numpy as np
 
 from tracking.constellation import Constellation, NodeConfig
-from tracking.filters.joint.params import CARRIERS
 from tracking.measurements import Kind, MeasurementBlock
+from tracking.vehicles import VEHICLES
 
 FINE = 1000.0
 STAND, RAMP = 2.0, 1.0
@@ -46,7 +46,7 @@ class ExactGroup:
 
     @staticmethod
     def _drive(s, pace, rate, k, centre):
-        car = CARRIERS["car"]
+        car = VEHICLES["car"]
         forward = (0.8 + 0.15 * np.sin(0.7 * s + k)) * pace
         turn = rate * (0.8 + 0.2 * np.cos(0.5 * s + 2 * k)) * pace
         yaw = np.cumsum(turn, axis=0) / FINE + k

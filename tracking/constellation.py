@@ -11,13 +11,7 @@ import numpy as np
 
 from tracking.arrays import F64, I64, Bool
 from tracking.errors import ConfigError
-
-VEHICLES = ("car", "human", "drone", "hand", "robot", "none")
-WHEELED = ("car", "robot")
-"""Vehicles that stay level and accelerate for seconds on end."""
-CARRIED = ("hand", "drone", "none")
-"""Vehicles that tilt, and accelerate for seconds."""
-
+from tracking.vehicles import VEHICLES
 
 MOST_NODES = 256
 """[-] A filter of more takes gigabytes."""
@@ -44,7 +38,7 @@ class NodeConfig:
     kind: Literal["moving", "static"] = "moving"
     """A static node has no IMU and never moves."""
     vehicle: str = "none"
-    """What carries it, one of `VEHICLES`."""
+    """What carries it, one of `tracking.vehicles.VEHICLES`."""
     initial_heading: float | None = None
     """[rad] Yaw of the body at its first IMU sample, for headings without a magnetometer."""
     imu_hz: float = 100.0

@@ -21,9 +21,10 @@ from tracking._orientation_kernels import N_NODE, forget
 from tracking._rest_kernels import N_REST, REST_TAU
 from tracking._vqf_kernels import N_TILT
 from tracking.arrays import F64, Bool
-from tracking.constellation import CARRIED, WHEELED, Constellation
+from tracking.constellation import Constellation
 from tracking.geometry import GRAVITY
 from tracking.numbers import check_numbers
+from tracking.vehicles import VEHICLES
 
 VQF_TAU_ACC = 3.0
 """[s] VQF's accelerometer time constant."""
@@ -35,12 +36,6 @@ class OrientationParams:
 
     tau_acc: float = VQF_TAU_ACC
     """[s] VQF's accelerometer time constant. Longer trusts the gyroscope more. VQF default."""
-    tau_acc_curves: float = 30.0
-    """[s] The same on what accelerates sideways for seconds in every curve: cars and robots. A
-    short time constant takes that for tilt, and so it is missing in the acceleration."""
-    tau_acc_turned: float = 10.0
-    """[s] The same on drones and on what is carried in a hand, for filters that follow slow errors.
-    They are turned about, and their tilt is as good as what is known of the gyroscope's bias."""
     tau_mag: float = 9.0
     """[s] VQF's magnetometer time constant. VQF default."""
     rest_rate: float = math.radians(4.0)
@@ -154,10 +149,11 @@ def make_coefficients(
     nodes = constellation.nodes
     dt = np.array([1.0 / node.imu_hz for node in nodes])
     mag_dt = np.array([1.0 / (node.mag_hz or node.imu_hz) for node in nodes])
-    tau_by_vehicle = dict.fromkeys(WHEELED, params.tau_acc_curves)
-    if follows_bias:
-        tau_by_vehicle |= dict.fromkeys(CARRIED, params.tau_acc_turned)
-    tau_acc = np.array([tau_by_vehicle.get(node.vehicle, params.tau_acc) for node in nodes])
+    vehicles = [VEHICLES[node.vehicle] for node in nodes]
+    with_bias = [v.ahrs_accel_tau_with_bias if follows_bias else None for v in vehicles]
+    tau_acc = np.array(
+        [b or v.ahrs_accel_tau or params.tau_acc for b, v in zip(with_bias, vehicles, strict=True)]
+    )
     drift_var = 10.0**2 * dt / 100.0
     motion_sigma2 = 10.0**2 * tau_acc / VQF_TAU_ACC
     motion_var = motion_sigma2**2 / drift_var + motion_sigma2

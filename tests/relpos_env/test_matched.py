@@ -62,10 +62,10 @@ def test_sight_is_lost_and_found_as_often_as_is_said(drives):
 
 def test_tyres_slip_as_far_in_eight_seconds_as_white_noise_would(drives):
     joint = matched_params(recordable("cars-nlos"))
-    slip = joint.carriers["car"].slip
+    slip = joint.vehicles["car"].slip
     means = np.concatenate([MEASURES["slips"](log, slip)[-1] for log in drives])
     n = MEASURES["SPANS"][-1] / MEASURES["PERIOD"]
-    assert joint.carriers["car"].sideways_std == SIDEWAYS
+    assert joint.vehicles["car"].sideways_std == SIDEWAYS
     assert np.sqrt(np.mean(means**2) * n) == pytest.approx(SIDEWAYS, rel=0.4)
 
 

@@ -22,12 +22,13 @@ from tracking import (
 from tracking.bounds import posterior_bound
 from tracking.consistency import chi_square_band, pair_nees
 from tracking.filters import FilterParams
-from tracking.filters.joint.params import CARRIERS, JointParams, RangeErrorParams
+from tracking.filters.joint.params import JointParams, RangeErrorParams
 from tracking.gospa import labelled_gospa
 from tracking.horizon import Horizon, HorizonParams
 from tracking.log import Log, Truth
 from tracking.measurements import Kind, MeasurementBlock
 from tracking.metrics import score
+from tracking.vehicles import VEHICLES
 
 
 @pytest.fixture(scope="module")
@@ -201,11 +202,11 @@ def far_nodes():
         nodes=(*nodes, NodeConfig(id=4, vehicle="drone", imu_hz=HZ)), dimensions=2
     )
     carrier = replace(
-        CARRIERS["drone"], accel_psd=PSD, turn_psd=1e-9, bias_std=1e-9, rise_bias_std=1e-9,
+        VEHICLES["drone"], accel_psd=PSD, turn_psd=1e-9, bias_std=1e-9, rise_bias_std=1e-9,
         heading_std=1e-9, unsettled_speed=0.0,
     )  # fmt: skip
     params = JointParams(
-        carriers={**CARRIERS, "drone": carrier},
+        vehicles={**VEHICLES, "drone": carrier},
         range_error=RangeErrorParams(white_std=SIGMA, fast_std=0.0, slow_std=0.0),
         static_drift=1e-9,
     )

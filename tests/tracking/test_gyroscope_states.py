@@ -11,12 +11,12 @@ from tracking.filters.joint import _gyroscope_kernels as gyroscope
 from tracking.filters.joint import _motion_kernels
 from tracking.filters.joint._rest_kernels import learn_at_rest
 from tracking.filters.joint.alignment import Alignment
-from tracking.filters.joint.params import CARRIERS
 from tracking.measurements import GYRO_BIAS, GYRO_VAR, N_VALUES, TOLD
+from tracking.vehicles import VEHICLES
 
 START_STD = 0.009
 """[rad/s] Half a degree per second."""
-TRUSTED = CARRIERS["hand"].gyro_std
+TRUSTED = VEHICLES["hand"].gyro_std
 
 
 def tell(s, bias, var, rests, begins=False):

@@ -14,10 +14,11 @@ from tracking.filters import FilterParams
 from tracking.filters.joint._sample_kernels import take_state
 from tracking.filters.joint._start_kernels import begin_node, begin_pair, first_sight
 from tracking.filters.joint.coefficients import make_coefficients
-from tracking.filters.joint.params import CARRIERS, JointParams, NlosParams
+from tracking.filters.joint.params import JointParams, NlosParams
 from tracking.filters.joint.state import JointState, make_state
 from tracking.filters.records import as_records
 from tracking.measurements import N_VALUES
+from tracking.vehicles import VEHICLES
 
 
 def one_env(vehicle="car"):
@@ -39,7 +40,7 @@ def test_after_a_blow_the_speed_is_uncertain(vehicle, accel, is_blow):
     values[0, 1, 4] = accel
     for k, t in enumerate((0.0, 0.01, 0.02)):
         take_state(c, s.nodes, s.held, s.pre, 0, t, values, 0, k)
-    carrier = CARRIERS[vehicle]
+    carrier = VEHICLES[vehicle]
     usual = carrier.turn_psd**2 * accel**2 * 0.01
     expected = usual + (carrier.blow_share * accel * 0.01) ** 2 * is_blow
     assert carrier.turn_psd**2 * s.pre[0, 11] == pytest.approx(expected)
@@ -54,7 +55,7 @@ def test_a_tilt_that_is_being_found_leaves_the_bias_uncertain(at_rest):
     s.alive[:], s.nodes["present"] = True, True
     s.nodes["has_state"], s.nodes["t_state"] = True, 4.0
     s.nodes["t_moved"] = s.nodes["t_first"] = 0.0 if at_rest else 4.0
-    carrier = CARRIERS["hand"]
+    carrier = VEHICLES["hand"]
     for t_oriented, age in ((0.0, 4.0), (-96.0, 100.0)):
         s.nodes["t_oriented"] = t_oriented
         begin_node(c, s, 0, 0, 4.0)
@@ -100,7 +101,7 @@ def test_headings_are_uncertain_until_cars_have_driven():
     """Magnetometers are wrong by degrees where they stand, and nothing changes that at rest."""
     log = simulate(scenario="cars-los", seconds=20.0, seed=3)
     joint = matched_params(recordable("cars-los"))
-    car = joint.carriers["car"]
+    car = joint.vehicles["car"]
     tracker = Tracker(log.constellation, TrackerParams(filter=FilterParams(joint=joint)))
     std = []
     for start, end in ((0.0, STAND_STILL + 0.2), (STAND_STILL + 0.2, 19.0)):

@@ -8,11 +8,12 @@ import pytest
 from tracking import Constellation, NodeConfig, Tracker
 from tracking.constellation import Antenna
 from tracking.errors import ConfigError
-from tracking.filters.joint.params import CarrierParams, JointParams
+from tracking.filters.joint.params import JointParams
 from tracking.filters.pair.params import PairEkfParams
 from tracking.horizon import Horizon, HorizonParams
 from tracking.measurements import Kind, MeasurementBlock
 from tracking.orientation import OrientationParams
+from tracking.vehicles import VehicleParams
 
 GROUP = Constellation(nodes=tuple(NodeConfig(id=k, kind="static") for k in range(4)), dimensions=2)
 T = np.arange(0.0, 3.0, 0.05)
@@ -205,7 +206,7 @@ def test_to_join_again_changes_nothing(filter):
         (lambda v: group_of(imu_hz=v), "imu_hz"),
         (lambda v: group_of(mag_hz=v), "mag_hz"),
         (lambda v: PairEkfParams(speed_tau=v), "speed_tau"),
-        (lambda v: CarrierParams(slip=v), "slip"),
+        (lambda v: VehicleParams(slip=v), "slip"),
     ],
 )
 @pytest.mark.parametrize("value", [-1.0, float("nan"), float("inf")])

@@ -6,7 +6,7 @@ import numpy as np
 
 from tracking import Constellation, NodeConfig, Tracker, TrackerParams
 from tracking.filters import FilterParams
-from tracking.filters.joint.params import CARRIERS, JointParams
+from tracking.filters.joint.params import JointParams
 from tracking.geometry import GRAVITY
 from tracking.measurements import (
     GYRO_VAR,
@@ -17,6 +17,7 @@ from tracking.measurements import (
     MeasurementBlock,
 )
 from tracking.orientation import Orientation, OrientationParams
+from tracking.vehicles import VEHICLES
 
 FIXED = np.array([[-2.0, -2.0, 0.2], [2.0, -1.5, 2.0], [1.5, 2.0, 0.4], [-1.8, 1.7, 1.9]])
 
@@ -57,8 +58,8 @@ def walk(upright, told, lean=0.0, seconds=12.0, seed=0):
         NodeConfig(id=0, vehicle="hand", initial_heading=0.0),
         *(NodeConfig(id=k + 1, kind="static") for k in range(len(FIXED))),
     )
-    carriers = {**CARRIERS, "hand": replace(CARRIERS["hand"], told_bias_tau=1e9)}
-    params = TrackerParams(filter=FilterParams(joint=JointParams(carriers=carriers)))
+    carriers = {**VEHICLES, "hand": replace(VEHICLES["hand"], told_bias_tau=1e9)}
+    params = TrackerParams(filter=FilterParams(joint=JointParams(vehicles=carriers)))
     tracker = Tracker(Constellation(nodes=nodes, heading="initial", dimensions=3), params)
     t = np.arange(0.0, seconds, 0.01)
     angle = np.array([0.7, 1.1, 1.6])

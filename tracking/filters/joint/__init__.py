@@ -1,6 +1,7 @@
 """One extended Kalman filter over all nodes of a group."""
 
 from tracking.filters.joint.joint_ekf import JointEkf
-from tracking.filters.joint.params import CarrierParams, JointParams
+from tracking.filters.joint.params import JointParams
+from tracking.vehicles import VehicleParams
 
-__all__ = ["CarrierParams", "JointEkf", "JointParams"]
+__all__ = ["VehicleParams", "JointEkf", "JointParams"]

@@ -108,7 +108,7 @@ def make_coefficients(constellation: Constellation, params: JointParams) -> Reco
         "survey_var": params.survey_std**2,
         "rest_var": params.rest_std**2,
         "ok_var": params.ok_std**2,
-        "carry_period": min(params.carriers[n.vehicle].carry_period for n in moving),
+        "carry_period": min(params.vehicles[n.vehicle].carry_period for n in moving),
     }
     c = np.zeros(1, dtype=COEFFICIENTS)
     c["d"] = constellation.dimensions
@@ -154,7 +154,7 @@ def has_offset(constellation: Constellation, params: JointParams, node: int) -> 
     """True if the offset of a node's accelerometer has states: in space, where it turns about."""
     config = constellation.nodes[node]
     moves = config.kind != "static" and constellation.dimensions == 3
-    return moves and params.carriers[config.vehicle].offset_std is not None
+    return moves and params.vehicles[config.vehicle].offset_std is not None
 
 
 def has_range_errors(constellation: Constellation, params: JointParams) -> bool:

@@ -123,7 +123,7 @@ def make_state(
     nodes = np.zeros((n_envs, n), dtype=NODE)
     at, fades = 0, count_motion(constellation)
     for k, node in enumerate(constellation.nodes):
-        carrier = params.carriers[node.vehicle]
+        carrier = params.vehicles[node.vehicle]
         static = node.kind == "static"
         initial, offset = constellation.heading == "initial", has_offset(constellation, params, k)
         heading_std = params.initial_heading_std if initial else carrier.heading_std

@@ -153,15 +153,8 @@ class StartParams:
 class PairEkfParams:
     """One extended Kalman filter per pair."""
 
-    accel_psd: float = 0.15
-    """[m/s2/sqrt(Hz)] Noise of one node's world acceleration: sensor noise, vibration and the
-    slow error of a wrong tilt. Larger forgets dead reckoning sooner."""
-    wheeled_accel_psd: float = 0.07
-    """[m/s2/sqrt(Hz)] The same on cars and robots, whose acceleration is free of tilt errors."""
-    hand_accel_psd: float = 0.25
-    """[m/s2/sqrt(Hz)] The same in a hand, whose heading is often off by many degrees."""
     unaided_accel_psd: float = 0.7
-    """[m/s2/sqrt(Hz)] The same for a moving node whose IMU is not heard."""
+    """[m/s2/sqrt(Hz)] White noise of the acceleration of a moving node without IMU samples."""
     unaided_after: float = 0.3
     """[s] A node whose IMU was silent for so long is unaided."""
     survey_std: float = 0.02

@@ -13,10 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from tracking.arrays import F64, I64, Bool
-from tracking.constellation import WHEELED, Constellation
+from tracking.constellation import Constellation
 from tracking.filters.pair.params import PairEkfParams
 from tracking.filters.records import Records
 from tracking.filters.rotations import starting_rotations
+from tracking.vehicles import VEHICLES
 
 SPEED_MODELS = {"none": 0, "range-rate": 1, "speed-norm": 2}
 
@@ -219,12 +220,12 @@ def make_state(
     n, p = constellation.n_nodes, constellation.n_pairs
     nodes = np.zeros((n_envs, n), dtype=NODE)
     nodes["static"] = constellation.is_static
-    psd = {"hand": params.hand_accel_psd, **dict.fromkeys(WHEELED, params.wheeled_accel_psd)}
+    vehicles = [VEHICLES[node.vehicle] for node in constellation.nodes]
     nodes["psd"] = [
-        0.0 if node.kind == "static" else psd.get(node.vehicle, params.accel_psd)
-        for node in constellation.nodes
+        0.0 if node.kind == "static" else vehicle.pair_accel_psd
+        for node, vehicle in zip(constellation.nodes, vehicles, strict=True)
     ]
-    nodes["levelled"] = [node.vehicle in WHEELED for node in constellation.nodes]
+    nodes["levelled"] = [vehicle.levelled for vehicle in vehicles]
     cars = [node.vehicle == "car" and node.kind == "moving" for node in constellation.nodes]
     nodes["sideways_var"] = np.where(cars, params.wheels.std**2, 0.0)
     nodes["rear_axle"] = params.wheels.rear_axle
