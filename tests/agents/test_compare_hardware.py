@@ -12,6 +12,7 @@ from agents.compare.contender import Contender
 from agents.compare.hardware import compare_hardware
 from agents.compare.meter import IN_FORMATION
 from agents.controllers import Consensus
+from agents.drive import keys
 from agents.emulate import EmulateOptions
 from agents.emulate.virtual import VirtualBridge
 from agents.errors import UsageError
@@ -227,7 +228,7 @@ def command(monkeypatch, capsys, *args):
         (["--swarm", "cars.toml", "--arm", "--jobs", "2"], "--jobs: expected without --swarm"),
         (["--swarm", "cars.toml", "--task", "ring"], "--task: expected without --swarm"),
         (["--swarm", "cars.toml", "--first-seed", "7"], "--first-seed: expected without --swarm"),
-        (["--swarm", "cars.toml", "--arm"], "cars.toml"),
+        (["--swarm", "cars.toml", "--arm"], "--arm: expected a terminal, on which space stops"),
         (["--swarm", "cars.toml"], "--arm: a comparison needs cars that move"),
     ],
     ids=" ".join,
@@ -250,6 +251,7 @@ def test_the_command_compares_on_cars(monkeypatch, capsys, tmp_path):
         return bridge
 
     monkeypatch.setattr(hardware, "Bridge", opens)
+    monkeypatch.setattr(keys, "check_stop_source", lambda source: None)  # as on a terminal
     args = ["--swarm", str(tmp_path / "swarm.toml"), "--arm", "--episodes", "1"]
     args += ["--seconds", "1", "--settle", "0.5", "--json", "--out", str(tmp_path / "out")]
     monkeypatch.setattr(sys, "argv", ["relpos", "compare", "consensus", *args])

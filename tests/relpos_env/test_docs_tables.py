@@ -80,6 +80,8 @@ def test_arguments_of_the_forms_are_told(form):
 def test_snippets_run(code, tmp_path, monkeypatch):
     if "sb3" in code:
         pytest.importorskip("stable_baselines3")
+    if "torchrl" in code:
+        pytest.importorskip("torchrl")
     monkeypatch.chdir(tmp_path)
     exec(compile(code, "environment.md", "exec"), {})
 

@@ -8,13 +8,8 @@ import pytest
 from tracking.constellation import Constellation, NodeConfig
 from tracking.filters.pair import _mds_kernels, _range_kernels, _sight_kernels, _wheel_kernels
 from tracking.filters.pair.params import PairEkfParams
-from tracking.filters.pair.state import (
-    FilterState,
-    as_records,
-    make_coefficients,
-    make_layout,
-    make_state,
-)
+from tracking.filters.pair.state import FilterState, make_coefficients, make_layout, make_state
+from tracking.filters.records import as_records
 from tracking.mds import refine_positions, weighted_mds
 from tracking.tracker import Tracker
 
