@@ -4,7 +4,8 @@ For `docs/tracker.md`. A mechanism is left out by parameters alone. Errors are p
 the whole filter on the same seeds: the median ratio and its 95 % interval by the bootstrap.
 
 Faults are those of one node from 25 s on. Recordings are read from `RELPOS_DATA`, else
-`../shared/data`. Run `python docs/measure_ablation.py [RUNS] [MECHANISM ...]`.
+`../shared/data`. Run `python docs/measure_ablation.py [RUNS] [MECHANISM ...] > rows.jsonl`, then
+`python docs/measure_ablation.py --table rows.jsonl`.
 """
 
 from __future__ import annotations
@@ -54,9 +55,19 @@ def vehicles(**values: Any) -> Callable[[JointParams], JointParams]:
 
 
 MECHANISMS: dict[str, Callable[[JointParams], JointParams]] = {
+    "states of range errors": part("range_error", max_pairs=ALWAYS),
+    "NLOS": lambda p: replace(
+        p,
+        nlos=replace(p.nlos, enter_rate=ALWAYS, enter_rate_with_power=ALWAYS),
+        nlos_in_space=replace(p.nlos_in_space, enter_rate=ALWAYS, enter_rate_with_power=ALWAYS),
+    ),
+    "non-holonomic constraint": vehicles(sideways_std=None),
+    "level vehicles": vehicles(levelled=False),
+    "bias of accelerations": vehicles(bias_std=ALWAYS, rise_bias_std=ALWAYS),
+    "heading error": vehicles(heading_std=ALWAYS, first_heading_std=None),
+    "offset of accelerometers": vehicles(offset_std=None),
     "node faults: outliers": part("supervision", outlier_ratio=2.0),
     "node faults: offsets": lambda p: replace(p, common_error=NEVER),
-    "divergence": part("supervision", least_inliers=ALWAYS),
     "wrong positions": part("supervision", position_misfit=NEVER),
     "frozen ranges": part("supervision", frozen_ranges=NEVER),
     "stale nodes": lambda p: replace(p, silent_after=NEVER),
@@ -186,6 +197,7 @@ def rows(n_runs: int, names: list[str]) -> Iterator[dict[str, Any]]:
             yield {
                 "kind": kind,
                 "without": name,
+                "runs": n,
                 "changed": int((left != whole).any(axis=1).sum()),
                 "yaw": interval(left[:, 0] / whole[:, 0], rng),
                 "shape": interval(left[:, 1] / whole[:, 1], rng),
@@ -193,8 +205,39 @@ def rows(n_runs: int, names: list[str]) -> Iterator[dict[str, Any]]:
             }
 
 
+def tables(lines: list[str]) -> str:
+    """Rows as two tables in Markdown: without a fault, and with one."""
+    rows = [json.loads(line) for line in lines]
+    kinds = list(dict.fromkeys(row["kind"] for row in rows))
+    names = list(dict.fromkeys(row["without"] for row in rows))
+    found = {(row["without"], row["kind"]): row for row in rows}
+    parts = []
+    for some in ([k for k in kinds if "," not in k], [k for k in kinds if "," in k]):
+        head = ["without", *some]
+        text = [head, ["---"] * len(head)]
+        text += [[name or "all of them", *(cell(found[name, k]) for k in some)] for name in names]
+        parts.append("\n".join("| " + " | ".join(row) + " |" for row in text))
+    return "\n\n".join(parts)
+
+
+def cell(row: dict[str, Any]) -> str:
+    """One figure: errors [m] of the whole filter, else their ratio to it; and what is wrong."""
+    wrong = f"{100.0 * row['wrong']:.2g} %"
+    if not row["without"]:
+        return f"{row['yaw']:.3f} / {row['shape']:.3f} m; {wrong}"
+    if not row["changed"]:
+        return "="
+    (yaw, low, high), (shape, *ends) = row["yaw"], row["shape"]
+    if row["runs"] == 1:
+        return f"{yaw:.2f} / {shape:.2f}; {wrong}"
+    return f"{yaw:.2f} ({low:.2f}-{high:.2f}) / {shape:.2f} ({ends[0]:.2f}-{ends[1]:.2f}); {wrong}"
+
+
 def main() -> None:
-    """Print the rows as JSON lines."""
+    """Print the rows as JSON lines, or rows of before as tables."""
+    if sys.argv[1:2] == ["--table"]:
+        print(tables(Path(sys.argv[2]).read_text().splitlines()))
+        return
     n_runs = int(sys.argv[1]) if len(sys.argv) > 1 else 40
     for row in rows(n_runs, sys.argv[2:] or list(MECHANISMS)):
         print(json.dumps(row), flush=True)

@@ -131,7 +131,7 @@ def prune_bank(c, s):
         # How well ranges fit was told by the other.
         for p in range(s.pairs.shape[0]):
             forget_fits(s.pairs[p])
-        group.misfit, group.fit = 1.0, 1.0
+        group.misfit = 1.0
     top = s.loglik[best]
     for h in range(n_hyps):
         if s.alive[h] and h != group.best and s.loglik[h] < top - c.prune:
@@ -151,19 +151,6 @@ def prune_bank(c, s):
     for h in range(n_hyps):
         group.n_alive += s.alive[h]
         s.loglik[h] -= top
-
-
-@kernel
-def open_up(c, s, dt):
-    """Know less about where everything is, in a filter that most ranges contradict."""
-    for h in range(s.alive.shape[0]):
-        if s.alive[h]:
-            for i in range(s.nodes.shape[0]):
-                node = s.nodes[i]
-                if node.present and not node.static:
-                    for k in range(c.d):
-                        s.P[h, node.at_p + k, node.at_p + k] += c.divergence_rate**2 * dt
-                        s.P[h, node.at_v + k, node.at_v + k] += c.divergence_rate**2 * dt
 
 
 @kernel

@@ -37,7 +37,7 @@ def note_fit(c, s, p, dt, distance, fits, nu):
 
 @kernel
 def watch_nodes(c, s, layout, t):
-    """Doubt nodes that disagree with the group; tell whether it is the group that is lost."""
+    """Doubt nodes that disagree with the group."""
     group = s.group[0]
     dt = t - group.t_check
     worst = -1
@@ -48,7 +48,6 @@ def watch_nodes(c, s, layout, t):
         elif worst < 0 or node.astray > s.nodes[worst].astray:
             worst = i
     blames = worst >= 0 and others_fit(c, s, worst, t)
-    group.diverged = group.fit < c.least_inliers and not blames
     for i in range(s.nodes.shape[0]):
         node = s.nodes[i]
         if not node.present:

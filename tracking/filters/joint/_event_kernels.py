@@ -8,7 +8,6 @@ from tracking.filters.joint._alignment_kernels import NONE, STATIC, is_linear
 from tracking.filters.joint._antenna_kernels import antenna_offset
 from tracking.filters.joint._bank_kernels import (
     bank_range,
-    open_up,
     prune_bank,
     remove_node,
     remove_silent,
@@ -245,7 +244,6 @@ def take_range(c, s, layout, scratch, p, a_i, a_j, t, distance, sight, is_survey
             capped = min(misfit, 25.0) if weight > 0.5 else 25.0
             pair.misfit += 0.05 * (capped - pair.misfit)
             fits = 1.0 if weight > 0.5 and misfit < 6.0 else 0.0
-            group.fit += 0.01 * (fits - group.fit)
             note_fit(c, s, p, dt, distance, fits, nu)
             if not (s.nodes[pair.i].doubted or s.nodes[pair.j].doubted):
                 group.misfit += 0.01 * (weight * capped - group.misfit)
@@ -294,6 +292,4 @@ def look_at_group(c, s, layout, t):
     watch_rotation(c, s, layout, t - s.group[0].t_check)
     watch_places(c, s, layout, t)
     watch_nodes(c, s, layout, t)
-    if s.group[0].diverged:
-        open_up(c, s, t - s.group[0].t_check)
     s.group[0].t_check = t

@@ -194,11 +194,10 @@ def fuse_range(c, s, h, p, dt, distance, levers, sight, scratch):
             open_var = turn_gradient(s, h, m, scratch)
     R = c.white_var + bent + s.nlos[h, p] * c.excess_white_var
     nis = nu * nu / (variance + open_var + R)
-    # A pair whose ranges have long contradicted all else is believed less and less; where most
-    # contradict the filter, it is the filter that is wrong.
+    # A pair whose ranges have long contradicted all else is believed less and less.
     doubt = s.pairs[p].misfit / (0.7 * c.doubt)
     trust = sane
-    if doubt > 1.0 and not s.group[0].diverged:
+    if doubt > 1.0:
         trust /= doubt * doubt * doubt * doubt
     if trust > 1e-3:
         if is_linear(s.group[0]):

@@ -89,7 +89,7 @@ def try_start(c, s, layout, t):
         if s.nodes[members[a]].sideways_var > 0.0:
             group.t_patient = t + c.wheels_after
     group.turn_var = c.rotation_var if c.d == 2 else 0.0
-    group.misfit, group.fit, group.diverged = 1.0, 1.0, False
+    group.misfit = 1.0
     group.strain, group.strain_limit = 0.0, c.strained
     return True
 

@@ -113,8 +113,6 @@ GROUP = np.dtype(
         ("misfit", "f8"),  # running mean of NIS of ranges that mean anything, not of doubted nodes
         ("strain", "f8"),  # slow running mean of the misfit [-]
         ("strain_limit", "f8"),  # how much of it brings up other rotations [-]
-        ("fit", "f8"),  # running share of ranges that fit [-]
-        ("diverged", "?"),  # most ranges do not fit, and no single node is to blame
         ("nis_sum", "f8"),
         ("nis_n", "i8"),
     ]

@@ -33,8 +33,6 @@ class SupervisionParams:
     starts again: the line of sight at 2 m may be off by 20 degrees."""
     outlier_ratio: float = 0.6
     """[-] A node of whose ranges a larger share does not fit is faulty, if the others fit."""
-    least_inliers: float = 0.4
-    """[-] The group has diverged where a smaller share of all ranges fits."""
     fault_hysteresis: float = 0.5
     """[-] A fault lasts while its residual is above this share of its limit."""
     fault_time: float = 2.0
@@ -45,8 +43,6 @@ class SupervisionParams:
     """[m] Standard deviation of the range offset that a faulty node may have at first."""
     offset_rate: float = 1.0
     """[m/sqrt(s)] Process noise of that offset."""
-    divergence_rate: float = 0.7
-    """[m/sqrt(s), m/s/sqrt(s)] Process noise of all positions and velocities after divergence."""
     settled_ranges: float = 10.0
     """[-] Ranges of a pair before its mean residual counts against a node's position."""
     largest_scatter: float = 0.25
