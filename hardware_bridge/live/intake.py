@@ -10,8 +10,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 
-import numpy as np
-
 from hardware_bridge.clocks import EvenTime
 from hardware_bridge.config.swarm import CarConfig, LinkConfig, SwarmConfig
 from hardware_bridge.decoders import make_decoder
@@ -26,6 +24,7 @@ from hardware_bridge.live.other_tracker import OtherTracker
 from hardware_bridge.live.repeated import RepeatedSamples
 from hardware_bridge.live.sample_rates import SampleRates
 from hardware_bridge.live.stream import OF_A_CAR, Stream
+from hardware_bridge.live.trims import Trims
 from hardware_bridge.plausibility import Plausibility
 from hardware_bridge.readings import (
     NOBODY,
@@ -47,8 +46,6 @@ from tracking.errors import ConfigError
 from tracking.measurements import Kind
 
 NS = 1e-9
-NO_NODE = -1
-"""In place of an id, of an operator without."""
 
 
 class Intake:
@@ -76,8 +73,6 @@ class Intake:
         self.near = Near(config.n_slots, config.task.proximity)
         self.motion: dict[int, tuple[int, MotionReading]] = {}
         """What each car last said of its motion, with its host time [ns], by index."""
-        self.trim: dict[int, tuple[int, tuple[float, float]]] = {}
-        """What an operator last asked of each car, with its host time [ns], by index."""
         self.voltage: dict[int, float] = {}
         """Of each node, by index [V]."""
         self.fault: dict[tuple[str, int], int] = {}
@@ -91,6 +86,7 @@ class Intake:
         self.sample_rates = SampleRates(rates)
         self._repeated = RepeatedSamples(rates)
         self._naming = Naming(self.group, self.refused, self.notices)
+        self.trims = Trims(self._naming, self.refused)
         self.other = OtherTracker(
             start_ns, self.group.ids, self._naming, self.plausibility, self.refused, self.notices
         )
@@ -162,7 +158,7 @@ class Intake:
             self.refused["stranger"] += 1
             return
         if isinstance(reading, OperatorReading):
-            self._take_trim(stream, reading, arrival_ns)
+            self.trims.take(stream, reading, arrival_ns)
             return
         if isinstance(reading, PairReading | PoseReading):
             nodes = self.other.take(stream, reading, arrival_ns)
@@ -268,21 +264,6 @@ class Intake:
         if stream.name.startswith("links."):
             self.heard_ns[near] = self.heard_ns[far] = arrival_ns  # it answered
         return True
-
-    def _take_trim(self, stream: Stream, reading: OperatorReading, arrival_ns: int) -> None:
-        source, device = reading.source, reading.source.device
-        if source is not stream.source or source is NOBODY:
-            # A remote control is none of the nodes; it has an id of its own.
-            who = int(device) if device and device.isascii() and device.isdigit() else NO_NODE
-            stream.verdict = stream.identities.check(stream.name, source, arrival_ns, who)
-            stream.source = source
-            if not stream.verdict.accepted:
-                self.refused[stream.verdict.value] += 1
-        if not stream.verdict.accepted:
-            return
-        node = self._naming.index(stream, reading.to, arrival_ns, named=True)
-        if node is not None and np.isfinite(reading.velocity).all():
-            self.trim[node] = arrival_ns, reading.velocity
 
     def _note_fault(self, stream: Stream, node: int, fault: int, arrival_ns: int) -> None:
         if fault == self.fault.get((stream.name, node), 0):

@@ -207,7 +207,7 @@ class LiveSwarm:
             view.speed[0, k], view.steering[0, k] = speed, steering
             if abs(speed) > DRIVES:
                 driving.add(k)
-            asked = intake.trim.get(k)
+            asked = intake.trims.newest.get(k)
             fresh = asked is not None and (t_ns - asked[0]) * 1e-9 <= SILENT
             self.trim[0, k] = asked[1] if fresh and asked is not None else 0.0
         view.near[0] = np.where(view.present[0][:, None], intake.near.beams(t_ns), 0.0)
