@@ -157,8 +157,8 @@ def recording(name: str) -> Any:
 
 def data() -> Path:
     """Where recordings are."""
-    beside = Path(__file__).resolve().parents[2] / "shared" / "data"
-    return Path(os.environ.get("RELPOS_DATA", beside))
+    default = Path(__file__).resolve().parents[2] / "shared" / "data"
+    return Path(os.environ.get("RELPOS_DATA", default))
 
 
 def figures(of: Case, params: JointParams) -> tuple[float, float, float]:

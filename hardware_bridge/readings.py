@@ -46,7 +46,7 @@ class Source(NamedTuple):
     clock: DeviceClock | None = None
 
 
-NOBODY = Source()
+UNNAMED = Source()
 """Of formats that tell nothing."""
 
 

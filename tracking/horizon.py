@@ -38,7 +38,7 @@ class HorizonParams:
 
 
 class HorizonState(NamedTuple):
-    """What waits, and what was counted."""
+    """Measurements in the queue, and counters."""
 
     slots: F64
     """Events, in columns that `_horizon_kernels` names, (env, slot, N_COLUMNS)."""

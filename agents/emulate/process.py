@@ -1,4 +1,4 @@
-"""The emulator in a process of its own, beside a drive that knows only its ports."""
+"""The emulator in its own process; the drive sees only its ports."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ import re
 
 from hardware_bridge.decoders.lines import Lines
 from hardware_bridge.decoders.plausible import Damaged, decimal, distance, power
-from hardware_bridge.readings import NOBODY, RangeReading, Reading
+from hardware_bridge.readings import UNNAMED, RangeReading, Reading
 
 MARK = "from: "
 NUMBER = r"(-?[0-9]+\.[0-9]{2}|-?nan|-?inf|-?ovf)"
@@ -58,7 +58,7 @@ def range_of(text: str) -> RangeReading:
     if measured is None:
         raise Damaged
     return RangeReading(
-        NOBODY, to=match["id"], distance=measured, rx_power=power(decimal(match["dbm"]))
+        UNNAMED, to=match["id"], distance=measured, rx_power=power(decimal(match["dbm"]))
     )
 
 
@@ -79,7 +79,7 @@ def links_of(text: str) -> list[Reading]:
             raise Damaged
         measured = distance(decimal(text))
         if measured is not None:
-            readings.append(RangeReading(NOBODY, to=to, distance=measured))
+            readings.append(RangeReading(UNNAMED, to=to, distance=measured))
     return readings
 
 

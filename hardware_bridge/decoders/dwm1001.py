@@ -18,7 +18,7 @@ import re
 
 from hardware_bridge.decoders.lines import Lines
 from hardware_bridge.decoders.plausible import Damaged, decimal, distance
-from hardware_bridge.readings import NOBODY, RangeReading, Reading
+from hardware_bridge.readings import UNNAMED, RangeReading, Reading
 
 MARK = "DIST,"
 PROMPT = "dwm> "
@@ -54,7 +54,7 @@ def read_line(line: str) -> list[Reading]:
         seen.add(anchor["id"])
         measured = distance(decimal(anchor["m"]))
         if measured is not None:
-            readings.append(RangeReading(NOBODY, to=anchor["id"], distance=measured))
+            readings.append(RangeReading(UNNAMED, to=anchor["id"], distance=measured))
         at = anchor.end()
     if POSITION.fullmatch(line, at) is None:
         raise Damaged

@@ -19,7 +19,7 @@ from hardware_bridge.decoders.plausible import Damaged
 from hardware_bridge.decoders.uwb_core import parse
 from hardware_bridge.readings import (
     MICROSECONDS_64,
-    NOBODY,
+    UNNAMED,
     PairReading,
     PoseReading,
     Reading,
@@ -108,7 +108,7 @@ def source_of(said: dict[str, Any]) -> Source:
     """The time that the line tells."""
     time = said.get("time")
     if time is None:
-        return NOBODY
+        return UNNAMED
     if type(time) is float and math.isfinite(time):
         time = int(time)
     if type(time) is not int or not 0 <= time < MICROSECONDS_64.modulus:

@@ -31,12 +31,13 @@ DISTANCE_UNIT = 0.00025
 """[m]"""
 LOCK = 8
 """[-] So many samples in a row make sure where samples begin."""
-FARTHEST_STEP = 20 * 64
-"""[1/64 deg] From one sample to the next: a slow scanner that turns fast makes 5 deg."""
+FARTHEST_STEP, FARTHEST_BACK = 20 * 64, 10 * 64
+"""[1/64 deg] Between two samples with the turn, of which a slow scanner that turns fast makes 5 deg,
+and against it, by the parallax of a near point."""
 LEAST_TURN = 32
 """[1/64 deg] Over `LOCK` samples; the densest scanner makes 0.8 deg."""
 WATCH = 8 * LOCK
-"""[-] Once believed, the turn is looked at over so many: parallax may take some of it back."""
+"""[-] Samples over which the turn is checked once locked: parallax may take some of it back."""
 REQUEST = bytes.fromhex("a5f0029402c1 a520")
 """Turn the motor, where the adapter has a line for that, and scan; others ignore the first."""
 
@@ -107,7 +108,7 @@ class RplidarDecoder:
         self._watched += 1
         turned = self._turned + step
         believed = self._n_run == LOCK
-        if abs(step) > FARTHEST_STEP:
+        if not -FARTHEST_BACK <= step <= FARTHEST_STEP:
             return False
         if self._watched == (WATCH if believed else LOCK):
             if turned < LEAST_TURN * self._watched // LOCK:

@@ -34,8 +34,8 @@ from hardware_bridge.decoders.lines import Lines
 from hardware_bridge.decoders.plausible import Damaged, decimal, distance, power
 from hardware_bridge.readings import (
     MICROSECONDS_32,
-    NOBODY,
     RADIO_40,
+    UNNAMED,
     DeviceClock,
     RangeReading,
     Reading,
@@ -88,7 +88,7 @@ def source_of(said: dict[str, Any]) -> Source:
     """The time that the line tells."""
     ticks = said.get("utime")
     if ticks is None:
-        return NOBODY
+        return UNNAMED
     if type(ticks) is not int or not 0 <= ticks < RADIO_64.modulus:
         raise Damaged
     if ticks < MICROSECONDS_32.modulus:

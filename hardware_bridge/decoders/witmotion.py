@@ -19,7 +19,7 @@ import struct
 from math import pi
 
 from hardware_bridge.decoders.checked_frames import CheckedFrames
-from hardware_bridge.readings import NOBODY, ImuReading, Reading, Vector
+from hardware_bridge.readings import UNNAMED, ImuReading, Reading, Vector
 
 START = 0x55
 TIME, ACC, GYR, MAG, QUATERNION = 0x50, 0x51, 0x52, 0x54, 0x59
@@ -57,7 +57,7 @@ class Bursts:
             return readings
         if kind == GYR and self._acc is not None:
             gyr = (x * GYR_UNIT, y * GYR_UNIT, z * GYR_UNIT)
-            self._imu = ImuReading(NOBODY, gyr=gyr, acc=self._acc)
+            self._imu = ImuReading(UNNAMED, gyr=gyr, acc=self._acc)
             self._acc = None
             if self._mag_comes is False:
                 return self._finish(None)
@@ -74,7 +74,7 @@ class Bursts:
         if imu is None:
             return []
         self._mag_comes = mag is not None
-        return [ImuReading(NOBODY, gyr=imu.gyr, acc=imu.acc, mag=mag)]
+        return [ImuReading(UNNAMED, gyr=imu.gyr, acc=imu.acc, mag=mag)]
 
 
 def witmotion_decoder() -> CheckedFrames:

@@ -32,7 +32,7 @@ from hardware_bridge.drivers.vesc_frames import (
     frame,
 )
 from hardware_bridge.drivers.vesc_values import read_values
-from hardware_bridge.readings import NOBODY, MotionReading, Reading, StatusReading
+from hardware_bridge.readings import UNNAMED, MotionReading, Reading, StatusReading
 
 MOST_ERPM = 1e6
 """[1/min] More than any motor turns; keeps numbers in their fields."""
@@ -126,8 +126,8 @@ class VescTelemetry:
                 self.counts.skipped += 1
                 continue
             self.counts.frames += 1
-            readings.append(MotionReading(NOBODY, values.erpm / self._speed_to_erpm))
-            readings.append(StatusReading(NOBODY, values.voltage, values.fault))
+            readings.append(MotionReading(UNNAMED, values.erpm / self._speed_to_erpm))
+            readings.append(StatusReading(UNNAMED, values.voltage, values.fault))
         return readings
 
 

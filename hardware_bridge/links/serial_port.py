@@ -3,8 +3,8 @@
 Modem lines. Linux raises DTR and RTS together when a port is opened. They are left at that: to
 clear one of them, or one after the other, is what resets boards (on an ESP32, RTS without DTR pulls
 the reset line). HUPCL is cleared, so that closing leaves both lines up as well and a board with a
-capacitor from DTR to reset (Arduino) starts anew only when it is plugged in. The exception are
-devices that `PortSpec.dtr` is off for: there the line stops a motor.
+capacitor from DTR to reset (Arduino) restarts only when it is plugged in. Exceptions are
+devices for which `PortSpec.dtr` is off: there the line stops a motor.
 
 VMIN is 1: a read without data then says so (EAGAIN), and an empty read is a hang-up.
 """

@@ -27,7 +27,7 @@ from hardware_bridge.live.stream import OF_A_CAR, Stream
 from hardware_bridge.live.trims import Trims
 from hardware_bridge.plausibility import Plausibility
 from hardware_bridge.readings import (
-    NOBODY,
+    UNNAMED,
     ImuReading,
     MotionReading,
     NearReading,
@@ -170,7 +170,7 @@ class Intake:
         node = self._naming.index(stream, source.device, arrival_ns)
         if node is None:
             return
-        if source is not stream.source or source is NOBODY:
+        if source is not stream.source or source is UNNAMED:
             self._judge(stream, source, node, arrival_ns)
         if not stream.verdict.accepted:
             return

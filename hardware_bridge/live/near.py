@@ -12,8 +12,8 @@ from relpos_env.interface.beams import FARTHEST
 from tracking.arrays import F64, I64
 
 LASTS, N_SPANS = 0.3, 6
-"""[s, -] A measurement counts for so long, in so many spans: less one span, that is more than a
-turn of a slow scanner."""
+"""[s, -] Time that a measurement counts, and number of spans that it is divided into. All spans but
+one last longer than a turn of a slow scanner."""
 SPAN_NS = round(LASTS * 1e9) // N_SPANS
 
 

@@ -7,7 +7,7 @@ from collections import Counter
 
 from hardware_bridge.live.naming import Naming
 from hardware_bridge.live.stream import Stream
-from hardware_bridge.readings import NOBODY, OperatorReading
+from hardware_bridge.readings import UNNAMED, OperatorReading
 
 NO_NODE = -1
 """In place of an id, of an operator without."""
@@ -36,7 +36,7 @@ class Trims:
             arrival_ns: Host time [ns].
         """
         source, device = reading.source, reading.source.device
-        if source is not stream.source or source is NOBODY:
+        if source is not stream.source or source is UNNAMED:
             # A remote control is none of the nodes; it has an id of its own.
             who = int(device) if device and device.isascii() and device.isdigit() else NO_NODE
             stream.verdict = stream.identities.check(stream.name, source, arrival_ns, who)

@@ -13,7 +13,7 @@ import numpy as np
 from hardware_bridge.config.swarm import SwarmConfig
 from hardware_bridge.live.group import LiveGroup
 from hardware_bridge.live.swarm import LiveSwarm
-from hardware_bridge.readings import NOBODY, PoseReading
+from hardware_bridge.readings import UNNAMED, PoseReading
 from hardware_bridge.safety.picture import Picture
 from relpos_env.interface.observations import observation_mode
 from relpos_env.timing import DECISION
@@ -51,7 +51,7 @@ class _Pretend:
             swarm.intake.heard_ns[k] = swarm.intake.sensed_ns[k] = round(t * 1e9)
             events.add(t, Kind.MAG, k, (20.0, 0.0, -40.0))
             events.add(t, Kind.IMU, k, (0.0, 0.0, 0.1, 0.3 * math.sin(t), 0.0, GRAVITY))
-            told = PoseReading(NOBODY, "", pos=tuple(pos[k]), q_wb=(1.0, 0.0, 0.0, 0.0))
+            told = PoseReading(UNNAMED, "", pos=tuple(pos[k]), q_wb=(1.0, 0.0, 0.0, 0.0))
             swarm.intake.other.told.add_pose(t, k, told)
         for i, j in group.pairs.tolist():
             distance = float(np.linalg.norm(pos[j] - pos[i]))

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 
 from hardware_bridge.config.swarm import CarConfig
 from hardware_bridge.identity import Identities, Mark, Verdict
-from hardware_bridge.readings import NOBODY, Reading, Source
+from hardware_bridge.readings import UNNAMED, Reading, Source
 
 
 class Believed:
@@ -22,7 +22,7 @@ class Believed:
         self._link, self._node, self._own = car.port.name, car.node, str(car.node)
         self._identities = Identities(authenticated=bool(car.key))
         self._identities.restore(marks)
-        self._source: Source = NOBODY
+        self._source: Source = UNNAMED
         self._accepted = False
 
     def sift(self, readings: Iterable[Reading], t_ns: int) -> Iterator[Reading]:
@@ -37,7 +37,7 @@ class Believed:
             if source.device not in (None, self._own):
                 continue
             # A message is judged once, for all that it holds.
-            if source is not self._source or source is NOBODY:
+            if source is not self._source or source is UNNAMED:
                 verdict: Verdict = self._identities.check(self._link, source, t_ns, self._node)
                 self._source, self._accepted = source, verdict.accepted
             if self._accepted:

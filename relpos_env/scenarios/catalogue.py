@@ -118,18 +118,18 @@ def scenario_from(
         raise where.error(str(error)) from error
 
 
-def _within(beside: Path | None, wanted: str, key: str) -> Path:
+def _within(folder: Path | None, wanted: str, key: str) -> Path:
     """A file that a scenario names: in its own folder or below, since scenarios are shared.
 
     Args:
-        beside: The folder of the scenario.
+        folder: The folder of the scenario.
         wanted: What it says.
         key: Begins the messages of errors.
 
     Raises:
         EnvError: It is elsewhere, or no name of a file.
     """
-    folder = beside or Path()
+    folder = folder or Path()
     path = folder / wanted
     try:
         inside = path.resolve().is_relative_to(folder.resolve())

@@ -150,7 +150,7 @@ def test_command_table_and_raw(talker, formats):
     [
         (["sniff", "/dev/none"], "no port /dev/none: plug it in"),
         (["sniff", "tcp:host"], "expected tcp:host:port"),
-        (["sniff", "serial:NOBODY"], "no adapter with serial number NOBODY"),
+        (["sniff", "serial:UNNAMED"], "no adapter with serial number UNNAMED"),
         (["sniff", "/dev/null", "--key", "zz"], "--key: expected 16 bytes as 32 hex digits"),
         (["doctor", "--seconds", "0"], "--seconds: expected 0.1 to 3600"),
     ],

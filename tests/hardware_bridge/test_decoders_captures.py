@@ -23,7 +23,7 @@ from hardware_bridge.decoders.uwb_core import RADIO_64
 from hardware_bridge.readings import (
     MICROSECONDS_32,
     MILLISECONDS_32,
-    NOBODY,
+    UNNAMED,
     ImuReading,
     RangeReading,
     Source,
@@ -202,7 +202,7 @@ def test_uwb_core_refuses(line):
 
 def test_dw1000_capture():
     readings, counts = decode("dw1000", DW1000[0])
-    assert readings == [RangeReading(NOBODY, "A1B2", 3.01, rx_power=-45.0)]
+    assert readings == [RangeReading(UNNAMED, "A1B2", 3.01, rx_power=-45.0)]
     assert (counts.frames, counts.skipped, counts.damaged) == (1, 0, 0)
 
 
@@ -242,7 +242,7 @@ def test_dw1000_lines(line, n, damaged):
 def test_dw1000_links_are_read_until_lines_come():
     links = b'{"links":[{"A":"1783","R":"1.2"}]}\r\n'
     decoder = make_decoder("dw1000")
-    assert decoder.feed(links) == [RangeReading(NOBODY, "1783", 1.2)]
+    assert decoder.feed(links) == [RangeReading(UNNAMED, "1783", 1.2)]
     decoder.feed(DW1000[0])
     assert decoder.feed(links) == []
 
@@ -253,7 +253,7 @@ def test_dwm1001_captures():
         ("022E", 3.44), ("9280", 5.68), ("DCAE", 7.76), ("5431", 8.73),
         ("2F2F", 2.20), ("2ED0", 2.23), ("2BA2", 3.13),
     ]  # fmt: skip
-    assert all(r == RangeReading(NOBODY, r.to, r.distance) for r in readings)
+    assert all(r == RangeReading(UNNAMED, r.to, r.distance) for r in readings)
     assert (counts.frames, counts.skipped, counts.damaged) == (2, 1, 1)
 
 
@@ -287,11 +287,11 @@ def test_dwm1001_lines(line, n, damaged):
 
 
 IMU = ImuReading(
-    NOBODY,
+    UNNAMED,
     gyr=tuple(k * 2000.0 / 32768.0 * 0.017453292519943295 for k in (100, -200, 16384)),
     acc=tuple(k * 16.0 / 32768.0 * 9.80665 for k in (16, -32, 2048)),
 )
-WITH_MAG = ImuReading(NOBODY, gyr=IMU.gyr, acc=IMU.acc, mag=(20.0, -10.0, -40.0))
+WITH_MAG = ImuReading(UNNAMED, gyr=IMU.gyr, acc=IMU.acc, mag=(20.0, -10.0, -40.0))
 
 
 def near(readings, expected):

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from hardware_bridge.decoders.checked_frames import CheckedFrames
 from hardware_bridge.decoders.lines import MOST_LINE, Lines
 from hardware_bridge.decoders.plausible import Damaged
-from hardware_bridge.readings import NOBODY, HeartbeatReading, StatusReading
+from hardware_bridge.readings import UNNAMED, HeartbeatReading, StatusReading
 
 START = 1
 LENGTHS = range(3, 8)
@@ -59,7 +59,7 @@ def test_frames_are_those_of_a_plain_search(data, cut):
 
     def read(frame):
         frames.append(frame)
-        return [HeartbeatReading(NOBODY)]
+        return [HeartbeatReading(UNNAMED)]
 
     decoder = small_frames(read)
     readings = decoder.feed(data[:cut]) + decoder.feed(data[cut:])
@@ -71,7 +71,7 @@ def test_frames_are_those_of_a_plain_search(data, cut):
 
 def test_a_frame_that_was_refused_hides_no_other():
     inner = bytes((1, 3, 4))
-    decoder = small_frames(lambda frame: [HeartbeatReading(NOBODY)])
+    decoder = small_frames(lambda frame: [HeartbeatReading(UNNAMED)])
     assert len(decoder.feed(bytes((1, 6, 9)) + inner + bytes((9, 9)))) == 1
     assert (decoder.counts.frames, decoder.counts.strange) == (1, 5)
 
@@ -94,7 +94,7 @@ def test_what_looks_damaged_within_a_good_frame_is_not_counted():
 def read(line):
     if line == "bad":
         raise Damaged
-    return [StatusReading(NOBODY, fault=len(line))] if line.isalpha() else []
+    return [StatusReading(UNNAMED, fault=len(line))] if line.isalpha() else []
 
 
 def test_lines_end_at_either_end_and_empty_ones_are_nothing():
@@ -116,6 +116,6 @@ def test_a_line_without_end_is_given_up():
         decoder.feed(b"a")
         assert decoder.waiting <= MOST_LINE
     assert decoder.counts.strange == MOST_LINE + 5
-    assert decoder.feed(b"aa\nbb\n") == [StatusReading(NOBODY, fault=2)]
+    assert decoder.feed(b"aa\nbb\n") == [StatusReading(UNNAMED, fault=2)]
     assert decoder.counts.strange == MOST_LINE + 7
     assert [r.fault for r in decoder.feed(b"a" * MOST_LINE + b"\n")] == [MOST_LINE]

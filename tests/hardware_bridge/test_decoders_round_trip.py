@@ -16,8 +16,8 @@ from hardware_bridge.readings import (
     MICROSECONDS_32,
     MICROSECONDS_64,
     MILLISECONDS_32,
-    NOBODY,
     RADIO_40,
+    UNNAMED,
     HeartbeatReading,
     ImuReading,
     RangeReading,
@@ -108,13 +108,13 @@ def test_uwb_core(ticks, to, metres, power):
     power=st.floats(-139.0, 0.0) | st.none(),
 )
 def test_dw1000(to, metres, power):
-    sent = [RangeReading(NOBODY, to, metres, rx_power=power)]
+    sent = [RangeReading(UNNAMED, to, metres, rx_power=power)]
     same_ranges(decoded("dw1000", "A1B2", sent), sent, 0.0051, 0.0051)
 
 
 @given(others=st.lists(HEX4, max_size=9, unique=True), metres=st.lists(METRES, min_size=9))
 def test_dwm1001(others, metres):
-    sent = [RangeReading(NOBODY, to, m) for to, m in zip(others, metres, strict=False)]
+    sent = [RangeReading(UNNAMED, to, m) for to, m in zip(others, metres, strict=False)]
     same_ranges(decoded("dwm1001", "tag", sent), sent, 0.0051, 0.0)
 
 
@@ -123,8 +123,8 @@ def test_dwm1001(others, metres):
     has_mag=st.booleans(),
 )
 def test_witmotion(samples, has_mag):
-    sent = [ImuReading(NOBODY, gyr=g, acc=a, mag=m if has_mag else None) for g, a, m in samples]
-    got = decoded("witmotion", "imu", [*sent, ImuReading(NOBODY, (0, 0, 0), (0, 0, 9.8))])
+    sent = [ImuReading(UNNAMED, gyr=g, acc=a, mag=m if has_mag else None) for g, a, m in samples]
+    got = decoded("witmotion", "imu", [*sent, ImuReading(UNNAMED, (0, 0, 0), (0, 0, 9.8))])
     for ours, theirs in zip(got, sent, strict=False):
         assert ours.gyr == pytest.approx(theirs.gyr, abs=0.00054)
         assert ours.acc == pytest.approx(theirs.acc, abs=0.0025)
@@ -139,7 +139,7 @@ def test_witmotion(samples, has_mag):
     step=st.floats(0.003, 0.3),
 )
 def test_rplidar(metres, first, step):
-    sent = [ScanReading(NOBODY, first - k * step, m) for k, m in enumerate(metres)]
+    sent = [ScanReading(UNNAMED, first - k * step, m) for k, m in enumerate(metres)]
     got = decoded("rplidar", "scanner", sent)
     sent = [reading for reading in sent if reading.distance is not None]
     for ours, theirs in zip(got, sent, strict=True):
@@ -150,23 +150,27 @@ def test_rplidar(metres, first, step):
 
 def test_rplidar_is_not_read_before_enough_samples_follow_each_other():
     encoder, decoder = make_encoder("rplidar", ""), decoder_of("rplidar")
-    sent = [ScanReading(NOBODY, -0.02 * k, 1.0) for k in range(20)]
+    sent = [ScanReading(UNNAMED, -0.02 * k, 1.0) for k in range(20)]
     counts = [len(decoder.feed(encoder.encode([reading]))) for reading in sent]
     assert counts == [0] * (LOCK - 1) + [LOCK] + [1] * (20 - LOCK)
-    jump = encoder.encode([ScanReading(NOBODY, -0.02 * 20 - 1.5, 1.0)])
+    back = encoder.encode([ScanReading(UNNAMED, -0.02 * 19 + 0.2, 1.0)])  # 11 deg, no parallax
+    other = decoder_of("rplidar")
+    other.feed(make_encoder("rplidar", "").encode(sent))
+    assert other.feed(back) == []
+    jump = encoder.encode([ScanReading(UNNAMED, -0.02 * 20 - 1.5, 1.0)])
     assert decoder.feed(jump) == []
     still = decoder_of("rplidar")
-    assert still.feed(encoder.encode([ScanReading(NOBODY, 1.0, 1.0)]) * 30) == []
+    assert still.feed(encoder.encode([ScanReading(UNNAMED, 1.0, 1.0)]) * 30) == []
     # One that stands after it has turned is soon not believed, nor one that turns back.
     for step in (0.0, 0.02):
         turned, scanner = decoder_of("rplidar"), make_encoder("rplidar", "")
         turned.feed(scanner.encode(sent))
-        later = [ScanReading(NOBODY, -0.38 + step * k, 1.0) for k in range(1000)]
+        later = [ScanReading(UNNAMED, -0.38 + step * k, 1.0) for k in range(1000)]
         assert len(turned.feed(scanner.encode(later))) < 2 * WATCH
 
 
 def test_witmotion_stops_at_its_limits():
-    sent = ImuReading(NOBODY, gyr=(100.0, -100.0, 0.0), acc=(500.0, -500.0, 0.0), mag=(0, 0, 0))
+    sent = ImuReading(UNNAMED, gyr=(100.0, -100.0, 0.0), acc=(500.0, -500.0, 0.0), mag=(0, 0, 0))
     (got,) = decoded("witmotion", "imu", [sent])
     assert got.acc[:2] == pytest.approx((156.9, -156.9), abs=0.01)
     assert got.gyr[:2] == pytest.approx((34.906, -34.907), abs=0.002)
@@ -176,8 +180,8 @@ def test_witmotion_stops_at_its_limits():
 def test_what_a_format_cannot_say_is_left_out(name):
     encoder = make_encoder(name, "1")
     assert encoder.encode([]) == b""
-    assert encoder.encode([HeartbeatReading(NOBODY)]) == b""
-    strange = [RangeReading(NOBODY, "no such id", 1.0)]
+    assert encoder.encode([HeartbeatReading(UNNAMED)]) == b""
+    strange = [RangeReading(UNNAMED, "no such id", 1.0)]
     assert encoder.encode(strange) == b""
 
 
@@ -196,4 +200,4 @@ def test_times_go_from_one_clock_to_another():
 
     assert ticks_on(MILLISECONDS_32, said(2**40, MICROSECONDS_64)) == round(2**40 / 1000) % 2**32
     assert ticks_on(MICROSECONDS_32, said(63897600000, RADIO_40)) == 1_000_000
-    assert ticks_on(MICROSECONDS_32, HeartbeatReading(NOBODY)) == 0
+    assert ticks_on(MICROSECONDS_32, HeartbeatReading(UNNAMED)) == 0

@@ -19,7 +19,7 @@ from hardware_bridge.drivers.vesc_frames import LONGEST, MOST_PAYLOAD, FrameRead
 from hardware_bridge.drivers.vesc_values import VescValues, read_values, write_values
 from hardware_bridge.emulator.cars.vesc import VescFirmware
 from hardware_bridge.errors import BridgeError
-from hardware_bridge.readings import NOBODY, MotionReading, StatusReading
+from hardware_bridge.readings import UNNAMED, MotionReading, StatusReading
 
 patient = settings(suppress_health_check=[HealthCheck.too_slow])
 
@@ -144,7 +144,7 @@ def test_values_that_do_not_fit_are_cut():
 def test_telemetry_comes_back(speed, voltage, fault, how):
     options = VescOptions(speed_to_erpm=how.draw(st.sampled_from([4614.0, -3000.0])))
     driver, firmware = VescDriver(options), VescFirmware(1, options)
-    says = [MotionReading(NOBODY, speed), StatusReading(NOBODY, voltage, fault)]
+    says = [MotionReading(UNNAMED, speed), StatusReading(UNNAMED, voltage, fault)]
     assert firmware.encode(says) == b"", "nobody has asked"
     firmware.feed(driver.ask())
     answer = firmware.encode(says)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from hardware_bridge.decoders.positions import MOST_LINE, MOST_PLACE, MOST_SPEED
 from hardware_bridge.emulator.encoders import make_encoder
-from hardware_bridge.readings import MICROSECONDS_64, NOBODY, PairReading, PoseReading, Source
+from hardware_bridge.readings import MICROSECONDS_64, UNNAMED, PairReading, PoseReading, Source
 from tracking.estimate import Status
 
 
@@ -49,7 +49,7 @@ def test_golden_lines():
 
 
 def test_time_is_optional():
-    assert read(i=1, j=2, pos=[1, 2, 3])[0].source == NOBODY
+    assert read(i=1, j=2, pos=[1, 2, 3])[0].source == UNNAMED
     assert read(node=1, yaw=0, time=2**40)[0].source.ticks == 2**40
 
 
@@ -140,7 +140,7 @@ def test_a_line_whose_end_was_lost_costs_no_other():
 
 
 VECTOR = st.tuples(*[st.floats(-99.0, 99.0)] * 3)
-SOURCES = st.just(NOBODY) | st.integers(0, 2**64 - 1).map(at)
+SOURCES = st.just(UNNAMED) | st.integers(0, 2**64 - 1).map(at)
 
 
 @st.composite

@@ -12,7 +12,7 @@ from hardware_bridge.live.ready import ReadyPerception
 from hardware_bridge.live.ready_params import ReadyParams
 from hardware_bridge.live.told import Told, ToldHeading, ToldPlace
 from hardware_bridge.live.tracks import Tracks
-from hardware_bridge.readings import NOBODY, PairReading, PoseReading
+from hardware_bridge.readings import UNNAMED, PairReading, PoseReading
 from tracking.constellation import Constellation, NodeConfig
 from tracking.estimate import Status
 from tracking.measurements import Kind, MeasurementBlock
@@ -32,12 +32,12 @@ class Watcher:
         )
 
     def pair(self, t, i, j, pos, **said):
-        self.told.add_pair(t, (i, j), PairReading(NOBODY, "", "", tuple(pos), **said))
+        self.told.add_pair(t, (i, j), PairReading(UNNAMED, "", "", tuple(pos), **said))
 
     def node(self, t, k, pos=None, yaw=None, **said):
         q = None if yaw is None else (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))
         pos = None if pos is None else tuple(pos)
-        self.told.add_pose(t, k, PoseReading(NOBODY, "", pos, q_wb=q, **said))
+        self.told.add_pose(t, k, PoseReading(UNNAMED, "", pos, q_wb=q, **said))
 
     def see(self, now):
         self.ready.view.present[:] = True

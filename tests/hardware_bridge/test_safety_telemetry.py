@@ -14,7 +14,7 @@ from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.ports import PortSpec
 from hardware_bridge.live.marks import KeptMarks
 from hardware_bridge.live.silent_cars import GROWTH, SILENT, SilentCars
-from hardware_bridge.readings import NOBODY, AckReading, MotionReading, Source, StatusReading
+from hardware_bridge.readings import UNNAMED, AckReading, MotionReading, Source, StatusReading
 from hardware_bridge.safety.believed import Believed
 from hardware_bridge.safety.params import SafetyParams
 from hardware_bridge.safety.picture import blank_picture
@@ -94,7 +94,7 @@ class Telling(Drive):
     def answer(self, n, late=0):
         """Of car 0, to the last command or one so much older."""
         for _ in range(n):
-            self.say(AckReading(NOBODY, self.drivers[0].sequence - 1 - late))
+            self.say(AckReading(UNNAMED, self.drivers[0].sequence - 1 - late))
 
     def moves(self):
         return [data != NEUTRAL for data in self.tick().values()]
@@ -110,28 +110,28 @@ def ready(**options):
 
 def test_a_car_that_runs_away_is_stopped_for_good():
     drive = ready()
-    drive.say(MotionReading(NOBODY, 1.0), n=60)
+    drive.say(MotionReading(UNNAMED, 1.0), n=60)
     assert drive.moves() == [True, True]
-    drive.say(MotionReading(NOBODY, 8.0), n=20)
+    drive.say(MotionReading(UNNAMED, 8.0), n=20)
     assert drive.moves() == [True, True]
-    drive.say(MotionReading(NOBODY, 8.0), n=20)
+    drive.say(MotionReading(UNNAMED, 8.0), n=20)
     assert drive.moves() == [False, True]
     assert "faster than it was asked" in drive.supervisor.stopped()[0].text
-    drive.say(MotionReading(NOBODY, 0.0), n=70)
+    drive.say(MotionReading(UNNAMED, 0.0), n=70)
     assert drive.arm() == []
     assert drive.moves() == [True, True]
 
 
 def test_a_fault_and_an_empty_battery_stop_the_car_that_has_them():
     drive = ready(cells=2)
-    drive.say(StatusReading(NOBODY, 7.6, 0), n=10)
+    drive.say(StatusReading(UNNAMED, 7.6, 0), n=10)
     assert drive.moves() == [True, True]
-    drive.say(StatusReading(NOBODY, 6.2, 0), n=10)  # a motor that starts
+    drive.say(StatusReading(UNNAMED, 6.2, 0), n=10)  # a motor that starts
     assert drive.moves() == [True, True]
-    drive.say(StatusReading(NOBODY, 6.2, 0), n=900)
+    drive.say(StatusReading(UNNAMED, 6.2, 0), n=900)
     assert drive.moves() == [False, True]
     drive = ready()
-    drive.say(StatusReading(NOBODY, 6.2, 3))
+    drive.say(StatusReading(UNNAMED, 6.2, 3))
     assert drive.moves() == [False, True]
 
 
@@ -145,7 +145,7 @@ def test_a_car_that_answers_nothing_is_never_armed_and_one_that_stops_answering_
     drive.answer(100)
     assert len(drive.arm()) == 1
     assert drive.moves() == [True, False]
-    drive.say(AckReading(NOBODY, drive.drivers[0].sequence - 1), n=60)  # one that was recorded
+    drive.say(AckReading(UNNAMED, drive.drivers[0].sequence - 1), n=60)  # one that was recorded
     assert drive.moves() == [False, False]
 
 
@@ -163,9 +163,9 @@ def test_a_car_that_answers_late_was_told_late():
 
 def test_a_car_whose_wheels_stand_although_it_is_asked_to_drive_is_stopped():
     drive = ready()
-    drive.say(MotionReading(NOBODY, 0.0), n=290)
+    drive.say(MotionReading(UNNAMED, 0.0), n=290)
     assert drive.moves() == [True, True]
-    drive.say(MotionReading(NOBODY, 0.0), n=60)
+    drive.say(MotionReading(UNNAMED, 0.0), n=60)
     assert drive.moves() == [False, True]
 
 
@@ -173,7 +173,7 @@ def test_a_car_that_cannot_go_as_slow_as_it_is_asked_may_stand():
     drive = Telling(slowest=1.5)
     drive.tick(60)
     drive.arm()
-    drive.say(MotionReading(NOBODY, 0.0), n=350)
+    drive.say(MotionReading(UNNAMED, 0.0), n=350)
     assert drive.moves() == [True, True]
 
 
@@ -209,7 +209,7 @@ def test_words_of_others_and_old_ones_are_not_listened_to():
 def test_a_car_that_tells_its_speed_no_more_is_stopped():
     """What is sent to it may wait in a serial server, and come all at once."""
     drive = ready()
-    drive.say(MotionReading(NOBODY, 1.0), n=20)
+    drive.say(MotionReading(UNNAMED, 1.0), n=20)
     drive.tick(40)
     assert drive.moves() == [True, True]
     drive.tick(20)

@@ -21,7 +21,7 @@ from hardware_bridge.links.serial_port import SerialPort
 from hardware_bridge.live.near import LASTS, Near
 from hardware_bridge.live.scanner import ScannerMount
 from hardware_bridge.live.swarm import LiveSwarm
-from hardware_bridge.readings import NOBODY, ScanReading
+from hardware_bridge.readings import UNNAMED, ScanReading
 from relpos_env.interface.beams import FARTHEST, beam_directions, beam_starts
 
 TEXT = """
@@ -58,7 +58,7 @@ def in_a_corridor(mount, bearing):
 def turn(mount, n=800):
     """A whole turn of the scanner, clockwise."""
     bearings = [-2.0 * math.pi * k / n for k in range(n)]
-    return [ScanReading(NOBODY, b, in_a_corridor(mount, b)) for b in bearings]
+    return [ScanReading(UNNAMED, b, in_a_corridor(mount, b)) for b in bearings]
 
 
 @given(

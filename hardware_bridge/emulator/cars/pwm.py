@@ -7,7 +7,7 @@ import re
 from hardware_bridge.counts import Counts
 from hardware_bridge.drivers.pwm import LEAST_PULSE, MOST_PULSE, PwmOptions, speed_of
 from hardware_bridge.emulator.cars.base import DEADMAN
-from hardware_bridge.readings import NOBODY, DriveReading, Reading
+from hardware_bridge.readings import UNNAMED, DriveReading, Reading
 
 _LINE = re.compile(rb"\s*(\d{4}), *(\d{4})\s*")
 _LONGEST = 64
@@ -69,5 +69,5 @@ class PwmFirmware:
         points = options.forward if is_forward else options.reverse
         speed = speed_of(throttle, points, centre)
         return DriveReading(
-            NOBODY, self._to, speed if is_forward else 0.0 - speed, steering, brake=False
+            UNNAMED, self._to, speed if is_forward else 0.0 - speed, steering, brake=False
         )

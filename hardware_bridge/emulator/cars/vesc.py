@@ -20,7 +20,7 @@ from hardware_bridge.drivers.vesc_frames import (
 )
 from hardware_bridge.drivers.vesc_values import VescValues, write_values
 from hardware_bridge.emulator.cars.base import DEADMAN
-from hardware_bridge.readings import NOBODY, DriveReading, MotionReading, Reading, StatusReading
+from hardware_bridge.readings import UNNAMED, DriveReading, MotionReading, Reading, StatusReading
 
 _LENGTHS = {GET_VALUES: 1, SET_RPM: 5, SET_CURRENT_BRAKE: 5, SET_SERVO: 3}
 _MOST_ASKED = 8
@@ -76,7 +76,7 @@ class VescFirmware:
 
     def _command(self, payload: bytes) -> DriveReading:
         if payload[0] == SET_CURRENT_BRAKE:
-            return DriveReading(NOBODY, self._to, 0.0, self._steering, brake=True)
+            return DriveReading(UNNAMED, self._to, 0.0, self._steering, brake=True)
         (erpm,) = struct.unpack(">i", payload[1:])
         speed = erpm / self._options.speed_to_erpm
-        return DriveReading(NOBODY, self._to, speed, self._steering, brake=False)
+        return DriveReading(UNNAMED, self._to, speed, self._steering, brake=False)

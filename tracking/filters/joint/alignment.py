@@ -22,7 +22,7 @@ class Alignment(IntEnum):
     LINEAR = 2
     """One filter with sensitivities to the rotation stands for all rotations."""
     CHALLENGED = 3
-    """As `LINEAR`, beside a rotation that is reported until another one is clearly likelier."""
+    """As `LINEAR`, with a rotation that is reported until another one is clearly likelier."""
     MODES = 4
     """Each hypothesis is a mode of the rotation, with sensitivities to rotations near it."""
     CANDIDATES = 5

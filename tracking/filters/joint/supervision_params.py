@@ -23,7 +23,7 @@ class SupervisionParams:
     fastest: float = 10.0
     """[m/s] Ranges that change faster jump."""
     missed_intervals: float = 3.0
-    """[-] A pair or a node is silent after so many of its mean intervals, where these are long."""
+    """[-] Mean intervals without a range after which a pair or a node is silent."""
     interval_gain: float = 0.1
     """[-] Weight of an interval in its running mean."""
     longest_interval: float = 5.0
@@ -84,9 +84,9 @@ class AlignmentParams:
     stood_for: float = 1.0
     """[s] Unless the group has been at rest for so long."""
     degenerate: float = 2.5
-    """[-] A layout whose least extent is below so many standard deviations is degenerate."""
+    """[-] Least extent of a layout, in standard deviations, below which it is degenerate."""
     regular: float = 4.0
-    """[-] And no longer above so many."""
+    """[-] Least extent above which it is no longer degenerate."""
     same_rotation: float = 0.15
     """[rad] Hypotheses that differ by a smaller rotation of the group alone are one."""
     gauge_std: float = 0.05
@@ -94,9 +94,9 @@ class AlignmentParams:
     misfit_time: float = 3.3
     """[s] Time constant of a group's misfit, on which the alignment is challenged."""
     challenge_raise: float = 1.5
-    """[-] After a challenge only so many times the misfit begins another,"""
+    """[-] Factor on the misfit that begins another challenge after the first."""
     challenge_time: float = 60.0
-    """[s] with this time constant back to `JointStartParams.strained`."""
+    """[s] Time constant with which that limit returns to `JointStartParams.strained`."""
     challenge_position: float = 0.2
     """[m] Added standard deviation of positions on a challenge in the plane."""
     challenge_speed: float = 0.5
