@@ -32,7 +32,7 @@ DISTANCE_UNIT = 0.00025
 LOCK = 8
 """[-] So many samples in a row make sure where samples begin."""
 FARTHEST_STEP, FARTHEST_BACK = 20 * 64, 10 * 64
-"""[1/64 deg] Between two samples with the turn, of which a slow scanner that turns fast makes 5 deg,
+"""[1/64 deg] Between two samples with the turn, of which a slow scanner that turns fast makes 5,
 and against it, by the parallax of a near point."""
 LEAST_TURN = 32
 """[1/64 deg] Over `LOCK` samples; the densest scanner makes 0.8 deg."""
