@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from relpos_env.world import CAR_RADIUS, WALL_RADIUS
-from tracking.compiled import kernel, small_kernel
+from tracking.jit import kernel, small_kernel
 
 FARTHEST = 0.5
 """[m] What is farther away is not looked for."""

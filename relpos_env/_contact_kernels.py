@@ -9,7 +9,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from relpos_env.world import REST
-from tracking.compiled import kernel, small_kernel
+from tracking.jit import kernel, small_kernel
 
 LASTS = 3
 """[-] Steps for which the solver remembers a contact that is gone; what comes back then is not

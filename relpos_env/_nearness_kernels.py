@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from tracking.compiled import small_kernel
+from tracking.jit import small_kernel
 
 MARGIN = 0.10
 """[m] More than two bodies come nearer within a step, with the roundings of their corners."""

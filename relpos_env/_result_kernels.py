@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracking.compiled import kernel
+from tracking.jit import kernel
 
 
 class TeamResults(NamedTuple):

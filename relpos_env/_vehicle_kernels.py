@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import math
 
-from tracking.compiled import kernel, small_kernel
+from tracking.jit import kernel, small_kernel
 
 X, Y, HEADING, VX, VY, RATE = range(6)
 """Columns of a body: [m], [m], [rad], world velocity [m/s], [m/s], yaw rate [rad/s]."""

@@ -29,7 +29,7 @@ from relpos_env.tasks import reward_weights
 from relpos_env.timing import DECISION, DT, STAND_STILL
 from relpos_env.world_state import WorldState
 from tracking.arrays import F64, I64, Bool
-from tracking.compiled import bind
+from tracking.jit import bind
 
 MOST_ENVS = 1 << 20
 NO_OPTIONS = ResetOptions()

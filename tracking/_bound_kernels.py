@@ -7,7 +7,7 @@ changes those, which is what the variance of a sum over time needs.
 
 from __future__ import annotations
 
-from tracking.compiled import kernel, small_kernel
+from tracking.jit import kernel, small_kernel
 from tracking.filters.joint._alignment_kernels import FILTERED, NONE
 from tracking.filters.joint._antenna_kernels import antenna_offset
 from tracking.filters.joint._carrier_kernels import centre, hold_nodes

@@ -18,7 +18,7 @@ import math
 
 from tracking._lowpass_kernels import low_pass
 from tracking._rest_kernels import GYR, MAX_BIAS, RESTING
-from tracking.compiled import small_kernel
+from tracking.jit import small_kernel
 
 START_VAR = 50.0**2
 """[(0.01 deg/s)^2] Variance before any measurement."""

@@ -9,7 +9,7 @@ comes behind the horizon.
 
 from __future__ import annotations
 
-from tracking.compiled import kernel, small_kernel
+from tracking.jit import kernel, small_kernel
 from tracking.measurements import N_MEASURED, N_VALUES
 
 TIME, KIND, NODE_I, NODE_J, ANTENNA_I, ANTENNA_J, VALUES, HAS_POWER = 0, 1, 2, 3, 4, 5, 6, 14

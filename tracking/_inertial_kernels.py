@@ -7,7 +7,7 @@ seconds of magnetometer to undo.
 
 from __future__ import annotations
 
-from tracking.compiled import kernel, small_kernel
+from tracking.jit import kernel, small_kernel
 
 STUCK_AFTER = 20
 """[-] Readings in a row that are equal in all six axes; noise makes two of them rare."""

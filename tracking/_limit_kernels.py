@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 
-from tracking.compiled import kernel, small_kernel
+from tracking.jit import kernel, small_kernel
 
 CHANCE = math.log(1e-5)
 """[-] A run of equal readings is chance as long as it is more likely than this."""

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 
 from tracking._lowpass_kernels import low_pass
-from tracking.compiled import small_kernel
+from tracking.jit import small_kernel
 
 FIELD_TAU = 0.05
 """[s] Low pass of length and dip."""

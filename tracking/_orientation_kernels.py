@@ -22,7 +22,7 @@ from tracking._vqf_kernels import (
     update_heading,
     update_vqf,
 )
-from tracking.compiled import kernel, small_kernel
+from tracking.jit import kernel, small_kernel
 from tracking.measurements import GYRO_BIAS, GYRO_VAR, TOLD, UPRIGHT
 
 # Plain numbers of `Kind`: kernels do not know enums.

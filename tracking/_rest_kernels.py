@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from tracking._lowpass_kernels import low_pass
-from tracking.compiled import small_kernel
+from tracking.jit import small_kernel
 
 REST_TAU = 0.5
 """[s] Time constant of both low passes."""

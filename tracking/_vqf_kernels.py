@@ -22,7 +22,7 @@ from tracking._gyro_bias_kernels import BIAS, estimate_bias, start_bias
 from tracking._lowpass_kernels import low_pass
 from tracking._magnetic_kernels import COS, SIN, correct_heading, start_magnetic
 from tracking._rest_kernels import GYR, N_REST, RESTING, watch_accelerometer, watch_gyroscope
-from tracking.compiled import kernel, small_kernel
+from tracking.jit import kernel, small_kernel
 
 Q_GYR, Q_ACC, Q_6D, FORCE, N_GYR_READ, N_ACC_READ = 0, 4, 8, 12, 21, 22
 TURN = 23

@@ -16,7 +16,7 @@ import numpy as np
 
 from tracking._horizon_kernels import N_COLUMNS, count_due, hand_on, sum_turns, take_in
 from tracking.arrays import F64, I64
-from tracking.compiled import bind
+from tracking.jit import bind
 from tracking.constellation import Constellation
 from tracking.errors import ConfigError
 from tracking.measurements import Kind, MeasurementBlock

@@ -22,7 +22,7 @@ from dataclasses import replace
 import numpy as np
 
 from tracking._orientation_kernels import forget, orient
-from tracking.compiled import bind
+from tracking.jit import bind
 from tracking.constellation import Constellation
 from tracking.geometry import GRAVITY
 from tracking.measurements import Kind, MeasurementBlock

@@ -12,7 +12,7 @@ References:
 
 import numpy as np
 
-from tracking.compiled import kernel, small_kernel
+from tracking.jit import kernel, small_kernel
 
 
 @small_kernel

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from tracking.compiled import kernel
+from tracking.jit import kernel
 
 
 @kernel

@@ -10,7 +10,7 @@ import numpy as np
 from relpos_env.interface._view_kernels import see_estimate, see_truth
 from relpos_env.interface.beams import FARTHEST
 from tracking.arrays import F64, I64, Bool
-from tracking.compiled import bind
+from tracking.jit import bind
 from tracking.estimate import TeamEstimate
 
 

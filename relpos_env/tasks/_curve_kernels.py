@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tracking.compiled import small_kernel
+from tracking.jit import small_kernel
 
 
 @small_kernel

@@ -23,7 +23,7 @@ from relpos_env.tasks._score_kernels import (
     time_term,
     velocity_term,
 )
-from tracking.compiled import kernel, small_kernel
+from tracking.jit import kernel, small_kernel
 
 
 @small_kernel

@@ -16,7 +16,7 @@ from relpos_env.tasks._score_kernels import (
     targets_from_goals,
     time_term,
 )
-from tracking.compiled import kernel
+from tracking.jit import kernel
 
 PROGRESS_SCALE = 1.0
 """[m] Distance from the goal at which the progress term is exp(-1)."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from relpos_env.tasks._score_kernels import changed, common_terms, time_term
-from tracking.compiled import kernel
+from tracking.jit import kernel
 
 CLOSING_SPEED = 1.0
 """[m/s] Speed towards the middle of the group at which the progress term is 1."""

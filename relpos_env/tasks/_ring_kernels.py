@@ -16,7 +16,7 @@ from relpos_env.tasks._score_kernels import (
     targets_from_goals,
     velocity_term,
 )
-from tracking.compiled import kernel
+from tracking.jit import kernel
 
 
 @kernel

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from tracking.compiled import small_kernel
+from tracking.jit import small_kernel
 
 HARD_ACCEL = 5.0
 """[m/s2] Acceleration whose effort is 1; harder counts no more."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 
 from relpos_env.sensors.radio._occlusion_kernels import crosses_box
-from tracking.compiled import kernel, small_kernel
+from tracking.jit import kernel, small_kernel
 
 BERTH = 0.12
 """[m] A way comes no nearer to a box or a wall, along their sides: half the width of a car, and a

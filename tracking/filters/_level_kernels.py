@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from tracking.compiled import small_kernel
+from tracking.jit import small_kernel
 
 GRAVITY = 9.81
 

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from tracking.arrays import F64
-from tracking.compiled import bind
+from tracking.jit import bind
 from tracking.constellation import Constellation
 from tracking.estimate import TeamEstimate
 from tracking.measurements import MeasurementBlock

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from tracking.compiled import small_kernel
+from tracking.jit import small_kernel
 from tracking.ranging.timestamps import METRES_PER_TICK, SPEED_OF_LIGHT, TICK_HZ
 
 NO_INTERVAL, FITS, MISFIT = 0, 1, 2

@@ -6,7 +6,7 @@ number resolves; `p`, `s`, `peers`, `me` as in `_turn_kernels`.
 
 from __future__ import annotations
 
-from tracking.compiled import small_kernel
+from tracking.jit import small_kernel
 from tracking.ranging._exchange_kernels import (
     FIRST_VAR,
     NO_INTERVAL,

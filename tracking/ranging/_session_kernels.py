@@ -11,7 +11,7 @@ those that the node with the larger ID resolves a little later.
 
 from __future__ import annotations
 
-from tracking.compiled import small_kernel
+from tracking.jit import small_kernel
 from tracking.ranging._hearing_kernels import forget_peers, take_message
 from tracking.ranging._turn_kernels import (
     FRAME,

@@ -6,7 +6,7 @@ environment everywhere.
 
 from __future__ import annotations
 
-from tracking.compiled import small_kernel
+from tracking.jit import small_kernel
 from tracking.ranging.peers import ELSEWHERE, MAX_SILENCES
 from tracking.ranging.turns import CHECK_ROUNDS, OPEN
 

@@ -13,7 +13,7 @@ from relpos_env.sensors.radio._path_kernels import (
     true_time,
 )
 from relpos_env.sensors.radio._random_kernels import draw_key, uniform
-from tracking.compiled import kernel
+from tracking.jit import kernel
 from tracking.ranging.timestamps import TICK_HZ
 
 

@@ -7,7 +7,7 @@ node for some rounds is no reason to forget where it is.
 
 from __future__ import annotations
 
-from tracking.compiled import small_kernel
+from tracking.jit import small_kernel
 
 INITIATOR = 1
 """Role of a session, see `tracking.ranging._turn_kernels`."""

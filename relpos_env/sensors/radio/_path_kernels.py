@@ -16,7 +16,7 @@ from relpos_env.sensors.radio._channel_kernels import (
 from relpos_env.sensors.radio._normal_kernels import normal
 from relpos_env.sensors.radio._occlusion_kernels import crosses_box, crosses_capsule
 from relpos_env.sensors.radio._random_kernels import draw_key, uniform
-from tracking.compiled import small_kernel
+from tracking.jit import small_kernel
 from tracking.ranging.timestamps import SPEED_OF_LIGHT
 
 MESSAGES, PAIRS, CLOCKS, STARTS = 1 << 40, 2 << 40, 3 << 40, 4 << 40

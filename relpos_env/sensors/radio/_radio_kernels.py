@@ -13,7 +13,7 @@ from relpos_env.sensors.radio._path_kernels import (
     receive,
     true_time,
 )
-from tracking.compiled import kernel, small_kernel
+from tracking.jit import kernel, small_kernel
 from tracking.ranging._session_kernels import (
     may_insert,
     speak,

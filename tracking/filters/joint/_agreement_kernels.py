@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from tracking.compiled import allocating_kernel, kernel, small_kernel
+from tracking.jit import allocating_kernel, kernel, small_kernel
 from tracking.filters.joint._alignment_kernels import CHALLENGED, STATIC, has_modes
 from tracking.filters.joint._open_kernels import can_open
 from tracking.filters.joint._peak_kernels import APART

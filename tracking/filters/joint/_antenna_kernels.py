@@ -6,7 +6,7 @@ are: while it is open how the group is turned (`_open_kernels`), they turn with 
 
 from __future__ import annotations
 
-from tracking.compiled import small_kernel
+from tracking.jit import small_kernel
 from tracking.filters.joint._motion_kernels import moves
 
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from tracking._exponential_kernels import decay
-from tracking.compiled import allocating_kernel, kernel, small_kernel
+from tracking.jit import allocating_kernel, kernel, small_kernel
 from tracking.filters._shape_kernels import forget_first
 from tracking.filters.joint._agreement_kernels import are_same, turn_between
 from tracking.filters.joint._alignment_kernels import CANDIDATES, FILTERED, NONE, STATIC, has_modes

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from tracking.compiled import small_kernel
+from tracking.jit import small_kernel
 from tracking.filters.joint._alignment_kernels import is_linear
 from tracking.filters.joint._linear_kernels import absorb, covariance, project, settle, symmetrise
 from tracking.filters.joint._open_kernels import tell_turn, turn_gradient

@@ -7,7 +7,7 @@ not heard.
 
 from __future__ import annotations
 
-from tracking.compiled import small_kernel
+from tracking.jit import small_kernel
 
 IN_PLANE = 2.0
 """A cut-off of more than what is along the body's z."""

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 
-from tracking.compiled import kernel, small_kernel
+from tracking.jit import kernel, small_kernel
 from tracking.filters.joint._sight_kernels import MIN_PROB
 
 

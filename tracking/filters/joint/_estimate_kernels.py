@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tracking.compiled import kernel
+from tracking.jit import kernel
 from tracking.filters._clear_kernels import clear_estimate, is_heard
 from tracking.filters.joint._alignment_kernels import LINEAR, MODES, NONE, STATIC
 from tracking.filters.joint._motion_kernels import predict

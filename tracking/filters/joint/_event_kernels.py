@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tracking.compiled import kernel, small_kernel
+from tracking.jit import kernel, small_kernel
 from tracking.filters._shape_kernels import collect
 from tracking.filters.joint._alignment_kernels import NONE, STATIC, is_linear
 from tracking.filters.joint._antenna_kernels import antenna_offset

@@ -20,7 +20,7 @@ import math
 
 import numpy as np
 
-from tracking.compiled import allocating_kernel
+from tracking.jit import allocating_kernel
 from tracking.filters.joint._alignment_kernels import (
     CANDIDATES,
     CHALLENGED,

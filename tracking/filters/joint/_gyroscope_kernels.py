@@ -16,7 +16,7 @@ learns in motion is not taken: ranges say it better.
 
 from __future__ import annotations
 
-from tracking.compiled import small_kernel
+from tracking.jit import small_kernel
 from tracking.geometry import GRAVITY
 from tracking.measurements import GYRO_BIAS, GYRO_VAR, TOLD
 

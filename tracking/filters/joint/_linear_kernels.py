@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 
-from tracking.compiled import small_kernel
+from tracking.jit import small_kernel
 from tracking.filters.joint._product_kernels import take_off
 from tracking.filters.joint._projection_kernels import sum_rows
 

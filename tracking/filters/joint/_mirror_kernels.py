@@ -10,7 +10,7 @@ from numba import config, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from tracking.compiled import kernel
+from tracking.jit import kernel
 from tracking.filters.joint import _vector_kernels as vectors
 from tracking.filters.joint._vector_kernels import (
     INT,

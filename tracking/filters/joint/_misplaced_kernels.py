@@ -17,7 +17,7 @@ import math
 
 import numpy as np
 
-from tracking.compiled import allocating_kernel, kernel, small_kernel
+from tracking.jit import allocating_kernel, kernel, small_kernel
 from tracking.filters.joint._bank_kernels import remove_node
 from tracking.filters.joint._doubt_kernels import ranges_now
 from tracking.filters.joint._place_kernels import SHORT, best_place, misfit, sum_of_misfits

@@ -17,7 +17,7 @@ import math
 
 from tracking._angle_kernels import cosine_sine
 from tracking._exponential_kernels import decay
-from tracking.compiled import small_kernel
+from tracking.jit import small_kernel
 from tracking.filters.joint._gyroscope_kernels import fade_lean, lean_columns, lean_rows
 from tracking.filters.joint._mirror_kernels import mirror
 from tracking.filters.joint._product_kernels import take_off

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.compiled import allocating_kernel, kernel, small_kernel
+from tracking.jit import allocating_kernel, kernel, small_kernel
 from tracking.filters.joint._alignment_kernels import LINEAR, has_modes
 from tracking.filters.joint._antenna_kernels import turn_with_world
 from tracking.filters.joint._gyroscope_kernels import STEP, lean_slope

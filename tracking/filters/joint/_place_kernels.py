@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.compiled import allocating_kernel, kernel, small_kernel
+from tracking.jit import allocating_kernel, kernel, small_kernel
 from tracking.filters._shape_kernels import main_axes, place_across
 
 JOIN_SPREAD = 0.75

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 
 from tracking._angle_kernels import cosine_sine
-from tracking.compiled import small_kernel
+from tracking.jit import small_kernel
 from tracking.filters.joint._alignment_kernels import is_linear
 from tracking.filters.joint._antenna_kernels import note_levers
 from tracking.filters.joint._linear_kernels import absorb, project

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tracking.compiled import small_kernel
+from tracking.jit import small_kernel
 from tracking.filters.joint._alignment_kernels import is_linear
 from tracking.filters.joint._gyroscope_kernels import KNOWN, REST
 from tracking.filters.joint._linear_kernels import absorb, project

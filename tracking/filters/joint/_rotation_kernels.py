@@ -28,7 +28,7 @@ from __future__ import annotations
 
 import math
 
-from tracking.compiled import kernel, small_kernel
+from tracking.jit import kernel, small_kernel
 from tracking.filters.joint._linear_kernels import settle
 from tracking.filters.joint._mirror_kernels import mirror
 from tracking.filters.joint._projection_kernels import sum_rows

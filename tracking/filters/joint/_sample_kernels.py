@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from tracking._exponential_kernels import decay
-from tracking.compiled import small_kernel
+from tracking.jit import small_kernel
 from tracking.filters._level_kernels import angle_between, direction, level
 from tracking.filters.joint._upright_kernels import take_upright
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from tracking._exponential_kernels import exponential, likelihood
-from tracking.compiled import small_kernel
+from tracking.jit import small_kernel
 from tracking.filters.joint._linear_kernels import covariance
 
 MIN_PROB = 1e-4

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.compiled import allocating_kernel, kernel, small_kernel
+from tracking.jit import allocating_kernel, kernel, small_kernel
 from tracking.filters.joint._bank_kernels import remove_node
 
 SAME = 1e-5

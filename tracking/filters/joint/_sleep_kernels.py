@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.compiled import allocating_kernel, kernel, small_kernel
+from tracking.jit import allocating_kernel, kernel, small_kernel
 from tracking.filters.joint._alignment_kernels import FILTERED
 from tracking.filters.joint._copy_kernels import copy_hypothesis, turn_hypothesis
 from tracking.filters.joint._linear_kernels import decouple

@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from tracking._exponential_kernels import decay
-from tracking.compiled import allocating_kernel, kernel
+from tracking.jit import allocating_kernel, kernel
 from tracking.filters._shape_kernels import (
     N_FIRST,
     choose_members,

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from tracking.compiled import small_kernel
+from tracking.jit import small_kernel
 from tracking.filters.joint._sleep_kernels import rests
 
 

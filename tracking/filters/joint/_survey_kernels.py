@@ -6,7 +6,7 @@ is used once more when they do. It is remembered while a node is away.
 
 from __future__ import annotations
 
-from tracking.compiled import kernel, small_kernel
+from tracking.jit import kernel, small_kernel
 from tracking.filters.joint._alignment_kernels import is_linear
 from tracking.filters.joint._linear_kernels import absorb, project, settle_all
 from tracking.filters.joint._open_kernels import tell_turn, turn_gradient

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.compiled import allocating_kernel, kernel
+from tracking.jit import allocating_kernel, kernel
 
 
 @allocating_kernel

@@ -12,7 +12,7 @@ Without the last part a layout is believed to lean as the orientation of what mo
 from __future__ import annotations
 
 from tracking._exponential_kernels import decay
-from tracking.compiled import small_kernel
+from tracking.jit import small_kernel
 from tracking.filters.joint._step_kernels import STATES
 from tracking.geometry import GRAVITY
 

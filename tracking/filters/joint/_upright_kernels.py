@@ -12,7 +12,7 @@ Where these turns are told, only what the gyroscope leans by is not known of the
 
 from __future__ import annotations
 
-from tracking.compiled import small_kernel
+from tracking.jit import small_kernel
 from tracking.filters.joint._gyroscope_kernels import STEP, lean, take_gyroscope
 from tracking.geometry import GRAVITY
 from tracking.measurements import TOLD, UPRIGHT

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.compiled import allocating_kernel, kernel, small_kernel
+from tracking.jit import allocating_kernel, kernel, small_kernel
 from tracking.filters._shape_kernels import forget_first
 from tracking.filters.pair._mds_kernels import add_pair, factor, move_pair, solve, weigh
 from tracking.filters.pair._start_kernels import (

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracking.compiled import allocating_kernel, kernel, small_kernel
+from tracking.jit import allocating_kernel, kernel, small_kernel
 from tracking.filters._clear_kernels import clear_estimate, is_heard
 from tracking.filters._level_kernels import direction, level
 from tracking.filters._shape_kernels import collect

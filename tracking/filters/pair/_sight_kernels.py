@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 
 from tracking._exponential_kernels import decay, exponential, likelihood
-from tracking.compiled import small_kernel
+from tracking.jit import small_kernel
 
 E = 6
 """Place of the range error in the state."""

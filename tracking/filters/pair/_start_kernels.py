@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.compiled import allocating_kernel, kernel
+from tracking.jit import allocating_kernel, kernel
 from tracking.filters._shape_kernels import (
     N_FIRST,
     choose_members,

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 
-from tracking.compiled import small_kernel
+from tracking.jit import small_kernel
 from tracking.filters.pair._start_kernels import MEAN_SPEED_VAR
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.compiled import allocating_kernel, kernel
+from tracking.jit import allocating_kernel, kernel
 from tracking.filters._clear_kernels import clear_estimate
 from tracking.filters.paper._filter_kernels import (
     ORIENTATION,

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from tracking.compiled import allocating_kernel, kernel
+from tracking.jit import allocating_kernel, kernel
 from tracking.filters.paper._filter_kernels import (
     ORIENTATION,
     VELOCITY,

@@ -1,0 +1,178 @@
+"""How numba compiles and keeps a kernel: each one by itself, once.
+
+By default numba links everything that a function calls into it and optimises all of that again, in
+each caller on the way up, and keeps it there again; and it compiles a function for constants and
+for variables of one type. Here
+
+- a kernel is a unit: optimised once, called by its name in machine code. Only small kernels and
+  numba's own functions are linked in, and those are optimised with their callers alone;
+- a constant argument is of the same type as a variable;
+- cached code is stamped with what it was compiled from (`fingerprint`), and loads the units that it
+  calls before it runs.
+
+Everything of numba that is not public is used in this file only (numba 0.61 to 0.68).
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import llvmlite.binding as llvm
+from numba.core import types
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
+
+from tracking.fingerprint import fingerprint
+
+_kernels: dict[tuple[str, str], Any] = {}
+"""Dispatchers by module and name, for units that are called by cached code."""
+
+
+def compile_as_unit(compiled: Any) -> None:
+    """Let a dispatcher compile its function as a unit, and keep it on the disk."""
+    function = compiled.py_func
+    _kernels[function.__module__, function.__qualname__] = compiled
+    compiled._compiler.pipeline_class = _UnitCompiler
+    compiled._cache = _UnitCache(compiled)
+    resolve = compiled.get_call_template
+
+    def resolve_without_constants(args: Any, kws: Any) -> Any:
+        named = {name: types.unliteral(kind) for name, kind in kws.items()}
+        return resolve([types.unliteral(kind) for kind in args], named)
+
+    compiled.get_call_template = resolve_without_constants
+
+
+class _Unit(JITCodeLibrary):  # type: ignore[misc]
+    """Machine code of one kernel for one set of types."""
+
+    def __init__(self, codegen: Any, name: str) -> None:
+        super().__init__(codegen, name)
+        self.key: Any = None
+        """Module and name of the kernel, types; None for one that is linked into its callers."""
+        self.calls: list[Any] = []
+        """Units that it calls: those of its own and of what is linked into it."""
+        self._names: set[str] | None = None
+
+    def finalize(self) -> None:
+        """Link, optimise and emit the code."""
+        self._raise_if_finalized()
+        calls = dict[int, Any]()
+        for library in dict.fromkeys(self._linking_libraries):
+            self._reload_init.update(library._reload_init)
+            calls.update((id(unit), unit) for unit in getattr(library, "calls", ()))
+            if getattr(library, "key", None) is None:
+                self._final_module.link_in(library._get_module_for_linking(), preserve=True)
+            else:
+                calls[id(library)] = library
+        self.calls = list(calls.values())
+        if self.key is not None:
+            self._optimize_final_module()
+        self._final_module.verify()
+        self._finalize_final_module()
+
+    def defined_names(self) -> set[str]:
+        """Names of all functions that the code defines."""
+        if self._names is None:
+            functions = self._final_module.functions
+            self._names = {f.name for f in functions if not f.is_declaration}
+        return self._names
+
+
+class _UnitCompiler(Compiler):  # type: ignore[misc]
+    """Numba's compiler, with a `_Unit` for the code."""
+
+    def compile_extra(self, func: Any) -> Any:
+        codegen = self.state.targetctx.codegen()
+        self.state.library = library = _Unit(codegen, func.__qualname__)
+        library.enable_object_caching()
+        if not self.state.flags.forceinline:
+            library.key = (func.__module__, func.__qualname__), tuple(self.state.args)
+        return super().compile_extra(func)
+
+
+class _UnitCacheImpl(CompileResultCacheImpl):  # type: ignore[misc]
+    """What is kept of a unit: its code, and the names in other units that the code expects."""
+
+    def reduce(self, compiled: Any) -> Any:
+        """What is written to the disk."""
+        unit = compiled.library
+        library, *rest = super().reduce(compiled)
+        defined = unit.defined_names()
+        if unit.key is not None:
+            # Nothing links it, so its code is enough.
+            name, kind, (code, _) = library
+            library = name, kind, (code, _empty_module(unit))
+        calls = [(called.key, called.defined_names()) for called in unit.calls]
+        declared = {f.name for f in unit._final_module.functions if f.is_declaration}
+        expected = [(key, declared & names) for key, names in calls]
+        return unit.key, defined, expected, (library, *rest)
+
+    def rebuild(self, target_context: Any, payload: Any) -> Any:
+        """The unit; None if what it calls is not what it was compiled with."""
+        key, defined, expected, reduced = payload
+        calls = []
+        for (name, args), names in expected:
+            if name not in _kernels:
+                return None
+            _kernels[name].compile(args)
+            unit = _kernels[name].overloads[args].library
+            if not names <= unit.defined_names():
+                return None
+            calls.append(unit)
+        target_context.codegen()._engine._defined_symbols.update(defined)
+        compiled = super().rebuild(target_context, reduced)
+        unit = compiled.library
+        unit.key, unit.calls, unit.defined_names = key, calls, lambda: defined
+        return compiled
+
+
+def _empty_module(unit: Any) -> bytes:
+    return llvm.parse_assembly(str(unit.codegen._create_empty_module(unit.name))).as_bitcode()
+
+
+class _UnitCache(FunctionCache):  # type: ignore[misc]
+    """The cache of one kernel."""
+
+    _impl_class = _UnitCacheImpl
+
+    def __init__(self, compiled: Any) -> None:
+        super().__init__(compiled.py_func)
+        self._cache_file = _CacheFile(compiled, self._impl)
+
+
+class _CacheFile(IndexDataCacheFile):  # type: ignore[misc]
+    """The file of one kernel; each entry says what it was compiled from, and for which types.
+
+    Entries are numbered files. Where several processes compile at a time, one can find under a
+    number what another has saved for other types, or what is left from before a change.
+    """
+
+    def __init__(self, compiled: Any, impl: Any) -> None:
+        # The number of the kernel's first line says nothing about its contents.
+        base = re.sub(r"-\d+\.", ".", impl.filename_base, count=1)
+        super().__init__(impl.locator.get_cache_path(), base, None)
+        self._kernel = compiled
+
+    def load(self, key: Any) -> Any:
+        """The compiled code for a key, None if there is none, or none that can be read."""
+        self._source_stamp = fingerprint(self._kernel)
+        try:
+            stamp, data = super().load(key) or (None, None)
+        except Exception:
+            # A class that has moved, a file that was cut short: what cannot be read is no code.
+            return None
+        return data if stamp == (self._source_stamp, key) else None
+
+    def save(self, key: Any, data: Any) -> None:
+        """Keep compiled code under a key."""
+        self._source_stamp = fingerprint(self._kernel)
+        super().save(key, ((self._source_stamp, key), data))
+
+    def _load_index(self) -> Any:
+        try:
+            return super()._load_index()
+        except Exception:
+            return {}

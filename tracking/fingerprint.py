@@ -1,0 +1,103 @@
+"""What compiled code was compiled from: a hash that names it in the cache on the disk.
+
+Numba names cached code after the time of the kernel's own file. But small kernels are compiled into
+their callers, and so are the constants that they import. `fingerprint` hashes the contents of all
+of these: a change of any of them compiles the kernel again, a change of anything else does not, and
+neither does a copy with new file times.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from dis import opmap
+from pathlib import Path
+from types import CodeType, FunctionType, ModuleType
+from typing import Any
+
+import numpy as np
+from numba.core.dispatcher import Dispatcher
+
+
+def fingerprint(kernel: Any) -> str:
+    """Hash of a kernel's code and, recursively, of everything that is compiled into it.
+
+    Args:
+        kernel: Of any of the three kinds.
+    """
+    found: str | None = getattr(kernel, "_fingerprint", None)
+    if found is None:
+        function, sha = kernel.py_func, hashlib.sha256()
+        sha.update(repr(sorted(kernel.targetoptions.items(), key=str)).encode())
+        for part in _code_parts(function.__code__):
+            sha.update(part.encode())
+        for name in sorted(_globals_of(function.__code__)):
+            if name in function.__globals__:
+                sha.update(f"{name}={_describe(function.__globals__[name])};".encode())
+        found = kernel._fingerprint = sha.hexdigest()
+    return found
+
+
+def _code_parts(code: CodeType) -> Iterator[str]:
+    """What a function does, without its names for lines, files and itself, nor its docstring."""
+    constants = code.co_consts
+    if constants and isinstance(constants[0], str | None):
+        constants = constants[1:]  # the docstring, or that there is none
+    yield code.co_code.hex()
+    yield repr((code.co_names, code.co_varnames, code.co_freevars))
+    for constant in constants:
+        if isinstance(constant, CodeType):
+            yield from _code_parts(constant)
+        else:
+            yield repr(constant)
+
+
+def _globals_of(code: CodeType) -> set[str]:
+    """Names of the globals that a function reads, those of functions in it included."""
+    names, extended = set[str](), 0
+    for op, arg in zip(code.co_code[::2], code.co_code[1::2], strict=True):
+        if op == opmap["EXTENDED_ARG"]:
+            extended = (extended | arg) << 8
+            continue
+        if op == opmap["LOAD_GLOBAL"]:
+            names.add(code.co_names[(extended | arg) >> 1])
+        extended = 0
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            names |= _globals_of(constant)
+    return names
+
+
+def _describe(value: Any) -> str:
+    """The contents of a global of a kernel."""
+    if isinstance(value, Dispatcher):
+        return fingerprint(value)
+    if isinstance(value, np.ndarray):
+        return f"{value.dtype}{value.shape}{value.tobytes().hex()}"
+    if isinstance(value, type):
+        return f"{value.__module__}.{value.__qualname__}{getattr(value, '_fields', '')}"
+    if isinstance(value, ModuleType):
+        return value.__name__
+    maker = getattr(value, "_defn", value)  # of an intrinsic
+    if isinstance(maker, FunctionType):
+        return _files_of(maker)
+    return repr(value)
+
+
+def _files_of(function: FunctionType) -> str:
+    """The files that a function which writes machine code is made of, its own package's."""
+    package = function.__module__.partition(".")[0]
+    waiting, files = [function.__globals__], dict[str, str]()
+    while waiting:
+        names = waiting.pop()
+        path = names.get("__file__")
+        if path is None or path in files:
+            continue
+        files[path] = hashlib.sha256(Path(path).read_bytes()).hexdigest()
+        for value in names.values():
+            if isinstance(value, ModuleType):
+                if value.__name__.partition(".")[0] == package:
+                    waiting.append(vars(value))
+            elif isinstance(value, FunctionType) and value.__module__.startswith(package + "."):
+                waiting.append(value.__globals__)
+    return " ".join(sorted(files.values()))
