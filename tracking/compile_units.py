@@ -15,7 +15,9 @@ Everything of numba that is not public is used in this file only (numba 0.61 to 
 
 from __future__ import annotations
 
+import hashlib
 import re
+from pathlib import Path
 from typing import Any
 
 import llvmlite.binding as llvm
@@ -26,6 +28,8 @@ from numba.core.compiler import Compiler
 
 from tracking.fingerprint import fingerprint
 
+_FORMAT = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
+"""How code is compiled and kept is a part of what it was compiled from."""
 _kernels: dict[tuple[str, str], Any] = {}
 """Dispatchers by module and name, for units that are called by cached code."""
 
@@ -158,7 +162,7 @@ class _CacheFile(IndexDataCacheFile):  # type: ignore[misc]
 
     def load(self, key: Any) -> Any:
         """The compiled code for a key, None if there is none, or none that can be read."""
-        self._source_stamp = fingerprint(self._kernel)
+        self._source_stamp = self._stamp()
         try:
             stamp, data = super().load(key) or (None, None)
         except Exception:
@@ -168,8 +172,11 @@ class _CacheFile(IndexDataCacheFile):  # type: ignore[misc]
 
     def save(self, key: Any, data: Any) -> None:
         """Keep compiled code under a key."""
-        self._source_stamp = fingerprint(self._kernel)
+        self._source_stamp = self._stamp()
         super().save(key, ((self._source_stamp, key), data))
+
+    def _stamp(self) -> str:
+        return _FORMAT + fingerprint(self._kernel)
 
     def _load_index(self) -> Any:
         try:
