@@ -21,10 +21,10 @@ from pathlib import Path
 from typing import Any
 
 import llvmlite.binding as llvm
-from numba.core import types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
+from numba.core.types.misc import unliteral
 
 from tracking.fingerprint import fingerprint
 
@@ -43,8 +43,8 @@ def compile_as_unit(compiled: Any) -> None:
     resolve = compiled.get_call_template
 
     def resolve_without_constants(args: Any, kws: Any) -> Any:
-        named = {name: types.unliteral(kind) for name, kind in kws.items()}
-        return resolve([types.unliteral(kind) for kind in args], named)
+        named = {name: unliteral(kind) for name, kind in kws.items()}
+        return resolve([unliteral(kind) for kind in args], named)
 
     compiled.get_call_template = resolve_without_constants
 
@@ -134,7 +134,9 @@ class _UnitCacheImpl(CompileResultCacheImpl):  # type: ignore[misc]
 
 
 def _empty_module(unit: Any) -> bytes:
-    return llvm.parse_assembly(str(unit.codegen._create_empty_module(unit.name))).as_bitcode()
+    module = llvm.parse_assembly(str(unit.codegen._create_empty_module(unit.name)))
+    code: bytes = module.as_bitcode()
+    return code
 
 
 class _UnitCache(FunctionCache):  # type: ignore[misc]
