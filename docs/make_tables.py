@@ -37,7 +37,7 @@ from relpos_env.scenarios import LEVELS, SCENARIOS, Scenario
 from relpos_env.sensors.radio.channel import CHANNELS
 from relpos_env.tasks import DEFAULT_WEIGHTS, TASKS
 from relpos_env.tasks.needs import DEFAULT_SCENARIO
-from tracking.filters.joint.alignment import TRANSITIONS, Alignment
+from tracking.filters.joint.hypotheses.alignment import TRANSITIONS, Alignment
 
 DOCS = Path(__file__).resolve().parent
 CARS = 3
@@ -82,7 +82,7 @@ def observations(mode: str) -> str:
     large = observation_mode(mode, CARS).fields
     rows = []
     for few, many, row in zip(small, large, index_table(large), strict=True):
-        last = f" to {row['last']}" if row["last"] > row["first"] else ""
+        last = f" to {row['last']}" if row["last_range"] > row["first"] else ""
         size = in_others(few.size, many.size)
         limits = f"{row['low']:g} to {row['high']:g}"
         name = f"`{row['name']}`"

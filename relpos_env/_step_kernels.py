@@ -24,8 +24,8 @@ from relpos_env.sensors._magnetometer_kernels import read_magnetometer
 from relpos_env.sensors.radio._membership_kernels import note_members
 from relpos_env.sensors.radio._radio_kernels import run_env_window
 from relpos_env.timing import SOON
-from tracking._angle_kernels import cosine_sine
 from tracking.jit import kernel, small_kernel
+from tracking.maths.angles import cosine_sine
 
 MAG, IMU, RANGE = 1, 2, 5
 WAITS, PUSHED, MOVED = 0, 1, 2

@@ -58,7 +58,7 @@ class Bodies(NamedTuple):
     calm: Array
     """Steps for which the solver keeps the room yet, (env)."""
     stage: Array
-    """How far the step under way is, see `_step_kernels`, (env)."""
+    """How far the step under way is, see `block_propagation`, (env)."""
     fast: Array
     """Steps in which nothing touches are made without the space, (env)."""
 

@@ -24,20 +24,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tracking._bound_kernels import run_bound
+from tracking.ahrs.orientation import Orientation, OrientationParams
 from tracking.arrays import F64, Bool, aligned, whole_lines
 from tracking.calibration.range_errors import measure_range_errors
 from tracking.constellation import Constellation
 from tracking.errors import LogError
 from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.params import JointParams
-from tracking.filters.joint.scratch import make_scratch
 from tracking.filters.joint.state import JointState, make_layout, make_state, room_to_wait
+from tracking.filters.joint.workspace import make_workspace
 from tracking.filters.records import Records, as_records
 from tracking.geometry import quat_conjugate, quat_multiply, yaw_of
+from tracking.information_bound import run_bound
 from tracking.log import Log
 from tracking.measurements import Kind, MeasurementBlock
-from tracking.orientation import Orientation, OrientationParams
 from tracking.short_repr import short_repr
 
 RATE = 5.0
@@ -123,7 +123,7 @@ def posterior_bound(
         coefficients,
         make_layout(constellation, params),
         JointState._make(fields),
-        make_scratch(n, constellation.n_pairs, int(coefficients[0]["n"])),
+        make_workspace(n, constellation.n_pairs, int(coefficients[0]["n"])),
         tuple(np.ascontiguousarray(a) for a in events),
         hidden,
         truth,
@@ -193,9 +193,9 @@ def _with_a_row_more(state: JointState, coefficients: Records) -> JointState:
     return state._replace(
         x=aligned(1, 1, width),
         P=P,
-        waiting=aligned(1, 1, room_to_wait(width), width),
-        moved=aligned(1, 1, width),
-        slope=np.zeros((1, 1, 0, width)),
+        pending_updates=aligned(1, 1, room_to_wait(width), width),
+        accumulated_correction=aligned(1, 1, width),
+        sensitivity=np.zeros((1, 1, 0, width)),
     )
 
 

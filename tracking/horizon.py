@@ -14,11 +14,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tracking._horizon_kernels import N_COLUMNS, count_due, hand_on, sum_turns, take_in
 from tracking.arrays import F64, I64
-from tracking.jit import bind
 from tracking.constellation import Constellation
 from tracking.errors import ConfigError
+from tracking.horizon_queue import N_COLUMNS, count_due, hand_on, sum_turns, take_in
+from tracking.jit import bind
 from tracking.measurements import Kind, MeasurementBlock
 from tracking.numbers import check_numbers
 
@@ -41,7 +41,7 @@ class HorizonState(NamedTuple):
     """Measurements in the queue, and counters."""
 
     slots: F64
-    """Events, in columns that `_horizon_kernels` names, (env, slot, N_COLUMNS)."""
+    """Events, in columns that `horizon_queue` names, (env, slot, N_COLUMNS)."""
     order: I64
     """Slots: those that wait, in order, then the free ones, (env, slot)."""
     n_waiting: I64

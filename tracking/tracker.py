@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from tracking.ahrs.orientation import Orientation, OrientationParams
 from tracking.arrays import F64
 from tracking.constellation import Constellation
 from tracking.errors import ConfigError
@@ -23,8 +24,7 @@ from tracking.filters.joint import JointEkf
 from tracking.filters.params import FilterParams
 from tracking.horizon import HorizonParams
 from tracking.measurements import MeasurementBlock
-from tracking.orientation import Orientation, OrientationParams
-from tracking.usable import check, usable
+from tracking.sanity.blocks import check, usable
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,7 +81,7 @@ class Tracker:
 
         Args:
             block: Events in order, none earlier than those handled before. What cannot be is
-                passed over (`tracking.usable`).
+                passed over (`tracking.sanity.blocks`).
             t_out: Ascending times, (time) or (env, time) [s], none before the events of earlier
                 blocks. An estimate holds every event up to its time.
 

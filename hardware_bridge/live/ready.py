@@ -17,9 +17,9 @@ from hardware_bridge.live.tracks import Tracks
 from relpos_env.interface._view_kernels import forget_all, note_ranges
 from relpos_env.interface.views import View, bind_view, make_view
 from tracking.arrays import F64, I64, Bool
-from tracking.jit import bind
 from tracking.constellation import Constellation
 from tracking.estimate import Status, TeamEstimate
+from tracking.jit import bind
 from tracking.measurements import Kind, MeasurementBlock
 
 

@@ -15,11 +15,11 @@ import numpy as np
 from relpos_env.interface._view_kernels import forget_all, note_ranges
 from relpos_env.interface.views import View, bind_view, make_view
 from tracking.arrays import F64, I64, Bool
-from tracking.jit import bind
 from tracking.constellation import Constellation
 from tracking.estimate import TeamEstimate
 from tracking.filters import FilterBuilder
 from tracking.horizon import Horizon
+from tracking.jit import bind
 from tracking.measurements import MeasurementBlock
 from tracking.tracker import Tracker, TrackerParams
 

@@ -10,8 +10,8 @@ import numpy as np
 from relpos_env.interface._view_kernels import see_estimate, see_truth
 from relpos_env.interface.beams import FARTHEST
 from tracking.arrays import F64, I64, Bool
-from tracking.jit import bind
 from tracking.estimate import TeamEstimate
+from tracking.jit import bind
 
 
 class View(NamedTuple):

@@ -52,11 +52,11 @@ def put_on_truth(state, group, turn=None, clock=0.0):
         t = state.group["t"][0] - clock
         vel = (group.pos(t + h)[0] - group.pos(t - h)[0]) / (2 * h)
         for k, node in enumerate(state.nodes[0]):
-            d = node["at_v"] - node["at_p"]
-            state.x[0, :, node["at_p"] : node["at_p"] + d] = (turn @ group.pos(t)[0, k])[:d]
-            state.x[0, :, node["at_v"] : node["at_v"] + d] = (turn @ vel[k])[:d]
-            state.x[0, :, node["at_b"] : node["at_h"] + 1] = 0.0
-        state.x[0, :, state.nodes[0, -1]["at_h"] + 1 :] = 0.0
+            d = node["i_vel"] - node["i_pos"]
+            state.x[0, :, node["i_pos"] : node["i_pos"] + d] = (turn @ group.pos(t)[0, k])[:d]
+            state.x[0, :, node["i_vel"] : node["i_vel"] + d] = (turn @ vel[k])[:d]
+            state.x[0, :, node["i_tilt_bias"] : node["i_heading"] + 1] = 0.0
+        state.x[0, :, state.nodes[0, -1]["i_heading"] + 1 :] = 0.0
         return
     for p, t in enumerate(state.pairs["t"][0] - clock):
         vel = (group.pairs(t + h)[p] - group.pairs(t - h)[p]) / (2 * h)

@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tracking.filters.joint._place_kernels import (
+from tracking.maths.multilateration import (
     SHORT,
-    best_place,
-    best_sides,
-    mirror_image,
-    sum_of_misfits,
+    best_position,
+    best_positions,
+    reflected_position,
+    total_loss,
 )
 
 
@@ -33,7 +33,7 @@ def test_exact_distances_lead_to_the_place_from_anywhere(seed, d):
     known, pos, distance = layout(seed, d)
     found = np.zeros(3)
     found[:d] = np.random.default_rng(seed + 1).uniform(-3.0, 3.0, d)
-    assert best_place(d, known, distance, found) < 1e-6
+    assert best_position(d, known, distance, found) < 1e-6
     np.testing.assert_allclose(found, pos, atol=1e-4)
 
 
@@ -44,17 +44,17 @@ def test_a_place_is_never_replaced_by_one_that_fits_worse(seed, d, k):
     known, pos, distance = layout(seed, d)
     distance[k] += 0.5
     found = pos.copy()
-    least = best_place(d, known, distance, found)
-    assert least <= sum_of_misfits(known, distance, pos)
-    assert least == sum_of_misfits(known, distance, found)
+    least = best_position(d, known, distance, found)
+    assert least <= total_loss(known, distance, pos)
+    assert least == total_loss(known, distance, found)
 
 
 @given(seed=st.integers(0, 2**32 - 1), d=st.sampled_from([2, 3]))
 @settings(max_examples=60)
 def test_the_mirror_image_of_the_mirror_image_is_the_place(seed, d):
     known, pos, _ = layout(seed, d)
-    image = mirror_image(d, known, pos)
-    np.testing.assert_allclose(mirror_image(d, known, image), pos, atol=1e-9)
+    image = reflected_position(d, known, pos)
+    np.testing.assert_allclose(reflected_position(d, known, image), pos, atol=1e-9)
     if d == 2:
         assert image[2] == pos[2]
 
@@ -65,8 +65,8 @@ def test_short_distances_say_more_than_long_ones(d):
     long, short = distance.copy(), distance.copy()
     long[0] += 2.0 * SHORT
     short[0] -= 2.0 * SHORT
-    assert sum_of_misfits(known, short, pos) == pytest.approx(4.0)
-    assert sum_of_misfits(known, long, pos) < 1.0
+    assert total_loss(known, short, pos) == pytest.approx(4.0)
+    assert total_loss(known, long, pos) < 1.0
 
 
 def test_others_in_line_leave_both_sides():
@@ -75,7 +75,7 @@ def test_others_in_line_leave_both_sides():
     pos = np.array([0.3, 1.2, 0.0])
     distance = np.linalg.norm(known - pos, axis=1)
     found = np.array([0.5, -0.2, 0.0])
-    assert best_place(2, known, distance, found) < 1e-6
+    assert best_position(2, known, distance, found) < 1e-6
     np.testing.assert_allclose(np.abs(found), np.abs(pos), atol=1e-4)
 
 
@@ -98,10 +98,10 @@ def test_others_close_together_leave_two_sides_and_one_is_right(seed, d, more, w
     pos[:d] = rng.normal(size=d)
     pos *= rng.uniform(1.0, 5.0) / np.linalg.norm(pos)
     distance = np.linalg.norm(known - pos, axis=1)
-    n_sides = best_sides(d, 0.15, known, distance, sides)
+    n_sides = best_positions(d, 0.15, known, distance, sides)
     off = np.linalg.norm(sides[:n_sides] - pos, axis=1)
     assert off.min() < 0.3
-    fits = [sum_of_misfits(known, distance, side) for side in sides[:n_sides]]
+    fits = [total_loss(known, distance, side) for side in sides[:n_sides]]
     assert fits == sorted(fits)
     assert fits[0] < 0.05
 
@@ -109,5 +109,5 @@ def test_others_close_together_leave_two_sides_and_one_is_right(seed, d, more, w
 def test_others_that_span_the_room_leave_one_side():
     known, pos, distance = layout(3, 2)
     sides = np.zeros((2, 3))
-    assert best_sides(2, 0.15, known, distance, sides) == 1
+    assert best_positions(2, 0.15, known, distance, sides) == 1
     np.testing.assert_allclose(sides[0], pos, atol=1e-4)

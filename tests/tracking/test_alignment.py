@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from tests.exact_motion import ExactGroup
 from tracking import Tracker
-from tracking.filters.joint.alignment import TRANSITIONS, Alignment
+from tracking.filters.joint.hypotheses.alignment import TRANSITIONS, Alignment
 from tracking.measurements import Kind
 
 ALLOWED = {(a, b) for a, following in TRANSITIONS.items() for b in following}

@@ -8,17 +8,11 @@ from scipy.spatial.transform import Rotation
 from test_joint_kernels import running
 from test_open_turn import MIRROR, anywhere, log_likelihood
 
-from tracking.filters.joint import (
-    _bank_kernels,
-    _carrier_kernels,
-    _frame_kernels,
-    _linear_kernels,
-    _open_kernels,
-    _peak_kernels,
-    _range_kernels,
-)
-from tracking.filters.joint.alignment import Alignment
+from tracking.filters.joint import motion_constraints, range_update, scalar_update
+from tracking.filters.joint.hypotheses import alignment_modes, alignment_sensitivity, bank
+from tracking.filters.joint.hypotheses.alignment import Alignment
 from tracking.filters.joint.state import JointState
+from tracking.maths import rotation_modes
 
 
 def told(rng, R, weight):
@@ -35,24 +29,24 @@ def told(rng, R, weight):
 
 def open_bank(n_hyps=3):
     """A group of three whose turn is open, in a bank with room."""
-    c, s, scratch, layout = running(3, "human")
+    c, s, work, layout = running(3, "human")
     names = "x P waiting n_waiting moved nlos stays loglik alive slope score information spread"
     s = s._replace(**{k: np.repeat(getattr(s, k), n_hyps, axis=0) for k in names.split()})
     s.alive[1:] = False
     n = s.x.shape[1]
     A = np.random.default_rng(5).standard_normal((n, n))
     s.P[0] = A @ A.T / n + 0.1 * np.eye(n)
-    _open_kernels.open_frame(c, s, layout, 0)
+    alignment_sensitivity.start_alignment(c, s, layout, 0)
     s.group["alignment"] = Alignment.MODES
-    return c, s, scratch, layout
+    return c, s, work, layout
 
 
 def places(s, h):
-    return s.x[h, s.nodes["at_p"][:, None] + np.arange(3)]
+    return s.x[h, s.nodes["i_pos"][:, None] + np.arange(3)]
 
 
 def test_derivatives_of_a_small_turn():
-    J, step = _open_kernels.near_turns(), 1e-6
+    J, step = alignment_sensitivity.small_rotation_derivatives(), 1e-6
     for a in range(3):
         turn = Rotation.from_rotvec(step * np.eye(3)[a]).as_matrix() - np.eye(3)
         np.testing.assert_allclose(J[a], turn.ravel() / step, atol=1e-5)
@@ -64,16 +58,16 @@ def test_a_frame_goes_to_the_peak_near_it(seed):
     rng = np.random.default_rng(seed)
     c, s, _, _ = open_bank()
     R = Rotation.from_rotvec(rng.uniform(-0.3, 0.3, 3)).as_matrix()
-    s.information[0], s.score[0] = told(rng, R, 100.0)
+    s.alignment_information[0], s.alignment_score[0] = told(rng, R, 100.0)
     before = places(s, 0)
     for _ in range(20):
-        known = _frame_kernels.turn_to_peak(c, s, 0)
+        known = alignment_modes.move_to_mode(c, s, 0)
     assert known
     # What was the turn R is none in the frame now, to what a frame is not turned by.
-    np.testing.assert_allclose(places(s, 0), before @ R, atol=6.0 * _frame_kernels.SMALL)
+    np.testing.assert_allclose(places(s, 0), before @ R, atol=6.0 * alignment_modes.SMALL)
     peak, H = np.eye(3), np.zeros((3, 3))
-    _peak_kernels.climb(s.information[0], s.score[0], peak, H)
-    assert Rotation.from_matrix(peak).magnitude() < 2.0 * _frame_kernels.SMALL
+    rotation_modes.climb_to_mode(s.alignment_information[0], s.alignment_score[0], peak, H)
+    assert Rotation.from_matrix(peak).magnitude() < 2.0 * alignment_modes.SMALL
 
 
 def test_a_frame_does_not_turn_about_an_axis_of_which_nothing_is_known():
@@ -85,12 +79,12 @@ def test_a_frame_does_not_turn_about_an_axis_of_which_nothing_is_known():
         g = np.outer(np.eye(3)[r], up).ravel()
         information += 500.0 * np.outer(g, g)
         score += 500.0 * ((lean - np.eye(3)) @ up)[r] * g
-    s.information[0], s.score[0] = information, score
+    s.alignment_information[0], s.alignment_score[0] = information, score
     before = places(s, 0)
     for _ in range(5):
-        assert not _frame_kernels.turn_to_peak(c, s, 0)
+        assert not alignment_modes.move_to_mode(c, s, 0)
     turn, _ = Rotation.align_vectors(before - before.mean(0), places(s, 0) - places(s, 0).mean(0))
-    np.testing.assert_allclose(turn.as_rotvec(), [0.2, 0.0, 0.0], atol=_frame_kernels.SMALL)
+    np.testing.assert_allclose(turn.as_rotvec(), [0.2, 0.0, 0.0], atol=alignment_modes.SMALL)
 
 
 def test_every_turn_that_may_be_has_a_frame():
@@ -98,10 +92,10 @@ def test_every_turn_that_may_be_has_a_frame():
     rng = np.random.default_rng(2)
     turns = np.array([anywhere(rng), MIRROR @ anywhere(rng), anywhere(rng), anywhere(rng)])
     values = np.array([30.0, 28.0, 20.0, 15.0])
-    s.information[0], s.score[0] = told(rng, turns[0], 10.0)
+    s.alignment_information[0], s.alignment_score[0] = told(rng, turns[0], 10.0)
     s.loglik[0] = 1.0
     begun = JointState._make(a.copy() for a in s)
-    _frame_kernels.follow_turns(c, s, 0, turns, values)
+    alignment_modes.spawn_modes(c, s, 0, turns, values)
     assert s.alive.all()
     assert s.group["n_alive"][0] == 3
     for h in range(3):  # the bank has no room for a fourth
@@ -109,9 +103,9 @@ def test_every_turn_that_may_be_has_a_frame():
         np.testing.assert_allclose(places(s, h), places(begun, 0) @ turns[h], atol=1e-9)
         # What one frame says of a turn R M', the other says of M'.
         other = anywhere(rng)
-        old = log_likelihood(begun.information[0], begun.score[0], other)
-        old -= log_likelihood(begun.information[0], begun.score[0], turns[h])
-        new = log_likelihood(s.information[h], s.score[h], turns[h].T @ other)
+        old = log_likelihood(begun.alignment_information[0], begun.alignment_score[0], other)
+        old -= log_likelihood(begun.alignment_information[0], begun.alignment_score[0], turns[h])
+        new = log_likelihood(s.alignment_information[h], s.alignment_score[h], turns[h].T @ other)
         assert new == pytest.approx(old, abs=1e-8)
 
 
@@ -121,34 +115,41 @@ def test_frames_that_have_come_together_are_one(parted):
     c, s, _, _ = open_bank()
     s.group["t"], s.group["best"] = 100.0, 0
     s.group["alignment"] = Alignment.MODES if parted else Alignment.LINEAR
-    s.information[0], s.score[0] = told(np.random.default_rng(3), np.eye(3), 10.0)
+    s.alignment_information[0], s.alignment_score[0] = told(
+        np.random.default_rng(3), np.eye(3), 10.0
+    )
     turns = np.array([np.eye(3), Rotation.from_rotvec([0.0, 0.0, 0.25]).as_matrix()])
-    _frame_kernels.follow_turns(c, s, 0, turns, np.zeros(2))
+    alignment_modes.spawn_modes(c, s, 0, turns, np.zeros(2))
     s.group["alignment"] = Alignment.MODES if parted else Alignment.FILTERED
-    _bank_kernels.prune_bank(c, s)
+    bank.prune_bank(c, s)
     assert s.alive.sum() == (1 if parted else 2)
 
 
 @pytest.mark.parametrize("parted", [True, False])
 def test_a_frame_is_not_likelier_for_being_surer(parted):
     """As far as all is linear each is as sure as the others; wrong ones are bent and look surer."""
-    c, s, scratch, _ = open_bank()
+    c, s, work, _ = open_bank()
     s.group["alignment"] = Alignment.MODES if parted else Alignment.LINEAR
     s.group["n_alive"] = 2
     p, gained = 0, []
     for scale in (1.0, 0.01):
-        s.P[1], s.x[1], s.slope[1], s.nlos[1] = scale * s.P[0], s.x[0], s.slope[0], s.nlos[0]
-        s.spread[1], s.loglik[1], s.waiting[1], s.n_waiting[1] = 0.0, 0.0, 0.0, 0
-        levers = np.zeros(6)
-        distance, _ = _range_kernels.range_model(
-            c, s, 1, p, levers[:3], levers[3:], scratch.idx, scratch.val
+        s.P[1], s.x[1], s.sensitivity[1], s.nlos[1] = (
+            scale * s.P[0],
+            s.x[0],
+            s.sensitivity[0],
+            s.nlos[0],
         )
-        scratch.direct[:] = 0.0
+        s.alignment_cov[1], s.loglik[1], s.pending_updates[1], s.n_pending[1] = 0.0, 0.0, 0.0, 0
+        levers = np.zeros(6)
+        distance, _ = range_update.range_model(
+            c, s, 1, p, levers[:3], levers[3:], work.idx, work.val
+        )
+        work.direct[:] = 0.0
         sight = (0.0, c["enter_rate"], c["leave_rate"])
-        _range_kernels.fuse_range(c, s, 1, p, 0.02, distance, levers, sight, scratch)
+        range_update.range_update(c, s, 1, p, 0.02, distance, levers, sight, work)
         of_range = s.loglik[1]
-        scratch.idx[0], scratch.val[0] = s.nodes["at_v"][0], 1.0
-        _carrier_kernels.judge(c, s, 1, 0.0, 1, 0.1, scratch)
+        work.idx[0], work.val[0] = s.nodes["i_vel"][0], 1.0
+        motion_constraints.apply_constraint(c, s, 1, 0.0, 1, 0.1, work)
         gained.append((of_range, s.loglik[1] - of_range))
     surer = np.subtract(gained[1], gained[0])
     # What another sight would have told is all that is left.
@@ -157,20 +158,20 @@ def test_a_frame_is_not_likelier_for_being_surer(parted):
 
 def test_the_nis_is_over_the_variance_that_the_correction_used():
     """From how much the correction narrows the range: its variance goes from v to v - v^2 / S."""
-    c, s, scratch, _ = open_bank()
+    c, s, work, _ = open_bank()
     s.group["n_alive"], s.group["alignment"] = 1, Alignment.FILTERED
     h, p, levers = 0, 0, np.zeros(6)
     sight = (0.0, c["enter_rate"], c["leave_rate"])
 
     def predicted():
-        distance, m = _range_kernels.range_model(
-            c, s, h, p, levers[:3], levers[3:], scratch.idx, scratch.val
+        distance, m = range_update.range_model(
+            c, s, h, p, levers[:3], levers[3:], work.idx, work.val
         )
-        return distance, _linear_kernels.project(s, h, m, scratch)
+        return distance, scalar_update.compute_pht(s, h, m, work)
 
     before, v = predicted()
-    nu, _, nis, sane = _range_kernels.fuse_range(
-        c, s, h, p, 0.02, before + 0.05, levers, sight, scratch
+    nu, _, nis, sane = range_update.range_update(
+        c, s, h, p, 0.02, before + 0.05, levers, sight, work
     )
     _, after = predicted()
     assert sane > 0.99

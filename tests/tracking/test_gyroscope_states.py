@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 from test_joint_kernels import running
 from test_upright import walk
 
-from tracking.filters.joint import _gyroscope_kernels as gyroscope
-from tracking.filters.joint import _motion_kernels
-from tracking.filters.joint._rest_kernels import learn_at_rest
-from tracking.filters.joint.alignment import Alignment
+from tracking.filters.joint import gyro_bias as gyroscope
+from tracking.filters.joint import propagation
+from tracking.filters.joint.gyro_bias_at_rest import update_gyro_bias_at_rest
+from tracking.filters.joint.hypotheses.alignment import Alignment
 from tracking.measurements import GYRO_BIAS, GYRO_VAR, N_VALUES, TOLD
 from tracking.vehicles import VEHICLES
 
@@ -19,23 +19,23 @@ START_STD = 0.009
 TRUSTED = VEHICLES["hand"].gyro_std
 
 
-def tell(s, bias, var, rests, begins=False):
+def tell(s, bias, var, is_at_rest, begins=False):
     """A STATE event of node 0 that tells of its gyroscope."""
     values = np.zeros((1, 1, N_VALUES))
-    values[0, 0, TOLD] = 2.0 if rests else 1.0
+    values[0, 0, TOLD] = 2.0 if is_at_rest else 1.0
     values[0, 0, GYRO_BIAS : GYRO_BIAS + 3], values[0, 0, GYRO_VAR] = bias, var
-    gyroscope.take_gyroscope(s.nodes[0], s.pre, 0, values, 0, 0, begins)
+    gyroscope.process_gyro_bias(s.nodes[0], s.preintegrated, 0, values, 0, 0, begins)
 
 
 def group(open_turn=False):
     """Three nodes in hands, of which the first has just told of its gyroscope."""
-    c, s, scratch, layout = running(3, "hand")
-    s.nodes["told"], s.pre[:] = True, 0.0
+    c, s, work, layout = running(3, "hand")
+    s.nodes["has_ahrs_feedback"], s.preintegrated[:] = True, 0.0
     s.group["alignment"] = Alignment.LINEAR if open_turn else Alignment.FILTERED
-    at = s.nodes["at_g"][0] + np.arange(3)
+    at = s.nodes["i_gyro_bias"][0] + np.arange(3)
     s.x[0, at], s.P[0] = 0.0, np.eye(s.x.shape[1])
     s.P[0, at, at] = START_STD**2
-    return c, s, scratch, at
+    return c, s, work, at
 
 
 @settings(max_examples=20, deadline=None)
@@ -43,7 +43,7 @@ def group(open_turn=False):
 def test_who_knows_no_more_ends_with_what_was_learned_at_rest(seed, n):
     """Filter and orientation begin with the same; then rest is all that either hears of."""
     rng = np.random.default_rng(seed)
-    c, s, scratch, at = group()
+    c, s, work, at = group()
     bias, var, noise = 0.002 * rng.standard_normal(3), START_STD**2, 1e-3**2
     tell(s, bias, var, rests=False, begins=True)
     for _ in range(n):
@@ -52,22 +52,22 @@ def test_who_knows_no_more_ends_with_what_was_learned_at_rest(seed, n):
         var *= noise / (var + noise)
         tell(s, bias, var, rests=True)
     s.nodes["by_gyroscope"] = True
-    _motion_kernels.predict(c, s, 0, 0.0, scratch)
-    learn_at_rest(s, 0, 0, scratch)
-    for q in range(s.n_waiting[0]):
-        s.P[0] -= np.outer(s.waiting[0, q], s.waiting[0, q])
+    propagation.predict(c, s, 0, 0.0, work)
+    update_gyro_bias_at_rest(s, 0, 0, work)
+    for q in range(s.n_pending[0]):
+        s.P[0] -= np.outer(s.pending_updates[0, q], s.pending_updates[0, q])
     np.testing.assert_allclose(s.x[0, at], 0.0, atol=1e-9)
     np.testing.assert_allclose(np.diagonal(s.P[0])[at], var, rtol=1e-6)
 
 
 @pytest.mark.parametrize("open_turn", [False, True])
 def test_what_is_learned_in_motion_only_moves_what_is_left(open_turn):
-    c, s, scratch, at = group(open_turn)
+    c, s, work, at = group(open_turn)
     tell(s, np.zeros(3), START_STD**2, rests=False, begins=True)
     tell(s, np.array([1e-3, -2e-3, 3e-3]), 0.1 * START_STD**2, rests=False)
-    _motion_kernels.predict(c, s, 0, 0.0, scratch)
+    propagation.predict(c, s, 0, 0.0, work)
     before = s.x.copy(), s.P.copy()
-    learn_at_rest(s, 0, 0, scratch)
+    update_gyro_bias_at_rest(s, 0, 0, work)
     np.testing.assert_array_equal(s.x, before[0])
     np.testing.assert_array_equal(s.P, before[1])
     np.testing.assert_allclose(s.x[0, at], [-1e-3, 2e-3, -3e-3], atol=1e-15)
@@ -78,7 +78,7 @@ def test_ranges_tell_what_a_gyroscope_leans_by(lean):
     """The hand is never turned, so the body is the world's frame but for the first heading."""
     _, tracker = walk(0.0, told=True, lean=lean, seconds=30.0)
     s = tracker._filter.save()
-    h, at = s.group["best"][0, 0], s.nodes["at_g"][0, 0] + np.arange(2)
+    h, at = s.group["best"][0, 0], s.nodes["i_gyro_bias"][0, 0] + np.arange(2)
     std = np.sqrt(s.P[0, h, at, at])
     assert (std < TRUSTED / 3.0).all()
     np.testing.assert_array_less(np.abs(s.x[0, h, at] - [lean, 0.5 * lean]), 3.0 * std)
@@ -87,5 +87,5 @@ def test_ranges_tell_what_a_gyroscope_leans_by(lean):
 def test_a_gyroscope_of_which_nothing_is_told_leans_nowhere():
     _, tracker = walk(0.0, told=False, lean=0.003)
     s = tracker._filter.save()
-    h, at = s.group["best"][0, 0], s.nodes["at_g"][0, 0] + np.arange(3)
+    h, at = s.group["best"][0, 0], s.nodes["i_gyro_bias"][0, 0] + np.arange(3)
     np.testing.assert_array_equal(s.x[0, h, at], 0.0)

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tracking._horizon_kernels import hand_on, take_in
 from tracking.errors import ConfigError
 from tracking.horizon import Horizon, HorizonParams
+from tracking.horizon_queue import hand_on, take_in
 from tracking.measurements import N_MEASURED, MeasurementBlock
 
 NAMES = tuple(f.name for f in fields(MeasurementBlock))

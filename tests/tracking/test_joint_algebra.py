@@ -9,15 +9,19 @@ from scipy.spatial.transform import Rotation
 
 from tracking import Constellation, NodeConfig
 from tracking.arrays import aligned
-from tracking.filters._level_kernels import angle_between, direction
-from tracking.filters.joint import _vector_kernels
-from tracking.filters.joint._agreement_kernels import are_same, turn_between
-from tracking.filters.joint._copy_kernels import turn_hypothesis
-from tracking.filters.joint._flatness_kernels import least_axis
-from tracking.filters.joint._mirror_kernels import mirror, mirror_plainly
-from tracking.filters.joint._product_kernels import take_off, take_off_plainly
-from tracking.filters.joint._projection_kernels import sum_rows, sum_rows_plainly
-from tracking.filters.joint._step_kernels import (
+from tracking.filters.joint.coefficients import make_coefficients
+from tracking.filters.joint.hypotheses.alignment import Alignment
+from tracking.filters.joint.hypotheses.copying import rotate_hypothesis
+from tracking.filters.joint.hypotheses.geometric_degeneracy import least_axis
+from tracking.filters.joint.hypotheses.merging import are_same, rotation_between
+from tracking.filters.joint.params import JointParams
+from tracking.filters.joint.state import JointState, make_state
+from tracking.filters.joint.supervision.params import AlignmentParams
+from tracking.filters.level_vehicle import angle_between, direction
+from tracking.filters.records import as_records
+from tracking.geometry import quat_from_yaw
+from tracking.maths.simd import vectors
+from tracking.maths.simd.block_propagation import (
     ROOM,
     SHAPES,
     STATES,
@@ -26,13 +30,9 @@ from tracking.filters.joint._step_kernels import (
     add_to_rows,
     add_to_rows_plainly,
 )
-from tracking.filters.joint.alignment import Alignment
-from tracking.filters.joint.coefficients import make_coefficients
-from tracking.filters.joint.params import JointParams
-from tracking.filters.joint.state import JointState, make_state
-from tracking.filters.joint.supervision_params import AlignmentParams
-from tracking.filters.records import as_records
-from tracking.geometry import quat_from_yaw
+from tracking.maths.simd.low_rank_downdate import apply_downdate, apply_downdate_plainly
+from tracking.maths.simd.symmetrise import mirror, mirror_plainly
+from tracking.maths.simd.weighted_row_sum import sum_rows, sum_rows_plainly
 
 angles = st.floats(-3.1, 3.1)
 SAME_TURN = AlignmentParams().same_rotation
@@ -63,7 +63,7 @@ def test_a_turned_hypothesis_is_turned_as_a_whole(dimensions, kinds, mirrored):
     M[0] *= np.sign(np.linalg.det(M)) * (-1.0 if mirrored else 1.0)
     x, P = s.x[1].copy(), s.P[1].copy()
     T = np.eye(len(x))
-    vectors = [(s.nodes["at_p"], np.ones(3, dtype=bool)), (s.nodes["at_v"], ~s.nodes["static"])]
+    vectors = [(s.nodes["i_pos"], np.ones(3, dtype=bool)), (s.nodes["i_vel"], ~s.nodes["static"])]
     for at, there in vectors:
         rows = [slice(a, a + d) for a in at[there]]
         mean = np.mean([x[row] for row in rows], axis=0)
@@ -72,7 +72,7 @@ def test_a_turned_hypothesis_is_turned_as_a_whole(dimensions, kinds, mirrored):
         for row in rows:
             x[row] = mean + M @ (x[row] - mean)
             T[row, row] = M
-    turn_hypothesis(c, s, 1, np.ascontiguousarray(M))
+    rotate_hypothesis(c, s, 1, np.ascontiguousarray(M))
     np.testing.assert_allclose(s.x[1], x, atol=1e-12)
     np.testing.assert_allclose(s.P[1], T @ P @ T.T, atol=1e-11)
 
@@ -84,11 +84,11 @@ def test_hypotheses_are_the_same_where_they_agree_about_the_centre(dimensions, k
     moving, none = ~s.nodes["static"], np.eye(dimensions)
     s.x[1] = s.x[0]
     for k in range(dimensions):  # all of the group elsewhere, and faster if it is free
-        s.x[1, s.nodes["at_p"] + k] += 5.0
-        s.x[1, s.nodes["at_v"][moving] + k] += 3.0 * moving.all()
+        s.x[1, s.nodes["i_pos"] + k] += 5.0
+        s.x[1, s.nodes["i_vel"][moving] + k] += 3.0 * moving.all()
     assert are_same(c, s, 0, 1, none)
     limit = c["merge_distance"]
-    at = s.nodes["at_v"][0]
+    at = s.nodes["i_vel"][0]
     # One of n moves: it is off by (n - 1) / n of that from the mean, or by all beside static ones.
     share = 2.0 / 3.0 if moving.all() else 1.0
     s.x[1, at] += 0.95 * limit / share
@@ -105,16 +105,16 @@ def test_a_hypothesis_that_is_another_one_turned_a_little_is_the_same(dimensions
     s.x[1] = s.x[0]
     M = np.eye(dimensions)
     M[:2, :2] = [[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]
-    turn_hypothesis(c, s, 1, M)
+    rotate_hypothesis(c, s, 1, M)
     none, found = np.eye(dimensions), np.eye(dimensions)
     assert not are_same(c, s, 0, 1, none)
-    turn_between(c, s, 0, 1, found)
+    rotation_between(c, s, 0, 1, found)
     assert are_same(c, s, 0, 1, found) == (abs(turn) < SAME_TURN)
     np.testing.assert_allclose(found, M.T if abs(turn) < SAME_TURN else none, atol=1e-12)
     M[1] *= -1.0  # and its mirror image is not
-    turn_hypothesis(c, s, 1, M)
+    rotate_hypothesis(c, s, 1, M)
     found[:] = none
-    turn_between(c, s, 0, 1, found)
+    rotation_between(c, s, 0, 1, found)
     assert not are_same(c, s, 0, 1, found)
 
 
@@ -125,16 +125,16 @@ def test_while_every_turn_is_open_layouts_are_the_same_whose_shapes_are(seed):
     c, s = bank(3, ("moving", "static", "moving", "moving", "static"), seed=3)
     s.x[1] = s.x[0]
     M = Rotation.random(random_state=rng).as_matrix() * rng.choice([-1.0, 1.0])
-    turn_hypothesis(c, s, 1, M)
+    rotate_hypothesis(c, s, 1, M)
     found = np.eye(3)
-    turn_between(c, s, 0, 1, found)
+    rotation_between(c, s, 0, 1, found)
     assert are_same(c, s, 0, 1, found) == (np.trace(M) > 1.0 + 2.0 * np.cos(SAME_TURN))
     s.group["alignment"] = Alignment.LINEAR
-    turn_between(c, s, 0, 1, found)
+    rotation_between(c, s, 0, 1, found)
     assert are_same(c, s, 0, 1, found)
     np.testing.assert_allclose(found, M.T, atol=1e-9)
-    s.x[1, s.nodes["at_p"][2]] += 2.0
-    turn_between(c, s, 0, 1, found)
+    s.x[1, s.nodes["i_pos"][2]] += 2.0
+    rotation_between(c, s, 0, 1, found)
     assert not are_same(c, s, 0, 1, found)
 
 
@@ -147,8 +147,8 @@ def test_what_is_taken_off_is_the_product(n, m, fades):
     A = rng.standard_normal((n, n))
     P, W = np.stack([A @ A.T, A @ A.T]), rng.standard_normal((2, 16, n))
     twin, before, rows = P.copy(), P[0].copy(), W.copy()
-    take_off(P, 1, W, 0, m, scale)
-    take_off_plainly(twin, 1, W, 0, m, scale)
+    apply_downdate(P, 1, W, 0, m, scale)
+    apply_downdate_plainly(twin, 1, W, 0, m, scale)
     np.testing.assert_allclose(P[1], twin[1], atol=1e-10)
     np.testing.assert_array_equal(P[1], P[1].T)  # to the last bit
     np.testing.assert_array_equal(P[0], before)
@@ -222,7 +222,7 @@ def test_a_step_is_a_product_with_its_derivatives(n, p, shape):
 @pytest.mark.parametrize("add", [add_to_rows, add_to_columns])
 @pytest.mark.parametrize("lanes", [2, 4, 8])
 def test_a_step_in_registers_of_any_width_is_the_same(monkeypatch, lanes, add):
-    monkeypatch.setattr(_vector_kernels, "LANES", lanes)
+    monkeypatch.setattr(vectors, "LANES", lanes)
     anew = njit(add.py_func)  # kept nowhere
     plainly = add_to_rows_plainly if add is add_to_rows else add_to_columns_plainly
     for shape in SHAPES:
@@ -235,15 +235,15 @@ def test_a_step_in_registers_of_any_width_is_the_same(monkeypatch, lanes, add):
 @pytest.mark.skipif(config.DISABLE_JIT, reason="the plain loops are all there is")
 @pytest.mark.parametrize("lanes", [2, 4, 8])
 def test_registers_of_any_width_give_the_same(monkeypatch, lanes):
-    monkeypatch.setattr(_vector_kernels, "LANES", lanes)
-    anew = njit(take_off.py_func)  # kept nowhere
+    monkeypatch.setattr(vectors, "LANES", lanes)
+    anew = njit(apply_downdate.py_func)  # kept nowhere
     rng = np.random.default_rng(lanes)
     for n in (8, 40):
         A = rng.standard_normal((n, n))
         P, W = (A @ A.T)[None], rng.standard_normal((1, 8, n))
         twin = P.copy()
         anew(P, 0, W, 0, 7, None)
-        take_off_plainly(twin, 0, W, 0, 7, None)
+        apply_downdate_plainly(twin, 0, W, 0, 7, None)
         np.testing.assert_allclose(P, twin, atol=1e-10)
         np.testing.assert_array_equal(P[0], P[0].T)
     anew = njit(sum_rows.py_func)
@@ -275,7 +275,9 @@ def test_the_least_axis_is_the_librarys(seed, d, n):
     assert axis @ scatter @ axis == pytest.approx(eigenvalues[0], abs=1e-6 * top)
 
 
-@pytest.mark.parametrize("scatter", [np.zeros((3, 3)), np.eye(3), np.diag([0.0, 0.0, 2.0])])
+@pytest.mark.parametrize(
+    "mean_abs_residual", [np.zeros((3, 3)), np.eye(3), np.diag([0.0, 0.0, 2.0])]
+)
 def test_the_least_axis_of_what_has_none(scatter):
     least, axis = least_axis(tuple(scatter[np.triu_indices(3)]), 3)
     assert least == pytest.approx(scatter[0, 0], abs=1e-12)

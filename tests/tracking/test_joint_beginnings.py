@@ -11,10 +11,14 @@ from relpos_env.scenarios import recordable
 from relpos_env.timing import STAND_STILL
 from tracking import Constellation, NodeConfig, Tracker, TrackerParams
 from tracking.filters import FilterParams
-from tracking.filters.joint._sample_kernels import take_state
-from tracking.filters.joint._start_kernels import begin_node, begin_pair, first_sight
 from tracking.filters.joint.coefficients import make_coefficients
+from tracking.filters.joint.hypotheses.initialisation import (
+    initial_nlos_prob,
+    initialise_node,
+    initialise_pair,
+)
 from tracking.filters.joint.params import JointParams, NlosParams
+from tracking.filters.joint.preintegration import process_attitude
 from tracking.filters.joint.state import JointState, make_state
 from tracking.filters.records import as_records
 from tracking.measurements import N_VALUES
@@ -39,13 +43,13 @@ def test_after_a_blow_the_speed_is_uncertain(vehicle, accel, is_blow):
     values[..., 0] = 1.0  # level, and pointing along x
     values[0, 1, 4] = accel
     for k, t in enumerate((0.0, 0.01, 0.02)):
-        take_state(c, s.nodes, s.held, s.pre, 0, t, values, 0, k)
+        process_attitude(c, s.nodes, s.last_attitude_accel, s.preintegrated, 0, t, values, 0, k)
     carrier = VEHICLES[vehicle]
     usual = carrier.turn_psd**2 * accel**2 * 0.01
     expected = usual + (carrier.blow_share * accel * 0.01) ** 2 * is_blow
-    assert carrier.turn_psd**2 * s.pre[0, 11] == pytest.approx(expected)
+    assert carrier.turn_psd**2 * s.preintegrated[0, 11] == pytest.approx(expected)
     # Half before and half after: what is missing of it is not known.
-    assert s.pre[0, 1] == pytest.approx(accel * 0.01)
+    assert s.preintegrated[0, 1] == pytest.approx(accel * 0.01)
 
 
 @pytest.mark.parametrize("at_rest", [True, False])
@@ -58,8 +62,8 @@ def test_a_tilt_that_is_being_found_leaves_the_bias_uncertain(at_rest):
     carrier = VEHICLES["hand"]
     for t_oriented, age in ((0.0, 4.0), (-96.0, 100.0)):
         s.nodes["t_oriented"] = t_oriented
-        begin_node(c, s, 0, 0, 4.0)
-        at = s.nodes["at_b"][0]
+        initialise_node(c, s, 0, 0, 4.0)
+        at = s.nodes["i_tilt_bias"][0]
         unsettled = 0.0 if at_rest else carrier.unsettled_speed / age
         assert s.P[0, at, at] == pytest.approx(carrier.bias_std**2 + unsettled**2)
 
@@ -71,7 +75,7 @@ def test_an_orientation_goes_on_over_gaps_that_are_filled(gap, anew):
     values = np.zeros((1, 2, N_VALUES))
     values[..., 0] = 1.0
     for k, t in enumerate((7.0, 7.0 + gap)):
-        take_state(c, s.nodes, s.held, s.pre, 0, t, values, 0, k)
+        process_attitude(c, s.nodes, s.last_attitude_accel, s.preintegrated, 0, t, values, 0, k)
     assert s.nodes["t_oriented"][0] == (7.0 + gap if anew else 7.0)
 
 
@@ -79,10 +83,10 @@ def test_an_orientation_goes_on_over_gaps_that_are_filled(gap, anew):
 def test_range_errors_begin_as_those_of_both_sights(evidence):
     """The slow error is that of a mixture, with its mean and variance."""
     c, s = one_env()
-    s.pairs["start_sight"][0] = evidence
-    hidden = first_sight(c, s.pairs[0])
-    begin_pair(c, s, 0, 0, hidden)
-    at, p = s.pairs["at_e"][0] + 1, NlosParams()
+    s.pairs["start_nlos_llr"][0] = evidence
+    hidden = initial_nlos_prob(c, s.pairs[0])
+    initialise_pair(c, s, 0, 0, hidden)
+    at, p = s.pairs["i_range_error"][0] + 1, NlosParams()
     assert 0.0 < hidden < 1.0
     mean = hidden * p.excess
     squared = hidden * (p.excess**2 + p.excess_std**2)
@@ -94,7 +98,9 @@ def test_range_errors_begin_as_those_of_both_sights(evidence):
 def test_without_powers_sight_is_as_likely_at_first_as_it_is_in_the_long_run():
     c, s = one_env()
     p = NlosParams()
-    assert first_sight(c, s.pairs[0]) == pytest.approx(p.enter_rate / (p.enter_rate + p.leave_rate))
+    assert initial_nlos_prob(c, s.pairs[0]) == pytest.approx(
+        p.enter_rate / (p.enter_rate + p.leave_rate)
+    )
 
 
 def test_headings_are_uncertain_until_cars_have_driven():
@@ -108,7 +114,7 @@ def test_headings_are_uncertain_until_cars_have_driven():
         t = log.block.t[0]
         tracker.step(log.block.take((t > start) & (t <= end)), end)
         state = tracker.save()["filter"]
-        h, at = state.group["best"][0, 0], state.nodes["at_h"][0]
+        h, at = state.group["best"][0, 0], state.nodes["i_heading"][0]
         std.append(np.sqrt(state.P[0, h, at, at]))
     assert (std[0] > 0.9 * car.first_heading_std).all()
     assert (std[1] < car.heading_std + 0.01).all()
@@ -119,5 +125,5 @@ def test_a_compass_that_has_driven_is_believed_when_its_node_comes_back():
     node = s.nodes[0]
     for drove, var in ((0.0, "first_heading_var"), (100.0, "heading_var")):
         node["t_first"], node["t_moved"] = 10.0, 10.0 + drove
-        begin_node(c, s, 0, 0, 200.0)
-        assert s.P[0, node["at_h"], node["at_h"]] == pytest.approx(node[var], rel=0.05)
+        initialise_node(c, s, 0, 0, 200.0)
+        assert s.P[0, node["i_heading"], node["i_heading"]] == pytest.approx(node[var], rel=0.05)

@@ -5,9 +5,9 @@ import pytest
 
 from agents.simulate import simulate
 from tracking import Tracker
+from tracking.ahrs.orientation import Orientation, OrientationParams
 from tracking.estimate import Status
 from tracking.measurements import Kind, MeasurementBlock
-from tracking.orientation import Orientation, OrientationParams
 
 BEGIN, END = 14.0, 26.0
 DRIVES = range(200, 216)

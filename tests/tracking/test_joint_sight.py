@@ -8,31 +8,31 @@ from scipy.linalg import expm
 from scipy.stats import norm
 
 from tests.tracking.test_joint_kernels import running
-from tracking.filters.joint._motion_kernels import predict
-from tracking.filters.joint._sight_kernels import change_sight, judge_sight
+from tracking.filters.joint.nlos_model import reset_bias_on_transition, update_nlos_posterior
+from tracking.filters.joint.propagation import predict
 
 SHARES = st.floats(0.0, 0.99)
 
 
 def believing(seed, hidden, *, waiting):
     """Random states and covariance; a correction may wait to be taken off."""
-    c, s, scratch, _ = running(2, seed=seed)
+    c, s, work, _ = running(2, seed=seed)
     rng = np.random.default_rng(seed)
     n = s.x.shape[1]
     A = rng.standard_normal((n, n))
     s.P[0] = A @ A.T / n
-    s.nlos[:], s.stays[:] = hidden, 1.0
+    s.nlos[:], s.bias_retention[:] = hidden, 1.0
     if waiting:
         H = rng.standard_normal(n)
         s = s._replace(waiting=np.zeros((1, 8, n)))  # as in groups large enough
-        s.n_waiting[0] = 1
-        s.waiting[0, 0] = s.P[0] @ H / np.sqrt(H @ s.P[0] @ H + 1.0)
-    return c, s, scratch
+        s.n_pending[0] = 1
+        s.pending_updates[0, 0] = s.P[0] @ H / np.sqrt(H @ s.P[0] @ H + 1.0)
+    return c, s, work
 
 
 def covariance(s):
     """With what waits taken off."""
-    rows = s.waiting[0, : s.n_waiting[0]]
+    rows = s.pending_updates[0, : s.n_pending[0]]
     return s.P[0] - rows.T @ rows
 
 
@@ -41,8 +41,8 @@ def covariance(s):
 def test_by_so_much_it_is_forgotten(seed, hidden, switched, is_far):
     """Mean and variance move towards those of a new error; nothing else changes."""
     c, s, _ = believing(seed, hidden, waiting=True)
-    at, before, x = s.pairs["at_e"][0] + 1, covariance(s), s.x[0].copy()
-    change_sight(c, s, 0, 0, switched, is_far)
+    at, before, x = s.pairs["i_range_error"][0] + 1, covariance(s), s.x[0].copy()
+    reset_bias_on_transition(c, s, 0, 0, switched, is_far)
     after, stays = covariance(s), 1.0 - switched
     shares = np.array([1.0 - is_far, is_far])
     means = np.array([c["excess"], c["far_excess"]])
@@ -68,17 +68,17 @@ def test_a_change_that_waits_for_the_prediction_moves_the_mean_as_one_at_once(
     seed, hidden, switched
 ):
     """And all covariances; its own variance is that of a way which leaves as much."""
-    c, s, scratch = believing(seed, hidden, waiting=False)
+    c, s, work = believing(seed, hidden, waiting=False)
     x, P = s.x[0].copy(), s.P[0].copy()
-    s.pre[:] = 0.0
-    change_sight(c, s, 0, 0, switched, 0.0)
-    predict(c, s, 0, 0.0, scratch)
+    s.preintegrated[:] = 0.0
+    reset_bias_on_transition(c, s, 0, 0, switched, 0.0)
+    predict(c, s, 0, 0.0, work)
     at_once = s.x[0].copy(), s.P[0].copy()
     s.x[0], s.P[0] = x, P
-    s.stays[0, 0] = 1.0 - switched
-    predict(c, s, 0, 0.0, scratch)
+    s.bias_retention[0, 0] = 1.0 - switched
+    predict(c, s, 0, 0.0, work)
     np.testing.assert_allclose(s.x[0], at_once[0], atol=1e-12)
-    at, stays = s.pairs["at_e"][0] + 1, 1.0 - switched
+    at, stays = s.pairs["i_range_error"][0] + 1, 1.0 - switched
     new = c["slow_var"] + hidden * c["excess_var"]
     assert s.P[0, at, at] == pytest.approx(stays**2 * P[at, at] + (1.0 - stays**2) * new)
     s.P[0, at, at] = at_once[1][at, at]
@@ -91,9 +91,11 @@ def test_sight_is_judged_by_the_rule_of_bayes(before, nu, variance, evidence):
     """Over sight before and after, and over small and large excesses."""
     c, s, _, _ = running(2, seed=1)
     s.P[0], s.nlos[0, 0] = np.eye(s.x.shape[1]), before
-    at, dt, rates = s.pairs["at_e"][0] + 1, 0.1, (0.7, 2.5)
+    at, dt, rates = s.pairs["i_range_error"][0] + 1, 0.1, (0.7, 2.5)
     slow = s.x[0, at]
-    found = judge_sight(c, s, 0, 0, dt, nu, variance, (evidence, *rates), np.zeros(s.x.shape[1]))
+    found = update_nlos_posterior(
+        c, s, 0, 0, dt, nu, variance, (evidence, *rates), np.zeros(s.x.shape[1])
+    )
 
     def density(mean, var):
         return norm.pdf(nu, mean, np.sqrt(var))

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from tracking.filters.pair import _pair_kernels
-from tracking.filters.rotations import starting_rotations
-from tracking.mds import classical_mds
+from tracking.filters.pair import dynamics
+from tracking.maths.mds import classical_mds
+from tracking.maths.starting_rotations import starting_rotations
 
 
 def random_pair(rng, d=3, size=6):
@@ -20,9 +20,9 @@ def random_pair(rng, d=3, size=6):
 
 
 MODELS = {
-    "range": lambda x, work: _pair_kernels.range_model(x, 0, 0, 0.1, -0.2, 0.05, work),
-    "range-rate": lambda x, work: _pair_kernels.range_rate_model(x, 0, 0, 0.1, -0.2, 0.05, work),
-    "speed-norm": lambda x, work: _pair_kernels.speed_model(x, 0, 0, work),
+    "range": lambda x, work: dynamics.range_model(x, 0, 0, 0.1, -0.2, 0.05, work),
+    "range-rate": lambda x, work: dynamics.range_rate_model(x, 0, 0, 0.1, -0.2, 0.05, work),
+    "speed-norm": lambda x, work: dynamics.speed_model(x, 0, 0, work),
 }
 
 
@@ -32,13 +32,13 @@ def test_jacobians_are_finite_differences(name, size):
     rng = np.random.default_rng(1)
     for _ in range(20):
         x, _ = random_pair(rng, size=size)
-        work, scratch = np.zeros((2, size)), np.zeros((2, size))
+        work, work = np.zeros((2, size)), np.zeros((2, size))
         MODELS[name](x, work)
         for k in range(size):
             up, down = x.copy(), x.copy()
             up[..., k] += 1e-6
             down[..., k] -= 1e-6
-            slope = (MODELS[name](up, scratch) - MODELS[name](down, scratch)) / 2e-6
+            slope = (MODELS[name](up, work) - MODELS[name](down, work)) / 2e-6
             assert slope == pytest.approx(work[0, k], abs=1e-7)
 
 
@@ -54,7 +54,7 @@ def test_predict_is_its_matrix_form(d, size):
     W = np.vstack([0.5 * dt**2 * eye, dt * eye, np.zeros((size - 6, 3))])
     expected_x = F @ x[0, 0] + W @ accel
     expected_P = F @ P[0, 0] @ F.T + W @ (psd**2 / dt * np.eye(3)) @ W.T
-    _pair_kernels.predict(x, P, 0, 0, dt, *accel, psd, d)
+    dynamics.predict(x, P, 0, 0, dt, *accel, psd, d)
     np.testing.assert_allclose(x[0, 0], expected_x, atol=1e-12)
     np.testing.assert_allclose(P[0, 0], expected_P, atol=1e-12)
 
@@ -62,7 +62,7 @@ def test_predict_is_its_matrix_form(d, size):
 def test_predict_over_no_time_changes_nothing():
     x, P = random_pair(np.random.default_rng(3))
     before = x.copy(), P.copy()
-    _pair_kernels.predict(x, P, 0, 0, 0.0, 1.0, 2.0, 3.0, 0.5, 3)
+    dynamics.predict(x, P, 0, 0, 0.0, 1.0, 2.0, 3.0, 0.5, 3)
     np.testing.assert_array_equal(x, before[0])
     np.testing.assert_array_equal(P, before[1])
 
@@ -78,7 +78,7 @@ def test_correct_is_the_joseph_form(size):
     expected = x[0, 0] + K * nu, A @ P[0, 0] @ A.T + R * np.outer(K, K)
     work = np.zeros((2, size))
     work[0] = H
-    assert _pair_kernels.correct(x, P, 0, 0, work, nu, R) == pytest.approx(S)
+    assert dynamics.correct(x, P, 0, 0, work, nu, R) == pytest.approx(S)
     np.testing.assert_allclose(x[0, 0], expected[0], atol=1e-12)
     np.testing.assert_allclose(P[0, 0], expected[1], atol=1e-12)
 
@@ -89,9 +89,9 @@ def test_covariance_survives_many_updates():
     work = np.zeros((2, 6))
     for k in range(20000):
         x[0, 0, :3] = 3.0 * np.array([np.cos(k / 50), np.sin(k / 50), 0.2])
-        _pair_kernels.predict(x, P, 0, 0, 0.01, 0.0, 0.0, 0.0, 0.1, 3)
-        _pair_kernels.range_model(x, 0, 0, 0.0, 0.0, 0.0, work)
-        _pair_kernels.correct(x, P, 0, 0, work, 0.01, 1e-6)
+        dynamics.predict(x, P, 0, 0, 0.01, 0.0, 0.0, 0.0, 0.1, 3)
+        dynamics.range_model(x, 0, 0, 0.0, 0.0, 0.0, work)
+        dynamics.correct(x, P, 0, 0, work, 0.01, 1e-6)
     np.testing.assert_array_equal(P, np.swapaxes(P, -1, -2))
     assert np.linalg.eigvalsh(P[0, 0]).min() > 0.0
 

@@ -8,25 +8,20 @@ from scipy.spatial.transform import Rotation
 from test_joint_kernels import running
 
 from tracking import Status, Tracker
-from tracking.filters.joint import (
-    _carrier_kernels,
-    _frame_kernels,
-    _motion_kernels,
-    _open_kernels,
-    _peak_kernels,
-    _survey_kernels,
-)
-from tracking.filters.joint._antenna_kernels import antenna_offset, note_levers
-from tracking.filters.joint._flatness_kernels import flatness
-from tracking.filters.joint._range_kernels import range_model
-from tracking.filters.joint._sample_kernels import sum_inertial
-from tracking.filters.joint._upright_kernels import GAIN
-from tracking.filters.joint.alignment import Alignment
+from tracking.filters.joint import motion_constraints, propagation, surveyed_distance
 from tracking.filters.joint.coefficients import make_coefficients
+from tracking.filters.joint.hypotheses import alignment_modes, alignment_sensitivity
+from tracking.filters.joint.hypotheses.alignment import Alignment
+from tracking.filters.joint.hypotheses.geometric_degeneracy import degeneracy_ratio
+from tracking.filters.joint.lever_arm import antenna_offset, lever_arm_sensitivity
 from tracking.filters.joint.params import JointParams
+from tracking.filters.joint.preintegration import preintegrate
+from tracking.filters.joint.range_update import range_model
 from tracking.filters.joint.state import JointState, make_state
+from tracking.filters.joint.tilt_correction import GAIN
 from tracking.filters.records import as_records
-from tracking.filters.rotations import starting_rotations
+from tracking.maths import rotation_modes
+from tracking.maths.starting_rotations import starting_rotations
 from tracking.measurements import Kind
 
 MIRROR = np.diag([1.0, 1.0, -1.0])
@@ -64,9 +59,9 @@ def test_derivatives_of_the_likelihood_by_a_turn_are_its_differences(seed):
     information, score, _ = evidence(rng)
     R, h = anywhere(rng), 1e-4
     g, w, H = np.zeros(9), np.zeros(3), np.zeros((3, 3))
-    value = _peak_kernels.gain(information, score, R, g)
+    value = rotation_modes.gain(information, score, R, g)
     assert value == pytest.approx(log_likelihood(information, score, R), rel=1e-9, abs=1e-9)
-    _peak_kernels.curvature(information, R, g, w, H)
+    rotation_modes.curvature(information, R, g, w, H)
 
     def moved(v):
         return log_likelihood(information, score, Rotation.from_rotvec(v).as_matrix() @ R)
@@ -86,7 +81,7 @@ def test_derivatives_of_the_likelihood_by_a_turn_are_its_differences(seed):
 def test_no_turn_is_likelier_than_the_first_peak(seed):
     rng = np.random.default_rng(seed)
     information, score, _ = evidence(rng)
-    turns, values = _peak_kernels.find_peaks(information, score, starting_rotations(3, 16))
+    turns, values = rotation_modes.find_modes(information, score, starting_rotations(3, 16))
     assert np.all(np.diff(values) <= 0.0)
     for R, value in zip(turns, values, strict=True):
         np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-9)
@@ -96,42 +91,42 @@ def test_no_turn_is_likelier_than_the_first_peak(seed):
 
 
 def open_group(vehicle="human", static=()):
-    c, s, scratch, layout = running(3, vehicle, static=static)
+    c, s, work, layout = running(3, vehicle, static=static)
     n = s.x.shape[1]
     rng = np.random.default_rng(5)
     A = rng.standard_normal((n, n))
     s.P[0] = A @ A.T / n + 0.1 * np.eye(n)
-    s.x[0, s.pairs["at_e"].min() :] = 0.0
-    _open_kernels.open_frame(c, s, layout, 0)
-    return c, s, scratch, layout
+    s.x[0, s.pairs["i_range_error"].min() :] = 0.0
+    alignment_sensitivity.start_alignment(c, s, layout, 0)
+    return c, s, work, layout
 
 
-def drive(c, s, scratch, turn, steps=12):
+def drive(c, s, work, turn, steps=12):
     """Dead reckoning and constraints for a while, with accelerations turned; its log-likelihood."""
     total, said = 0.0, []
     rng = np.random.default_rng(7)
     for k in range(steps):
         for i in range(3):
             if not s.nodes["static"][i]:
-                s.held[i, 4:] = turn @ rng.standard_normal(3)
-        s.pre[:] = 0.0
+                s.last_attitude_accel[i, 4:] = turn @ rng.standard_normal(3)
+        s.preintegrated[:] = 0.0
         for i in range(3):
             if not s.nodes["static"][i]:
-                sum_inertial(c, s.nodes, s.held, s.pre, i, 0.05 * (k + 1))
-        _motion_kernels.predict(c, s, 0, 0.05, scratch)
+                preintegrate(c, s.nodes, s.last_attitude_accel, s.preintegrated, i, 0.05 * (k + 1))
+        propagation.predict(c, s, 0, 0.05, work)
         if s.group["alignment"][0] == Alignment.LINEAR:
-            _open_kernels.carry_slope(c, s, 0, scratch)
+            alignment_sensitivity.propagate_sensitivity(c, s, 0, work)
         for i in range(3):
             if not s.nodes["static"][i]:
                 for a in range(3):
-                    at = s.nodes["at_v"][i] + a
+                    at = s.nodes["i_vel"][i] + a
                     nu = -s.x[0, at]
                     said.append(nu)
-                    scratch.idx[0], scratch.val[0] = at, 1.0
-                    scratch.direct[:] = 0.0
+                    work.idx[0], work.val[0] = at, 1.0
+                    work.direct[:] = 0.0
                     S = s.P[0, at, at] + 4.0  # noqa: N806
                     total -= 0.5 * nu * nu / S
-                    _carrier_kernels.judge(c, s, 0, nu, 1, 4.0, scratch)
+                    motion_constraints.apply_constraint(c, s, 0, nu, 1, 4.0, work)
     assert max(np.abs(said)) > 0.5
     return total
 
@@ -143,17 +138,20 @@ def test_one_filter_gives_the_states_and_likelihoods_of_all_turns(static):
     Exact where the model is linear: headings are held, range errors do not fade with the way, and
     what is measured is a velocity.
     """
-    c, s, scratch, _ = open_group(static=static)
+    c, s, work, _ = open_group(static=static)
     c["fast_length"] = c["slow_length"] = c["excess_length"] = 1e12
     for i in range(3):
         if not s.nodes["static"][i]:
-            at = s.nodes["at_h"][i]
+            at = s.nodes["i_heading"][i]
             s.x[0, at], s.P[0, at], s.P[0, :, at] = 0.0, 0.0, 0.0
             s.P[0, at, at] = 1e-18
     s.nodes["heading_var"] = 1e-18
-    s.information[0], s.score[0] = 0.0, 0.0  # without what is known of fixed nodes
+    s.alignment_information[0], s.alignment_score[0] = (
+        0.0,
+        0.0,
+    )  # without what is known of fixed nodes
     begun = JointState._make(a.copy() for a in s)
-    reached = drive(c, s, scratch, np.eye(3))
+    reached = drive(c, s, work, np.eye(3))
     rng = np.random.default_rng(11)
     for _ in range(4):
         turn = anywhere(rng)
@@ -162,27 +160,27 @@ def test_one_filter_gives_the_states_and_likelihoods_of_all_turns(static):
         other = other._replace(nodes=begun.nodes.copy(), group=begun.group.copy())
         other.group["alignment"] = Alignment.FILTERED
         d = (turn - np.eye(3)).ravel()
-        other.x[0] += d @ begun.slope[0]  # what was found of biases is turned as well
-        total = drive(c, other, scratch, turn)
-        np.testing.assert_allclose(s.x[0] + d @ s.slope[0], other.x[0], atol=1e-9)
+        other.x[0] += d @ begun.sensitivity[0]  # what was found of biases is turned as well
+        total = drive(c, other, work, turn)
+        np.testing.assert_allclose(s.x[0] + d @ s.sensitivity[0], other.x[0], atol=1e-9)
         np.testing.assert_allclose(s.P[0], other.P[0], atol=1e-9)
-        told = log_likelihood(s.information[0], s.score[0], turn)
+        told = log_likelihood(s.alignment_information[0], s.alignment_score[0], turn)
         assert told == pytest.approx(total - reached, abs=1e-6)
 
 
 @pytest.mark.parametrize("from_turn", [True, False])
 def test_a_survey_counts_against_a_layout_by_what_no_turn_explains(from_turn):
     """Of two fixed nodes that an unknown turn puts elsewhere, a distance says nothing yet."""
-    c, s, scratch, _ = open_group(static=(2, 3))
-    at = s.nodes["at_p"]
+    c, s, work, _ = open_group(static=(2, 3))
+    at = s.nodes["i_pos"]
     pair = int(np.nonzero((s.pairs["i"] == 1) & (s.pairs["j"] == 2))[0][0])
     s.P[0] = 1e-4 * np.eye(s.x.shape[1])
     s.x[0, at[1] : at[1] + 3], s.x[0, at[2] : at[2] + 3] = 0.0, [2.0, 0.0, 0.0]
     s.group["n_alive"] = 2
-    s.slope[0], s.spread[0] = 0.0, np.eye(9)
-    s.slope[0, :, at[2]] = 1.0 if from_turn else 0.0
+    s.sensitivity[0], s.alignment_cov[0] = 0.0, np.eye(9)
+    s.sensitivity[0, :, at[2]] = 1.0 if from_turn else 0.0
     before = s.loglik[0]
-    _survey_kernels.fuse_survey(c, s, 0, pair, 3.0, True, scratch)
+    surveyed_distance.surveyed_distance_update(c, s, 0, pair, 3.0, True, work)
     assert s.loglik[0] == (before if from_turn else pytest.approx(before - 0.5 * c["max_nis"]))
 
 
@@ -190,52 +188,52 @@ def test_a_survey_counts_against_a_layout_by_what_no_turn_explains(from_turn):
 def test_slopes_are_carried_as_errors_of_the_states_are(vehicle):
     """With no acceleration, of which a turn would make another."""
     vehicle, *told = vehicle.split(", ")
-    c, s, scratch, _ = open_group(vehicle)
-    s.nodes["told"], s.nodes["by_gyroscope"] = bool(told), True
+    c, s, work, _ = open_group(vehicle)
+    s.nodes["has_ahrs_feedback"], s.nodes["by_gyroscope"] = bool(told), True
     c["fast_length"] = c["slow_length"] = c["excess_length"] = 1e12
-    s.held[:, 4:] = 0.0
-    for name in ("at_b", "at_o", "at_g"):
+    s.last_attitude_accel[:, 4:] = 0.0
+    for name in ("i_tilt_bias", "i_acc_bias", "i_gyro_bias"):
         for at in s.nodes[name][s.nodes[name] >= 0]:
             s.x[0, at : at + 3] = 0.0
     x0, h = s.x[0].copy(), 1e-6
-    s.slope[0] = np.random.default_rng(3).standard_normal(s.slope[0].shape)
-    for z in s.slope[0].copy():
+    s.sensitivity[0] = np.random.default_rng(3).standard_normal(s.sensitivity[0].shape)
+    for z in s.sensitivity[0].copy():
         reached = []
         for step in (h, -h, 0.0):  # the last is the step that slopes are carried over
-            s.x[0], s.pre[:] = x0 + step * z, 0.0
+            s.x[0], s.preintegrated[:] = x0 + step * z, 0.0
             for i in range(3):
                 s.nodes["t_pre"][i] = 0.0
-                sum_inertial(c, s.nodes, s.held, s.pre, i, 0.05)
-            _motion_kernels.predict(c, s, 0, 0.05, scratch)
+                preintegrate(c, s.nodes, s.last_attitude_accel, s.preintegrated, i, 0.05)
+            propagation.predict(c, s, 0, 0.05, work)
             reached.append(s.x[0].copy())
         expected = (reached[0] - reached[1]) / (2.0 * h)
-        s.x[0], before = x0, s.slope[0].copy()
-        s.slope[0, 0] = z
-        _open_kernels.carry_slope(c, s, 0, scratch)
-        np.testing.assert_allclose(s.slope[0, 0], expected, atol=1e-6)
-        s.slope[0] = before
+        s.x[0], before = x0, s.sensitivity[0].copy()
+        s.sensitivity[0, 0] = z
+        alignment_sensitivity.propagate_sensitivity(c, s, 0, work)
+        np.testing.assert_allclose(s.sensitivity[0, 0], expected, atol=1e-6)
+        s.sensitivity[0] = before
 
 
 def test_what_an_orientation_is_turned_upright_by_turns_with_the_frame():
     """Its bias is one of the world: with the turn M it is ``M u`` in the frame."""
-    c, s, scratch, _ = open_group("hand")
-    s.held[:, 4:], s.nodes["told"] = 0.0, True
+    c, s, work, _ = open_group("hand")
+    s.last_attitude_accel[:, 4:], s.nodes["has_ahrs_feedback"] = 0.0, True
     x0, reached = s.x[0].copy(), []
     gain = np.random.default_rng(4).standard_normal((3, 2))
     for given_ in (0.0 * gain, gain):
-        s.x[0], s.slope[0], s.pre[:] = x0, 0.0, 0.0
+        s.x[0], s.sensitivity[0], s.preintegrated[:] = x0, 0.0, 0.0
         for i in range(3):
             s.nodes["t_pre"][i] = 0.0
-            sum_inertial(c, s.nodes, s.held, s.pre, i, 0.05)
-        s.pre[:, GAIN : GAIN + 2] = given_
-        _motion_kernels.predict(c, s, 0, 0.05, scratch)
-        _open_kernels.carry_slope(c, s, 0, scratch)
-        reached.append((s.x[0].copy(), s.slope[0].copy()))
+            preintegrate(c, s.nodes, s.last_attitude_accel, s.preintegrated, i, 0.05)
+        s.preintegrated[:, GAIN : GAIN + 2] = given_
+        propagation.predict(c, s, 0, 0.05, work)
+        alignment_sensitivity.propagate_sensitivity(c, s, 0, work)
+        reached.append((s.x[0].copy(), s.sensitivity[0].copy()))
     (x, slope), (x_told, slope_told) = reached
-    for i, at in enumerate(s.nodes["at_b"]):
-        cos, sin = np.cos(x0[s.nodes["at_h"][i]]), np.sin(x0[s.nodes["at_h"][i]])
+    for i, at in enumerate(s.nodes["i_tilt_bias"]):
+        cos, sin = np.cos(x0[s.nodes["i_heading"][i]]), np.sin(x0[s.nodes["i_heading"][i]])
         u = np.array([*(np.array([[cos, -sin], [sin, cos]]) @ gain[i]), 0.0])
-        keep = scratch.scale[at : at + 3]
+        keep = work.scale[at : at + 3]
         np.testing.assert_allclose((x_told - x)[at : at + 3], keep * u, atol=1e-9)
         by_turn = (slope_told - slope)[:, at : at + 3].reshape(3, 3, 3)
         np.testing.assert_allclose(by_turn, np.einsum("ra,q,r->rqa", np.eye(3), u, keep), atol=1e-9)
@@ -243,44 +241,47 @@ def test_what_an_orientation_is_turned_upright_by_turns_with_the_frame():
 
 def test_what_stands_still_tells_nothing_of_a_turn():
     """Antennas away from their nodes are where they were, and what is read at rest is a bias."""
-    c, s, scratch, layout = running(3, "hand", static=(3,))
+    c, s, work, layout = running(3, "hand", static=(3,))
     antenna_b = np.array([[0.1, -0.2, 0.05], [0.0, 0.0, 0.0], [-0.1, 0.0, 0.3]])
     layout = layout._replace(antenna_b=antenna_b)
     s.nodes["antenna"] = [0, 1, 2]
     moving = ~s.nodes["static"]
     for i in np.nonzero(moving)[0]:
-        s.x[0, s.nodes["at_o"][i] + np.arange(3)] = 0.0
-        s.x[0, [s.nodes["at_h"][i], *(s.nodes["at_v"][i] + np.arange(3))]] = 0.0
-        s.x[0, s.nodes["at_b"][i] + np.arange(3)] *= 0.01
-        s.held[i, 4:] = s.x[0, s.nodes["at_b"][i] + np.arange(3)]
-    _open_kernels.open_frame(c, s, layout, 0)
+        s.x[0, s.nodes["i_acc_bias"][i] + np.arange(3)] = 0.0
+        s.x[0, [s.nodes["i_heading"][i], *(s.nodes["i_vel"][i] + np.arange(3))]] = 0.0
+        s.x[0, s.nodes["i_tilt_bias"][i] + np.arange(3)] *= 0.01
+        s.last_attitude_accel[i, 4:] = s.x[0, s.nodes["i_tilt_bias"][i] + np.arange(3)]
+    alignment_sensitivity.start_alignment(c, s, layout, 0)
     for p in range(len(s.pairs)):
         i, j = s.pairs["i"][p], s.pairs["j"][p]
-        levers = [antenna_offset(s.held, layout, k, k) for k in (i, j)]
-        _, m = range_model(c, s, 0, p, *levers, scratch.idx, scratch.val)
-        note_levers(np.concatenate(levers), scratch)
-        _open_kernels.turn_gradient(s, 0, m, scratch)
-        np.testing.assert_allclose(scratch.gradient, 0.0, atol=1e-12)
-    s.pre[:] = 0.0
+        levers = [antenna_offset(s.last_attitude_accel, layout, k, k) for k in (i, j)]
+        _, m = range_model(c, s, 0, p, *levers, work.idx, work.val)
+        lever_arm_sensitivity(np.concatenate(levers), work)
+        alignment_sensitivity.innovation_sensitivity(s, 0, m, work)
+        np.testing.assert_allclose(work.gradient, 0.0, atol=1e-12)
+    s.preintegrated[:] = 0.0
     for i in np.nonzero(moving)[0]:
-        sum_inertial(c, s.nodes, s.held, s.pre, i, 0.3)
-    _motion_kernels.predict(c, s, 0, 0.3, scratch)
-    _open_kernels.carry_slope(c, s, 0, scratch)
-    at_v = s.nodes["at_v"][moving][:, None] + np.arange(3)
+        preintegrate(c, s.nodes, s.last_attitude_accel, s.preintegrated, i, 0.3)
+    propagation.predict(c, s, 0, 0.3, work)
+    alignment_sensitivity.propagate_sensitivity(c, s, 0, work)
+    at_v = s.nodes["i_vel"][moving][:, None] + np.arange(3)
     # But for the tilt that the bias is thought to come from, which is of second order.
-    assert np.abs(s.slope[0][:, at_v]).max() < 0.01 * 0.3 * np.abs(s.held[moving, 4:]).max()
+    assert (
+        np.abs(s.sensitivity[0][:, at_v]).max()
+        < 0.01 * 0.3 * np.abs(s.last_attitude_accel[moving, 4:]).max()
+    )
 
 
 @pytest.mark.parametrize("vehicle", ["human", "hand"])
 def test_turning_the_frame_back_changes_nothing(vehicle):
-    c, s, scratch, _ = open_group(vehicle)
-    drive(c, s, scratch, np.eye(3))
-    names = ("x", "P", "slope", "score", "information", "loglik")
+    c, s, work, _ = open_group(vehicle)
+    drive(c, s, work, np.eye(3))
+    names = ("x", "P", "sensitivity", "alignment_score", "alignment_information", "loglik")
     before = {name: getattr(s, name).copy() for name in names}
     R = anywhere(np.random.default_rng(2))
-    _frame_kernels.turn_frame(c, s, 0, R)
+    alignment_modes.rotate_frame(c, s, 0, R)
     assert np.abs(s.x - before["x"]).max() > 0.1
-    _frame_kernels.turn_frame(c, s, 0, np.ascontiguousarray(R.T))
+    alignment_modes.rotate_frame(c, s, 0, np.ascontiguousarray(R.T))
     for name in names:
         np.testing.assert_allclose(getattr(s, name), before[name], atol=1e-8, err_msg=name)
 
@@ -288,12 +289,14 @@ def test_turning_the_frame_back_changes_nothing(vehicle):
 def test_fixed_nodes_of_a_room_are_rather_flat_than_tall():
     """And that is forgotten with the turn, not with the layout."""
     c, s, _, layout = running(3, "human", static=(1, 2, 3))
-    at = s.nodes["at_p"]
+    at = s.nodes["i_pos"]
     for k, place in enumerate(([0.0, 0.0, 0.0], [0.3, 0.0, 4.0], [0.3, 0.2, 9.0])):
         s.x[0, at[k] : at[k] + 3] = place
-    _open_kernels.open_frame(c, s, layout, 0)
-    turns, _ = _peak_kernels.find_peaks(s.information[0], s.score[0], layout.rotations)
-    _frame_kernels.turn_frame(c, s, 0, turns[0])
+    alignment_sensitivity.start_alignment(c, s, layout, 0)
+    turns, _ = rotation_modes.find_modes(
+        s.alignment_information[0], s.alignment_score[0], layout.rotations
+    )
+    alignment_modes.rotate_frame(c, s, 0, turns[0])
     heights = s.x[0, at + 2]
     assert np.ptp(heights) < 0.3
 
@@ -304,22 +307,22 @@ def test_an_unknown_turn_makes_no_layout_flat(make_group):
     batch = make_state(group.constellation, JointParams(), 1, 1)
     s = JointState._make(as_records(a[0]) if a.dtype.names else a[0] for a in batch)
     s.nodes["present"] = True
-    at = s.nodes["at_p"]
+    at = s.nodes["i_pos"]
     pos = group.pos(1.0).reshape(-1, 3)
     pos -= pos.mean(axis=0)
     for k, place in enumerate(pos):
         s.x[0, at[k] : at[k] + 3] = place
     s.P[0] = 1e-4 * np.eye(s.x.shape[1])
-    well_known = flatness(c, s, 0, True)
+    well_known = degeneracy_ratio(c, s, 0, True)
     # Nearly what is linear along the layout of errors that are all alike goes with the turn.
-    assert flatness(c, s, 0, False) > well_known > 10.0
+    assert degeneracy_ratio(c, s, 0, False) > well_known > 10.0
     for a in range(3):
         turn = np.zeros(s.x.shape[1])
         for k, place in enumerate(pos):
             turn[at[k] : at[k] + 3] = np.cross(np.eye(3)[a], place)
         s.P[0] += 0.3**2 * np.outer(turn, turn)
-    assert flatness(c, s, 0, True) < 0.2 * well_known
-    assert flatness(c, s, 0, False) > well_known
+    assert degeneracy_ratio(c, s, 0, True) < 0.2 * well_known
+    assert degeneracy_ratio(c, s, 0, False) > well_known
 
 
 def turned(group, R):  # noqa: N803

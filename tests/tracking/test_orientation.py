@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from vqf import VQF
 
-from tracking import _inertial_kernels, _limit_kernels
+from tracking.ahrs.orientation import Orientation, OrientationParams
 from tracking.constellation import Constellation, NodeConfig
 from tracking.geometry import GRAVITY, rotate, yaw_of
 from tracking.measurements import Kind, MeasurementBlock
-from tracking.orientation import Orientation, OrientationParams
+from tracking.sanity import imu, saturation
 
 
 def constellation(heading="magnetic", vehicle="hand"):
@@ -33,22 +33,22 @@ def recording(n=400, mag=True, seed=0):
 
 
 def new_health():
-    return np.zeros((1, 1, _inertial_kernels.N_HEALTH))
+    return np.zeros((1, 1, imu.N_HEALTH))
 
 
 def inspect(health, samples):
     judged, usable = samples[None].copy(), np.zeros((1, len(samples)), dtype=bool)
-    _inertial_kernels.inspect(health, judged, usable)
+    imu.inspect(health, judged, usable)
     return judged[0], usable[0]
 
 
 def new_limits():
-    return np.zeros((1, 1, _limit_kernels.N_LIMIT))
+    return np.zeros((1, 1, saturation.N_LIMIT))
 
 
 def at_limit(limits, accel_b):
     cut, upright = np.zeros((1, *accel_b.shape), dtype=bool), np.zeros((1, len(accel_b)), bool)
-    _limit_kernels.at_limit(limits, accel_b[None].copy(), cut, upright)
+    saturation.at_limit(limits, accel_b[None].copy(), cut, upright)
     return cut[0], upright[0]
 
 

@@ -36,5 +36,5 @@ def test_nodes_that_join_one_by_one_are_tried_in_every_rotation_and_mirror_image
     found = orientations(X, true)
     assert np.abs(X @ np.swapaxes(found, -1, -2) - true).max() < 1e-3
     assert np.sum(np.linalg.det(found) > 0.0) == 24
-    apart = np.linalg.norm(found[:, None] - found[None], axis=(2, 3))
-    assert apart[~np.eye(48, dtype=bool)].min() > 0.5
+    relative_covariance = np.linalg.norm(found[:, None] - found[None], axis=(2, 3))
+    assert relative_covariance[~np.eye(48, dtype=bool)].min() > 0.5

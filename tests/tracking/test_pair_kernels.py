@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from tracking.constellation import Constellation, NodeConfig
-from tracking.filters.pair import _mds_kernels, _range_kernels, _sight_kernels, _wheel_kernels
+from tracking.filters.pair import mds_feedback, motion_constraints, nlos_model, range_update
 from tracking.filters.pair.params import PairEkfParams
 from tracking.filters.pair.state import FilterState, make_coefficients, make_layout, make_state
 from tracking.filters.records import as_records
-from tracking.mds import refine_positions, weighted_mds
+from tracking.maths.mds import refine_positions, weighted_mds
 from tracking.tracker import Tracker
 
 Y = {2: [0, 1, 3, 4], 3: [0, 1, 2, 3, 4, 5]}
@@ -41,12 +41,12 @@ def compiled_mds(x, P, pairs, d):
     rows = (n - 1) * m
     W, A, y = np.zeros((len(pairs), 6, 6)), np.zeros((rows, rows)), np.zeros(rows)
     for p, (a, b) in enumerate(pairs):
-        _mds_kernels.weigh(cov, p, 0, d, np.zeros((6, 6)), W)
-        _mds_kernels.add_pair(states, p, 0, d, W, a, b, A, y)
-    _mds_kernels.factor(A, rows)
-    _mds_kernels.solve(A, y, rows)
+        mds_feedback.weigh(cov, p, 0, d, np.zeros((6, 6)), W)
+        mds_feedback.add_pair(states, p, 0, d, W, a, b, A, y)
+    mds_feedback.factor(A, rows)
+    mds_feedback.solve(A, y, rows)
     for p, (a, b) in enumerate(pairs):
-        _mds_kernels.move_pair(states, cov, p, 0, d, W, a, b, y, np.zeros(6))
+        mds_feedback.move_pair(states, cov, p, 0, d, W, a, b, y, np.zeros(6))
     return states[:, 0]
 
 
@@ -115,13 +115,13 @@ def test_range_error_fades_to_what_it_is_without_news():
     c, _, s, _ = team()
     s.x[0, 0], s.P[0, 0, 0, 6], s.P[0, 0, 6, 0] = [2, 1, 0, 1, 0, 0, 0.3], 0.05, 0.05
     for _ in range(200):
-        _sight_kernels.fade_error(c, s, 0, 0, 0.2)
+        nlos_model.decay_range_error(c, s, 0, 0, 0.2)
     assert s.x[0, 0, 6] == pytest.approx(0.0, abs=1e-6)
     assert s.P[0, 0, 0, 6] == pytest.approx(0.0, abs=1e-6)
     assert s.P[0, 0, 6, 6] == pytest.approx(c["slow_var"])
 
 
-def judge(excess, evidence, repeats=6):
+def apply_constraint(excess, evidence, repeats=6):
     """NLOS probability and state after ranges that are too long."""
     c, layout, s, _ = team()
     s.x[0, 0, 0], s.pairs["n_ranges"][0] = 2.0, 1
@@ -130,7 +130,7 @@ def judge(excess, evidence, repeats=6):
     s.P[0, 0, 6, 6] = c["slow_var"]
     for k in range(repeats):
         t = 0.04 * (k + 1)
-        _range_kernels.fuse_range(
+        range_update.range_update(
             c, s, layout, 0, t, 2.0 + excess, evidence, 0, 1, np.zeros((2, 7))
         )
     assert np.linalg.eigvalsh(s.P[0, 0][np.ix_([0, 1, 3, 4, 6], [0, 1, 3, 4, 6])]).min() > 0.0
@@ -138,14 +138,14 @@ def judge(excess, evidence, repeats=6):
 
 
 def test_a_long_range_with_a_weak_first_path_is_no_line_of_sight():
-    nlos, x = judge(0.3, 1.0)
+    nlos, x = apply_constraint(0.3, 1.0)
     assert nlos > 0.9
     assert x[6] > 0.15
     assert abs(x[0] - 2.0) < 0.1
 
 
 def test_a_right_range_with_a_strong_first_path_is_in_sight():
-    nlos, x = judge(0.0, -1.0)
+    nlos, x = apply_constraint(0.0, -1.0)
     assert nlos < 0.01
     assert x[0] == pytest.approx(2.0, abs=0.01)
 
@@ -165,7 +165,7 @@ def test_wheels_leave_what_rolls():
     s.x[:, 0, 3:5] = v[pairs[:, 1]] - v[pairs[:, 0]]
     s.mean_v[0] = v.mean(axis=0)
     before = s.x.copy()
-    _wheel_kernels.apply_wheels(c, s, layout, 0.05, np.zeros((2, 7)))
+    motion_constraints.apply_motion_constraints(c, s, layout, 0.05, np.zeros((2, 7)))
     np.testing.assert_allclose(s.x, before, atol=1e-12)
     np.testing.assert_allclose(s.mean_v[0], v.mean(axis=0), atol=1e-12)
 
@@ -176,15 +176,15 @@ def test_wheels_find_the_mean_velocity_and_what_slides():
     s.x[:, 0, 3:5] = v[pairs[:, 1]] - v[pairs[:, 0]]
     s.P[..., 3, 3] = s.P[..., 4, 4] = 1e-4
     for _ in range(200):
-        _wheel_kernels.apply_wheels(c, s, layout, 0.0, np.zeros((2, 7)))
+        motion_constraints.apply_motion_constraints(c, s, layout, 0.0, np.zeros((2, 7)))
     np.testing.assert_allclose(s.mean_v[0], v.mean(axis=0), atol=0.01)
     s.P[..., 3, 3] = s.P[..., 4, 4] = 0.04
     s.x[:, 0, 3:5] += [[0.2, 0.1], [-0.1, 0.2], [-0.3, 0.1]]
     for _ in range(200):
-        _wheel_kernels.apply_wheels(c, s, layout, 0.0, np.zeros((2, 7)))
+        motion_constraints.apply_motion_constraints(c, s, layout, 0.0, np.zeros((2, 7)))
     yaw, m = s.nodes["yaw"], s.mean_v[0]
     for i in range(3):
-        r = _wheel_kernels.velocity_in_group(s, layout, 0, i, 3)
+        r = motion_constraints.velocity_in_group(s, layout, 0, i, 3)
         left = -np.sin(yaw[i]) * (m[0] + r[0]) + np.cos(yaw[i]) * (m[1] + r[1])
         assert left == pytest.approx(0.15 * s.nodes["yaw_rate"][i], abs=0.02)
     for p in range(3):
@@ -195,7 +195,7 @@ def test_wheels_are_those_of_cars():
     c, layout, s, _ = team(vehicle="human")
     s.x[:, 0, 3:5] = 1.0
     before = s.x.copy()
-    _wheel_kernels.apply_wheels(c, s, layout, 0.05, np.zeros((2, 7)))
+    motion_constraints.apply_motion_constraints(c, s, layout, 0.05, np.zeros((2, 7)))
     np.testing.assert_array_equal(s.x, before)
 
 
@@ -234,7 +234,7 @@ def test_wheels_leave_a_covariance_beside_a_node_that_just_joined(n):
     s.nodes["yaw"] = np.linspace(0.0, 3.0, n)
     for _ in range(20):
         before = s.P[:, 0].copy()
-        _wheel_kernels.apply_wheels(c, s, layout, 0.0, np.zeros((2, 7)))
+        motion_constraints.apply_motion_constraints(c, s, layout, 0.0, np.zeros((2, 7)))
         after = s.P[:, 0]
         np.testing.assert_array_equal(after, np.swapaxes(after, 1, 2))
         assert np.linalg.eigvalsh(after[:, cols][:, :, cols]).min() > 0.0
@@ -244,12 +244,12 @@ def test_wheels_leave_a_covariance_beside_a_node_that_just_joined(n):
 def test_a_share_is_a_half_where_all_pairs_are_alike():
     for m in (3, 6, 10):
         own = 0.5 / m * (m - 1) * 0.2
-        assert _wheel_kernels.own_share(0.2, own) == 0.5
+        assert motion_constraints.own_share(0.2, own) == 0.5
 
 
 def test_a_share_correlates_no_more_than_fully():
     for pair in (1e-6, 0.1, 1.0, 50.0):
         for own in (1e-9, 1e-3, 0.1, 10.0):
-            share = _wheel_kernels.own_share(pair, own)
+            share = motion_constraints.own_share(pair, own)
             assert 0.0 < share <= 0.5
             assert (share * pair) ** 2 <= pair * own * (1.0 + 1e-12)

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from tracking import Constellation, NodeConfig, Tracker
+from tracking.ahrs.orientation import Orientation, OrientationParams
 from tracking.geometry import rotate
 from tracking.measurements import Kind, MeasurementBlock
-from tracking.orientation import Orientation, OrientationParams
 
 DOCS = Path(__file__).parents[2] / "docs"
 

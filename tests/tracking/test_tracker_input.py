@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from tracking import Constellation, NodeConfig, Tracker
+from tracking.ahrs.orientation import OrientationParams
 from tracking.constellation import Antenna
 from tracking.errors import ConfigError
 from tracking.filters.joint.params import JointParams
 from tracking.filters.pair.params import PairEkfParams
 from tracking.horizon import Horizon, HorizonParams
 from tracking.measurements import Kind, MeasurementBlock
-from tracking.orientation import OrientationParams
 from tracking.vehicles import VehicleParams
 
 GROUP = Constellation(nodes=tuple(NodeConfig(id=k, kind="static") for k in range(4)), dimensions=2)

@@ -6,18 +6,18 @@ import pytest
 from agents.simulate import simulate
 from relpos_env.timing import STAND_STILL
 from tracking import Constellation, NodeConfig, Tracker
-from tracking.filters.joint._linear_kernels import settle
-from tracking.filters.joint._rotation_kernels import follow_rotation
-from tracking.filters.joint._sleep_kernels import wake_turn
-from tracking.filters.joint._start_kernels import add_node
-from tracking.filters.joint._survey_kernels import fuse_survey
-from tracking.filters.joint._turn_kernels import note_turn, spread_turn
-from tracking.filters.joint.alignment import Alignment
 from tracking.filters.joint.coefficients import make_coefficients
+from tracking.filters.joint.heading_gauge import add_rotation_uncertainty, update_heading_variance
+from tracking.filters.joint.hypotheses.alignment import Alignment
+from tracking.filters.joint.hypotheses.initialisation import add_node
+from tracking.filters.joint.hypotheses.static_initialisation import reset_heading_uncertainty
+from tracking.filters.joint.observability import enforce_observability
 from tracking.filters.joint.params import JointParams
-from tracking.filters.joint.scratch import make_scratch
+from tracking.filters.joint.scalar_update import flush_updates
 from tracking.filters.joint.smoothing import with_clones
 from tracking.filters.joint.state import JointState, make_layout, make_state
+from tracking.filters.joint.surveyed_distance import surveyed_distance_update
+from tracking.filters.joint.workspace import make_workspace
 from tracking.filters.records import as_records
 from tracking.geometry import best_rotation
 
@@ -43,15 +43,15 @@ def four(static=(), seed=0, *, dimensions=2):
 
 def room_for(s):
     """Scratch of such a group."""
-    return make_scratch(N, len(s.pairs), len(s.x[0]))
+    return make_workspace(N, len(s.pairs), len(s.x[0]))
 
 
 def turned(s, but=(), *, velocities=True):
     """What a turn of the group by a radian does to the states."""
     D, moving = np.zeros(len(s.x[0])), ~s.nodes["static"]  # noqa: N806
     everybody = np.ones(N, dtype=bool)
-    for name, of, free in (("at_p", everybody, True), ("at_v", moving, moving.all())):
-        if name == "at_v" and not velocities:
+    for name, of, free in (("i_pos", everybody, True), ("i_vel", moving, moving.all())):
+        if name == "i_vel" and not velocities:
             continue
         at = s.nodes[name][of & ~np.isin(np.arange(N), but)]
         value = s.x[0][at[:, None] + np.arange(2)]
@@ -64,27 +64,27 @@ def turned(s, but=(), *, velocities=True):
 def test_no_range_sees_what_is_spread(static):
     c, s, _ = four(static)
     before = s.P[0].copy()
-    spread_turn(c, s, 0, c["rotation_var"])
+    add_rotation_uncertainty(c, s, 0, c["rotation_var"])
     D = turned(s)  # noqa: N806
     np.testing.assert_allclose(s.P[0] - before, c["rotation_var"] * np.outer(D, D), atol=1e-12)
-    at = s.nodes["at_p"]
+    at = s.nodes["i_pos"]
     for i in range(N):
         for j in range(i + 1, N):
             H = np.zeros(len(D))  # noqa: N806
             H[at[j] : at[j] + 2] = s.x[0, at[j] : at[j] + 2] - s.x[0, at[i] : at[i] + 2]
             H[at[i] : at[i] + 2] = -H[at[j] : at[j] + 2]
             assert abs(H @ D) < 1e-12
-    note_turn(c, s)
+    update_heading_variance(c, s)
     A = turned(s, velocities=False)  # noqa: N806
     expected = c["rotation_var"] + 1e-4 / (A @ A)
-    assert s.group["turn_var"][0] == pytest.approx(expected)
+    assert s.group["heading_gauge_var"][0] == pytest.approx(expected)
 
 
 def test_in_space_it_is_spread_about_every_axis():
     c, s, _ = four(dimensions=3)
     before = s.P[0].copy()
-    spread_turn(c, s, 0, 0.1)
-    at = s.nodes["at_p"][:, None] + np.arange(3)
+    add_rotation_uncertainty(c, s, 0, 0.1)
+    at = s.nodes["i_pos"][:, None] + np.arange(3)
     X = s.x[0][at] - s.x[0][at].mean(axis=0)  # noqa: N806
     D = np.cross(np.eye(3)[:, None], X[None]).reshape(3, -1)  # noqa: N806
     spread = (s.P[0] - before)[np.ix_(at.ravel(), at.ravel())]
@@ -94,9 +94,9 @@ def test_in_space_it_is_spread_about_every_axis():
 def test_a_group_that_knows_as_little_anyway_does_not_wake_with_less():
     c, s, _ = four()
     for _ in range(2):
-        wake_turn(c, s, 0, room_for(s))
-        note_turn(c, s)
-        assert s.group["turn_var"][0] == pytest.approx(c["rotation_var"], rel=1e-9)
+        reset_heading_uncertainty(c, s, 0, room_for(s))
+        update_heading_variance(c, s)
+        assert s.group["heading_gauge_var"][0] == pytest.approx(c["rotation_var"], rel=1e-9)
 
 
 def test_the_moment_that_is_smoothed_wakes_with_the_group():
@@ -109,7 +109,7 @@ def test_the_moment_that_is_smoothed_wakes_with_the_group():
     x = twice.x[0]
     source = [x[:own].tolist().index(value) for value in x[own : own + more]]
     before = twice.P[0].copy()
-    spread_turn(c, twice, 0, 0.1)
+    add_rotation_uncertainty(c, twice, 0, 0.1)
     D = np.zeros(c["n"])  # noqa: N806
     D[:own] = turned(s)
     D[own : own + more] = D[source]
@@ -120,10 +120,10 @@ def test_two_nodes_have_no_shape_that_could_turn_with_their_moves():
     """What they were moved by would else add up, and count when a third joins."""
     c, s, _ = four()
     s.nodes["present"][2:] = False
-    s.moved[0] = 1.0
+    s.accumulated_correction[0] = 1.0
     before = s.P[0].copy()
-    follow_rotation(c, s, 0, room_for(s))
-    assert not s.moved.any()
+    enforce_observability(c, s, 0, room_for(s))
+    assert not s.accumulated_correction.any()
     assert np.array_equal(s.P[0], before)
 
 
@@ -131,24 +131,24 @@ def test_surveys_do_not_tell_how_a_group_is_turned():
     """Distances that move the nodes to and fro, as the first after a start do."""
     c, s, _ = four()
     s.x[0, 4 * N :] = 0.0  # no range errs
-    spread_turn(c, s, 0, c["rotation_var"])
+    add_rotation_uncertainty(c, s, 0, c["rotation_var"])
     for node in range(N):
-        at = s.nodes["at_p"][node]
+        at = s.nodes["i_pos"][node]
         s.P[0][at, at], s.P[0][at + 1, at + 1] = (
             s.P[0][at, at] + 0.06,
             s.P[0][at + 1, at + 1] + 0.06,
         )
-    note_turn(c, s)
-    before = s.group["turn_var"][0]
-    scratch = room_for(s)
+    update_heading_variance(c, s)
+    before = s.group["heading_gauge_var"][0]
+    work = room_for(s)
     rng = np.random.default_rng(0)
     for p in np.tile(np.arange(len(s.pairs)), 10):
-        i, j = (s.nodes["at_p"][s.pairs[name][p]] for name in "ij")
+        i, j = (s.nodes["i_pos"][s.pairs[name][p]] for name in "ij")
         way = np.linalg.norm(s.x[0, j : j + 2] - s.x[0, i : i + 2])
-        fuse_survey(c, s, 0, p, way + rng.normal(0.0, 0.1), True, scratch)
-    settle(s, 0)
-    note_turn(c, s)
-    assert s.group["turn_var"][0] > 0.5 * before
+        surveyed_distance_update(c, s, 0, p, way + rng.normal(0.0, 0.1), True, work)
+    flush_updates(s, 0)
+    update_heading_variance(c, s)
+    assert s.group["heading_gauge_var"][0] > 0.5 * before
 
 
 def test_who_joins_turns_with_the_others():
@@ -156,15 +156,15 @@ def test_who_joins_turns_with_the_others():
     c, s, layout = four()
     new, pos = 3, np.array([5.0, -3.0, 0.0])
     s.nodes["present"][new] = False
-    spread_turn(c, s, 0, c["rotation_var"])
-    note_turn(c, s)
-    before = s.group["turn_var"][0]
+    add_rotation_uncertainty(c, s, 0, c["rotation_var"])
+    update_heading_variance(c, s)
+    before = s.group["heading_gauge_var"][0]
     add_node(c, s, layout, 0, new, pos, c["position_var"], 0.0)
     s.nodes["present"][new] = True
-    note_turn(c, s)
-    assert s.group["turn_var"][0] == pytest.approx(before, rel=0.05)
+    update_heading_variance(c, s)
+    assert s.group["heading_gauge_var"][0] == pytest.approx(before, rel=0.05)
     # A range to it, as exact as may be, tells what it is wrong by itself, and nothing of the turn.
-    at = s.nodes["at_p"]
+    at = s.nodes["i_pos"]
     for other in range(3):
         H = np.zeros(len(s.x[0]))  # noqa: N806
         way = s.x[0, at[new] : at[new] + 2] - s.x[0, at[other] : at[other] + 2]
@@ -172,8 +172,8 @@ def test_who_joins_turns_with_the_others():
         H[at[other] : at[other] + 2] = -H[at[new] : at[new] + 2]
         w = s.P[0] @ H
         s.P[0] -= np.outer(w, w) / (H @ w + 1e-6)
-    note_turn(c, s)
-    assert s.group["turn_var"][0] == pytest.approx(before, rel=0.1)
+    update_heading_variance(c, s)
+    assert s.group["heading_gauge_var"][0] == pytest.approx(before, rel=0.1)
     assert np.linalg.eigvalsh(s.P[0]).min() > 0.0
 
 
@@ -183,7 +183,7 @@ def test_a_join_is_as_uncertain_as_centre_and_turn_of_the_others_and_its_own_pla
     s.nodes["present"][new] = False
     A = np.random.default_rng(1).standard_normal(s.P[0].shape)  # noqa: N806
     s.P[0] = A @ A.T
-    at, P = s.nodes["at_p"], s.P[0].copy()  # noqa: N806
+    at, P = s.nodes["i_pos"], s.P[0].copy()  # noqa: N806
     N_others = turned(s, but=[new], velocities=False)  # noqa: N806
     read = N_others / (N_others @ N_others)
     others = np.array([s.x[0, a : a + 2] for a in at[:3]])
@@ -207,11 +207,11 @@ def test_standing_does_not_tell_how_a_group_is_turned():
     tracker.step(log.block.take(t <= STAND_STILL - 0.1), STAND_STILL - 0.1)
     group = tracker.save()["filter"].group[0, 0]
     assert group["alignment"] == Alignment.STATIC
-    assert np.sqrt(group["turn_var"]) > 0.05
+    assert np.sqrt(group["heading_gauge_var"]) > 0.05
     until = STAND_STILL + 2.0
     estimate = tracker.step(log.block.take((t > STAND_STILL - 0.1) & (t <= until)), until)
     truth, _ = log.truth.pairs(log.constellation, np.array([until]))
     R = best_rotation(estimate.pos_ij_w, truth, planar=True)[0]  # noqa: N806
     turn = np.arctan2(R[1, 0], R[0, 0])
-    assert abs(turn) < 4.0 * np.sqrt(tracker.save()["filter"].group["turn_var"][0, 0])
+    assert abs(turn) < 4.0 * np.sqrt(tracker.save()["filter"].group["heading_gauge_var"][0, 0])
     assert abs(turn) < 0.12

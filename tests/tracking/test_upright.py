@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from tracking import Constellation, NodeConfig, Tracker, TrackerParams
+from tracking.ahrs.orientation import Orientation, OrientationParams
 from tracking.filters import FilterParams
 from tracking.filters.joint.params import JointParams
 from tracking.geometry import GRAVITY
@@ -16,7 +17,6 @@ from tracking.measurements import (
     Kind,
     MeasurementBlock,
 )
-from tracking.orientation import Orientation, OrientationParams
 from tracking.vehicles import VEHICLES
 
 FIXED = np.array([[-2.0, -2.0, 0.2], [2.0, -1.5, 2.0], [1.5, 2.0, 0.4], [-1.8, 1.7, 1.9]])

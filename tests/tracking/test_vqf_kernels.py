@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from vqf import VQF
 
-from tracking._gyro_bias_kernels import BIAS
-from tracking._vqf_kernels import run_vqf
+from tracking.ahrs.gyro_bias import BIAS
+from tracking.ahrs.orientation import Orientation, OrientationParams, make_coefficients, make_state
+from tracking.ahrs.vqf import run_vqf
 from tracking.constellation import Constellation, NodeConfig
 from tracking.geometry import GRAVITY, quat_conjugate, rotate
 from tracking.measurements import Kind, MeasurementBlock
-from tracking.orientation import Orientation, OrientationParams, make_coefficients, make_state
 
 NORTH = np.array([0.5, 20.0, -40.0])
 

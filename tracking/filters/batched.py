@@ -10,9 +10,9 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from tracking.arrays import F64
-from tracking.jit import bind
 from tracking.constellation import Constellation
 from tracking.estimate import TeamEstimate
+from tracking.jit import bind
 from tracking.measurements import MeasurementBlock
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from tracking.arrays import Bool
 from tracking.estimate import Status, TeamEstimate
-from tracking.filters._shape_kernels import FEWEST
+from tracking.filters.first_ranges import FEWEST
 from tracking.log.folder import Log
 from tracking.measurements import Kind
 

@@ -1,7 +1,7 @@
 """Kernels of `listening`, `peers` and `exchange`: what a node makes of a message it hears.
 
 They keep the node's own pairs only, and of these the ranges that the node with the smaller
-number resolves; `p`, `s`, `peers`, `me` as in `_turn_kernels`.
+number resolves; `p`, `s`, `peers`, `me` as in `heading_gauge`.
 """
 
 from __future__ import annotations

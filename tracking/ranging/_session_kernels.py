@@ -6,7 +6,7 @@ their errors, tables split over frames, other PANs, duplicate IDs (and so the mu
 clocks that jump, antenna delays that the node knows of, ranges overheard by third nodes and
 those that the node with the larger ID resolves a little later.
 
-`p`, `s`, `peers`, `me` as in `_turn_kernels`.
+`p`, `s`, `peers`, `me` as in `heading_gauge`.
 """
 
 from __future__ import annotations

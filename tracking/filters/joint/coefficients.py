@@ -9,7 +9,7 @@ import numpy as np
 from tracking.arrays import Bool, whole_lines
 from tracking.constellation import Constellation
 from tracking.filters.joint.params import JointParams
-from tracking.filters.joint.supervision_params import AlignmentParams, SupervisionParams
+from tracking.filters.joint.supervision.params import AlignmentParams, SupervisionParams
 from tracking.filters.records import Records
 
 _NUMBERS = (

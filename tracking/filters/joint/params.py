@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from tracking.errors import ConfigError
-from tracking.filters.joint.supervision_params import AlignmentParams, SupervisionParams
+from tracking.filters.joint.supervision.params import AlignmentParams, SupervisionParams
 from tracking.numbers import check_numbers
 from tracking.vehicles import VEHICLES, VehicleParams
 

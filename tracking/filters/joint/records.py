@@ -8,7 +8,7 @@ NODE = np.dtype(
     [
         ("t_pre", "f8"),  # time up to which the inertial samples are summed [s]
         ("t_state", "f8"),  # time of the last STATE event [s]
-        ("t_heard", "f8"),  # time of the last range it took part in [s]
+        ("t_last_range", "f8"),  # time of the last range it took part in [s]
         ("interval", "f8"),  # running mean of the time between two of these [s]
         ("antenna", "i8"),  # with which
         ("cos_yaw", "f8"),  # of the last STATE event, as measured
@@ -19,21 +19,21 @@ NODE = np.dtype(
         ("turning", "f8"),  # running mean of the angular rate [rad/s]
         ("t_first", "f8"),  # its first sample, or the first after a long silence [s]
         ("t_oriented", "f8"),  # since when its orientation goes on without a break [s]
-        ("told", "?"),  # it is told how it is turned upright
-        ("upright0", "f8"),  # by how much so far, about x and y [rad]
-        ("upright1", "f8"),
+        ("has_ahrs_feedback", "?"),  # it is told how it is turned upright
+        ("tilt_correction0", "f8"),  # by how much so far, about x and y [rad]
+        ("tilt_correction1", "f8"),
         ("gyro0", "f8"),  # what is taken for the bias of its gyroscope [rad/s]
         ("gyro1", "f8"),
         ("gyro2", "f8"),
         ("gyro_var", "f8"),  # its variance [(rad/s)^2]
         ("t_moved", "f8"),  # last time it was not at rest [s]
-        ("t_shaken", "f8"),  # last time its acceleration told so [s]
-        ("cut_off", "?"),  # its last acceleration was at the end of the sensor's scale
-        ("astray", "f8"),  # running share of its ranges that do not fit [-]
-        ("t_doubted", "f8"),  # when it last disagreed with the group [s]
-        ("doubted", "?"),  # it has, lately
+        ("t_accelerated", "f8"),  # last time its acceleration told so [s]
+        ("saturated", "?"),  # its last acceleration was at the end of the sensor's scale
+        ("outlier_ratio", "f8"),  # running share of its ranges that do not fit [-]
+        ("t_faulty", "f8"),  # when it last disagreed with the group [s]
+        ("faulty", "?"),  # it has, lately
         ("has_state", "?"),
-        ("heard", "?"),
+        ("seen", "?"),
         ("present", "?"),
         ("static", "?"),  # constant from here on
         ("levelled", "?"),
@@ -60,12 +60,12 @@ NODE = np.dtype(
         ("sideways_var", "f8"),  # 0 for what may move sideways
         ("rear_axle", "f8"),
         ("slip", "f8"),
-        ("at_p", "i8"),  # first state of its position
-        ("at_v", "i8"),  # of its velocity; -1 for static nodes, like the next two
-        ("at_b", "i8"),
-        ("at_o", "i8"),  # of the offset of its accelerometer; -1 for none
-        ("at_h", "i8"),
-        ("at_g", "i8"),  # of what the bias of its gyroscope is off; -1 for none
+        ("i_pos", "i8"),  # first state of its position
+        ("i_vel", "i8"),  # of its velocity; -1 for static nodes, like the next two
+        ("i_tilt_bias", "i8"),
+        ("i_acc_bias", "i8"),  # of the offset of its accelerometer; -1 for none
+        ("i_heading", "i8"),
+        ("i_gyro_bias", "i8"),  # of what the bias of its gyroscope is off; -1 for none
     ]
 )
 PAIR = np.dtype(
@@ -74,27 +74,27 @@ PAIR = np.dtype(
         ("t_used", "f8"),  # time of the last range that counted [s]
         ("interval", "f8"),  # running mean of the time between two ranges [s]
         ("nis", "f8"),  # NIS of the last range in the best hypothesis [-]
-        ("misfit", "f8"),  # running mean of it [-]
-        ("last", "f8"),  # its last range as reported [m]
+        ("mean_nis", "f8"),  # running mean of it [-]
+        ("last_range", "f8"),  # its last range as reported [m]
         ("t_last", "f8"),  # when it came [s]
-        ("n_same", "i8"),  # ranges before it that were equal
-        ("way", "f8"),  # what both ends travelled meanwhile [m]
-        ("residual", "f8"),  # running mean of its innovations [m]
-        ("beyond", "f8"),  # the same, single ones counting as 1 m off at most [m]
-        ("scatter", "f8"),  # running mean of their distance from it [m]
+        ("n_equal", "i8"),  # ranges before it that were equal
+        ("distance_travelled", "f8"),  # what both ends travelled meanwhile [m]
+        ("mean_residual", "f8"),  # running mean of its innovations [m]
+        ("clipped_mean_residual", "f8"),  # the same, single ones counting as 1 m off at most [m]
+        ("mean_abs_residual", "f8"),  # running mean of their distance from it [m]
         ("last_used", "f8"),  # its last range that was used [m]
-        ("jumps", "f8"),  # running mean of what they change faster than things move [m]
+        ("rate_violation", "f8"),  # running mean of what they change faster than things move [m]
         ("start_r", "f8", (8,)),  # newest ranges of a pair not started, a ring [m]
         ("start_t", "f8", (8,)),  # their times [s]
         ("start_n", "i8"),  # how many came
         ("t_start", "f8"),  # when the first came [s]
         ("surveyed", "f8"),  # surveyed distance [m]; 0 for none
-        ("start_sight", "f8"),  # what their powers say: log-likelihood ratio of no sight
+        ("start_nlos_llr", "f8"),  # what their powers say: log-likelihood ratio of no sight
         ("n_ranges", "i8"),
         ("n_rejected", "i8"),  # ranges that hardly counted
         ("i", "i8"),  # constant: node indices, i < j
         ("j", "i8"),
-        ("at_e", "i8"),  # constant: first state of its range error, -1 for none
+        ("i_range_error", "i8"),  # constant: first state of its range error, -1 for none
     ]
 )
 GROUP = np.dtype(
@@ -104,15 +104,21 @@ GROUP = np.dtype(
         ("n_alive", "i8"),
         ("best", "i8"),
         ("t", "f8"),  # time of the states [s]
-        ("t_open", "f8"),  # since when other turns are looked for [s]
+        ("t_alignment", "f8"),  # since when other turns are looked for [s]
         ("t_check", "f8"),
-        ("t_carrier", "f8"),
+        ("t_constraints", "f8"),
         ("t_gauge", "f8"),
-        ("t_patient", "f8"),  # until when nothing speaks for or against a hypothesis [s]
-        ("turn_var", "f8"),  # of the turn of a group in the plane, lately; 0 in space [rad2]
-        ("misfit", "f8"),  # running mean of NIS of ranges that mean anything, not of doubted nodes
-        ("strain", "f8"),  # slow running mean of the misfit [-]
-        ("strain_limit", "f8"),  # how much of it brings up other rotations [-]
+        ("t_scoring_starts", "f8"),  # until when nothing speaks for or against a hypothesis [s]
+        (
+            "heading_gauge_var",
+            "f8",
+        ),  # of the turn of a group in the plane, lately; 0 in space [rad2]
+        (
+            "mean_nis",
+            "f8",
+        ),  # running mean of NIS of ranges that mean anything, not of doubted nodes
+        ("slow_nis", "f8"),  # slow running mean of the misfit [-]
+        ("challenge_nis", "f8"),  # how much of it brings up other rotations [-]
         ("nis_sum", "f8"),
         ("nis_n", "i8"),
     ]

@@ -17,7 +17,7 @@ import numpy as np
 
 from tracking.arrays import F64, aligned, whole_lines
 from tracking.estimate import Status, TeamEstimate
-from tracking.filters.joint.alignment import Alignment
+from tracking.filters.joint.hypotheses.alignment import Alignment
 from tracking.filters.joint.state import JointState, room_to_wait
 from tracking.filters.records import Records
 
@@ -47,23 +47,23 @@ def with_clones(state: JointState, coefficients: Records) -> tuple[JointState, R
     wider["n"] = width
     clones = JointState(
         nodes=state.nodes.copy(),
-        held=state.held.copy(),
-        pre=state.pre.copy(),
+        last_attitude_accel=state.last_attitude_accel.copy(),
+        preintegrated=state.preintegrated.copy(),
         pairs=state.pairs.copy(),
         group=group,
         x=aligned(len(envs), 1, width),
         P=aligned(len(envs), 1, width, width),
-        waiting=aligned(len(envs), 1, room_to_wait(width), width),
-        n_waiting=np.zeros((len(envs), 1), dtype=np.int64),
-        moved=aligned(len(envs), 1, width),
+        pending_updates=aligned(len(envs), 1, room_to_wait(width), width),
+        n_pending=np.zeros((len(envs), 1), dtype=np.int64),
+        accumulated_correction=aligned(len(envs), 1, width),
         nlos=state.nlos[envs, best][:, None].copy(),
-        stays=state.stays[envs, best][:, None].copy(),
+        bias_retention=state.bias_retention[envs, best][:, None].copy(),
         alive=state.alive[envs, best][:, None].copy(),
         loglik=np.zeros((len(envs), 1)),
-        slope=np.zeros((len(envs), 1, 0, width)),
-        score=np.zeros((len(envs), 1, 0)),
-        information=np.zeros((len(envs), 1, 0, 0)),
-        spread=np.zeros((len(envs), 1, 0, 0)),
+        sensitivity=np.zeros((len(envs), 1, 0, width)),
+        alignment_score=np.zeros((len(envs), 1, 0)),
+        alignment_information=np.zeros((len(envs), 1, 0, 0)),
+        alignment_cov=np.zeros((len(envs), 1, 0, 0)),
     )
     used = len(every)
     clones.x[:, 0, :used] = state.x[envs, best][:, every]
@@ -83,17 +83,17 @@ def read_clones(clones: JointState, estimate: TeamEstimate, n_states: int) -> Te
     """
     constellation, nodes = estimate.constellation, clones.nodes[0]
     d = constellation.dimensions
-    x, W = clones.x[:, 0, n_states:], clones.waiting[:, 0, :, n_states:]  # noqa: N806
-    waits = np.arange(W.shape[1]) < clones.n_waiting
+    x, W = clones.x[:, 0, n_states:], clones.pending_updates[:, 0, :, n_states:]  # noqa: N806
+    waits = np.arange(W.shape[1]) < clones.n_pending
     W = np.where(waits[..., None], W, 0.0)  # noqa: N806
     P = clones.P[:, 0, n_states:, n_states:] - np.swapaxes(W, -1, -2) @ W  # noqa: N806
     take = np.zeros((constellation.n_pairs, 6, x.shape[1]))
     for p, (i, j) in enumerate(constellation.pairs):
         for k in range(d):
             for node, sign in ((j, 1.0), (i, -1.0)):
-                take[p, k, nodes["at_p"][node] + k] = sign
-                if nodes["at_v"][node] >= 0:
-                    take[p, 3 + k, nodes["at_v"][node] + k] = sign
+                take[p, k, nodes["i_pos"][node] + k] = sign
+                if nodes["i_vel"][node] >= 0:
+                    take[p, 3 + k, nodes["i_vel"][node] + k] = sign
     relative: F64 = np.einsum("pkc,ec->epk", take, x)
     cov = take @ P[:, None] @ np.swapaxes(take, -1, -2)
     cov = 0.5 * (cov + np.swapaxes(cov, -1, -2))

@@ -30,10 +30,10 @@ from tracking.filters.joint.coefficients import (
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.records import GROUP, NODE, PAIR
 from tracking.filters.records import Records
-from tracking.filters.rotations import starting_rotations
+from tracking.maths.starting_rotations import starting_rotations
 
 N_PRE = 39
-"""Columns of `JointState.pre`."""
+"""Columns of `JointState.preintegrated`."""
 
 
 class JointState(NamedTuple):
@@ -41,15 +41,15 @@ class JointState(NamedTuple):
 
     nodes: Records
     """NODE, (env, node)."""
-    held: F64
+    last_attitude_accel: F64
     """q_wb and accel_w [m/s2] of the last STATE event, the acceleration levelled where the
     carrier stays level, (env, node, 7)."""
-    pre: F64
+    preintegrated: F64
     """Sums over inertial samples since the states' time, (env, node, N_PRE): time [s]; velocity
     and way that they add [m/s, m]; cosine and sine that turn a bias, summed once and twice;
     square of the acceleration [m2/s3]; the orientation, row by row, summed once and twice, of nodes
     whose accelerometer has an offset; of these the bias that they gain as they are turned upright
-    [m/s2], and what is told of their gyroscopes (`_gyroscope_kernels`)."""
+    [m/s2], and what is told of their gyroscopes (`gyro_bias`)."""
     pairs: Records
     """PAIR, (env, pair)."""
     group: Records
@@ -58,29 +58,29 @@ class JointState(NamedTuple):
     """States, (env, hyp, state)."""
     P: F64
     """Covariance, (env, hyp, state, state), before what waits is taken off."""
-    waiting: F64
+    pending_updates: F64
     """Corrections that wait, ``P - W^T W`` is the covariance, (env, hyp, correction, state)."""
-    n_waiting: I64
+    n_pending: I64
     """How many do, (env, hyp)."""
-    moved: F64
+    accumulated_correction: F64
     """How far measurements moved the states since P last followed, (env, hyp, state)."""
     nlos: F64
     """Probability that a pair has no line of sight, (env, hyp, pair)."""
-    stays: F64
+    bias_retention: F64
     """How much of the slow range error of a pair is still what it was at the states' time; the
     rest is forgotten when they are carried on, (env, hyp, pair)."""
     alive: Bool
     """True for hypotheses still considered, (env, hyp)."""
     loglik: F64
     """Log-likelihood of the measurements, (env, hyp)."""
-    slope: F64
-    """In space, while it is open how the group is turned (`_open_kernels`): derivatives of the
-    states by the elements of the turn, (env, hyp, 9, state); the next three as well."""
-    score: F64
+    sensitivity: F64
+    """In space, while the rotation of the group is unknown (`alignment_sensitivity`): derivatives
+    of the states by the elements of the turn, (env, hyp, 9, state); the next three as well."""
+    alignment_score: F64
     """Derivatives of the log-likelihood by them, (env, hyp, 9)."""
-    information: F64
+    alignment_information: F64
     """Its negative second derivatives, (env, hyp, 9, 9)."""
-    spread: F64
+    alignment_cov: F64
     """How uncertain the elements are, each by itself, (env, hyp, 9, 9)."""
 
 
@@ -154,12 +154,12 @@ def make_state(
             "sideways_var": (carrier.sideways_std or 0.0) ** 2,
             "rear_axle": carrier.rear_axle,
             "slip": carrier.slip,
-            "at_p": at,
-            "at_v": -1 if static else at + d,
-            "at_b": -1 if static else fades,
-            "at_o": fades + d if offset else -1,
-            "at_h": -1 if static else fades + d + 3 * offset,
-            "at_g": fades + d + 4 if offset else -1,
+            "i_pos": at,
+            "i_vel": -1 if static else at + d,
+            "i_tilt_bias": -1 if static else fades,
+            "i_acc_bias": fades + d if offset else -1,
+            "i_heading": -1 if static else fades + d + 3 * offset,
+            "i_gyro_bias": fades + d + 4 if offset else -1,
         }
         for name, value in constants.items():
             nodes[name][:, k] = value
@@ -167,10 +167,10 @@ def make_state(
         fades += 0 if static else d + 1 + 6 * offset
     pairs = np.zeros((n_envs, p), dtype=PAIR)
     pairs["i"], pairs["j"] = constellation.pairs.T
-    pairs["at_e"] = -1
+    pairs["i_range_error"] = -1
     if has_range_errors(constellation, params):
         for pair in np.nonzero(moving_pairs(constellation))[0]:
-            pairs["at_e"][:, pair] = fades
+            pairs["i_range_error"][:, pair] = fades
             fades += 2
     held = np.zeros((n_envs, n, 7))
     held[..., 0] = 1.0
@@ -178,21 +178,21 @@ def make_state(
     P[..., np.arange(n_states), np.arange(n_states)] = 1.0
     return JointState(
         nodes=nodes,
-        held=held,
-        pre=np.zeros((n_envs, n, N_PRE)),
+        last_attitude_accel=held,
+        preintegrated=np.zeros((n_envs, n, N_PRE)),
         pairs=pairs,
         group=np.zeros((n_envs, 1), dtype=GROUP),
         x=aligned(n_envs, n_hyps, n_states),
         P=P,
-        waiting=aligned(n_envs, n_hyps, room_to_wait(n_states), n_states),
-        n_waiting=np.zeros((n_envs, n_hyps), dtype=np.int64),
-        moved=aligned(n_envs, n_hyps, n_states),
+        pending_updates=aligned(n_envs, n_hyps, room_to_wait(n_states), n_states),
+        n_pending=np.zeros((n_envs, n_hyps), dtype=np.int64),
+        accumulated_correction=aligned(n_envs, n_hyps, n_states),
         nlos=np.zeros((n_envs, n_hyps, p)),
-        stays=np.ones((n_envs, n_hyps, p)),
+        bias_retention=np.ones((n_envs, n_hyps, p)),
         alive=np.zeros((n_envs, n_hyps), dtype=bool),
         loglik=np.zeros((n_envs, n_hyps)),
-        slope=np.zeros((n_envs, n_hyps, open_elements(d), n_states)),
-        score=np.zeros((n_envs, n_hyps, open_elements(d))),
-        information=np.zeros((n_envs, n_hyps, open_elements(d), open_elements(d))),
-        spread=np.zeros((n_envs, n_hyps, open_elements(d), open_elements(d))),
+        sensitivity=np.zeros((n_envs, n_hyps, open_elements(d), n_states)),
+        alignment_score=np.zeros((n_envs, n_hyps, open_elements(d))),
+        alignment_information=np.zeros((n_envs, n_hyps, open_elements(d), open_elements(d))),
+        alignment_cov=np.zeros((n_envs, n_hyps, open_elements(d), open_elements(d))),
     )

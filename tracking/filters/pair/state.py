@@ -16,7 +16,7 @@ from tracking.arrays import F64, I64, Bool
 from tracking.constellation import Constellation
 from tracking.filters.pair.params import PairEkfParams
 from tracking.filters.records import Records
-from tracking.filters.rotations import starting_rotations
+from tracking.maths.starting_rotations import starting_rotations
 from tracking.vehicles import VEHICLES
 
 SPEED_MODELS = {"none": 0, "range-rate": 1, "speed-norm": 2}
@@ -24,9 +24,9 @@ SPEED_MODELS = {"none": 0, "range-rate": 1, "speed-norm": 2}
 NODE = np.dtype(
     [
         ("t_state", "f8"),  # time of the last STATE event [s]
-        ("t_heard", "f8"),  # time of the last range it took part in [s]
+        ("t_last_range", "f8"),  # time of the last range it took part in [s]
         ("has_state", "?"),  # after the first STATE event
-        ("heard", "?"),  # after the first range
+        ("seen", "?"),  # after the first range
         ("present", "?"),  # in the group, with filters
         ("static", "?"),  # constant: never moves
         ("levelled", "?"),  # constant: its carrier stays level

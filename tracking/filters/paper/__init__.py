@@ -1,6 +1,6 @@
 """The algorithm of the paper as its text has it."""
 
-from tracking.filters.paper.paper_ekf import PaperEkf
+from tracking.filters.paper.filter import PaperEkf
 from tracking.filters.paper.params import PaperParams
 
 __all__ = ["PaperEkf", "PaperParams"]

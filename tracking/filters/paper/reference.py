@@ -39,7 +39,7 @@ class PaperReference:
         self.group, self.c, self.d = constellation, params, constellation.dimensions
         n = constellation.n_nodes
         self.u = [np.concatenate([np.zeros(3), [1.0, 0.0, 0.0, 0.0]]) for _ in range(n)]
-        self.t_imu, self.t_heard = np.full(n, -np.inf), np.full(n, -np.inf)
+        self.t_imu, self.t_last_range = np.full(n, -np.inf), np.full(n, -np.inf)
         self.present: list[int] = []
         self.filters: dict[tuple[int, int], PairFilter] = {}
         self.first: dict[tuple[int, int], tuple[list[float], list[F64]]] = {}
@@ -89,9 +89,9 @@ class PaperReference:
 
     def take_range(self, i: int, j: int, t: float, distance: float, is_survey: bool) -> None:
         """Correct the pair's filter, or collect its first k measurements."""
-        for node in np.nonzero(t - self.t_heard > self.c.leave_after)[0]:
+        for node in np.nonzero(t - self.t_last_range > self.c.leave_after)[0]:
             self.remove(int(node))
-        self.t_heard[i] = self.t_heard[j] = t
+        self.t_last_range[i] = self.t_last_range[j] = t
         if is_survey:
             self.surveyed[i, j] = distance
         if (i, j) not in self.filters:

@@ -14,7 +14,7 @@ from tracking.filters.records import Records
 NODE = np.dtype(
     [
         ("t_imu", "f8"),  # time of the last STATE event [s]; -inf before the first
-        ("t_heard", "f8"),  # time of the last range [s]; -inf before the first
+        ("t_last_range", "f8"),  # time of the last range [s]; -inf before the first
         ("present", "?"),  # has filters
         ("static", "?"),  # constant
     ]
@@ -119,7 +119,7 @@ def make_state(constellation: Constellation, n_envs: int) -> PaperState:
     """The state before any measurement."""
     n, p = constellation.n_nodes, constellation.n_pairs
     nodes = np.zeros((n_envs, n), dtype=NODE)
-    nodes["t_imu"] = nodes["t_heard"] = -np.inf
+    nodes["t_imu"] = nodes["t_last_range"] = -np.inf
     nodes["static"] = constellation.is_static
     control = np.zeros((n_envs, n, 7))
     control[..., 3] = 1.0

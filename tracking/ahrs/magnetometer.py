@@ -1,0 +1,153 @@
+"""The heading by the magnetometer, and when not to believe it, [1] sec. 3.3 and 3.6.
+
+The field, turned to the world by the orientation without a magnetometer, should point north: the
+heading that is missing, delta, is a first-order low pass of the angle between. Where length or
+dip of the field differ from those that are known, the field is disturbed: for a minute nothing
+is corrected, then half as fast. A new field is accepted once it has lasted while the sensor
+turned.
+
+References:
+    [1] Laidig, Seel, VQF, Information Fusion 91 (2023) 187.
+"""
+
+from __future__ import annotations
+
+import math
+
+from tracking.ahrs.lowpass import low_pass
+from tracking.jit import small_kernel
+
+FIELD_TAU = 0.05
+"""[s] Low pass of length and dip."""
+REFERENCE_TAU = 20.0
+"""[s] Time constant with which what is known of the field follows."""
+MAX_NORM_CHANGE = 0.1
+"""[-] Relative difference in length of a field that is not disturbed."""
+MAX_DIP_CHANGE = math.radians(10.0)
+"""[rad] The same of the dip."""
+NEW_AFTER, FIRST_AFTER = 20.0, 5.0
+"""[s] A new field is accepted after so much turning; the first one."""
+MIN_TURN = math.radians(20.0)
+"""[rad/s] What counts as turning."""
+UNDISTURBED_AFTER = 0.5
+"""[s] So long the field must be as known before it is believed again."""
+MAX_REJECTION = 60.0
+"""[s] So long a disturbed field is left out; twice as much undisturbed time makes up for it."""
+REJECTION_FACTOR = 2.0
+"""[-] How much slower the heading follows a field that stays disturbed."""
+
+DELTA, COS, SIN, GAIN, DISTURBED, REJECTED_T, UNDISTURBED_T = 0, 1, 2, 3, 4, 5, 6
+NORM, DIP, NEW_NORM, NEW_DIP, NEW_T, COUNT, FIELD = 7, 8, 9, 10, 11, 12, 13
+N_MAGNETIC = 19
+"""Columns of the memory: delta [rad], cosine and sine of its half; least gain of the next reading,
+which starts as a mean; 1 in a disturbed field; how long it was left out and how long it was
+undisturbed [s]; length and dip [rad] of the known field, then of the candidate for a new one,
+and how long the sensor turned in that [s]; number of readings; low pass of length and dip."""
+
+
+@small_kernel
+def start_magnetic(magnetic, e, n):
+    """Before any reading: no field is known, and the first ones are believed as they are."""
+    for k in range(N_MAGNETIC):
+        magnetic[e, n, k] = 0.0
+    magnetic[e, n, COS] = magnetic[e, n, GAIN] = magnetic[e, n, DISTURBED] = 1.0
+    magnetic[e, n, REJECTED_T] = MAX_REJECTION
+    magnetic[e, n, NEW_NORM] = -1.0
+
+
+@small_kernel
+def is_near(norm, dip, known_norm, known_dip):
+    """Whether a field is the one that is known."""
+    near = abs(norm - known_norm) < MAX_NORM_CHANGE * known_norm
+    return near and abs(dip - known_dip) < MAX_DIP_CHANGE
+
+
+@small_kernel
+def watch_field(magnetic, c, e, n, norm, dip, rate):
+    """Judge whether the field is disturbed.
+
+    Args:
+        magnetic: Memory, updated.
+        c: OrientationCoefficients.
+        e: Environment.
+        n: Node.
+        norm: Length of the field, in any unit.
+        dip: Its angle below the horizon [rad].
+        rate: Low-passed turn rate [rad/s].
+    """
+    dt, gain = c.mag_dt[n], c.reference_gain[n]
+    magnetic[e, n, COUNT] += 1.0
+    magnetic[e, n, FIELD], magnetic[e, n, FIELD + 1] = norm, dip
+    low_pass(magnetic, e, n, FIELD, 2, magnetic[e, n, COUNT], c.field_pass, n)
+    norm, dip = magnetic[e, n, FIELD], magnetic[e, n, FIELD + 1]
+    if is_near(norm, dip, magnetic[e, n, NORM], magnetic[e, n, DIP]):
+        magnetic[e, n, UNDISTURBED_T] += dt
+        if magnetic[e, n, UNDISTURBED_T] >= UNDISTURBED_AFTER:
+            magnetic[e, n, DISTURBED] = 0.0
+            magnetic[e, n, NORM] += gain * (norm - magnetic[e, n, NORM])
+            magnetic[e, n, DIP] += gain * (dip - magnetic[e, n, DIP])
+    else:
+        magnetic[e, n, UNDISTURBED_T] = 0.0
+        magnetic[e, n, DISTURBED] = 1.0
+    if is_near(norm, dip, magnetic[e, n, NEW_NORM], magnetic[e, n, NEW_DIP]):
+        if rate >= MIN_TURN:
+            magnetic[e, n, NEW_T] += dt
+        magnetic[e, n, NEW_NORM] += gain * (norm - magnetic[e, n, NEW_NORM])
+        magnetic[e, n, NEW_DIP] += gain * (dip - magnetic[e, n, NEW_DIP])
+        needed = FIRST_AFTER if magnetic[e, n, NORM] == 0.0 else NEW_AFTER
+        if magnetic[e, n, DISTURBED] != 0.0 and magnetic[e, n, NEW_T] >= needed:
+            magnetic[e, n, NORM] = magnetic[e, n, NEW_NORM]
+            magnetic[e, n, DIP] = magnetic[e, n, NEW_DIP]
+            magnetic[e, n, DISTURBED] = 0.0
+            magnetic[e, n, UNDISTURBED_T] = UNDISTURBED_AFTER
+    else:
+        magnetic[e, n, NEW_T] = 0.0
+        magnetic[e, n, NEW_NORM], magnetic[e, n, NEW_DIP] = norm, dip
+
+
+@small_kernel
+def wrapped(angle):
+    """An angle within -3 pi to 3 pi brought to -pi to pi."""
+    if angle > math.pi:
+        angle -= 2.0 * math.pi
+    elif angle < -math.pi:
+        angle += 2.0 * math.pi
+    return angle
+
+
+@small_kernel
+def correct_heading(magnetic, c, e, n, mx, my, mz, rate):
+    """Take a field that the 6D orientation turned to the world.
+
+    Args:
+        magnetic: Memory, updated.
+        c: OrientationCoefficients.
+        e: Environment.
+        n: Node.
+        mx: Field, not all zero, in any unit.
+        my: Likewise.
+        mz: Likewise, up.
+        rate: Low-passed turn rate [rad/s].
+    """
+    norm = math.sqrt(mx * mx + my * my + mz * mz)
+    watch_field(magnetic, c, e, n, norm, -math.asin(min(max(mz / norm, -1.0), 1.0)), rate)
+    angle = wrapped(math.atan2(mx, my) - magnetic[e, n, DELTA])
+    gain, dt = c.mag_gain[n], c.mag_dt[n]
+    if magnetic[e, n, DISTURBED] == 0.0:
+        magnetic[e, n, REJECTED_T] = max(magnetic[e, n, REJECTED_T] - REJECTION_FACTOR * dt, 0.0)
+    elif magnetic[e, n, REJECTED_T] <= MAX_REJECTION:
+        magnetic[e, n, REJECTED_T] += dt
+        gain = 0.0
+    else:
+        gain /= REJECTION_FACTOR
+    # The first readings are averaged, whatever the field: 1, 1/2, 1/3, ...
+    least = magnetic[e, n, GAIN]
+    if least != 0.0:
+        gain = max(gain, least)
+        least /= least + 1.0
+        magnetic[e, n, GAIN] = 0.0 if least * c.tau_mag[n] < dt else least
+    delta = wrapped(magnetic[e, n, DELTA] + gain * angle)
+    if gain != 0.0:
+        magnetic[e, n, DELTA] = delta
+        magnetic[e, n, COS] = math.cos(0.5 * delta)
+        magnetic[e, n, SIN] = math.sin(0.5 * delta)

@@ -1,0 +1,204 @@
+"""The arrays of the orientation stage: what evolves, and what is derived once.
+
+Every array of the state has the axes env and node first, so a slice of environments is a slice
+of each (`OrientationState.of`). The kernels write the arrays in place.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from tracking.ahrs.gyro_bias import N_BIAS
+from tracking.ahrs.lowpass import N_LOW_PASS
+from tracking.ahrs.magnetometer import FIELD_TAU, N_MAGNETIC, REFERENCE_TAU
+from tracking.ahrs.rest import N_REST, REST_TAU
+from tracking.ahrs.stage import N_NODE, forget
+from tracking.ahrs.vqf import N_TILT
+from tracking.arrays import F64, Bool
+from tracking.constellation import Constellation
+from tracking.geometry import GRAVITY
+from tracking.numbers import check_numbers
+from tracking.sanity.imu import N_HEALTH
+from tracking.sanity.saturation import N_LIMIT
+from tracking.vehicles import VEHICLES
+
+VQF_TAU_ACC = 3.0
+"""[s] VQF's accelerometer time constant."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OrientationParams:
+    """What the orientation stage believes."""
+
+    tau_acc: float = VQF_TAU_ACC
+    """[s] VQF's accelerometer time constant. Longer trusts the gyroscope more. VQF default."""
+    tau_mag: float = 9.0
+    """[s] VQF's magnetometer time constant. VQF default."""
+    rest_rate: float = math.radians(4.0)
+    """[rad/s] A gyroscope that reads within this of its own low pass for 1.5 s, as the
+    accelerometer does within 0.5 m/s2, is at rest. VQF's 2 deg/s are passed by the noise alone of
+    `isas_walk1`, 0.5 to 0.8 deg/s along each axis, so that its bias was never learned."""
+    max_gap: float = 0.5
+    """[s] Missing samples up to here are filled by interpolation, so that the gyroscope is
+    integrated over them. After a longer silence the orientation is found anew, where there is a
+    magnetometer; elsewhere it goes on from where it was."""
+    gravity_tau: float = 0.5
+    """[s] Time constant with which a node at rest learns the length of gravity that its own
+    accelerometer reads, which removes the vertical part of its offset."""
+
+    def __post_init__(self) -> None:
+        check_numbers(self)
+
+
+class OrientationCoefficients(NamedTuple):
+    """Constants derived once from `OrientationParams` and the constellation, (node, ...)."""
+
+    dt: F64
+    """Interval of the IMU, (node) [s]."""
+    rate: F64
+    """Its inverse, (node) [Hz]."""
+    mag_dt: F64
+    """Interval of the magnetometer, (node) [s]."""
+    tilt_pass: F64
+    """Low pass of the specific force in the frame of the gyroscope, (node, N_LOW_PASS)."""
+    rest_pass: F64
+    """Low passes of the rest detection, (node, N_LOW_PASS)."""
+    field_pass: F64
+    """Low pass of length and dip of the field, (node, N_LOW_PASS)."""
+    mag_gain: F64
+    """Share of a heading error that one magnetometer reading corrects, (node)."""
+    tau_mag: F64
+    """Time constant behind it, (node) [s]."""
+    reference_gain: F64
+    """Share by which a reading moves what is known of the field, (node)."""
+    rest_rate: F64
+    """`OrientationParams.rest_rate`, (node) [rad/s]."""
+    drift_var: F64
+    """What the variance of a gyroscope's bias gains per sample, (node) [(0.01 deg/s)^2]."""
+    rest_var: F64
+    """Variance of the bias read at rest, (node) [(0.01 deg/s)^2]."""
+    motion_var: F64
+    """The same in motion, horizontal, (node)."""
+    vertical_var: F64
+    """The same about the vertical, (node)."""
+    gravity_gain: F64
+    """Share by which a sample at rest moves the length of gravity, (node)."""
+    max_gap: F64
+    """`OrientationParams.max_gap`, (node) [s]."""
+    heading: F64
+    """Yaw of the body at the first sample, without magnetometer, (node) [rad]."""
+    magnetic: Bool
+    """True where the heading comes from the magnetometer, (node)."""
+
+
+class OrientationState(NamedTuple):
+    """Everything that evolves; the columns are named in the kernels' modules."""
+
+    node: F64
+    """What a node remembers beside its VQF, (env, node, N_NODE)."""
+    health: F64
+    """Memory of `imu`, (env, node, N_HEALTH)."""
+    limits: F64
+    """Memory of `saturation`, (env, node, N_LIMIT)."""
+    tilt: F64
+    """Rotations of VQF, (env, node, N_TILT)."""
+    rest: F64
+    """Its rest detection, (env, node, N_REST)."""
+    bias: F64
+    """Its bias of the gyroscope, (env, node, N_BIAS)."""
+    magnetic: F64
+    """Its heading correction, (env, node, N_MAGNETIC)."""
+
+    def of(self, envs: slice) -> OrientationState:
+        """Some environments, as views."""
+        return OrientationState(*(array[envs] for array in self))
+
+    def copy(self) -> OrientationState:
+        """A copy that shares nothing."""
+        return OrientationState(*(array.copy() for array in self))
+
+
+def make_state(n_envs: int, n_nodes: int) -> OrientationState:
+    """The state before any measurement."""
+    columns = (N_NODE, N_HEALTH, N_LIMIT, N_TILT, N_REST, N_BIAS, N_MAGNETIC)
+    state = OrientationState(*(np.zeros((n_envs, n_nodes, n)) for n in columns))
+    forget(state, GRAVITY)
+    return state
+
+
+def make_coefficients(
+    constellation: Constellation, params: OrientationParams, *, follows_bias: bool = False
+) -> OrientationCoefficients:
+    """Derive the constants of the kernels.
+
+    Args:
+        constellation: The nodes.
+        params: What is believed.
+        follows_bias: As of `Filter.follows_bias`.
+
+    The noises of the gyroscope's bias are the defaults of VQF: a drift of 0.1 deg/s in 100 s,
+    and steady states of 0.1 deg/s in motion and 0.03 deg/s at rest. In motion a bias is told by
+    corrections of the tilt, which come later the longer the time constant of the accelerometer
+    is. What follows them as fast all the same swings, by tilts of 5 to 10 degrees at 30 s: so the
+    variance of what they tell is in proportion to the square of that time constant.
+    """
+    nodes = constellation.nodes
+    dt = np.array([1.0 / node.imu_hz for node in nodes])
+    mag_dt = np.array([1.0 / (node.mag_hz or node.imu_hz) for node in nodes])
+    vehicles = [VEHICLES[node.vehicle] for node in nodes]
+    with_bias = [v.ahrs_accel_tau_with_bias if follows_bias else None for v in vehicles]
+    tau_acc = np.array(
+        [b or v.ahrs_accel_tau or params.tau_acc for b, v in zip(with_bias, vehicles, strict=True)]
+    )
+    drift_var = 10.0**2 * dt / 100.0
+    motion_sigma2 = 10.0**2 * tau_acc / VQF_TAU_ACC
+    motion_var = motion_sigma2**2 / drift_var + motion_sigma2
+    return OrientationCoefficients(
+        dt=dt,
+        rate=np.array([node.imu_hz for node in nodes], dtype=np.float64),
+        mag_dt=mag_dt,
+        tilt_pass=np.array([low_pass_of(*pair) for pair in zip(tau_acc, dt, strict=True)]),
+        rest_pass=np.array([low_pass_of(REST_TAU, each) for each in dt]),
+        field_pass=np.array([low_pass_of(FIELD_TAU, each) for each in mag_dt]),
+        mag_gain=1.0 - np.exp(-mag_dt / params.tau_mag),
+        tau_mag=np.full(len(nodes), params.tau_mag),
+        reference_gain=1.0 - np.exp(-mag_dt / REFERENCE_TAU),
+        rest_rate=np.full(len(nodes), params.rest_rate),
+        drift_var=drift_var,
+        rest_var=3.0**4 / drift_var + 3.0**2,
+        motion_var=motion_var,
+        vertical_var=motion_var / 1e-4,
+        gravity_gain=dt / params.gravity_tau,
+        max_gap=np.full(len(nodes), params.max_gap),
+        heading=np.array([node.initial_heading or 0.0 for node in nodes]),
+        magnetic=np.full(len(nodes), constellation.heading == "magnetic"),
+    )
+
+
+def low_pass_of(tau: float, dt: float) -> F64:
+    """Coefficients of a second-order Butterworth low pass, (N_LOW_PASS).
+
+    Its cut-off is at ``sqrt(2) / (2 pi tau)``, by the bilinear transform. Shorter time constants
+    than half an interval let everything pass.
+
+    Args:
+        tau: Time constant of the step response's decaying part [s].
+        dt: Interval of the samples [s].
+    """
+    table = np.zeros(N_LOW_PASS)
+    n_mean = max(1, math.floor(tau / dt) - 1)
+    while n_mean * dt < tau:
+        n_mean += 1
+    if tau < 0.5 * dt:
+        table[:] = 1.0, 0.0, 0.0, 0.0, 0.0, n_mean
+        return table
+    c = math.tan(dt / (math.sqrt(2.0) * tau))
+    d = c * c + math.sqrt(2.0) * c + 1.0
+    b0 = c * c / d
+    a1, a2 = 2.0 * (c * c - 1.0) / d, (1.0 - math.sqrt(2.0) * c + c * c) / d
+    table[:] = b0, 2.0 * b0, b0, a1, a2, n_mean
+    return table

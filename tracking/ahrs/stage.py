@@ -1,0 +1,190 @@
+"""From inertial samples to states, in one pass over the events of every environment.
+
+A field waits for the next inertial sample of its node. A sample is judged, then given to VQF,
+after samples that were lost have been interpolated; its event becomes a STATE in place.
+"""
+
+from __future__ import annotations
+
+import math
+
+from tracking.ahrs.gyro_bias import BIAS, START_VAR, mean_variance, worst_variance
+from tracking.ahrs.magnetometer import COS, SIN
+from tracking.ahrs.rest import RESTING
+from tracking.ahrs.vqf import (
+    Q_6D,
+    TURN,
+    about_vertical,
+    start_vqf,
+    turned,
+    update_heading,
+    update_vqf,
+)
+from tracking.jit import kernel, small_kernel
+from tracking.measurements import GYRO_BIAS, GYRO_VAR, TOLD, UPRIGHT
+from tracking.sanity.imu import GOOD, inspect_sample
+from tracking.sanity.saturation import find_limits
+
+# Plain numbers of `Kind`: kernels do not know enums.
+MAG, IMU, STATE = 1, 2, 3
+STEADY = 1.5
+"""[-] Samples that are further apart than so many nominal intervals have lost some between."""
+
+STARTED, T, GRAVITY, COS_YAW, SIN_YAW = 0, 1, 2, 3, 4
+LAST_GYR, LAST_ACC, FIELD, HAS_FIELD, SEEN_FIELD, TURNED = 5, 8, 11, 14, 15, 16
+N_NODE = 18
+"""Columns of what a node remembers beside its VQF: 1 after the first sample; its time [s]; length
+of gravity [m/s2]; cosine and sine of half the turn that gives the initial heading; the last
+sample, gyroscope [rad/s] and specific force [m/s2]; a field that no sample followed yet, and 1
+if there is one; 1 after a field was used; by how much it was turned upright, about x and y of the
+world [rad]."""
+
+
+@kernel
+def orient(c, s, t, kind, node, values, valid):
+    """Turn IMU events into STATE events and MAG events into padding, in place.
+
+    Environments may be any slice of a batch: then `s` holds the same slice.
+
+    Args:
+        c: OrientationCoefficients.
+        s: OrientationState, updated.
+        t: Time, (env, event) [s], in order.
+        kind: `Kind`, (env, event), written.
+        node: Node, (env, event).
+        values: What was measured, (env, event, N_VALUES), written.
+        valid: False for padding, (env, event), written.
+    """
+    for e in range(t.shape[0]):
+        for k in range(t.shape[1]):
+            if not valid[e, k]:
+                continue
+            what, n = kind[e, k], node[e, k]
+            if what == IMU:
+                take_sample(c, s, e, n, t[e, k], kind, values, valid, k)
+            elif what == MAG:
+                for a in range(3):
+                    s.node[e, n, FIELD + a] = values[e, k, a]
+                s.node[e, n, HAS_FIELD] = 1.0
+                valid[e, k] = False
+
+
+@small_kernel
+def take_sample(c, s, e, n, t, kind, values, valid, k):
+    """Handle the inertial sample of node n in column k."""
+    m, good = s.node, s.health
+    has_field = m[e, n, HAS_FIELD] != 0.0 and c.magnetic[n]
+    m[e, n, HAS_FIELD] = 0.0
+    if not inspect_sample(s.health, e, n, values, e, k):
+        valid[e, k] = False
+        return
+    ax, ay, az = good[e, n, GOOD + 3], good[e, n, GOOD + 4], good[e, n, GOOD + 5]
+    cut_x, cut_y, cut_z, upright = find_limits(s.limits, e, n, ax, ay, az)
+    n_lost = find_gap(c, s, e, n, t)
+    integrate_over(c, s, e, n, n_lost, upright)
+    if has_field:
+        update_heading(s, c, e, n, m[e, n, FIELD], m[e, n, FIELD + 1], m[e, n, FIELD + 2])
+        m[e, n, SEEN_FIELD] = 1.0
+    if m[e, n, STARTED] == 0.0:
+        start_heading(c, s, e, n)
+        m[e, n, STARTED] = 1.0
+    m[e, n, T] = t
+    if upright and s.rest[e, n, RESTING] != 0.0:
+        length = math.sqrt(ax * ax + ay * ay + az * az)
+        m[e, n, GRAVITY] += c.gravity_gain[n] * (length - m[e, n, GRAVITY])
+
+    cos, sin = m[e, n, COS_YAW], m[e, n, SIN_YAW]
+    if c.magnetic[n]:
+        cos, sin = s.magnetic[e, n, COS], s.magnetic[e, n, SIN]
+    qw, qx, qy, qz = about_vertical(cos, sin, s.tilt, e, n)
+    x, y, z = turned(qw, qx, qy, qz, ax, ay, az)
+    kind[e, k] = STATE
+    values[e, k, 0], values[e, k, 1], values[e, k, 2], values[e, k, 3] = qw, qx, qy, qz
+    values[e, k, 4], values[e, k, 5], values[e, k, 6] = x, y, z - m[e, n, GRAVITY]
+    values[e, k, 7] = 2.0 if cut_x or cut_y else (1.0 if cut_z else 0.0)
+    tell_upright(s, e, n, cos, sin, values, k)
+    valid[e, k] = m[e, n, SEEN_FIELD] != 0.0 or not c.magnetic[n]
+
+
+@small_kernel
+def tell_upright(s, e, n, cos, sin, values, k):
+    """Write how node n was turned upright so far, and what is taken for its gyroscope's bias.
+
+    Cosine and sine are of half the turn about the vertical that gives its heading.
+    """
+    m, q = s.node, s.tilt
+    turn_cos, turn_sin = cos * cos - sin * sin, 2.0 * cos * sin
+    x, y = q[e, n, TURN], q[e, n, TURN + 1]
+    q[e, n, TURN] = q[e, n, TURN + 1] = 0.0
+    m[e, n, TURNED] += turn_cos * x - turn_sin * y
+    m[e, n, TURNED + 1] += turn_sin * x + turn_cos * y
+    values[e, k, TOLD] = 2.0 if s.rest[e, n, RESTING] != 0.0 else 1.0
+    values[e, k, UPRIGHT], values[e, k, UPRIGHT + 1] = m[e, n, TURNED], m[e, n, TURNED + 1]
+    for a in range(3):
+        values[e, k, GYRO_BIAS + a] = s.bias[e, n, BIAS + a]
+    values[e, k, GYRO_VAR] = mean_variance(s.bias, e, n)
+
+
+@small_kernel
+def find_gap(c, s, e, n, t):
+    """Samples lost before one at time t [s]; after a long silence VQF starts anew instead."""
+    m = s.node
+    gap = t - m[e, n, T]
+    if m[e, n, STARTED] == 0.0 or gap * c.rate[n] <= STEADY:
+        return 0
+    if gap <= c.max_gap[n]:
+        return round(gap * c.rate[n]) - 1
+    if c.magnetic[n]:
+        # Where it points now, nobody knows; what its gyroscope reads at rest is still true.
+        start_vqf(s, e, n, worst_variance(s.bias, e, n))
+        m[e, n, SEEN_FIELD] = 0.0
+    return 0
+
+
+@small_kernel
+def integrate_over(c, s, e, n, n_lost, upright):
+    """Give VQF the believed sample, and before it those that were lost, interpolated."""
+    m, good = s.node, s.health
+    for step in range(n_lost, -1, -1):
+        w = step / (n_lost + 1.0)
+        gx, gy, gz = good[e, n, GOOD], good[e, n, GOOD + 1], good[e, n, GOOD + 2]
+        ax, ay, az = good[e, n, GOOD + 3], good[e, n, GOOD + 4], good[e, n, GOOD + 5]
+        if step > 0:
+            gx += w * (m[e, n, LAST_GYR] - gx)
+            gy += w * (m[e, n, LAST_GYR + 1] - gy)
+            gz += w * (m[e, n, LAST_GYR + 2] - gz)
+            ax += w * (m[e, n, LAST_ACC] - ax)
+            ay += w * (m[e, n, LAST_ACC + 1] - ay)
+            az += w * (m[e, n, LAST_ACC + 2] - az)
+        elif not upright:
+            ax = ay = az = 0.0  # tells no tilt
+        update_vqf(s, c, e, n, gx, gy, gz, ax, ay, az)
+    for a in range(3):
+        m[e, n, LAST_GYR + a] = good[e, n, GOOD + a]
+        m[e, n, LAST_ACC + a] = good[e, n, GOOD + 3 + a]
+
+
+@small_kernel
+def start_heading(c, s, e, n):
+    """Find the turn after which the first orientation has the initial heading."""
+    q = s.tilt
+    w, x, y, z = q[e, n, Q_6D], q[e, n, Q_6D + 1], q[e, n, Q_6D + 2], q[e, n, Q_6D + 3]
+    half = 0.5 * (c.heading[n] - math.atan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z)))
+    s.node[e, n, COS_YAW], s.node[e, n, SIN_YAW] = math.cos(half), math.sin(half)
+
+
+@kernel
+def forget(s, gravity):
+    """Bring every environment and node of `s` to where it was before any measurement.
+
+    Args:
+        s: OrientationState, written.
+        gravity: Length of gravity assumed [m/s2].
+    """
+    for e in range(s.node.shape[0]):
+        for n in range(s.node.shape[1]):
+            for memory in (s.node, s.health, s.limits, s.bias):
+                for k in range(memory.shape[2]):
+                    memory[e, n, k] = 0.0
+            start_vqf(s, e, n, START_VAR)
+            s.node[e, n, GRAVITY], s.node[e, n, COS_YAW] = gravity, 1.0

@@ -1,0 +1,35 @@
+"""Estimates of one instant as nothing is known: zeros, absent, no orientation; and who is heard."""
+
+from __future__ import annotations
+
+from tracking.jit import small_kernel
+
+
+@small_kernel
+def is_heard(c, node, t):
+    """True for a node that took part in a range lately: who did long ago has left."""
+    return node.seen and t - node.t_last_range <= c.leave_after
+
+
+@small_kernel
+def clear_estimate(e, o, out):
+    """Forget what an estimate held before.
+
+    Args:
+        e: Environment.
+        o: Time.
+        out: pos, vel, cov, q, has_q, age, nis, nlos, status; (env, time, ...), written.
+    """
+    pos, vel, cov, q_wb, has_q, age, nis, nlos, status = out
+    for p in range(pos.shape[2]):
+        age[e, o, p] = nis[e, o, p] = nlos[e, o, p] = 0.0
+        status[e, o, p] = 0
+        for a in range(3):
+            pos[e, o, p, a] = vel[e, o, p, a] = 0.0
+        for a in range(6):
+            for b in range(6):
+                cov[e, o, p, a, b] = 0.0
+    for n in range(has_q.shape[2]):
+        has_q[e, o, n] = False
+        for k in range(4):
+            q_wb[e, o, n, k] = 0.0

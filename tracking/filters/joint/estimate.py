@@ -1,0 +1,125 @@
+"""The report: relative positions, velocities and covariances of the best hypothesis."""
+
+from __future__ import annotations
+
+from tracking.filters.clear_estimate import clear_estimate, is_heard
+from tracking.filters.joint.hypotheses.alignment import LINEAR, MODES, NONE, STATIC
+from tracking.filters.joint.preintegration import preintegrate
+from tracking.filters.joint.propagation import predict
+from tracking.filters.joint.state import N_PRE, JointState
+from tracking.jit import kernel
+from tracking.maths.simd.low_rank_downdate import apply_downdate
+
+# Plain numbers of `Status`: kernels do not know enums.
+ABSENT, STARTING, AMBIGUOUS, OK, LOST, DOUBTFUL = 0, 1, 2, 3, 4, 5
+
+
+@kernel
+def write_estimate(c, s, work, t, e, o, out):
+    """The best hypothesis at time t, without touching the state."""
+    clear_estimate(e, o, out)
+    pos, vel, cov, q_wb, has_q, age, nis, nlos, status = out
+    group = s.group[0]
+    h, d, n = group.best, c.d, s.nodes.shape[0]
+    for i in range(n):
+        has_q[e, o, i] = s.nodes[i].has_state
+        for k in range(4):
+            q_wb[e, o, i, k] = s.last_attitude_accel[i, k]
+    if group.alignment != NONE:
+        predict_estimate(c, s, work, t)
+    x, P = work.x[0], work.P[0]
+    for p in range(s.pairs.shape[0]):
+        pair = s.pairs[p]
+        node_i, node_j = s.nodes[pair.i], s.nodes[pair.j]
+        nis[e, o, p] = pair.nis
+        if not (node_i.present and node_j.present):
+            both = is_heard(c, node_i, t) and is_heard(c, node_j, t)
+            status[e, o, p] = STARTING if both else ABSENT
+            continue
+        nlos[e, o, p] = s.nlos[h, p]
+        age[e, o, p] = t - pair.t_used
+        worst = 0.0
+        for k in range(d):
+            pos[e, o, p, k] = x[node_j.i_pos + k] - x[node_i.i_pos + k]
+            if not node_j.static:
+                vel[e, o, p, k] += x[node_j.i_vel + k]
+            if not node_i.static:
+                vel[e, o, p, k] -= x[node_i.i_vel + k]
+        for a in range(2 * d):
+            for b in range(a, 2 * d):
+                v = pair_covariance(P, node_i, node_j, a, b, d)
+                r, q = (a if a < d else 3 + a - d), (b if b < d else 3 + b - d)
+                cov[e, o, p, r, q] = v
+                cov[e, o, p, q, r] = v
+            if a < d:
+                worst = max(worst, cov[e, o, p, a, a])
+        if group.n_alive > 1 or group.alignment in (STATIC, LINEAR, MODES):
+            status[e, o, p] = AMBIGUOUS
+        elif node_i.static and node_j.static:
+            status[e, o, p] = OK
+        elif (
+            age[e, o, p] > max(c.lost_after, c.missed_intervals * pair.interval) or worst > c.ok_var
+        ):
+            status[e, o, p] = LOST
+        elif pair.mean_nis > c.doubt or node_i.faulty or node_j.faulty:
+            status[e, o, p] = DOUBTFUL
+        else:
+            status[e, o, p] = OK
+
+
+@kernel
+def pair_covariance(P, node_i, node_j, a, b, d):
+    """Covariance of two components of ``(p_j - p_i, v_j - v_i)``."""
+    total = 0.0
+    for one in range(2):
+        node_a = node_j if one == 1 else node_i
+        at_a = node_a.i_pos + a if a < d else (-1 if node_a.static else node_a.i_vel + a - d)
+        for other in range(2):
+            node_b = node_j if other == 1 else node_i
+            at_b = node_b.i_pos + b if b < d else (-1 if node_b.static else node_b.i_vel + b - d)
+            if at_a >= 0 and at_b >= 0:
+                total += P[at_a, at_b] if one == other else -P[at_a, at_b]
+    return total
+
+
+@kernel
+def predict_estimate(c, s, work, t):
+    """The states at time t, written to the scratch."""
+    h, n = s.group[0].best, s.nodes.shape[0]
+    for r in range(c.n):
+        work.x[0, r] = s.x[h, r]
+        for k in range(c.n):
+            work.P[0, r, k] = s.P[h, r, k]
+    apply_downdate(work.P, 0, s.pending_updates, h, s.n_pending[h], None)
+    for i in range(n):
+        for k in range(N_PRE):
+            work.preintegrated[i, k] = s.preintegrated[i, k]
+        work.t_pre[i] = s.nodes[i].t_pre
+        if s.nodes[i].present and not s.nodes[i].static:
+            preintegrate(c, s.nodes, s.last_attitude_accel, work.preintegrated, i, t)
+    if t > s.group[0].t:
+        for p in range(s.pairs.shape[0]):
+            work.nlos[0, p], work.bias_retention[0, p] = s.nlos[h, p], s.bias_retention[h, p]
+        ahead = JointState(
+            s.nodes,
+            s.last_attitude_accel,
+            work.preintegrated,
+            s.pairs,
+            s.group,
+            work.x,
+            work.P,
+            s.pending_updates,
+            work.none_waiting,
+            s.accumulated_correction,
+            work.nlos,
+            work.bias_retention,
+            s.alive,
+            s.loglik,
+            s.sensitivity,
+            s.alignment_score,
+            s.alignment_information,
+            s.alignment_cov,
+        )
+        predict(c, ahead, 0, t - s.group[0].t, work)
+    for i in range(n):
+        s.nodes[i].t_pre = work.t_pre[i]

@@ -1,0 +1,304 @@
+"""The loop over events: one pass in time order, estimates written where they are due."""
+
+from __future__ import annotations
+
+from tracking.filters.first_ranges import collect
+from tracking.filters.joint.estimate import write_estimate
+from tracking.filters.joint.gyro_bias_at_rest import update_gyro_bias_at_rest
+from tracking.filters.joint.heading_gauge import update_heading_variance
+from tracking.filters.joint.hypotheses.alignment import NONE, STATIC, is_linear
+from tracking.filters.joint.hypotheses.alignment_modes import monitor_modes
+from tracking.filters.joint.hypotheses.alignment_sensitivity import propagate_sensitivity
+from tracking.filters.joint.hypotheses.bank import (
+    drop_timed_out,
+    hypothesis_range,
+    monitor_alignment,
+    monitor_reflection,
+    prune_bank,
+    remove_node,
+)
+from tracking.filters.joint.hypotheses.initialisation import try_join, try_start
+from tracking.filters.joint.hypotheses.static_initialisation import (
+    all_static,
+    may_move,
+    spawn_rotation_hypotheses,
+)
+from tracking.filters.joint.lever_arm import antenna_offset
+from tracking.filters.joint.motion_constraints import apply_motion_constraints, centre
+from tracking.filters.joint.nlos_model import power_evidence
+from tracking.filters.joint.observability import enforce_observability, propagate_corrections
+from tracking.filters.joint.preintegration import preintegrate, process_attitude
+from tracking.filters.joint.propagation import moves, predict
+from tracking.filters.joint.range_update import range_update
+from tracking.filters.joint.saturation_noise import add_saturation_noise
+from tracking.filters.joint.scalar_update import flush_all_updates
+from tracking.filters.joint.state import N_PRE, JointState
+from tracking.filters.joint.supervision.fault_detection import (
+    monitor_faults,
+    update_residual_statistics,
+)
+from tracking.filters.joint.supervision.frozen_range import is_frozen
+from tracking.filters.joint.supervision.reinitialisation import monitor_positions
+from tracking.filters.joint.supervision.staleness import (
+    drop_stale,
+    is_silent,
+    note_seen,
+    update_interval,
+)
+from tracking.filters.joint.surveyed_distance import apply_surveys, surveyed_distance_update
+from tracking.jit import kernel, small_kernel
+
+# Plain numbers of `Kind`: kernels do not know enums.
+STATE, SURVEY, RANGE, LEAVE = 3, 4, 5, 6
+SAME = 1e-5
+"""[s] Ranges of one message differ by their rounding only: they share a prediction."""
+GAUGE_PERIOD = 1.0
+"""[s] Time between two moves of the centre to the origin."""
+
+
+@kernel
+def run_events(coefficients, layout, state, work, block, t_out, out):
+    """Handle the events of every environment in order.
+
+    Args:
+        coefficients: COEFFICIENTS, (1).
+        layout: Tables.
+        state: JointState, updated.
+        work: Room.
+        block: Events: t, kind, i, j, antenna_i, antenna_j, values, has_power, valid;
+            (env, event, ...).
+        t_out: Times at which estimates are due, ascending, (env, time) [s]. An estimate
+            holds every event up to its time, that time included.
+        out: Arrays written: pos, vel, cov, q, has_q, age, nis, nlos, status; (env, time, ...).
+    """
+    t, kind, node_i, node_j, antenna_i, antenna_j, values, has_power, valid = block
+    c = coefficients[0]
+    for e in range(t.shape[0]):
+        s = one_env(state, e)
+        o = 0
+        for k in range(t.shape[1]):
+            if not valid[e, k]:
+                continue
+            while o < t_out.shape[1] and t_out[e, o] < t[e, k]:
+                write_estimate(c, s, work, t_out[e, o], e, o, out)
+                o += 1
+            i, j, what = node_i[e, k], node_j[e, k], kind[e, k]
+            if what == STATE:
+                add_saturation_noise(c, s.nodes[i], s.preintegrated, i, t[e, k], values[e, k, 7])
+                process_attitude(
+                    c, s.nodes, s.last_attitude_accel, s.preintegrated, i, t[e, k], values, e, k
+                )
+            elif what in (RANGE, SURVEY):
+                a_i, a_j = antenna_i[e, k], antenna_j[e, k]
+                if i > j:
+                    i, j, a_i, a_j = j, i, a_j, a_i
+                sight = (0.0, c.enter_rate, c.leave_rate)
+                if has_power[e, k]:
+                    evidence = power_evidence(c, values[e, k, 1] - values[e, k, 2])
+                    sight = (evidence, c.enter_rate_with_power, c.leave_rate_with_power)
+                is_survey, now, distance = what == SURVEY, t[e, k], values[e, k, 0]
+                process_range(c, s, layout, work, i, j, a_i, a_j, now, distance, sight, is_survey)
+            elif what == LEAVE:
+                flush_all_updates(s)
+                remove_node(c, s, layout, i)
+        while o < t_out.shape[1]:
+            write_estimate(c, s, work, t_out[e, o], e, o, out)
+            o += 1
+
+
+@kernel
+def one_env(state, e):
+    """The state of environment e; shares its memory."""
+    return JointState(
+        state.nodes[e],
+        state.last_attitude_accel[e],
+        state.preintegrated[e],
+        state.pairs[e],
+        state.group[e],
+        state.x[e],
+        state.P[e],
+        state.pending_updates[e],
+        state.n_pending[e],
+        state.accumulated_correction[e],
+        state.nlos[e],
+        state.bias_retention[e],
+        state.alive[e],
+        state.loglik[e],
+        state.sensitivity[e],
+        state.alignment_score[e],
+        state.alignment_information[e],
+        state.alignment_cov[e],
+    )
+
+
+@kernel
+def predict_all(coefficients, layout, state, work, t):
+    """Carry every environment to its time t, (env) [s]."""
+    for e in range(t.shape[0]):
+        s = one_env(state, e)
+        if s.group[0].alignment != NONE:
+            predict_to(coefficients[0], s, layout, work, t[e], True)
+            flush_all_updates(s)
+
+
+@small_kernel
+def process_range(c, s, layout, work, i, j, a_i, a_j, t, distance, sight, is_survey):
+    """A range or survey between nodes i < j."""
+    p = layout.pair_index[i, j]
+    if not is_survey and is_frozen(c, s, p, t, distance):
+        return
+    node_i, node_j = s.nodes[i], s.nodes[j]
+    if s.group[0].alignment != NONE and t - s.group[0].t_check > c.leave_after:
+        # Nobody was heard: whoever speaks first has been away as long as the others.
+        flush_all_updates(s)
+        drop_timed_out(c, s, layout, t)
+    if s.group[0].alignment != NONE and (is_silent(c, node_i, t) or is_silent(c, node_j, t)):
+        predict_to(c, s, layout, work, t, True)
+        flush_all_updates(s)
+        drop_stale(c, s, layout, t)
+    note_seen(c, node_i, t)
+    note_seen(c, node_j, t)
+    if not is_survey:
+        node_i.antenna, node_j.antenna = a_i, a_j
+    runs = node_i.present and node_j.present
+    if s.group[0].alignment != NONE:
+        predict_to(c, s, layout, work, t, not runs)
+        for k in (i, j):
+            if moves(s.nodes[k]):
+                preintegrate(c, s.nodes, s.last_attitude_accel, s.preintegrated, k, t)
+        if t - s.group[0].t_check + SAME >= c.check_period:
+            supervise(c, s, layout, t)
+    if node_i.present and node_j.present:
+        update_range(c, s, layout, work, p, a_i, a_j, t, distance, sight, is_survey)
+    else:
+        collect_initial_range(c, s, layout, work, i, j, p, t, distance, sight, is_survey)
+
+
+@small_kernel
+def predict_to(c, s, layout, work, t, at_once):
+    """Carry every hypothesis to time t, and use what is known about the carriers.
+
+    Carrying a covariance costs more than a range does. So unless it has to be `at_once`, the states
+    stay where they are for a while, and ranges tell of them by what happened since
+    (`range_update.range_model`): only the noise of so short a time comes after them, not before.
+    """
+    group = s.group[0]
+    if group.alignment == STATIC and not all_static(c, s, t):
+        flush_all_updates(s)
+        spawn_rotation_hypotheses(c, s, layout, work)
+    carriers_due = t - group.t_constraints + SAME >= c.carrier_period
+    since = t - group.t
+    if since > SAME and (at_once or carriers_due or since + SAME >= c.carry_period):
+        propagate(c, s, work, t)
+    if carriers_due:
+        first, end = hypothesis_range(s)
+        for h in range(first, end):
+            if s.alive[h]:
+                apply_motion_constraints(c, s, h, t, t - group.t_constraints, work)
+        group.t_constraints = t
+    if t - group.t_gauge + SAME >= GAUGE_PERIOD:
+        first, end = hypothesis_range(s)
+        for h in range(first, end):
+            if s.alive[h]:
+                centre(c, s, h, work.w)
+        group.t_gauge = t
+
+
+@small_kernel
+def propagate(c, s, work, t):
+    """Carry every hypothesis to time t."""
+    group = s.group[0]
+    for i in range(s.nodes.shape[0]):
+        if moves(s.nodes[i]):
+            preintegrate(c, s.nodes, s.last_attitude_accel, s.preintegrated, i, t)
+    first, end = hypothesis_range(s)
+    for h in range(first, end):
+        if s.alive[h]:
+            enforce_observability(c, s, h, work)
+            propagate_corrections(c, s, h)
+            predict(c, s, h, t - group.t, work)
+            if is_linear(group):
+                propagate_sensitivity(c, s, h, work)
+            for i in range(s.nodes.shape[0]):
+                if moves(s.nodes[i]) and s.nodes[i].has_ahrs_feedback:
+                    update_gyro_bias_at_rest(s, h, i, work)
+            s.bias_retention[h, :] = 1.0
+    for i in range(s.nodes.shape[0]):
+        for k in range(N_PRE):
+            s.preintegrated[i, k] = 0.0
+    group.t = t
+
+
+@small_kernel
+def update_range(c, s, layout, work, p, a_i, a_j, t, distance, sight, is_survey):
+    """A range or survey of a running pair, at most `carry_period` after the states."""
+    pair, group = s.pairs[p], s.group[0]
+    i0, i1, i2 = antenna_offset(s.last_attitude_accel, layout, pair.i, a_i)
+    j0, j1, j2 = antenna_offset(s.last_attitude_accel, layout, pair.j, a_j)
+    levers = (i0, i1, i2, j0, j1, j2)
+    dt, is_news = max(t - pair.t_range, 0.0), False
+    if is_survey:
+        pair.t_range, pair.t_used, is_news = t, t, distance != pair.surveyed
+        collect(c, pair, t, distance, True)  # for when one of them comes again
+    first, end = hypothesis_range(s)
+    for h in range(first, end):
+        if not s.alive[h]:
+            continue
+        if is_survey:
+            surveyed_distance_update(c, s, h, p, distance, is_news, work)
+            continue
+        nu, misfit, nis, weight = range_update(c, s, h, p, dt, distance, levers, sight, work)
+        if h == group.best:
+            pair.nis = nis
+            capped = min(misfit, 25.0) if weight > 0.5 else 25.0
+            pair.mean_nis += 0.05 * (capped - pair.mean_nis)
+            fits = 1.0 if weight > 0.5 and misfit < 6.0 else 0.0
+            update_residual_statistics(c, s, p, dt, distance, fits, nu)
+            if not (s.nodes[pair.i].faulty or s.nodes[pair.j].faulty):
+                group.mean_nis += 0.01 * (weight * capped - group.mean_nis)
+            if weight > 0.5:
+                group.nis_sum += nis
+                group.nis_n += 1
+                pair.t_used = t
+            else:
+                pair.n_rejected += 1
+    update_interval(c, pair, dt)
+    pair.t_range = t
+    pair.n_ranges += 1
+
+
+@kernel
+def collect_initial_range(c, s, layout, work, i, j, p, t, distance, sight, is_survey):
+    """A range or survey of a pair that does not run yet, i < j."""
+    collect(c, s.pairs[p], t, distance, is_survey)
+    if s.pairs[p].start_n <= 1:
+        s.pairs[p].start_nlos_llr = 0.0
+    if not is_survey:
+        s.pairs[p].start_nlos_llr += sight[0]
+    flush_all_updates(s)
+    if s.group[0].alignment == NONE:
+        if try_start(c, s, layout, t):
+            for a in range(s.nodes.shape[0]):
+                apply_surveys(c, s, layout, work, a, a)
+        return
+    if s.group[0].alignment == STATIC and may_move(c, s, t):
+        return
+    for new in (i, j):
+        if not s.nodes[new].present and try_join(c, s, layout, new, t):
+            apply_surveys(c, s, layout, work, new, s.nodes.shape[0])
+
+
+@kernel
+def supervise(c, s, layout, t):
+    """From time to time: who left, and which hypotheses are worth their time."""
+    flush_all_updates(s)
+    drop_timed_out(c, s, layout, t)
+    if is_linear(s.group[0]):
+        monitor_modes(c, s, layout)
+    prune_bank(c, s)
+    update_heading_variance(c, s)
+    monitor_reflection(c, s)
+    monitor_alignment(c, s, layout, t - s.group[0].t_check)
+    monitor_positions(c, s, layout, t)
+    monitor_faults(c, s, layout, t)
+    s.group[0].t_check = t

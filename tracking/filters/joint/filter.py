@@ -1,0 +1,109 @@
+"""One extended Kalman filter over all nodes of a group: the default filter.
+
+Pair filters share nodes and cannot know how their errors go together. Here all nodes are one
+state vector (`state`), so that every range informs every node it has to do with, and the
+covariance is that of the group:
+
+    predict     dead reckoning with the nodes' accelerations, biases and heading errors
+    correct     ranges, in sight or not (`range_update`); what is known about the carriers
+    choose      among rotations and mirror images, by the likelihood of all that (`bank`)
+
+`docs/tracker.md` derives it and says what each part is worth.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Self
+
+import numpy as np
+
+from tracking.arrays import F64
+from tracking.constellation import Constellation
+from tracking.estimate import TeamEstimate
+from tracking.filters.batched import BatchedFilter
+from tracking.filters.joint.coefficients import make_coefficients
+from tracking.filters.joint.event_loop import predict_all, run_events
+from tracking.filters.joint.params import JointParams
+from tracking.filters.joint.smoothing import read_clones, with_clones
+from tracking.filters.joint.state import Layout, make_layout, make_state
+from tracking.filters.joint.workspace import Workspace, make_workspace
+from tracking.filters.records import as_records, with_records
+from tracking.measurements import MeasurementBlock
+
+
+class JointEkf(BatchedFilter):
+    """One filter per group over a batch of groups; see the module."""
+
+    follows_bias = True
+    kernel = run_events
+
+    def __init__(self, constellation: Constellation, params: JointParams, n_envs: int = 1) -> None:
+        self._coefficients = make_coefficients(constellation, params)
+        self._layout = make_layout(constellation, params)
+        n_hyps = bank_size(constellation, self._layout)
+        state = make_state(constellation, params, n_envs, n_hyps)
+        # Of one hypothesis: all begin alike.
+        super().__init__(constellation, state, make_state(constellation, params, 1, 1))
+        self._scratch = self._make_scratch(state.x.shape[2])
+
+    def smooth(self, later: MeasurementBlock, t: F64) -> TeamEstimate:
+        """Report at one time with the help of later measurements, and stay where it is.
+
+        Args:
+            later: Events after t, in order. STATE, not IMU.
+            t: Time of the estimate, not before the last event handled, (env) [s].
+
+        Returns:
+            Estimates, arrays over (env, ...).
+        """
+        saved, n_envs = self.save(), len(t)
+        try:
+            now = self.run(MeasurementBlock.empty(n_envs), t[:, None])
+            names = TeamEstimate.__slots__[1:]
+            estimate = TeamEstimate(
+                now.constellation, *(getattr(now, name)[:, 0] for name in names)
+            )
+            coefficients = as_records(self._coefficients)
+            predict_all(coefficients, self._layout, with_records(self._state), self._scratch, t)
+            clones, coefficients = with_clones(self._state, self._coefficients)
+        finally:
+            self.restore(saved)
+        nothing = TeamEstimate.empty(self._constellation, np.zeros((n_envs, 0)))
+        run_events(
+            as_records(coefficients),
+            self._layout,
+            with_records(clones),
+            self._make_scratch(int(coefficients[0]["n"])),
+            later.arrays,
+            nothing.t,
+            nothing.arrays,
+        )
+        return read_clones(clones, estimate, self._state.x.shape[2])
+
+    def part(self, envs: slice) -> Self:
+        """Some of the environments; shares their memory."""
+        part = super().part(envs)
+        part._scratch = self._make_scratch(self._state.x.shape[2])
+        return part
+
+    def _arguments(self, events: tuple[Any, ...], estimate: TeamEstimate) -> tuple[Any, ...]:
+        state, coefficients = with_records(self._state), as_records(self._coefficients)
+        times, arrays = estimate.t, estimate.arrays
+        return coefficients, self._layout, state, self._scratch, events, times, arrays
+
+    def _make_scratch(self, n_states: int) -> Workspace:
+        constellation = self._constellation
+        return make_workspace(constellation.n_nodes, constellation.n_pairs, n_states)
+
+
+def bank_size(constellation: Constellation, layout: Layout) -> int:
+    """How many hypotheses there is room for.
+
+    Those of all rotations, and the reflections of nodes that join meanwhile. Where one filter
+    stands for all rotations (`Alignment.LINEAR`), those of their likeliest modes: of 60 simulated
+    groups eight had more than six.
+    """
+    n_rotations = len(layout.rotations)
+    if constellation.dimensions == 2:
+        return n_rotations + 8
+    return 9 if constellation.n_nodes > 3 else 2 * n_rotations

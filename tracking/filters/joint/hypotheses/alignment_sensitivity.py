@@ -1,0 +1,170 @@
+"""A group in space of which nothing tells yet how it is turned: all turns at once, linearly.
+
+Ranges give the layout of a group in some frame, which is the world's turned or mirrored by an
+orthogonal matrix M. What is measured in the world, accelerations first of all, enters that
+frame as ``M a``: linear in the nine elements of M. So with M known, what the filter does is
+linear in M as well, as far as it is linear at all: its states are ``x + sum_k slope_k (M - 1)_k``,
+its gains do not depend on M, and innovations are ``nu + g . (M - 1)``. One filter thus gives the
+likelihood of every M, which is Gaussian in its elements,
+
+    log L(M) = score . (M - 1) - (M - 1) . information (M - 1) / 2,
+
+among them all rotations and mirror images, which `rotation_modes` looks through and
+`alignment_modes` follows. It is the estimate of a constant by the sensitivities of a Kalman filter
+to it [1], and to look for a rotation among all matrices first is an old way to find one without a
+first guess [2].
+
+References:
+    [1] Friedland, Treatment of bias in recursive filtering, IEEE Trans. Automatic Control 14
+        (1969) 359.
+    [2] Wahba, A least squares estimate of satellite attitude, SIAM Review 7 (1965) 409.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tracking.filters.joint.gyro_bias import STEP, propagate_gyro_bias_sensitivity
+from tracking.filters.joint.hypotheses.alignment import LINEAR, has_modes
+from tracking.filters.joint.lever_arm import attach_to_world
+from tracking.filters.joint.propagation import moves, n_bias_states
+from tracking.jit import allocating_kernel, kernel, small_kernel
+from tracking.maths.simd.block_propagation import STATES
+
+LOOSE = 3.0
+"""[-] Each element of M has a variance of a third, over all rotations."""
+
+
+@small_kernel
+def has_linear_alignment(c, s):
+    """True for groups in space of more than three nodes: too little holds a layout of three.
+
+    Those that start are few at first, the others join at once. A smoother, which has no slopes,
+    takes the turn as it is.
+    """
+    return s.sensitivity.shape[1] > 0 and s.nodes.shape[0] > c.d
+
+
+@allocating_kernel
+def start_alignment(c, s, layout, h):
+    """Take back what is known of the turn of hypothesis h, nothing of which waits.
+
+    But that fixed nodes differ less in height than in width, where people put them.
+    """
+    s.alignment_score[h], s.alignment_information[h] = 0.0, 0.0
+    attach_to_world(s, layout, h)
+    mean, m = np.zeros(3), 0
+    for i in range(s.nodes.shape[0]):
+        if s.nodes[i].present and s.nodes[i].static:
+            mean += s.x[h, s.nodes[i].i_pos : s.nodes[i].i_pos + 3]
+            m += 1
+    mean /= max(m, 1)
+    for i in range(s.nodes.shape[0]):
+        if s.nodes[i].present and s.nodes[i].static:
+            out = s.x[h, s.nodes[i].i_pos : s.nodes[i].i_pos + 3] - mean
+            for r in range(3):
+                s.alignment_score[h, 3 * r + 2] -= out[r] * out[2] / c.height_var
+                for q in range(3):
+                    s.alignment_information[h, 3 * r + 2, 3 * q + 2] += (
+                        out[r] * out[q] / c.height_var
+                    )
+    group = s.group[0]
+    group.alignment, group.t_alignment = LINEAR, group.t
+    update_alignment_cov(c, s, h)
+
+
+@allocating_kernel
+def update_alignment_cov(c, s, h):
+    """Work out how uncertain the elements of the turn are: those of any, or of one that is near."""
+    if has_modes(s.group[0]):
+        J = small_rotation_derivatives()
+        H = J @ (s.alignment_information[h] @ J.T.copy()) + np.eye(3) / c.mode_std**2
+        s.alignment_cov[h] = J.T.copy() @ (np.linalg.inv(H) @ J)
+    else:
+        s.alignment_cov[h] = np.linalg.inv(s.alignment_information[h] + LOOSE * np.eye(9))
+
+
+@allocating_kernel
+def small_rotation_derivatives():
+    """Derivatives of the elements of a small turn by its three components, (3, 9)."""
+    J = np.zeros((3, 9))
+    for a in range(3):
+        u, v = (a + 1) % 3, (a + 2) % 3
+        J[a, 3 * u + v], J[a, 3 * v + u] = -1.0, 1.0
+    return J
+
+
+@kernel
+def propagate_sensitivity(c, s, h, work):
+    """Carry the slopes over the step that `predict` has just made, and from which `work` is."""
+    first, last = c.n_motion, c.n
+    for k in range(9):
+        row, column = k // 3, k % 3
+        z = s.sensitivity[h, k]
+        for r in range(first, last):
+            z[r] *= work.scale[r]
+        for i in range(s.nodes.shape[0]):
+            node = s.nodes[i]
+            if not moves(node):
+                continue
+            p, v, b, w, F = (
+                node.i_pos,
+                node.i_vel,
+                node.i_tilt_bias,
+                work.step[i],
+                work.derivatives[i],
+            )
+            for r in range(6):
+                z[p + r] += F[STATES, r] * z[p + 3 + r] if r < 3 else 0.0
+                for q in range(n_bias_states(node)):
+                    z[p + r] += F[q, r] * z[b + q]
+            if node.has_ahrs_feedback:
+                propagate_gyro_bias_sensitivity(node, z, w, work.scale)
+                z[b + row] += (w[STEP], w[STEP + 1], 0.0)[column]
+            # A turn by the heading error is one of M as well.
+            z[p + row] += (w[6], -w[5], w[28])[column]
+            z[v + row] += (w[8], -w[7], w[27])[column]
+
+
+@small_kernel
+def innovation_sensitivity(s, h, m, work):
+    """Write the derivatives of an innovation by the turn; returns the variance they add.
+
+    Args:
+        s: JointState of one environment, open.
+        h: Hypothesis.
+        m: Number of derivatives by states.
+        work: Room; `idx` and `val` hold states and derivatives of what is predicted, `direct`
+            its derivatives by the turn with the states held; `gradient` is written.
+    """
+    g = work.gradient
+    for k in range(9):
+        g[k] = -work.direct[k]
+        for a in range(m):
+            g[k] -= work.val[a] * s.sensitivity[h, k, work.idx[a]]
+    variance = 0.0
+    for k in range(9):
+        for q in range(9):
+            variance += g[k] * s.alignment_cov[h, k, q] * g[q]
+    return variance
+
+
+@small_kernel
+def accumulate_alignment_information(s, h, work, nu, S):
+    """Let an innovation of variance S, about to be absorbed, tell of the turn.
+
+    Args:
+        s: JointState of one environment, open.
+        h: Hypothesis.
+        work: `w` is ``P H``, `gradient` as of `innovation_sensitivity`.
+        nu: The innovation.
+        S: Its variance, the turn known.
+    """
+    g, w = work.gradient, work.w
+    for k in range(9):
+        share = g[k] / S
+        s.alignment_score[h, k] -= share * nu
+        for q in range(9):
+            s.alignment_information[h, k, q] += share * g[q]
+        for r in range(s.sensitivity.shape[2]):
+            s.sensitivity[h, k, r] += w[r] * share

@@ -1,0 +1,212 @@
+"""The bank of hypotheses: mirror images that become possible, and which ones are kept.
+
+A layout and its mirror image have the same ranges; motion tells them apart. While the nodes
+pass through a line (or a plane, in space) the two are one, and the filter may come out on the
+wrong side. So its mirror image is followed beside it from there, until one is unlikely.
+
+What fits badly for seconds on end is turned or mirrored, by a start or join that few ranges
+decided: ranges alone fit any rotation, but moves that go elsewhere than the IMUs say do not.
+Then all rotations and mirror images are followed again.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tracking.filters.first_ranges import forget_first
+from tracking.filters.joint.gyro_bias import last_state
+from tracking.filters.joint.hypotheses.alignment import (
+    CANDIDATES,
+    FILTERED,
+    NONE,
+    STATIC,
+    has_modes,
+)
+from tracking.filters.joint.hypotheses.alignment_modes import challenge_alignment
+from tracking.filters.joint.hypotheses.alignment_sensitivity import has_linear_alignment
+from tracking.filters.joint.hypotheses.copying import copy_hypothesis, rotate_hypothesis
+from tracking.filters.joint.hypotheses.geometric_degeneracy import (
+    degeneracy_ratio,
+    least_axis,
+    scatter_of,
+)
+from tracking.filters.joint.hypotheses.initialisation import (
+    initialise_pair,
+    reset_residual_statistics,
+)
+from tracking.filters.joint.hypotheses.merging import are_same, rotation_between
+from tracking.filters.joint.hypotheses.static_initialisation import TIE, spawn_rotations
+from tracking.filters.joint.scalar_update import reset_state
+from tracking.jit import allocating_kernel, kernel, small_kernel
+from tracking.maths.exponentials import decay
+
+
+@small_kernel
+def hypothesis_range(s):
+    """Hypotheses to go through: all, or the only one."""
+    group = s.group[0]
+    if group.n_alive > 1:
+        return 0, s.alive.shape[0]
+    return group.best, group.best + 1
+
+
+@allocating_kernel
+def add_mirror_image(c, s):
+    """Make the mirror image of the reported hypothesis one, if the bank has room.
+
+    It is mirrored across the line or plane that the layout is nearest to, velocities as well.
+    """
+    h, d = s.group[0].best, c.d
+    target = copy_hypothesis(s, h)
+    if target < 0:
+        return
+    M = np.eye(d)
+    scatter, _ = scatter_of(c, s, h)
+    _, across = least_axis(scatter, d)
+    for r in range(d):
+        for k in range(d):
+            M[r, k] -= 2.0 * across[r] * across[k]
+    rotate_hypothesis(c, s, target, M)
+
+
+@kernel
+def monitor_alignment(c, s, layout, dt):
+    """Follow all rotations and mirror images again where ranges have fitted badly for long."""
+    group = s.group[0]
+    group.slow_nis += (1.0 - decay(dt / c.misfit_time)) * (group.mean_nis - group.slow_nis)
+    group.challenge_nis += (1.0 - decay(dt / c.challenge_time)) * (c.strained - group.challenge_nis)
+    watched = group.n_alive == 1 and group.alignment >= CANDIDATES
+    if not watched or group.slow_nis < group.challenge_nis:
+        return
+    n_doubted = 0
+    for i in range(s.nodes.shape[0]):
+        n_doubted += s.nodes[i].present and s.nodes[i].faulty
+    # A single node that contradicts the others is to blame, and not the layout.
+    if n_doubted == 1:
+        return
+    h = group.best
+    if degeneracy_ratio(c, s, h, True) == np.inf:
+        return
+    if has_linear_alignment(c, s):
+        group.slow_nis = 0.0
+        challenge_alignment(c, s, layout, h)
+        return
+    group.challenge_nis = c.challenge_raise * max(group.slow_nis, group.challenge_nis)
+    group.slow_nis = 0.0
+    for i in range(s.nodes.shape[0]):
+        node = s.nodes[i]
+        if node.present and not node.static:
+            for k in range(c.d):
+                s.P[h, node.i_pos + k, node.i_pos + k] += c.challenge_position**2
+                s.P[h, node.i_vel + k, node.i_vel + k] += c.challenge_speed**2
+    for p in range(s.pairs.shape[0]):
+        if s.nodes[s.pairs[p].i].present and s.nodes[s.pairs[p].j].present:
+            initialise_pair(c, s, h, p, s.nlos[h, p])
+    spawn_rotations(c, s, layout, h)
+    for k in range(s.alive.shape[0]):
+        if s.alive[k] and k != h:
+            s.loglik[k] -= c.head_start
+
+
+@kernel
+def monitor_reflection(c, s):
+    """Bring the mirror image up where it can no longer be excluded."""
+    group = s.group[0]
+    if group.n_alive != 1 or group.alignment < CANDIDATES:
+        return
+    ratio = degeneracy_ratio(c, s, group.best, True)
+    if ratio < c.degenerate:
+        group.degenerate = (
+            group.degenerate or degeneracy_ratio(c, s, group.best, False) < c.degenerate
+        )
+    elif group.degenerate and ratio > c.regular:
+        group.degenerate = False
+        add_mirror_image(c, s)
+
+
+@allocating_kernel
+def prune_bank(c, s):
+    """Drop hypotheses that are unlikely or the same as a better one; choose the best."""
+    group = s.group[0]
+    if group.n_alive < 2:
+        if group.alignment == CANDIDATES:
+            group.alignment = FILTERED
+        return
+    n_hyps = s.alive.shape[0]
+    if group.alignment != STATIC and group.t < group.t_scoring_starts - TIE:
+        for h in range(n_hyps):
+            s.loglik[h] = 0.0
+    best = -1
+    for h in range(n_hyps):
+        if s.alive[h] and (best < 0 or s.loglik[h] > s.loglik[best]):
+            best = h
+    # The report changes only for a clear gain, or equal hypotheses would take turns.
+    if not s.alive[group.best] or s.loglik[best] > s.loglik[group.best] + 2.0:
+        group.best = best
+        # How well ranges fit was told by the other.
+        for p in range(s.pairs.shape[0]):
+            reset_residual_statistics(s.pairs[p])
+        group.mean_nis = 1.0
+    top = s.loglik[best]
+    for h in range(n_hyps):
+        if s.alive[h] and h != group.best and s.loglik[h] < top - c.prune:
+            s.alive[h] = False
+    turn = np.eye(c.d)
+    for a in range(n_hyps):
+        for b in range(n_hyps):
+            better = s.loglik[a] >= s.loglik[b] or a == group.best
+            if a == b or b == group.best or not (s.alive[a] and s.alive[b] and better):
+                continue
+            turn[:] = np.eye(c.d)
+            if a == group.best or has_modes(group):
+                rotation_between(c, s, a, b, turn)
+            if are_same(c, s, a, b, turn):
+                s.alive[b] = False
+    group.n_alive = 0
+    for h in range(n_hyps):
+        group.n_alive += s.alive[h]
+        s.loglik[h] -= top
+
+
+@kernel
+def remove_node(c, s, layout, i):
+    """Forget a node that left."""
+    node = s.nodes[i]
+    node.present, node.seen = False, False
+    node.outlier_ratio, node.faulty = 0.0, False
+    n_present = 0
+    for k in range(s.nodes.shape[0]):
+        n_present += s.nodes[k].present
+        if k != i:
+            pair = s.pairs[layout.pair_index[i, k]]
+            pair.n_ranges = 0
+            forget_first(pair)
+    for h in range(s.alive.shape[0]):
+        if s.alive[h]:
+            for r in range(node.i_pos, node.i_pos + (c.d if node.static else 2 * c.d)):
+                s.accumulated_correction[h, r] = 0.0
+                reset_state(s, h, c.n, r, 1.0)
+            for r in range(
+                node.i_tilt_bias, node.i_tilt_bias if node.static else last_state(node) + 1
+            ):
+                reset_state(s, h, c.n, r, 1.0)
+            for k in range(s.nodes.shape[0]):
+                at = s.pairs[layout.pair_index[i, k]].i_range_error if k != i else -1
+                if at >= 0:
+                    reset_state(s, h, c.n, at, 1.0)
+                    reset_state(s, h, c.n, at + 1, 1.0)
+    if n_present < 2:
+        for k in range(s.nodes.shape[0]):
+            s.nodes[k].present, s.nodes[k].seen = False, False
+            s.nodes[k].outlier_ratio, s.nodes[k].faulty = 0.0, False
+        s.alive[:] = False
+        s.group[0].n_alive = 0
+        s.group[0].alignment = NONE
+
+
+@kernel
+def drop_timed_out(c, s, layout, t):
+    """Remove the nodes that were not heard for so long that they must have left."""
+    for i in range(s.nodes.shape[0]):
+        if (s.nodes[i].present or s.nodes[i].seen) and t - s.nodes[i].t_last_range > c.leave_after:
+            remove_node(c, s, layout, i)

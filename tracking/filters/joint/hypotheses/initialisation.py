@@ -1,0 +1,277 @@
+"""Starting a group and joining it: from the first k ranges of each pair to running states.
+
+A group starts with MDS on the mean of the first k ranges, once for every rotation and mirror
+image of the bank; the covariance holds the gap between two rotations. While all nodes rest, one
+of them stands for all (`static_initialisation`). A node that joins is placed by least squares on
+its distances to the others, in every hypothesis; where those are too few or too flat to tell on
+which side it is, both sides become hypotheses.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tracking.filters.first_ranges import (
+    N_FIRST,
+    choose_members,
+    first_shape,
+    is_ready,
+    start_distance,
+)
+from tracking.filters.joint.heading_gauge import add_rotation_uncertainty, heading_functional
+from tracking.filters.joint.hypotheses.alignment import FILTERED, STATIC
+from tracking.filters.joint.hypotheses.alignment_sensitivity import (
+    has_linear_alignment,
+    start_alignment,
+)
+from tracking.filters.joint.hypotheses.copying import copy_hypothesis
+from tracking.filters.joint.hypotheses.static_initialisation import all_static, is_at_rest
+from tracking.filters.joint.motion_constraints import CENTRE_VAR
+from tracking.filters.joint.propagation import initial_tilt_variance
+from tracking.filters.joint.scalar_update import reset_state
+from tracking.jit import allocating_kernel, kernel
+from tracking.maths.exponentials import decay
+from tracking.maths.multilateration import best_positions
+
+
+@allocating_kernel
+def try_start(c, s, layout, t):
+    """Start the group with the nodes whose pairs are all ready; tells whether it has."""
+    n = s.nodes.shape[0]
+    members = np.empty(n, np.int64)
+    m = choose_members(c, s, layout, members, t)
+    if m == 0 or is_motion_unknown(c, s, members, m, t):
+        return False
+    X = first_shape(c, s, layout, members, m)
+    for a in range(m):
+        s.nodes[members[a]].present = True
+        reset_preintegration(s, members[a], t)
+    asleep = all_static(c, s, t)
+    # A smoother has room for one hypothesis; of what it starts nothing is reported.
+    opens = has_linear_alignment(c, s) and not asleep
+    n_first = 1 if asleep or opens else min(layout.rotations.shape[0], s.alive.shape[0])
+    for h in range(n_first):
+        s.alive[h] = True
+        s.loglik[h] = 0.0
+        Y = X @ layout.rotations[h].T.copy()
+        s.x[h, :] = 0.0
+        s.accumulated_correction[h, :] = 0.0
+        s.P[h, :, :] = 0.0
+        for r in range(c.n):
+            s.P[h, r, r] = 1.0
+        for a in range(m):
+            initialise_node(c, s, h, members[a], t)
+            at, variance = s.nodes[members[a]].i_pos, c.position_var
+            for b in range(m):
+                if b != a:
+                    _, scatter = start_distance(c, s, layout, members[a], members[b])
+                    variance = max(variance, scatter * scatter)
+            for k in range(c.d):
+                s.x[h, at + k] = Y[a, k]
+                s.P[h, at + k, at + k] = variance
+        add_translation_uncertainty(c, s, h, members, m)
+        add_rotation_uncertainty(c, s, h, c.rotation_var)
+        for p in range(s.pairs.shape[0]):
+            if s.nodes[s.pairs[p].i].present and s.nodes[s.pairs[p].j].present:
+                initialise_pair(c, s, h, p, initial_nlos_prob(c, s.pairs[p]))
+    for p in range(s.pairs.shape[0]):
+        initialise_interval(s.pairs[p], t)
+        reset_residual_statistics(s.pairs[p])
+    group = s.group[0]
+    group.alignment = STATIC if asleep else FILTERED
+    group.degenerate = False
+    if opens:
+        start_alignment(c, s, layout, 0)
+    group.n_alive = n_first
+    group.best = 0
+    group.t, group.t_check, group.t_constraints, group.t_gauge = t, t, t, t
+    group.t_scoring_starts = t
+    for a in range(m):
+        if s.nodes[members[a]].sideways_var > 0.0:
+            group.t_scoring_starts = t + c.wheels_after
+    group.heading_gauge_var = c.rotation_var if c.d == 2 else 0.0
+    group.mean_nis = 1.0
+    group.slow_nis, group.challenge_nis = 0.0, c.strained
+    return True
+
+
+@kernel
+def is_motion_unknown(c, s, members, m, t):
+    """True while a node's samples are too few to tell whether it moves.
+
+    Nodes at rest are followed in one rotation that stands for all; of nodes that move it would use
+    the accelerations in a wrong one.
+    """
+    for a in range(m):
+        node = s.nodes[members[a]]
+        if node.has_state and not node.static and t - node.t_first <= c.settling:
+            return True
+    return False
+
+
+@kernel
+def initialise_interval(pair, t):
+    """A pair that runs from here on; of how often it ranges its first ranges tell."""
+    n = min(pair.start_n, N_FIRST)
+    first = pair.start_t[(pair.start_n - n) % N_FIRST]
+    pair.interval = (t - first) / (n - 1) if n > 1 else 0.0
+    pair.t_range, pair.t_used = t, t
+
+
+@kernel
+def add_translation_uncertainty(c, s, h, members, m):
+    """Add to P of hypothesis h that nothing is known of where the centre is."""
+    for a in range(m):
+        for b in range(m):
+            at_a, at_b = s.nodes[members[a]].i_pos, s.nodes[members[b]].i_pos
+            for k in range(c.d):
+                s.P[h, at_a + k, at_b + k] += CENTRE_VAR
+
+
+@kernel
+def reset_preintegration(s, i, t):
+    """Start the sums of a node's inertial samples anew."""
+    s.preintegrated[i, :] = 0.0
+    s.nodes[i].t_pre = t
+
+
+@kernel
+def initialise_node(c, s, h, i, t):
+    """Velocity, bias and heading error of a node that nothing is known of yet."""
+    node = s.nodes[i]
+    if node.static:
+        return
+    still = is_at_rest(c, node, t)
+    # What its compass reads where it stood when it was switched on counts less as it drives.
+    drove = max(node.t_moved - node.t_first - c.orienting, 0.0)
+    stood = decay(drove / node.heading_tau)
+    heading_var = node.heading_var + stood * (node.first_heading_var - node.heading_var)
+    for k in range(c.d):
+        speed_var = c.rest_var if still else c.start_speed_var
+        reset_state(s, h, c.n, node.i_vel + k, speed_var)
+        bias_var = node.bias_var if k < 2 else node.rise_bias_var
+        if k < 2 and not still:
+            bias_var += initial_tilt_variance(node, t - node.t_oriented)
+        reset_state(s, h, c.n, node.i_tilt_bias + k, bias_var)
+    for k in range(node.i_acc_bias, node.i_acc_bias + (3 if node.i_acc_bias >= 0 else 0)):
+        reset_state(s, h, c.n, k, node.offset_var)
+    reset_state(s, h, c.n, node.i_heading, heading_var)
+    for k in range(node.i_gyro_bias, node.i_gyro_bias + (3 if node.i_gyro_bias >= 0 else 0)):
+        reset_state(
+            s, h, c.n, k, min(node.gyro_var, node.first_gyro_var) if node.has_ahrs_feedback else 0.0
+        )
+
+
+@kernel
+def initial_nlos_prob(c, pair):
+    """Probability that the first ranges of a pair had no line of sight, by their powers."""
+    odds = c.enter_rate / c.leave_rate * math.exp(min(max(pair.start_nlos_llr, -7.0), 7.0))
+    return odds / (1.0 + odds)
+
+
+@kernel
+def initialise_pair(c, s, h, p, hidden):
+    """Range errors that nothing is known of yet but how likely it is that there is no sight."""
+    s.nlos[h, p], s.bias_retention[h, p] = hidden, 1.0
+    at = s.pairs[p].i_range_error
+    if at >= 0:
+        reset_state(s, h, c.n, at, max(c.fast_var, 1e-12))
+        slow_var = c.slow_var + hidden * c.excess_var + hidden * (1.0 - hidden) * c.excess**2
+        reset_state(s, h, c.n, at + 1, max(slow_var, 1e-12))
+        s.x[h, at + 1] = hidden * c.excess
+
+
+@kernel
+def reset_residual_statistics(pair):
+    """How well a pair's ranges fit, as if none had come yet."""
+    pair.n_ranges, pair.mean_nis = 0, 1.0
+    pair.mean_residual, pair.clipped_mean_residual, pair.mean_abs_residual, pair.rate_violation = (
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+    )
+
+
+@allocating_kernel
+def try_join(c, s, layout, new, t):
+    """Take a node in once it is ready with enough of the others; tells whether it was."""
+    n = s.nodes.shape[0]
+    n_present, n_ready = 0, 0
+    ready = np.empty(n, np.int64)
+    for k in range(n):
+        if s.nodes[k].present:
+            n_present += 1
+            if is_ready(c, s, layout, new, k, t):
+                ready[n_ready] = k
+                n_ready += 1
+    if n_ready < min(c.d + 1, n_present):
+        return False
+    sides, variance = np.empty((2, 3)), c.position_var
+    known, distance = np.zeros((n_ready, 3)), np.empty(n_ready)
+    was_alive = s.alive.copy()
+    reset_preintegration(s, new, t)
+    # The likeliest first: there may not be room for the second sides of all.
+    for h in np.argsort(-s.loglik):
+        if not was_alive[h]:
+            continue
+        for a in range(n_ready):
+            at = s.nodes[ready[a]].i_pos
+            for k in range(c.d):
+                known[a, k] = s.x[h, at + k]
+            distance[a], scatter = start_distance(c, s, layout, new, ready[a])
+            variance = max(variance, scatter * scatter)
+        n_sides = best_positions(c.d, c.merge_distance, known, distance, sides)
+        for side in range(n_sides):
+            target = h if side == 0 else copy_hypothesis(s, h)
+            if target >= 0:
+                add_node(c, s, layout, target, new, sides[side], variance, t)
+    for k in range(n):
+        if s.nodes[k].present:
+            initialise_interval(s.pairs[layout.pair_index[new, k]], t)
+    s.nodes[new].present = True
+    return True
+
+
+@allocating_kernel
+def add_node(c, s, layout, h, new, pos, variance, t):
+    """Put a node at a position: its error is that of a body with the others, and its own.
+
+    Where the others are elsewhere, or turned, it is as well: ranges to it tell neither.
+    """
+    initialise_node(c, s, h, new, t)
+    d, n = c.d, s.nodes.shape[0]
+    for k in range(d):
+        reset_state(s, h, c.n, s.nodes[new].i_pos + k, 0.0)
+    # What reads the errors of the node, one row a coordinate, off those of the others.
+    J, A, present = np.zeros((d, c.n)), np.zeros(c.n), 0
+    for i in range(n):
+        present += s.nodes[i].present and i != new
+    for k in range(d):
+        for i in range(n):
+            if s.nodes[i].present and i != new:
+                J[k, s.nodes[i].i_pos + k] = 1.0 / present
+    if d == 2:
+        centre0, centre1 = heading_functional(s, h, new, A)
+        J[0] -= (pos[1] - centre1) * A
+        J[1] += (pos[0] - centre0) * A
+    rows = J @ s.P[h]
+    own = rows @ J.T.copy()
+    for k in range(d):
+        at = s.nodes[new].i_pos + k
+        s.P[h, at, :] = rows[k]
+        s.P[h, :, at] = rows[k]
+        s.x[h, at] = pos[k]
+        for q in range(s.sensitivity.shape[1]):
+            s.sensitivity[h, q, at] = np.sum(J[k] * s.sensitivity[h, q])
+    for k in range(d):
+        for q in range(d):
+            s.P[h, s.nodes[new].i_pos + k, s.nodes[new].i_pos + q] = own[k, q]
+        s.P[h, s.nodes[new].i_pos + k, s.nodes[new].i_pos + k] += variance
+    for i in range(n):
+        if i != new and s.nodes[i].present:
+            p = layout.pair_index[i, new]
+            initialise_pair(c, s, h, p, initial_nlos_prob(c, s.pairs[p]))
+            reset_residual_statistics(s.pairs[p])

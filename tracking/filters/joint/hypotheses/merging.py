@@ -1,0 +1,101 @@
+"""When two hypotheses are one: they put every node in the same place round the centre."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tracking.filters.joint.hypotheses.alignment import CHALLENGED, STATIC, has_modes
+from tracking.filters.joint.hypotheses.alignment_sensitivity import has_linear_alignment
+from tracking.jit import allocating_kernel, kernel, small_kernel
+from tracking.maths.rotation_modes import APART
+
+
+@kernel
+def are_same(c, s, a, b, turn):
+    """True when two hypotheses agree in position and velocity of every node round the centre.
+
+    Velocities count over one second: a layout and its mirror image may meet in a line, but
+    they go on to different sides.
+
+    Args:
+        c: Coefficients.
+        s: JointState of one environment.
+        a: Hypothesis.
+        b: Another, turned before it is compared,
+        turn: by this, orthogonal, (d, d).
+    """
+    # Those that come from one filter, turned, are bent by that.
+    limit = c.merge_distance * (2.0 if has_modes(s.group[0]) else 1.0)
+    way, pace = centre_of(c, s, b, False), centre_of(c, s, b, True)
+    way_a, pace_a = centre_of(c, s, a, False), centre_of(c, s, a, True)
+    for i in range(s.nodes.shape[0]):
+        node = s.nodes[i]
+        if not node.present:
+            continue
+        squared = 0.0
+        for at, of_b, of_a in ((node.i_pos, way, way_a), (node.i_vel, pace, pace_a)):
+            if at < 0:
+                continue
+            for r in range(c.d):
+                off = s.x[a, at + r] - of_a[r]
+                for k in range(c.d):
+                    off -= turn[r, k] * (s.x[b, at + k] - of_b[k])
+                squared += off * off
+        if squared > limit * limit:
+            return False
+    return True
+
+
+@allocating_kernel
+def rotation_between(c, s, a, b, turn):
+    """Write how b is to be turned to be nearest to a, (d, d); leaves what is written if far.
+
+    Each rotation that was tried stands for those near it. Two of them that have come nearer than
+    `SAME_TURN` are one, and nobody should wait until a drive tells which is better. While each
+    stands for all turns and mirror images, in space, it may be any of them; while each stands for
+    the turns near its own, those nearer than its peaks can be. By Procrustes.
+    """
+    way_a, way_b = centre_of(c, s, a, False), centre_of(c, s, b, False)
+    scatter = np.zeros((c.d, c.d))
+    for i in range(s.nodes.shape[0]):
+        if s.nodes[i].present:
+            at = s.nodes[i].i_pos
+            for r in range(c.d):
+                for k in range(c.d):
+                    scatter[r, k] += (s.x[a, at + r] - way_a[r]) * (s.x[b, at + k] - way_b[k])
+    u, _, v = np.linalg.svd(scatter)
+    if has_linear_alignment(c, s) and STATIC <= s.group[0].alignment <= CHALLENGED:
+        turn[:] = u @ v
+        return
+    if np.linalg.det(u) * np.linalg.det(v) < 0.0:
+        u[:, c.d - 1] *= -1.0
+    nearest = u @ v
+    # The trace is 2 cos in the plane, 1 + 2 cos in space.
+    limit = APART if has_modes(s.group[0]) else c.same_rotation
+    if np.trace(nearest) > (c.d - 2) + 2.0 * math.cos(limit):
+        turn[:] = nearest
+
+
+@small_kernel
+def centre_of(c, s, h, of_velocities):
+    """Where hypothesis h puts the centre of the group, or how it moves, three numbers.
+
+    Beside static nodes, velocities have no common part that is free: 0.
+    """
+    total0, total1, total2, present, moving = 0.0, 0.0, 0.0, 0, 0
+    for i in range(s.nodes.shape[0]):
+        node = s.nodes[i]
+        if node.present:
+            present += 1
+            moving += not node.static
+            at = node.i_vel if of_velocities else node.i_pos
+            if not (of_velocities and node.static):
+                total0 += s.x[h, at]
+                total1 += s.x[h, at + 1]
+                if c.d == 3:
+                    total2 += s.x[h, at + 2]
+    if present == 0 or (of_velocities and moving != present):
+        return 0.0, 0.0, 0.0
+    return total0 / present, total1 / present, total2 / present

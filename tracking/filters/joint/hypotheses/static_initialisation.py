@@ -1,0 +1,120 @@
+"""Groups in which nothing has moved yet: one rotation stands for all.
+
+Ranges say nothing about the rotation of a layout, nor about its mirror image, and the
+accelerations of nodes at rest neither: until something moves, all hypotheses of the bank are
+one, turned. So only one is followed; the others are made of it when the first node moves.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tracking.filters.joint.heading_gauge import add_rotation_uncertainty, heading_variance
+from tracking.filters.joint.hypotheses.alignment import FILTERED
+from tracking.filters.joint.hypotheses.alignment_sensitivity import (
+    has_linear_alignment,
+    start_alignment,
+)
+from tracking.filters.joint.hypotheses.copying import copy_hypothesis, rotate_hypothesis
+from tracking.filters.joint.observability import shift_nullspace
+from tracking.filters.joint.scalar_update import reset_state
+from tracking.jit import allocating_kernel, kernel, small_kernel
+
+TIE = 1e-6
+"""[s] Times that differ by less are equal, whatever the clock began with."""
+
+
+@small_kernel
+def is_at_rest(c, node, t):
+    """True for a node whose IMU has read the same for a while, up to now."""
+    if not node.has_state or t - node.t_state > c.unaided_after:
+        return False
+    return node.rests and t - node.t_moved > c.rest_after
+
+
+@small_kernel
+def all_static(c, s, t):
+    """True if no present node has been seen to move since it was first heard."""
+    for i in range(s.nodes.shape[0]):
+        node = s.nodes[i]
+        if not node.present or node.static:
+            continue
+        if not node.has_state or t - node.t_state > c.unaided_after:
+            return False
+        if (
+            node.t_accelerated - node.t_first > c.settling
+            or node.t_moved - node.t_first > c.orienting
+        ):
+            return False
+    return True
+
+
+@small_kernel
+def may_move(c, s, t):
+    """True while it is too early to know whether the present nodes move."""
+    for i in range(s.nodes.shape[0]):
+        node = s.nodes[i]
+        if node.present and not node.static and t - node.t_first <= c.settling:
+            return True
+    return False
+
+
+@allocating_kernel
+def spawn_rotation_hypotheses(c, s, layout, work):
+    """Follow all rotations and mirror images from now on, in space by one filter for all.
+
+    Where a node that joined may be on two sides there are two layouts; in the plane the bank has
+    room for a few rotations of the second.
+    """
+    group = s.group[0]
+    group.alignment = FILTERED
+    if group.t > group.t_scoring_starts - c.wheels_after + c.stood_for + TIE:
+        group.t_scoring_starts = group.t
+    was_alive = s.alive.copy()
+    for h in range(s.alive.shape[0]):
+        for i in range(s.nodes.shape[0]):
+            node = s.nodes[i]
+            # Errors of headings stay as long as nobody moves.
+            if was_alive[h] and node.present and not node.static:
+                reset_state(s, h, c.n, node.i_heading, node.first_heading_var)
+        if was_alive[h]:
+            reset_heading_uncertainty(c, s, h, work)
+    if has_linear_alignment(c, s):
+        for h in range(s.alive.shape[0]):
+            if s.alive[h]:
+                start_alignment(c, s, layout, h)
+        return
+    for _ in range(s.alive.shape[0]):
+        # The likelier layout first.
+        original = -1
+        for h in range(s.alive.shape[0]):
+            if was_alive[h] and (original < 0 or s.loglik[h] > s.loglik[original]):
+                original = h
+        if original < 0:
+            return
+        was_alive[original] = False
+        spawn_rotations(c, s, layout, original)
+
+
+@kernel
+def reset_heading_uncertainty(c, s, h, work):
+    """Make hypothesis h as uncertain of how it is turned as the gap between two that are tried.
+
+    In space it is as uncertain as the start and ranges left it (`heading_gauge`).
+    """
+    if c.d == 2:
+        shift_nullspace(c, s, h, 1.0, work)  # by what moved lately
+        add_rotation_uncertainty(c, s, h, max(c.rotation_var - heading_variance(c, s, h), 0.0))
+        s.group[0].heading_gauge_var = max(s.group[0].heading_gauge_var, c.rotation_var)
+
+
+@allocating_kernel
+def spawn_rotations(c, s, layout, original):
+    """Follow a hypothesis in all other rotations and mirrored, while the bank has room."""
+    d = c.d
+    first = layout.rotations[0, :d, :d].copy()
+    for r in range(1, layout.rotations.shape[0]):
+        h = copy_hypothesis(s, original)
+        if h >= 0:
+            turn = layout.rotations[r, :d, :d].copy() @ first.T.copy()
+            rotate_hypothesis(c, s, h, np.ascontiguousarray(turn))

@@ -1,0 +1,116 @@
+"""Whether the ends of a range see each other, and what follows from that for its slow error.
+
+It is judged by Bayes' rule, from the residual, from the gap between received and first-path power
+where it is reported, and from what it was before: a Markov chain of two states for every pair and
+hypothesis.
+"""
+
+from __future__ import annotations
+
+import math
+
+from tracking.filters.joint.scalar_update import covariance
+from tracking.jit import small_kernel
+from tracking.maths.exponentials import exponential, likelihood
+
+MIN_PROB = 1e-4
+SQRT_2PI = math.sqrt(2.0 * math.pi)
+
+
+@small_kernel
+def power_evidence(c, gap):
+    """Log-likelihood ratio of no sight against sight, of a power gap [dB]."""
+    los = max(gap - c.gap_los, 0.0) / c.gap_los_std
+    nlos = min(gap - c.gap_nlos, 0.0) / c.gap_nlos_std
+    ratio = 0.5 * (los * los - nlos * nlos) - math.log(c.gap_nlos_std / c.gap_los_std)
+    return min(max(c.gap_weight * ratio, -4.0), 4.0)
+
+
+@small_kernel
+def update_nlos_posterior(c, s, h, p, dt, nu, variance, sight, w):
+    """Bayes' rule over what the sight was and is; updates the pair's NLOS probability.
+
+    The slow error holds the excess while there is no sight. So in sight before and after, or
+    in neither, the range is predicted as it is; entering adds an excess, leaving takes the
+    slow error away. Most obstacles add little, some a lot: so the excess has two parts.
+
+    Args:
+        c: Coefficients.
+        s: JointState of one environment.
+        h: Hypothesis.
+        p: Pair.
+        dt: Time since the pair's last range [s].
+        nu: Innovation [m].
+        variance: Of the prediction [m2].
+        sight: As of `range_update`.
+        w: ``P H``.
+
+    Returns:
+        Probability that the sight changed; that the range meant anything; likelihood; and
+        probability that the excess, if any came, is one of the large ones.
+    """
+    at = s.pairs[p].i_range_error + 1
+    before = s.nlos[h, p]
+    evidence, enter_rate, leave_rate = sight
+    changes = (1.0 - exponential(-(enter_rate + leave_rate) * dt)) / (enter_rate + leave_rate)
+    enter, leave = enter_rate * changes, leave_rate * changes
+    S = variance + c.white_var
+    near = (1.0 - c.far_share) * likelihood(nu - c.excess, S + c.excess_var)
+    far = c.far_share * likelihood(nu - c.far_excess, S + c.far_excess_var)
+    enters = near + far
+    nu_leave, S_leave = nu, S
+    if at > 0:
+        nu_leave = nu + s.x[h, at]
+        S_leave += max(covariance(s, h, at, at) - 2.0 * w[at], -0.9 * variance) + c.slow_var
+    hidden = exponential(evidence)
+    stays = likelihood(nu, S)
+    los_los = (1.0 - before) * (1.0 - enter) * stays
+    los_nlos = (1.0 - before) * enter * enters
+    nlos_los = before * leave * likelihood(nu_leave, S_leave)
+    nlos_nlos = before * (1.0 - leave) * stays
+    if at <= 0:
+        # Without a state for the excess, no sight is a range that is worse.
+        nlos_nlos = before * (1.0 - leave) * enters
+    los_nlos *= hidden
+    nlos_nlos *= hidden
+    wild = SQRT_2PI * c.outlier_prob / c.outlier_span
+    total = los_los + los_nlos + nlos_los + nlos_nlos
+    s.nlos[h, p] = min(max((los_nlos + nlos_nlos) / max(total, 1e-300), MIN_PROB), 1.0 - MIN_PROB)
+    if total < 1e-300:
+        s.nlos[h, p] = before
+        return 0.0, 0.0, wild, 0.0
+    # The power says nothing about where the nodes are: it is no evidence for a hypothesis.
+    norm = 1.0 + (s.nlos[h, p]) * (hidden - 1.0) if hidden > 1.0 else 1.0
+    switched = (los_nlos + nlos_los) / total
+    is_far = far / max(enters, 1e-300)
+    return switched, total / (total + wild), total / norm + wild, is_far
+
+
+@small_kernel
+def reset_bias_on_transition(c, s, h, p, switched, is_far):
+    """Forget the slow error of a pair by the probability that its sight changed.
+
+    A new one is of the large ones with the probability `is_far`, a mixture taken for a Gaussian.
+    """
+    at = s.pairs[p].i_range_error + 1
+    if at <= 0:
+        return
+    stays = 1.0 - switched
+    before = covariance(s, h, at, at)
+    for r in range(c.n):
+        s.P[h, at, r] *= stays
+        s.P[h, r, at] *= stays
+    for q in range(s.n_pending[h]):
+        s.pending_updates[h, q, at] *= stays
+    for k in range(s.sensitivity.shape[1]):
+        s.sensitivity[h, k, at] *= stays
+    hidden = s.nlos[h, p]
+    relative_covariance = c.far_excess - c.excess
+    within = c.excess_var + is_far * (c.far_excess_var - c.excess_var)
+    excess_var = within + is_far * (1.0 - is_far) * relative_covariance * relative_covariance
+    excess = c.excess + is_far * relative_covariance
+    new_var = c.slow_var + hidden * excess_var + hidden * (1.0 - hidden) * excess * excess
+    off = s.x[h, at] - hidden * excess
+    # Of the mixture of both; the waiting corrections hold what has been taken off already.
+    s.P[h, at, at] += switched * stays * before + switched * new_var + switched * stays * off * off
+    s.x[h, at] -= switched * off

@@ -1,0 +1,1 @@
+"""Detection of faults, and what is done about them."""

@@ -1,0 +1,80 @@
+"""Nodes that were not heard for a while, and may be anywhere by now.
+
+A second without ranges or samples leaves a moving node a metre from where it is believed, two
+seconds several. Ranges to a place that is as wrong as it is far bend too much for a filter that
+takes them for straight: it comes out mirrored, or turned, and is sure of it. So such a node
+joins anew as it is heard again, and a group of such nodes begins anew.
+
+How uncertain it is shows in its distances, which no turn of the whole group changes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tracking.filters.joint.hypotheses.bank import remove_node
+from tracking.jit import allocating_kernel, kernel, small_kernel
+
+SAME = 1e-5
+"""[s] Ranges of one message differ by their rounding only."""
+
+
+@small_kernel
+def note_seen(c, node, t):
+    """Note that a node takes part in a range, and how often it does."""
+    if node.seen:
+        update_interval(c, node, t - node.t_last_range)
+    node.seen, node.t_last_range = True, t
+
+
+@small_kernel
+def update_interval(c, record, dt):
+    """Count a time between two ranges of a node or a pair [s]; those of one round are one."""
+    if dt > SAME:
+        record.interval += c.interval_gain * (min(dt, c.longest_interval) - record.interval)
+
+
+@small_kernel
+def is_silent(c, node, t):
+    """True for a node of the group that moves and was not heard lately."""
+    waits = max(c.silent_after, c.missed_intervals * node.interval)
+    return node.present and not node.static and t - node.t_last_range > waits
+
+
+@allocating_kernel
+def drop_stale(c, s, layout, t):
+    """Remove all nodes that were silent and may be anywhere, as one of them is heard again.
+
+    Those that stay away would keep the others from beginning anew. The states are those of time
+    t, and nothing of them waits. A smoother looks no farther ahead than a silence lasts: what
+    it holds of the past would go with the group.
+    """
+    if c.n > c.n_own:
+        return
+    faded = np.zeros(s.nodes.shape[0], np.bool_)  # of all, before the first is gone
+    for i in range(s.nodes.shape[0]):
+        faded[i] = is_silent(c, s.nodes[i], t) and is_stale(c, s, i)
+    for i in range(s.nodes.shape[0]):
+        if faded[i] and s.nodes[i].present:
+            remove_node(c, s, layout, i)
+
+
+@kernel
+def is_stale(c, s, i):
+    """True if the distances of node i to all others are open, in the reported hypothesis."""
+    h, at = s.group[0].best, s.nodes[i].i_pos
+    for k in range(s.nodes.shape[0]):
+        if k == i or not s.nodes[k].present:
+            continue
+        other = s.nodes[k].i_pos
+        squared, along = 1e-12, 0.0
+        for a in range(c.d):
+            off = s.x[h, other + a] - s.x[h, at + a]
+            squared += off * off
+            for b in range(c.d):
+                across = s.P[h, at + a, other + b] + s.P[h, other + a, at + b]
+                relative_covariance = s.P[h, at + a, at + b] + s.P[h, other + a, other + b] - across
+                along += off * (s.x[h, other + b] - s.x[h, at + b]) * relative_covariance
+        if along <= c.stale_share * c.ok_var * squared:
+            return False
+    return True

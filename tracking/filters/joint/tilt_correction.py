@@ -1,0 +1,55 @@
+"""What an orientation was turned upright by is known: so much more or less gravity is measured.
+
+VQF turns what its gyroscope says upright, over some seconds, by what its accelerometer reads: by
+its offset and by motion that lasts, too. A horizontal bias b is gravity seen through a tilt
+(`attitude_coupling`), so after a turn by (t_x, t_y) about x and y of the world it is
+
+    b + g (t_y, -t_x)
+
+Where these turns are told, only what the gyroscope leans by is not known of the bias
+(`gyro_bias`).
+"""
+
+from __future__ import annotations
+
+from tracking.filters.joint.gyro_bias import STEP, gyro_bias_transition, process_gyro_bias
+from tracking.geometry import GRAVITY
+from tracking.jit import small_kernel
+from tracking.measurements import TOLD, UPRIGHT
+
+GAIN = 30
+"""First of two columns of the sums since the states' time: the bias that was added [m/s2]."""
+
+
+@small_kernel
+def process_tilt_correction(node, pre, i, values, e, k, anew):
+    """Note how node i was turned upright between two STATE events, the later in column k."""
+    told = node.i_acc_bias >= 0 and values[e, k, TOLD] != 0.0
+    if told:
+        turned0, turned1 = values[e, k, UPRIGHT], values[e, k, UPRIGHT + 1]
+        begins = anew or not node.has_ahrs_feedback
+        if not begins:
+            pre[i, GAIN] += GRAVITY * (turned1 - node.tilt_correction1)
+            pre[i, GAIN + 1] -= GRAVITY * (turned0 - node.tilt_correction0)
+        node.tilt_correction0, node.tilt_correction1 = turned0, turned1
+        process_gyro_bias(node, pre, i, values, e, k, begins)
+    node.has_ahrs_feedback = told
+
+
+@small_kernel
+def apply_tilt_correction(node, pre, x, h, i, cos_r, sin_r, w):
+    """Add that to the bias of node i in hypothesis h, and write it to row i of w."""
+    w[i, STEP] = cos_r * pre[i, GAIN] - sin_r * pre[i, GAIN + 1]
+    w[i, STEP + 1] = sin_r * pre[i, GAIN] + cos_r * pre[i, GAIN + 1]
+    b0, b1, y = gyro_bias_transition(node, pre, x, h, i, cos_r, sin_r, w)
+    w[i, STEP] += b0
+    w[i, STEP + 1] += b1
+    x[h, node.i_tilt_bias] += w[i, STEP]
+    x[h, node.i_tilt_bias + 1] += w[i, STEP + 1]
+    x[h, node.i_heading] += y
+
+
+@small_kernel
+def tilt_bias_tau(node):
+    """How long the horizontal bias of a node stays the same [s]."""
+    return node.told_bias_tau if node.has_ahrs_feedback else node.bias_tau

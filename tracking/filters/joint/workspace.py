@@ -1,0 +1,80 @@
+"""Room for the intermediate results of the joint filter's kernels."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tracking.arrays import F64, I64, aligned
+from tracking.filters.joint.state import N_PRE, room_to_wait
+from tracking.maths.simd.block_propagation import ROOM, STATES
+
+
+class Workspace(NamedTuple):
+    """Room for intermediate results, so that no event allocates."""
+
+    idx: I64
+    """States of a measurement."""
+    val: F64
+    """Derivatives by them."""
+    w: F64
+    """(state)"""
+    share: F64
+    """Of each correction that waits in a measurement, (correction)."""
+    scale: F64
+    """(state)"""
+    step: F64
+    """(node, 42)"""
+    derivatives: F64
+    """Of position and velocity by the states behind, see `block_propagation`."""
+    speed: F64
+    """(node)"""
+    none: F64
+    """Zeros, (3)."""
+    x: F64
+    """States of an estimate, (1, state)."""
+    P: F64
+    """Its covariance, (1, state, state)."""
+    preintegrated: F64
+    """Its sums, (node, N_PRE)."""
+    t_pre: F64
+    """(node) [s]"""
+    nlos: F64
+    """(1, pair)"""
+    bias_retention: F64
+    """(1, pair)"""
+    none_waiting: I64
+    """Of its covariance nothing waits: zero, (1)."""
+    gradient: F64
+    """Of an innovation by the turn of an open group, (9)."""
+    direct: F64
+    """Of a prediction by it, the states held, (9)."""
+    turns: F64
+    """What reads a rotation of the group, its covariance, and moves turned, (3, axis, state)."""
+
+
+def make_workspace(n_nodes: int, n_pairs: int, n_states: int) -> Workspace:
+    """Room for a group of the given size."""
+    most = max(16, 3 * n_nodes)
+    return Workspace(
+        idx=np.zeros(most, dtype=np.int64),
+        val=np.zeros(most),
+        w=aligned(n_states),
+        share=np.zeros(room_to_wait(n_states)),
+        scale=aligned(n_states),
+        step=np.zeros((n_nodes, 42)),
+        derivatives=aligned(n_nodes, STATES + 1, ROOM),
+        speed=np.zeros(n_nodes),
+        none=np.zeros(3),
+        x=aligned(1, n_states),
+        P=aligned(1, n_states, n_states),
+        preintegrated=np.zeros((n_nodes, N_PRE)),
+        t_pre=np.zeros(n_nodes),
+        nlos=np.zeros((1, n_pairs)),
+        bias_retention=np.zeros((1, n_pairs)),
+        none_waiting=np.zeros(1, dtype=np.int64),
+        gradient=np.zeros(9),
+        direct=np.zeros(9),
+        turns=aligned(3, 3, n_states),
+    )

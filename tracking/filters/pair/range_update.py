@@ -1,0 +1,216 @@
+"""A range in a running pair: dead reckoning up to it, the outlier gate, the corrections."""
+
+from __future__ import annotations
+
+import math
+
+from tracking.filters.pair.dynamics import (
+    correct,
+    predict,
+    range_model,
+    range_rate_model,
+    speed_model,
+)
+from tracking.filters.pair.nlos_model import (
+    E,
+    decay_range_error,
+    reset_bias_on_transition,
+    update_nlos_posterior,
+)
+from tracking.jit import kernel, small_kernel
+
+TIE = 1e-6
+"""[s] Times that differ by less are equal, whatever the clock began with."""
+MOST_BEND = 0.1
+"""[m] No more noise than this is added for what the straight line misses."""
+
+
+@small_kernel
+def is_aided(c, node, t):
+    """True if the IMU of a node is heard."""
+    return node.has_state and t - node.t_state <= c.unaided_after
+
+
+@small_kernel
+def advance_pair(c, s, p, t):
+    """Predict pair p of every hypothesis to time t."""
+    pair = s.pairs[p]
+    dt = t - pair.t
+    if dt <= 0.0:
+        return
+    i, j = pair.i, pair.j
+    aided_i, aided_j = is_aided(c, s.nodes[i], t), is_aided(c, s.nodes[j], t)
+    q = node_variance(c, s.nodes[i], aided_i) + node_variance(c, s.nodes[j], aided_j)
+    w_i, w_j = 1.0 if aided_i else 0.0, 1.0 if aided_j else 0.0
+    a0 = w_j * s.held[j, 4] - w_i * s.held[i, 4]
+    a1 = w_j * s.held[j, 5] - w_i * s.held[i, 5]
+    a2 = w_j * s.held[j, 6] - w_i * s.held[i, 6]
+    psd = math.sqrt(q)
+    group = s.group[0]
+    first, end = (0, s.alive.shape[0]) if group.n_alive > 1 else (group.best, group.best + 1)
+    for h in range(first, end):
+        if s.alive[h]:
+            predict(s.x, s.P, p, h, dt, a0, a1, a2, psd, c.d)
+    pair.t = t
+
+
+@small_kernel
+def node_variance(c, node, aided):
+    """Squared acceleration noise density that a node adds."""
+    if node.static:
+        return 0.0
+    return node.psd * node.psd if aided else c.unaided_psd * c.unaided_psd
+
+
+@small_kernel
+def antenna_offset(s, layout, n, antenna):
+    """Position of an antenna relative to its node in the world frame [m]."""
+    o0, o1, o2 = (
+        layout.antenna_b[antenna, 0],
+        layout.antenna_b[antenna, 1],
+        layout.antenna_b[antenna, 2],
+    )
+    w, x, y, z = s.held[n, 0], s.held[n, 1], s.held[n, 2], s.held[n, 3]
+    # o + 2 w (u x o) + 2 u x (u x o), with u the vector part
+    c0, c1, c2 = y * o2 - z * o1, z * o0 - x * o2, x * o1 - y * o0
+    return (
+        o0 + 2.0 * (w * c0 + y * c2 - z * c1),
+        o1 + 2.0 * (w * c1 + z * c0 - x * c2),
+        o2 + 2.0 * (w * c2 + x * c1 - y * c0),
+    )
+
+
+@small_kernel
+def passes_gate(c, s, p, t, distance):
+    """The outlier gate of the paper; updates the running average.
+
+    The allowed variation grows with the relative speed and with the age of the average, so
+    that a node that was silent and came back passes.
+    """
+    pair = s.pairs[p]
+    if pair.n_ranges == 0:
+        pair.mean_distance = distance
+        pair.in_a_row = 0
+        return True
+    age = t - pair.t_range
+    b = s.group[0].best
+    v0, v1, v2 = s.x[p, b, 3], s.x[p, b, 4], s.x[p, b, 5]
+    speed = math.sqrt(v0 * v0 + v1 * v1 + v2 * v2)
+    lag = c.gate_tau + age
+    allowed = c.gate_floor + c.gate_speed_gain * max(speed, c.gate_min_speed) * lag
+    jump = distance - pair.mean_distance
+    if abs(jump) > allowed:
+        pair.n_rejected += 1
+        pair.in_a_row += 1
+        if pair.in_a_row < c.gate_max_rejected:
+            return False
+        pair.mean_distance = distance
+    else:
+        pair.mean_distance += jump * age / lag
+    pair.in_a_row = 0
+    return True
+
+
+@kernel
+def surveyed_distance_update(c, s, p, distance, work):
+    """Correct pair p of every hypothesis with a surveyed distance."""
+    for h in range(s.alive.shape[0]):
+        if s.alive[h]:
+            nu = distance - range_model(s.x, p, h, 0.0, 0.0, 0.0, work)
+            correct(s.x, s.P, p, h, work, nu, c.survey_var)
+
+
+@small_kernel
+def update_rate(c, pair, t, distance):
+    """Low-pass the derivative of the range; True once the filter has settled."""
+    age = t - pair.t_range
+    if pair.n_ranges > 0 and 0.0 < age < 3.0 * c.speed_tau:
+        raw = (distance - pair.last_distance) / age
+        pair.rate += age / (c.speed_tau + age) * (raw - pair.rate)
+        return pair.n_ranges * age > 2.0 * c.speed_tau + TIE
+    if age > 0.0:
+        pair.rate = 0.0
+        pair.n_ranges = 0
+    return False
+
+
+@small_kernel
+def bend(s, p, h, work):
+    """What the straight line misses: how much longer a range is on average than predicted [m].
+
+    To second order ``tr(P_across) / (2 d)``, with P_across the covariance of the relative
+    position across the line of sight.
+    """
+    trace, along, squared = 0.0, 0.0, 0.0
+    for a in range(3):
+        squared += s.x[p, h, a] * s.x[p, h, a]
+        trace += s.P[p, h, a, a]
+        for b in range(3):
+            along += work[0, a] * s.P[p, h, a, b] * work[0, b]
+    return 0.5 * max(trace - along, 0.0) / math.sqrt(squared + 0.01)
+
+
+@small_kernel
+def range_update(c, s, layout, p, t, distance, evidence, antenna_i, antenna_j, work):
+    """Gate a range, then correct pair p of every hypothesis with it and with its rate."""
+    if not passes_gate(c, s, p, t, distance):
+        return
+    pair = s.pairs[p]
+    i0, i1, i2 = antenna_offset(s, layout, pair.i, antenna_i)
+    j0, j1, j2 = antenna_offset(s, layout, pair.j, antenna_j)
+    l0, l1, l2 = j0 - i0, j1 - i1, j2 - i2
+    dt = max(t - pair.t_range, 0.0)
+    has_rate = update_rate(c, pair, t, distance)
+    group = s.group[0]
+    many = group.n_alive > 1
+    first, end = (0, s.alive.shape[0]) if many else (group.best, group.best + 1)
+    for h in range(first, end):
+        if not s.alive[h]:
+            continue
+        decay_range_error(c, s, p, h, dt)
+        nu = distance - range_model(s.x, p, h, l0, l1, l2, work)
+        variance, w_e = predicted_variance(s.P, p, h, work)
+        expected = variance + c.range_var
+        misfit = nu * nu / expected
+        switched, sane, loglik = update_nlos_posterior(c, s, p, h, dt, nu, variance, w_e, evidence)
+        nu += s.x[p, h, E]
+        reset_bias_on_transition(c, s, p, h, switched)
+        nu -= s.x[p, h, E]
+        bent = min(c.bend_gain * bend(s, p, h, work), MOST_BEND)
+        R = c.range_var + bent * bent + s.nlos[p, h] * c.excess_white_var
+        variance, _ = predicted_variance(s.P, p, h, work)
+        nis = nu * nu / (variance + R)
+        if sane > 1e-3:
+            correct(s.x, s.P, p, h, work, nu, R / sane)
+        s.loglik[h] += c.evidence * max(loglik, -0.5 * (c.max_nis + math.log(expected)))
+        if h == group.best:
+            pair.nis = nis
+            group.nis_sum += nis
+            group.nis_n += 1
+            group.misfit += 0.01 * (sane * min(misfit, 25.0) - group.misfit)
+            if sane > 0.5:
+                pair.t_used = t
+        if has_rate and c.speed_model == 1:
+            nu = pair.rate - range_rate_model(s.x, p, h, l0, l1, l2, work)
+            correct(s.x, s.P, p, h, work, nu, c.speed_var)
+        elif has_rate and c.speed_model == 2:
+            nu = abs(pair.rate) - speed_model(s.x, p, h, work)
+            correct(s.x, s.P, p, h, work, nu, c.speed_var)
+    pair.last_distance = distance
+    if dt > TIE:
+        pair.interval += 0.1 * (min(dt, c.leave_after) - pair.interval)
+    pair.t_range = t
+    pair.n_ranges += 1
+
+
+@small_kernel
+def predicted_variance(P, p, h, work):
+    """Variance of a predicted range, and its covariance with the range's slow error [m2]."""
+    variance, w_e = 0.0, 0.0
+    for r in range(P.shape[2]):
+        total = 0.0
+        for k in range(P.shape[2]):
+            total += P[p, h, r, k] * work[0, k]
+        variance += work[0, r] * total
+        w_e = total
+    return variance, w_e

@@ -1,0 +1,1 @@
+"""Checks of measurements before any filter takes them."""
