@@ -80,7 +80,6 @@ MECHANISMS: dict[str, Callable[[JointParams], JointParams]] = {
     "initial tilt": vehicles(unsettled_speed=0.0),
     "rest": vehicles(rests=False),
     "heading error at first": vehicles(first_heading_std=None),
-    "noise of attitude": vehicles(turn_psd=ALWAYS),
     "large NLOS": lambda p: replace(p, nlos_in_space=replace(p.nlos_in_space, far_share=0.0)),
     "power of ranges": lambda p: replace(
         p,
@@ -88,7 +87,6 @@ MECHANISMS: dict[str, Callable[[JointParams], JointParams]] = {
         nlos_in_space=replace(p.nlos_in_space, gap_weight=ALWAYS),
     ),
     "fast range error": part("range_error", fast_std=0.0),
-    "patience with wheels": part("alignment", wheels_after=ALWAYS),
 }
 """Name to parameters without it."""
 

@@ -13,9 +13,6 @@ class VehicleParams:
 
     accel_psd: float = 0.1
     """[m/s2/sqrt(Hz)] White noise of the acceleration: sensor, vibration, tilt jitter."""
-    turn_psd: float = 0.015
-    """[rad/sqrt(Hz)] Error of the orientation while it moves, times the acceleration: limbs are
-    off by a degree or two for a fraction of a second, with accelerations of several g."""
     bias_std: float = 0.3
     """[m/s2] Slow error of the acceleration, mostly gravity seen through a wrong tilt."""
     bias_tau: float = 30.0
@@ -94,7 +91,6 @@ VEHICLES = {
         ahrs_accel_tau=30.0,
         pair_accel_psd=0.07,
         accel_psd=0.045,
-        turn_psd=0.002,
         bias_std=0.05,
         bias_tau=100.0,
         levelled=True,

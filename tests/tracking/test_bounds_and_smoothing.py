@@ -202,7 +202,7 @@ def far_nodes():
         nodes=(*nodes, NodeConfig(id=4, vehicle="drone", imu_hz=HZ)), dimensions=2
     )
     carrier = replace(
-        VEHICLES["drone"], accel_psd=PSD, turn_psd=1e-9, bias_std=1e-9, rise_bias_std=1e-9,
+        VEHICLES["drone"], accel_psd=PSD, bias_std=1e-9, rise_bias_std=1e-9,
         heading_std=1e-9, unsettled_speed=0.0,
     )  # fmt: skip
     params = JointParams(

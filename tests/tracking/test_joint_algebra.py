@@ -276,7 +276,7 @@ def test_the_least_axis_is_the_librarys(seed, d, n):
 
 
 @pytest.mark.parametrize(
-    "mean_abs_residual", [np.zeros((3, 3)), np.eye(3), np.diag([0.0, 0.0, 2.0])]
+    "scatter", [np.zeros((3, 3)), np.eye(3), np.diag([0.0, 0.0, 2.0])]
 )
 def test_the_least_axis_of_what_has_none(scatter):
     least, axis = least_axis(tuple(scatter[np.triu_indices(3)]), 3)

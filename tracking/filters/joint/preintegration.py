@@ -32,12 +32,10 @@ def preintegrate(c, nodes, held, pre, i, t):
     aided = is_aided(c, node, t)
     for k in range(3):
         a = held[i, 4 + k] if aided else 0.0
-        pre[i, 11] += dt * a * a
         pre[i, 4 + k] += dt * pre[i, 1 + k] + half * a
         pre[i, 1 + k] += dt * a
     if not aided:
-        # In terms of the noise that grows with the acceleration: it stays when samples come again.
-        pre[i, 11] += dt * c.unaided_psd2 / node.turn_psd2
+        pre[i, 11] += dt * c.unaided_psd2
     cos_b, sin_b = (1.0, 0.0) if aided else (0.0, 0.0)
     if node.levelled and aided:
         cos_b, sin_b = node.cos_yaw, node.sin_yaw
@@ -103,8 +101,7 @@ def process_attitude(c, nodes, held, pre, i, t, values, e, k):
         pre[i, 6] += half_p * (a2 - held[i, 6])
         squared = a0 * a0 + a1 * a1
         if squared > node.blow * node.blow:
-            # In terms of the noise that grows with the acceleration.
-            pre[i, 11] += (node.blow_share * dt) ** 2 * squared / node.turn_psd2
+            pre[i, 11] += (node.blow_share * dt) ** 2 * squared
     held[i, 4], held[i, 5], held[i, 6] = a0, a1, a2
     node.cos_yaw, node.sin_yaw = cos_yaw, sin_yaw
     node.t_state = t

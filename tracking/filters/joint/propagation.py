@@ -228,7 +228,7 @@ def add_noise(c, node, pre, P, h, i, scale, step):
         return
     v, b, y = node.i_vel, node.i_tilt_bias, node.i_heading
     T = pre[i, 0]
-    q = node.psd2 * T + node.turn_psd2 * pre[i, 11]
+    q = node.psd2 * T + pre[i, 11]
     for k in range(c.d):
         P[h, p + k, p + k] += q * T * T / 3.0
         P[h, p + k, v + k] += 0.5 * q * T

@@ -39,7 +39,6 @@ NODE = np.dtype(
         ("levelled", "?"),
         ("rests", "?"),
         ("psd2", "f8"),
-        ("turn_psd2", "f8"),
         ("blow", "f8"),  # infinite for what moves by blows
         ("blow_share", "f8"),
         ("bias_var", "f8"),
@@ -108,7 +107,6 @@ GROUP = np.dtype(
         ("t_check", "f8"),
         ("t_constraints", "f8"),
         ("t_gauge", "f8"),
-        ("t_scoring_starts", "f8"),  # until when nothing speaks for or against a hypothesis [s]
         (
             "heading_gauge_var",
             "f8",

@@ -30,5 +30,5 @@ def add_saturation_noise(c, node, pre, i, t, cut_off):
     now = cut_off >= IN_PLANE or (cut_off > 0.0 and not node.levelled)
     if (now or node.saturated) and node.has_state:
         dt = min(max(t - node.t_state, 0.0), c.unaided_after)
-        pre[i, 11] += dt * c.unaided_psd2 / node.turn_psd2
+        pre[i, 11] += dt * c.unaided_psd2
     node.saturated = now

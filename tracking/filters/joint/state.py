@@ -47,7 +47,7 @@ class JointState(NamedTuple):
     preintegrated: F64
     """Sums over inertial samples since the states' time, (env, node, N_PRE): time [s]; velocity
     and way that they add [m/s, m]; cosine and sine that turn a bias, summed once and twice;
-    square of the acceleration [m2/s3]; the orientation, row by row, summed once and twice, of nodes
+    noise of the velocity [m2/s2]; the orientation, row by row, summed once and twice, of nodes
     whose accelerometer has an offset; of these the bias that they gain as they are turned upright
     [m/s2], and what is told of their gyroscopes (`gyro_bias`)."""
     pairs: Records
@@ -133,7 +133,6 @@ def make_state(
             "levelled": carrier.levelled,
             "rests": carrier.rests,
             "psd2": carrier.accel_psd**2,
-            "turn_psd2": carrier.turn_psd**2,
             "blow": carrier.blow or np.inf,
             "blow_share": carrier.blow_share,
             "bias_var": carrier.bias_std**2,
