@@ -82,7 +82,7 @@ def observations(mode: str) -> str:
     large = observation_mode(mode, CARS).fields
     rows = []
     for few, many, row in zip(small, large, index_table(large), strict=True):
-        last = f" to {row['last']}" if row["last_range"] > row["first"] else ""
+        last = f" to {row['last']}" if row["last"] > row["first"] else ""
         size = in_others(few.size, many.size)
         limits = f"{row['low']:g} to {row['high']:g}"
         name = f"`{row['name']}`"

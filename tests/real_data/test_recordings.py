@@ -41,20 +41,20 @@ MIRRORED = pytest.mark.xfail(
     ("name", "limit"), [pytest.param("isas_walk1", 0.30, marks=MIRRORED), ("inrol_env1", 0.20)]
 )
 def test_mds_keeps_the_shape(results, name, limit):
-    assert results[name, "ekf-mds"].alignment_score.rmse_shape <= limit
+    assert results[name, "ekf-mds"].score.rmse_shape <= limit
 
 
 @pytest.mark.parametrize("name", ["isas_walk1", "inrol_env1"])
 def test_mds_is_better_than_filters_alone(results, name):
-    refined = results[name, "ekf-mds"].alignment_score
-    alone = results[name, "ekf"].alignment_score
+    refined = results[name, "ekf-mds"].score
+    alone = results[name, "ekf"].score
     for figure in ("rmse", "rmse_yaw", "rmse_shape"):
         assert getattr(refined, figure) < getattr(alone, figure)
 
 
 def test_one_filter_over_all_nodes_follows_a_hand_among_reflections(results):
     """From nothing but measurements; no more than 10 s of it are not scored."""
-    found = results["inrol_env1", "joint"].alignment_score
+    found = results["inrol_env1", "joint"].score
     assert found.rmse <= 0.25
     assert found.rmse_shape <= 0.122
     assert found.ok_share >= 0.95
@@ -63,18 +63,18 @@ def test_one_filter_over_all_nodes_follows_a_hand_among_reflections(results):
 @pytest.mark.xfail(strict=True, reason="it takes 12 s to find the heading: 0.171 m from 10 s on")
 @pytest.mark.parametrize("limit", [0.15, 0.165])
 def test_it_does_so_from_ten_seconds_on(results, limit):
-    assert results["inrol_env1", "joint"].alignment_score.rmse_yaw <= limit
+    assert results["inrol_env1", "joint"].score.rmse_yaw <= limit
 
 
 def test_once_it_is_found_how_the_group_is_turned_it_is_so_for_good(data):
-    found = track_log(data / "logs" / "inrol_env1", skip=20.0).alignment_score
+    found = track_log(data / "logs" / "inrol_env1", skip=20.0).score
     assert found.rmse_yaw <= 0.15
 
 
 @pytest.fixture(scope="module")
 def settled_walk(data):
     """Its score once it is found how the group is turned."""
-    return track_log(data / "logs" / "isas_walk1", skip=20.0).alignment_score
+    return track_log(data / "logs" / "isas_walk1", skip=20.0).score
 
 
 def test_a_walk_is_followed_once_it_is_found_how_the_group_is_turned(settled_walk):
@@ -93,7 +93,7 @@ def test_recordings_are_near_what_their_ranges_allow(data):
     log = read_log(data / "logs" / "inrol_env1")
     found = track_log(log, bound=recorded_bound(log))
     for name, least in found.expected.items():
-        assert getattr(found.alignment_score, name) < 1.25 * least, name
+        assert getattr(found.score, name) < 1.25 * least, name
 
 
 def test_gross_outliers_are_refused(results):

@@ -40,7 +40,7 @@ def rng(seed=0):
 # Gyroscope and accelerometer
 
 
-def is_at_rest(degrees, noise=0.0, scale=SCALE, seconds=3.0, seed=0):
+def rests(degrees, noise=0.0, scale=SCALE, seconds=3.0, seed=0):
     """Poses held still, with a second of shaking after each."""
     draw, parts = rng(seed), []
     for euler in degrees:
@@ -54,42 +54,42 @@ def is_at_rest(degrees, noise=0.0, scale=SCALE, seconds=3.0, seed=0):
 
 
 def test_six_poses_give_offset_and_scale():
-    exact = calibrate_imu(*is_at_rest(SIX))
+    exact = calibrate_imu(*rests(SIX))
     assert (exact.acc_method, exact.n_poses, exact.n_seen) == ("full", 6, 3)
     np.testing.assert_allclose(exact.calibration.gyr_offset, GYR, atol=1e-12)
     np.testing.assert_allclose(exact.calibration.acc_offset, ACC, atol=1e-9)
     np.testing.assert_allclose(exact.calibration.acc_scale, SCALE, atol=1e-9)
-    noisy = calibrate_imu(*is_at_rest(SIX, noise=1.0))
+    noisy = calibrate_imu(*rests(SIX, noise=1.0))
     assert (np.abs(noisy.calibration.gyr_offset - GYR) < 5.0 * noisy.gyr_se).all()
     np.testing.assert_allclose(noisy.calibration.acc_offset, ACC, atol=2e-3)
     assert noisy.residual_after < 1e-3 < noisy.residual_before
 
 
 def test_rest_is_found_where_it_is():
-    rest = calibrate_imu(*is_at_rest(SIX, noise=1.0)).rest
+    rest = calibrate_imu(*rests(SIX, noise=1.0)).rest
     assert len(rest.n) == 6
     np.testing.assert_allclose(rest.span[:, 1] - rest.span[:, 0], 3.0, atol=0.6)
     np.testing.assert_allclose(rest.span[:, 0], 4.0 * np.arange(6), atol=0.3)
 
 
 def test_one_pose_shows_the_part_along_gravity_only():
-    found = calibrate_imu(*is_at_rest([[0, 0, 0]], scale=np.ones(3)))
+    found = calibrate_imu(*rests([[0, 0, 0]], scale=np.ones(3)))
     assert (found.acc_method, found.n_seen) == ("partial", 1)
     assert found.calibration.acc_scale is None
     length = np.linalg.norm(ACC + [0.0, 0.0, 9.81])
     assert np.linalg.norm(found.calibration.acc_offset) == pytest.approx(length - 9.81)
-    level = calibrate_imu(*is_at_rest([[0, 0, 0]], scale=np.ones(3)), level=True)
+    level = calibrate_imu(*rests([[0, 0, 0]], scale=np.ones(3)), level=True)
     np.testing.assert_allclose(level.calibration.acc_offset, ACC, atol=1e-9)
 
 
 def test_poses_that_are_alike_do_not_make_a_full_fit():
     alike = [[10 * k - 35, 12 * (k % 3), 0] for k in range(8)]
-    found = calibrate_imu(*is_at_rest(alike))
+    found = calibrate_imu(*rests(alike))
     assert found.acc_method == "partial"
 
 
 def test_a_slow_turn_is_no_rest():
-    t, imu = is_at_rest([[0, 0, 0]] * 3)
+    t, imu = rests([[0, 0, 0]] * 3)
     imu[400:700, 2] += 0.05
     found = calibrate_imu(t, imu)
     assert len(found.rest.n) == 2
@@ -97,12 +97,12 @@ def test_a_slow_turn_is_no_rest():
 
 
 def shaken():
-    t, imu = is_at_rest([[0, 0, 0]])
+    t, imu = rests([[0, 0, 0]])
     return t, imu + rng().normal(size=imu.shape)
 
 
 def dead():
-    t, imu = is_at_rest([[0, 0, 0]])
+    t, imu = rests([[0, 0, 0]])
     imu[:, 3:] = 0.0
     return t, imu
 
@@ -111,11 +111,11 @@ def dead():
     ("data", "level", "reason"),
     [
         (shaken(), False, "0.0 s at rest"),
-        (is_at_rest([[0, 0, 0]], seconds=0.6), False, "0.0 s at rest"),
+        (rests([[0, 0, 0]], seconds=0.6), False, "0.0 s at rest"),
         ((np.arange(5) / 100.0, np.zeros((5, 6))), False, "at rest"),
-        (is_at_rest([[20, 0, 0]]), True, "tilted by 19 degrees"),
-        (is_at_rest([[0, 0, 0]], scale=np.full(3, 9.81)), False, "is it in m/s2"),
-        (is_at_rest(SIX, scale=np.array([1.3, 1.0, 1.0])), False, "scales"),
+        (rests([[20, 0, 0]]), True, "tilted by 19 degrees"),
+        (rests([[0, 0, 0]], scale=np.full(3, 9.81)), False, "is it in m/s2"),
+        (rests(SIX, scale=np.array([1.3, 1.0, 1.0])), False, "scales"),
         (dead(), False, "0 m/s2 at rest, expected gravity"),
     ],
 )

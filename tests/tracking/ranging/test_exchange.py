@@ -70,7 +70,7 @@ class Line:
                 self.hear(other, node, t)
         self.t += self.step
 
-    def process_range(self, other, node, t):
+    def hear(self, other, node, t):
         flight = abs(other.at(t) - node.at(t)) / SPEED_OF_LIGHT
         arrived = other.local(t + flight)
         moving = (other.speed - node.speed) * (1 if other.at(t) > node.at(t) else -1)
@@ -141,8 +141,8 @@ def test_order_changes_from_round_to_round(drawn, orders):
 @given(lines(3), st.permutations(range(3)), st.data())
 def test_lost_messages_make_no_wrong_ranges(drawn, order, data):
     line, _ = drawn
-    process_range = line.hear
-    line.hear = lambda *message: data.draw(st.booleans()) and process_range(*message)
+    hear = line.hear
+    line.hear = lambda *message: data.draw(st.booleans()) and hear(*message)
     line.rounds(8, order)
     assert max(line.wrong, default=0.0) < 0.05
 

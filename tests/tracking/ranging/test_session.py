@@ -72,7 +72,7 @@ class Alone:
         self.now += max(self.left, 0)
         self.take(self.session.timeout(self.now % MODULUS))
 
-    def process_range(self, data, delay=0.0, stamp=None, carrier=None, powers=(-80.0, -83.0)):
+    def hear(self, data, delay=0.0, stamp=None, carrier=None, powers=(-80.0, -83.0)):
         """A frame comes in, whole, and is handed over so much later."""
         self.take(self.session.preamble(self.now % MODULUS))
         moment = self.now + ticks(self.params.phy.header_time)
@@ -81,7 +81,7 @@ class Alone:
         reception = Reception((moment if stamp is None else stamp) % MODULUS, *powers, carrier)
         self.take(self.session.frame(data, reception, self.now % MODULUS))
 
-    def flush_updates(self, seconds=5.0):
+    def settle(self, seconds=5.0):
         """Nothing comes in any more: within so long it leads, and ranges go on from there."""
         end = self.now + ticks(seconds)
         while self.session.role is not Role.INITIATOR:
