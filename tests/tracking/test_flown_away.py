@@ -21,7 +21,7 @@ def send_away(tracker, nodes):
     saved = tracker.save()
     state = saved["filter"]
     for k, node in enumerate(nodes):
-        p, v = state.nodes["at_p"][0, node], state.nodes["at_v"][0, node]
+        p, v = state.nodes["i_pos"][0, node], state.nodes["i_vel"][0, node]
         state.x[0, :, p] += AWAY * (k + 1.0)
         state.x[0, :, v] += 5.0
     tracker.restore(saved)

@@ -30,7 +30,10 @@ def told(rng, R, weight):
 def open_bank(n_hyps=3):
     """A group of three whose turn is open, in a bank with room."""
     c, s, work, layout = running(3, "human")
-    names = "x P waiting n_waiting moved nlos stays loglik alive slope score information spread"
+    names = (
+        "x P pending_updates n_pending accumulated_correction nlos bias_retention loglik alive "
+        "sensitivity alignment_score alignment_information alignment_cov"
+    )
     s = s._replace(**{k: np.repeat(getattr(s, k), n_hyps, axis=0) for k in names.split()})
     s.alive[1:] = False
     n = s.x.shape[1]

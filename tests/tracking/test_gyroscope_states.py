@@ -19,10 +19,10 @@ START_STD = 0.009
 TRUSTED = VEHICLES["hand"].gyro_std
 
 
-def tell(s, bias, var, is_at_rest, begins=False):
+def tell(s, bias, var, rests, begins=False):
     """A STATE event of node 0 that tells of its gyroscope."""
     values = np.zeros((1, 1, N_VALUES))
-    values[0, 0, TOLD] = 2.0 if is_at_rest else 1.0
+    values[0, 0, TOLD] = 2.0 if rests else 1.0
     values[0, 0, GYRO_BIAS : GYRO_BIAS + 3], values[0, 0, GYRO_VAR] = bias, var
     gyroscope.process_gyro_bias(s.nodes[0], s.preintegrated, 0, values, 0, 0, begins)
 

@@ -275,9 +275,7 @@ def test_the_least_axis_is_the_librarys(seed, d, n):
     assert axis @ scatter @ axis == pytest.approx(eigenvalues[0], abs=1e-6 * top)
 
 
-@pytest.mark.parametrize(
-    "scatter", [np.zeros((3, 3)), np.eye(3), np.diag([0.0, 0.0, 2.0])]
-)
+@pytest.mark.parametrize("scatter", [np.zeros((3, 3)), np.eye(3), np.diag([0.0, 0.0, 2.0])])
 def test_the_least_axis_of_what_has_none(scatter):
     least, axis = least_axis(tuple(scatter[np.triu_indices(3)]), 3)
     assert least == pytest.approx(scatter[0, 0], abs=1e-12)

@@ -103,7 +103,7 @@ def test_prediction_takes_off_what_waits(vehicle):
     n = s.x.shape[1]
     rng = np.random.default_rng(3)
     W = rng.standard_normal((1, 16, n))
-    s = s._replace(waiting=W)
+    s = s._replace(pending_updates=W)
     A = rng.standard_normal((n, n))
     s.nodes["heading_tau"], s.nodes["bias_tau"] = 0.05, 0.02
     x0, P0 = s.x[0].copy(), A @ A.T + 100.0 * np.eye(n)
@@ -187,9 +187,9 @@ def holding(x, P, room):  # noqa: N803
     return JointState(**none)._replace(
         x=x[None].copy(),
         P=P[None].copy(),
-        waiting=np.zeros((1, room, n)),
-        n_waiting=np.zeros(1, dtype=np.int64),
-        moved=np.zeros((1, n)),
+        pending_updates=np.zeros((1, room, n)),
+        n_pending=np.zeros(1, dtype=np.int64),
+        accumulated_correction=np.zeros((1, n)),
         alive=np.ones(1, dtype=bool),
     )
 

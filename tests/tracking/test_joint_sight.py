@@ -24,7 +24,7 @@ def believing(seed, hidden, *, waiting):
     s.nlos[:], s.bias_retention[:] = hidden, 1.0
     if waiting:
         H = rng.standard_normal(n)
-        s = s._replace(waiting=np.zeros((1, 8, n)))  # as in groups large enough
+        s = s._replace(pending_updates=np.zeros((1, 8, n)))  # as in groups large enough
         s.n_pending[0] = 1
         s.pending_updates[0, 0] = s.P[0] @ H / np.sqrt(H @ s.P[0] @ H + 1.0)
     return c, s, work

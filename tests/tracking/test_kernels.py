@@ -32,13 +32,13 @@ def test_jacobians_are_finite_differences(name, size):
     rng = np.random.default_rng(1)
     for _ in range(20):
         x, _ = random_pair(rng, size=size)
-        work, work = np.zeros((2, size)), np.zeros((2, size))
+        work, other = np.zeros((2, size)), np.zeros((2, size))
         MODELS[name](x, work)
         for k in range(size):
             up, down = x.copy(), x.copy()
             up[..., k] += 1e-6
             down[..., k] -= 1e-6
-            slope = (MODELS[name](up, work) - MODELS[name](down, work)) / 2e-6
+            slope = (MODELS[name](up, other) - MODELS[name](down, other)) / 2e-6
             assert slope == pytest.approx(work[0, k], abs=1e-7)
 
 

@@ -68,7 +68,7 @@ def test_surveyed_distances_settle_on_which_side_fixed_nodes_are(measured):
     tracker.step(run.block.take(slice(0, int(np.searchsorted(t, 2.0)))), 2.0)
     state = tracker.save()["filter"]
     best, truth = int(state.group["best"][0, 0]), run.positions(np.array([2.0]))[0, 1:]
-    found = np.stack([state.x[0, best, at : at + 3] for at in state.nodes["at_p"][0, 1:]])
+    found = np.stack([state.x[0, best, at : at + 3] for at in state.nodes["i_pos"][0, 1:]])
     for places in (found, truth):
         places -= places.mean(axis=0)
     u, _, v = np.linalg.svd(truth.T @ found)

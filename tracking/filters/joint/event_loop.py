@@ -7,22 +7,16 @@ from tracking.filters.joint.estimate import write_estimate
 from tracking.filters.joint.gyro_bias_at_rest import update_gyro_bias_at_rest
 from tracking.filters.joint.heading_gauge import update_heading_variance
 from tracking.filters.joint.hypotheses.alignment import NONE, STATIC, is_linear
-from tracking.filters.joint.hypotheses.alignment_modes import monitor_modes
 from tracking.filters.joint.hypotheses.alignment_sensitivity import propagate_sensitivity
 from tracking.filters.joint.hypotheses.bank import (
-    drop_timed_out,
+    any_timed_out,
     hypothesis_range,
-    monitor_alignment,
-    monitor_reflection,
+    needs_challenge,
+    needs_reflection,
     prune_bank,
-    remove_node,
 )
-from tracking.filters.joint.hypotheses.initialisation import try_join, try_start
-from tracking.filters.joint.hypotheses.static_initialisation import (
-    all_static,
-    may_move,
-    spawn_rotation_hypotheses,
-)
+from tracking.filters.joint.hypotheses.initialisation import can_join, can_start
+from tracking.filters.joint.hypotheses.static_initialisation import all_static, may_move
 from tracking.filters.joint.lever_arm import antenna_offset
 from tracking.filters.joint.motion_constraints import apply_motion_constraints, centre
 from tracking.filters.joint.nlos_model import power_evidence
@@ -32,22 +26,23 @@ from tracking.filters.joint.propagation import moves, predict
 from tracking.filters.joint.range_update import range_update
 from tracking.filters.joint.saturation_noise import add_saturation_noise
 from tracking.filters.joint.scalar_update import flush_all_updates
-from tracking.filters.joint.state import N_PRE, JointState
+from tracking.filters.joint.state import N_PRE, one_env
 from tracking.filters.joint.supervision.fault_detection import (
     monitor_faults,
     update_residual_statistics,
 )
 from tracking.filters.joint.supervision.frozen_range import is_frozen
-from tracking.filters.joint.supervision.reinitialisation import monitor_positions
-from tracking.filters.joint.supervision.staleness import (
-    drop_stale,
-    is_silent,
-    note_seen,
-    update_interval,
-)
-from tracking.filters.joint.surveyed_distance import apply_surveys, surveyed_distance_update
+from tracking.filters.joint.supervision.reinitialisation import find_misplaced
+from tracking.filters.joint.supervision.staleness import is_silent, note_seen, update_interval
+from tracking.filters.joint.surveyed_distance import surveyed_distance_update
+from tracking.filters.joint.workspace import DONE, ENV, EVENT, FLAG, NODE, OUT
 from tracking.jit import kernel, small_kernel
 
+# What is rare and large is compiled apart (`rare`). In the order in which a range needs them:
+(
+    NOTHING, TIME_OUT, SPAWN, STALE, SUPERVISED, TIME_OUT_LATER, MODES_STEP, REFLECT, CHALLENGE,
+    REINITIALISE, START, JOIN, JOIN_OTHER, REMOVE,
+) = range(14)  # fmt: skip
 # Plain numbers of `Kind`: kernels do not know enums.
 STATE, SURVEY, RANGE, LEAVE = 3, 4, 5, 6
 SAME = 1e-5
@@ -70,19 +65,21 @@ def run_events(coefficients, layout, state, work, block, t_out, out):
         t_out: Times at which estimates are due, ascending, (env, time) [s]. An estimate
             holds every event up to its time, that time included.
         out: Arrays written: pos, vel, cov, q, has_q, age, nis, nlos, status; (env, time, ...).
+
+    Returns:
+        What has to be done elsewhere before it is called again, see `rare`.
     """
     t, kind, node_i, node_j, antenna_i, antenna_j, values, has_power, valid = block
-    c = coefficients[0]
-    for e in range(t.shape[0]):
-        s = one_env(state, e)
-        o = 0
-        for k in range(t.shape[1]):
+    c, cursor = coefficients[0], work.cursor
+    for e in range(cursor[ENV], t.shape[0]):
+        s, o = one_env(state, e), cursor[OUT]
+        for k in range(cursor[EVENT], t.shape[1]):
             if not valid[e, k]:
                 continue
             while o < t_out.shape[1] and t_out[e, o] < t[e, k]:
                 write_estimate(c, s, work, t_out[e, o], e, o, out)
                 o += 1
-            i, j, what = node_i[e, k], node_j[e, k], kind[e, k]
+            i, j, what, action = node_i[e, k], node_j[e, k], kind[e, k], NOTHING
             if what == STATE:
                 add_saturation_noise(c, s.nodes[i], s.preintegrated, i, t[e, k], values[e, k, 7])
                 process_attitude(
@@ -97,85 +94,78 @@ def run_events(coefficients, layout, state, work, block, t_out, out):
                     evidence = power_evidence(c, values[e, k, 1] - values[e, k, 2])
                     sight = (evidence, c.enter_rate_with_power, c.leave_rate_with_power)
                 is_survey, now, distance = what == SURVEY, t[e, k], values[e, k, 0]
-                process_range(c, s, layout, work, i, j, a_i, a_j, now, distance, sight, is_survey)
-            elif what == LEAVE:
-                flush_all_updates(s)
-                remove_node(c, s, layout, i)
+                action = process_range(
+                    c, s, layout, work, i, j, a_i, a_j, now, distance, sight, is_survey
+                )
+            elif what == LEAVE and cursor[DONE] != REMOVE:
+                cursor[NODE], action = i, REMOVE
+            cursor[DONE] = action
+            if action != NOTHING:
+                cursor[ENV], cursor[EVENT], cursor[OUT] = e, k, o
+                return action
         while o < t_out.shape[1]:
             write_estimate(c, s, work, t_out[e, o], e, o, out)
             o += 1
+        cursor[EVENT], cursor[OUT] = 0, 0
+    return NOTHING
 
 
 @kernel
-def one_env(state, e):
-    """The state of environment e; shares its memory."""
-    return JointState(
-        state.nodes[e],
-        state.last_attitude_accel[e],
-        state.preintegrated[e],
-        state.pairs[e],
-        state.group[e],
-        state.x[e],
-        state.P[e],
-        state.pending_updates[e],
-        state.n_pending[e],
-        state.accumulated_correction[e],
-        state.nlos[e],
-        state.bias_retention[e],
-        state.alive[e],
-        state.loglik[e],
-        state.sensitivity[e],
-        state.alignment_score[e],
-        state.alignment_information[e],
-        state.alignment_cov[e],
-    )
-
-
-@kernel
-def predict_all(coefficients, layout, state, work, t):
+def predict_all(coefficients, state, work, t):
     """Carry every environment to its time t, (env) [s]."""
     for e in range(t.shape[0]):
         s = one_env(state, e)
         if s.group[0].alignment != NONE:
-            predict_to(coefficients[0], s, layout, work, t[e], True)
+            predict_to(coefficients[0], s, work, t[e], True)
             flush_all_updates(s)
 
 
 @small_kernel
 def process_range(c, s, layout, work, i, j, a_i, a_j, t, distance, sight, is_survey):
-    """A range or survey between nodes i < j."""
+    """A range or survey between nodes i < j; returns what has to be done elsewhere, see `rare`.
+
+    It is called again after that, and goes on from there: `work.cursor` has what is done already.
+    """
+    done, group = work.cursor[DONE], s.group[0]
     p = layout.pair_index[i, j]
-    if not is_survey and is_frozen(c, s, p, t, distance):
-        return
+    if done == NOTHING and not is_survey and is_frozen(c, s, p, t, distance):
+        return NOTHING
     node_i, node_j = s.nodes[i], s.nodes[j]
-    if s.group[0].alignment != NONE and t - s.group[0].t_check > c.leave_after:
-        # Nobody was heard: whoever speaks first has been away as long as the others.
-        flush_all_updates(s)
-        drop_timed_out(c, s, layout, t)
-    if s.group[0].alignment != NONE and (is_silent(c, node_i, t) or is_silent(c, node_j, t)):
-        predict_to(c, s, layout, work, t, True)
-        flush_all_updates(s)
-        drop_stale(c, s, layout, t)
-    note_seen(c, node_i, t)
-    note_seen(c, node_j, t)
-    if not is_survey:
-        node_i.antenna, node_j.antenna = a_i, a_j
-    runs = node_i.present and node_j.present
-    if s.group[0].alignment != NONE:
-        predict_to(c, s, layout, work, t, not runs)
-        for k in (i, j):
-            if moves(s.nodes[k]):
-                preintegrate(c, s.nodes, s.last_attitude_accel, s.preintegrated, k, t)
-        if t - s.group[0].t_check + SAME >= c.check_period:
-            supervise(c, s, layout, t)
+    if done < TIME_OUT and group.alignment != NONE and t - group.t_check > c.leave_after:
+        # Without ranges for so long, the first one finds all nodes as long away.
+        return TIME_OUT
+    if done < SPAWN and group.alignment == STATIC and not all_static(c, s, t):
+        return SPAWN
+    silent = is_silent(c, node_i, t) or is_silent(c, node_j, t)
+    if done < STALE and group.alignment != NONE and silent:
+        predict_to(c, s, work, t, True)
+        return STALE
+    if done <= STALE:
+        note_seen(c, node_i, t)
+        note_seen(c, node_j, t)
+        if not is_survey:
+            node_i.antenna, node_j.antenna = a_i, a_j
+        if group.alignment != NONE:
+            predict_to(c, s, work, t, not (node_i.present and node_j.present))
+            for k in (i, j):
+                if moves(s.nodes[k]):
+                    preintegrate(c, s.nodes, s.last_attitude_accel, s.preintegrated, k, t)
+            if t - group.t_check + SAME >= c.check_period:
+                done = SUPERVISED
+    if SUPERVISED <= done <= REINITIALISE:
+        action = supervise(c, s, layout, work, t, done)
+        if action != NOTHING:
+            return action
+    if done > REINITIALISE:
+        return next_join(c, s, layout, work, i, j, t, done)
     if node_i.present and node_j.present:
         update_range(c, s, layout, work, p, a_i, a_j, t, distance, sight, is_survey)
-    else:
-        collect_initial_range(c, s, layout, work, i, j, p, t, distance, sight, is_survey)
+        return NOTHING
+    return collect_initial_range(c, s, layout, work, i, j, p, t, distance, sight, is_survey)
 
 
 @small_kernel
-def predict_to(c, s, layout, work, t, at_once):
+def predict_to(c, s, work, t, at_once):
     """Carry every hypothesis to time t, and use what is known about the carriers.
 
     Carrying a covariance costs more than a range does. So unless it has to be `at_once`, the states
@@ -183,9 +173,6 @@ def predict_to(c, s, layout, work, t, at_once):
     (`range_update.range_model`): only the noise of so short a time comes after them, not before.
     """
     group = s.group[0]
-    if group.alignment == STATIC and not all_static(c, s, t):
-        flush_all_updates(s)
-        spawn_rotation_hypotheses(c, s, layout, work)
     carriers_due = t - group.t_constraints + SAME >= c.carrier_period
     since = t - group.t
     if since > SAME and (at_once or carriers_due or since + SAME >= c.carry_period):
@@ -204,7 +191,7 @@ def predict_to(c, s, layout, work, t, at_once):
         group.t_gauge = t
 
 
-@small_kernel
+@kernel
 def propagate(c, s, work, t):
     """Carry every hypothesis to time t."""
     group = s.group[0]
@@ -269,7 +256,7 @@ def update_range(c, s, layout, work, p, a_i, a_j, t, distance, sight, is_survey)
 
 @kernel
 def collect_initial_range(c, s, layout, work, i, j, p, t, distance, sight, is_survey):
-    """A range or survey of a pair that does not run yet, i < j."""
+    """A range or survey of a pair that does not run yet, i < j; returns what is to be done."""
     collect(c, s.pairs[p], t, distance, is_survey)
     if s.pairs[p].start_n <= 1:
         s.pairs[p].start_nlos_llr = 0.0
@@ -277,28 +264,47 @@ def collect_initial_range(c, s, layout, work, i, j, p, t, distance, sight, is_su
         s.pairs[p].start_nlos_llr += sight[0]
     flush_all_updates(s)
     if s.group[0].alignment == NONE:
-        if try_start(c, s, layout, t):
-            for a in range(s.nodes.shape[0]):
-                apply_surveys(c, s, layout, work, a, a)
-        return
+        return START if can_start(c, s, layout, work.idx, t) > 0 else NOTHING
     if s.group[0].alignment == STATIC and may_move(c, s, t):
-        return
-    for new in (i, j):
-        if not s.nodes[new].present and try_join(c, s, layout, new, t):
-            apply_surveys(c, s, layout, work, new, s.nodes.shape[0])
+        return NOTHING
+    return next_join(c, s, layout, work, i, j, t, NOTHING)
 
 
 @kernel
-def supervise(c, s, layout, t):
-    """From time to time: who left, and which hypotheses are worth their time."""
+def next_join(c, s, layout, work, i, j, t, done):
+    """Which of the nodes of a range can join next."""
+    for new, action in ((i, JOIN), (j, JOIN_OTHER)):
+        is_due = done < action and done != START and not s.nodes[new].present
+        if is_due and can_join(c, s, layout, new, work.idx, t) > 0:
+            work.cursor[NODE] = new
+            return action
+    return NOTHING
+
+
+@kernel
+def supervise(c, s, layout, work, t, done):
+    """From time to time: who left, which hypotheses are worth their time, what is at fault.
+
+    Returns:
+        What has to be done elsewhere before it goes on, see `rare`.
+    """
     flush_all_updates(s)
-    drop_timed_out(c, s, layout, t)
-    if is_linear(s.group[0]):
-        monitor_modes(c, s, layout)
-    prune_bank(c, s)
-    update_heading_variance(c, s)
-    monitor_reflection(c, s)
-    monitor_alignment(c, s, layout, t - s.group[0].t_check)
-    monitor_positions(c, s, layout, t)
+    if done < TIME_OUT_LATER and any_timed_out(c, s, t):
+        return TIME_OUT_LATER
+    if done < MODES_STEP and is_linear(s.group[0]):
+        return MODES_STEP
+    if done < REFLECT:
+        prune_bank(c, s)
+        update_heading_variance(c, s)
+        if needs_reflection(c, s):
+            return REFLECT
+    if done < CHALLENGE and needs_challenge(c, s, t - s.group[0].t_check):
+        return CHALLENGE
+    if done < REINITIALISE:
+        node, is_away = find_misplaced(c, s, layout, t)
+        if node >= 0:
+            work.cursor[NODE], work.cursor[FLAG] = node, is_away
+            return REINITIALISE
     monitor_faults(c, s, layout, t)
     s.group[0].t_check = t
+    return NOTHING

@@ -13,6 +13,8 @@ covariance is that of the group:
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any, Self
 
 import numpy as np
@@ -24,10 +26,12 @@ from tracking.filters.batched import BatchedFilter
 from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.event_loop import predict_all, run_events
 from tracking.filters.joint.params import JointParams
+from tracking.filters.joint.rare import compile_all, run_to_end
 from tracking.filters.joint.smoothing import read_clones, with_clones
 from tracking.filters.joint.state import Layout, make_layout, make_state
 from tracking.filters.joint.workspace import Workspace, make_workspace
 from tracking.filters.records import as_records, with_records
+from tracking.jit import bind
 from tracking.measurements import MeasurementBlock
 
 
@@ -44,7 +48,21 @@ class JointEkf(BatchedFilter):
         state = make_state(constellation, params, n_envs, n_hyps)
         # Of one hypothesis: all begin alike.
         super().__init__(constellation, state, make_state(constellation, params, 1, 1))
-        self._scratch = self._make_scratch(state.x.shape[2])
+        self._work = self._make_workspace(state.x.shape[2])
+
+    def run(self, block: MeasurementBlock, t_out: F64) -> TeamEstimate:
+        """Handle the events and report at the given times; see `Filter.run`."""
+        t_out = np.ascontiguousarray(t_out, dtype=np.float64)
+        estimate = TeamEstimate.empty(self._constellation, t_out)
+        arguments = self._arguments(block.arrays, estimate)
+        run_to_end(partial(run_events, *arguments), arguments)
+        return estimate
+
+    def bind(self, block: MeasurementBlock, estimate: TeamEstimate) -> Callable[[], None]:
+        """`run` for arrays that stay where they are; see `Filter.bind`."""
+        arguments = self._arguments(block.in_place, estimate)
+        compile_all(arguments)
+        return partial(run_to_end, bind(run_events, *arguments), arguments)
 
     def smooth(self, later: MeasurementBlock, t: F64) -> TeamEstimate:
         """Report at one time with the help of later measurements, and stay where it is.
@@ -64,34 +82,35 @@ class JointEkf(BatchedFilter):
                 now.constellation, *(getattr(now, name)[:, 0] for name in names)
             )
             coefficients = as_records(self._coefficients)
-            predict_all(coefficients, self._layout, with_records(self._state), self._scratch, t)
+            predict_all(coefficients, with_records(self._state), self._work, t)
             clones, coefficients = with_clones(self._state, self._coefficients)
         finally:
             self.restore(saved)
         nothing = TeamEstimate.empty(self._constellation, np.zeros((n_envs, 0)))
-        run_events(
+        arguments = (
             as_records(coefficients),
             self._layout,
             with_records(clones),
-            self._make_scratch(int(coefficients[0]["n"])),
+            self._make_workspace(int(coefficients[0]["n"])),
             later.arrays,
             nothing.t,
             nothing.arrays,
         )
+        run_to_end(partial(run_events, *arguments), arguments)
         return read_clones(clones, estimate, self._state.x.shape[2])
 
     def part(self, envs: slice) -> Self:
         """Some of the environments; shares their memory."""
         part = super().part(envs)
-        part._scratch = self._make_scratch(self._state.x.shape[2])
+        part._work = self._make_workspace(self._state.x.shape[2])
         return part
 
     def _arguments(self, events: tuple[Any, ...], estimate: TeamEstimate) -> tuple[Any, ...]:
         state, coefficients = with_records(self._state), as_records(self._coefficients)
         times, arrays = estimate.t, estimate.arrays
-        return coefficients, self._layout, state, self._scratch, events, times, arrays
+        return coefficients, self._layout, state, self._work, events, times, arrays
 
-    def _make_scratch(self, n_states: int) -> Workspace:
+    def _make_workspace(self, n_states: int) -> Workspace:
         constellation = self._constellation
         return make_workspace(constellation.n_nodes, constellation.n_pairs, n_states)
 

@@ -30,6 +30,7 @@ from tracking.filters.joint.coefficients import (
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.records import GROUP, NODE, PAIR
 from tracking.filters.records import Records
+from tracking.jit import kernel
 from tracking.maths.starting_rotations import starting_rotations
 
 N_PRE = 39
@@ -82,6 +83,31 @@ class JointState(NamedTuple):
     """Its negative second derivatives, (env, hyp, 9, 9)."""
     alignment_cov: F64
     """How uncertain the elements are, each by itself, (env, hyp, 9, 9)."""
+
+
+@kernel
+def one_env(state: JointState, e: int) -> JointState:
+    """The state of environment e; shares its memory."""
+    return JointState(
+        state.nodes[e],
+        state.last_attitude_accel[e],
+        state.preintegrated[e],
+        state.pairs[e],
+        state.group[e],
+        state.x[e],
+        state.P[e],
+        state.pending_updates[e],
+        state.n_pending[e],
+        state.accumulated_correction[e],
+        state.nlos[e],
+        state.bias_retention[e],
+        state.alive[e],
+        state.loglik[e],
+        state.sensitivity[e],
+        state.alignment_score[e],
+        state.alignment_information[e],
+        state.alignment_cov[e],
+    )
 
 
 class Layout(NamedTuple):

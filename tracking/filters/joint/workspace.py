@@ -10,9 +10,16 @@ from tracking.arrays import F64, I64, aligned
 from tracking.filters.joint.state import N_PRE, room_to_wait
 from tracking.maths.simd.block_propagation import ROOM, STATES
 
+ENV, EVENT, OUT, DONE, NODE, FLAG = range(6)
+"""Elements of `Workspace.cursor`."""
+
 
 class Workspace(NamedTuple):
     """Room for intermediate results, so that no event allocates."""
+
+    cursor: I64
+    """Where the loop over events goes on: environment, event, estimate, what of the event is done;
+    and of which node and how (6)."""
 
     idx: I64
     """States of a measurement."""
@@ -58,6 +65,7 @@ def make_workspace(n_nodes: int, n_pairs: int, n_states: int) -> Workspace:
     """Room for a group of the given size."""
     most = max(16, 3 * n_nodes)
     return Workspace(
+        cursor=np.zeros(6, dtype=np.int64),
         idx=np.zeros(most, dtype=np.int64),
         val=np.zeros(most),
         w=aligned(n_states),

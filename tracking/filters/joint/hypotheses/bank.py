@@ -69,23 +69,26 @@ def add_mirror_image(c, s):
 
 
 @kernel
-def monitor_alignment(c, s, layout, dt):
-    """Follow all rotations and mirror images again where ranges have fitted badly for long."""
+def needs_challenge(c, s, dt):
+    """True where ranges have fitted the only hypothesis badly for long; dt since the last look."""
     group = s.group[0]
     group.slow_nis += (1.0 - decay(dt / c.misfit_time)) * (group.mean_nis - group.slow_nis)
     group.challenge_nis += (1.0 - decay(dt / c.challenge_time)) * (c.strained - group.challenge_nis)
     watched = group.n_alive == 1 and group.alignment >= CANDIDATES
     if not watched or group.slow_nis < group.challenge_nis:
-        return
-    n_doubted = 0
+        return False
+    n_faulty = 0
     for i in range(s.nodes.shape[0]):
-        n_doubted += s.nodes[i].present and s.nodes[i].faulty
+        n_faulty += s.nodes[i].present and s.nodes[i].faulty
     # A single node that contradicts the others is to blame, and not the layout.
-    if n_doubted == 1:
-        return
+    return n_faulty != 1 and degeneracy_ratio(c, s, group.best, True) != np.inf
+
+
+@kernel
+def challenge(c, s, layout):
+    """Follow all rotations and mirror images again beside the only hypothesis."""
+    group = s.group[0]
     h = group.best
-    if degeneracy_ratio(c, s, h, True) == np.inf:
-        return
     if has_linear_alignment(c, s):
         group.slow_nis = 0.0
         challenge_alignment(c, s, layout, h)
@@ -108,11 +111,11 @@ def monitor_alignment(c, s, layout, dt):
 
 
 @kernel
-def monitor_reflection(c, s):
-    """Bring the mirror image up where it can no longer be excluded."""
+def needs_reflection(c, s):
+    """True where a layout was degenerate and no longer is: its mirror image is as likely."""
     group = s.group[0]
     if group.n_alive != 1 or group.alignment < CANDIDATES:
-        return
+        return False
     ratio = degeneracy_ratio(c, s, group.best, True)
     if ratio < c.degenerate:
         group.degenerate = (
@@ -120,7 +123,8 @@ def monitor_reflection(c, s):
         )
     elif group.degenerate and ratio > c.regular:
         group.degenerate = False
-        add_mirror_image(c, s)
+        return True
+    return False
 
 
 @allocating_kernel
@@ -201,8 +205,23 @@ def remove_node(c, s, layout, i):
 
 
 @kernel
-def drop_timed_out(c, s, layout, t):
-    """Remove the nodes that were not heard for so long that they must have left."""
+def has_timed_out(c, node, t):
+    """True for a node without a range for so long that it must have left."""
+    return (node.present or node.seen) and t - node.t_last_range > c.leave_after
+
+
+@kernel
+def any_timed_out(c, s, t):
+    """True if a node has."""
+    n = 0
     for i in range(s.nodes.shape[0]):
-        if (s.nodes[i].present or s.nodes[i].seen) and t - s.nodes[i].t_last_range > c.leave_after:
+        n += has_timed_out(c, s.nodes[i], t)
+    return n > 0
+
+
+@kernel
+def drop_timed_out(c, s, layout, t):
+    """Remove the nodes that have timed out."""
+    for i in range(s.nodes.shape[0]):
+        if has_timed_out(c, s.nodes[i], t):
             remove_node(c, s, layout, i)

@@ -36,14 +36,18 @@ from tracking.maths.exponentials import decay
 from tracking.maths.multilateration import best_positions
 
 
-@allocating_kernel
-def try_start(c, s, layout, t):
-    """Start the group with the nodes whose pairs are all ready; tells whether it has."""
-    n = s.nodes.shape[0]
-    members = np.empty(n, np.int64)
+@kernel
+def can_start(c, s, layout, members, t):
+    """How many nodes can start, 0 for none; writes them."""
     m = choose_members(c, s, layout, members, t)
-    if m == 0 or is_motion_unknown(c, s, members, m, t):
-        return False
+    return 0 if m == 0 or is_motion_unknown(c, s, members, m, t) else m
+
+
+@allocating_kernel
+def start(c, s, layout, t):
+    """Start the group with the nodes whose pairs are all ready."""
+    members = np.empty(s.nodes.shape[0], np.int64)
+    m = can_start(c, s, layout, members, t)
     X = first_shape(c, s, layout, members, m)
     for a in range(m):
         s.nodes[members[a]].present = True
@@ -90,7 +94,6 @@ def try_start(c, s, layout, t):
     group.heading_gauge_var = c.rotation_var if c.d == 2 else 0.0
     group.mean_nis = 1.0
     group.slow_nis, group.challenge_nis = 0.0, c.strained
-    return True
 
 
 @kernel
@@ -191,20 +194,26 @@ def reset_residual_statistics(pair):
     )
 
 
-@allocating_kernel
-def try_join(c, s, layout, new, t):
-    """Take a node in once it is ready with enough of the others; tells whether it was."""
+@kernel
+def can_join(c, s, layout, new, ready, t):
+    """With how many others a node is ready to join them, 0 if too few; writes them."""
     n = s.nodes.shape[0]
     n_present, n_ready = 0, 0
-    ready = np.empty(n, np.int64)
     for k in range(n):
         if s.nodes[k].present:
             n_present += 1
             if is_ready(c, s, layout, new, k, t):
                 ready[n_ready] = k
                 n_ready += 1
-    if n_ready < min(c.d + 1, n_present):
-        return False
+    return 0 if n_ready < min(c.d + 1, n_present) else n_ready
+
+
+@allocating_kernel
+def join(c, s, layout, new, t):
+    """Take a node in that is ready with enough of the others."""
+    n = s.nodes.shape[0]
+    ready = np.empty(n, np.int64)
+    n_ready = can_join(c, s, layout, new, ready, t)
     sides, variance = np.empty((2, 3)), c.position_var
     known, distance = np.zeros((n_ready, 3)), np.empty(n_ready)
     was_alive = s.alive.copy()
@@ -228,7 +237,6 @@ def try_join(c, s, layout, new, t):
         if s.nodes[k].present:
             initialise_interval(s.pairs[layout.pair_index[new, k]], t)
     s.nodes[new].present = True
-    return True
 
 
 @allocating_kernel

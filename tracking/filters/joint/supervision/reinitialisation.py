@@ -25,16 +25,15 @@ from tracking.maths.multilateration import SHORT, best_position, misfit, total_l
 
 
 @kernel
-def monitor_positions(c, s, layout, t):
-    """Look for another place for the node that its ranges contradict most."""
+def find_misplaced(c, s, layout, t):
+    """The node that its ranges contradict most, -1 for none, and whether it is metres off."""
     worst, most, worst_is_away = -1, c.position_misfit, False
     for i in range(s.nodes.shape[0]):
         if s.nodes[i].present:
             total, is_away = node_misfit(c, s, layout, i, t)
             if total > most:
                 worst, most, worst_is_away = i, total, is_away
-    if worst >= 0:
-        reinitialise_node(c, s, layout, worst, worst_is_away, t)
+    return worst, worst_is_away
 
 
 @kernel

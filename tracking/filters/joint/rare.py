@@ -1,0 +1,140 @@
+"""What is rare and large: each is compiled by itself, when it is first needed.
+
+`event_loop.run_events` returns the number of one of them and is called again when it is done. So
+those that track a log compile what the log needs, and a range reaches little code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from tracking.filters.joint import event_loop
+from tracking.filters.joint.hypotheses.alignment_modes import monitor_modes
+from tracking.filters.joint.hypotheses.bank import (
+    add_mirror_image,
+    challenge,
+    drop_timed_out,
+    remove_node,
+)
+from tracking.filters.joint.hypotheses.initialisation import join, start
+from tracking.filters.joint.hypotheses.static_initialisation import spawn_rotation_hypotheses
+from tracking.filters.joint.scalar_update import flush_all_updates
+from tracking.filters.joint.state import one_env
+from tracking.filters.joint.supervision.reinitialisation import reinitialise_node
+from tracking.filters.joint.supervision.staleness import drop_stale
+from tracking.filters.joint.surveyed_distance import apply_surveys
+from tracking.filters.joint.workspace import ENV, EVENT, FLAG, NODE
+from tracking.jit import bind, kernel
+
+
+@kernel
+def time_out(coefficients, layout, state, work, t):
+    """Remove nodes without ranges for long."""
+    s = one_env(state, work.cursor[ENV])
+    flush_all_updates(s)
+    drop_timed_out(coefficients[0], s, layout, t)
+
+
+@kernel
+def spawn(coefficients, layout, state, work, t):
+    """Follow all rotations and mirror images, as the first node moves."""
+    s = one_env(state, work.cursor[ENV])
+    flush_all_updates(s)
+    spawn_rotation_hypotheses(coefficients[0], s, layout, work)
+
+
+@kernel
+def stale(coefficients, layout, state, work, t):
+    """Remove nodes that were silent and may be anywhere."""
+    s = one_env(state, work.cursor[ENV])
+    flush_all_updates(s)
+    drop_stale(coefficients[0], s, layout, t)
+
+
+@kernel
+def modes(coefficients, layout, state, work, t):
+    """Move each hypothesis to its mode of the rotation."""
+    monitor_modes(coefficients[0], one_env(state, work.cursor[ENV]), layout)
+
+
+@kernel
+def reflect(coefficients, layout, state, work, t):
+    """Add the mirror image."""
+    add_mirror_image(coefficients[0], one_env(state, work.cursor[ENV]))
+
+
+@kernel
+def challenge_alignment(coefficients, layout, state, work, t):
+    """Follow all rotations and mirror images again."""
+    challenge(coefficients[0], one_env(state, work.cursor[ENV]), layout)
+
+
+@kernel
+def reinitialise(coefficients, layout, state, work, t):
+    """Look for another position of a node."""
+    s, cursor = one_env(state, work.cursor[ENV]), work.cursor
+    reinitialise_node(coefficients[0], s, layout, cursor[NODE], cursor[FLAG] != 0, t)
+
+
+@kernel
+def start_group(coefficients, layout, state, work, t):
+    """Start the group."""
+    c, s = coefficients[0], one_env(state, work.cursor[ENV])
+    start(c, s, layout, t)
+    for a in range(s.nodes.shape[0]):
+        apply_surveys(c, s, layout, work, a, a)
+
+
+@kernel
+def join_group(coefficients, layout, state, work, t):
+    """Let a node join."""
+    c, s, new = coefficients[0], one_env(state, work.cursor[ENV]), work.cursor[NODE]
+    flush_all_updates(s)
+    join(c, s, layout, new, t)
+    apply_surveys(c, s, layout, work, new, s.nodes.shape[0])
+
+
+@kernel
+def remove(coefficients, layout, state, work, t):
+    """Remove a node that has left."""
+    s = one_env(state, work.cursor[ENV])
+    flush_all_updates(s)
+    remove_node(coefficients[0], s, layout, work.cursor[NODE])
+
+
+RARE: dict[int, Callable[..., None]] = {
+    event_loop.TIME_OUT: time_out,
+    event_loop.SPAWN: spawn,
+    event_loop.STALE: stale,
+    event_loop.TIME_OUT_LATER: time_out,
+    event_loop.MODES_STEP: modes,
+    event_loop.REFLECT: reflect,
+    event_loop.CHALLENGE: challenge_alignment,
+    event_loop.REINITIALISE: reinitialise,
+    event_loop.START: start_group,
+    event_loop.JOIN: join_group,
+    event_loop.JOIN_OTHER: join_group,
+    event_loop.REMOVE: remove,
+}
+
+
+def run_to_end(run: Callable[[], int], arguments: tuple[Any, ...]) -> None:
+    """Call `run_events` until all events are handled, and what it needs between.
+
+    Args:
+        run: `run_events` with its arguments.
+        arguments: Its arguments.
+    """
+    coefficients, layout, state, work, events, *_ = arguments
+    work.cursor[:] = 0
+    while action := run():
+        t = events[0][work.cursor[ENV], work.cursor[EVENT]]
+        RARE[action](coefficients, layout, state, work, t)
+
+
+def compile_all(arguments: tuple[Any, ...]) -> None:
+    """Compile everything ahead, for those that cannot wait later."""
+    coefficients, layout, state, work, *_ = arguments
+    for action in set(RARE.values()):
+        bind(action, coefficients, layout, state, work, 0.0)
