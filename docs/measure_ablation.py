@@ -87,6 +87,7 @@ MECHANISMS: dict[str, Callable[[JointParams], JointParams]] = {
         nlos_in_space=replace(p.nlos_in_space, gap_weight=ALWAYS),
     ),
     "fast range error": part("range_error", fast_std=0.0),
+    "patience with wheels": part("alignment", wheels_after=ALWAYS),
 }
 """Name to parameters without it."""
 

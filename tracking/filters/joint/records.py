@@ -107,6 +107,7 @@ GROUP = np.dtype(
         ("t_check", "f8"),
         ("t_constraints", "f8"),
         ("t_gauge", "f8"),
+        ("t_scoring_starts", "f8"),  # until when nothing speaks for or against a hypothesis [s]
         (
             "heading_gauge_var",
             "f8",

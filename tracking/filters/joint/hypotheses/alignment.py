@@ -51,10 +51,12 @@ TRANSITIONS: dict[Alignment, dict[Alignment, str]] = {
     Alignment.CHALLENGED: {
         Alignment.MODES: "another rotation is clearly likelier",
         Alignment.FILTERED: "no other rotation is likelier",
+        Alignment.LINEAR: "the group has just started on wheels in motion",
         Alignment.NONE: "fewer than two nodes are left",
     },
     Alignment.MODES: {
         Alignment.CANDIDATES: "each mode is known to 0.2 rad",
+        Alignment.LINEAR: "the group has just started on wheels in motion",
         Alignment.NONE: "fewer than two nodes are left",
     },
     Alignment.CANDIDATES: {

@@ -33,6 +33,7 @@ from tracking.filters.joint.hypotheses.alignment_sensitivity import (
     update_alignment_cov,
 )
 from tracking.filters.joint.hypotheses.copying import copy_hypothesis, rotate_block
+from tracking.filters.joint.hypotheses.static_initialisation import TIE
 from tracking.jit import allocating_kernel
 from tracking.maths.rotation_modes import (
     climb_to_mode,
@@ -65,7 +66,13 @@ def challenge_alignment(c, s, layout, h):
 @allocating_kernel
 def monitor_modes(c, s, layout):
     """Turn frames to the likeliest turns, and go on with one for each once it is time."""
-    group = s.group[0]
+    group, was_alive = s.group[0], s.alive.copy()
+    if group.t < group.t_scoring_starts - TIE:
+        # Nothing counts yet for or against any.
+        for h in range(s.alive.shape[0]):
+            if was_alive[h]:
+                start_alignment(c, s, layout, h)
+        return
     if group.alignment == CHALLENGED and group.n_alive == 1:
         resolve_challenge(c, s, layout)
     elif group.alignment == MODES:

@@ -19,6 +19,7 @@ from tracking.filters.joint.hypotheses.alignment import (
     CANDIDATES,
     FILTERED,
     NONE,
+    STATIC,
     has_modes,
 )
 from tracking.filters.joint.hypotheses.alignment_modes import challenge_alignment
@@ -34,7 +35,7 @@ from tracking.filters.joint.hypotheses.initialisation import (
     reset_residual_statistics,
 )
 from tracking.filters.joint.hypotheses.merging import are_same, rotation_between
-from tracking.filters.joint.hypotheses.static_initialisation import spawn_rotations
+from tracking.filters.joint.hypotheses.static_initialisation import TIE, spawn_rotations
 from tracking.filters.joint.scalar_update import reset_state
 from tracking.jit import allocating_kernel, kernel, small_kernel
 from tracking.maths.exponentials import decay
@@ -136,6 +137,9 @@ def prune_bank(c, s):
             group.alignment = FILTERED
         return
     n_hyps = s.alive.shape[0]
+    if group.alignment != STATIC and group.t < group.t_scoring_starts - TIE:
+        for h in range(n_hyps):
+            s.loglik[h] = 0.0
     best = -1
     for h in range(n_hyps):
         if s.alive[h] and (best < 0 or s.loglik[h] > s.loglik[best]):

@@ -91,6 +91,10 @@ def start(c, s, layout, t):
     group.n_alive = n_first
     group.best = 0
     group.t, group.t_check, group.t_constraints, group.t_gauge = t, t, t, t
+    group.t_scoring_starts = t
+    for a in range(m):
+        if s.nodes[members[a]].sideways_var > 0.0:
+            group.t_scoring_starts = t + c.wheels_after
     group.heading_gauge_var = c.rotation_var if c.d == 2 else 0.0
     group.mean_nis = 1.0
     group.slow_nis, group.challenge_nis = 0.0, c.strained

@@ -20,6 +20,9 @@ from tracking.filters.joint.observability import shift_nullspace
 from tracking.filters.joint.scalar_update import reset_state
 from tracking.jit import allocating_kernel, kernel, small_kernel
 
+TIE = 1e-6
+"""[s] Times that differ by less are equal, whatever the clock began with."""
+
 
 @small_kernel
 def is_at_rest(c, node, t):
@@ -65,6 +68,8 @@ def spawn_rotation_hypotheses(c, s, layout, work):
     """
     group = s.group[0]
     group.alignment = FILTERED
+    if group.t > group.t_scoring_starts - c.wheels_after + c.stood_for + TIE:
+        group.t_scoring_starts = group.t
     was_alive = s.alive.copy()
     for h in range(s.alive.shape[0]):
         for i in range(s.nodes.shape[0]):

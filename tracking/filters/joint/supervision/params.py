@@ -78,6 +78,11 @@ class AlignmentParams:
     """[s] The first samples of a node look like motion: its orientation is still being found."""
     orienting: float = 1.5
     """[s] Rotation means nothing for so long."""
+    wheels_after: float = 4.0
+    """[s] After a start in motion wheels do not count against a rotation for so long: velocities
+    are not known yet."""
+    stood_for: float = 1.0
+    """[s] Unless the group has been at rest for so long."""
     degenerate: float = 2.5
     """[-] Least extent of a layout, in standard deviations, below which it is degenerate."""
     regular: float = 4.0
