@@ -20,7 +20,7 @@ from tracking.filters.joint.motion_constraints import centre, constrain_nodes
 from tracking.filters.joint.nlos_model import reset_bias_on_transition
 from tracking.filters.joint.preintegration import preintegrate, process_attitude
 from tracking.filters.joint.propagation import predict
-from tracking.filters.joint.range_update import range_model
+from tracking.filters.joint.range_update import predict_range
 from tracking.filters.joint.scalar_update import compute_pht, flush_updates, kalman_update
 from tracking.filters.joint.state import N_PRE
 from tracking.jit import kernel, small_kernel
@@ -180,7 +180,7 @@ def learn_range(c, s, layout, work, p, a_i, a_j, is_hidden, what):
         if was_hidden != is_hidden:
             reset_bias_on_transition(c, s, 0, p, 1.0, c.far_share)
         variance = c.white_var + s.nlos[0, p] * c.excess_white_var
-    _, m = range_model(c, s, 0, p, (i0, i1, i2), (j0, j1, j2), work.idx, work.val)
+    _, m = predict_range(c, s, 0, p, (i0, i1, i2), (j0, j1, j2), work.idx, work.val)
     S = compute_pht(s, 0, m, work) + variance
     kalman_update(s, 0, work.w, 0.0, S)
 

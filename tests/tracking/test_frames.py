@@ -144,7 +144,7 @@ def test_a_frame_is_not_likelier_for_being_surer(parted):
         )
         s.alignment_cov[1], s.loglik[1], s.pending_updates[1], s.n_pending[1] = 0.0, 0.0, 0.0, 0
         levers = np.zeros(6)
-        distance, _ = range_update.range_model(
+        distance, _ = range_update.predict_range(
             c, s, 1, p, levers[:3], levers[3:], work.idx, work.val
         )
         work.direct[:] = 0.0
@@ -167,7 +167,7 @@ def test_the_nis_is_over_the_variance_that_the_correction_used():
     sight = (0.0, c["enter_rate"], c["leave_rate"])
 
     def predicted():
-        distance, m = range_update.range_model(
+        distance, m = range_update.predict_range(
             c, s, h, p, levers[:3], levers[3:], work.idx, work.val
         )
         return distance, scalar_update.compute_pht(s, h, m, work)

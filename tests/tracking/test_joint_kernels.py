@@ -17,7 +17,7 @@ from tracking.filters.joint import (
 from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.hypotheses.alignment import Alignment
 from tracking.filters.joint.params import JointParams
-from tracking.filters.joint.range_update import range_model
+from tracking.filters.joint.range_update import predict_range
 from tracking.filters.joint.state import JointState, make_layout, make_state
 from tracking.filters.joint.workspace import make_workspace
 from tracking.filters.records import as_records
@@ -129,7 +129,7 @@ def test_range_has_its_own_derivatives(dimensions, seed, since, atol):
     c, s, work, _ = running(dimensions, seed=seed)
     sum_since(c, s, since)
     lever_i, lever_j = np.array([0.3, -0.2, 0.1]), np.array([-0.1, 0.4, 0.2])
-    _, m = range_model(c, s, 0, 1, lever_i, lever_j, work.idx, work.val)
+    _, m = predict_range(c, s, 0, 1, lever_i, lever_j, work.idx, work.val)
     written = np.zeros(s.x.shape[1])
     written[work.idx[:m]] = work.val[:m]
     for k in range(len(written)):
@@ -137,7 +137,7 @@ def test_range_has_its_own_derivatives(dimensions, seed, since, atol):
         for h in (1e-6, -1e-6):
             s.x[0, k] += h
             idx, val = work.idx.copy(), work.val.copy()
-            values.append(range_model(c, s, 0, 1, lever_i, lever_j, idx, val)[0])
+            values.append(predict_range(c, s, 0, 1, lever_i, lever_j, idx, val)[0])
             s.x[0, k] -= h
         assert written[k] == pytest.approx((values[0] - values[1]) / 2e-6, abs=atol)
 
@@ -149,14 +149,14 @@ def test_a_range_is_the_same_before_and_after_carrying(dimensions, vehicle):
     s.x[0, s.pairs["i_range_error"].min() :] = 0.0
     lever = np.zeros(3)
     sum_since(c, s, 0.02)
-    late, _ = range_model(c, s, 0, 1, lever, lever, work.idx, work.val)
+    late, _ = predict_range(c, s, 0, 1, lever, lever, work.idx, work.val)
     at_t0 = s.x[0].copy()
     propagation.predict(c, s, 0, 0.02, work)
     s.preintegrated[:] = 0.0
-    at_once, _ = range_model(c, s, 0, 1, lever, lever, work.idx, work.val)
+    at_once, _ = predict_range(c, s, 0, 1, lever, lever, work.idx, work.val)
     assert late == pytest.approx(at_once, abs=1e-12)
     s.x[0] = at_t0
-    before, _ = range_model(c, s, 0, 1, lever, lever, work.idx, work.val)
+    before, _ = predict_range(c, s, 0, 1, lever, lever, work.idx, work.val)
     assert abs(before - late) > 1e-3
 
 

@@ -20,9 +20,9 @@ def random_pair(rng, d=3, size=6):
 
 
 MODELS = {
-    "range": lambda x, work: dynamics.range_model(x, 0, 0, 0.1, -0.2, 0.05, work),
-    "range-rate": lambda x, work: dynamics.range_rate_model(x, 0, 0, 0.1, -0.2, 0.05, work),
-    "speed-norm": lambda x, work: dynamics.speed_model(x, 0, 0, work),
+    "range": lambda x, work: dynamics.predict_range(x, 0, 0, 0.1, -0.2, 0.05, work),
+    "range-rate": lambda x, work: dynamics.predict_range_rate(x, 0, 0, 0.1, -0.2, 0.05, work),
+    "speed-norm": lambda x, work: dynamics.predict_speed(x, 0, 0, work),
 }
 
 
@@ -90,7 +90,7 @@ def test_covariance_survives_many_updates():
     for k in range(20000):
         x[0, 0, :3] = 3.0 * np.array([np.cos(k / 50), np.sin(k / 50), 0.2])
         dynamics.predict(x, P, 0, 0, 0.01, 0.0, 0.0, 0.0, 0.1, 3)
-        dynamics.range_model(x, 0, 0, 0.0, 0.0, 0.0, work)
+        dynamics.predict_range(x, 0, 0, 0.0, 0.0, 0.0, work)
         dynamics.correct(x, P, 0, 0, work, 0.01, 1e-6)
     np.testing.assert_array_equal(P, np.swapaxes(P, -1, -2))
     assert np.linalg.eigvalsh(P[0, 0]).min() > 0.0

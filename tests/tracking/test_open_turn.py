@@ -16,7 +16,7 @@ from tracking.filters.joint.hypotheses.geometric_degeneracy import degeneracy_ra
 from tracking.filters.joint.lever_arm import antenna_offset, lever_arm_sensitivity
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.preintegration import preintegrate
-from tracking.filters.joint.range_update import range_model
+from tracking.filters.joint.range_update import predict_range
 from tracking.filters.joint.state import JointState, make_state
 from tracking.filters.joint.tilt_correction import GAIN
 from tracking.filters.records import as_records
@@ -255,7 +255,7 @@ def test_what_stands_still_tells_nothing_of_a_turn():
     for p in range(len(s.pairs)):
         i, j = s.pairs["i"][p], s.pairs["j"][p]
         levers = [antenna_offset(s.last_attitude_accel, layout, k, k) for k in (i, j)]
-        _, m = range_model(c, s, 0, p, *levers, work.idx, work.val)
+        _, m = predict_range(c, s, 0, p, *levers, work.idx, work.val)
         lever_arm_sensitivity(np.concatenate(levers), work)
         alignment_sensitivity.innovation_sensitivity(s, 0, m, work)
         np.testing.assert_allclose(work.gradient, 0.0, atol=1e-12)

@@ -19,7 +19,6 @@ from tracking.filters.joint.hypotheses.initialisation import can_join, can_start
 from tracking.filters.joint.hypotheses.static_initialisation import all_static, may_move
 from tracking.filters.joint.lever_arm import antenna_offset
 from tracking.filters.joint.motion_constraints import apply_motion_constraints, centre
-from tracking.filters.joint.nlos_model import power_evidence
 from tracking.filters.joint.observability import enforce_observability, propagate_corrections
 from tracking.filters.joint.preintegration import preintegrate, process_attitude
 from tracking.filters.joint.propagation import moves, predict
@@ -37,6 +36,7 @@ from tracking.filters.joint.supervision.staleness import is_silent, note_seen, u
 from tracking.filters.joint.surveyed_distance import surveyed_distance_update
 from tracking.filters.joint.workspace import DONE, ENV, EVENT, FLAG, NODE, OUT
 from tracking.jit import kernel, small_kernel
+from tracking.models.nlos import power_evidence
 
 # What is rare and large is compiled apart (`rare`). In the order in which a range needs them:
 (

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from tracking.filters.joint.propagation import moves
 from tracking.jit import small_kernel
+from tracking.models.lever_arm import antenna_in_world
 
 
 @small_kernel
@@ -20,14 +21,7 @@ def antenna_offset(held, layout, n, antenna):
     )
     if o0 == 0.0 and o1 == 0.0 and o2 == 0.0:
         return 0.0, 0.0, 0.0
-    w, x, y, z = held[n, 0], held[n, 1], held[n, 2], held[n, 3]
-    # o + 2 w (u x o) + 2 u x (u x o), with u the vector part
-    c0, c1, c2 = y * o2 - z * o1, z * o0 - x * o2, x * o1 - y * o0
-    return (
-        o0 + 2.0 * (w * c0 + y * c2 - z * c1),
-        o1 + 2.0 * (w * c1 + z * c0 - x * c2),
-        o2 + 2.0 * (w * c2 + x * c1 - y * c0),
-    )
+    return antenna_in_world(held[n, 0], held[n, 1], held[n, 2], held[n, 3], o0, o1, o2)
 
 
 @small_kernel

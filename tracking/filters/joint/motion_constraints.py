@@ -23,6 +23,9 @@ from tracking.filters.joint.scalar_update import (
     symmetrise,
 )
 from tracking.jit import small_kernel
+from tracking.models.mean_velocity import mean_velocity_model
+from tracking.models.nonholonomic import nonholonomic_model
+from tracking.models.zero_velocity import zero_velocity_model
 
 GLIDES = 9.0
 """[-] Square of the standard deviations by which a velocity differs from zero."""
@@ -59,10 +62,11 @@ def constrain_nodes(c, s, h, t, work):
                     node.t_moved = t
                 continue
             for k in range(c.d):
-                work.idx[0], work.val[0] = node.i_vel + k, 1.0
+                predicted, work.val[0] = zero_velocity_model(s.x[h, node.i_vel + k])
+                work.idx[0] = node.i_vel + k
                 if is_linear(s.group[0]):
                     work.direct[:] = 0.0
-                apply_constraint(c, s, h, -s.x[h, node.i_vel + k], 1, c.rest_var, work)
+                apply_constraint(c, s, h, -predicted, 1, c.rest_var, work)
         elif node.sideways_var > 0.0:
             nonholonomic_constraint(c, s, h, i, work)
 
@@ -106,16 +110,12 @@ def nonholonomic_constraint(c, s, h, i, work):
         node.cos_yaw * cos_e - node.sin_yaw * sin_e,
         node.sin_yaw * cos_e + node.cos_yaw * sin_e,
     )
-    v0, v1 = s.x[h, node.i_vel], s.x[h, node.i_vel + 1]
-    sideways, forward = -sin_y * v0 + cos_y * v1, cos_y * v0 + sin_y * v1
-    # Its tyres need a slip angle for the force that a curve takes, v yaw_rate; so it drifts out.
-    outwards = node.slip * node.yaw_rate * forward
-    gain = 2.0 * outwards
     idx, val = work.idx, work.val
     idx[0], idx[1], idx[2] = node.i_vel, node.i_vel + 1, node.i_heading
-    val[0], val[1] = -sin_y + gain * cos_y, cos_y + gain * sin_y
-    val[2] = -forward + gain * sideways
-    nu = node.rear_axle * node.yaw_rate - outwards * forward - sideways
+    predicted, val[0], val[1], val[2] = nonholonomic_model(
+        s.x[h, node.i_vel], s.x[h, node.i_vel + 1], error, cos_y, sin_y, node.slip * node.yaw_rate
+    )
+    nu = node.rear_axle * node.yaw_rate - predicted
     if is_linear(s.group[0]):
         velocity_sensitivity(s, h, node.i_vel, val[0], val[1], 0.0, work)
     apply_constraint(c, s, h, nu, 3, node.sideways_var, work)
@@ -154,8 +154,9 @@ def mean_velocity_prior(c, s, h, dt, work):
         for i in range(s.nodes.shape[0]):
             if s.nodes[i].present and not s.nodes[i].static:
                 at = s.nodes[i].i_vel + k
-                work.idx[a], work.val[a] = at, 1.0 / m
-                mean += s.x[h, at] / m
+                part, work.val[a] = mean_velocity_model(s.x[h, at], m)
+                work.idx[a] = at
+                mean += part
                 a += 1
         S = compute_pht(s, h, m, work) + variance
         if is_linear(s.group[0]):

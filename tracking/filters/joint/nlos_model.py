@@ -7,23 +7,11 @@ hypothesis.
 
 from __future__ import annotations
 
-import math
-
 from tracking.filters.joint.scalar_update import covariance
 from tracking.jit import small_kernel
 from tracking.maths.exponentials import exponential, likelihood
-
-MIN_PROB = 1e-4
-SQRT_2PI = math.sqrt(2.0 * math.pi)
-
-
-@small_kernel
-def power_evidence(c, gap):
-    """Log-likelihood ratio of no sight against sight, of a power gap [dB]."""
-    los = max(gap - c.gap_los, 0.0) / c.gap_los_std
-    nlos = min(gap - c.gap_nlos, 0.0) / c.gap_nlos_std
-    ratio = 0.5 * (los * los - nlos * nlos) - math.log(c.gap_nlos_std / c.gap_los_std)
-    return min(max(c.gap_weight * ratio, -4.0), 4.0)
+from tracking.models.nlos import nlos_posterior, outlier_density, transition_probs
+from tracking.models.range_bias import slow_error_var
 
 
 @small_kernel
@@ -50,40 +38,29 @@ def update_nlos_posterior(c, s, h, p, dt, nu, variance, sight, w):
         probability that the excess, if any came, is one of the large ones.
     """
     at = s.pairs[p].i_range_error + 1
-    before = s.nlos[h, p]
     evidence, enter_rate, leave_rate = sight
-    changes = (1.0 - exponential(-(enter_rate + leave_rate) * dt)) / (enter_rate + leave_rate)
-    enter, leave = enter_rate * changes, leave_rate * changes
+    enter, leave = transition_probs(enter_rate, leave_rate, dt)
     S = variance + c.white_var
     near = (1.0 - c.far_share) * likelihood(nu - c.excess, S + c.excess_var)
     far = c.far_share * likelihood(nu - c.far_excess, S + c.far_excess_var)
-    enters = near + far
     nu_leave, S_leave = nu, S
     if at > 0:
         nu_leave = nu + s.x[h, at]
         S_leave += max(covariance(s, h, at, at) - 2.0 * w[at], -0.9 * variance) + c.slow_var
-    hidden = exponential(evidence)
     stays = likelihood(nu, S)
-    los_los = (1.0 - before) * (1.0 - enter) * stays
-    los_nlos = (1.0 - before) * enter * enters
-    nlos_los = before * leave * likelihood(nu_leave, S_leave)
-    nlos_nlos = before * (1.0 - leave) * stays
-    if at <= 0:
-        # Without a state for the excess, no sight is a range that is worse.
-        nlos_nlos = before * (1.0 - leave) * enters
-    los_nlos *= hidden
-    nlos_nlos *= hidden
-    wild = SQRT_2PI * c.outlier_prob / c.outlier_span
-    total = los_los + los_nlos + nlos_los + nlos_nlos
-    s.nlos[h, p] = min(max((los_nlos + nlos_nlos) / max(total, 1e-300), MIN_PROB), 1.0 - MIN_PROB)
-    if total < 1e-300:
-        s.nlos[h, p] = before
-        return 0.0, 0.0, wild, 0.0
-    # The power says nothing about where the nodes are: it is no evidence for a hypothesis.
-    norm = 1.0 + (s.nlos[h, p]) * (hidden - 1.0) if hidden > 1.0 else 1.0
-    switched = (los_nlos + nlos_los) / total
-    is_far = far / max(enters, 1e-300)
-    return switched, total / (total + wild), total / norm + wild, is_far
+    s.nlos[h, p], switched, total, of_range = nlos_posterior(
+        s.nlos[h, p],
+        enter,
+        leave,
+        stays,
+        near + far,
+        likelihood(nu_leave, S_leave),
+        # Without a state for the bias, NLOS is a range that is worse.
+        stays if at > 0 else near + far,
+        exponential(evidence),
+    )
+    wild = outlier_density(c)
+    return switched, total / (total + wild), of_range + wild, far / max(near + far, 1e-300)
 
 
 @small_kernel
@@ -109,7 +86,7 @@ def reset_bias_on_transition(c, s, h, p, switched, is_far):
     within = c.excess_var + is_far * (c.far_excess_var - c.excess_var)
     excess_var = within + is_far * (1.0 - is_far) * relative_covariance * relative_covariance
     excess = c.excess + is_far * relative_covariance
-    new_var = c.slow_var + hidden * excess_var + hidden * (1.0 - hidden) * excess * excess
+    new_var = slow_error_var(c.slow_var, hidden, excess, excess_var)
     off = s.x[h, at] - hidden * excess
     # Of the mixture of both; the waiting corrections hold what has been taken off already.
     s.P[h, at, at] += switched * stays * before + switched * new_var + switched * stays * off * off

@@ -24,10 +24,10 @@ from tracking.filters.joint.observability import enforce_observability
 from tracking.filters.joint.propagation import displacement_since_epoch, time_since_epoch
 from tracking.filters.joint.scalar_update import compute_pht, kalman_update
 from tracking.jit import small_kernel
-from tracking.maths.angles import cosine_sine
+from tracking.models.lever_arm import lever_arm_slope, rotate_lever_arm
+from tracking.models.range import range_model
+from tracking.models.range_bias import range_bias_model
 
-MIN_DISTANCE = 0.01
-"""[m] Closer than this a direction has no meaning."""
 NEGLIGIBLE, MOST_BENT = 1e-3, 0.2
 """[-, m] Share of the noise that is not worth working out; the most a range is thought bent."""
 AT_ONCE = 0.1
@@ -35,7 +35,7 @@ AT_ONCE = 0.1
 
 
 @small_kernel
-def range_model(c, s, h, p, lever_i, lever_j, idx, val):
+def predict_range(c, s, h, p, lever_i, lever_j, idx, val):
     """Predicted range of pair p [m] and its derivatives.
 
     Args:
@@ -56,11 +56,9 @@ def range_model(c, s, h, p, lever_i, lever_j, idx, val):
     i0, i1 = lever_i[0], lever_i[1]
     j0, j1 = lever_j[0], lever_j[1]
     if not node_i.static and (i0 != 0.0 or i1 != 0.0):
-        cos_r, sin_r = cosine_sine(s.x[h, node_i.i_heading])
-        i0, i1 = cos_r * i0 - sin_r * i1, sin_r * i0 + cos_r * i1
+        i0, i1 = rotate_lever_arm(s.x[h, node_i.i_heading], i0, i1)
     if not node_j.static and (j0 != 0.0 or j1 != 0.0):
-        cos_r, sin_r = cosine_sine(s.x[h, node_j.i_heading])
-        j0, j1 = cos_r * j0 - sin_r * j1, sin_r * j0 + cos_r * j1
+        j0, j1 = rotate_lever_arm(s.x[h, node_j.i_heading], j0, j1)
     at_i, at_j = node_i.i_pos, node_j.i_pos
     r0 = s.x[h, at_j] - s.x[h, at_i] + j0 - i0
     r1 = s.x[h, at_j + 1] - s.x[h, at_i + 1] + j1 - i1
@@ -74,9 +72,7 @@ def range_model(c, s, h, p, lever_i, lever_j, idx, val):
     if T_j > 0.0:
         way0, way1, way2 = displacement_since_epoch(c, s, h, pair.j)
         r0, r1, r2 = r0 + way0, r1 + way1, r2 + way2
-    distance = math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
-    inverse = 1.0 / max(distance, MIN_DISTANCE)
-    u0, u1, u2 = r0 * inverse, r1 * inverse, r2 * inverse
+    distance, u0, u1, u2 = range_model(r0, r1, r2)
     idx[0], idx[1], idx[2], idx[3] = at_i, at_i + 1, at_j, at_j + 1
     val[0], val[1], val[2], val[3] = -u0, -u1, u0, u1
     m = 4
@@ -94,16 +90,18 @@ def range_model(c, s, h, p, lever_i, lever_j, idx, val):
                 idx[m], val[m] = node.i_vel + 2, sign * T * u2
                 m += 1
     if not node_i.static and (i0 != 0.0 or i1 != 0.0):
-        idx[m], val[m] = node_i.i_heading, u0 * i1 - u1 * i0
+        idx[m], val[m] = node_i.i_heading, -lever_arm_slope(i0, i1, u0, u1)
         m += 1
     if not node_j.static and (j0 != 0.0 or j1 != 0.0):
-        idx[m], val[m] = node_j.i_heading, u1 * j0 - u0 * j1
+        idx[m], val[m] = node_j.i_heading, lever_arm_slope(j0, j1, u0, u1)
         m += 1
     if pair.i_range_error >= 0:
         idx[m], idx[m + 1] = pair.i_range_error, pair.i_range_error + 1
-        val[m], val[m + 1] = 1.0, 1.0
+        bias, val[m], val[m + 1] = range_bias_model(
+            s.x[h, pair.i_range_error], s.x[h, pair.i_range_error + 1]
+        )
         m += 2
-        distance += s.x[h, pair.i_range_error] + s.x[h, pair.i_range_error + 1]
+        distance += bias
     return distance, m
 
 
@@ -174,7 +172,7 @@ def range_update(c, s, h, p, dt, distance, levers, sight, work):
     """
     if s.group[0].heading_gauge_var > c.gauge_std * c.gauge_std:
         enforce_observability(c, s, h, work)
-    predicted, m = range_model(c, s, h, p, levers[:3], levers[3:], work.idx, work.val)
+    predicted, m = predict_range(c, s, h, p, levers[:3], levers[3:], work.idx, work.val)
     nu = distance - predicted
     variance = compute_pht(s, h, m, work)
     open_var = 0.0
@@ -196,7 +194,7 @@ def range_update(c, s, h, p, dt, distance, levers, sight, work):
         s.bias_retention[h, p] *= 1.0 - switched
     else:
         reset_bias_on_transition(c, s, h, p, switched, is_far)
-        predicted, m = range_model(c, s, h, p, levers[:3], levers[3:], work.idx, work.val)
+        predicted, m = predict_range(c, s, h, p, levers[:3], levers[3:], work.idx, work.val)
         nu = distance - predicted
         variance = compute_pht(s, h, m, work)
         if is_linear(s.group[0]):

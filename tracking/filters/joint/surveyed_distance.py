@@ -12,7 +12,7 @@ from tracking.filters.joint.hypotheses.alignment_sensitivity import (
     innovation_sensitivity,
 )
 from tracking.filters.joint.observability import enforce_observability
-from tracking.filters.joint.range_update import range_model
+from tracking.filters.joint.range_update import predict_range
 from tracking.filters.joint.scalar_update import compute_pht, flush_all_updates, kalman_update
 from tracking.jit import kernel, small_kernel
 
@@ -30,7 +30,7 @@ def surveyed_distance_update(c, s, h, p, distance, is_news, work):
     if s.group[0].heading_gauge_var > c.gauge_std * c.gauge_std:
         enforce_observability(c, s, h, work)
     none = work.none
-    predicted, m = range_model(c, s, h, p, none, none, work.idx, work.val)
+    predicted, m = predict_range(c, s, h, p, none, none, work.idx, work.val)
     variance, open_var = compute_pht(s, h, m, work), 0.0
     if not is_news:
         share = (distance - predicted) / (variance + c.survey_var)

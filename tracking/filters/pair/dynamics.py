@@ -8,12 +8,10 @@ the kernels, since handing on slices costs more than the algebra.
 
 from __future__ import annotations
 
-import math
-
 from tracking.jit import small_kernel
-
-MIN_DISTANCE = 0.01
-"""[m] Closer than this a direction has no meaning and a range is not used."""
+from tracking.models.range import range_model
+from tracking.models.range_rate import range_rate_model
+from tracking.models.relative_speed import relative_speed_model
 
 
 @small_kernel
@@ -95,15 +93,13 @@ def correct(x, P, p, h, work, nu, R):
 
 
 @small_kernel
-def range_model(x, p, h, l0, l1, l2, work):
+def predict_range(x, p, h, l0, l1, l2, work):
     """Range between two antennas, its slow error included; its Jacobian to row 0 of work.
 
     ``l0 l1 l2`` is the antenna's offset on j minus that on i, world frame [m].
     """
-    r0, r1, r2 = x[p, h, 0] + l0, x[p, h, 1] + l1, x[p, h, 2] + l2
-    distance = math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
-    inverse = 1.0 / max(distance, MIN_DISTANCE)
-    work[0, 0], work[0, 1], work[0, 2] = r0 * inverse, r1 * inverse, r2 * inverse
+    distance, u0, u1, u2 = range_model(x[p, h, 0] + l0, x[p, h, 1] + l1, x[p, h, 2] + l2)
+    work[0, 0], work[0, 1], work[0, 2] = u0, u1, u2
     work[0, 3] = work[0, 4] = work[0, 5] = 0.0
     for e in range(6, x.shape[2]):
         work[0, e] = 1.0
@@ -112,32 +108,23 @@ def range_model(x, p, h, l0, l1, l2, work):
 
 
 @small_kernel
-def range_rate_model(x, p, h, l0, l1, l2, work):
-    """Rate of the distance, ``u . vel`` with u the unit vector along it, and its Jacobian."""
-    range_model(x, p, h, l0, l1, l2, work)
+def predict_range_rate(x, p, h, l0, l1, l2, work):
+    """Rate of the distance, and its Jacobian to row 0 of work."""
     r0, r1, r2 = x[p, h, 0] + l0, x[p, h, 1] + l1, x[p, h, 2] + l2
-    distance = max(math.sqrt(r0 * r0 + r1 * r1 + r2 * r2), MIN_DISTANCE)
+    v0, v1, v2 = x[p, h, 3], x[p, h, 4], x[p, h, 5]
+    rate, d0, d1, d2, u0, u1, u2 = range_rate_model(r0, r1, r2, v0, v1, v2)
+    work[0, 0], work[0, 1], work[0, 2] = d0, d1, d2
+    work[0, 3], work[0, 4], work[0, 5] = u0, u1, u2
     for e in range(6, x.shape[2]):
         work[0, e] = 0.0
-    rate = 0.0
-    for k in range(3):
-        rate += work[0, k] * x[p, h, 3 + k]
-    for k in range(3):
-        u = work[0, k]
-        work[0, k] = (x[p, h, 3 + k] - rate * u) / distance
-        work[0, 3 + k] = u
     return rate
 
 
 @small_kernel
-def speed_model(x, p, h, work):
-    """Relative speed ``|vel|`` and its Jacobian: the model that the paper's text writes."""
-    v0, v1, v2 = x[p, h, 3], x[p, h, 4], x[p, h, 5]
-    speed = math.sqrt(v0 * v0 + v1 * v1 + v2 * v2)
-    inverse = 1.0 / max(speed, 1e-6)
-    for e in range(6, x.shape[2]):
-        work[0, e] = 0.0
-    for k in range(3):
+def predict_speed(x, p, h, work):
+    """Relative speed, and its Jacobian to row 0 of work."""
+    speed, d0, d1, d2 = relative_speed_model(x[p, h, 3], x[p, h, 4], x[p, h, 5])
+    for k in range(x.shape[2]):
         work[0, k] = 0.0
-        work[0, 3 + k] = x[p, h, 3 + k] * inverse
+    work[0, 3], work[0, 4], work[0, 5] = d0, d1, d2
     return speed

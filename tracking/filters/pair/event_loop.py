@@ -24,7 +24,6 @@ from tracking.filters.pair.motion_constraints import (
     apply_motion_constraints,
     note_heading,
 )
-from tracking.filters.pair.nlos_model import power_evidence
 from tracking.filters.pair.range_update import (
     TIE,
     advance_pair,
@@ -35,6 +34,7 @@ from tracking.filters.pair.range_update import (
 )
 from tracking.filters.pair.state import FilterState
 from tracking.jit import allocating_kernel, kernel, small_kernel
+from tracking.models.nlos import power_evidence
 
 # Plain numbers of `Kind` and `Status`: kernels do not know enums.
 STATE, SURVEY, RANGE, LEAVE = 3, 4, 5, 6

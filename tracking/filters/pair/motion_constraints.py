@@ -18,6 +18,7 @@ import math
 
 from tracking.filters.pair.initialisation import MEAN_SPEED_VAR
 from tracking.jit import small_kernel
+from tracking.models.nonholonomic import nonholonomic_model
 
 
 @small_kernel
@@ -99,10 +100,10 @@ def hold(c, s, layout, h, i, m, work):
     node, u, Pu = s.nodes[i], s.mean_v[h], s.mean_cov[h]
     n0, n1 = -math.sin(node.yaw), math.cos(node.yaw)
     r0, r1 = velocity_in_group(s, layout, h, i, m)
-    forward = n1 * (u[0] + r0) - n0 * (u[1] + r1)
-    # Its tyres need a slip angle for the force that a curve takes; so the axle drifts out.
-    sideways = (node.rear_axle - node.slip * forward * forward) * node.yaw_rate
-    nu = sideways - n0 * (u[0] + r0) - n1 * (u[1] + r1)
+    predicted, _, _, _ = nonholonomic_model(
+        u[0] + r0, u[1] + r1, 0.0, n1, -n0, node.slip * node.yaw_rate
+    )
+    nu = node.rear_axle * node.yaw_rate - predicted
     # Variance of the velocity in the group: half of that of a pair is each end's.
     own = 0.0
     for k in range(s.nodes.shape[0]):

@@ -14,20 +14,11 @@ import math
 
 from tracking.jit import small_kernel
 from tracking.maths.exponentials import decay, exponential, likelihood
+from tracking.models.nlos import nlos_posterior, outlier_density, transition_probs
+from tracking.models.range_bias import slow_error_var
 
 E = 6
 """Place of the range error in the state."""
-MIN_PROB = 1e-4
-SQRT_2PI = math.sqrt(2.0 * math.pi)
-
-
-@small_kernel
-def power_evidence(c, gap):
-    """Log-likelihood ratio of no sight against sight, of a power gap [dB]."""
-    los = max(gap - c.gap_los, 0.0) / c.gap_los_std
-    nlos = min(gap - c.gap_nlos, 0.0) / c.gap_nlos_std
-    ratio = 0.5 * (los * los - nlos * nlos) - math.log(c.gap_nlos_std / c.gap_los_std)
-    return min(max(c.gap_weight * ratio, -4.0), 4.0)
 
 
 @small_kernel
@@ -65,30 +56,22 @@ def update_nlos_posterior(c, s, p, h, dt, nu, variance, w_e, evidence):
     Returns:
         Probability that the sight changed; that the range meant anything; log-likelihood.
     """
-    before = s.nlos[p, h]
-    rates = c.enter_rate + c.leave_rate
-    changes = (1.0 - exponential(-rates * dt)) / rates
-    enter, leave = c.enter_rate * changes, c.leave_rate * changes
+    enter, leave = transition_probs(c.enter_rate, c.leave_rate, dt)
     S = variance + c.range_var
-    nu_leave = nu + s.x[p, h, E]
     S_leave = S + max(s.P[p, h, E, E] - 2.0 * w_e, -0.9 * variance) + c.slow_var
-    hidden = exponential(evidence)
     stays = likelihood(nu, S)
-    los_los = (1.0 - before) * (1.0 - enter) * stays
-    los_nlos = (1.0 - before) * enter * likelihood(nu - c.excess, S + c.excess_var)
-    nlos_los = before * leave * likelihood(nu_leave, S_leave)
-    nlos_nlos = before * (1.0 - leave) * stays
-    los_nlos *= hidden
-    nlos_nlos *= hidden
-    wild = SQRT_2PI * c.outlier_prob / c.outlier_span
-    total = los_los + los_nlos + nlos_los + nlos_nlos
-    if total < 1e-300:
-        return 0.0, 0.0, math.log(wild)
-    after = min(max((los_nlos + nlos_nlos) / total, MIN_PROB), 1.0 - MIN_PROB)
-    s.nlos[p, h] = after
-    # The power says nothing about where the nodes are: it is no evidence for a hypothesis.
-    norm = 1.0 + after * (hidden - 1.0) if hidden > 1.0 else 1.0
-    return (los_nlos + nlos_los) / total, total / (total + wild), math.log(total / norm + wild)
+    s.nlos[p, h], switched, total, of_range = nlos_posterior(
+        s.nlos[p, h],
+        enter,
+        leave,
+        stays,
+        likelihood(nu - c.excess, S + c.excess_var),
+        likelihood(nu + s.x[p, h, E], S_leave),
+        stays,
+        exponential(evidence),
+    )
+    wild = outlier_density(c)
+    return switched, total / (total + wild), math.log(of_range + wild)
 
 
 @small_kernel
@@ -100,7 +83,7 @@ def reset_bias_on_transition(c, s, p, h, switched):
         s.P[p, h, k, E] = v
         s.P[p, h, E, k] = v
     hidden = s.nlos[p, h]
-    new_var = c.slow_var + hidden * c.excess_var + hidden * (1.0 - hidden) * c.excess * c.excess
+    new_var = slow_error_var(c.slow_var, hidden, c.excess, c.excess_var)
     off = s.x[p, h, E] - hidden * c.excess
     s.P[p, h, E, E] = stays * s.P[p, h, E, E] + switched * (new_var + stays * off * off)
     s.x[p, h, E] -= switched * off

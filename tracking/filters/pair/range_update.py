@@ -7,9 +7,9 @@ import math
 from tracking.filters.pair.dynamics import (
     correct,
     predict,
-    range_model,
-    range_rate_model,
-    speed_model,
+    predict_range,
+    predict_range_rate,
+    predict_speed,
 )
 from tracking.filters.pair.nlos_model import (
     E,
@@ -18,6 +18,7 @@ from tracking.filters.pair.nlos_model import (
     update_nlos_posterior,
 )
 from tracking.jit import kernel, small_kernel
+from tracking.models.lever_arm import antenna_in_world
 
 TIE = 1e-6
 """[s] Times that differ by less are equal, whatever the clock began with."""
@@ -70,14 +71,8 @@ def antenna_offset(s, layout, n, antenna):
         layout.antenna_b[antenna, 1],
         layout.antenna_b[antenna, 2],
     )
-    w, x, y, z = s.held[n, 0], s.held[n, 1], s.held[n, 2], s.held[n, 3]
-    # o + 2 w (u x o) + 2 u x (u x o), with u the vector part
-    c0, c1, c2 = y * o2 - z * o1, z * o0 - x * o2, x * o1 - y * o0
-    return (
-        o0 + 2.0 * (w * c0 + y * c2 - z * c1),
-        o1 + 2.0 * (w * c1 + z * c0 - x * c2),
-        o2 + 2.0 * (w * c2 + x * c1 - y * c0),
-    )
+    held = s.held
+    return antenna_in_world(held[n, 0], held[n, 1], held[n, 2], held[n, 3], o0, o1, o2)
 
 
 @small_kernel
@@ -116,7 +111,7 @@ def surveyed_distance_update(c, s, p, distance, work):
     """Correct pair p of every hypothesis with a surveyed distance."""
     for h in range(s.alive.shape[0]):
         if s.alive[h]:
-            nu = distance - range_model(s.x, p, h, 0.0, 0.0, 0.0, work)
+            nu = distance - predict_range(s.x, p, h, 0.0, 0.0, 0.0, work)
             correct(s.x, s.P, p, h, work, nu, c.survey_var)
 
 
@@ -168,7 +163,7 @@ def range_update(c, s, layout, p, t, distance, evidence, antenna_i, antenna_j, w
         if not s.alive[h]:
             continue
         decay_range_error(c, s, p, h, dt)
-        nu = distance - range_model(s.x, p, h, l0, l1, l2, work)
+        nu = distance - predict_range(s.x, p, h, l0, l1, l2, work)
         variance, w_e = predicted_variance(s.P, p, h, work)
         expected = variance + c.range_var
         misfit = nu * nu / expected
@@ -191,10 +186,10 @@ def range_update(c, s, layout, p, t, distance, evidence, antenna_i, antenna_j, w
             if sane > 0.5:
                 pair.t_used = t
         if has_rate and c.speed_model == 1:
-            nu = pair.rate - range_rate_model(s.x, p, h, l0, l1, l2, work)
+            nu = pair.rate - predict_range_rate(s.x, p, h, l0, l1, l2, work)
             correct(s.x, s.P, p, h, work, nu, c.speed_var)
         elif has_rate and c.speed_model == 2:
-            nu = abs(pair.rate) - speed_model(s.x, p, h, work)
+            nu = abs(pair.rate) - predict_speed(s.x, p, h, work)
             correct(s.x, s.P, p, h, work, nu, c.speed_var)
     pair.last_distance = distance
     if dt > TIE:

@@ -34,6 +34,7 @@ from tracking.filters.joint.scalar_update import reset_state
 from tracking.jit import allocating_kernel, kernel
 from tracking.maths.exponentials import decay
 from tracking.maths.multilateration import best_positions
+from tracking.models.range_bias import slow_error_var
 
 
 @kernel
@@ -181,7 +182,7 @@ def initialise_pair(c, s, h, p, hidden):
     at = s.pairs[p].i_range_error
     if at >= 0:
         reset_state(s, h, c.n, at, max(c.fast_var, 1e-12))
-        slow_var = c.slow_var + hidden * c.excess_var + hidden * (1.0 - hidden) * c.excess**2
+        slow_var = slow_error_var(c.slow_var, hidden, c.excess, c.excess_var)
         reset_state(s, h, c.n, at + 1, max(slow_var, 1e-12))
         s.x[h, at + 1] = hidden * c.excess
 

@@ -15,8 +15,8 @@ from __future__ import annotations
 
 import math
 
-from tracking.filters.joint.nlos_model import MIN_PROB
 from tracking.jit import kernel, small_kernel
+from tracking.models.nlos import MIN_PROB
 
 
 @small_kernel

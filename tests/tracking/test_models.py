@@ -1,0 +1,80 @@
+"""Every measurement model of the registry, against finite differences."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tracking.geometry import rotate
+from tracking.models import MODELS
+from tracking.models.lever_arm import antenna_in_world
+from tracking.models.nlos import nlos_posterior, transition_probs
+
+STEP = 1e-6
+
+
+def function(name):
+    """A model as a function of its state and constants; angles as such, not as cosine and sine."""
+    if name != "non-holonomic":
+        return MODELS[name].function
+
+    def with_yaw(v0, v1, error, yaw, yaw_rate, slip):
+        cos_yaw, sin_yaw = math.cos(yaw + error), math.sin(yaw + error)
+        return MODELS[name].function(v0, v1, error, cos_yaw, sin_yaw, slip * yaw_rate)
+
+    return with_yaw
+
+
+@settings(max_examples=50, deadline=None)
+@pytest.mark.parametrize("name", MODELS)
+@given(seed=st.integers(0, 2**31))
+def test_derivatives_are_finite_differences(name, seed):
+    model, rng = MODELS[name], np.random.default_rng(seed)
+    x = rng.uniform(0.2, 2.0, model.n_state + model.n_constants) * rng.choice([-1.0, 1.0])
+    call = function(name)
+    _, *derivatives = call(*x)
+    assert len(derivatives) == model.n_state
+    for k, derivative in enumerate(derivatives):
+        up, down = x.copy(), x.copy()
+        up[k], down[k] = x[k] + STEP, x[k] - STEP
+        slope = (call(*up)[0] - call(*down)[0]) / (2.0 * STEP)
+        assert derivative == pytest.approx(slope, abs=1e-6)
+
+
+@settings(max_examples=50, deadline=None)
+@given(seed=st.integers(0, 2**31))
+def test_an_antenna_is_rotated_by_the_orientation(seed):
+    rng = np.random.default_rng(seed)
+    q, lever = rng.standard_normal(4), rng.standard_normal(3)
+    q /= np.linalg.norm(q)
+    np.testing.assert_allclose(antenna_in_world(*q, *lever), rotate(q, lever), atol=1e-12)
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    enter=st.floats(0.01, 10.0), leave=st.floats(0.01, 10.0), dt=st.floats(0.0, 5.0),
+    n=st.integers(2, 5),
+)  # fmt: skip
+def test_transitions_over_a_time_are_those_over_its_parts(enter, leave, dt, n):
+    """Chapman and Kolmogorov."""
+
+    def matrix(over):
+        a, b = transition_probs(enter, leave, over)
+        return np.array([[1.0 - a, a], [b, 1.0 - b]])
+
+    parts = np.linalg.matrix_power(matrix(dt / n), n)
+    np.testing.assert_allclose(parts, matrix(dt), atol=1e-9)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(st.floats(1e-3, 1.0), min_size=8, max_size=8))
+def test_the_nlos_posterior_is_bayes_rule(numbers):
+    before, enter, leave, los, entered, left, nlos, odds = numbers
+    after, switched, total, _ = nlos_posterior(*numbers)
+    prior = np.array([[1.0 - before], [before]]) * [[1.0 - enter, enter], [leave, 1.0 - leave]]
+    joint = prior * np.array([[los, entered * odds], [left, nlos * odds]])
+    assert total == pytest.approx(joint.sum())
+    assert after == pytest.approx(np.clip(joint[:, 1].sum() / joint.sum(), 1e-4, 1.0 - 1e-4))
+    assert switched == pytest.approx((joint[0, 1] + joint[1, 0]) / joint.sum())

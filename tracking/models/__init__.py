@@ -1,0 +1,50 @@
+"""Measurement models: what a measurement is predicted to be, and its derivatives.
+
+One file each, used by all filters. A model is a compiled function of numbers,
+
+    z_hat, *derivatives = model(*state, *constants)
+
+with a derivative by each number of the state, in order. Which elements of a filter's state these
+numbers are is the filter's business. `MODELS` lists them; every model in it is held to finite
+differences (`tests/tracking/test_models.py`). Adding one: a file and a line here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from tracking.models.lever_arm import lever_arm_model
+from tracking.models.mean_velocity import mean_velocity_model
+from tracking.models.nonholonomic import nonholonomic_model
+from tracking.models.range import range_model
+from tracking.models.range_bias import range_bias_model
+from tracking.models.range_rate import range_rate_model
+from tracking.models.relative_speed import relative_speed_model
+from tracking.models.zero_velocity import zero_velocity_model
+
+
+class Model(NamedTuple):
+    """A measurement model and what is needed to check it."""
+
+    function: Callable[..., tuple[float, ...]]
+    n_state: int
+    """Its first arguments are the state, one derivative each."""
+    n_constants: int
+    noise: str
+    """The parameter that is its standard deviation."""
+
+
+MODELS: dict[str, Model] = {
+    "range": Model(range_model, 3, 0, "RangeErrorParams.white_std"),
+    "lever arm": Model(lever_arm_model, 1, 4, "RangeErrorParams.white_std"),
+    "range bias": Model(range_bias_model, 2, 0, "RangeErrorParams.white_std"),
+    "range rate": Model(range_rate_model, 6, 0, "PairEkfParams.speed_std"),
+    "relative speed": Model(relative_speed_model, 3, 0, "PairEkfParams.speed_std"),
+    "zero velocity": Model(zero_velocity_model, 1, 0, "JointParams.rest_std"),
+    "non-holonomic": Model(nonholonomic_model, 3, 3, "VehicleParams.sideways_std"),
+    "mean velocity": Model(mean_velocity_model, 1, 1, "VehicleParams.speed_std"),
+}
+"""By name. A surveyed distance is a range between two origins, without bias or lever arm."""
+
+__all__ = ["MODELS", "Model"]

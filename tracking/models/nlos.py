@@ -1,0 +1,80 @@
+"""Line of sight of a pair: a hidden Markov chain of two states, LOS and NLOS.
+
+Between two ranges of a pair the state changes with rates a (to NLOS) and b (to LOS), over dt with
+
+    a / (a + b) (1 - exp(-(a + b) dt)),    b / (a + b) (1 - exp(-(a + b) dt))
+
+The slow range error holds the NLOS bias. So in LOS or NLOS before and after, a range is predicted
+as it is; a transition to NLOS adds a bias, one to LOS takes the slow error away. Bayes' rule over
+the four transitions gives the probability of NLOS; the Gaussian sum is collapsed after each (GPB1
+[1]). The difference of received and first-path power, where it is reported, is evidence of its own.
+
+References:
+    [1] Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking and Navigation,
+        Wiley 2001, section 11.6.
+"""
+
+from __future__ import annotations
+
+import math
+
+from tracking.jit import small_kernel
+from tracking.maths.exponentials import exponential
+
+MIN_PROB = 1e-4
+SQRT_2PI = math.sqrt(2.0 * math.pi)
+MOST_EVIDENCE = 4.0
+"""[-] Of the powers of a single range."""
+
+
+@small_kernel
+def power_evidence(c, gap):
+    """Log-likelihood ratio of NLOS against LOS, of a power difference [dB]."""
+    los = max(gap - c.gap_los, 0.0) / c.gap_los_std
+    nlos = min(gap - c.gap_nlos, 0.0) / c.gap_nlos_std
+    ratio = 0.5 * (los * los - nlos * nlos) - math.log(c.gap_nlos_std / c.gap_los_std)
+    return min(max(c.gap_weight * ratio, -MOST_EVIDENCE), MOST_EVIDENCE)
+
+
+@small_kernel
+def transition_probs(enter_rate, leave_rate, dt):
+    """Probabilities of a transition to NLOS and to LOS over dt [s]."""
+    changes = (1.0 - exponential(-(enter_rate + leave_rate) * dt)) / (enter_rate + leave_rate)
+    return enter_rate * changes, leave_rate * changes
+
+
+@small_kernel
+def nlos_posterior(before, enter, leave, los_like, enter_like, leave_like, nlos_like, odds):
+    """Bayes' rule over the four transitions.
+
+    Args:
+        before: Probability of NLOS before.
+        enter: Probability of a transition to NLOS.
+        leave: Probability of a transition to LOS.
+        los_like: Likelihood of the range, LOS before and after.
+        enter_like: Likelihood after a transition to NLOS.
+        leave_like: Likelihood after a transition to LOS.
+        nlos_like: Likelihood, NLOS before and after.
+        odds: Likelihood ratio of the powers.
+
+    Returns:
+        Probability of NLOS; of a transition; likelihood of the range and its powers; likelihood of
+        the range alone, as the powers say nothing about where nodes are. Where nothing is likely,
+        the probability is as before and the others are 0.
+    """
+    los_los = (1.0 - before) * (1.0 - enter) * los_like
+    los_nlos = (1.0 - before) * enter * enter_like * odds
+    nlos_los = before * leave * leave_like
+    nlos_nlos = before * (1.0 - leave) * nlos_like * odds
+    total = los_los + los_nlos + nlos_los + nlos_nlos
+    if total < 1e-300:
+        return before, 0.0, 0.0, 0.0
+    after = min(max((los_nlos + nlos_nlos) / total, MIN_PROB), 1.0 - MIN_PROB)
+    norm = 1.0 + after * (odds - 1.0) if odds > 1.0 else 1.0
+    return after, (los_nlos + nlos_los) / total, total, total / norm
+
+
+@small_kernel
+def outlier_density(c):
+    """Likelihood of a range that means nothing, in the scale of `likelihood`."""
+    return SQRT_2PI * c.outlier_prob / c.outlier_span
