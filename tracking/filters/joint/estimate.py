@@ -9,6 +9,7 @@ from tracking.filters.joint.propagation import predict
 from tracking.filters.joint.state import N_PRE, JointState
 from tracking.jit import kernel
 from tracking.maths.simd.low_rank_downdate import apply_downdate
+from tracking.reference import by_reference
 
 # Plain numbers of `Status`: kernels do not know enums.
 ABSENT, STARTING, AMBIGUOUS, OK, LOST, DOUBTFUL = 0, 1, 2, 3, 4, 5
@@ -120,6 +121,6 @@ def predict_estimate(c, s, work, t):
             s.alignment_information,
             s.alignment_cov,
         )
-        predict(c, ahead, 0, t - s.group[0].t, work)
+        predict(c, by_reference(ahead), 0, t - s.group[0].t, work)
     for i in range(n):
         s.nodes[i].t_pre = work.t_pre[i]

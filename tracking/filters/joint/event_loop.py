@@ -35,8 +35,9 @@ from tracking.filters.joint.supervision.reinitialisation import find_misplaced
 from tracking.filters.joint.supervision.staleness import is_silent, note_seen, update_interval
 from tracking.filters.joint.surveyed_distance import surveyed_distance_update
 from tracking.filters.joint.workspace import DONE, ENV, EVENT, FLAG, NODE, OUT
-from tracking.jit import kernel, small_kernel
+from tracking.jit import kernel
 from tracking.models.nlos import power_evidence
+from tracking.reference import by_reference
 
 # What is rare and large is compiled apart (`rare`). In the order in which a range needs them:
 (
@@ -71,8 +72,9 @@ def run_events(coefficients, layout, state, work, block, t_out, out):
     """
     t, kind, node_i, node_j, antenna_i, antenna_j, values, has_power, valid = block
     c, cursor = coefficients[0], work.cursor
+    layout, work = by_reference(layout), by_reference(work)
     for e in range(cursor[ENV], t.shape[0]):
-        s, o = one_env(state, e), cursor[OUT]
+        s, o = by_reference(one_env(state, e)), cursor[OUT]
         for k in range(cursor[EVENT], t.shape[1]):
             if not valid[e, k]:
                 continue
@@ -114,13 +116,13 @@ def run_events(coefficients, layout, state, work, block, t_out, out):
 def predict_all(coefficients, state, work, t):
     """Carry every environment to its time t, (env) [s]."""
     for e in range(t.shape[0]):
-        s = one_env(state, e)
+        s = by_reference(one_env(state, e))
         if s.group[0].alignment != NONE:
             predict_to(coefficients[0], s, work, t[e], True)
             flush_all_updates(s)
 
 
-@small_kernel
+@kernel
 def process_range(c, s, layout, work, i, j, a_i, a_j, t, distance, sight, is_survey):
     """A range or survey between nodes i < j; returns what has to be done elsewhere, see `rare`.
 
@@ -164,7 +166,7 @@ def process_range(c, s, layout, work, i, j, a_i, a_j, t, distance, sight, is_sur
     return collect_initial_range(c, s, layout, work, i, j, p, t, distance, sight, is_survey)
 
 
-@small_kernel
+@kernel
 def predict_to(c, s, work, t, at_once):
     """Carry every hypothesis to time t, and use what is known about the carriers.
 
@@ -216,7 +218,7 @@ def propagate(c, s, work, t):
     group.t = t
 
 
-@small_kernel
+@kernel
 def update_range(c, s, layout, work, p, a_i, a_j, t, distance, sight, is_survey):
     """A range or survey of a running pair, at most `carry_period` after the states."""
     pair, group = s.pairs[p], s.group[0]

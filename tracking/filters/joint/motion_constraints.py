@@ -22,7 +22,7 @@ from tracking.filters.joint.scalar_update import (
     kalman_update,
     symmetrise,
 )
-from tracking.jit import small_kernel
+from tracking.jit import kernel, small_kernel
 from tracking.models.mean_velocity import mean_velocity_model
 from tracking.models.nonholonomic import nonholonomic_model
 from tracking.models.zero_velocity import zero_velocity_model
@@ -33,7 +33,7 @@ CENTRE_VAR = 1.0
 """[m2] Variance of the centre after it was moved back."""
 
 
-@small_kernel
+@kernel
 def apply_motion_constraints(c, s, h, t, dt, work):
     """Use what is known about the carriers, in hypothesis h.
 
@@ -166,7 +166,7 @@ def mean_velocity_prior(c, s, h, dt, work):
         kalman_update(s, h, work.w, -mean, S)
 
 
-@small_kernel
+@kernel
 def centre(c, s, h, w):
     """Move the centre of the group to the origin: ``p <- p - mean p``, and P with it.
 

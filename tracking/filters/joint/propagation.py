@@ -27,7 +27,7 @@ from tracking.filters.joint.gyro_bias import (
     propagate_gyro_bias_rows,
 )
 from tracking.filters.joint.tilt_correction import apply_tilt_correction, tilt_bias_tau
-from tracking.jit import small_kernel
+from tracking.jit import kernel, small_kernel
 from tracking.maths.angles import cosine_sine
 from tracking.maths.exponentials import decay
 from tracking.maths.simd.block_propagation import STATES, add_to_columns, add_to_rows
@@ -35,7 +35,7 @@ from tracking.maths.simd.low_rank_downdate import apply_downdate
 from tracking.maths.simd.symmetrise import mirror
 
 
-@small_kernel
+@kernel
 def predict(c, s, h, step, work):
     """Carry hypothesis h over the summed time of every node; nothing of it waits from then on.
 

@@ -23,7 +23,7 @@ from tracking.filters.joint.nlos_model import reset_bias_on_transition, update_n
 from tracking.filters.joint.observability import enforce_observability
 from tracking.filters.joint.propagation import displacement_since_epoch, time_since_epoch
 from tracking.filters.joint.scalar_update import compute_pht, kalman_update
-from tracking.jit import small_kernel
+from tracking.jit import kernel, small_kernel
 from tracking.models.lever_arm import lever_arm_slope, rotate_lever_arm
 from tracking.models.range import range_model
 from tracking.models.range_bias import range_bias_model
@@ -150,7 +150,7 @@ def relative_covariance(P, h, i, j, a, b):
     return P[h, i + a, i + b] + P[h, j + a, j + b] - P[h, i + a, j + b] - P[h, j + a, i + b]
 
 
-@small_kernel
+@kernel
 def range_update(c, s, h, p, dt, distance, levers, sight, work):
     """Correct hypothesis h with a range of pair p.
 

@@ -26,12 +26,14 @@ from tracking.filters.joint.supervision.staleness import drop_stale
 from tracking.filters.joint.surveyed_distance import apply_surveys
 from tracking.filters.joint.workspace import ENV, EVENT, FLAG, NODE
 from tracking.jit import bind, kernel
+from tracking.reference import by_reference
 
 
 @kernel
 def time_out(coefficients, layout, state, work, t):
     """Remove nodes without ranges for long."""
-    s = one_env(state, work.cursor[ENV])
+    cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
+    s = by_reference(one_env(state, cursor[ENV]))
     flush_all_updates(s)
     drop_timed_out(coefficients[0], s, layout, t)
 
@@ -39,7 +41,8 @@ def time_out(coefficients, layout, state, work, t):
 @kernel
 def spawn(coefficients, layout, state, work, t):
     """Follow all rotations and mirror images, as the first node moves."""
-    s = one_env(state, work.cursor[ENV])
+    cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
+    s = by_reference(one_env(state, cursor[ENV]))
     flush_all_updates(s)
     spawn_rotation_hypotheses(coefficients[0], s, layout, work)
 
@@ -47,7 +50,8 @@ def spawn(coefficients, layout, state, work, t):
 @kernel
 def stale(coefficients, layout, state, work, t):
     """Remove nodes that were silent and may be anywhere."""
-    s = one_env(state, work.cursor[ENV])
+    cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
+    s = by_reference(one_env(state, cursor[ENV]))
     flush_all_updates(s)
     drop_stale(coefficients[0], s, layout, t)
 
@@ -55,32 +59,37 @@ def stale(coefficients, layout, state, work, t):
 @kernel
 def modes(coefficients, layout, state, work, t):
     """Move each hypothesis to its mode of the rotation."""
-    monitor_modes(coefficients[0], one_env(state, work.cursor[ENV]), layout)
+    cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
+    monitor_modes(coefficients[0], by_reference(one_env(state, cursor[ENV])), layout)
 
 
 @kernel
 def reflect(coefficients, layout, state, work, t):
     """Add the mirror image."""
-    add_mirror_image(coefficients[0], one_env(state, work.cursor[ENV]))
+    cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
+    add_mirror_image(coefficients[0], by_reference(one_env(state, cursor[ENV])))
 
 
 @kernel
 def challenge_alignment(coefficients, layout, state, work, t):
     """Follow all rotations and mirror images again."""
-    challenge(coefficients[0], one_env(state, work.cursor[ENV]), layout)
+    cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
+    challenge(coefficients[0], by_reference(one_env(state, cursor[ENV])), layout)
 
 
 @kernel
 def reinitialise(coefficients, layout, state, work, t):
     """Look for another position of a node."""
-    s, cursor = one_env(state, work.cursor[ENV]), work.cursor
+    cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
+    s = by_reference(one_env(state, cursor[ENV]))
     reinitialise_node(coefficients[0], s, layout, cursor[NODE], cursor[FLAG] != 0, t)
 
 
 @kernel
 def start_group(coefficients, layout, state, work, t):
     """Start the group."""
-    c, s = coefficients[0], one_env(state, work.cursor[ENV])
+    cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
+    c, s = coefficients[0], by_reference(one_env(state, cursor[ENV]))
     start(c, s, layout, t)
     for a in range(s.nodes.shape[0]):
         apply_surveys(c, s, layout, work, a, a)
@@ -89,7 +98,8 @@ def start_group(coefficients, layout, state, work, t):
 @kernel
 def join_group(coefficients, layout, state, work, t):
     """Let a node join."""
-    c, s, new = coefficients[0], one_env(state, work.cursor[ENV]), work.cursor[NODE]
+    cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
+    c, s, new = coefficients[0], by_reference(one_env(state, cursor[ENV])), cursor[NODE]
     flush_all_updates(s)
     join(c, s, layout, new, t)
     apply_surveys(c, s, layout, work, new, s.nodes.shape[0])
@@ -98,9 +108,10 @@ def join_group(coefficients, layout, state, work, t):
 @kernel
 def remove(coefficients, layout, state, work, t):
     """Remove a node that has left."""
-    s = one_env(state, work.cursor[ENV])
+    cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
+    s = by_reference(one_env(state, cursor[ENV]))
     flush_all_updates(s)
-    remove_node(coefficients[0], s, layout, work.cursor[NODE])
+    remove_node(coefficients[0], s, layout, cursor[NODE])
 
 
 RARE: dict[int, Callable[..., None]] = {

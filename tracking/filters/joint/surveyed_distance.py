@@ -29,8 +29,8 @@ def surveyed_distance_update(c, s, h, p, distance, is_news, work):
     """
     if s.group[0].heading_gauge_var > c.gauge_std * c.gauge_std:
         enforce_observability(c, s, h, work)
-    none = work.none
-    predicted, m = predict_range(c, s, h, p, none, none, work.idx, work.val)
+    origin = (0.0, 0.0, 0.0)
+    predicted, m = predict_range(c, s, h, p, origin, origin, work.idx, work.val)
     variance, open_var = compute_pht(s, h, m, work), 0.0
     if not is_news:
         share = (distance - predicted) / (variance + c.survey_var)

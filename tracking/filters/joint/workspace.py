@@ -37,8 +37,6 @@ class Workspace(NamedTuple):
     """Of position and velocity by the states behind, see `block_propagation`."""
     speed: F64
     """(node)"""
-    none: F64
-    """Zeros, (3)."""
     x: F64
     """States of an estimate, (1, state)."""
     P: F64
@@ -74,7 +72,6 @@ def make_workspace(n_nodes: int, n_pairs: int, n_states: int) -> Workspace:
         step=np.zeros((n_nodes, 42)),
         derivatives=aligned(n_nodes, STATES + 1, ROOM),
         speed=np.zeros(n_nodes),
-        none=np.zeros(3),
         x=aligned(1, n_states),
         P=aligned(1, n_states, n_states),
         preintegrated=np.zeros((n_nodes, N_PRE)),
