@@ -24,7 +24,6 @@ from tracking.geometry import GRAVITY, quat_to_matrix
 
 STEP, CENTRE_VAR = 1e-30, 1.0
 AT_ONCE, NEGLIGIBLE, MOST_BENT, ENOUGH, FALSE, MOST, LINE = 0.1, 1e-3, 0.2, 0.01, 0.05, 0.3, 1e-3
-Function = Callable[[Any], Any]
 
 
 def decay(ratio: Any) -> Any:
@@ -37,7 +36,7 @@ def normal(off: float, variance: float) -> float:
     return float(np.exp(-0.5 * off * off / variance) / np.sqrt(variance))
 
 
-def jacobian(function: Function, x: F64) -> F64:
+def jacobian(function: Callable[[Any], Any], x: F64) -> F64:
     """Derivatives of a function by complex steps, (value, state)."""
     steps = x + 1j * STEP * np.eye(len(x))
     return np.array([np.imag(function(step)) / STEP for step in steps]).T
@@ -60,8 +59,6 @@ class JointReference:
         self.i_pos = self.nodes["i_pos"][:, None] + [0, 1]  # (node, 2)
         names = ("i_pos", "i_vel", "i_tilt_bias", "i_heading")
         self.indices = [[int(node[name]) for name in names] for node in self.nodes]
-
-    # Inertial samples
 
     def attitude(self, i: int, t: float, q: F64, accel: F64) -> None:
         """Take an orientation and an acceleration of the world."""
@@ -105,8 +102,6 @@ class JointReference:
             twice += dt * once + 0.5 * dt * dt * np.array(a)
             once += dt * np.array(a)
         s[0] += dt
-
-    # Prediction
 
     def increments(self, x: Any, i: int) -> list[Any]:
         """What the sums add to position and velocity beyond ``T v``: ``R dp - R_b B b``, (2) each.
@@ -189,16 +184,15 @@ class JointReference:
         A[self.i_pos] = np.stack([-out[:, 1], out[:, 0]], axis=1)
         return A / (A @ A + 1e-9)
 
-    # Corrections
-
-    def update(self, H: F64, nu: float, R: float) -> None:  # noqa: N803
-        """Kalman update in Joseph form."""
+    def update(self, H: F64, nu: float, R: float, most: float = np.inf) -> None:  # noqa: N803
+        """Kalman update in Joseph form; an innovation of a NIS beyond `most` counts for less."""
+        R += max(nu * nu / most - H @ self.P @ H - R, 0.0)
         K = self.P @ H / (H @ self.P @ H + R)
         A = np.eye(len(self.x)) - np.outer(K, H)
         self.x, self.P = self.x + K * nu, A @ self.P @ A.T + R * np.outer(K, K)
         self.moved += K * nu
 
-    def distance(self, p: int) -> Function:
+    def distance(self, p: int) -> Callable[[Any], Any]:
         """Predicted range of a pair as a function of the states, its errors included."""
         pair = self.pairs[p]
         i, j, e = int(pair["i"]), int(pair["j"]), int(pair["i_range_error"])
@@ -280,11 +274,11 @@ class JointReference:
                     node["t_moved"] = t
                     continue
                 for k in range(2):
-                    self.hold(np.eye(n)[v + k], -self.x[v + k], c["rest_var"])
+                    self.update(np.eye(n)[v + k], -self.x[v + k], c["rest_var"], 25.0)
             elif node["sideways_var"] > 0.0:
                 model = partial(self.slides, node, v, y)
                 nu = node["rear_axle"] * node["yaw_rate"] - model(self.x)
-                self.hold(jacobian(model, self.x), nu, node["sideways_var"])
+                self.update(jacobian(model, self.x), nu, node["sideways_var"], 25.0)
         for k in range(2):
             H = np.zeros(n)
             H[self.nodes["i_vel"] + k] = 1.0 / len(self.nodes)
@@ -297,11 +291,6 @@ class JointReference:
         forward = np.cos(yaw) * x[v] + np.sin(yaw) * x[v + 1]
         slip = node["slip"] * node["yaw_rate"] * forward**2
         return slip - np.sin(yaw) * x[v] + np.cos(yaw) * x[v + 1]
-
-    def hold(self, H: F64, nu: float, R: float) -> None:  # noqa: N803
-        """Correct with a constraint; a jolt counts for less."""
-        S = H @ self.P @ H + R
-        self.update(H, nu, R + max(nu * nu / 25.0 - S, 0.0))
 
     def centre(self, t: float) -> None:
         """Move the centre of the group to the origin, with a fixed uncertainty."""
