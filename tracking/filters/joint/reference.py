@@ -53,8 +53,8 @@ class JointReference:
         self.x, self.nlos = state.x[h].copy(), state.nlos[h].copy()
         pending = state.pending_updates[h, : state.n_pending[h]]
         self.P = state.P[h] - pending.T @ pending
-        self.moved, self.stays = state.accumulated_correction[h].copy(), state.bias_retention[h]
-        self.stays = self.stays.copy()
+        self.moved = state.accumulated_correction[h].copy()
+        self.stays = state.bias_retention[h].copy()
         self.held, self.sums = state.last_attitude_accel.copy(), state.preintegrated.copy()
         self.i_pos = self.nodes["i_pos"][:, None] + [0, 1]  # (node, 2)
         names = ("i_pos", "i_vel", "i_tilt_bias", "i_heading")
@@ -73,7 +73,7 @@ class JointReference:
         node["yaw_rate"] = keep * node["yaw_rate"] + (1.0 - keep) * turn / dt
         keep = decay(dt / 0.1)
         node["turning"] = keep * node["turning"] + (1.0 - keep) * angle / dt
-        accel = accel.copy()
+        accel = 1.0 * accel
         if node["levelled"]:
             force = R.T @ (accel + [0.0, 0.0, GRAVITY])
             yaw = np.array([[direction[0], -direction[1]], [direction[1], direction[0]]])
@@ -155,8 +155,7 @@ class JointReference:
             mean[slow] = (1.0 - scale[slow]) * hidden * c["excess"]
             Q[fast, fast] = (1.0 - scale[fast] ** 2) * c["fast_var"]
             Q[slow, slow] = (1.0 - scale[slow] ** 2) * (c["slow_var"] + hidden * c["excess_var"])
-        self.x = scale * x + mean
-        F = scale[:, None] * F
+        self.x, F = scale * x + mean, scale[:, None] * F
         self.P = F @ self.P @ F.T + Q
         self.stays[:], self.sums[:], self.group["t"] = 1.0, 0.0, t
 
@@ -194,11 +193,10 @@ class JointReference:
 
     def distance(self, p: int) -> Callable[[Any], Any]:
         """Predicted range of a pair as a function of the states, its errors included."""
-        pair = self.pairs[p]
-        i, j, e = int(pair["i"]), int(pair["j"]), int(pair["i_range_error"])
+        i, j, e = (int(self.pairs[p][name]) for name in ("i", "j", "i_range_error"))
 
         def where(x: Any, i: int) -> Any:
-            p, v = int(self.nodes[i]["i_pos"]), int(self.nodes[i]["i_vel"])
+            p, v, *_ = self.indices[i]
             # By biases and headings the way since the states' time changes too little to count.
             way, _ = self.increments(np.real(x), i)
             return x[p : p + 2] + self.sums[i, 0] * x[v : v + 2] + way
