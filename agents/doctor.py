@@ -125,9 +125,22 @@ class Diagnosis:
 
     @property
     def records(self) -> list[dict[str, Any]]:
-        """For JSON, the verdict last."""
+        """For JSON, the verdict last; rates to 0.1 Hz, other figures to three decimals."""
         verdict = {"kind": "verdict", "ok": self.ok}
-        return [*(p.record for p in self.ports), *(each.record for each in self.links), verdict]
+        found = [*(p.record for p in self.ports), *(each.record for each in self.links), verdict]
+        return [_rounded(record) for record in found]
+
+
+def _rounded(value: Any, name: str = "") -> Any:
+    """A value as exact as a few seconds of listening make it."""
+    if isinstance(value, dict):
+        # Rates by node are under the name of the rate.
+        return {k: _rounded(v, name if name.endswith("_hz") else str(k)) for k, v in value.items()}
+    if isinstance(value, list):
+        return [_rounded(each, name) for each in value]
+    if isinstance(value, float):
+        return round(value, 1 if name.endswith("_hz") else 3)
+    return value
 
 
 def doctor(

@@ -3,6 +3,7 @@
 import json
 import os
 import random
+import re
 from types import SimpleNamespace
 
 import pytest
@@ -230,6 +231,7 @@ def test_listens_to_links_and_cars_and_writes_nothing(talkers):
     for talker in (left, right, motor, wrong):
         assert talker.heard() == b""
     text = json.dumps(found.records, allow_nan=False)
+    assert not re.search(r"\.\d{4}", text)
     assert json.loads(text)[-1] == {"kind": "verdict", "ok": False}
 
 
