@@ -45,7 +45,9 @@ def matched_params(scenario: Scenario | HumanScenario) -> JointParams:
     channel, imu = scenario.radio.channel, scenario.imu
     mean, std = excess_moments(channel)
     hidden = can_hide(scenario)
-    gap_los_std, gap_nlos_std = (math.hypot(x, channel.gap_noise) for x in channel.gap_place)
+    power_diff_los_std, power_diff_nlos_std = (
+        math.hypot(x, channel.gap_noise) for x in channel.gap_place
+    )
     white = STAMPS * channel.stamp_std * SPEED_OF_LIGHT
     carriers = dict(VEHICLES)
     if isinstance(scenario, HumanScenario):
@@ -74,18 +76,18 @@ def matched_params(scenario: Scenario | HumanScenario) -> JointParams:
             sideways_std=SIDEWAYS,
         )
     nlos = NlosParams(
-        enter_rate=ENTER_RATE if hidden else NEVER,
-        leave_rate=LEAVE_RATE,
-        enter_rate_with_power=ENTER_RATE if hidden else NEVER,
-        leave_rate_with_power=LEAVE_RATE,
-        excess=max(mean, 1e-3),
-        excess_std=max(std, 1e-3),
-        excess_length=channel.excess_length,
+        los_to_nlos_rate=ENTER_RATE if hidden else NEVER,
+        nlos_to_los_rate=LEAVE_RATE,
+        los_to_nlos_rate_with_power=ENTER_RATE if hidden else NEVER,
+        nlos_to_los_rate_with_power=LEAVE_RATE,
+        nlos_bias=max(mean, 1e-3),
+        nlos_bias_std=max(std, 1e-3),
+        nlos_bias_length=channel.excess_length,
         white_std=1e-3,
-        gap_los=channel.gap,
-        gap_los_std=max(gap_los_std, 0.1),
-        gap_nlos=channel.gap + max(channel.gap_nlos, 0.1),
-        gap_nlos_std=max(gap_nlos_std, 0.1),
+        power_diff_los=channel.gap,
+        power_diff_los_std=max(power_diff_los_std, 0.1),
+        power_diff_nlos=channel.gap + max(channel.gap_nlos, 0.1),
+        power_diff_nlos_std=max(power_diff_nlos_std, 0.1),
         # Simulated radios lose ranges; none of those that come means nothing.
         outlier_prob=NEVER,
     )
@@ -101,7 +103,7 @@ def matched_params(scenario: Scenario | HumanScenario) -> JointParams:
         nlos=nlos,
         nlos_in_space=nlos,
         # The NIS is 1 where noise is what it is believed to be.
-        start=JointStartParams(strained=2.0),
+        start=JointStartParams(respawn_nis=2.0),
     )
 
 

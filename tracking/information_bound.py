@@ -118,7 +118,7 @@ def run_bound(coefficients, layout, s, work, block, hidden, truth, turn_var, t_o
             s.preintegrated[:, :N_PRE] = 0.0
             group.t = now
         put_on_truth(c, s, truth, k)
-        if now - group.t_constraints >= c.carrier_period:
+        if now - group.t_constraints >= c.constraint_period:
             constrain_nodes(c, s, 0, now, work)
             group.t_constraints = now
             put_on_truth(c, s, truth, k)
@@ -178,8 +178,8 @@ def learn_range(c, s, layout, work, p, a_i, a_j, is_hidden, what):
         was_hidden = s.nlos[0, p] > 0.5
         s.nlos[0, p] = 1.0 if is_hidden else 0.0
         if was_hidden != is_hidden:
-            reset_bias_on_transition(c, s, 0, p, 1.0, c.far_share)
-        variance = c.white_var + s.nlos[0, p] * c.excess_white_var
+            reset_bias_on_transition(c, s, 0, p, 1.0, c.nlos_large_share)
+        variance = c.white_var + s.nlos[0, p] * c.nlos_white_var
     _, m = predict_range(c, s, 0, p, (i0, i1, i2), (j0, j1, j2), work.idx, work.val)
     S = compute_pht(s, 0, m, work) + variance
     kalman_update(s, 0, work.w, 0.0, S)

@@ -17,19 +17,19 @@ class VehicleParams:
     """[m/s2] Slow error of the acceleration, mostly gravity seen through a wrong tilt."""
     bias_tau: float = 30.0
     """[s] How long it stays the same."""
-    told_bias_tau: float = 100.0
+    bias_tau_with_ahrs_feedback: float = 100.0
     """[s] The same in space, beside an offset, where it is told how the orientation is turned
     upright: what is left of it, and what the gyroscope makes it lean by has states of its own."""
     gyro_std: float = 3e-3
     """[rad/s] What is left of the bias of the gyroscope at first, unless rest has told better."""
     gyro_drift: float = 2e-4
     """[rad/s/sqrt(s)] How fast the bias of the gyroscope changes, where it has states."""
-    rise_bias_std: float = 0.1
+    vertical_bias_std: float = 0.1
     """[m/s2] The same along the vertical, where a wrong tilt shows by its square only: the offset
     of the accelerometer, less what is learned of it at rest."""
-    rise_bias_tau: float = 100.0
+    vertical_bias_tau: float = 100.0
     """[s] How long that stays the same."""
-    unsettled_speed: float = 0.0
+    initial_tilt_speed: float = 0.0
     """[m/s] How fast it may move while its orientation is still being found. The tilt of VQF is
     at first off by the mean acceleration since its first sample, which over a time t is a change
     of velocity over t."""
@@ -57,14 +57,14 @@ class VehicleParams:
     slip: float = 0.0
     """[s2/m] How fast that axle drifts outwards in a curve, per squared speed and yaw rate: the
     inverse of its cornering stiffness per load [1/rad] times gravity."""
-    blow: float | None = None
+    impact_threshold: float | None = None
     """[m/s2] More is a blow: what carries it runs into something and stops within a sample or two,
     that may have been cut off at the end of the scale, 8 or 16 g. None for what moves by blows."""
-    blow_share: float = 0.25
+    impact_noise_ratio: float = 0.25
     """[-] Error of what such a sample adds to the velocity, in terms of that."""
     rests: bool = True
     """It stands still now and then, and its IMU tells."""
-    carry_period: float = 0.02
+    propagation_period: float = 0.02
     """[s] The covariance of a group with such a node is carried forward so often; ranges in between
     do with its older state, without the noise of the time since."""
 
@@ -79,11 +79,11 @@ class VehicleParams:
     vibration and the slow error of a wrong tilt."""
 
     def __post_init__(self) -> None:
-        check_numbers(self, may_be_zero=("rear_axle", "slip", "unsettled_speed"))
+        check_numbers(self, may_be_zero=("rear_axle", "slip", "initial_tilt_speed"))
 
 
 _TURNED = VehicleParams(
-    accel_psd=0.05, unsettled_speed=1.0, offset_std=0.2, ahrs_accel_tau_with_bias=10.0
+    accel_psd=0.05, initial_tilt_speed=1.0, offset_std=0.2, ahrs_accel_tau_with_bias=10.0
 )
 """What turns about all its axes: its tilt is as good as what is known of the gyroscope's bias."""
 VEHICLES = {
@@ -100,8 +100,8 @@ VEHICLES = {
         sideways_std=0.08,
         rear_axle=0.15,
         slip=0.018,
-        blow=70.0,
-        carry_period=0.05,
+        impact_threshold=70.0,
+        propagation_period=0.05,
     ),
     "robot": VehicleParams(
         accel_psd=0.07,
@@ -116,8 +116,8 @@ VEHICLES = {
         accel_psd=0.1,
         bias_std=0.03,
         bias_tau=5.0,
-        rise_bias_std=0.03,
-        rise_bias_tau=5.0,
+        vertical_bias_std=0.03,
+        vertical_bias_tau=5.0,
         heading_std=0.02,
         heading_tau=30.0,
     ),

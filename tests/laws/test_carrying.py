@@ -14,7 +14,7 @@ def test_carrying_late_is_carrying_at_once(make_group):
     """But for the noise of a twentieth of a second, and what comes of it later."""
     group = make_group(n=4, seconds=12.0, hz=100.0)
     t_out = np.arange(4.0, 12.0, 0.03)
-    carriers = {name: replace(c, carry_period=1e-6) for name, c in VEHICLES.items()}
+    carriers = {name: replace(c, propagation_period=1e-6) for name, c in VEHICLES.items()}
     often = TrackerParams(filter=FilterParams(joint=JointParams(vehicles=carriers)))
     at_once = Tracker(group.constellation, often).run(group.block, t_out)
     late = Tracker(group.constellation).run(group.block, t_out)

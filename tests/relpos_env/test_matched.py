@@ -35,8 +35,12 @@ def test_sight_is_lost_only_where_something_may_hide(name, hides):
     scenario = recordable(name)
     assert can_hide(scenario) == hides
     nlos = matched_params(scenario).nlos
-    assert nlos.enter_rate == nlos.enter_rate_with_power == (ENTER_RATE if hides else NEVER)
-    assert nlos.leave_rate == nlos.leave_rate_with_power == LEAVE_RATE
+    assert (
+        nlos.los_to_nlos_rate
+        == nlos.los_to_nlos_rate_with_power
+        == (ENTER_RATE if hides else NEVER)
+    )
+    assert nlos.nlos_to_los_rate == nlos.nlos_to_los_rate_with_power == LEAVE_RATE
 
 
 def test_obstacles_that_are_drawn_for_episodes_hide_as_well():
@@ -49,8 +53,8 @@ def test_power_gaps_scatter_as_much_as_they_are_said_to(drives):
     gap, clear = np.concatenate([MEASURES["sight"](log)[1] for log in drives]).T
     nlos = matched_params(recordable("cars-nlos")).nlos
     # Gaps of a drive are alike: eight drives have tens of independent ones.
-    assert gap[clear == 1].std() == pytest.approx(nlos.gap_los_std, rel=0.25)
-    assert gap[clear == 0].std() == pytest.approx(nlos.gap_nlos_std, rel=0.25)
+    assert gap[clear == 1].std() == pytest.approx(nlos.power_diff_los_std, rel=0.25)
+    assert gap[clear == 0].std() == pytest.approx(nlos.power_diff_nlos_std, rel=0.25)
 
 
 def test_sight_is_lost_and_found_as_often_as_is_said(drives):
@@ -73,5 +77,5 @@ def test_an_exact_channel_still_has_parameters():
     scenario = recordable("cars-los")
     radio = replace(scenario.radio, channel=EXACT)
     nlos = matched_params(replace(scenario, radio=radio)).nlos
-    assert nlos.gap_los_std > 0.0
-    assert nlos.gap_nlos > nlos.gap_los
+    assert nlos.power_diff_los_std > 0.0
+    assert nlos.power_diff_nlos > nlos.power_diff_los

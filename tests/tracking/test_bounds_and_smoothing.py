@@ -202,8 +202,8 @@ def far_nodes():
         nodes=(*nodes, NodeConfig(id=4, vehicle="drone", imu_hz=HZ)), dimensions=2
     )
     carrier = replace(
-        VEHICLES["drone"], accel_psd=PSD, bias_std=1e-9, rise_bias_std=1e-9,
-        heading_std=1e-9, unsettled_speed=0.0,
+        VEHICLES["drone"], accel_psd=PSD, bias_std=1e-9, vertical_bias_std=1e-9,
+        heading_std=1e-9, initial_tilt_speed=0.0,
     )  # fmt: skip
     params = JointParams(
         vehicles={**VEHICLES, "drone": carrier},

@@ -45,7 +45,7 @@ def test_after_a_blow_the_speed_is_uncertain(vehicle, accel, is_blow):
     for k, t in enumerate((0.0, 0.01, 0.02)):
         process_attitude(c, s.nodes, s.last_attitude_accel, s.preintegrated, 0, t, values, 0, k)
     carrier = VEHICLES[vehicle]
-    expected = (carrier.blow_share * accel * 0.01) ** 2 * is_blow
+    expected = (carrier.impact_noise_ratio * accel * 0.01) ** 2 * is_blow
     assert s.preintegrated[0, 11] == pytest.approx(expected)
     # Half before and half after: what is missing of it is not known.
     assert s.preintegrated[0, 1] == pytest.approx(accel * 0.01)
@@ -63,7 +63,7 @@ def test_a_tilt_that_is_being_found_leaves_the_bias_uncertain(at_rest):
         s.nodes["t_oriented"] = t_oriented
         initialise_node(c, s, 0, 0, 4.0)
         at = s.nodes["i_tilt_bias"][0]
-        unsettled = 0.0 if at_rest else carrier.unsettled_speed / age
+        unsettled = 0.0 if at_rest else carrier.initial_tilt_speed / age
         assert s.P[0, at, at] == pytest.approx(carrier.bias_std**2 + unsettled**2)
 
 
@@ -87,8 +87,8 @@ def test_range_errors_begin_as_those_of_both_sights(evidence):
     initialise_pair(c, s, 0, 0, hidden)
     at, p = s.pairs["i_range_error"][0] + 1, NlosParams()
     assert 0.0 < hidden < 1.0
-    mean = hidden * p.excess
-    squared = hidden * (p.excess**2 + p.excess_std**2)
+    mean = hidden * p.nlos_bias
+    squared = hidden * (p.nlos_bias**2 + p.nlos_bias_std**2)
     assert s.nlos[0, 0] == hidden
     assert s.x[0, at] == pytest.approx(mean)
     assert s.P[0, at, at] == pytest.approx(c["slow_var"] + squared - mean**2)
@@ -98,7 +98,7 @@ def test_without_powers_sight_is_as_likely_at_first_as_it_is_in_the_long_run():
     c, s = one_env()
     p = NlosParams()
     assert initial_nlos_prob(c, s.pairs[0]) == pytest.approx(
-        p.enter_rate / (p.enter_rate + p.leave_rate)
+        p.los_to_nlos_rate / (p.los_to_nlos_rate + p.nlos_to_los_rate)
     )
 
 

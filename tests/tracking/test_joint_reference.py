@@ -39,9 +39,9 @@ def noisy(vehicle, at_rest, powers):
 def advance(reference, t):
     """Predict to t where it is due, and constrain."""
     c, g = reference.c, reference.group
-    due = t - g["t_constraints"] + SAME >= c["carrier_period"]
+    due = t - g["t_constraints"] + SAME >= c["constraint_period"]
     since = t - g["t"]
-    if since > SAME and (due or since + SAME >= c["carry_period"]):
+    if since > SAME and (due or since + SAME >= c["propagation_period"]):
         reference.predict(t)
     if due:
         reference.constrain(t)
@@ -65,10 +65,10 @@ def follow(reference, block, first, last):
         if block.kind[0, k] == Kind.STATE:
             reference.attitude(i, t, values[:4], values[4:7])
             continue
-        evidence, rates = 0.0, (c["enter_rate"], c["leave_rate"])
+        evidence, rates = 0.0, (c["los_to_nlos_rate"], c["nlos_to_los_rate"])
         if block.has_power[0, k]:
             evidence = power_evidence(c.view(np.recarray), values[1] - values[2])
-            rates = c["enter_rate_with_power"], c["leave_rate_with_power"]
+            rates = c["los_to_nlos_rate_with_power"], c["nlos_to_los_rate_with_power"]
         advance(reference, t)
         for node in (i, j):
             reference.integrate(node, t)

@@ -45,13 +45,15 @@ def test_by_so_much_it_is_forgotten(seed, hidden, switched, is_far):
     reset_bias_on_transition(c, s, 0, 0, switched, is_far)
     after, stays = covariance(s), 1.0 - switched
     shares = np.array([1.0 - is_far, is_far])
-    means = np.array([c["excess"], c["far_excess"]])
+    means = np.array([c["nlos_bias"], c["nlos_bias_large"]])
     excess = shares @ means
-    excess_var = shares @ (np.array([c["excess_var"], c["far_excess_var"]]) + means**2) - excess**2
+    nlos_bias_var = (
+        shares @ (np.array([c["nlos_bias_var"], c["nlos_bias_large_var"]]) + means**2) - excess**2
+    )
     # Four cases, each with its probability, mean and variance: the moments of their mixture.
     chance = np.array([stays, switched * (1.0 - hidden), switched * hidden])
     mean = np.array([x[at], 0.0, excess])
-    var = c["slow_var"] + np.array([before[at, at] - c["slow_var"], 0.0, excess_var])
+    var = c["slow_var"] + np.array([before[at, at] - c["slow_var"], 0.0, nlos_bias_var])
     expected = chance @ (var + mean**2) - (chance @ mean) ** 2
     assert after[at, at] == pytest.approx(expected)
     assert s.x[0, at] == pytest.approx(stays * x[at] + switched * hidden * excess)
@@ -79,7 +81,7 @@ def test_a_change_that_waits_for_the_prediction_moves_the_mean_as_one_at_once(
     predict(c, s, 0, 0.0, work)
     np.testing.assert_allclose(s.x[0], at_once[0], atol=1e-12)
     at, stays = s.pairs["i_range_error"][0] + 1, 1.0 - switched
-    new = c["slow_var"] + hidden * c["excess_var"]
+    new = c["slow_var"] + hidden * c["nlos_bias_var"]
     assert s.P[0, at, at] == pytest.approx(stays**2 * P[at, at] + (1.0 - stays**2) * new)
     s.P[0, at, at] = at_once[1][at, at]
     np.testing.assert_allclose(s.P[0], at_once[1], atol=1e-12)
@@ -104,8 +106,8 @@ def test_sight_is_judged_by_the_rule_of_bayes(before, nu, variance, evidence):
     chain = expm(dt * np.array([[-rates[0], rates[0]], [rates[1], -rates[1]]]))
     enter, leave = chain[0, 1], chain[1, 0]
     S, hidden = variance + c["white_var"], np.exp(evidence)
-    near = (1.0 - c["far_share"]) * density(c["excess"], S + c["excess_var"])
-    far = c["far_share"] * density(c["far_excess"], S + c["far_excess_var"])
+    near = (1.0 - c["nlos_large_share"]) * density(c["nlos_bias"], S + c["nlos_bias_var"])
+    far = c["nlos_large_share"] * density(c["nlos_bias_large"], S + c["nlos_bias_large_var"])
     same = density(0.0, S)
     entered = (1.0 - before) * enter * (near + far) * hidden
     left = before * leave * density(-slow, S + 1.0 + c["slow_var"])

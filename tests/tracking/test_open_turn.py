@@ -139,7 +139,7 @@ def test_one_filter_gives_the_states_and_likelihoods_of_all_turns(static):
     what is measured is a velocity.
     """
     c, s, work, _ = open_group(static=static)
-    c["fast_length"] = c["slow_length"] = c["excess_length"] = 1e12
+    c["fast_length"] = c["slow_length"] = c["nlos_bias_length"] = 1e12
     for i in range(3):
         if not s.nodes["static"][i]:
             at = s.nodes["i_heading"][i]
@@ -181,7 +181,7 @@ def test_a_survey_counts_against_a_layout_by_what_no_turn_explains(from_turn):
     s.sensitivity[0, :, at[2]] = 1.0 if from_turn else 0.0
     before = s.loglik[0]
     surveyed_distance.surveyed_distance_update(c, s, 0, pair, 3.0, True, work)
-    assert s.loglik[0] == (before if from_turn else pytest.approx(before - 0.5 * c["max_nis"]))
+    assert s.loglik[0] == (before if from_turn else pytest.approx(before - 0.5 * c["nis_cap"]))
 
 
 @pytest.mark.parametrize("vehicle", ["human", "hand", "hand, told", "car"])
@@ -190,7 +190,7 @@ def test_slopes_are_carried_as_errors_of_the_states_are(vehicle):
     vehicle, *told = vehicle.split(", ")
     c, s, work, _ = open_group(vehicle)
     s.nodes["has_ahrs_feedback"], s.nodes["by_gyroscope"] = bool(told), True
-    c["fast_length"] = c["slow_length"] = c["excess_length"] = 1e12
+    c["fast_length"] = c["slow_length"] = c["nlos_bias_length"] = 1e12
     s.last_attitude_accel[:, 4:] = 0.0
     for name in ("i_tilt_bias", "i_acc_bias", "i_gyro_bias"):
         for at in s.nodes[name][s.nodes[name] >= 0]:

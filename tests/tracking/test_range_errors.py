@@ -73,8 +73,8 @@ def test_noise_and_what_stays_are_told_apart(drive, white, fast, slow, wild):
 
 
 def test_what_is_not_measured_stays_as_it_was(drive):
-    like = replace(matched_params(recordable("cars-los")).range_error, bend_gain=2.5)
-    assert measure_range_errors(drive, like).bend_gain == 2.5
+    like = replace(matched_params(recordable("cars-los")).range_error, nonlinearity_gain=2.5)
+    assert measure_range_errors(drive, like).nonlinearity_gain == 2.5
 
 
 def test_labelled_ranges_do_not_count(drive):

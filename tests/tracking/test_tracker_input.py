@@ -71,7 +71,7 @@ def test_a_node_is_nowhere_relative_to_itself():
         estimate.between(1, 1)
 
 
-@pytest.mark.parametrize("name", ["leave_after", "unaided_after"])
+@pytest.mark.parametrize("name", ["node_timeout", "imu_timeout"])
 @pytest.mark.parametrize("value", [0, -1, 0.0, float("nan")])
 def test_parameters_are_above_0_whole_or_not(name, value):
     with pytest.raises(ConfigError, match=name):

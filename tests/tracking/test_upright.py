@@ -58,7 +58,7 @@ def walk(upright, told, lean=0.0, seconds=12.0, seed=0):
         NodeConfig(id=0, vehicle="hand", initial_heading=0.0),
         *(NodeConfig(id=k + 1, kind="static") for k in range(len(FIXED))),
     )
-    carriers = {**VEHICLES, "hand": replace(VEHICLES["hand"], told_bias_tau=1e9)}
+    carriers = {**VEHICLES, "hand": replace(VEHICLES["hand"], bias_tau_with_ahrs_feedback=1e9)}
     params = TrackerParams(filter=FilterParams(joint=JointParams(vehicles=carriers)))
     tracker = Tracker(Constellation(nodes=nodes, heading="initial", dimensions=3), params)
     t = np.arange(0.0, seconds, 0.01)

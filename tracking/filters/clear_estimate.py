@@ -8,7 +8,7 @@ from tracking.jit import small_kernel
 @small_kernel
 def is_heard(c, node, t):
     """True for a node that took part in a range lately: who did long ago has left."""
-    return node.seen and t - node.t_last_range <= c.leave_after
+    return node.seen and t - node.t_last_range <= c.node_timeout
 
 
 @small_kernel

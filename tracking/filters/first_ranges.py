@@ -20,7 +20,7 @@ def collect(c, pair, t, distance, is_survey):
     if is_survey:
         pair.surveyed = distance
         return
-    if pair.start_n > 0 and t - newest_first(pair) > c.leave_after:
+    if pair.start_n > 0 and t - newest_first(pair) > c.node_timeout:
         pair.start_n = 0
     if pair.start_n == 0:
         pair.t_start = t

@@ -30,17 +30,19 @@ MOST_EVIDENCE = 4.0
 @small_kernel
 def power_evidence(c, gap):
     """Log-likelihood ratio of NLOS against LOS, of a power difference [dB]."""
-    los = max(gap - c.gap_los, 0.0) / c.gap_los_std
-    nlos = min(gap - c.gap_nlos, 0.0) / c.gap_nlos_std
-    ratio = 0.5 * (los * los - nlos * nlos) - math.log(c.gap_nlos_std / c.gap_los_std)
-    return min(max(c.gap_weight * ratio, -MOST_EVIDENCE), MOST_EVIDENCE)
+    los = max(gap - c.power_diff_los, 0.0) / c.power_diff_los_std
+    nlos = min(gap - c.power_diff_nlos, 0.0) / c.power_diff_nlos_std
+    ratio = 0.5 * (los * los - nlos * nlos) - math.log(c.power_diff_nlos_std / c.power_diff_los_std)
+    return min(max(c.power_diff_weight * ratio, -MOST_EVIDENCE), MOST_EVIDENCE)
 
 
 @small_kernel
-def transition_probs(enter_rate, leave_rate, dt):
+def transition_probs(los_to_nlos_rate, nlos_to_los_rate, dt):
     """Probabilities of a transition to NLOS and to LOS over dt [s]."""
-    changes = (1.0 - exponential(-(enter_rate + leave_rate) * dt)) / (enter_rate + leave_rate)
-    return enter_rate * changes, leave_rate * changes
+    changes = (1.0 - exponential(-(los_to_nlos_rate + nlos_to_los_rate) * dt)) / (
+        los_to_nlos_rate + nlos_to_los_rate
+    )
+    return los_to_nlos_rate * changes, nlos_to_los_rate * changes
 
 
 @small_kernel

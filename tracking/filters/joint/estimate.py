@@ -62,7 +62,7 @@ def write_estimate(c, s, work, t, e, o, out):
             age[e, o, p] > max(c.lost_after, c.missed_intervals * pair.interval) or worst > c.ok_var
         ):
             status[e, o, p] = LOST
-        elif pair.mean_nis > c.doubt or node_i.faulty or node_j.faulty:
+        elif pair.mean_nis > c.pair_nis_limit or node_i.faulty or node_j.faulty:
             status[e, o, p] = DOUBTFUL
         else:
             status[e, o, p] = OK

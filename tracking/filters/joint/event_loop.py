@@ -91,10 +91,10 @@ def run_events(coefficients, layout, state, work, block, t_out, out):
                 a_i, a_j = antenna_i[e, k], antenna_j[e, k]
                 if i > j:
                     i, j, a_i, a_j = j, i, a_j, a_i
-                sight = (0.0, c.enter_rate, c.leave_rate)
+                sight = (0.0, c.los_to_nlos_rate, c.nlos_to_los_rate)
                 if has_power[e, k]:
                     evidence = power_evidence(c, values[e, k, 1] - values[e, k, 2])
-                    sight = (evidence, c.enter_rate_with_power, c.leave_rate_with_power)
+                    sight = (evidence, c.los_to_nlos_rate_with_power, c.nlos_to_los_rate_with_power)
                 is_survey, now, distance = what == SURVEY, t[e, k], values[e, k, 0]
                 action = process_range(
                     c, s, layout, work, i, j, a_i, a_j, now, distance, sight, is_survey
@@ -133,7 +133,7 @@ def process_range(c, s, layout, work, i, j, a_i, a_j, t, distance, sight, is_sur
     if done == NOTHING and not is_survey and is_frozen(c, s, p, t, distance):
         return NOTHING
     node_i, node_j = s.nodes[i], s.nodes[j]
-    if done < TIME_OUT and group.alignment != NONE and t - group.t_check > c.leave_after:
+    if done < TIME_OUT and group.alignment != NONE and t - group.t_check > c.node_timeout:
         # Without ranges for so long, the first one finds all nodes as long away.
         return TIME_OUT
     if done < SPAWN and group.alignment == STATIC and not all_static(c, s, t):
@@ -175,9 +175,9 @@ def predict_to(c, s, work, t, at_once):
     (`range_update.range_model`): only the noise of so short a time comes after them, not before.
     """
     group = s.group[0]
-    carriers_due = t - group.t_constraints + SAME >= c.carrier_period
+    carriers_due = t - group.t_constraints + SAME >= c.constraint_period
     since = t - group.t
-    if since > SAME and (at_once or carriers_due or since + SAME >= c.carry_period):
+    if since > SAME and (at_once or carriers_due or since + SAME >= c.propagation_period):
         propagate(c, s, work, t)
     if carriers_due:
         first, end = hypothesis_range(s)
@@ -220,7 +220,7 @@ def propagate(c, s, work, t):
 
 @kernel
 def update_range(c, s, layout, work, p, a_i, a_j, t, distance, sight, is_survey):
-    """A range or survey of a running pair, at most `carry_period` after the states."""
+    """A range or survey of a running pair, at most `propagation_period` after the states."""
     pair, group = s.pairs[p], s.group[0]
     i0, i1, i2 = antenna_offset(s.last_attitude_accel, layout, pair.i, a_i)
     j0, j1, j2 = antenna_offset(s.last_attitude_accel, layout, pair.j, a_j)

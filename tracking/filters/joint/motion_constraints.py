@@ -54,7 +54,7 @@ def constrain_nodes(c, s, h, t, work):
     """Nodes that rest do not move, and the axles of cars do not slide."""
     for i in range(s.nodes.shape[0]):
         node = s.nodes[i]
-        if not node.present or node.static or t - node.t_state > c.unaided_after:
+        if not node.present or node.static or t - node.t_state > c.imu_timeout:
             continue
         if is_at_rest(c, node, t):
             if is_known_to_move(c, s, h, i):
@@ -94,7 +94,7 @@ def apply_constraint(c, s, h, nu, m, variance, work):
         open_var = innovation_sensitivity(s, h, m, work)
         accumulate_alignment_information(s, h, work, nu, max(S, nu * nu / 25.0))
     if s.group[0].n_alive > 1:
-        s.loglik[h] -= 0.5 * min(nu * nu / (S + open_var), c.max_nis)
+        s.loglik[h] -= 0.5 * min(nu * nu / (S + open_var), c.nis_cap)
     if nu * nu > 25.0 * S:
         S = nu * nu / 25.0  # a jolt or a skid: it counts for less
     kalman_update(s, h, work.w, nu, S)

@@ -38,11 +38,11 @@ def update_nlos_posterior(c, s, h, p, dt, nu, variance, sight, w):
         probability that the excess, if any came, is one of the large ones.
     """
     at = s.pairs[p].i_range_error + 1
-    evidence, enter_rate, leave_rate = sight
-    enter, leave = transition_probs(enter_rate, leave_rate, dt)
+    evidence, los_to_nlos_rate, nlos_to_los_rate = sight
+    enter, leave = transition_probs(los_to_nlos_rate, nlos_to_los_rate, dt)
     S = variance + c.white_var
-    near = (1.0 - c.far_share) * likelihood(nu - c.excess, S + c.excess_var)
-    far = c.far_share * likelihood(nu - c.far_excess, S + c.far_excess_var)
+    near = (1.0 - c.nlos_large_share) * likelihood(nu - c.nlos_bias, S + c.nlos_bias_var)
+    far = c.nlos_large_share * likelihood(nu - c.nlos_bias_large, S + c.nlos_bias_large_var)
     nu_leave, S_leave = nu, S
     if at > 0:
         nu_leave = nu + s.x[h, at]
@@ -82,11 +82,11 @@ def reset_bias_on_transition(c, s, h, p, switched, is_far):
     for k in range(s.sensitivity.shape[1]):
         s.sensitivity[h, k, at] *= stays
     hidden = s.nlos[h, p]
-    relative_covariance = c.far_excess - c.excess
-    within = c.excess_var + is_far * (c.far_excess_var - c.excess_var)
-    excess_var = within + is_far * (1.0 - is_far) * relative_covariance * relative_covariance
-    excess = c.excess + is_far * relative_covariance
-    new_var = slow_error_var(c.slow_var, hidden, excess, excess_var)
+    relative_covariance = c.nlos_bias_large - c.nlos_bias
+    within = c.nlos_bias_var + is_far * (c.nlos_bias_large_var - c.nlos_bias_var)
+    nlos_bias_var = within + is_far * (1.0 - is_far) * relative_covariance * relative_covariance
+    excess = c.nlos_bias + is_far * relative_covariance
+    new_var = slow_error_var(c.slow_var, hidden, excess, nlos_bias_var)
     off = s.x[h, at] - hidden * excess
     # Of the mixture of both; the waiting corrections hold what has been taken off already.
     s.P[h, at, at] += switched * stays * before + switched * new_var + switched * stays * off * off

@@ -24,53 +24,53 @@ class RangeErrorParams:
     """[m] Multipath and antennas, changing within metres."""
     slow_length: float = 8.0
     """[m]"""
-    bend_gain: float = 1.0
+    nonlinearity_gain: float = 1.0
     """[-] Trust lost where the filter is uncertain across a short line of sight, in units of the
     second-order error there. That error lasts, so it weighs more than once."""
     max_pairs: int = 28
     """[-] Larger groups have no states for these errors: their ranges count as worse and white."""
 
     def __post_init__(self) -> None:
-        check_numbers(self, may_be_zero=("fast_std", "slow_std", "bend_gain"))
+        check_numbers(self, may_be_zero=("fast_std", "slow_std", "nonlinearity_gain"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NlosParams:
     """Ranges that are not line of sight, and those that are plainly wrong."""
 
-    enter_rate: float = 1.0
+    los_to_nlos_rate: float = 1.0
     """[1/s] How often a pair loses sight."""
-    leave_rate: float = 3.0
+    nlos_to_los_rate: float = 3.0
     """[1/s] How often it regains it."""
-    enter_rate_with_power: float = 1.0
+    los_to_nlos_rate_with_power: float = 1.0
     """[1/s] The same where powers are reported: what each range tells leaves less to the past."""
-    leave_rate_with_power: float = 6.0
+    nlos_to_los_rate_with_power: float = 6.0
     """[1/s] Likewise."""
-    excess: float = 0.1
+    nlos_bias: float = 0.1
     """[m] Mean of what most obstacles add to a range."""
-    excess_std: float = 0.2
+    nlos_bias_std: float = 0.2
     """[m] Its standard deviation."""
-    far_share: float = 0.0
+    nlos_large_share: float = 0.0
     """[-] Share of obstacles that add much more."""
-    far_excess: float = 0.6
+    nlos_bias_large: float = 0.6
     """[m] What they add, in the mean."""
-    far_excess_std: float = 0.5
+    nlos_bias_large_std: float = 0.5
     """[m] Its standard deviation."""
-    excess_length: float = 2.0
+    nlos_bias_length: float = 2.0
     """[m] Way of both ends after which the excess is another."""
     white_std: float = 0.25
     """[m] White noise that is added behind an obstacle: the excess jumps where paths change."""
     repeats: float = 20.0
     """[-] So many ranges in a row have the same excess: together they count as one."""
-    gap_los: float = 3.0
+    power_diff_los: float = 3.0
     """[dB] Received minus first-path power in sight."""
-    gap_los_std: float = 1.2
+    power_diff_los_std: float = 1.2
     """[dB]"""
-    gap_nlos: float = 8.0
+    power_diff_nlos: float = 8.0
     """[dB] The same behind an obstacle."""
-    gap_nlos_std: float = 3.0
+    power_diff_nlos_std: float = 3.0
     """[dB]"""
-    gap_weight: float = 0.2
+    power_diff_weight: float = 0.2
     """[-] Gaps of successive ranges are alike, so that each counts for less than one."""
     outlier_prob: float = 1e-2
     """[-] Share of ranges that mean nothing."""
@@ -78,12 +78,16 @@ class NlosParams:
     """[m] They lie anywhere in so much."""
 
     def __post_init__(self) -> None:
-        check_numbers(self, may_be_zero=("far_share",))
-        if not 0.0 <= self.far_share <= 1.0:
-            raise ConfigError(f"far_share: expected a share from 0 to 1, got {self.far_share}")
+        check_numbers(self, may_be_zero=("nlos_large_share",))
+        if not 0.0 <= self.nlos_large_share <= 1.0:
+            raise ConfigError(
+                f"nlos_large_share: expected a share from 0 to 1, got {self.nlos_large_share}"
+            )
 
 
-NLOS_IN_SPACE = NlosParams(enter_rate=0.5, leave_rate=2.0, far_share=0.2, white_std=0.2)
+NLOS_IN_SPACE = NlosParams(
+    los_to_nlos_rate=0.5, nlos_to_los_rate=2.0, nlos_large_share=0.2, white_std=0.2
+)
 """Published sets of ranges in buildings have an excess of 0.23 +- 0.38 m, 17 % beyond 0.5 m; these
 numbers make it 0.20 +- 0.35 m and 13 %. Groups in the plane, with fewer ranges to spare, would take
 wrong calibrations and absurd ranges for such obstacles."""
@@ -107,18 +111,18 @@ class JointStartParams:
     """[-] A hypothesis so much less likely than the best (log-likelihood) is dropped."""
     merge_distance: float = 0.15
     """[m] Two hypotheses as near as this in every pair are one."""
-    max_nis: float = 9.0
+    nis_cap: float = 9.0
     """[-] A single measurement counts for at most this in the likelihood."""
     check_period: float = 0.1
     """[s] Time between two looks at the bank."""
-    strained: float = 0.8
+    respawn_nis: float = 0.8
     """[-] Slow mean of the NIS of ranges from which on it is doubted how the layout is turned. It
     is 0.4 where all is well, as a range is believed less than its noise alone would allow, and up
     to 1.0 in recordings of sensors that are known less well."""
     height_std: float = 1.0
     """[m] How much fixed nodes differ in height from each other, where nothing tells how the group
     is turned: people put them into rooms, which are wider than they are high."""
-    head_start: float = 10.0
+    challenger_penalty: float = 10.0
     """[-] Log-likelihood by which other rotations have to make up for being looked at so late."""
 
     def __post_init__(self) -> None:
@@ -144,10 +148,10 @@ class JointParams:
     """[s] How long they keep it."""
     unaided_accel_psd: float = 1.5
     """[m/s2/sqrt(Hz)] Acceleration of a moving node whose IMU is not heard."""
-    anew_after: float = 0.5
+    attitude_reset_gap: float = 0.5
     """[s] After a longer silence of its IMU the orientation of a node is a new one: shorter gaps
     are filled (`OrientationParams.max_gap`)."""
-    unaided_after: float = 0.3
+    imu_timeout: float = 0.3
     """[s] A node whose IMU was silent for so long is unaided."""
     static_drift: float = 1e-4
     """[m/sqrt(s)] Static nodes may creep so much: keeps the covariance positive for ever."""
@@ -161,18 +165,18 @@ class JointParams:
     """[s] It must have done so for so long."""
     rest_std: float = 0.02
     """[m/s] Speed of a node at rest."""
-    carrier_period: float = 0.05
+    constraint_period: float = 0.05
     """[s] Time between two uses of what is known about the carriers."""
-    silent_after: float = 0.5
+    range_timeout: float = 0.5
     """[s] A node not heard for so long joins anew, if its distances to all others are less certain
     than 0.7 `ok_std` by now. More than the time between two ranges of a node."""
     lost_after: float = 1.0
     """[s] A pair without a range for so long is lost."""
-    leave_after: float = 5.0
+    node_timeout: float = 5.0
     """[s] A node not heard for so long has left; its states are forgotten."""
-    doubt: float = 6.0
+    pair_nis_limit: float = 6.0
     """[-] A pair whose ranges misfit so badly, as a running mean of NIS, is doubtful."""
-    common_error: float = 0.33
+    node_bias_limit: float = 0.33
     """[m] A node all of whose ranges err by so much, over the root of their number, is doubted."""
     ok_std: float = 1.0
     """[m] A pair is not ok while its position is less certain than this along an axis."""

@@ -17,7 +17,7 @@ from tracking.maths.exponentials import decay
 @small_kernel
 def is_aided(c, node, t):
     """True if the IMU of a node is heard."""
-    return node.has_state and t - node.t_state <= c.unaided_after
+    return node.has_state and t - node.t_state <= c.imu_timeout
 
 
 @small_kernel
@@ -72,8 +72,8 @@ def process_attitude(c, nodes, held, pre, i, t, values, e, k):
     cos_yaw, sin_yaw = direction(w, x, y, z)
     a0, a1, a2 = values[e, k, 4], values[e, k, 5], values[e, k, 6]
     dt = t - node.t_state
-    fresh = not node.has_state or dt > c.unaided_after
-    anew = not node.has_state or dt > c.anew_after
+    fresh = not node.has_state or dt > c.imu_timeout
+    anew = not node.has_state or dt > c.attitude_reset_gap
     if anew:
         node.t_oriented = t
     process_tilt_correction(node, pre, i, values, e, k, anew)
@@ -100,8 +100,8 @@ def process_attitude(c, nodes, held, pre, i, t, values, e, k):
         pre[i, 5] += half_p * (a1 - held[i, 5])
         pre[i, 6] += half_p * (a2 - held[i, 6])
         squared = a0 * a0 + a1 * a1
-        if squared > node.blow * node.blow:
-            pre[i, 11] += (node.blow_share * dt) ** 2 * squared
+        if squared > node.impact_threshold * node.impact_threshold:
+            pre[i, 11] += (node.impact_noise_ratio * dt) ** 2 * squared
     held[i, 4], held[i, 5], held[i, 6] = a0, a1, a2
     node.cos_yaw, node.sin_yaw = cos_yaw, sin_yaw
     node.t_state = t

@@ -66,11 +66,11 @@ def predict(c, s, h, step, work):
         way = (speed[pairs[p].i] + speed[pairs[p].j]) * step
         scale[at] = decay(way / c.fast_length)
         hidden = s.nlos[h, p]
-        scale[at + 1] = decay(way * ((1.0 - hidden) / c.slow_length + hidden / c.excess_length))
+        scale[at + 1] = decay(way * ((1.0 - hidden) / c.slow_length + hidden / c.nlos_bias_length))
         scale[at + 1] *= s.bias_retention[h, p]  # as a way does that leaves so much
         x[h, at] *= scale[at]
         x[h, at + 1] *= scale[at + 1]
-        x[h, at + 1] += (1.0 - scale[at + 1]) * hidden * c.excess
+        x[h, at + 1] += (1.0 - scale[at + 1]) * hidden * c.nlos_bias
     apply_downdate(P, h, s.pending_updates, h, s.n_pending[h], scale)
     s.n_pending[h] = 0
     for i in range(nodes.shape[0]):
@@ -94,7 +94,7 @@ def predict(c, s, h, step, work):
     for p in range(pairs.shape[0]):
         at = pairs[p].i_range_error
         if at >= 0:
-            slow_var = c.slow_var + s.nlos[h, p] * c.excess_var
+            slow_var = c.slow_var + s.nlos[h, p] * c.nlos_bias_var
             P[h, at, at] += (1.0 - scale[at] * scale[at]) * c.fast_var
             P[h, at + 1, at + 1] += (1.0 - scale[at + 1] * scale[at + 1]) * slow_var
 
@@ -145,7 +145,7 @@ def propagate_state(c, node, pre, x, h, i, scale, w, speed):
     keep = decay(T / tilt_bias_tau(node))
     scale[b], scale[b + 1] = keep, keep
     if d == 3:
-        scale[b + 2] = decay(T / node.rise_bias_tau)
+        scale[b + 2] = decay(T / node.vertical_bias_tau)
     for k in range(b, y):
         x[h, k] *= scale[k]
     scale[y] = decay(T / node.heading_tau)
@@ -215,7 +215,7 @@ def write_derivatives(d, node, w, i, F, scale):
 @small_kernel
 def initial_tilt_variance(node, age):
     """Variance of the bias that comes from an orientation of that age [s], which is new."""
-    return node.unsettled2 / (max(age, 1.0) * max(age, 1.0))
+    return node.initial_tilt_speed2 / (max(age, 1.0) * max(age, 1.0))
 
 
 @small_kernel
@@ -234,9 +234,9 @@ def add_noise(c, node, pre, P, h, i, scale, step):
         P[h, p + k, v + k] += 0.5 * q * T
         P[h, v + k, p + k] += 0.5 * q * T
         P[h, v + k, v + k] += q
-        bias_var = node.bias_var if k < 2 else node.rise_bias_var
+        bias_var = node.bias_var if k < 2 else node.vertical_bias_var
         P[h, b + k, b + k] += (1.0 - scale[b + k] * scale[b + k]) * bias_var
-    if node.unsettled2 > 0.0:
+    if node.initial_tilt_speed2 > 0.0:
         age = max(node.t_pre - node.t_oriented, 1.0)
         for k in range(2):
             P[h, b + k, b + k] += 2.0 * T / age * initial_tilt_variance(node, age)

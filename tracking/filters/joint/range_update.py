@@ -118,7 +118,7 @@ def second_order_variance(c, s, h, p, val):
     if c.d == 3:
         r2 = s.x[h, j + 2] - s.x[h, i + 2]
         trace += relative_covariance(s.P, h, i, j, 2, 2)
-    gain = 0.5 * c.bend_gain / math.sqrt(r0 * r0 + r1 * r1 + r2 * r2 + 0.01)
+    gain = 0.5 * c.nonlinearity_gain / math.sqrt(r0 * r0 + r1 * r1 + r2 * r2 + 0.01)
     if (gain * trace) ** 2 < NEGLIGIBLE * c.white_var:
         return 0.0  # and less by what waits
     u0, u1, u2 = val[2], val[3], val[5] if c.d == 3 else 0.0
@@ -188,7 +188,7 @@ def range_update(c, s, h, p, dt, distance, levers, sight, work):
     if s.group[0].n_alive > 1:
         # Rotations and mirror images of one group are equally uncertain but for how far each was
         # bent, and wrong ones, bent most, look surest: only how well they fit counts.
-        s.loglik[h] += max(math.log(likelihood) + 0.5 * math.log(S), -0.5 * c.max_nis)
+        s.loglik[h] += max(math.log(likelihood) + 0.5 * math.log(S), -0.5 * c.nis_cap)
     before, misfit = nu, nu * nu / S
     if switched < AT_ONCE or s.pairs[p].i_range_error < 0:
         s.bias_retention[h, p] *= 1.0 - switched
@@ -199,10 +199,10 @@ def range_update(c, s, h, p, dt, distance, levers, sight, work):
         variance = compute_pht(s, h, m, work)
         if is_linear(s.group[0]):
             open_var = innovation_sensitivity(s, h, m, work)
-    R = c.white_var + bent + s.nlos[h, p] * c.excess_white_var
+    R = c.white_var + bent + s.nlos[h, p] * c.nlos_white_var
     nis = nu * nu / (variance + open_var + R)
     # A pair whose ranges have long contradicted all else is believed less and less.
-    doubt = s.pairs[p].mean_nis / (0.7 * c.doubt)
+    doubt = s.pairs[p].mean_nis / (0.7 * c.pair_nis_limit)
     trust = sane
     if doubt > 1.0:
         trust /= doubt * doubt * doubt * doubt

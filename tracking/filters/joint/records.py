@@ -39,17 +39,17 @@ NODE = np.dtype(
         ("levelled", "?"),
         ("rests", "?"),
         ("psd2", "f8"),
-        ("blow", "f8"),  # infinite for what moves by blows
-        ("blow_share", "f8"),
+        ("impact_threshold", "f8"),  # infinite for what moves by blows
+        ("impact_noise_ratio", "f8"),
         ("bias_var", "f8"),
         ("bias_tau", "f8"),
-        ("told_bias_tau", "f8"),
+        ("bias_tau_with_ahrs_feedback", "f8"),
         ("first_gyro_var", "f8"),
         ("gyro_drift2", "f8"),
         ("by_gyroscope", "?"),  # its heading is what its gyroscope adds to the first
-        ("rise_bias_var", "f8"),
-        ("rise_bias_tau", "f8"),
-        ("unsettled2", "f8"),
+        ("vertical_bias_var", "f8"),
+        ("vertical_bias_tau", "f8"),
+        ("initial_tilt_speed2", "f8"),
         ("offset_var", "f8"),
         ("offset_tau", "f8"),
         ("heading_var", "f8"),

@@ -80,8 +80,8 @@ class JointReference:
             accel[:2] = yaw @ force[:2]
         self.sums[i, 1:4] += 0.5 * dt * (accel - held[4:])
         self.sums[i, 4:7] += 0.25 * dt * dt * (accel - held[4:])
-        if np.hypot(*accel[:2]) > node["blow"]:
-            self.sums[i, 11] += (node["blow_share"] * dt) ** 2 * (accel[:2] @ accel[:2])
+        if np.hypot(*accel[:2]) > node["impact_threshold"]:
+            self.sums[i, 11] += (node["impact_noise_ratio"] * dt) ** 2 * (accel[:2] @ accel[:2])
         held[:4], held[4:] = q, accel
         node["cos_yaw"], node["sin_yaw"] = direction
         node["t_state"] = t
@@ -149,12 +149,12 @@ class JointReference:
         for p, pair in enumerate(self.pairs):
             fast, slow, hidden = pair["i_range_error"], pair["i_range_error"] + 1, self.nlos[p]
             way = (speed[pair["i"]] + speed[pair["j"]]) * step
-            length = (1.0 - hidden) / c["slow_length"] + hidden / c["excess_length"]
+            length = (1.0 - hidden) / c["slow_length"] + hidden / c["nlos_bias_length"]
             scale[fast] = decay(way / c["fast_length"])
             scale[slow] = decay(way * length) * self.stays[p]
-            mean[slow] = (1.0 - scale[slow]) * hidden * c["excess"]
+            mean[slow] = (1.0 - scale[slow]) * hidden * c["nlos_bias"]
             Q[fast, fast] = (1.0 - scale[fast] ** 2) * c["fast_var"]
-            Q[slow, slow] = (1.0 - scale[slow] ** 2) * (c["slow_var"] + hidden * c["excess_var"])
+            Q[slow, slow] = (1.0 - scale[slow] ** 2) * (c["slow_var"] + hidden * c["nlos_bias_var"])
         self.x, F = scale * x + mean, scale[:, None] * F
         self.P = F @ self.P @ F.T + Q
         self.stays[:], self.sums[:], self.group["t"] = 1.0, 0.0, t
@@ -221,7 +221,7 @@ class JointReference:
         leave_var = S + less + c["slow_var"]
         a, b = np.array(rates) / sum(rates) * -np.expm1(-sum(rates) * (t - pair["t_range"]))
         prior = np.array([[1.0 - self.nlos[p]], [self.nlos[p]]]) * [[1.0 - a, a], [b, 1.0 - b]]
-        enters = normal(nu - c["excess"], S + c["excess_var"])
+        enters = normal(nu - c["nlos_bias"], S + c["nlos_bias_var"])
         leaves = normal(nu + self.x[slow], leave_var)
         chance = (
             prior * [[normal(nu, S), enters], [leaves, normal(nu, S)]] * [1.0, np.exp(evidence)]
@@ -236,14 +236,14 @@ class JointReference:
         else:
             keep, old_var = np.ones(len(self.x)), self.P[slow, slow]
             keep[slow] = stays = 1.0 - switched
-            off, bias = self.x[slow] - hidden * c["excess"], c["excess"]
-            new_var = c["slow_var"] + hidden * c["excess_var"] + hidden * (1.0 - hidden) * bias**2
+            off, bias = self.x[slow] - hidden * c["nlos_bias"], c["nlos_bias"]
+            new_var = c["slow_var"] + hidden * (c["nlos_bias_var"] + (1.0 - hidden) * bias**2)
             self.P *= np.outer(keep, keep)
             self.P[slow, slow] += switched * (stays * old_var + new_var + stays * off * off)
             self.x[slow] -= switched * off
             nu = z - model(self.x)
-        R, doubt = c["white_var"] + bent + hidden * c["excess_white_var"], pair["mean_nis"]
-        trust = sane / max(doubt / (0.7 * c["doubt"]), 1.0) ** 4
+        R, doubt = c["white_var"] + bent + hidden * c["nlos_white_var"], pair["mean_nis"]
+        trust = sane / max(doubt / (0.7 * c["pair_nis_limit"]), 1.0) ** 4
         if trust > 1e-3:
             self.update(H, nu, R / trust)
         capped = min(misfit, 25.0) if sane > 0.5 else 25.0
@@ -256,7 +256,7 @@ class JointReference:
         i, j = self.i_pos[pair["i"]], self.i_pos[pair["j"]]
         D[[0, 1], i], D[[0, 1], j] = -1.0, 1.0
         cov, out, u = D @ self.P @ D.T, D @ self.x, H[j]
-        gain = 0.5 * c["bend_gain"] / np.sqrt(out @ out + 0.01)
+        gain = 0.5 * c["nonlinearity_gain"] / np.sqrt(out @ out + 0.01)
         if (gain * np.trace(cov)) ** 2 < NEGLIGIBLE * c["white_var"]:
             return 0.0
         return float(min(gain * max(np.trace(cov) - u @ cov @ u, 0.0), MOST_BENT) ** 2)

@@ -29,6 +29,6 @@ def add_saturation_noise(c, node, pre, i, t, cut_off):
     # A carrier that stays level does not need what is across its plane.
     now = cut_off >= IN_PLANE or (cut_off > 0.0 and not node.levelled)
     if (now or node.saturated) and node.has_state:
-        dt = min(max(t - node.t_state, 0.0), c.unaided_after)
+        dt = min(max(t - node.t_state, 0.0), c.imu_timeout)
         pre[i, 11] += dt * c.unaided_psd2
     node.saturated = now

@@ -45,7 +45,7 @@ def surveyed_distance_update(c, s, h, p, distance, is_news, work):
     nu, S = distance - predicted, variance + c.survey_var
     nis = nu * nu / (S + open_var)
     if s.group[0].n_alive > 1 and nis > c.survey_nis:
-        s.loglik[h] -= 0.5 * min(nis, c.max_nis)
+        s.loglik[h] -= 0.5 * min(nis, c.nis_cap)
     kalman_update(s, h, work.w, nu, S)
 
 

@@ -52,4 +52,4 @@ def apply_tilt_correction(node, pre, x, h, i, cos_r, sin_r, w):
 @small_kernel
 def tilt_bias_tau(node):
     """How long the horizontal bias of a node stays the same [s]."""
-    return node.told_bias_tau if node.has_ahrs_feedback else node.bias_tau
+    return node.bias_tau_with_ahrs_feedback if node.has_ahrs_feedback else node.bias_tau

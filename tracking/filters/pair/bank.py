@@ -201,5 +201,5 @@ def remove_node(s, layout, i, t):
 def drop_timed_out(c, s, layout, t):
     """Remove the nodes that were not heard for so long that they must have left."""
     for i in range(s.nodes.shape[0]):
-        if (s.nodes[i].present or s.nodes[i].seen) and t - s.nodes[i].t_last_range > c.leave_after:
+        if (s.nodes[i].present or s.nodes[i].seen) and t - s.nodes[i].t_last_range > c.node_timeout:
             remove_node(s, layout, i, t)

@@ -27,7 +27,7 @@ def note_heading(c, node, t, q):
     w, x, y, z = q[0], q[1], q[2], q[3]
     yaw = math.atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
     dt = t - node.t_state
-    if not node.has_state or dt > c.unaided_after:
+    if not node.has_state or dt > c.imu_timeout:
         node.yaw_rate = 0.0
     elif dt > 1e-4:
         change = yaw - node.yaw
@@ -90,7 +90,7 @@ def apply_motion_constraints(c, s, layout, t, work):
         Pu[1, 1] = min(Pu[1, 1] + q, MEAN_SPEED_VAR)
         for i in range(s.nodes.shape[0]):
             node = s.nodes[i]
-            if node.present and node.sideways_var > 0.0 and t - node.t_state < c.unaided_after:
+            if node.present and node.sideways_var > 0.0 and t - node.t_state < c.imu_timeout:
                 hold(c, s, layout, h, i, m, work)
 
 
@@ -114,7 +114,7 @@ def hold(c, s, layout, h, i, m, work):
     common = n0 * w0 + n1 * w1
     S = common + own + node.sideways_var
     nis = nu * nu / S
-    s.loglik[h] -= 0.5 * (min(nis, c.max_nis) + math.log(S))
+    s.loglik[h] -= 0.5 * (min(nis, c.nis_cap) + math.log(S))
     if nis > 25.0:
         S *= nis / 25.0  # a jolt or a skid: it counts for less
     for k in range(s.nodes.shape[0]):

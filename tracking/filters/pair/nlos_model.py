@@ -28,13 +28,13 @@ def decay_range_error(c, s, p, h, dt):
     v0, v1, v2 = x[p, h, 3], x[p, h, 4], x[p, h, 5]
     way = math.sqrt(v0 * v0 + v1 * v1 + v2 * v2 + c.least_speed * c.least_speed) * dt
     hidden = s.nlos[p, h]
-    keep = decay(way * ((1.0 - hidden) / c.slow_length + hidden / c.excess_length))
-    x[p, h, E] = keep * x[p, h, E] + (1.0 - keep) * hidden * c.excess
+    keep = decay(way * ((1.0 - hidden) / c.slow_length + hidden / c.nlos_bias_length))
+    x[p, h, E] = keep * x[p, h, E] + (1.0 - keep) * hidden * c.nlos_bias
     for k in range(E):
         v = keep * P[p, h, k, E]
         P[p, h, k, E] = v
         P[p, h, E, k] = v
-    var = c.slow_var + hidden * c.excess_var
+    var = c.slow_var + hidden * c.nlos_bias_var
     P[p, h, E, E] = keep * keep * P[p, h, E, E] + (1.0 - keep * keep) * var
 
 
@@ -56,7 +56,7 @@ def update_nlos_posterior(c, s, p, h, dt, nu, variance, w_e, evidence):
     Returns:
         Probability that the sight changed; that the range meant anything; log-likelihood.
     """
-    enter, leave = transition_probs(c.enter_rate, c.leave_rate, dt)
+    enter, leave = transition_probs(c.los_to_nlos_rate, c.nlos_to_los_rate, dt)
     S = variance + c.range_var
     S_leave = S + max(s.P[p, h, E, E] - 2.0 * w_e, -0.9 * variance) + c.slow_var
     stays = likelihood(nu, S)
@@ -65,7 +65,7 @@ def update_nlos_posterior(c, s, p, h, dt, nu, variance, w_e, evidence):
         enter,
         leave,
         stays,
-        likelihood(nu - c.excess, S + c.excess_var),
+        likelihood(nu - c.nlos_bias, S + c.nlos_bias_var),
         likelihood(nu + s.x[p, h, E], S_leave),
         stays,
         exponential(evidence),
@@ -83,7 +83,7 @@ def reset_bias_on_transition(c, s, p, h, switched):
         s.P[p, h, k, E] = v
         s.P[p, h, E, k] = v
     hidden = s.nlos[p, h]
-    new_var = slow_error_var(c.slow_var, hidden, c.excess, c.excess_var)
-    off = s.x[p, h, E] - hidden * c.excess
+    new_var = slow_error_var(c.slow_var, hidden, c.nlos_bias, c.nlos_bias_var)
+    off = s.x[p, h, E] - hidden * c.nlos_bias
     s.P[p, h, E, E] = stays * s.P[p, h, E, E] + switched * (new_var + stays * off * off)
     s.x[p, h, E] -= switched * off

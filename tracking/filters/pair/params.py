@@ -58,7 +58,7 @@ class RangeErrorParams:
     does not remember, and its range error would wander off."""
     least_speed: float = 1.0
     """[m/s] Relative speed counted at least. Zero keeps the error of a pair at rest for ever."""
-    bend_gain: float = 0.1
+    nonlinearity_gain: float = 0.1
     """[-] Trust lost where a filter is uncertain across a short line of sight, in units of the
     second-order error there."""
 
@@ -70,27 +70,27 @@ class RangeErrorParams:
 class NlosParams:
     """Ranges that are not line of sight, and those that are plainly wrong."""
 
-    enter_rate: float = 0.5
+    los_to_nlos_rate: float = 0.5
     """[1/s] How often a pair loses sight."""
-    leave_rate: float = 5.0
+    nlos_to_los_rate: float = 5.0
     """[1/s] How often it regains it."""
-    excess: float = 0.15
+    nlos_bias: float = 0.15
     """[m] Mean of what is added to a range behind an obstacle."""
-    excess_std: float = 0.12
+    nlos_bias_std: float = 0.12
     """[m] Its standard deviation."""
-    excess_length: float = 1.5
+    nlos_bias_length: float = 1.5
     """[m] Relative way after which the excess is another."""
     white_std: float = 0.25
     """[m] White noise that is added behind an obstacle: the excess jumps where paths change."""
-    gap_los: float = 3.0
+    power_diff_los: float = 3.0
     """[dB] Received minus first-path power in sight."""
-    gap_los_std: float = 1.2
+    power_diff_los_std: float = 1.2
     """[dB]"""
-    gap_nlos: float = 8.0
+    power_diff_nlos: float = 8.0
     """[dB] The same behind an obstacle."""
-    gap_nlos_std: float = 3.0
+    power_diff_nlos_std: float = 3.0
     """[dB]"""
-    gap_weight: float = 0.2
+    power_diff_weight: float = 0.2
     """[-] Gaps of successive ranges are alike, so that each counts for less than one."""
     outlier_prob: float = 1e-2
     """[-] Share of ranges that mean nothing."""
@@ -137,10 +137,10 @@ class StartParams:
     of real ranges are correlated over a second, so that their evidence counts too much."""
     merge_distance: float = 0.25
     """[m] Two hypotheses as near as this in every pair are one."""
-    evidence: float = 0.3
+    likelihood_tempering: float = 0.3
     """[-] So much each range counts in the likelihood: errors that last make successive ranges
     say the same thing."""
-    max_nis: float = 6.0
+    nis_cap: float = 6.0
     """[-] A single range counts for at most this in the likelihood, outlier or not."""
     check_period: float = 0.25
     """[s] Time between two looks at the bank."""
@@ -155,7 +155,7 @@ class PairEkfParams:
 
     unaided_accel_psd: float = 0.7
     """[m/s2/sqrt(Hz)] White noise of the acceleration of a moving node without IMU samples."""
-    unaided_after: float = 0.3
+    imu_timeout: float = 0.3
     """[s] A node whose IMU was silent for so long is unaided."""
     survey_std: float = 0.02
     """[m] Standard deviation of a surveyed distance."""
@@ -169,7 +169,7 @@ class PairEkfParams:
     """[s] Time constant of that low pass."""
     lost_after: float = 1.0
     """[s] A pair without an accepted range for so long is lost."""
-    leave_after: float = 5.0
+    node_timeout: float = 5.0
     """[s] A node not heard for so long has left; its filters are destroyed."""
     gate: GateParams = field(default_factory=GateParams)
     mds: MdsParams = field(default_factory=MdsParams)

@@ -29,7 +29,7 @@ MOST_BEND = 0.1
 @small_kernel
 def is_aided(c, node, t):
     """True if the IMU of a node is heard."""
-    return node.has_state and t - node.t_state <= c.unaided_after
+    return node.has_state and t - node.t_state <= c.imu_timeout
 
 
 @small_kernel
@@ -130,7 +130,7 @@ def update_rate(c, pair, t, distance):
 
 
 @small_kernel
-def bend(s, p, h, work):
+def second_order_bias(s, p, h, work):
     """What the straight line misses: how much longer a range is on average than predicted [m].
 
     To second order ``tr(P_across) / (2 d)``, with P_across the covariance of the relative
@@ -171,13 +171,13 @@ def range_update(c, s, layout, p, t, distance, evidence, antenna_i, antenna_j, w
         nu += s.x[p, h, E]
         reset_bias_on_transition(c, s, p, h, switched)
         nu -= s.x[p, h, E]
-        bent = min(c.bend_gain * bend(s, p, h, work), MOST_BEND)
-        R = c.range_var + bent * bent + s.nlos[p, h] * c.excess_white_var
+        bent = min(c.nonlinearity_gain * second_order_bias(s, p, h, work), MOST_BEND)
+        R = c.range_var + bent * bent + s.nlos[p, h] * c.nlos_white_var
         variance, _ = predicted_variance(s.P, p, h, work)
         nis = nu * nu / (variance + R)
         if sane > 1e-3:
             correct(s.x, s.P, p, h, work, nu, R / sane)
-        s.loglik[h] += c.evidence * max(loglik, -0.5 * (c.max_nis + math.log(expected)))
+        s.loglik[h] += c.likelihood_tempering * max(loglik, -0.5 * (c.nis_cap + math.log(expected)))
         if h == group.best:
             pair.nis = nis
             group.nis_sum += nis
@@ -193,7 +193,7 @@ def range_update(c, s, layout, p, t, distance, evidence, antenna_i, antenna_j, w
             correct(s.x, s.P, p, h, work, nu, c.speed_var)
     pair.last_distance = distance
     if dt > TIE:
-        pair.interval += 0.1 * (min(dt, c.leave_after) - pair.interval)
+        pair.interval += 0.1 * (min(dt, c.node_timeout) - pair.interval)
     pair.t_range = t
     pair.n_ranges += 1
 

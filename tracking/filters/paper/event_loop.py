@@ -90,7 +90,7 @@ def update_range(c, s, layout, i, j, t, distance, is_survey, H, PH):
     """Correct the filter of nodes i < j, or collect their first k measurements."""
     present = 0
     for node in range(s.nodes.shape[0]):
-        if t - s.nodes[node].t_last_range > c.leave_after and s.nodes[node].t_last_range > -np.inf:
+        if t - s.nodes[node].t_last_range > c.node_timeout and s.nodes[node].t_last_range > -np.inf:
             remove_node(s, layout, node)
     for node in range(s.nodes.shape[0]):
         present += s.nodes[node].present
@@ -144,7 +144,7 @@ def write_estimate(c, s, t, e, o, out, x, P):
         nis[e, o, p] = pair.nis
         if not (node_i.present and node_j.present):
             oldest = min(node_i.t_last_range, node_j.t_last_range)
-            status[e, o, p] = STARTING if t - oldest <= c.leave_after else 0
+            status[e, o, p] = STARTING if t - oldest <= c.node_timeout else 0
             continue
         x[:], P[:, :] = s.x[p], s.P[p]
         predict(c, s, p, t, x, P)

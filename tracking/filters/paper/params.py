@@ -52,7 +52,7 @@ class PaperParams:
     """[s] Age of the last IMU sample beyond which the acceleration of a node counts as zero."""
     lost_after: float = 1.0
     """[s] Age of the last accepted range beyond which a pair is LOST."""
-    leave_after: float = 5.0
+    node_timeout: float = 5.0
     """[s] Silence after which a node has left and its filters are destroyed."""
     speed: Literal["norm", "rate"] = "norm"
     """Model of the speed measurement: ``|v|`` as in eq. (10), or ``x . v / |x|``, which is the

@@ -89,7 +89,7 @@ class PaperReference:
 
     def take_range(self, i: int, j: int, t: float, distance: float, is_survey: bool) -> None:
         """Correct the pair's filter, or collect its first k measurements."""
-        for node in np.nonzero(t - self.t_last_range > self.c.leave_after)[0]:
+        for node in np.nonzero(t - self.t_last_range > self.c.node_timeout)[0]:
             self.remove(int(node))
         self.t_last_range[i] = self.t_last_range[j] = t
         if is_survey:

@@ -58,7 +58,7 @@ def challenge_alignment(c, s, layout, h):
     """
     start_alignment(c, s, layout, h)
     for k in range(9):
-        s.alignment_information[h, k, k] += 0.5 * c.head_start
+        s.alignment_information[h, k, k] += 0.5 * c.challenger_penalty
     update_alignment_cov(c, s, h)
     s.group[0].alignment = CHALLENGED
 

@@ -74,7 +74,9 @@ def needs_challenge(c, s, dt):
     """True where ranges have fitted the only hypothesis badly for long; dt since the last look."""
     group = s.group[0]
     group.slow_nis += (1.0 - decay(dt / c.misfit_time)) * (group.mean_nis - group.slow_nis)
-    group.challenge_nis += (1.0 - decay(dt / c.challenge_time)) * (c.strained - group.challenge_nis)
+    group.challenge_nis += (1.0 - decay(dt / c.challenge_time)) * (
+        c.respawn_nis - group.challenge_nis
+    )
     watched = group.n_alive == 1 and group.alignment >= CANDIDATES
     if not watched or group.slow_nis < group.challenge_nis:
         return False
@@ -108,7 +110,7 @@ def challenge(c, s, layout):
     spawn_rotations(c, s, layout, h)
     for k in range(s.alive.shape[0]):
         if s.alive[k] and k != h:
-            s.loglik[k] -= c.head_start
+            s.loglik[k] -= c.challenger_penalty
 
 
 @kernel
@@ -211,7 +213,7 @@ def remove_node(c, s, layout, i):
 @kernel
 def has_timed_out(c, node, t):
     """True for a node without a range for so long that it must have left."""
-    return (node.present or node.seen) and t - node.t_last_range > c.leave_after
+    return (node.present or node.seen) and t - node.t_last_range > c.node_timeout
 
 
 @kernel

@@ -98,7 +98,7 @@ def start(c, s, layout, t):
             group.t_scoring_starts = t + c.wheels_after
     group.heading_gauge_var = c.rotation_var if c.d == 2 else 0.0
     group.mean_nis = 1.0
-    group.slow_nis, group.challenge_nis = 0.0, c.strained
+    group.slow_nis, group.challenge_nis = 0.0, c.respawn_nis
 
 
 @kernel
@@ -155,7 +155,7 @@ def initialise_node(c, s, h, i, t):
     for k in range(c.d):
         speed_var = c.rest_var if still else c.start_speed_var
         reset_state(s, h, c.n, node.i_vel + k, speed_var)
-        bias_var = node.bias_var if k < 2 else node.rise_bias_var
+        bias_var = node.bias_var if k < 2 else node.vertical_bias_var
         if k < 2 and not still:
             bias_var += initial_tilt_variance(node, t - node.t_oriented)
         reset_state(s, h, c.n, node.i_tilt_bias + k, bias_var)
@@ -171,7 +171,9 @@ def initialise_node(c, s, h, i, t):
 @kernel
 def initial_nlos_prob(c, pair):
     """Probability that the first ranges of a pair had no line of sight, by their powers."""
-    odds = c.enter_rate / c.leave_rate * math.exp(min(max(pair.start_nlos_llr, -7.0), 7.0))
+    odds = (
+        c.los_to_nlos_rate / c.nlos_to_los_rate * math.exp(min(max(pair.start_nlos_llr, -7.0), 7.0))
+    )
     return odds / (1.0 + odds)
 
 
@@ -182,9 +184,9 @@ def initialise_pair(c, s, h, p, hidden):
     at = s.pairs[p].i_range_error
     if at >= 0:
         reset_state(s, h, c.n, at, max(c.fast_var, 1e-12))
-        slow_var = slow_error_var(c.slow_var, hidden, c.excess, c.excess_var)
+        slow_var = slow_error_var(c.slow_var, hidden, c.nlos_bias, c.nlos_bias_var)
         reset_state(s, h, c.n, at + 1, max(slow_var, 1e-12))
-        s.x[h, at + 1] = hidden * c.excess
+        s.x[h, at + 1] = hidden * c.nlos_bias
 
 
 @kernel

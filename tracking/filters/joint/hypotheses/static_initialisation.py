@@ -27,7 +27,7 @@ TIE = 1e-6
 @small_kernel
 def is_at_rest(c, node, t):
     """True for a node whose IMU has read the same for a while, up to now."""
-    if not node.has_state or t - node.t_state > c.unaided_after:
+    if not node.has_state or t - node.t_state > c.imu_timeout:
         return False
     return node.rests and t - node.t_moved > c.rest_after
 
@@ -39,7 +39,7 @@ def all_static(c, s, t):
         node = s.nodes[i]
         if not node.present or node.static:
             continue
-        if not node.has_state or t - node.t_state > c.unaided_after:
+        if not node.has_state or t - node.t_state > c.imu_timeout:
             return False
         if (
             node.t_accelerated - node.t_first > c.settling

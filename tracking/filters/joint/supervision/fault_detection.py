@@ -54,7 +54,9 @@ def monitor_faults(c, s, layout, t):
             continue
         n, offset = common_range_error(c, s, layout, i, t)
         astray = i == worst and blames and node.outlier_ratio > c.outlier_ratio
-        limit = c.common_error / math.sqrt(max(n, 1)) * (c.fault_hysteresis if node.faulty else 1.0)
+        limit = (
+            c.node_bias_limit / math.sqrt(max(n, 1)) * (c.fault_hysteresis if node.faulty else 1.0)
+        )
         if n >= 2 and (astray or offset > limit):
             if not node.faulty:
                 activate_node_bias(s, layout, i, c.offset_std**2)
@@ -75,7 +77,7 @@ def others_consistent(c, s, i, t):
         pair = s.pairs[p]
         if pair.i != i and pair.j != i and is_ranging(c, s, p, t):
             n += 1
-            if pair.mean_nis > c.doubt:
+            if pair.mean_nis > c.pair_nis_limit:
                 return False
     return n > 0
 

@@ -96,7 +96,7 @@ class AlignmentParams:
     challenge_raise: float = 1.5
     """[-] Factor on the misfit that begins another challenge after the first."""
     challenge_time: float = 60.0
-    """[s] Time constant with which that limit returns to `JointStartParams.strained`."""
+    """[s] Time constant with which that limit returns to `JointStartParams.respawn_nis`."""
     challenge_position: float = 0.2
     """[m] Added standard deviation of positions on a challenge in the plane."""
     challenge_speed: float = 0.5

@@ -37,7 +37,7 @@ def update_interval(c, record, dt):
 @small_kernel
 def is_silent(c, node, t):
     """True for a node of the group that moves and was not heard lately."""
-    waits = max(c.silent_after, c.missed_intervals * node.interval)
+    waits = max(c.range_timeout, c.missed_intervals * node.interval)
     return node.present and not node.static and t - node.t_last_range > waits
 
 
