@@ -13,7 +13,7 @@ import inspect
 import re
 import sys
 from collections.abc import Callable, Iterable
-from dataclasses import MISSING, Field, fields
+from dataclasses import MISSING, Field, fields, is_dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -38,6 +38,7 @@ from relpos_env.sensors.radio.channel import CHANNELS
 from relpos_env.tasks import DEFAULT_WEIGHTS, TASKS
 from relpos_env.tasks.needs import DEFAULT_SCENARIO
 from tracking.filters.joint.hypotheses.alignment import TRANSITIONS, Alignment
+from tracking.filters.joint.params import JointParams
 
 DOCS = Path(__file__).resolve().parent
 CARS = 3
@@ -252,8 +253,25 @@ def alignment() -> str:
     return markdown(("state", "what it is", "then"), rows)
 
 
+def filter_parameters() -> str:
+    """Parameters of the joint filter, those of its parts among them."""
+    rows = []
+    params = JointParams()
+    for part in (params, params.range_error, params.nlos, params.start, params.alignment,
+                 params.supervision):  # fmt: skip
+        told = docstrings(type(part))
+        for f in fields(part):
+            value = getattr(part, f.name)
+            if not is_dataclass(value) and not isinstance(value, dict):
+                unit, _, meaning = told[f.name].replace("\n", " ").rpartition("] ")
+                named = [f"`{f.name}`", f"`{value:g}`", unit.lstrip("[")]
+                rows.append([*named, " ".join(meaning.split())])
+    return markdown(("parameter", "default", "unit", "meaning"), rows)
+
+
 TABLES: dict[str, Callable[[], str]] = {
     "alignment": alignment,
+    "filter-parameters": filter_parameters,
     "sizes": sizes,
     **{f"observation-{mode}": partial(observations, mode) for mode in OBSERVATIONS},
     "actions-continuous": continuous,
