@@ -77,7 +77,7 @@ def test_what_is_learned_in_motion_only_moves_what_is_left(open_turn):
 def test_ranges_tell_what_a_gyroscope_leans_by(lean):
     """The hand is never turned, so the body is the world's frame but for the first heading."""
     _, tracker = walk(0.0, told=True, lean=lean, seconds=30.0)
-    s = tracker._filter.save()
+    s = tracker.save()["filter"]
     h, at = s.group["best"][0, 0], s.nodes["i_gyro_bias"][0, 0] + np.arange(2)
     std = np.sqrt(s.P[0, h, at, at])
     assert (std < TRUSTED / 3.0).all()
@@ -86,6 +86,6 @@ def test_ranges_tell_what_a_gyroscope_leans_by(lean):
 
 def test_a_gyroscope_of_which_nothing_is_told_leans_nowhere():
     _, tracker = walk(0.0, told=False, lean=0.003)
-    s = tracker._filter.save()
+    s = tracker.save()["filter"]
     h, at = s.group["best"][0, 0], s.nodes["i_gyro_bias"][0, 0] + np.arange(3)
     np.testing.assert_array_equal(s.x[0, h, at], 0.0)

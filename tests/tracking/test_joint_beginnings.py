@@ -5,12 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agents.simulate import simulate
-from relpos_env.matched import matched_params
-from relpos_env.scenarios import recordable
-from relpos_env.timing import STAND_STILL
-from tracking import Constellation, NodeConfig, Tracker, TrackerParams
-from tracking.filters import FilterParams
+from tracking import Constellation, NodeConfig
 from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.hypotheses.initialisation import (
     initial_nlos_prob,
@@ -100,23 +95,6 @@ def test_without_powers_sight_is_as_likely_at_first_as_it_is_in_the_long_run():
     assert initial_nlos_prob(c, s.pairs[0]) == pytest.approx(
         p.los_to_nlos_rate / (p.los_to_nlos_rate + p.nlos_to_los_rate)
     )
-
-
-def test_headings_are_uncertain_until_cars_have_driven():
-    """Magnetometers are wrong by degrees where they stand, and nothing changes that at rest."""
-    log = simulate(scenario="cars-los", seconds=20.0, seed=3)
-    joint = matched_params(recordable("cars-los"))
-    car = joint.vehicles["car"]
-    tracker = Tracker(log.constellation, TrackerParams(filter=FilterParams(joint=joint)))
-    std = []
-    for start, end in ((0.0, STAND_STILL + 0.2), (STAND_STILL + 0.2, 19.0)):
-        t = log.block.t[0]
-        tracker.step(log.block.take((t > start) & (t <= end)), end)
-        state = tracker.save()["filter"]
-        h, at = state.group["best"][0, 0], state.nodes["i_heading"][0]
-        std.append(np.sqrt(state.P[0, h, at, at]))
-    assert (std[0] > 0.9 * car.first_heading_std).all()
-    assert (std[1] < car.heading_std + 0.01).all()
 
 
 def test_a_compass_that_has_driven_is_believed_when_its_node_comes_back():

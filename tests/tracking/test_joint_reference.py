@@ -5,6 +5,7 @@ import pytest
 
 from tests.exact_motion import ExactGroup
 from tracking.filters.joint import JointEkf
+from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.hypotheses.alignment import Alignment
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.reference import JointReference
@@ -88,7 +89,8 @@ def test_runs_match_the_reference(vehicle, at_rest, powers):
     state = tracker.save()
     assert state.group["alignment"][0, 0] == Alignment.FILTERED
     one = type(state)._make(array[0] for array in state)
-    reference = JointReference(tracker._coefficients[0], one, tracker._layout.pair_index)
+    coefficients = make_coefficients(group.constellation, params)[0]
+    reference = JointReference(coefficients, one, group.constellation.pair_index)
     follow(reference, block, START, END)
     tracker.run(block.take((block.t[0] > START) & (block.t[0] <= END)), np.array([[END]]))
     found = tracker.save()

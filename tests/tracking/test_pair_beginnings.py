@@ -29,7 +29,7 @@ def test_nodes_that_join_one_by_one_are_tried_in_every_rotation_and_mirror_image
     )
     tracker.step(surveys, 0.1)
 
-    s = tracker._filter.save()
+    s = tracker.save()["filter"]
     X = s.x[0, :, s.alive[0], :3]
     assert len(X) == 48
     true = truth[pairs[:, 1]] - truth[pairs[:, 0]]

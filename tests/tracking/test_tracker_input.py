@@ -163,7 +163,7 @@ def test_a_survey_does_not_say_with_which_antenna_a_node_ranges():
     tracker = Tracker(group)
     for block, t in ((ranged, 0.15), (survey, 0.25)):
         tracker.step(block, t)
-        np.testing.assert_array_equal(tracker._filter._state.nodes["antenna"][0], [1, 2])
+        np.testing.assert_array_equal(tracker.save()["filter"].nodes["antenna"][0], [1, 2])
 
 
 def test_smoothing_refuses_what_running_refuses_and_survives_it():
