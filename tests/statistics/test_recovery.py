@@ -25,11 +25,11 @@ def spoiled(log, spoil):
     saved = tracker.save()
     state = saved["filter"]
     h, nodes = state.group["best"][0, 0], state.nodes[0]
-    pos = np.array([state.x[0, h, n["at_p"] : n["at_p"] + 2] for n in nodes])
-    vel = np.array([state.x[0, h, n["at_v"] : n["at_v"] + 2] for n in nodes])
+    pos = np.array([state.x[0, h, n["i_pos"] : n["i_pos"] + 2] for n in nodes])
+    vel = np.array([state.x[0, h, n["i_vel"] : n["i_vel"] + 2] for n in nodes])
     for node, p, v in zip(nodes, *spoil(pos, vel), strict=True):
-        state.x[0, h, node["at_p"] : node["at_p"] + 2] = p
-        state.x[0, h, node["at_v"] : node["at_v"] + 2] = v
+        state.x[0, h, node["i_pos"] : node["i_pos"] + 2] = p
+        state.x[0, h, node["i_vel"] : node["i_vel"] + 2] = v
     tracker.restore(saved)
     t = np.arange(SPOILED + 0.1, END, 0.1)
     estimate = tracker.run(log.block.take(~before), t).take(0)

@@ -5,15 +5,10 @@ from __future__ import annotations
 from tracking.filters.first_ranges import collect
 from tracking.filters.joint.estimate import write_estimate
 from tracking.filters.joint.gyro_bias_at_rest import update_gyro_bias_at_rest
-from tracking.filters.joint.heading_gauge import update_heading_variance
 from tracking.filters.joint.hypotheses.alignment import NONE, STATIC, is_linear
 from tracking.filters.joint.hypotheses.alignment_sensitivity import propagate_sensitivity
 from tracking.filters.joint.hypotheses.bank import (
-    any_timed_out,
     hypothesis_range,
-    needs_challenge,
-    needs_reflection,
-    prune_bank,
 )
 from tracking.filters.joint.hypotheses.initialisation import can_join, can_start
 from tracking.filters.joint.hypotheses.static_initialisation import all_static, may_move
@@ -27,23 +22,33 @@ from tracking.filters.joint.saturation_noise import add_saturation_noise
 from tracking.filters.joint.scalar_update import flush_all_updates
 from tracking.filters.joint.state import N_PRE, one_env
 from tracking.filters.joint.supervision.fault_detection import (
-    monitor_faults,
     update_residual_statistics,
 )
 from tracking.filters.joint.supervision.frozen_range import is_frozen
-from tracking.filters.joint.supervision.reinitialisation import find_misplaced
 from tracking.filters.joint.supervision.staleness import is_silent, note_seen, update_interval
+from tracking.filters.joint.supervision.supervise import supervise
 from tracking.filters.joint.surveyed_distance import surveyed_distance_update
-from tracking.filters.joint.workspace import DONE, ENV, EVENT, FLAG, NODE, OUT
+from tracking.filters.joint.workspace import (
+    DONE,
+    ENV,
+    EVENT,
+    JOIN,
+    JOIN_OTHER,
+    NODE,
+    NOTHING,
+    OUT,
+    REINITIALISE,
+    REMOVE,
+    SPAWN,
+    STALE,
+    START,
+    SUPERVISED,
+    TIME_OUT,
+)
 from tracking.jit import kernel
 from tracking.models.nlos import power_evidence
 from tracking.reference import by_reference
 
-# What is rare and large is compiled apart (`rare`). In the order in which a range needs them:
-(
-    NOTHING, TIME_OUT, SPAWN, STALE, SUPERVISED, TIME_OUT_LATER, MODES_STEP, REFLECT, CHALLENGE,
-    REINITIALISE, START, JOIN, JOIN_OTHER, REMOVE,
-) = range(14)  # fmt: skip
 # Plain numbers of `Kind`: kernels do not know enums.
 STATE, SURVEY, RANGE, LEAVE = 3, 4, 5, 6
 SAME = 1e-5
@@ -280,33 +285,4 @@ def next_join(c, s, layout, work, i, j, t, done):
         if is_due and can_join(c, s, layout, new, work.idx, t) > 0:
             work.cursor[NODE] = new
             return action
-    return NOTHING
-
-
-@kernel
-def supervise(c, s, layout, work, t, done):
-    """From time to time: who left, which hypotheses are worth their time, what is at fault.
-
-    Returns:
-        What has to be done elsewhere before it goes on, see `rare`.
-    """
-    flush_all_updates(s)
-    if done < TIME_OUT_LATER and any_timed_out(c, s, t):
-        return TIME_OUT_LATER
-    if done < MODES_STEP and is_linear(s.group[0]):
-        return MODES_STEP
-    if done < REFLECT:
-        prune_bank(c, s)
-        update_heading_variance(c, s)
-        if needs_reflection(c, s):
-            return REFLECT
-    if done < CHALLENGE and needs_challenge(c, s, t - s.group[0].t_check):
-        return CHALLENGE
-    if done < REINITIALISE:
-        node, is_away = find_misplaced(c, s, layout, t)
-        if node >= 0:
-            work.cursor[NODE], work.cursor[FLAG] = node, is_away
-            return REINITIALISE
-    monitor_faults(c, s, layout, t)
-    s.group[0].t_check = t
     return NOTHING

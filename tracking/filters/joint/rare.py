@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from tracking.filters.joint import event_loop
+from tracking.filters.joint import workspace
 from tracking.filters.joint.hypotheses.alignment_modes import monitor_modes
 from tracking.filters.joint.hypotheses.bank import (
     add_mirror_image,
@@ -115,18 +115,18 @@ def remove(coefficients, layout, state, work, t):
 
 
 RARE: dict[int, Callable[..., None]] = {
-    event_loop.TIME_OUT: time_out,
-    event_loop.SPAWN: spawn,
-    event_loop.STALE: stale,
-    event_loop.TIME_OUT_LATER: time_out,
-    event_loop.MODES_STEP: modes,
-    event_loop.REFLECT: reflect,
-    event_loop.CHALLENGE: challenge_alignment,
-    event_loop.REINITIALISE: reinitialise,
-    event_loop.START: start_group,
-    event_loop.JOIN: join_group,
-    event_loop.JOIN_OTHER: join_group,
-    event_loop.REMOVE: remove,
+    workspace.TIME_OUT: time_out,
+    workspace.SPAWN: spawn,
+    workspace.STALE: stale,
+    workspace.TIME_OUT_LATER: time_out,
+    workspace.MODES_STEP: modes,
+    workspace.REFLECT: reflect,
+    workspace.CHALLENGE: challenge_alignment,
+    workspace.REINITIALISE: reinitialise,
+    workspace.START: start_group,
+    workspace.JOIN: join_group,
+    workspace.JOIN_OTHER: join_group,
+    workspace.REMOVE: remove,
 }
 
 

@@ -10,6 +10,12 @@ from tracking.arrays import F64, I64, aligned
 from tracking.filters.joint.state import N_PRE, room_to_wait
 from tracking.maths.simd.block_propagation import ROOM, STATES
 
+# What is rare and large is compiled apart (`rare`). In the order in which a range needs them:
+(
+    NOTHING, TIME_OUT, SPAWN, STALE, SUPERVISED, TIME_OUT_LATER, MODES_STEP, REFLECT, CHALLENGE,
+    REINITIALISE, START, JOIN, JOIN_OTHER, REMOVE,
+) = range(14)  # fmt: skip
+
 ENV, EVENT, OUT, DONE, NODE, FLAG = range(6)
 """Elements of `Workspace.cursor`."""
 

@@ -1,0 +1,55 @@
+"""Supervision of a group: who left, which hypotheses stay, what is at fault."""
+
+from __future__ import annotations
+
+from tracking.filters.joint.heading_gauge import update_heading_variance
+from tracking.filters.joint.hypotheses.alignment import is_linear
+from tracking.filters.joint.hypotheses.bank import (
+    any_timed_out,
+    needs_challenge,
+    needs_reflection,
+    prune_bank,
+)
+from tracking.filters.joint.scalar_update import flush_all_updates
+from tracking.filters.joint.supervision.fault_detection import monitor_faults
+from tracking.filters.joint.supervision.reinitialisation import find_misplaced
+from tracking.filters.joint.workspace import (
+    CHALLENGE,
+    FLAG,
+    MODES_STEP,
+    NODE,
+    NOTHING,
+    REFLECT,
+    REINITIALISE,
+    TIME_OUT_LATER,
+)
+from tracking.jit import kernel
+
+
+@kernel
+def supervise(c, s, layout, work, t, done):
+    """From time to time: who left, which hypotheses are worth their time, what is at fault.
+
+    Returns:
+        What has to be done elsewhere before it goes on, see `rare`.
+    """
+    flush_all_updates(s)
+    if done < TIME_OUT_LATER and any_timed_out(c, s, t):
+        return TIME_OUT_LATER
+    if done < MODES_STEP and is_linear(s.group[0]):
+        return MODES_STEP
+    if done < REFLECT:
+        prune_bank(c, s)
+        update_heading_variance(c, s)
+        if needs_reflection(c, s):
+            return REFLECT
+    if done < CHALLENGE and needs_challenge(c, s, t - s.group[0].t_check):
+        return CHALLENGE
+    if done < REINITIALISE:
+        node, is_away = find_misplaced(c, s, layout, t)
+        if node >= 0:
+            work.cursor[NODE], work.cursor[FLAG] = node, is_away
+            return REINITIALISE
+    monitor_faults(c, s, layout, t)
+    s.group[0].t_check = t
+    return NOTHING
