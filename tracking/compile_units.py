@@ -23,7 +23,7 @@ from typing import Any
 import llvmlite.binding as llvm
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler
+from numba.core.compiler import Compiler, Flags
 from numba.core.types.misc import unliteral
 
 from tracking.fingerprint import fingerprint
@@ -85,8 +85,27 @@ class _Unit(JITCodeLibrary):  # type: ignore[misc]
         return self._names
 
 
+class _Flags(Flags):  # type: ignore[misc]
+    """Flags of the compiler that are compared quickly: every typed call compares them."""
+
+    def values(self) -> dict[str, Any]:
+        """All of them by name."""
+        return {**_DEFAULTS, **self._values}
+
+    def __hash__(self) -> int:
+        return _FLAGS_HASH
+
+
+_DEFAULTS = {name: getattr(Flags(), name) for name in Flags.options}
+_FLAGS_HASH = hash(Flags())
+
+
 class _UnitCompiler(Compiler):  # type: ignore[misc]
     """Numba's compiler, with a `_Unit` for the code."""
+
+    def __init__(self, typing: Any, target: Any, library: Any, args: Any, result: Any,
+                 flags: Any, names: Any) -> None:  # fmt: skip
+        super().__init__(typing, target, library, args, result, _Flags(flags), names)
 
     def compile_extra(self, func: Any) -> Any:
         codegen = self.state.targetctx.codegen()

@@ -7,8 +7,10 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from numba import config, typeof
+from numba.core.errors import TypingError
 
-from tracking.jit import _type_of
+from tracking.jit import _type_of, kernel, small_kernel
+from tracking.reference import by_reference
 
 KERNEL = """
 from tracking.jit import kernel
@@ -138,3 +140,69 @@ def test_remembered_types_are_those_of_numba():
     for _ in range(2):
         for value in of_types():
             assert _type_of(value) == typeof(value), value
+
+
+@kernel
+def scaled(x, h):
+    return 2.0 * x[h]
+
+
+@small_kernel
+def plus_one(x, h):
+    return scaled(x, h) + 1.0
+
+
+@kernel
+def both(x):
+    worst = -1
+    for h in range(2):
+        worst = h
+    return plus_one(x, 0) + plus_one(x, worst)
+
+
+@pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
+def test_a_kernel_is_compiled_once_for_constants_and_variables():
+    assert both(np.array([1.0, 2.0])) == 8.0
+    assert len(scaled.signatures) == len(plus_one.signatures) == 1
+
+
+@pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
+def test_a_kernel_is_called_and_a_small_one_is_linked_in():
+    """If this fails with another numba, what `compile_units` overrides has changed."""
+    both(np.zeros(2))
+    (unit,) = (compiled.library for compiled in both.overloads.values())
+    assert [called.key[0][1] for called in unit.calls] == ["scaled"]
+    defined = " ".join(unit.defined_names())
+    assert "both" in defined
+    assert "scaled" not in defined
+
+
+@kernel
+def sum_of(s):
+    a = s.a
+    total = 0.0
+    for k in range(a.shape[0]):
+        total += a[k] * s.b[0]
+    s.b[1] = total
+    return total
+
+
+@kernel
+def sum_by_reference(s):
+    return sum_of(by_reference(s))
+
+
+def test_tuples_by_reference_are_read_and_written_as_they_are():
+    s = Pair(np.arange(4.0), np.array([2.0, 0.0]))
+    assert sum_by_reference(s) == sum_of(s) == s.b[1] == 12.0
+
+
+@kernel
+def missing_field(s):
+    return by_reference(s).c
+
+
+@pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
+def test_a_field_that_there_is_not_is_a_typing_error():
+    with pytest.raises(TypingError, match="Unknown attribute 'c'"):
+        missing_field(Pair(np.zeros(1), np.zeros(1)))
