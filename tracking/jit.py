@@ -21,7 +21,7 @@ def kernel(function: Function) -> Function:
     """Compile a function with numba, without the interpreter, and keep the result on disk.
 
     It holds no lock of the interpreter, so several threads can run kernels at a time. It makes no
-    arrays, only views of those it is given: so nobody counts who holds which, which costs atomic
+    arrays, only views of those it is given: so references are not counted, which costs atomic
     operations wherever an array is named.
     """
     return _compile(function)
@@ -31,7 +31,7 @@ def allocating_kernel(function: Function) -> Function:
     """A kernel that makes arrays of its own: what runs now and then, not for every measurement.
 
     It counts who holds them. So it must not take an array that a plain kernel returns, which
-    nobody has counted.
+    is not counted.
     """
     return _compile(function, nrt=True)
 
@@ -45,7 +45,7 @@ def small_kernel(function: Function) -> Function:
 
 
 def bind(kernel: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
-    """A kernel that is called again and again with the same arguments: arrays filled anew.
+    """A kernel that is called again and again with the same arguments: arrays filled again.
 
     Finding out the types of many arrays takes longer than most kernels do. Here that is done
     once, and the compiled code is then called without a look at them.

@@ -18,10 +18,10 @@ class VehicleParams:
     bias_tau: float = 30.0
     """[s] How long it stays the same."""
     bias_tau_with_ahrs_feedback: float = 100.0
-    """[s] The same in space, beside an offset, where it is told how the orientation is turned
+    """[s] The same in space, with an offset, where VQF reports how its orientation is turned
     upright: what is left of it, and what the gyroscope makes it lean by has states of its own."""
     gyro_std: float = 3e-3
-    """[rad/s] What is left of the bias of the gyroscope at first, unless rest has told better."""
+    """[rad/s] Residual bias of the gyroscope at first, unless it is known better from rest."""
     gyro_drift: float = 2e-4
     """[rad/s/sqrt(s)] How fast the bias of the gyroscope changes, where it has states."""
     vertical_bias_std: float = 0.1
@@ -63,7 +63,7 @@ class VehicleParams:
     impact_noise_ratio: float = 0.25
     """[-] Error of what such a sample adds to the velocity, in terms of that."""
     rests: bool = True
-    """It stands still now and then, and its IMU tells."""
+    """It stands still now and then, and its IMU shows it."""
     propagation_period: float = 0.02
     """[s] The covariance of a group with such a node is carried forward so often; ranges in between
     do with its older state, without the noise of the time since."""

@@ -9,7 +9,7 @@ rank-d fit of K otherwise [1]. (The text of the paper takes the square root twic
 do not see rotations, shifts and mirror images: X is then aligned to positions known otherwise
 by the orthogonal Procrustes problem [2], mirror images included.
 
-Classical MDS believes every distance alike, and one rotation stands for all it knows of the
+Classical MDS weights every distance alike, and one rotation stands for all it knows of the
 vectors. The weighted form [3] takes relative positions with their covariances: where those are
 certain of lengths only, it is classical MDS with Procrustes to first order. Its compiled form is in
 `tracking.filters.pair.mds_feedback`; this is the plain twin.

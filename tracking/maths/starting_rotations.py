@@ -1,4 +1,4 @@
-"""Rotations and mirror images to start from, where nothing tells which is right."""
+"""Rotations and mirror images to start from, where none is known to be right."""
 
 from __future__ import annotations
 

@@ -1,12 +1,12 @@
-"""What is turned about in space: the offset of its accelerometer, and its tilt.
+"""Accelerometer offset and tilt error of a node that turns about all its axes.
 
-An offset o turns with the body: it adds ``R(q_wb) o``, and its sums over time are kept beside
-those of the acceleration. A horizontal bias b is gravity seen through a tilt of
-``(-b_y, b_x, 0) / g``, and what is measured is turned by that tilt as well:
+An offset o turns with the body: it adds ``R(q_wb) o``, preintegrated beside the accelerations. A
+horizontal bias b is gravity seen through a tilt of ``(-b_y, b_x, 0) / g``, and the acceleration is
+rotated by that tilt as well:
 
     a_measured = a + b + (b_x a_z, b_y a_z, -b_x a_x - b_y a_y) / g
 
-Without the last part a layout is believed to lean as the orientation of what moves does.
+Without the last term the layout leans as the orientation of its moving nodes does.
 """
 
 from __future__ import annotations

@@ -176,7 +176,7 @@ def predict_to(c, s, work, t, at_once):
     """Carry every hypothesis to time t, and use what is known about the carriers.
 
     Carrying a covariance costs more than a range does. So unless it has to be `at_once`, the states
-    stay where they are for a while, and ranges tell of them by what happened since
+    stay where they are for a while, and ranges are predicted by the displacement since
     (`range_update.range_model`): only the noise of so short a time comes after them, not before.
     """
     group = s.group[0]

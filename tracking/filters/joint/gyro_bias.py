@@ -1,17 +1,16 @@
-"""What the bias of a gyroscope is off, of nodes whose orientations tell what they take it for.
+"""Residual gyroscope bias: what VQF has not removed, three states in the body.
 
-VQF takes a bias off its gyroscope that it learns at rest, and in motion by how it has to turn
-itself upright, which an offset of the accelerometer and motion that lasts tell as well. What is
-left, g in the body, turns what it measures by ``R(q_wb) g`` a second: it leans, which changes a
-horizontal bias as gravity is seen through it (`tilt_correction`), and its heading errs:
+VQF removes a bias that it learns at rest, and in motion from its corrections of the tilt. The
+residual g turns its orientation by ``R(q_wb) g`` a second: the tilt error changes the horizontal
+bias by gravity, and the heading error grows:
 
-    t += S g,    b += g_0 (t_y, -t_x),    heading error -= t_z,    S = int R(q_wb) dt
+    theta = S g,  b += g_0 (theta_y, -theta_x),  heading error -= theta_z,  S = int R(q_wb) dt
 
-where g_0 is gravity; where a magnetometer gives the heading, the last is left out. Ranges tell of g
-as of any other state. What VQF takes off is told, so when it changes, g does by as much the other
-way; and what it has learned at rest it tells by the variance that it believes: from one to a
-smaller one, V to V', comes a measurement of g of the variance ``1 / (1 / V' - 1 / V)``. What it
-learns in motion is not taken: ranges say it better.
+where g_0 is gravity; with a magnetometer the last is left out. Ranges observe g as any other state.
+Every attitude event reports the bias that VQF removes: when it changes, g changes by as much the
+other way. What VQF learns at rest is a measurement of g: from the variance V that it reports to a
+smaller one, V', of variance ``1 / (1 / V' - 1 / V)``. What it learns in motion is not used: ranges
+measure it better.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ STEP, LEAN = 31, 33
 """First of two columns of a step: all that is added to the two biases [m/s2]; of nine: what g adds
 to these and the heading error."""
 RESTS = 2.0
-"""What is told at rest."""
+"""Value of `TOLD` at rest."""
 
 
 @small_kernel
@@ -38,7 +37,7 @@ def last_state(node):
 
 @small_kernel
 def process_gyro_bias(node, pre, i, values, e, k, begins):
-    """Note what is told of the gyroscope of node i by a STATE event, the first or a later one."""
+    """Note what a STATE event reports of the gyroscope of node i, the first event or a later one."""
     g0, g1, g2 = values[e, k, GYRO_BIAS], values[e, k, GYRO_BIAS + 1], values[e, k, GYRO_BIAS + 2]
     var = values[e, k, GYRO_VAR]
     if not begins:

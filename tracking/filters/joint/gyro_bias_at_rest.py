@@ -1,4 +1,4 @@
-"""What rest tells of a gyroscope (`gyro_bias`) corrects all states."""
+"""Measurement of the residual gyroscope bias at rest (`gyro_bias`)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tracking.jit import small_kernel
 
 @small_kernel
 def update_gyro_bias_at_rest(s, h, i, work):
-    """Correct hypothesis h with what rest has told of the gyroscope of node i."""
+    """Correct hypothesis h with what VQF has learned of the gyroscope of node i at rest."""
     node, pre = s.nodes[i], s.preintegrated
     if pre[i, KNOWN] == 0.0:
         return

@@ -1,11 +1,11 @@
-"""How a group in the plane is turned: how uncertain that is, and what turns with it.
+"""Rotation of a group in the plane: its uncertainty, and what turns with it.
 
-Until a group has driven, nothing tells its rotation but that one of those tried is near. Ranges
-to nodes at rest do not make it more certain, nor does a node that joins. What a filter believes
-all the same, by derivatives that are a little out of date, leaves it degrees off when the group
-begins to move.
+Until a group has driven, its rotation is known only as near as the nearest of those tried. Ranges
+to nodes at rest do not measure it, nor does a node that joins. A filter becomes certain of it all
+the same, by derivatives that are a little out of date, and is degrees off when the group begins to
+move.
 
-In space one filter stands for all turns until they are known (`alignment_sensitivity`).
+In space one filter stands for all rotations until they are known (`alignment_sensitivity`).
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def heading_functional(s, h, but, A):
 
 @allocating_kernel
 def heading_variance(c, s, h):
-    """How uncertain the turn of hypothesis h is, nothing of which waits [rad2]."""
+    """Variance of the rotation of hypothesis h, which has no pending updates [rad2]."""
     A = np.zeros(c.n)
     heading_functional(s, h, -1, A)
     return A @ (s.P[h] @ A)
@@ -67,7 +67,7 @@ def add_rotation_uncertainty(c, s, h, variance):
     Args:
         c: Coefficients.
         s: JointState of one environment.
-        h: Hypothesis, updated; nothing of it waits.
+        h: Hypothesis without pending updates, updated.
         variance: What is added [rad2].
     """
     mean, mean_v, present, moving = np.zeros(3), np.zeros(3), 0, 0
@@ -94,7 +94,7 @@ def add_rotation_uncertainty(c, s, h, variance):
                 if not node.static:
                     D[node.i_vel + u] = -(s.x[h, node.i_vel + v] - mean_v[v])
                     D[node.i_vel + v] = s.x[h, node.i_vel + u] - mean_v[u]
-        # Clones of a moment in which nobody had moved either are turned alike (`smoothing`).
+        # Clones of a time at which no node had moved either are rotated alike (`smoothing`).
         for r in range(min(c.n_motion, c.n - c.n_own)):
             D[c.n_own + r] = D[r]
         for r in range(c.n):

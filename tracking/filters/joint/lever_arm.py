@@ -35,11 +35,11 @@ def lever_arm_sensitivity(levers, work):
 
 @small_kernel
 def attach_to_world(s, layout, h):
-    """Slopes of what was found while hypothesis h was thought to be turned as it is.
+    """Sensitivities of what was estimated while hypothesis h had its present rotation.
 
-    Ranges tell where the antenna of a node is in the frame, whatever M is: its origin is an offset
-    away that turns with M. So does a bias of the accelerations, which is one of the world. With
-    both the same for all M, ranges and rest would tell of a turn that nothing has measured.
+    Ranges measure where the antenna of a node is in the frame, whatever M is: its origin is an
+    offset away that turns with M. So does a bias of the accelerations, which is one of the world.
+    With both the same for all M, ranges and rest would measure a rotation that they do not observe.
     """
     s.sensitivity[h] = 0.0
     for i in range(s.nodes.shape[0]):

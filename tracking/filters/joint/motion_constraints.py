@@ -1,8 +1,8 @@
-"""What is known without measuring: cars do not slide sideways, a still node is still.
+"""Motion constraints: zero velocity, non-holonomic vehicles, mean velocity; and the gauge.
 
-Also the gauge: ranges and accelerations say nothing about where the group as a whole is. Its
-centre is moved back to the origin from time to time, with a fixed uncertainty that is
-independent of all else; differences between nodes do not feel it.
+Ranges and accelerations do not observe where the group as a whole is. Its centre is moved back to
+the origin from time to time, with a fixed uncertainty that is independent of all else; differences
+between nodes are not affected.
 """
 
 from __future__ import annotations

@@ -88,6 +88,6 @@ def reset_bias_on_transition(c, s, h, p, switched, is_far):
     excess = c.nlos_bias + is_far * relative_covariance
     new_var = slow_error_var(c.slow_var, hidden, excess, nlos_bias_var)
     off = s.x[h, at] - hidden * excess
-    # Of the mixture of both; the waiting corrections hold what has been taken off already.
+    # Of the mixture of both; pending updates hold what has been taken off already.
     s.P[h, at, at] += switched * stays * before + switched * new_var + switched * stays * off * off
     s.x[h, at] -= switched * off

@@ -1,6 +1,6 @@
 """The rotation of the whole group: corrections go round, and the covariance follows them.
 
-No range tells how the group is turned as a whole. At every estimate p the derivatives of the
+No range measures the rotation of the group as a whole. At every estimate p the derivatives of the
 ranges are blind to one direction per axis, ``axis x p``. But the estimate moves from one range
 to the next, and with it the blind direction: what was blind to the first range is not quite
 blind to the second, and the filter comes to believe in a rotation that nothing has measured
@@ -48,8 +48,8 @@ LINE = 1e-3
 def enforce_observability(c, s, h, work):
     """Let the covariance of hypothesis h follow what measurements have moved.
 
-    That must not be late while the rotation is uncertain: each range that tells of it what it
-    cannot know turns the group, by which the next one tells more.
+    That must not be late while the rotation is uncertain: each range with a false derivative by it
+    rotates the group, which makes the next derivative more false.
     """
     present, extent2, moved2 = 0, 0.0, 0.0
     for k in range(c.d):
@@ -89,7 +89,7 @@ def propagate_corrections(c, s, h):
 def shift_nullspace(c, s, h, share, work):
     """Make rotations of what was moved, and ``P <- T P T^T`` for the given share of it.
 
-    Nothing of hypothesis h waits.
+    Hypothesis h has no pending updates.
     """
     n, end, axes = c.n, c.n_motion, 3 if c.d == 3 else 1
     A, B, G, P = work.turns[0], work.turns[1], work.turns[2], s.P
@@ -174,7 +174,7 @@ def rotation_tangents(d, s, h, centre, N, idx):
 
 @small_kernel
 def correction_tangents(d, s, h, shift, share, end, G):
-    """Write a share of the moves of positions and velocities, turned likewise, (axis, state)."""
+    """Write a share of the moves of positions and velocities, turned as well, (axis, state)."""
     for a in range(3):
         for r in range(end):
             G[a, r] = 0.0

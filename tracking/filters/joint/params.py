@@ -1,4 +1,4 @@
-"""What the joint filter believes: every number with its unit, its effect and its source."""
+"""Parameters of the joint filter: every number with its unit, its effect and its source."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tracking.vehicles import VEHICLES, VehicleParams
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RangeErrorParams:
-    """How a range errs in sight: white noise, and parts that stay while nobody moves."""
+    """How a range errs in sight: white noise, and parts that stay while no node moves."""
 
     white_std: float = 0.05
     """[m] Of a single range."""
@@ -43,9 +43,9 @@ class NlosParams:
     nlos_to_los_rate: float = 3.0
     """[1/s] How often it regains it."""
     los_to_nlos_rate_with_power: float = 1.0
-    """[1/s] The same where powers are reported: what each range tells leaves less to the past."""
+    """[1/s] The same where powers are reported: each range measures the line of sight."""
     nlos_to_los_rate_with_power: float = 6.0
-    """[1/s] Likewise."""
+    """[1/s] The same where powers are reported."""
     nlos_bias: float = 0.1
     """[m] Mean of what most obstacles add to a range."""
     nlos_bias_std: float = 0.2
@@ -117,7 +117,7 @@ class JointStartParams:
     """[s] Time between two looks at the bank."""
     respawn_nis: float = 0.8
     """[-] Slow mean of the NIS of ranges from which on it is doubted how the layout is turned. It
-    is 0.4 where all is well, as a range is believed less than its noise alone would allow, and up
+    is 0.4 where all is well, as a range counts less than its noise alone would allow, and up
     to 1.0 in recordings of sensors that are known less well."""
     height_std: float = 1.0
     """[m] How much fixed nodes differ in height from each other, where nothing tells how the group
@@ -147,7 +147,7 @@ class JointParams:
     initial_heading_tau: float = 300.0
     """[s] How long they keep it."""
     unaided_accel_psd: float = 1.5
-    """[m/s2/sqrt(Hz)] Acceleration of a moving node whose IMU is not heard."""
+    """[m/s2/sqrt(Hz)] Acceleration of a moving node without samples of its IMU."""
     attitude_reset_gap: float = 0.5
     """[s] After a longer silence of its IMU the orientation of a node is a new one: shorter gaps
     are filled (`OrientationParams.max_gap`)."""
@@ -168,12 +168,12 @@ class JointParams:
     constraint_period: float = 0.05
     """[s] Time between two uses of what is known about the carriers."""
     range_timeout: float = 0.5
-    """[s] A node not heard for so long joins anew, if its distances to all others are less certain
-    than 0.7 `ok_std` by now. More than the time between two ranges of a node."""
+    """[s] A node without a range for so long joins again, if its distances to all others are less
+    certain than 0.7 `ok_std` by now. More than the time between two ranges of a node."""
     lost_after: float = 1.0
     """[s] A pair without a range for so long is lost."""
     node_timeout: float = 5.0
-    """[s] A node not heard for so long has left; its states are forgotten."""
+    """[s] A node without a range for so long has left; its states are forgotten."""
     pair_nis_limit: float = 6.0
     """[-] A pair whose ranges misfit so badly, as a running mean of NIS, is doubtful."""
     node_bias_limit: float = 0.33

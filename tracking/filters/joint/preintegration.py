@@ -16,7 +16,7 @@ from tracking.maths.exponentials import decay
 
 @small_kernel
 def is_aided(c, node, t):
-    """True if the IMU of a node is heard."""
+    """True if a node has samples of its IMU."""
     return node.has_state and t - node.t_state <= c.imu_timeout
 
 
@@ -73,10 +73,10 @@ def process_attitude(c, nodes, held, pre, i, t, values, e, k):
     a0, a1, a2 = values[e, k, 4], values[e, k, 5], values[e, k, 6]
     dt = t - node.t_state
     fresh = not node.has_state or dt > c.imu_timeout
-    anew = not node.has_state or dt > c.attitude_reset_gap
-    if anew:
+    is_new = not node.has_state or dt > c.attitude_reset_gap
+    if is_new:
         node.t_oriented = t
-    process_tilt_correction(node, pre, i, values, e, k, anew)
+    process_tilt_correction(node, pre, i, values, e, k, is_new)
     if not fresh and dt > 1e-4:
         # The angle between two orientations, from the vector part of their quotient.
         qw, qx, qy, qz = held[i, 0], held[i, 1], held[i, 2], held[i, 3]

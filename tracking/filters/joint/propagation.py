@@ -8,7 +8,7 @@ that turns with the body by ``B``, ``Bv = int B``, ``Bp = int int B`` (`preinteg
 exactly, for every hypothesis at once; the samples themselves cost next to nothing. What is turned
 about in space is in `attitude_coupling`. Bias, heading error and range errors decay towards zero
 (first-order Markov): the first two with time, the last with the way of both ends, so that they
-stay while nobody moves.
+stay while no node moves.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ from tracking.maths.simd.symmetrise import mirror
 
 @kernel
 def predict(c, s, h, step, work):
-    """Carry hypothesis h over the summed time of every node; nothing of it waits from then on.
+    """Carry hypothesis h over the summed time of every node; no update is pending from then on.
 
-    What decays does so first, in the sweep over P that takes off what waits. What is added after
+    What decays does so first, in the sweep over P that applies pending updates. What is added after
     it goes by what is left.
 
     Args:

@@ -120,7 +120,7 @@ def second_order_variance(c, s, h, p, val):
         trace += relative_covariance(s.P, h, i, j, 2, 2)
     gain = 0.5 * c.nonlinearity_gain / math.sqrt(r0 * r0 + r1 * r1 + r2 * r2 + 0.01)
     if (gain * trace) ** 2 < NEGLIGIBLE * c.white_var:
-        return 0.0  # and less by what waits
+        return 0.0  # and less by pending updates
     u0, u1, u2 = val[2], val[3], val[5] if c.d == 3 else 0.0
     along = u0 * u0 * relative_covariance(s.P, h, i, j, 0, 0) + u1 * u1 * relative_covariance(
         s.P, h, i, j, 1, 1
@@ -131,7 +131,7 @@ def second_order_variance(c, s, h, p, val):
             s.P, h, i, j, 1, 2
         )
         along += u2 * (2.0 * across + u2 * relative_covariance(s.P, h, i, j, 2, 2))
-    # Sums of their own for each axis: none waits for another.
+    # A sum for each axis: additions do not depend on each other.
     t0, t1, t2 = 0.0, 0.0, 0.0
     for q in range(s.n_pending[h]):
         off0, off1, off2 = W[h, q, j] - W[h, q, i], W[h, q, j + 1] - W[h, q, i + 1], 0.0
@@ -201,7 +201,7 @@ def range_update(c, s, h, p, dt, distance, levers, sight, work):
             open_var = innovation_sensitivity(s, h, m, work)
     R = c.white_var + bent + s.nlos[h, p] * c.nlos_white_var
     nis = nu * nu / (variance + open_var + R)
-    # A pair whose ranges have long contradicted all else is believed less and less.
+    # Ranges of a pair that have long contradicted all others count less and less.
     doubt = s.pairs[p].mean_nis / (0.7 * c.pair_nis_limit)
     trust = sane
     if doubt > 1.0:

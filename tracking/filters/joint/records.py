@@ -19,7 +19,7 @@ NODE = np.dtype(
         ("turning", "f8"),  # running mean of the angular rate [rad/s]
         ("t_first", "f8"),  # its first sample, or the first after a long silence [s]
         ("t_oriented", "f8"),  # since when its orientation goes on without a break [s]
-        ("has_ahrs_feedback", "?"),  # it is told how it is turned upright
+        ("has_ahrs_feedback", "?"),  # VQF reports its corrections
         ("tilt_correction0", "f8"),  # by how much so far, about x and y [rad]
         ("tilt_correction1", "f8"),
         ("gyro0", "f8"),  # what is taken for the bias of its gyroscope [rad/s]
@@ -27,7 +27,7 @@ NODE = np.dtype(
         ("gyro2", "f8"),
         ("gyro_var", "f8"),  # its variance [(rad/s)^2]
         ("t_moved", "f8"),  # last time it was not at rest [s]
-        ("t_accelerated", "f8"),  # last time its acceleration told so [s]
+        ("t_accelerated", "f8"),  # last time its acceleration showed it [s]
         ("saturated", "?"),  # its last acceleration was at the end of the sensor's scale
         ("outlier_ratio", "f8"),  # running share of its ranges that do not fit [-]
         ("t_faulty", "f8"),  # when it last disagreed with the group [s]
@@ -99,7 +99,7 @@ PAIR = np.dtype(
 GROUP = np.dtype(
     [
         ("alignment", "i8"),  # see `alignment.Alignment`
-        ("degenerate", "?"),  # the layout was too flat to tell its mirror image
+        ("degenerate", "?"),  # the layout could not be told from its mirror image
         ("n_alive", "i8"),
         ("best", "i8"),
         ("t", "f8"),  # time of the states [s]
@@ -107,7 +107,7 @@ GROUP = np.dtype(
         ("t_check", "f8"),
         ("t_constraints", "f8"),
         ("t_gauge", "f8"),
-        ("t_scoring_starts", "f8"),  # until when nothing speaks for or against a hypothesis [s]
+        ("t_scoring_starts", "f8"),  # until when no likelihood counts [s]
         (
             "heading_gauge_var",
             "f8",

@@ -1,8 +1,7 @@
-"""Accelerations that were cut off: what the sensor read is used, and doubted.
+"""Process noise of saturated accelerations.
 
-What was there beyond the end of the scale, nobody knows; the reading is still nearer to it than
-nothing at all. So it is summed like any other, with the process noise of a node whose IMU is
-not heard.
+A saturated reading is nearer to the acceleration than none. So it is preintegrated like any other,
+with the process noise of a node without an IMU.
 """
 
 from __future__ import annotations

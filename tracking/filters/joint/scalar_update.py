@@ -49,7 +49,7 @@ def compute_pht(s, h, m, work):
 
 @small_kernel
 def covariance(s, h, a, b):
-    """One element of the covariance of hypothesis h, what waits included."""
+    """One element of the covariance of hypothesis h, pending updates included."""
     total = s.P[h, a, b]
     for q in range(s.n_pending[h]):
         total -= s.pending_updates[h, q, a] * s.pending_updates[h, q, b]
@@ -88,7 +88,7 @@ def kalman_update(s, h, w, nu, S):
 
 @small_kernel
 def flush_updates(s, h):
-    """Take off what waits: from here on P is the covariance of hypothesis h."""
+    """Apply pending updates: from here on P is the covariance of hypothesis h."""
     if s.n_pending[h] > 0:
         apply_downdate(s.P, h, s.pending_updates, h, s.n_pending[h], None)
         s.n_pending[h] = 0
@@ -96,7 +96,7 @@ def flush_updates(s, h):
 
 @small_kernel
 def flush_all_updates(s):
-    """Take off what waits in every hypothesis."""
+    """Apply the pending updates of every hypothesis."""
     for h in range(s.alive.shape[0]):
         if s.alive[h]:
             flush_updates(s, h)

@@ -50,7 +50,7 @@ class JointState(NamedTuple):
     and way that they add [m/s, m]; cosine and sine that turn a bias, summed once and twice;
     noise of the velocity [m2/s2]; the orientation, row by row, summed once and twice, of nodes
     whose accelerometer has an offset; of these the bias that they gain as they are turned upright
-    [m/s2], and what is told of their gyroscopes (`gyro_bias`)."""
+    [m/s2], and what VQF reports of their gyroscopes (`gyro_bias`)."""
     pairs: Records
     """PAIR, (env, pair)."""
     group: Records
@@ -58,7 +58,7 @@ class JointState(NamedTuple):
     x: F64
     """States, (env, hyp, state)."""
     P: F64
-    """Covariance, (env, hyp, state, state), before what waits is taken off."""
+    """Covariance, (env, hyp, state, state), before pending updates are applied."""
     pending_updates: F64
     """Corrections that wait, ``P - W^T W`` is the covariance, (env, hyp, correction, state)."""
     n_pending: I64

@@ -1,7 +1,7 @@
-"""Surveyed distances: measured once, with a tape or a total station, and true for good.
+"""Surveyed distances: measured once, with a tape or a total station, and valid for good.
 
 One that is known before both of its nodes run shapes the start, which takes it for a range; so it
-is used once more when they do. It is remembered while a node is away.
+is used once more when they do. It is kept while a node is away.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ def surveyed_distance_update(c, s, h, p, distance, is_news, work):
     The same distance again says nothing new, so P stays: it takes back what linear corrections
     have stretched since.
 
-    A hypothesis that puts a newcomer on the wrong side of the others is told so by the next of
-    them, long before anybody moves.
+    A hypothesis that puts a newcomer on the wrong side of the others loses likelihood by the
+    next of them, long before any node moves.
     """
     if s.group[0].heading_gauge_var > c.gauge_std * c.gauge_std:
         enforce_observability(c, s, h, work)

@@ -1,13 +1,13 @@
-"""What an orientation was turned upright by is known: so much more or less gravity is measured.
+"""Corrections of the tilt by VQF: inputs of the horizontal bias.
 
-VQF turns what its gyroscope says upright, over some seconds, by what its accelerometer reads: by
-its offset and by motion that lasts, too. A horizontal bias b is gravity seen through a tilt
-(`attitude_coupling`), so after a turn by (t_x, t_y) about x and y of the world it is
+VQF corrects its tilt over some seconds by its accelerometer, whose offset and lasting motion it so
+takes for tilt. A horizontal bias b is gravity seen through a tilt (`attitude_coupling`), so after a
+correction by (t_x, t_y) about x and y of the world it is
 
     b + g (t_y, -t_x)
 
-Where these turns are told, only what the gyroscope leans by is not known of the bias
-(`gyro_bias`).
+Where these corrections are reported, only the residual gyroscope bias (`gyro_bias`) changes b
+otherwise.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ GAIN = 30
 
 
 @small_kernel
-def process_tilt_correction(node, pre, i, values, e, k, anew):
+def process_tilt_correction(node, pre, i, values, e, k, is_new):
     """Note how node i was turned upright between two STATE events, the later in column k."""
-    told = node.i_acc_bias >= 0 and values[e, k, TOLD] != 0.0
-    if told:
+    reported = node.i_acc_bias >= 0 and values[e, k, TOLD] != 0.0
+    if reported:
         turned0, turned1 = values[e, k, UPRIGHT], values[e, k, UPRIGHT + 1]
-        begins = anew or not node.has_ahrs_feedback
+        begins = is_new or not node.has_ahrs_feedback
         if not begins:
             pre[i, GAIN] += GRAVITY * (turned1 - node.tilt_correction1)
             pre[i, GAIN + 1] -= GRAVITY * (turned0 - node.tilt_correction0)
         node.tilt_correction0, node.tilt_correction1 = turned0, turned1
         process_gyro_bias(node, pre, i, values, e, k, begins)
-    node.has_ahrs_feedback = told
+    node.has_ahrs_feedback = reported
 
 
 @small_kernel

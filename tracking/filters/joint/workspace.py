@@ -34,7 +34,7 @@ class Workspace(NamedTuple):
     w: F64
     """(state)"""
     share: F64
-    """Of each correction that waits in a measurement, (correction)."""
+    """Weight of each pending update in a measurement, (update)."""
     scale: F64
     """(state)"""
     step: F64
@@ -56,7 +56,7 @@ class Workspace(NamedTuple):
     bias_retention: F64
     """(1, pair)"""
     none_waiting: I64
-    """Of its covariance nothing waits: zero, (1)."""
+    """Number of its pending updates: zero, (1)."""
     gradient: F64
     """Of an innovation by the turn of an open group, (9)."""
     direct: F64

@@ -17,7 +17,7 @@ def _wide_registers():
     """Whether registers of this machine hold eight numbers."""
     try:
         return bool(llvmlite.binding.get_host_cpu_features().get("avx512f"))
-    except RuntimeError:  # not told here
+    except RuntimeError:  # unknown here
         return False
 
 

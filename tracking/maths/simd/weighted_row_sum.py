@@ -1,4 +1,4 @@
-"""``P H`` of a measurement, what waits taken off: what every correction begins with.
+"""``P H`` of a measurement, pending updates applied: the first step of every update.
 
 A weighted sum of rows, those of P that the measurement looks at and those that wait. Compiled loops
 load and store it again for every few rows. Here a stretch of it stays in registers

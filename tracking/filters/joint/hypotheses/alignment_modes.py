@@ -91,7 +91,7 @@ def resolve_challenge(c, s, layout):
     if values[0] > value + c.challenger_lead:
         R[:], value = turns[0], values[0]
     if value < c.challenger_lead or is_near(R, np.eye(3)):
-        # One that is near is what these seconds tell; the filter knows it better from before.
+        # A mode near it is measured by these seconds alone; the filter knows it better.
         if len(values) == 1 or group.t - group.t_alignment > c.challenge_longest:
             group.alignment = FILTERED
         return

@@ -1,18 +1,16 @@
-"""A group in space of which nothing tells yet how it is turned: all turns at once, linearly.
+"""Alignment of a group in space by linear sensitivities: one filter for all rotations.
 
-Ranges give the layout of a group in some frame, which is the world's turned or mirrored by an
-orthogonal matrix M. What is measured in the world, accelerations first of all, enters that
-frame as ``M a``: linear in the nine elements of M. So with M known, what the filter does is
-linear in M as well, as far as it is linear at all: its states are ``x + sum_k slope_k (M - 1)_k``,
-its gains do not depend on M, and innovations are ``nu + g . (M - 1)``. One filter thus gives the
-likelihood of every M, which is Gaussian in its elements,
+Ranges give the layout in some frame, which is the world's rotated or reflected by an orthogonal
+matrix M. Accelerations of the world enter that frame as ``M a``, linear in the nine elements of M.
+So with M known the filter is linear in M as well, as far as it is linear at all: states are
+``x + sum_k sensitivity_k (M - 1)_k``, gains do not depend on M, innovations ``nu + g . (M - 1)``.
+One filter thus gives the log-likelihood of every M, a quadratic form in its elements,
 
     log L(M) = score . (M - 1) - (M - 1) . information (M - 1) / 2,
 
-among them all rotations and mirror images, which `rotation_modes` looks through and
-`alignment_modes` follows. It is the estimate of a constant by the sensitivities of a Kalman filter
-to it [1], and to look for a rotation among all matrices first is an old way to find one without a
-first guess [2].
+all rotations and reflections among them: `rotation_modes` finds its maxima, `alignment_modes`
+follows them. This is Friedland's estimate of a constant bias by the sensitivities of a Kalman
+filter [1]; the search among all matrices before rotations is that of Wahba's problem [2].
 
 References:
     [1] Friedland, Treatment of bias in recursive filtering, IEEE Trans. Automatic Control 14
@@ -47,7 +45,7 @@ def has_linear_alignment(c, s):
 
 @allocating_kernel
 def start_alignment(c, s, layout, h):
-    """Take back what is known of the turn of hypothesis h, nothing of which waits.
+    """Forget what is known of the rotation of hypothesis h, which has no pending updates.
 
     But that fixed nodes differ less in height than in width, where people put them.
     """
@@ -151,7 +149,7 @@ def innovation_sensitivity(s, h, m, work):
 
 @small_kernel
 def accumulate_alignment_information(s, h, work, nu, S):
-    """Let an innovation of variance S, about to be absorbed, tell of the turn.
+    """Add the information of an innovation of variance S, about to be used, on the rotation.
 
     Args:
         s: JointState of one environment, open.

@@ -1,12 +1,12 @@
-"""The bank of hypotheses: mirror images that become possible, and which ones are kept.
+"""The bank of hypotheses about rotation and reflection: which are added, which are kept.
 
-A layout and its mirror image have the same ranges; motion tells them apart. While the nodes
-pass through a line (or a plane, in space) the two are one, and the filter may come out on the
-wrong side. So its mirror image is followed beside it from there, until one is unlikely.
+A layout and its mirror image have the same ranges; motion distinguishes them. While the nodes pass
+through a line (or a plane, in space) the two coincide, and the filter may come out on the wrong
+side. So the mirror image is filtered as well from there, until one is unlikely.
 
-What fits badly for seconds on end is turned or mirrored, by a start or join that few ranges
-decided: ranges alone fit any rotation, but moves that go elsewhere than the IMUs say do not.
-Then all rotations and mirror images are followed again.
+A hypothesis whose ranges fit badly for seconds is rotated or reflected wrongly, by a start or join
+from few ranges: ranges alone fit any rotation, accelerations do not. Then all rotations and
+reflections compete again.
 """
 
 from __future__ import annotations
@@ -149,7 +149,7 @@ def prune_bank(c, s):
     # The report changes only for a clear gain, or equal hypotheses would take turns.
     if not s.alive[group.best] or s.loglik[best] > s.loglik[group.best] + 2.0:
         group.best = best
-        # How well ranges fit was told by the other.
+        # Residuals are those of the other hypothesis.
         for p in range(s.pairs.shape[0]):
             reset_residual_statistics(s.pairs[p])
         group.mean_nis = 1.0

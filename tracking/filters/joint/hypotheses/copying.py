@@ -1,4 +1,4 @@
-"""Copies of hypotheses, turned or mirrored."""
+"""Copies of hypotheses, rotated or reflected."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def rotate_hypothesis(c, s, h, M):
     Args:
         c: Coefficients.
         s: JointState of one environment.
-        h: Hypothesis, updated; nothing of it waits.
+        h: Hypothesis without pending updates, updated.
         M: Orthogonal, (d, d).
     """
     d = c.d

@@ -1,7 +1,7 @@
-"""How flat a layout is: its extent across the line or plane that it is nearest to.
+"""Degeneracy of a layout: its extent across the line or plane that it is nearest to.
 
-Looked at ten times a second in every group, so the few numbers are worked out by hand: a library
-takes longer for them than all else that is looked at then.
+Evaluated ten times a second in every group, so the few numbers are worked out by hand: a library
+takes longer for them than all other checks.
 
 References:
     [1] Smith, Eigenvalues of a symmetric 3x3 matrix, Comm. ACM 4 (1961) 168.
@@ -21,7 +21,7 @@ def degeneracy_ratio(c, s, h, turns):
     Args:
         c: Coefficients.
         s: JointState of one environment.
-        h: Hypothesis, nothing of which waits.
+        h: Hypothesis without pending updates.
         turns: Whether an error that is a turn of the whole group counts. In space it may be large,
             and makes the layout no flatter.
     """

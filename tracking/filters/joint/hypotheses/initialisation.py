@@ -1,10 +1,10 @@
-"""Starting a group and joining it: from the first k ranges of each pair to running states.
+"""Initialisation of a group, and of a node that joins it, from first ranges.
 
-A group starts with MDS on the mean of the first k ranges, once for every rotation and mirror
-image of the bank; the covariance holds the gap between two rotations. While all nodes rest, one
-of them stands for all (`static_initialisation`). A node that joins is placed by least squares on
-its distances to the others, in every hypothesis; where those are too few or too flat to tell on
-which side it is, both sides become hypotheses.
+A group starts with MDS on the medians of the newest ranges, once for every rotation and reflection
+of the bank; the covariance covers the gap between two rotations. While all nodes rest, one stands
+for all (`static_initialisation`). A node that joins is placed by least squares on its distances to
+the others, in every hypothesis; where those are too few or degenerate, both sides become
+hypotheses.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ def start(c, s, layout, t):
 
 @kernel
 def is_motion_unknown(c, s, members, m, t):
-    """True while a node's samples are too few to tell whether it moves.
+    """True while a node's samples are too few to show whether it moves.
 
     Nodes at rest are followed in one rotation that stands for all; of nodes that move it would use
     the accelerations in a wrong one.
@@ -117,7 +117,7 @@ def is_motion_unknown(c, s, members, m, t):
 
 @kernel
 def initialise_interval(pair, t):
-    """A pair that runs from here on; of how often it ranges its first ranges tell."""
+    """Initialise the interval of a pair that runs from here on, by its first ranges."""
     n = min(pair.start_n, N_FIRST)
     first = pair.start_t[(pair.start_n - n) % N_FIRST]
     pair.interval = (t - first) / (n - 1) if n > 1 else 0.0
@@ -136,7 +136,7 @@ def add_translation_uncertainty(c, s, h, members, m):
 
 @kernel
 def reset_preintegration(s, i, t):
-    """Start the sums of a node's inertial samples anew."""
+    """Reset the preintegrated samples of a node."""
     s.preintegrated[i, :] = 0.0
     s.nodes[i].t_pre = t
 
@@ -250,7 +250,7 @@ def join(c, s, layout, new, t):
 def add_node(c, s, layout, h, new, pos, variance, t):
     """Put a node at a position: its error is that of a body with the others, and its own.
 
-    Where the others are elsewhere, or turned, it is as well: ranges to it tell neither.
+    Where the others are elsewhere, or rotated, it is as well: ranges to it measure neither.
     """
     initialise_node(c, s, h, new, t)
     d, n = c.d, s.nodes.shape[0]

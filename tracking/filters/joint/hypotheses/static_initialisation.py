@@ -1,8 +1,8 @@
-"""Groups in which nothing has moved yet: one rotation stands for all.
+"""Static initialisation: groups in which no node has moved yet.
 
-Ranges say nothing about the rotation of a layout, nor about its mirror image, and the
-accelerations of nodes at rest neither: until something moves, all hypotheses of the bank are
-one, turned. So only one is followed; the others are made of it when the first node moves.
+Ranges do not observe the rotation of a layout nor its reflection, and accelerations of nodes at
+rest do not either: until something moves, all hypotheses of the bank are one, rotated. So one is
+filtered, and the others are spawned from it when the first node moves.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def is_at_rest(c, node, t):
 
 @small_kernel
 def all_static(c, s, t):
-    """True if no present node has been seen to move since it was first heard."""
+    """True if no present node has been seen to move since its first sample."""
     for i in range(s.nodes.shape[0]):
         node = s.nodes[i]
         if not node.present or node.static:
@@ -74,7 +74,7 @@ def spawn_rotation_hypotheses(c, s, layout, work):
     for h in range(s.alive.shape[0]):
         for i in range(s.nodes.shape[0]):
             node = s.nodes[i]
-            # Errors of headings stay as long as nobody moves.
+            # Errors of headings stay as long as no node moves.
             if was_alive[h] and node.present and not node.static:
                 reset_state(s, h, c.n, node.i_heading, node.first_heading_var)
         if was_alive[h]:

@@ -1,14 +1,14 @@
-"""Nodes that disagree with the group: wrong calibrations, liars, and nodes that lost their way.
+"""Detection of faulty nodes: wrong calibrations, random ranges, nodes at a wrong pose.
 
-Two signs are looked for, ten times a second, in nodes that range with two others or more:
+Two statistics of nodes that range with two others or more, ten times a second:
 
-    astray   most ranges of the node fit nothing, while those among the others do
-    offset   the errors of all its ranges are large and of one sign: an obstacle hides a node from
-             some, a wrong calibration lengthens all of its ranges alike
+    outliers   most ranges of the node do not fit, while those among the others do
+    offset     the errors of all its ranges are large and of one sign: an obstacle hides a node from
+               some others, a wrong calibration lengthens all of its ranges alike
 
-Such a node is doubted: its pairs are reported so, an offset common to its ranges becomes
-possible and, where it is astray, its position and velocity become uncertain. What it ranges then
-moves the node and the offset, and hardly the others; where it only lost its way, it is found again.
+The pairs of a faulty node are reported as doubtful, an offset common to its ranges becomes a state
+and, with outliers, its position and velocity become uncertain. Its ranges then move the node and
+the offset and hardly the others; a node at a wrong pose finds back.
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
-"""Ranges that stick: a radio that reports one number again and again while its nodes move.
+"""Frozen ranges: a radio that repeats one number while its nodes move.
 
-Radios round to a millimetre or a centimetre, and some report every range twice, so that a few
-equal ranges mean nothing: of the recordings that the filter was tried on, those rounded to a
-centimetre have runs of up to 11. Nodes at rest may repeat one for ever. But noise of several
-centimetres does not repeat while the ends travel.
+Radios round to a millimetre or a centimetre, and some report every range twice, so a few equal
+ranges mean nothing; recordings that are rounded to a centimetre have runs of up to 11. Nodes at
+rest may repeat one for ever. But noise of several centimetres does not repeat while the ends move.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from tracking.jit import small_kernel
 def is_frozen(c, s, p, t, distance):
     """True if a range repeats what pair p has reported all along; notes it in any case.
 
-    It is taken as not heard until another number comes, also when its nodes have left by then.
+    It is ignored until another number comes, also when its nodes have left by then.
     """
     pair = s.pairs[p]
     if distance != pair.last_range:

@@ -1,14 +1,13 @@
-"""Nodes at a wrong place: found by what they range, and moved to where that fits.
+"""Reinitialisation of nodes at a wrong position.
 
-A node can settle where some of its ranges fit and others never do: on the wrong side of the
-others, after a start or a join from few ranges. There the filter stays, for the ranges that
-would lead it away fit nothing and hardly count. But what it ranges tells of it: steady ranges,
-some too short, which no obstacle makes them, some too long, and a place that all of them agree
-on. Ranges that err alike are of a wrong calibration, and those that scatter mean nothing: both
-are for `fault_detection`.
+After a start or a join from few ranges a node can settle on the wrong side of the others: some of
+its ranges fit, the others do not, hardly count, and it stays. Its residuals show it: steady ranges,
+some too short, which no obstacle causes, some too long, and a position that fits all of them.
+Errors of one sign are a wrong calibration, and those that scatter are random: both are for
+`fault_detection`.
 
-In space a node can also leave, by dead reckoning: once it is metres off, no range fits any more,
-and none brings it back. No calibration errs by so much: if there is a place for it, it joins anew.
+In space a node can also drift away by dead reckoning: metres off, none of its ranges fits. No
+calibration errs by so much, so it joins again where there is a position for it.
 """
 
 from __future__ import annotations
@@ -93,9 +92,9 @@ def slow_range_error(c, s, p):
 def reinitialise_node(c, s, layout, i, is_away, t):
     """Move node i, in every hypothesis, to where its ranges fit much better, if there is such.
 
-    One that is metres away joins anew instead, on both sides of the others where that is open. What
-    is ranged with others that are away as well tells nothing; where most that move are, the group
-    begins anew.
+    One that is metres away joins again instead, on both sides of the others where that is open.
+    Ranges to others that are away as well do not count; where most that move are, the group starts
+    again.
     """
     n = s.nodes.shape[0]
     others, m, n_moving, n_away = np.empty(n, np.int64), 0, 0, 0
@@ -110,8 +109,8 @@ def reinitialise_node(c, s, layout, i, is_away, t):
         return  # a smoother would lose the past that it holds
     if is_away and (2 * n_away > n_moving or m < c.d):
         for k in range(n):
-            anew = 2 * n_away > n_moving and s.nodes[k].present and not s.nodes[k].static
-            if k == i or anew:
+            again = 2 * n_away > n_moving and s.nodes[k].present and not s.nodes[k].static
+            if k == i or again:
                 remove_node(c, s, layout, k)
         return
     known, distance, pos = np.zeros((m, 3)), np.empty(m), np.zeros(3)

@@ -1,11 +1,11 @@
-"""Nodes that were not heard for a while, and may be anywhere by now.
+"""Stale nodes: without ranges for a while, and uncertain by now.
 
-A second without ranges or samples leaves a moving node a metre from where it is believed, two
-seconds several. Ranges to a place that is as wrong as it is far bend too much for a filter that
-takes them for straight: it comes out mirrored, or turned, and is sure of it. So such a node
-joins anew as it is heard again, and a group of such nodes begins anew.
+A second without measurements leaves a moving node a metre from its estimate, two seconds several.
+The linearisation of ranges to a position that is as wrong as it is far fails: the filter comes out
+reflected or rotated, and certain. So such a node joins again with its next range, and a group of
+such nodes starts again.
 
-How uncertain it is shows in its distances, which no turn of the whole group changes.
+The criterion is the uncertainty of its distances, which no rotation of the group changes.
 """
 
 from __future__ import annotations
@@ -36,17 +36,17 @@ def update_interval(c, record, dt):
 
 @small_kernel
 def is_silent(c, node, t):
-    """True for a node of the group that moves and was not heard lately."""
+    """True for a node of the group that moves and had no range lately."""
     waits = max(c.range_timeout, c.missed_intervals * node.interval)
     return node.present and not node.static and t - node.t_last_range > waits
 
 
 @allocating_kernel
 def drop_stale(c, s, layout, t):
-    """Remove all nodes that were silent and may be anywhere, as one of them is heard again.
+    """Remove all nodes that were silent and may be anywhere, as one of them has a range again.
 
-    Those that stay away would keep the others from beginning anew. The states are those of time
-    t, and nothing of them waits. A smoother looks no farther ahead than a silence lasts: what
+    Those that stay away would keep the others from starting again. The states are those of time
+    t, and no update is pending. A smoother looks no farther ahead than a silence lasts: what
     it holds of the past would go with the group.
     """
     if c.n > c.n_own:
