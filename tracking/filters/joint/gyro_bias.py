@@ -37,7 +37,7 @@ def last_state(node):
 
 @small_kernel
 def process_gyro_bias(node, pre, i, values, e, k, begins):
-    """Note what a STATE event reports of the gyroscope of node i, the first event or a later one."""
+    """Take what a STATE event reports of the gyroscope of node i, the first event or a later."""
     g0, g1, g2 = values[e, k, GYRO_BIAS], values[e, k, GYRO_BIAS + 1], values[e, k, GYRO_BIAS + 2]
     var = values[e, k, GYRO_VAR]
     if not begins:
