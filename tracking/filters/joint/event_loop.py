@@ -119,7 +119,7 @@ def run_events(coefficients, layout, state, work, block, t_out, out):
 
 @kernel
 def predict_all(coefficients, state, work, t):
-    """Carry every environment to its time t, (env) [s]."""
+    """Predict every environment to its time t, (env) [s]."""
     for e in range(t.shape[0]):
         s = by_reference(one_env(state, e))
         if s.group[0].alignment != NONE:
@@ -173,18 +173,18 @@ def process_range(c, s, layout, work, i, j, a_i, a_j, t, distance, sight, is_sur
 
 @kernel
 def predict_to(c, s, work, t, at_once):
-    """Carry every hypothesis to time t, and use what is known about the carriers.
+    """Predict every hypothesis to time t, and apply the motion constraints that are due.
 
-    Carrying a covariance costs more than a range does. So unless it has to be `at_once`, the states
+    To propagate a covariance costs more than a range does. So unless it has to be `at_once`, the states
     stay where they are for a while, and ranges are predicted by the displacement since
-    (`range_update.range_model`): only the noise of so short a time comes after them, not before.
+    (`range_update.predict_range`): only the noise of so short a time comes after them, not before.
     """
     group = s.group[0]
-    carriers_due = t - group.t_constraints + SAME >= c.constraint_period
+    constraints_due = t - group.t_constraints + SAME >= c.constraint_period
     since = t - group.t
-    if since > SAME and (at_once or carriers_due or since + SAME >= c.propagation_period):
+    if since > SAME and (at_once or constraints_due or since + SAME >= c.propagation_period):
         propagate(c, s, work, t)
-    if carriers_due:
+    if constraints_due:
         first, end = hypothesis_range(s)
         for h in range(first, end):
             if s.alive[h]:
@@ -200,7 +200,7 @@ def predict_to(c, s, work, t, at_once):
 
 @kernel
 def propagate(c, s, work, t):
-    """Carry every hypothesis to time t."""
+    """Predict every hypothesis to time t."""
     group = s.group[0]
     for i in range(s.nodes.shape[0]):
         if moves(s.nodes[i]):
