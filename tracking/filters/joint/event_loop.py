@@ -175,7 +175,7 @@ def process_range(c, s, layout, work, i, j, a_i, a_j, t, distance, sight, is_sur
 def predict_to(c, s, work, t, at_once):
     """Predict every hypothesis to time t, and apply the motion constraints that are due.
 
-    To propagate a covariance costs more than a range does. So unless it has to be `at_once`, the states
+    To propagate a covariance costs more than a range. So unless it has to be `at_once`, the states
     stay where they are for a while, and ranges are predicted by the displacement since
     (`range_update.predict_range`): only the noise of so short a time comes after them, not before.
     """
