@@ -62,20 +62,19 @@ class _Unit(JITCodeLibrary):  # type: ignore[misc]
 
     def finalize(self) -> None:
         """Link, optimise and emit the code."""
-        self._raise_if_finalized()
-        calls = dict[int, Any]()
-        for library in dict.fromkeys(self._linking_libraries):
-            self._reload_init.update(library._reload_init)
-            calls.update((id(unit), unit) for unit in getattr(library, "calls", ()))
-            if getattr(library, "key", None) is None:
-                self._final_module.link_in(library._get_module_for_linking(), preserve=True)
-            else:
-                calls[id(library)] = library
-        self.calls = list(calls.values())
+        libraries: Any = self._linking_libraries
+        units = [library for library in libraries if getattr(library, "key", None) is not None]
+        linked = [library for library in libraries if getattr(library, "key", None) is None]
+        inherited = [unit for library in linked for unit in getattr(library, "calls", ())]
+        self.calls = list(dict.fromkeys([*units, *inherited]))
+        self._linking_libraries = type(libraries)(linked)
+        super().finalize()
+        for unit in self.calls:
+            getattr(self, "_reload_init", set()).update(getattr(unit, "_reload_init", ()))
+
+    def _optimize_final_module(self) -> None:
         if self.key is not None:
-            self._optimize_final_module()
-        self._final_module.verify()
-        self._finalize_final_module()
+            super()._optimize_final_module()
 
     def defined_names(self) -> set[str]:
         """Names of all functions that the code defines."""
