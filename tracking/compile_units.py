@@ -52,6 +52,8 @@ def compile_as_unit(compiled: Any) -> None:
 class _Unit(JITCodeLibrary):  # type: ignore[misc]
     """Machine code of one kernel for one set of types."""
 
+    _linking_libraries: Any
+
     def __init__(self, codegen: Any, name: str) -> None:
         super().__init__(codegen, name)
         self.key: Any = None
@@ -62,7 +64,7 @@ class _Unit(JITCodeLibrary):  # type: ignore[misc]
 
     def finalize(self) -> None:
         """Link, optimise and emit the code."""
-        libraries: Any = self._linking_libraries
+        libraries = self._linking_libraries
         units = [library for library in libraries if getattr(library, "key", None) is not None]
         linked = [library for library in libraries if getattr(library, "key", None) is None]
         inherited = [unit for library in linked for unit in getattr(library, "calls", ())]
