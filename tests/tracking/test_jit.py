@@ -163,7 +163,8 @@ def both(x):
 @pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
 def test_a_kernel_is_compiled_once_for_constants_and_variables():
     assert both(np.array([1.0, 2.0])) == 8.0
-    assert len(scaled.signatures) == len(plus_one.signatures) == 1
+    assert len(scaled.signatures) == 1
+    assert len(plus_one.signatures) <= 1  # none where the caller comes from the disk
 
 
 @pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
