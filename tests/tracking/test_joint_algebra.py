@@ -223,11 +223,11 @@ def test_a_step_is_a_product_with_its_derivatives(n, p, shape):
 @pytest.mark.parametrize("lanes", [2, 4, 8])
 def test_a_step_in_registers_of_any_width_is_the_same(monkeypatch, lanes, add):
     monkeypatch.setattr(vectors, "LANES", lanes)
-    anew = njit(add.py_func)  # kept nowhere
+    fresh = njit(add.py_func)  # kept nowhere
     plainly = add_to_rows_plainly if add is add_to_rows else add_to_columns_plainly
     for shape in SHAPES:
         ours, twin = step_to_add(6, shape, 40, 1), step_to_add(6, shape, 40, 1)
-        anew(*ours)
+        fresh(*ours)
         plainly(*twin)
         np.testing.assert_allclose(ours[0], twin[0], atol=1e-12)
 
@@ -236,26 +236,26 @@ def test_a_step_in_registers_of_any_width_is_the_same(monkeypatch, lanes, add):
 @pytest.mark.parametrize("lanes", [2, 4, 8])
 def test_registers_of_any_width_give_the_same(monkeypatch, lanes):
     monkeypatch.setattr(vectors, "LANES", lanes)
-    anew = njit(apply_downdate.py_func)  # kept nowhere
+    fresh = njit(apply_downdate.py_func)  # kept nowhere
     rng = np.random.default_rng(lanes)
     for n in (8, 40):
         A = rng.standard_normal((n, n))
         P, W = (A @ A.T)[None], rng.standard_normal((1, 8, n))
         twin = P.copy()
-        anew(P, 0, W, 0, 7, None)
+        fresh(P, 0, W, 0, 7, None)
         apply_downdate_plainly(twin, 0, W, 0, 7, None)
         np.testing.assert_allclose(P, twin, atol=1e-10)
         np.testing.assert_array_equal(P[0], P[0].T)
-    anew = njit(sum_rows.py_func)
+    fresh = njit(sum_rows.py_func)
     for n in (24, 56):
         arguments, summed = rows_to_sum(n, 8, 5, n), np.zeros(n)
-        anew(*arguments)
+        fresh(*arguments)
         sum_rows_plainly(*arguments[:-1], summed)
         np.testing.assert_allclose(arguments[-1], summed, atol=1e-12)
-    anew = njit(mirror.py_func)
+    fresh = njit(mirror.py_func)
     P = rng.standard_normal((1, 20, 20))
     twin = P.copy()
-    anew(P, 0, 13)
+    fresh(P, 0, 13)
     mirror_plainly(twin, 0, 13)
     np.testing.assert_array_equal(P, twin)
 

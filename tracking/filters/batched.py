@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from functools import partial
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -23,7 +24,7 @@ class BatchedFilter(ABC):
     """
 
     follows_bias: bool
-    kernel: ClassVar[Callable[..., None]]
+    kernel: ClassVar[Callable[..., Any]]
     """Handles the events; takes what `_arguments` gives."""
 
     def __init__(self, constellation: Constellation, state: Any, blank: Any) -> None:
@@ -44,8 +45,13 @@ class BatchedFilter(ABC):
         """Handle the events and report at the given times; see `Filter.run`."""
         t_out = np.ascontiguousarray(t_out, dtype=np.float64)
         estimate = TeamEstimate.empty(self._constellation, t_out)
-        type(self).kernel(*self._arguments(block.arrays, estimate))
+        arguments = self._arguments(block.arrays, estimate)
+        self._complete(partial(type(self).kernel, *arguments), arguments)
         return estimate
+
+    def _complete(self, handle: Callable[[], Any], arguments: tuple[Any, ...]) -> None:
+        """Call the kernel, with its arguments, until all events are handled."""
+        handle()
 
     def bind(self, block: MeasurementBlock, estimate: TeamEstimate) -> Callable[[], None]:
         """`run` for arrays that stay where they are; see `Filter.bind`."""

@@ -1,12 +1,12 @@
 """Accelerometer offset and tilt error of a node that turns about all its axes.
 
-An offset o turns with the body: it adds ``R(q_wb) o``, preintegrated beside the accelerations. A
+An offset o turns with the body: it adds ``R(q_wb) o``, preintegrated with the accelerations. A
 horizontal bias b is gravity seen through a tilt of ``(-b_y, b_x, 0) / g``, and the acceleration is
 rotated by that tilt as well:
 
     a_measured = a + b + (b_x a_z, b_y a_z, -b_x a_x - b_y a_y) / g
 
-Without the last term the layout leans as the orientation of its moving nodes does.
+Without the last term the layout is tilted as the orientations of its moving nodes are.
 """
 
 from __future__ import annotations

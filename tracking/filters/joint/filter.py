@@ -50,13 +50,8 @@ class JointEkf(BatchedFilter):
         super().__init__(constellation, state, make_state(constellation, params, 1, 1))
         self._work = self._make_workspace(state.x.shape[2])
 
-    def run(self, block: MeasurementBlock, t_out: F64) -> TeamEstimate:
-        """Handle the events and report at the given times; see `Filter.run`."""
-        t_out = np.ascontiguousarray(t_out, dtype=np.float64)
-        estimate = TeamEstimate.empty(self._constellation, t_out)
-        arguments = self._arguments(block.arrays, estimate)
-        run_to_end(partial(run_events, *arguments), arguments)
-        return estimate
+    def _complete(self, handle: Callable[[], Any], arguments: tuple[Any, ...]) -> None:
+        run_to_end(handle, arguments)
 
     def bind(self, block: MeasurementBlock, estimate: TeamEstimate) -> Callable[[], None]:
         """`run` for arrays that stay where they are; see `Filter.bind`."""

@@ -89,7 +89,7 @@ def needs_challenge(c, s, dt):
 
 @kernel
 def challenge(c, s, layout):
-    """Follow all rotations and mirror images again beside the only hypothesis."""
+    """Follow all rotations and mirror images again, and the only hypothesis."""
     group = s.group[0]
     h = group.best
     if has_linear_alignment(c, s):
