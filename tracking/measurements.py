@@ -21,8 +21,8 @@ N_VALUES = 16
 """Columns of `MeasurementBlock.values`."""
 N_MEASURED = 8
 """The first of them: what devices send. The rest is told by the tracker's own orientations."""
-TOLD, UPRIGHT, GYRO_BIAS, GYRO_VAR = 8, 9, 11, 14
-"""Columns of what a STATE event tells beside orientation and acceleration, see `Kind`."""
+ACCEL_NOISE, TOLD, UPRIGHT, GYRO_BIAS, GYRO_VAR = 7, 8, 9, 11, 14
+"""Columns of a STATE event beside orientation and acceleration, see `Kind`."""
 
 
 class Kind(IntEnum):
@@ -39,8 +39,8 @@ class Kind(IntEnum):
     """IMU sample of node i: gyroscope x y z [rad/s], specific force x y z [m/s2]."""
     STATE = 3
     """Node i's own orientation filter: q_wb (w x y z), gravity-free accel_w x y z [m/s2], then
-    which part of it means nothing because the sensor is at the end of its scale: 0 none, 1 what
-    is along the body's z, 2 more than that. Then 1 if the rest is told, as the tracker's own
+    the noise density of the acceleration beyond that of its vehicle [m/s2/sqrt(Hz)], 0 unless the
+    sample is doubted. Then 1 if the rest is told, as the tracker's own
     orientations do, 2 if it is and the body rests: by how much it has been turned upright so far,
     about x and y of the world [rad]; the bias that is taken off its gyroscope, x y z in the body
     [rad/s], and the variance of that about one axis [(rad/s)^2]."""

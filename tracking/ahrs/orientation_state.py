@@ -49,6 +49,9 @@ class OrientationParams:
     gravity_tau: float = 0.5
     """[s] Time constant with which a node at rest learns the length of gravity that its own
     accelerometer reads, which removes the vertical part of its offset."""
+    doubtful_psd: float = 1.5
+    """[m/s2/sqrt(Hz)] Added noise of an acceleration that is saturated or stands in for a spike:
+    that of a node without an IMU. Such a reading is nearer to the acceleration than none."""
 
     def __post_init__(self) -> None:
         check_numbers(self)
@@ -91,6 +94,10 @@ class OrientationCoefficients(NamedTuple):
     """`OrientationParams.max_gap`, (node) [s]."""
     heading: F64
     """Yaw of the body at the first sample, without magnetometer, (node) [rad]."""
+    doubtful_psd: F64
+    """`OrientationParams.doubtful_psd`, (node) [m/s2/sqrt(Hz)]."""
+    levelled: Bool
+    """True for vehicles that stay level, (node)."""
     magnetic: Bool
     """True where the heading comes from the magnetometer, (node)."""
 
@@ -175,6 +182,8 @@ def make_coefficients(
         gravity_gain=dt / params.gravity_tau,
         max_gap=np.full(len(nodes), params.max_gap),
         heading=np.array([node.initial_heading or 0.0 for node in nodes]),
+        doubtful_psd=np.full(len(nodes), params.doubtful_psd),
+        levelled=np.array([v.levelled for v in vehicles]),
         magnetic=np.full(len(nodes), constellation.heading == "magnetic"),
     )
 

@@ -18,7 +18,6 @@ from tracking.filters.joint.observability import enforce_observability, propagat
 from tracking.filters.joint.preintegration import preintegrate, process_attitude
 from tracking.filters.joint.propagation import moves, predict
 from tracking.filters.joint.range_update import range_update
-from tracking.filters.joint.saturation_noise import add_saturation_noise
 from tracking.filters.joint.scalar_update import flush_all_updates
 from tracking.filters.joint.state import N_PRE, one_env
 from tracking.filters.joint.supervision.fault_detection import (
@@ -88,7 +87,6 @@ def run_events(coefficients, layout, state, work, block, t_out, out):
                 o += 1
             i, j, what, action = node_i[e, k], node_j[e, k], kind[e, k], NOTHING
             if what == STATE:
-                add_saturation_noise(c, s.nodes[i], s.preintegrated, i, t[e, k], values[e, k, 7])
                 process_attitude(
                     c, s.nodes, s.last_attitude_accel, s.preintegrated, i, t[e, k], values, e, k
                 )

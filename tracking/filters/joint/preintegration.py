@@ -12,6 +12,7 @@ from tracking.filters.joint.tilt_correction import process_tilt_correction
 from tracking.filters.level_vehicle import angle_between, direction, level
 from tracking.jit import small_kernel
 from tracking.maths.exponentials import decay
+from tracking.measurements import ACCEL_NOISE
 
 
 @small_kernel
@@ -67,6 +68,11 @@ def preintegrate_rotation(held, pre, i, dt, share):
 def process_attitude(c, nodes, held, pre, i, t, values, e, k):
     """A new orientation and acceleration of node i, held until the next."""
     node = nodes[i]
+    noise = values[e, k, ACCEL_NOISE]
+    if node.has_state and (noise > 0.0 or node.accel_noise > 0.0):
+        dt = min(max(t - node.t_state, 0.0), c.imu_timeout)
+        pre[i, 11] += dt * max(noise, node.accel_noise) ** 2
+    node.accel_noise = noise
     preintegrate(c, nodes, held, pre, i, t)
     w, x, y, z = values[e, k, 0], values[e, k, 1], values[e, k, 2], values[e, k, 3]
     cos_yaw, sin_yaw = direction(w, x, y, z)

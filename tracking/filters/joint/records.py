@@ -28,7 +28,7 @@ NODE = np.dtype(
         ("gyro_var", "f8"),  # its variance [(rad/s)^2]
         ("t_moved", "f8"),  # last time it was not at rest [s]
         ("t_accelerated", "f8"),  # last time its acceleration showed it [s]
-        ("saturated", "?"),  # its last acceleration was at the end of the sensor's scale
+        ("accel_noise", "f8"),  # added noise density of its last sample [m/s2/sqrt(Hz)]
         ("outlier_ratio", "f8"),  # running share of its ranges that do not fit [-]
         ("t_faulty", "f8"),  # when it last disagreed with the group [s]
         ("faulty", "?"),  # it has, lately

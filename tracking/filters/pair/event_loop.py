@@ -34,6 +34,7 @@ from tracking.filters.pair.range_update import (
 )
 from tracking.filters.pair.state import FilterState
 from tracking.jit import allocating_kernel, kernel, small_kernel
+from tracking.measurements import ACCEL_NOISE
 from tracking.models.nlos import power_evidence
 
 # Plain numbers of `Kind` and `Status`: kernels do not know enums.
@@ -153,6 +154,7 @@ def process_attitude(c, s, layout, i, t, values, e, k):
         w, x, y, z = s.held[i, 0], s.held[i, 1], s.held[i, 2], s.held[i, 3]
         a0, a1 = level(w, x, y, z, s.held[i, 4], s.held[i, 5], s.held[i, 6], *direction(w, x, y, z))
         s.held[i, 4], s.held[i, 5] = a0, a1
+    node.accel_noise = values[e, k, ACCEL_NOISE]
     node.t_state = t
     node.has_state = True
 

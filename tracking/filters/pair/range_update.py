@@ -60,7 +60,9 @@ def node_variance(c, node, aided):
     """Squared acceleration noise density that a node adds."""
     if node.static:
         return 0.0
-    return node.psd * node.psd if aided else c.unaided_psd * c.unaided_psd
+    if not aided:
+        return c.unaided_psd * c.unaided_psd
+    return node.psd * node.psd + node.accel_noise * node.accel_noise
 
 
 @small_kernel

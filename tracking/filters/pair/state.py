@@ -33,6 +33,7 @@ NODE = np.dtype(
         ("yaw", "f8"),  # of the body [rad]
         ("yaw_rate", "f8"),  # low-passed [rad/s]
         ("t_sum", "f8"),  # until when its acceleration is in the mean velocity [s]
+        ("accel_noise", "f8"),  # added noise density of its last sample [m/s2/sqrt(Hz)]
         ("psd", "f8"),  # constant: acceleration noise with an IMU [m/s2/sqrt(Hz)]
         ("sideways_var", "f8"),  # constant: of its rear axle [m2/s2]; 0 if it may slide
         ("slip", "f8"),  # constant: how fast that axle drifts out in a curve [s2/m]
