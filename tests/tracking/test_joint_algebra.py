@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numba import config, njit
+from numba import njit
 from scipy.spatial.transform import Rotation
 
 from tracking import Constellation, NodeConfig
@@ -20,19 +20,19 @@ from tracking.filters.joint.supervision.params import AlignmentParams
 from tracking.filters.level_vehicle import angle_between, direction
 from tracking.filters.records import as_records
 from tracking.geometry import quat_from_yaw
-from tracking.maths.simd import vectors
-from tracking.maths.simd.block_propagation import (
+from tracking.maths import covariance_loops as loops
+from tracking.maths import covariance_simd as simd
+from tracking.maths.covariance import (
     ROOM,
-    SHAPES,
     STATES,
+    USES_SIMD,
     add_to_columns,
-    add_to_columns_plainly,
     add_to_rows,
-    add_to_rows_plainly,
+    apply_downdate,
+    mirror,
+    sum_rows,
 )
-from tracking.maths.simd.low_rank_downdate import apply_downdate, apply_downdate_plainly
-from tracking.maths.simd.symmetrise import mirror, mirror_plainly
-from tracking.maths.simd.weighted_row_sum import sum_rows, sum_rows_plainly
+from tracking.maths.covariance_simd import SHAPES
 
 angles = st.floats(-3.1, 3.1)
 SAME_TURN = AlignmentParams().same_rotation
@@ -148,7 +148,7 @@ def test_what_is_taken_off_is_the_product(n, m, fades):
     P, W = np.stack([A @ A.T, A @ A.T]), rng.standard_normal((2, 16, n))
     twin, before, rows = P.copy(), P[0].copy(), W.copy()
     apply_downdate(P, 1, W, 0, m, scale)
-    apply_downdate_plainly(twin, 1, W, 0, m, scale)
+    loops.apply_downdate(twin, 1, W, 0, m, scale)
     np.testing.assert_allclose(P[1], twin[1], atol=1e-10)
     np.testing.assert_array_equal(P[1], P[1].T)  # to the last bit
     np.testing.assert_array_equal(P[0], before)
@@ -170,7 +170,7 @@ def test_rows_are_summed(n, m, q):
     arguments, twin = rows_to_sum(n, m, q, n), np.zeros(n)
     before = [np.copy(a) for a in arguments]
     sum_rows(*arguments)
-    sum_rows_plainly(*arguments[:-1], twin)
+    loops.sum_rows(*arguments[:-1], twin)
     np.testing.assert_allclose(arguments[-1], twin, atol=1e-12 * m * (1 + q))
     for a, b in zip(arguments[:-1], before[:-1], strict=True):
         np.testing.assert_array_equal(a, b)
@@ -181,7 +181,8 @@ def test_one_half_is_the_mirror_image_of_the_other(n, rows):
     P = np.random.default_rng(n).standard_normal((2, n, n))
     twin = P.copy()
     mirror(P, 1, rows)
-    mirror_plainly(twin, 1, rows)
+    for r in range(rows):
+        twin[1, r:, r] = twin[1, r, r:]
     np.testing.assert_array_equal(P, twin)
 
 
@@ -218,13 +219,13 @@ def test_a_step_is_a_product_with_its_derivatives(n, p, shape):
     np.testing.assert_array_equal(P[0], before[0])
 
 
-@pytest.mark.skipif(config.DISABLE_JIT, reason="the plain loops are all there is")
+@pytest.mark.skipif(not USES_SIMD, reason="plain loops only")
 @pytest.mark.parametrize("add", [add_to_rows, add_to_columns])
 @pytest.mark.parametrize("lanes", [2, 4, 8])
 def test_a_step_in_registers_of_any_width_is_the_same(monkeypatch, lanes, add):
-    monkeypatch.setattr(vectors, "LANES", lanes)
+    monkeypatch.setattr(simd, "LANES", lanes)
     fresh = njit(add.py_func)  # kept nowhere
-    plainly = add_to_rows_plainly if add is add_to_rows else add_to_columns_plainly
+    plainly = loops.add_to_rows if add is add_to_rows else loops.add_to_columns
     for shape in SHAPES:
         ours, twin = step_to_add(6, shape, 40, 1), step_to_add(6, shape, 40, 1)
         fresh(*ours)
@@ -232,10 +233,10 @@ def test_a_step_in_registers_of_any_width_is_the_same(monkeypatch, lanes, add):
         np.testing.assert_allclose(ours[0], twin[0], atol=1e-12)
 
 
-@pytest.mark.skipif(config.DISABLE_JIT, reason="the plain loops are all there is")
+@pytest.mark.skipif(not USES_SIMD, reason="plain loops only")
 @pytest.mark.parametrize("lanes", [2, 4, 8])
 def test_registers_of_any_width_give_the_same(monkeypatch, lanes):
-    monkeypatch.setattr(vectors, "LANES", lanes)
+    monkeypatch.setattr(simd, "LANES", lanes)
     fresh = njit(apply_downdate.py_func)  # kept nowhere
     rng = np.random.default_rng(lanes)
     for n in (8, 40):
@@ -243,21 +244,15 @@ def test_registers_of_any_width_give_the_same(monkeypatch, lanes):
         P, W = (A @ A.T)[None], rng.standard_normal((1, 8, n))
         twin = P.copy()
         fresh(P, 0, W, 0, 7, None)
-        apply_downdate_plainly(twin, 0, W, 0, 7, None)
+        loops.apply_downdate(twin, 0, W, 0, 7, None)
         np.testing.assert_allclose(P, twin, atol=1e-10)
         np.testing.assert_array_equal(P[0], P[0].T)
     fresh = njit(sum_rows.py_func)
     for n in (24, 56):
         arguments, summed = rows_to_sum(n, 8, 5, n), np.zeros(n)
         fresh(*arguments)
-        sum_rows_plainly(*arguments[:-1], summed)
+        loops.sum_rows(*arguments[:-1], summed)
         np.testing.assert_allclose(arguments[-1], summed, atol=1e-12)
-    fresh = njit(mirror.py_func)
-    P = rng.standard_normal((1, 20, 20))
-    twin = P.copy()
-    fresh(P, 0, 13)
-    mirror_plainly(twin, 0, 13)
-    np.testing.assert_array_equal(P, twin)
 
 
 @given(st.integers(0, 2**31), st.sampled_from([2, 3]), st.sampled_from([1, 2, 3, 6]))

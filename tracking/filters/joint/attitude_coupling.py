@@ -13,8 +13,8 @@ from __future__ import annotations
 
 from tracking.geometry import GRAVITY
 from tracking.jit import small_kernel
+from tracking.maths.covariance import STATES
 from tracking.maths.exponentials import decay
-from tracking.maths.simd.block_propagation import STATES
 
 PER_GRAVITY = 1.0 / GRAVITY
 """[s2/m] Tilt by which gravity gives a horizontal acceleration."""

@@ -8,7 +8,7 @@ from tracking.filters.joint.preintegration import preintegrate
 from tracking.filters.joint.propagation import predict
 from tracking.filters.joint.state import N_PRE, JointState
 from tracking.jit import kernel
-from tracking.maths.simd.low_rank_downdate import apply_downdate
+from tracking.maths.covariance import apply_downdate
 from tracking.reference import by_reference
 
 # Plain numbers of `Status`: kernels do not know enums.

@@ -31,8 +31,7 @@ import math
 from tracking.filters.joint.retraction import retract_rotation
 from tracking.filters.joint.scalar_update import flush_updates
 from tracking.jit import kernel, small_kernel
-from tracking.maths.simd.symmetrise import mirror
-from tracking.maths.simd.weighted_row_sum import sum_rows
+from tracking.maths.covariance import mirror, sum_rows
 
 ENOUGH = 0.01
 """[-] The covariance follows once the positions have moved by this share of the group's extent."""

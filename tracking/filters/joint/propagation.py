@@ -29,10 +29,8 @@ from tracking.filters.joint.gyro_bias import (
 from tracking.filters.joint.tilt_correction import apply_tilt_correction, tilt_bias_tau
 from tracking.jit import kernel, small_kernel
 from tracking.maths.angles import cosine_sine
+from tracking.maths.covariance import STATES, add_to_columns, add_to_rows, apply_downdate, mirror
 from tracking.maths.exponentials import decay
-from tracking.maths.simd.block_propagation import STATES, add_to_columns, add_to_rows
-from tracking.maths.simd.low_rank_downdate import apply_downdate
-from tracking.maths.simd.symmetrise import mirror
 
 
 @kernel

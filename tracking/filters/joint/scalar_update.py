@@ -14,8 +14,7 @@ from __future__ import annotations
 import math
 
 from tracking.jit import small_kernel
-from tracking.maths.simd.low_rank_downdate import apply_downdate
-from tracking.maths.simd.weighted_row_sum import sum_rows
+from tracking.maths.covariance import apply_downdate, sum_rows
 
 
 @small_kernel

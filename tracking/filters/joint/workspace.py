@@ -8,7 +8,7 @@ import numpy as np
 
 from tracking.arrays import F64, I64, aligned
 from tracking.filters.joint.state import N_PRE, room_to_wait
-from tracking.maths.simd.block_propagation import ROOM, STATES
+from tracking.maths.covariance import ROOM, STATES
 
 # What is rare and large is compiled apart (`rare`). In the order in which a range needs them:
 (

@@ -27,7 +27,7 @@ from tracking.filters.joint.hypotheses.alignment import LINEAR, has_modes
 from tracking.filters.joint.lever_arm import attach_to_world
 from tracking.filters.joint.propagation import moves, n_bias_states
 from tracking.jit import allocating_kernel, kernel, small_kernel
-from tracking.maths.simd.block_propagation import STATES
+from tracking.maths.covariance import STATES
 
 LOOSE = 3.0
 """[-] Each element of M has a variance of a third, over all rotations."""

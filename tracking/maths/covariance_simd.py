@@ -1,0 +1,293 @@
+"""The sums of `covariance` in vectors, as many numbers at a time as a register holds.
+
+A compiler finds vectors along a row by itself, but not that many sums can stay in registers while
+all that belongs to them is added, and not how to transpose a square there. `covariance_loops` has
+the same in plain loops.
+"""
+
+from __future__ import annotations
+
+import llvmlite.binding
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from tracking.maths.covariance_loops import STATES
+
+
+def _wide_registers():
+    """Whether registers of this machine hold eight numbers."""
+    try:
+        return bool(llvmlite.binding.get_host_cpu_features().get("avx512f"))
+    except RuntimeError:  # unknown here
+        return False
+
+
+LANES = 8 if _wide_registers() else 4
+"""Numbers of a vector."""
+LONG, SHORT = 48, 16
+"""Numbers of a row that are summed at a time: as many as registers hold, or few in short rows."""
+WIDE = 2
+"""Vectors side by side in a square of P: enough sums at a time to hide how long each takes."""
+SHAPES = ((2, 3), (3, 4), (3, 7))
+"""Dimensions, and states behind position and velocity: the plane, space, space with an offset."""
+DOUBLE, INT = ir.DoubleType(), ir.IntType(64)
+CONTRACT = ("contract",)  # products may be added without being rounded before
+
+
+def vector():
+    """Its type."""
+    return ir.VectorType(DOUBLE, LANES)
+
+
+def _places(numbers):
+    """Which of two vectors' numbers make a third."""
+    return ir.Constant(ir.VectorType(ir.IntType(32), LANES), numbers)
+
+
+def matrix_at(target, builder, kind, array, index):
+    """Where a matrix of an array begins, and how long its rows are."""
+    a = target.make_array(kind)(target, builder, array)
+    _, height, width = cgutils.unpack_tuple(builder, a.shape)
+    at = builder.mul(index, builder.mul(height, width))
+    return builder.gep(a.data, [at]), width
+
+
+def row_at(builder, matrix, row, below, length):
+    """Where a row begins, so many below another."""
+    return builder.gep(matrix, [builder.mul(builder.add(row, INT(below)), length)])
+
+
+def load(builder, row, at):
+    """A vector, from any address."""
+    address = builder.bitcast(builder.gep(row, [at]), vector().as_pointer())
+    return builder.load(address, align=8)
+
+
+def store(builder, numbers, row, at):
+    """Write a vector, to any address."""
+    address = builder.bitcast(builder.gep(row, [at]), vector().as_pointer())
+    builder.store(numbers, address, align=8)
+
+
+def spread(builder, row, at):
+    """A vector of one number, again and again."""
+    nothing = ir.Constant(vector(), ir.Undefined)
+    first = builder.insert_element(nothing, builder.load(builder.gep(row, [at])), INT(0))
+    return builder.shuffle_vector(first, nothing, _places([0] * LANES))
+
+
+def transpose(builder, block):
+    """LANES vectors across: halves change places, then halves of halves."""
+    block, half = list(block), LANES // 2
+    while half:
+        for i in range(LANES):
+            if not i & half:
+                upper, lower = block[i], block[i + half]
+                left = [LANES + k - half if k & half else k for k in range(LANES)]
+                right = [LANES + k if k & half else k + half for k in range(LANES)]
+                block[i] = builder.shuffle_vector(upper, lower, _places(left))
+                block[i + half] = builder.shuffle_vector(upper, lower, _places(right))
+        half //= 2
+    return block
+
+
+@intrinsic
+def sum_rows(context, P, h, idx, val, m, W, share, q, w):
+    """The code of `sum_rows` for at least a short stretch."""
+
+    def generate(target, builder, signature, arguments):
+        P, h, idx, val, m, W, share, q, w = arguments
+        kinds = signature.args
+        states, n = matrix_at(target, builder, kinds[0], P, h)
+        waiting, _ = matrix_at(target, builder, kinds[5], W, h)
+        idx, val, share, w = (
+            target.make_array(kinds[k])(target, builder, array).data
+            for k, array in ((2, idx), (3, val), (6, share), (8, w))
+        )
+        nothing = vector()([0.0] * LANES)
+        sums = [cgutils.alloca_once(builder, vector()) for _ in range(LONG // LANES)]
+
+        def stretch(column, totals):
+            """All rows of one stretch."""
+            at = [builder.add(column, INT(LANES * j)) for j in range(len(totals))]
+            for total in totals:
+                builder.store(nothing, total)
+            with cgutils.for_range(builder, m, intp=INT) as k:
+                row = row_at(builder, states, builder.load(builder.gep(idx, [k.index])), 0, n)
+                add(row, spread(builder, val, k.index), zip(totals, at, strict=True), builder.fadd)
+            with cgutils.for_range(builder, q, intp=INT) as k:
+                row = row_at(builder, waiting, k.index, 0, n)
+                add(
+                    row, spread(builder, share, k.index), zip(totals, at, strict=True), builder.fsub
+                )
+            for total, place in zip(totals, at, strict=True):
+                store(builder, builder.load(total), w, place)
+
+        def add(row, weight, totals, operation):
+            for total, place in totals:
+                product = builder.fmul(weight, load(builder, row, place), flags=CONTRACT)
+                changed = operation(builder.load(total), product, flags=CONTRACT)
+                builder.store(changed, total)
+
+        def stretches(length):
+            """A row. Its last stretch ends with it: some numbers are summed twice, to the same."""
+            last, step = builder.sub(n, INT(length)), INT(length)
+            with cgutils.for_range_slice(builder, INT(0), n, step, intp=INT) as (column, _):
+                beyond = builder.icmp_signed(">", column, last)
+                stretch(builder.select(beyond, last, column), sums[: length // LANES])
+
+        with builder.if_else(builder.icmp_signed(">=", n, INT(LONG))) as (then, otherwise):
+            with then:
+                stretches(LONG)
+            with otherwise:
+                stretches(SHORT)
+        return target.get_dummy_value()
+
+    return types.void(P, h, idx, val, m, W, share, q, w), generate
+
+
+def _counts(d, m, r, q):
+    """Whether row r gains anything by state q."""
+    upright, rises = q == 2 and d == 3, r % d == 2
+    if m == STATES:
+        return rises or not upright
+    return rises == upright
+
+
+def _for_each_shape(builder, m, generate):
+    """The code of every shape; which of it runs is known by the number of states."""
+    for d, states in SHAPES:
+        with builder.if_then(builder.icmp_signed("==", m, INT(states))):
+            generate(d, states)
+
+
+def _add_product(builder, total, one, other):
+    return builder.fadd(total, builder.fmul(one, other, flags=CONTRACT), flags=CONTRACT)
+
+
+@intrinsic
+def add_to_rows(context, P, h, p, b, m, F, i):
+    """The code of `add_to_rows` for whole vectors."""
+
+    def generate(target, builder, signature, arguments):
+        P, h, p, b, m, F, i = arguments
+        states, n = matrix_at(target, builder, signature.args[0], P, h)
+        gains, room = matrix_at(target, builder, signature.args[5], F, i)
+
+        def gain(q, r):
+            return spread(builder, row_at(builder, gains, INT(q), 0, room), INT(r))
+
+        def add(d, m):
+            time = gain(STATES, 0)
+            each = [[q for q in range(m) if _counts(d, m, r, q)] for r in range(2 * d)]
+            weights = [{q: gain(q, r) for q in each[r]} for r in range(2 * d)]
+            step = INT(LANES)
+            with cgutils.for_range_slice(builder, INT(0), n, step, intp=INT) as (column, _):
+                own = [row_at(builder, states, p, r, n) for r in range(2 * d)]
+                behind = [row_at(builder, states, b, q, n) for q in range(m)]
+                known = [load(builder, row, column) for row in behind]
+                totals = [load(builder, row, column) for row in own]
+                for r in range(d):
+                    totals[r] = _add_product(builder, totals[r], time, totals[d + r])
+                for r in range(2 * d):
+                    for q, weight in weights[r].items():
+                        totals[r] = _add_product(builder, totals[r], weight, known[q])
+                    store(builder, totals[r], own[r], column)
+
+        _for_each_shape(builder, m, add)
+        return target.get_dummy_value()
+
+    return types.void(P, h, p, b, m, F, i), generate
+
+
+@intrinsic
+def add_to_columns(context, P, h, p, b, m, F, i):
+    """The code of `add_to_columns`. What stands behind them in a vector gains nothing."""
+
+    def generate(target, builder, signature, arguments):
+        P, h, p, b, m, F, i = arguments
+        states, n = matrix_at(target, builder, signature.args[0], P, h)
+        gains, room = matrix_at(target, builder, signature.args[5], F, i)
+
+        def add(d, m):
+            parts = range(0, 2 * d, LANES)
+            lines = [row_at(builder, gains, INT(q), 0, room) for q in range(STATES + 1)]
+            weights = [[load(builder, line, INT(at)) for at in parts] for line in lines]
+            end = builder.add(p, INT(2 * d))
+            with cgutils.for_range(builder, end, intp=INT) as r:
+                row = row_at(builder, states, r.index, 0, n)
+                known = [spread(builder, row, builder.add(b, INT(q))) for q in range(m)]
+                totals = []
+                for j, at in enumerate(parts):
+                    total = load(builder, row, builder.add(p, INT(at)))
+                    if at < d:
+                        velocity = load(builder, row, builder.add(p, INT(d + at)))
+                        total = _add_product(builder, total, weights[STATES][j], velocity)
+                    for q in range(m):
+                        total = _add_product(builder, total, weights[q][j], known[q])
+                    totals.append(total)
+                for total, at in zip(totals, parts, strict=True):
+                    store(builder, total, row, builder.add(p, INT(at)))
+
+        _for_each_shape(builder, m, add)
+        return target.get_dummy_value()
+
+    return types.void(P, h, p, b, m, F, i), generate
+
+
+@intrinsic
+def apply_downdate(context, P, h, W, g, m, scale):
+    """The code of `apply_downdate` for whole squares."""
+    fades = not isinstance(scale, types.NoneType)
+
+    def generate(target, builder, signature, arguments):
+        P, h, W, g, m, scale = arguments
+        states, n = matrix_at(target, builder, signature.args[0], P, h)
+        rows, _ = matrix_at(target, builder, signature.args[2], W, g)
+        if fades:
+            scale = target.make_array(signature.args[5])(target, builder, scale).data
+        sums = [[cgutils.alloca_once(builder, vector()) for _ in range(WIDE)] for _ in range(LANES)]
+
+        def square(row, column, wide):
+            """Take off LANES rows of P, wide vectors of each; the other half follows."""
+            own = [row_at(builder, states, row, i, n) for i in range(LANES)]
+            columns = [builder.add(column, INT(LANES * j)) for j in range(wide)]
+            each = [(i, j) for i in range(LANES) for j in range(wide)]
+            for i, j in each:
+                builder.store(load(builder, own[i], columns[j]), sums[i][j])
+            with cgutils.for_range(builder, m, intp=INT) as q:
+                w = row_at(builder, rows, q.index, 0, n)
+                right = [load(builder, w, at) for at in columns]
+                left = [spread(builder, w, builder.add(row, INT(i))) for i in range(LANES)]
+                for i, j in each:
+                    product = builder.fmul(left[i], right[j], flags=CONTRACT)
+                    total = builder.fsub(builder.load(sums[i][j]), product, flags=CONTRACT)
+                    builder.store(total, sums[i][j])
+            if fades:
+                keep = [spread(builder, scale, builder.add(row, INT(i))) for i in range(LANES)]
+            for j, at in enumerate(columns):
+                block = [builder.load(sums[i][j]) for i in range(LANES)]
+                if fades:
+                    # Of the two first, so that both halves are rounded alike.
+                    both = load(builder, scale, at)
+                    block = [
+                        builder.fmul(total, builder.fmul(one, both))
+                        for total, one in zip(block, keep, strict=True)
+                    ]
+                for i, numbers in enumerate(block):
+                    store(builder, numbers, own[i], at)
+                for i, numbers in enumerate(transpose(builder, block)):
+                    store(builder, numbers, row_at(builder, states, at, i, n), row)
+
+        step, width = INT(LANES), INT(LANES * WIDE)
+        with cgutils.for_range_slice(builder, INT(0), n, step, intp=INT) as (row, _):
+            whole = builder.sub(n, builder.srem(builder.sub(n, row), width))
+            with cgutils.for_range_slice(builder, row, whole, width, intp=INT) as (column, _):
+                square(row, column, WIDE)
+            with cgutils.for_range_slice(builder, whole, n, step, intp=INT) as (column, _):
+                square(row, column, 1)
+        return target.get_dummy_value()
+
+    return types.void(P, h, W, g, m, scale), generate
