@@ -9,7 +9,7 @@ from agents.settings import number
 
 MOST_SEED = 2147483647
 """Seeds have 31 bits."""
-FORMAT = 9
+FORMAT = 10
 """Version of the run folder; another one is refused."""
 
 
@@ -103,6 +103,9 @@ class TrainConfig:
     runs: int = number(1, 1, 64)
     """Runs side by side, with seeds from `seed` on, each in a process of its own; the best policy
     of them is kept."""
+    begin: str = ""
+    """Policy whose network the run begins with: a name, a file or a folder. Its task, observation
+    and shape must be those of the run. A tenth of the frames first teach the critic alone."""
     seed: int = number(0, 0, MOST_SEED)
     """Same seed, same weights, bit for bit on one machine with equal versions and threads."""
     leg: int = number(40, 1, 10000)

@@ -17,11 +17,14 @@ from agents.train.buffer import SwarmRolloutBuffer
 from agents.train.config import TrainConfig
 from agents.train.environments import layout_of, weights_of
 from agents.train.hyperbolic import Tanh
-from agents.train.network import SwarmPolicy
+from agents.train.network import Actor, SwarmPolicy
 from agents.train.rooms import Rooms, observation_space
 from relpos_env.interface.actions import ContinuousActions
 from relpos_env.state_space import N_TRUTH
 
+CRITIC_ALONE = 0.1
+"""[-] Share of a run that begins with a policy in which only the critic learns: before it knows
+what that policy is worth, its errors would undo it."""
 FALL = (0.5, 0.7)
 """[-] Shares of the run between which the bound on the noise of actions falls."""
 
@@ -122,6 +125,8 @@ def learn(model: PPO, config: TrainConfig, tell: Callable[[int], None] | None = 
         callbacks.append(_Tells(tell))
     if config.env.final_weights:
         callbacks.append(_Weights(config))
+    if config.begin:
+        callbacks.append(_CriticAlone(config))
     model.learn(frames, callbacks, reset_num_timesteps=False, log_interval=config.leg)
 
 
@@ -180,6 +185,24 @@ class _Noise(BaseCallback):  # type: ignore[misc]
             with torch.no_grad():
                 most = net.log_std + fallen * (net.final_log_std - net.log_std)
                 self.model.policy.log_std.clamp_(max=most)
+
+    def _on_step(self) -> bool:
+        return True
+
+
+class _CriticAlone(BaseCallback):  # type: ignore[misc]
+    """Keeps the actor as it was given until the critic has learned what it is worth."""
+
+    def __init__(self, config: TrainConfig) -> None:
+        super().__init__()
+        self._config = config
+
+    def _on_rollout_start(self) -> None:
+        learns = share_done(self._config, self.model.num_timesteps) >= CRITIC_ALONE
+        policy = self.model.policy
+        for weight in (*Actor(policy).parameters(), policy.log_std):
+            weight.requires_grad_(learns)
+            weight.grad = None
 
     def _on_step(self) -> bool:
         return True

@@ -10,10 +10,12 @@ from typing import Any
 from agents.output import write_results
 from agents.policy.card import check_name
 from agents.report.train_report import train_report
+from agents.train.begin import begin_with
 from agents.train.choice import choose, keep_choice
 from agents.train.config import TrainConfig
 from agents.train.environments import check_environments
 from agents.train.export import export_policy
+from agents.train.learner import make_policy
 from agents.train.run_folder import RunFolder
 from agents.train.side_by_side import train_side_by_side
 from agents.train.train import train
@@ -72,6 +74,8 @@ def train_policy(
     else:
         if not resumed:
             check_environments(config)
+            if config.begin:
+                begin_with(make_policy(config), config)
             RunFolder(folder).create(config)
         folders = [folder / f"seed-{seed}" for seed in seeds]
         results = train_side_by_side(configs, folders, tell)

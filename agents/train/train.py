@@ -20,10 +20,11 @@ from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
 from torch import Tensor
 
 from agents.errors import UsageError
+from agents.train.begin import begin_with
 from agents.train.config import TrainConfig
 from agents.train.environments import check_environments, layout_of, make_rooms
 from agents.train.evaluation import Evaluation
-from agents.train.learner import level_of, make_model, run_leg
+from agents.train.learner import level_of, make_model, make_policy, run_leg
 from agents.train.progress import Progress
 from agents.train.run_folder import RunFolder, restore, tensors_of
 
@@ -64,6 +65,8 @@ def train(
     config = run.config() if config is None else config
     every = check_environments(config)
     if not resumed:
+        if config.begin:
+            begin_with(make_policy(config), config)
         run.create(config)
     tensors, state = run.load() or (None, Progress())
     torch.set_num_threads(config.threads)
@@ -134,6 +137,8 @@ class _Learner:
         model.num_timesteps = frames
         if tensors is not None:
             restore(model.policy, model.policy.optimizer, tensors)
+        elif config.begin:
+            begin_with(model.policy, config)
         return cls(model, level)
 
 

@@ -21,6 +21,7 @@ from agents.errors import UsageError
 from agents.policy import load_policy
 from agents.policy.layout import Layout
 from agents.settings import as_options, from_options
+from agents.train.begin import begin_with
 from agents.train.config import TrainConfig
 from agents.train.environments import (
     check_environments,
@@ -32,7 +33,7 @@ from agents.train.environments import (
 )
 from agents.train.evaluation import Evaluation
 from agents.train.export import export_policy, read_results
-from agents.train.learner import level_of, make_model, make_policy
+from agents.train.learner import level_of, make_model, make_policy, run_leg
 from agents.train.network import Actor
 from agents.train.run import train_policy
 from agents.train.run_folder import BEST, LAST, RunFolder, restore_weights
@@ -63,6 +64,37 @@ def test_same_seed_same_weights(run, tmp_path):
     assert same(weights(run.folder), weights(tmp_path / "again"))
     train(small(seed="1"), tmp_path / "other")
     assert not same(weights(run.folder), weights(tmp_path / "other"))
+
+
+def test_a_run_begins_with_a_policy(run, policy, tmp_path):
+    config = small(begin=str(policy), seed="5", leg="1")
+    model = make_model(config, make_rooms(config, None))
+    begin_with(model.policy, config)
+    trained = make_policy(small())
+    restore_weights(trained, RunFolder(run.folder).load(BEST)[0])
+    given = dict(Actor(trained).named_parameters())
+    begun = {k: w.detach().clone() for k, w in Actor(model.policy).named_parameters()}
+    assert all(torch.equal(w, given[k]) for k, w in begun.items())
+    critic = model.policy.value_net.weight.detach().clone()
+    run_leg(model, config, 0)  # the critic alone at first
+    assert all(torch.equal(w, begun[k]) for k, w in Actor(model.policy).named_parameters())
+    assert not torch.equal(model.policy.value_net.weight, critic)
+
+
+@pytest.mark.parametrize(
+    ("begin", "other", "message"),
+    [
+        ("nobody", {}, "no such file"),
+        ("hold", {}, "other numbers"),
+        (None, {"width": "16"}, "another shape"),
+    ],
+)
+def test_a_run_does_not_begin_with_a_policy_that_does_not_fit(
+    policy, tmp_path, begin, other, message
+):
+    with pytest.raises(UsageError, match=message):
+        train(small(begin=begin or str(policy), **other), tmp_path / "run")
+    assert not (tmp_path / "run").exists()
 
 
 def test_a_run_that_was_stopped_goes_on_as_if_it_had_not_been(run, tmp_path):
