@@ -20,10 +20,8 @@ from tracking.filters.joint.propagation import moves, predict
 from tracking.filters.joint.range_update import range_update
 from tracking.filters.joint.scalar_update import flush_all_updates
 from tracking.filters.joint.state import N_PRE, one_env
-from tracking.filters.joint.supervision.fault_detection import (
-    update_residual_statistics,
-)
 from tracking.filters.joint.supervision.frozen_range import is_frozen
+from tracking.filters.joint.supervision.residuals import update_residuals
 from tracking.filters.joint.supervision.staleness import is_silent, note_seen, update_interval
 from tracking.filters.joint.supervision.supervise import supervise
 from tracking.filters.joint.surveyed_distance import surveyed_distance_update
@@ -52,8 +50,6 @@ from tracking.reference import by_reference
 STATE, SURVEY, RANGE, LEAVE = 3, 4, 5, 6
 SAME = 1e-5
 """[s] Ranges of one message differ by their rounding only: they share a prediction."""
-GAUGE_PERIOD = 1.0
-"""[s] Time between two moves of the centre to the origin."""
 
 
 @kernel
@@ -188,7 +184,7 @@ def predict_to(c, s, work, t, at_once):
             if s.alive[h]:
                 apply_motion_constraints(c, s, h, t, t - group.t_constraints, work)
         group.t_constraints = t
-    if t - group.t_gauge + SAME >= GAUGE_PERIOD:
+    if t - group.t_gauge + SAME >= c.centre_period:
         first, end = hypothesis_range(s)
         for h in range(first, end):
             if s.alive[h]:
@@ -242,12 +238,7 @@ def update_range(c, s, layout, work, p, a_i, a_j, t, distance, sight, is_survey)
         nu, misfit, nis, weight = range_update(c, s, h, p, dt, distance, levers, sight, work)
         if h == group.best:
             pair.nis = nis
-            capped = min(misfit, 25.0) if weight > 0.5 else 25.0
-            pair.mean_nis += 0.05 * (capped - pair.mean_nis)
-            fits = 1.0 if weight > 0.5 and misfit < 6.0 else 0.0
-            update_residual_statistics(c, s, p, dt, distance, fits, nu)
-            if not (s.nodes[pair.i].faulty or s.nodes[pair.j].faulty):
-                group.mean_nis += 0.01 * (weight * capped - group.mean_nis)
+            update_residuals(c, s, p, dt, distance, nu, misfit, weight)
             if weight > 0.5:
                 group.nis_sum += nis
                 group.nis_n += 1

@@ -27,11 +27,6 @@ from tracking.models.mean_velocity import mean_velocity_model
 from tracking.models.nonholonomic import nonholonomic_model
 from tracking.models.zero_velocity import zero_velocity_model
 
-GLIDES = 9.0
-"""[-] Square of the standard deviations by which a velocity differs from zero."""
-CENTRE_VAR = 1.0
-"""[m2] Variance of the centre after it was moved back."""
-
 
 @kernel
 def apply_motion_constraints(c, s, h, t, dt, work):
@@ -80,8 +75,8 @@ def is_known_to_move(c, s, h, i):
     for k in range(c.d):
         at = s.nodes[i].i_vel + k
         v = s.x[h, at]
-        floor = GLIDES * c.rest_var
-        if v * v > floor and v * v > floor + GLIDES * covariance(s, h, at, at):
+        floor = c.glide_nis * c.rest_var
+        if v * v > floor and v * v > floor + c.glide_nis * covariance(s, h, at, at):
             return True
     return False
 
@@ -92,11 +87,11 @@ def apply_constraint(c, s, h, nu, m, variance, work):
     S, open_var = compute_pht(s, h, m, work) + variance, 0.0
     if is_linear(s.group[0]):
         open_var = innovation_sensitivity(s, h, m, work)
-        accumulate_alignment_information(s, h, work, nu, max(S, nu * nu / 25.0))
+        accumulate_alignment_information(s, h, work, nu, max(S, nu * nu / c.jolt_nis))
     if s.group[0].n_alive > 1:
         s.loglik[h] -= 0.5 * min(nu * nu / (S + open_var), c.nis_cap)
-    if nu * nu > 25.0 * S:
-        S = nu * nu / 25.0  # a jolt or a skid: it counts for less
+    if nu * nu > c.jolt_nis * S:
+        S = nu * nu / c.jolt_nis  # a jolt or a skid: it counts for less
     kalman_update(s, h, work.w, nu, S)
 
 
@@ -207,5 +202,5 @@ def centre(c, s, h, w):
         for i in range(n_nodes):
             for j in range(n_nodes):
                 if s.nodes[i].present and s.nodes[j].present:
-                    s.P[h, s.nodes[i].i_pos + k, s.nodes[j].i_pos + k] += CENTRE_VAR
+                    s.P[h, s.nodes[i].i_pos + k, s.nodes[j].i_pos + k] += c.centre_std**2
     symmetrise(s.P, h, c.n)

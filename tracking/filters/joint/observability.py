@@ -33,12 +33,6 @@ from tracking.filters.joint.scalar_update import flush_updates
 from tracking.jit import kernel, small_kernel
 from tracking.maths.covariance import mirror, sum_rows
 
-ENOUGH = 0.01
-"""[-] The covariance follows once the positions have moved by this share of the group's extent."""
-FALSE = 0.05
-"""[-] Or once a range would see an uncertain turn of the plane by this share of its noise."""
-MOST = 0.3
-"""[-] It follows a move by at most this share at once."""
 LINE = 1e-3
 """[-] Share of a group's extent that a line has across, so that it has a rotation about itself."""
 
@@ -64,12 +58,13 @@ def enforce_observability(c, s, h, work):
                 at = s.nodes[i].i_pos + k
                 extent2 += (s.x[h, at] - mean / present) ** 2
                 moved2 += (s.accumulated_correction[h, at] - shift / present) ** 2
-    false2 = moved2 * s.group[0].heading_gauge_var
     if present < 3:
         s.accumulated_correction[h, :] = 0.0
-    elif moved2 > ENOUGH * ENOUGH * extent2 or false2 > FALSE * FALSE * c.white_var:
+        return
+    is_far = moved2 > c.follow_share**2 * extent2
+    if is_far or moved2 * s.group[0].heading_gauge_var > c.follow_false**2 * c.white_var:
         flush_updates(s, h)
-        shift_nullspace(c, s, h, min(1.0, MOST * math.sqrt(extent2 / moved2)), work)
+        shift_nullspace(c, s, h, min(1.0, c.follow_most * math.sqrt(extent2 / moved2)), work)
 
 
 @small_kernel

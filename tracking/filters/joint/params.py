@@ -130,6 +130,45 @@ class JointStartParams:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class UpdateParams:
+    """How a measurement corrects: linearisation, robust weights, what is at rest.
+
+    All are the authors' choice, on simulated runs.
+    """
+
+    largest_bend: float = 0.2
+    """[m] The error of linearisation counts for at most this."""
+    reset_at_once: float = 0.1
+    """[-] A sight that may have changed with a smaller probability is forgotten with the next
+    prediction, which costs nothing."""
+    contradiction_share: float = 0.7
+    """[-] A pair whose `contradiction` is above this share of `JointParams.pair_nis_limit` counts
+    less, by the fourth power."""
+    jolt_nis: float = 25.0
+    """[-] A motion constraint with a larger NIS counts less: a jolt, a skid."""
+    glide_nis: float = 9.0
+    """[-] A node that looks at rest, but whose velocity is known with this NIS, glides."""
+    centre_std: float = 1.0
+    """[m] Uncertainty of the centre of the group, which nothing measures."""
+    centre_period: float = 1.0
+    """[s] Time between two moves of the centre to the origin."""
+    follow_share: float = 0.01
+    """[-] The covariance follows the positions once measurements have moved them by this share of
+    the extent of the group."""
+    follow_false: float = 0.05
+    """[-] Or once a range sees an uncertain rotation by this share of its noise."""
+    follow_most: float = 0.3
+    """[-] It follows by at most this share of the extent at once."""
+    yaw_rate_tau: float = 0.05
+    """[s] Low pass of the yaw rate of a vehicle that cannot move sideways."""
+    rest_tau: float = 0.1
+    """[s] Low passes of the rest detection."""
+
+    def __post_init__(self) -> None:
+        check_numbers(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class JointParams:
     """One filter over all nodes."""
 
@@ -139,6 +178,7 @@ class JointParams:
     nlos: NlosParams = field(default_factory=NlosParams)
     """In the plane."""
     nlos_in_space: NlosParams = NLOS_IN_SPACE
+    update: UpdateParams = field(default_factory=UpdateParams)
     start: JointStartParams = field(default_factory=JointStartParams)
     alignment: AlignmentParams = field(default_factory=AlignmentParams)
     supervision: SupervisionParams = field(default_factory=SupervisionParams)

@@ -89,9 +89,9 @@ def process_attitude(c, nodes, held, pre, i, t, values, e, k):
         cosine = abs(w * qw + x * qx + y * qy + z * qz)
         angle = 2.0 * math.sqrt(max(2.0 * (1.0 - min(cosine, 1.0)), 0.0))
         turn = angle_between(node.cos_yaw, node.sin_yaw, cos_yaw, sin_yaw)
-        keep = decay(dt / 0.05)
+        keep = decay(dt / c.yaw_rate_tau)
         node.yaw_rate = keep * node.yaw_rate + (1.0 - keep) * turn / dt
-        keep = decay(dt / 0.1)
+        keep = decay(dt / c.rest_tau)
         node.turning = keep * node.turning + (1.0 - keep) * angle / dt
     held[i, 0], held[i, 1], held[i, 2], held[i, 3] = w, x, y, z
     if node.levelled:
@@ -125,7 +125,7 @@ def update_rest_detector(c, node, t, dt, accel, fresh):
         node.yaw_rate = 0.0
         node.t_first = node.t_moved = node.t_accelerated = t
         return
-    keep = decay(dt / 0.1)
+    keep = decay(dt / c.rest_tau)
     off = accel - node.accel_mean
     node.accel_mean += (1.0 - keep) * off
     node.accel_var = keep * node.accel_var + (1.0 - keep) * off * off

@@ -23,15 +23,14 @@ from tracking.filters.joint.nlos_model import reset_bias_on_transition, update_n
 from tracking.filters.joint.observability import enforce_observability
 from tracking.filters.joint.propagation import displacement_since_epoch, time_since_epoch
 from tracking.filters.joint.scalar_update import compute_pht, kalman_update
+from tracking.filters.joint.supervision.residuals import contradiction
 from tracking.jit import kernel, small_kernel
 from tracking.models.lever_arm import lever_arm_slope, rotate_lever_arm
 from tracking.models.range import range_model
 from tracking.models.range_bias import range_bias_model
 
-NEGLIGIBLE, MOST_BENT = 1e-3, 0.2
-"""[-, m] Share of the noise that is not worth working out; the most a range is thought bent."""
-AT_ONCE = 0.1
-"""[-] A sight that may have changed with a smaller probability is forgotten with the next step."""
+NEGLIGIBLE = 1e-3
+"""[-] Share of the noise that is not worth working out."""
 
 
 @small_kernel
@@ -141,7 +140,7 @@ def second_order_variance(c, s, h, p, val):
         part = u0 * off0 + u1 * off1 + u2 * off2
         along -= part * part
     trace -= t0 + t1 + t2
-    return min(gain * max(trace - along, 0.0), MOST_BENT) ** 2
+    return min(gain * max(trace - along, 0.0), c.largest_bend) ** 2
 
 
 @small_kernel
@@ -190,7 +189,7 @@ def range_update(c, s, h, p, dt, distance, levers, sight, work):
         # bent, and wrong ones, bent most, look surest: only how well they fit counts.
         s.loglik[h] += max(math.log(likelihood) + 0.5 * math.log(S), -0.5 * c.nis_cap)
     before, misfit = nu, nu * nu / S
-    if switched < AT_ONCE or s.pairs[p].i_range_error < 0:
+    if switched < c.reset_at_once or s.pairs[p].i_range_error < 0:
         s.bias_retention[h, p] *= 1.0 - switched
     else:
         reset_bias_on_transition(c, s, h, p, switched, is_far)
@@ -202,7 +201,7 @@ def range_update(c, s, h, p, dt, distance, levers, sight, work):
     R = c.white_var + bent + s.nlos[h, p] * c.nlos_white_var
     nis = nu * nu / (variance + open_var + R)
     # Ranges of a pair that have long contradicted all others count less and less.
-    doubt = s.pairs[p].mean_nis / (0.7 * c.pair_nis_limit)
+    doubt = contradiction(c, s.pairs[p]) / (c.contradiction_share * c.pair_nis_limit)
     trust = sane
     if doubt > 1.0:
         trust /= doubt * doubt * doubt * doubt

@@ -21,7 +21,7 @@ from tracking.filters.joint.hypotheses.initialisation import join, start
 from tracking.filters.joint.hypotheses.static_initialisation import spawn_rotation_hypotheses
 from tracking.filters.joint.scalar_update import flush_all_updates
 from tracking.filters.joint.state import one_env
-from tracking.filters.joint.supervision.reinitialisation import reinitialise_node
+from tracking.filters.joint.supervision.actions import reinitialise_node
 from tracking.filters.joint.supervision.staleness import drop_stale
 from tracking.filters.joint.surveyed_distance import apply_surveys
 from tracking.filters.joint.workspace import ENV, EVENT, FLAG, NODE

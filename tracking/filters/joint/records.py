@@ -29,9 +29,8 @@ NODE = np.dtype(
         ("t_moved", "f8"),  # last time it was not at rest [s]
         ("t_accelerated", "f8"),  # last time its acceleration showed it [s]
         ("accel_noise", "f8"),  # added noise density of its last sample [m/s2/sqrt(Hz)]
-        ("outlier_ratio", "f8"),  # running share of its ranges that do not fit [-]
-        ("t_faulty", "f8"),  # when it last disagreed with the group [s]
-        ("faulty", "?"),  # it has, lately
+        ("fault", "i8"),  # see `faults.Fault`
+        ("t_fault", "f8"),  # when its statistic was last beyond the limit [s]
         ("has_state", "?"),
         ("seen", "?"),
         ("present", "?"),
@@ -73,13 +72,13 @@ PAIR = np.dtype(
         ("t_used", "f8"),  # time of the last range that counted [s]
         ("interval", "f8"),  # running mean of the time between two ranges [s]
         ("nis", "f8"),  # NIS of the last range in the best hypothesis [-]
-        ("mean_nis", "f8"),  # running mean of it [-]
+        ("mean_nis", "f8"),  # running mean of it, by the probability that a range means anything
+        ("outlier_ratio", "f8"),  # running share of ranges that mean nothing [-]
         ("last_range", "f8"),  # its last range as reported [m]
         ("t_last", "f8"),  # when it came [s]
         ("n_equal", "i8"),  # ranges before it that were equal
         ("distance_travelled", "f8"),  # what both ends travelled meanwhile [m]
-        ("mean_residual", "f8"),  # running mean of its innovations [m]
-        ("clipped_mean_residual", "f8"),  # the same, single ones counting as 1 m off at most [m]
+        ("mean_residual", "f8"),  # running mean of innovations, none more than 1 m from it [m]
         ("mean_abs_residual", "f8"),  # running mean of their distance from it [m]
         ("last_used", "f8"),  # its last range that was used [m]
         ("rate_violation", "f8"),  # running mean of what they change faster than things move [m]
@@ -108,16 +107,9 @@ GROUP = np.dtype(
         ("t_constraints", "f8"),
         ("t_gauge", "f8"),
         ("t_scoring_starts", "f8"),  # until when no likelihood counts [s]
-        (
-            "heading_gauge_var",
-            "f8",
-        ),  # of the turn of a group in the plane, lately; 0 in space [rad2]
-        (
-            "mean_nis",
-            "f8",
-        ),  # running mean of NIS of ranges that mean anything, not of doubted nodes
-        ("slow_nis", "f8"),  # slow running mean of the misfit [-]
-        ("challenge_nis", "f8"),  # how much of it brings up other rotations [-]
+        ("heading_gauge_var", "f8"),  # of the rotation of a group in the plane; 0 in space [rad2]
+        ("misfit", "f8"),  # running mean of the NIS of all pairs [-]
+        ("misfit_limit", "f8"),  # how much of it brings up other rotations [-]
         ("nis_sum", "f8"),
         ("nis_n", "i8"),
     ]

@@ -22,8 +22,7 @@ import numpy as np
 from tracking.arrays import F64
 from tracking.geometry import GRAVITY, quat_to_matrix
 
-STEP, CENTRE_VAR = 1e-30, 1.0
-AT_ONCE, NEGLIGIBLE, MOST_BENT, ENOUGH, FALSE, MOST, LINE = 0.1, 1e-3, 0.2, 0.01, 0.05, 0.3, 1e-3
+STEP, NEGLIGIBLE, LINE = 1e-30, 1e-3, 1e-3
 
 
 def decay(ratio: Any) -> Any:
@@ -69,9 +68,9 @@ class JointReference:
         before = node["cos_yaw"] - 1j * node["sin_yaw"]
         turn = np.angle(before * (direction[0] + 1j * direction[1]))
         angle = 2.0 * np.sqrt(max(2.0 * (1.0 - min(abs(q @ held[:4]), 1.0)), 0.0))
-        keep = decay(dt / 0.05)
+        keep = decay(dt / self.c["yaw_rate_tau"])
         node["yaw_rate"] = keep * node["yaw_rate"] + (1.0 - keep) * turn / dt
-        keep = decay(dt / 0.1)
+        keep = decay(dt / self.c["rest_tau"])
         node["turning"] = keep * node["turning"] + (1.0 - keep) * angle / dt
         accel = 1.0 * accel
         if node["levelled"]:
@@ -165,10 +164,10 @@ class JointReference:
         pos, shift = self.x[at], self.moved[at]
         out2 = ((pos - pos.mean(axis=0)) ** 2).sum()
         moved2 = ((shift - shift.mean(axis=0)) ** 2).sum()
-        false2 = moved2 * self.group["heading_gauge_var"]
-        if moved2 <= ENOUGH**2 * out2 and false2 <= FALSE**2 * c["white_var"]:
+        false2 = moved2 * self.group["heading_gauge_var"] / c["white_var"]
+        if moved2 <= c["follow_share"] ** 2 * out2 and false2 <= c["follow_false"] ** 2:
             return
-        share, G = min(1.0, MOST * np.sqrt(out2 / moved2)), np.zeros(n)
+        share, G = min(1.0, c["follow_most"] * np.sqrt(out2 / moved2)), np.zeros(n)
         A = self.read_rotation(pos - shift) / (1.0 + LINE)
         move = share * (shift - shift.mean(axis=0))
         G[at] = np.stack([-move[:, 1], move[:, 0]], axis=1)
@@ -230,8 +229,8 @@ class JointReference:
         switched = (chance[0, 1] + chance[1, 0]) / total
         self.nlos[p] = hidden = np.clip(chance[:, 1].sum() / total, 1e-4, 1.0 - 1e-4)
         sane = total / (total + np.sqrt(2.0 * np.pi) * c["outlier_prob"] / c["outlier_span"])
-        misfit = nu * nu / S
-        if switched < AT_ONCE:
+        nis = min(nu * nu / S, c["largest_nis"])
+        if switched < c["reset_at_once"]:
             self.stays[p] *= 1.0 - switched
         else:
             keep, old_var = np.ones(len(self.x)), self.P[slow, slow]
@@ -242,12 +241,14 @@ class JointReference:
             self.P[slow, slow] += switched * (stays * old_var + new_var + stays * off * off)
             self.x[slow] -= switched * off
             nu = z - model(self.x)
-        R, doubt = c["white_var"] + bent + hidden * c["nlos_white_var"], pair["mean_nis"]
-        trust = sane / max(doubt / (0.7 * c["pair_nis_limit"]), 1.0) ** 4
+        R = c["white_var"] + bent + hidden * c["nlos_white_var"]
+        doubt = pair["mean_nis"] + c["largest_nis"] * pair["outlier_ratio"]
+        trust = sane / max(doubt / (c["contradiction_share"] * c["pair_nis_limit"]), 1.0) ** 4
         if trust > 1e-3:
             self.update(H, nu, R / trust)
-        capped = min(misfit, 25.0) if sane > 0.5 else 25.0
-        pair["mean_nis"] += 0.05 * (capped - pair["mean_nis"])
+        gain, outlier = c["residual_gain"], sane <= 0.5 or nis >= c["outlier_nis"]
+        pair["mean_nis"] += gain * (sane * nis - pair["mean_nis"])
+        pair["outlier_ratio"] += gain * (outlier - pair["outlier_ratio"])
         pair["t_range"] = t
 
     def second_order(self, p: int, H: F64) -> float:  # noqa: N803
@@ -259,7 +260,7 @@ class JointReference:
         gain = 0.5 * c["nonlinearity_gain"] / np.sqrt(out @ out + 0.01)
         if (gain * np.trace(cov)) ** 2 < NEGLIGIBLE * c["white_var"]:
             return 0.0
-        return float(min(gain * max(np.trace(cov) - u @ cov @ u, 0.0), MOST_BENT) ** 2)
+        return float(min(gain * max(np.trace(cov) - u @ cov @ u, 0.0), c["largest_bend"]) ** 2)
 
     def constrain(self, t: float) -> None:
         """Zero velocity of nodes at rest, axles that do not slide, the mean velocity of a group."""
@@ -272,11 +273,11 @@ class JointReference:
                     node["t_moved"] = t
                     continue
                 for k in range(2):
-                    self.update(np.eye(n)[v + k], -self.x[v + k], c["rest_var"], 25.0)
+                    self.update(np.eye(n)[v + k], -self.x[v + k], c["rest_var"], c["jolt_nis"])
             elif node["sideways_var"] > 0.0:
                 model = partial(self.slides, node, v, y)
                 nu = node["rear_axle"] * node["yaw_rate"] - model(self.x)
-                self.update(jacobian(model, self.x), nu, node["sideways_var"], 25.0)
+                self.update(jacobian(model, self.x), nu, node["sideways_var"], c["jolt_nis"])
         for k in range(2):
             H = np.zeros(n)
             H[self.nodes["i_vel"] + k] = 1.0 / len(self.nodes)
@@ -296,5 +297,5 @@ class JointReference:
             all_k, T = np.ix_(self.i_pos[:, k], self.i_pos[:, k]), np.eye(len(self.x))
             T[all_k] -= 1.0 / len(self.nodes)
             self.x, self.P = T @ self.x, T @ self.P @ T.T
-            self.P[all_k] += CENTRE_VAR
+            self.P[all_k] += self.c["centre_std"] ** 2
         self.group["t_gauge"] = t

@@ -13,13 +13,6 @@ from tracking.filters.pair.initialisation import (
 from tracking.filters.pair.mds_feedback import add_pair, factor, move_pair, solve, weigh
 from tracking.jit import allocating_kernel, kernel, small_kernel
 
-FLAT = 1.0
-"""[-] A layout flatter than so many of its standard deviations may turn over unseen."""
-OPEN = 2.0
-"""[-] When it opens to so many, its mirror image becomes a hypothesis."""
-MISFIT = 3.0
-"""[-] Ranges whose running mean of NIS is above this bring it up, too."""
-
 
 @small_kernel
 def refine_group(c, s, layout, work):
@@ -90,12 +83,12 @@ def monitor_reflection(c, s, layout):
     if group.n_alive != 1:
         return
     ratio = degeneracy_ratio(c, s, layout)
-    if ratio < FLAT:
+    if ratio < c.degenerate:
         group.flat = True
-    elif group.flat and ratio > OPEN:
+    elif group.flat and ratio > c.regular:
         group.flat = False
         add_mirror_image(c, s, layout)
-    elif group.misfit > MISFIT and ratio > OPEN and ratio < np.inf:
+    elif group.misfit > c.reflection_nis and ratio > c.regular and ratio < np.inf:
         group.misfit = 1.0
         add_mirror_image(c, s, layout)
 
@@ -136,7 +129,7 @@ def prune_bank(c, s):
         if s.alive[h] and (best < 0 or s.loglik[h] > s.loglik[best]):
             best = h
     # The report changes only for a clear gain, or equal hypotheses would take turns.
-    if not s.alive[group.best] or s.loglik[best] > s.loglik[group.best] + 2.0:
+    if not s.alive[group.best] or s.loglik[best] > s.loglik[group.best] + c.report_lead:
         group.best = best
     top = s.loglik[best]
     for h in range(n_hyps):
@@ -176,12 +169,12 @@ def are_same(c, s, a, b):
 
 
 @kernel
-def remove_node(s, layout, i, t):
+def remove_node(c, s, layout, i, t):
     """Destroy the filters of a node that left."""
     s.nodes[i].present = False
     s.nodes[i].seen = False
     s.group[0].flat = False
-    forget_mean(s, t)
+    forget_mean(c, s, t)
     n_present = 0
     for k in range(s.nodes.shape[0]):
         n_present += s.nodes[k].present
@@ -202,4 +195,4 @@ def drop_timed_out(c, s, layout, t):
     """Remove the nodes that were not heard for so long that they must have left."""
     for i in range(s.nodes.shape[0]):
         if (s.nodes[i].present or s.nodes[i].seen) and t - s.nodes[i].t_last_range > c.node_timeout:
-            remove_node(s, layout, i, t)
+            remove_node(c, s, layout, i, t)

@@ -40,8 +40,6 @@ from tracking.models.nlos import power_evidence
 # Plain numbers of `Kind` and `Status`: kernels do not know enums.
 STATE, SURVEY, RANGE, LEAVE = 3, 4, 5, 6
 ABSENT, STARTING, AMBIGUOUS, OK, LOST = 0, 1, 2, 3, 4
-MISSED = 3.0
-"""[-] A pair is lost after so many of its usual intervals, if these are long."""
 
 
 class Workspace(NamedTuple):
@@ -132,7 +130,7 @@ def run_events(coefficients, layout, state, block, t_out, out):
                         c, s, layout, work, p, a_i, a_j, t[e, k], distance, evidence, is_survey
                     )
             elif what == LEAVE:
-                remove_node(s, layout, i, t[e, k])
+                remove_node(c, s, layout, i, t[e, k])
         while o < t_out.shape[1]:
             write_estimate(c, s, t_out[e, o], e, o, out)
             o += 1
@@ -217,7 +215,7 @@ def supervise(c, s, layout, t):
 @small_kernel
 def is_lost(c, pair, age):
     """True if a pair had no range that meant anything for longer than it usually takes."""
-    return age > max(c.lost_after, MISSED * pair.interval)
+    return age > max(c.lost_after, c.missed_intervals * pair.interval)
 
 
 @allocating_kernel

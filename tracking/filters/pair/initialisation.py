@@ -21,9 +21,6 @@ from tracking.filters.first_ranges import (
 from tracking.filters.pair.nlos_model import E
 from tracking.jit import allocating_kernel, kernel
 
-MEAN_SPEED_VAR = 4.0
-"""[m2/s2] Variance of the mean velocity of a group before its wheels tell."""
-
 
 @kernel
 def initialise_pair(c, s, h, p, pos, t):
@@ -49,15 +46,15 @@ def initialise_pair(c, s, h, p, pos, t):
 
 
 @kernel
-def forget_mean(s, t):
+def forget_mean(c, s, t):
     """The mean velocity of another group is not known, and what came before t changed none."""
     s.group[0].dv0, s.group[0].dv1 = 0.0, 0.0
     for i in range(s.nodes.shape[0]):
         s.nodes[i].t_sum = t
     s.mean_v[:] = 0.0
     s.mean_cov[:] = 0.0
-    s.mean_cov[:, 0, 0] = MEAN_SPEED_VAR
-    s.mean_cov[:, 1, 1] = MEAN_SPEED_VAR
+    s.mean_cov[:, 0, 0] = c.group_speed_var
+    s.mean_cov[:, 1, 1] = c.group_speed_var
 
 
 @allocating_kernel
@@ -79,7 +76,7 @@ def try_start(c, s, layout, t):
                 if members[a] < members[b]:
                     p = layout.pair_index[members[a], members[b]]
                     initialise_pair(c, s, h, p, Y[b] - Y[a], t)
-    forget_mean(s, t)
+    forget_mean(c, s, t)
     group = s.group[0]
     group.started = True
     group.flat = False
@@ -144,7 +141,7 @@ def try_join(c, s, layout, new, t):
                     p = layout.pair_index[k, new]
                     initialise_pair(c, s, target, p, sign * (sides[side] - pos[k]), t)
     s.nodes[new].present = True
-    forget_mean(s, t)
+    forget_mean(c, s, t)
 
 
 @allocating_kernel

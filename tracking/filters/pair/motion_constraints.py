@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import math
 
-from tracking.filters.pair.initialisation import MEAN_SPEED_VAR
 from tracking.jit import small_kernel
 from tracking.models.nonholonomic import nonholonomic_model
 
@@ -32,7 +31,7 @@ def note_heading(c, node, t, q):
     elif dt > 1e-4:
         change = yaw - node.yaw
         change -= 2.0 * math.pi * math.floor(change / (2.0 * math.pi) + 0.5)
-        node.yaw_rate += dt / (0.05 + dt) * (change / dt - node.yaw_rate)
+        node.yaw_rate += dt / (c.yaw_rate_tau + dt) * (change / dt - node.yaw_rate)
     node.yaw = yaw
 
 
@@ -86,8 +85,8 @@ def apply_motion_constraints(c, s, layout, t, work):
         u, Pu = s.mean_v[h], s.mean_cov[h]
         u[0] += dv0
         u[1] += dv1
-        Pu[0, 0] = min(Pu[0, 0] + q, MEAN_SPEED_VAR)
-        Pu[1, 1] = min(Pu[1, 1] + q, MEAN_SPEED_VAR)
+        Pu[0, 0] = min(Pu[0, 0] + q, c.group_speed_var)
+        Pu[1, 1] = min(Pu[1, 1] + q, c.group_speed_var)
         for i in range(s.nodes.shape[0]):
             node = s.nodes[i]
             if node.present and node.sideways_var > 0.0 and t - node.t_state < c.imu_timeout:
@@ -115,8 +114,8 @@ def hold(c, s, layout, h, i, m, work):
     S = common + own + node.sideways_var
     nis = nu * nu / S
     s.loglik[h] -= 0.5 * (min(nis, c.nis_cap) + math.log(S))
-    if nis > 25.0:
-        S *= nis / 25.0  # a jolt or a skid: it counts for less
+    if nis > c.jolt_nis:
+        S *= nis / c.jolt_nis  # a jolt or a skid: it counts for less
     for k in range(s.nodes.shape[0]):
         if k == i or not s.nodes[k].present:
             continue

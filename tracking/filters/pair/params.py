@@ -113,6 +113,12 @@ class WheelParams:
     """[s2/m] How fast that axle drifts outwards in a curve, per squared speed and yaw rate."""
     period: float = 0.05
     """[s] Time between two uses."""
+    jolt_nis: float = 25.0
+    """[-] A larger NIS counts less: a jolt, a skid."""
+    yaw_rate_tau: float = 0.05
+    """[s] Low pass of the yaw rate."""
+    group_speed_std: float = 2.0
+    """[m/s] Mean velocity of a group before its wheels tell."""
 
     def __post_init__(self) -> None:
         check_numbers(self, may_be_zero=("rear_axle", "slip"))
@@ -144,6 +150,15 @@ class StartParams:
     """[-] A single range counts for at most this in the likelihood, outlier or not."""
     check_period: float = 0.25
     """[s] Time between two looks at the bank."""
+    report_lead: float = 2.0
+    """[-] Log-likelihood by which another hypothesis has to lead to be reported."""
+    degenerate: float = 1.0
+    """[-] Extent of a layout across itself, in standard deviations, below which its reflection
+    cannot be told."""
+    regular: float = 2.0
+    """[-] Extent from which on its mirror image becomes a hypothesis again."""
+    reflection_nis: float = 3.0
+    """[-] So does it where the running mean of NIS is above this."""
 
     def __post_init__(self) -> None:
         check_numbers(self)
@@ -169,8 +184,12 @@ class PairEkfParams:
     """[s] Time constant of that low pass."""
     lost_after: float = 1.0
     """[s] A pair without an accepted range for so long is lost."""
+    missed_intervals: float = 3.0
+    """[-] Or without one for so many of its usual intervals, where those are long."""
     node_timeout: float = 5.0
     """[s] A node not heard for so long has left; its filters are destroyed."""
+    largest_bend: float = 0.1
+    """[m] The error of linearisation counts for at most this."""
     gate: GateParams = field(default_factory=GateParams)
     mds: MdsParams = field(default_factory=MdsParams)
     range_error: RangeErrorParams = field(default_factory=RangeErrorParams)

@@ -22,8 +22,6 @@ from tracking.models.lever_arm import antenna_in_world
 
 TIE = 1e-6
 """[s] Times that differ by less are equal, whatever the clock began with."""
-MOST_BEND = 0.1
-"""[m] No more noise than this is added for what the straight line misses."""
 
 
 @small_kernel
@@ -173,7 +171,7 @@ def range_update(c, s, layout, p, t, distance, evidence, antenna_i, antenna_j, w
         nu += s.x[p, h, E]
         reset_bias_on_transition(c, s, p, h, switched)
         nu -= s.x[p, h, E]
-        bent = min(c.nonlinearity_gain * second_order_bias(s, p, h, work), MOST_BEND)
+        bent = min(c.nonlinearity_gain * second_order_bias(s, p, h, work), c.largest_bend)
         R = c.range_var + bent * bent + s.nlos[p, h] * c.nlos_white_var
         variance, _ = predicted_variance(s.P, p, h, work)
         nis = nu * nu / (variance + R)

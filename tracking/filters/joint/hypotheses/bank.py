@@ -32,13 +32,12 @@ from tracking.filters.joint.hypotheses.geometric_degeneracy import (
 )
 from tracking.filters.joint.hypotheses.initialisation import (
     initialise_pair,
-    reset_residual_statistics,
 )
 from tracking.filters.joint.hypotheses.merging import are_same, rotation_between
 from tracking.filters.joint.hypotheses.static_initialisation import TIE, spawn_rotations
 from tracking.filters.joint.scalar_update import reset_state
+from tracking.filters.joint.supervision.residuals import reset_residuals
 from tracking.jit import allocating_kernel, kernel, small_kernel
-from tracking.maths.exponentials import decay
 
 
 @small_kernel
@@ -70,34 +69,16 @@ def add_mirror_image(c, s):
 
 
 @kernel
-def needs_challenge(c, s, dt):
-    """True where ranges have fitted the only hypothesis badly for long; dt since the last look."""
-    group = s.group[0]
-    group.slow_nis += (1.0 - decay(dt / c.misfit_time)) * (group.mean_nis - group.slow_nis)
-    group.challenge_nis += (1.0 - decay(dt / c.challenge_time)) * (
-        c.respawn_nis - group.challenge_nis
-    )
-    watched = group.n_alive == 1 and group.alignment >= CANDIDATES
-    if not watched or group.slow_nis < group.challenge_nis:
-        return False
-    n_faulty = 0
-    for i in range(s.nodes.shape[0]):
-        n_faulty += s.nodes[i].present and s.nodes[i].faulty
-    # A single node that contradicts the others is to blame, and not the layout.
-    return n_faulty != 1 and degeneracy_ratio(c, s, group.best, True) != np.inf
-
-
-@kernel
 def challenge(c, s, layout):
     """Follow all rotations and mirror images again, and the only hypothesis."""
     group = s.group[0]
     h = group.best
     if has_linear_alignment(c, s):
-        group.slow_nis = 0.0
+        group.misfit = 0.0
         challenge_alignment(c, s, layout, h)
         return
-    group.challenge_nis = c.challenge_raise * max(group.slow_nis, group.challenge_nis)
-    group.slow_nis = 0.0
+    group.misfit_limit = c.challenge_raise * max(group.misfit, group.misfit_limit)
+    group.misfit = 0.0
     for i in range(s.nodes.shape[0]):
         node = s.nodes[i]
         if node.present and not node.static:
@@ -147,12 +128,11 @@ def prune_bank(c, s):
         if s.alive[h] and (best < 0 or s.loglik[h] > s.loglik[best]):
             best = h
     # The report changes only for a clear gain, or equal hypotheses would take turns.
-    if not s.alive[group.best] or s.loglik[best] > s.loglik[group.best] + 2.0:
+    if not s.alive[group.best] or s.loglik[best] > s.loglik[group.best] + c.report_lead:
         group.best = best
         # Residuals are those of the other hypothesis.
         for p in range(s.pairs.shape[0]):
-            reset_residual_statistics(s.pairs[p])
-        group.mean_nis = 1.0
+            reset_residuals(s.pairs[p])
     top = s.loglik[best]
     for h in range(n_hyps):
         if s.alive[h] and h != group.best and s.loglik[h] < top - c.prune:
@@ -179,7 +159,7 @@ def remove_node(c, s, layout, i):
     """Forget a node that left."""
     node = s.nodes[i]
     node.present, node.seen = False, False
-    node.outlier_ratio, node.faulty = 0.0, False
+    node.fault = 0
     n_present = 0
     for k in range(s.nodes.shape[0]):
         n_present += s.nodes[k].present
@@ -204,7 +184,7 @@ def remove_node(c, s, layout, i):
     if n_present < 2:
         for k in range(s.nodes.shape[0]):
             s.nodes[k].present, s.nodes[k].seen = False, False
-            s.nodes[k].outlier_ratio, s.nodes[k].faulty = 0.0, False
+            s.nodes[k].fault = 0
         s.alive[:] = False
         s.group[0].n_alive = 0
         s.group[0].alignment = NONE

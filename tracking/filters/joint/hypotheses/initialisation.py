@@ -28,9 +28,9 @@ from tracking.filters.joint.hypotheses.alignment_sensitivity import (
 )
 from tracking.filters.joint.hypotheses.copying import copy_hypothesis
 from tracking.filters.joint.hypotheses.static_initialisation import all_static, is_at_rest
-from tracking.filters.joint.motion_constraints import CENTRE_VAR
 from tracking.filters.joint.propagation import initial_tilt_variance
 from tracking.filters.joint.scalar_update import reset_state
+from tracking.filters.joint.supervision.residuals import reset_residuals
 from tracking.jit import allocating_kernel, kernel
 from tracking.maths.exponentials import decay
 from tracking.maths.multilateration import best_positions
@@ -83,7 +83,7 @@ def start(c, s, layout, t):
                 initialise_pair(c, s, h, p, initial_nlos_prob(c, s.pairs[p]))
     for p in range(s.pairs.shape[0]):
         initialise_interval(s.pairs[p], t)
-        reset_residual_statistics(s.pairs[p])
+        reset_residuals(s.pairs[p])
     group = s.group[0]
     group.alignment = STATIC if asleep else FILTERED
     group.degenerate = False
@@ -97,8 +97,7 @@ def start(c, s, layout, t):
         if s.nodes[members[a]].sideways_var > 0.0:
             group.t_scoring_starts = t + c.wheels_after
     group.heading_gauge_var = c.rotation_var if c.d == 2 else 0.0
-    group.mean_nis = 1.0
-    group.slow_nis, group.challenge_nis = 0.0, c.respawn_nis
+    group.misfit, group.misfit_limit = 0.0, c.respawn_nis
 
 
 @kernel
@@ -131,7 +130,7 @@ def add_translation_uncertainty(c, s, h, members, m):
         for b in range(m):
             at_a, at_b = s.nodes[members[a]].i_pos, s.nodes[members[b]].i_pos
             for k in range(c.d):
-                s.P[h, at_a + k, at_b + k] += CENTRE_VAR
+                s.P[h, at_a + k, at_b + k] += c.centre_std**2
 
 
 @kernel
@@ -187,18 +186,6 @@ def initialise_pair(c, s, h, p, hidden):
         slow_var = slow_error_var(c.slow_var, hidden, c.nlos_bias, c.nlos_bias_var)
         reset_state(s, h, c.n, at + 1, max(slow_var, 1e-12))
         s.x[h, at + 1] = hidden * c.nlos_bias
-
-
-@kernel
-def reset_residual_statistics(pair):
-    """How well a pair's ranges fit, as if none had come yet."""
-    pair.n_ranges, pair.mean_nis = 0, 1.0
-    pair.mean_residual, pair.clipped_mean_residual, pair.mean_abs_residual, pair.rate_violation = (
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-    )
 
 
 @kernel
@@ -285,4 +272,4 @@ def add_node(c, s, layout, h, new, pos, variance, t):
         if i != new and s.nodes[i].present:
             p = layout.pair_index[i, new]
             initialise_pair(c, s, h, p, initial_nlos_prob(c, s.pairs[p]))
-            reset_residual_statistics(s.pairs[p])
+            reset_residuals(s.pairs[p])

@@ -14,10 +14,12 @@ class SupervisionParams:
     All are the authors' choice, on simulated runs, where no other source is given.
     """
 
-    outlier_gain: float = 0.02
-    """[-] Weight of a range in a node's share of ranges that do not fit."""
     residual_gain: float = 0.1
     """[-] Weight of a range in the running means of a pair's residuals."""
+    largest_nis: float = 25.0
+    """[-] A single range moves the mean NIS by no more; one that means nothing counts as this."""
+    outlier_nis: float = 16.0
+    """[-] A range with a larger NIS does not fit, four standard deviations."""
     residual_clip: float = 1.0
     """[m] A single range moves these means by no more."""
     fastest: float = 10.0
@@ -87,6 +89,8 @@ class AlignmentParams:
     """[-] Least extent of a layout, in standard deviations, below which it is degenerate."""
     regular: float = 4.0
     """[-] Least extent above which it is no longer degenerate."""
+    report_lead: float = 2.0
+    """[-] Log-likelihood by which another hypothesis has to lead to be reported."""
     same_rotation: float = 0.15
     """[rad] Hypotheses that differ by a smaller rotation of the group alone are one."""
     gauge_std: float = 0.05

@@ -6,13 +6,19 @@ from tracking.filters.joint.heading_gauge import update_heading_variance
 from tracking.filters.joint.hypotheses.alignment import is_linear
 from tracking.filters.joint.hypotheses.bank import (
     any_timed_out,
-    needs_challenge,
     needs_reflection,
     prune_bank,
 )
 from tracking.filters.joint.scalar_update import flush_all_updates
-from tracking.filters.joint.supervision.fault_detection import monitor_faults
-from tracking.filters.joint.supervision.reinitialisation import find_misplaced
+from tracking.filters.joint.supervision.actions import begin_node_fault, follow_node_faults
+from tracking.filters.joint.supervision.faults import (
+    ALIGNMENT,
+    DIVERGED,
+    NONE,
+    POSITION,
+    find_fault,
+    update_group_misfit,
+)
 from tracking.filters.joint.workspace import (
     CHALLENGE,
     FLAG,
@@ -43,13 +49,16 @@ def supervise(c, s, layout, work, t, done):
         update_heading_variance(c, s)
         if needs_reflection(c, s):
             return REFLECT
-    if done < CHALLENGE and needs_challenge(c, s, t - s.group[0].t_check):
-        return CHALLENGE
-    if done < REINITIALISE:
-        node, is_away = find_misplaced(c, s, layout, t)
-        if node >= 0:
-            work.cursor[NODE], work.cursor[FLAG] = node, is_away
+    if done < CHALLENGE:
+        update_group_misfit(c, s, t - s.group[0].t_check)
+        fault, node = find_fault(c, s, layout, t)
+        if fault == ALIGNMENT:
+            return CHALLENGE
+        if fault in (POSITION, DIVERGED):
+            work.cursor[NODE], work.cursor[FLAG] = node, fault == DIVERGED
             return REINITIALISE
-    monitor_faults(c, s, layout, t)
+        if fault != NONE:
+            begin_node_fault(c, s, layout, node, fault, t)
+    follow_node_faults(c, s, layout, t)
     s.group[0].t_check = t
     return NOTHING

@@ -1,0 +1,148 @@
+"""Fault detection: a catalogue of faults, one decision a period, one action.
+
+Each fault has a statistic of the residuals (`residuals`) and a limit; the fault with the largest
+ratio of the two, if that is above 1, is the one that is acted on. In units of a log-likelihood
+ratio, as far as the residuals are Gaussian: squares over variances.
+
+A link alone that contradicts the rest needs no decision: its ranges count less by themselves
+(`range_update`), and its pair is reported as doubtful.
+"""
+
+from __future__ import annotations
+
+import math
+from enum import IntEnum
+
+from tracking.filters.joint.hypotheses.alignment import CANDIDATES
+from tracking.filters.joint.hypotheses.geometric_degeneracy import degeneracy_ratio
+from tracking.filters.joint.supervision.residuals import (
+    common_range_error,
+    group_nis,
+    has_large_residual,
+    is_informative,
+    mean_range_error,
+    node_outlier_ratio,
+    others_fit,
+)
+from tracking.jit import kernel
+from tracking.maths.exponentials import decay
+from tracking.maths.multilateration import SHORT, misfit
+
+
+class Fault(IntEnum):
+    """What is wrong with a node or the group."""
+
+    NONE = 0
+    """Nothing."""
+    BIAS = 1
+    """All ranges of a node err alike: a wrong calibration, or an obstacle that hides it."""
+    OUTLIERS = 2
+    """Most ranges of a node do not fit, those among the others do: random ranges."""
+    POSITION = 3
+    """Steady ranges of a node are too long and too short, and another position fits them all."""
+    DIVERGED = 4
+    """In space: a node is metres from where its ranges have it."""
+    ALIGNMENT = 5
+    """The ranges of the group fit badly for seconds: it is rotated or reflected wrongly."""
+
+
+ACTIONS: dict[Fault, str] = {
+    Fault.BIAS: "an offset common to the node's ranges becomes a state",
+    Fault.OUTLIERS: "the same, and its position and velocity become uncertain",
+    Fault.POSITION: "the node moves to where its ranges fit, if there is such a position",
+    Fault.DIVERGED: "the node joins again; where most do, the group starts again",
+    Fault.ALIGNMENT: "all rotations and reflections compete again",
+}
+"""Fault to what is done about it."""
+
+# Plain numbers: kernels do not know enums.
+NONE, BIAS, OUTLIERS, POSITION, DIVERGED, ALIGNMENT = (f.value for f in Fault)
+
+
+@kernel
+def find_fault(c, s, layout, t):
+    """The fault that is most beyond its limit, and the node; `NONE` and -1 where none is."""
+    found, at, most = NONE, -1, 1.0
+    ratio = alignment_ratio(c, s)
+    if ratio > most:
+        found, most = ALIGNMENT, ratio
+    worst = worst_node(c, s, layout, t)
+    for i in range(s.nodes.shape[0]):
+        node = s.nodes[i]
+        if not node.present:
+            continue
+        total, is_away = position_misfit(c, s, layout, i, t)
+        if total / c.position_misfit > most:
+            found, at, most = DIVERGED if is_away else POSITION, i, total / c.position_misfit
+        if node.fault == NONE:
+            ratio = bias_ratio(c, s, layout, i, t)
+            if ratio > most:
+                found, at, most = BIAS, i, ratio
+            if i == worst:
+                ratio = node_outlier_ratio(c, s, layout, i, t) / c.outlier_ratio
+                if ratio > most:
+                    found, at, most = OUTLIERS, i, ratio
+    return found, at
+
+
+@kernel
+def worst_node(c, s, layout, t):
+    """The node with the largest share of outliers, -1 unless the others fit without it."""
+    worst, most = -1, 0.0
+    for i in range(s.nodes.shape[0]):
+        if s.nodes[i].present:
+            ratio = node_outlier_ratio(c, s, layout, i, t)
+            if ratio > most:
+                worst, most = i, ratio
+    return worst if worst >= 0 and others_fit(c, s, worst, t) else -1
+
+
+@kernel
+def bias_ratio(c, s, layout, i, t):
+    """Square of the error common to the ranges of node i over that of its limit; 0 for few."""
+    n, error = common_range_error(c, s, layout, i, t)
+    return n * (error / c.node_bias_limit) ** 2 if n >= 2 else 0.0
+
+
+@kernel
+def position_misfit(c, s, layout, i, t):
+    """What the ranges of node i say against its position, and whether most are metres off.
+
+    Nothing where they are too few, or all too long, or too short, as by a wrong calibration.
+    """
+    if s.nodes[i].static:
+        return 0.0, False
+    total, n, n_far, least, greatest = 0.0, 0, 0, 0.0, 0.0
+    for k in range(s.nodes.shape[0]):
+        if k != i and is_informative(c, s, layout, i, k, t):
+            error = mean_range_error(c, s, layout.pair_index[i, k])
+            total += misfit(error)
+            least, greatest = min(least, error), max(greatest, error)
+            n += 1
+            n_far += has_large_residual(c, s.pairs[layout.pair_index[i, k]])
+    # In the plane a layout that is turned the wrong way looks like it, and is found as such.
+    if c.d == 3 and n >= c.d and 2 * n_far > n and least < -c.far_residual:
+        return total, True
+    return total if n > c.d and least < -SHORT and greatest > SHORT else 0.0, False
+
+
+@kernel
+def update_group_misfit(c, s, dt):
+    """Carry the group's misfit, and the limit that rises with each challenge, over dt [s]."""
+    group = s.group[0]
+    group.misfit += (1.0 - decay(dt / c.misfit_time)) * (group_nis(s) - group.misfit)
+    keep = decay(dt / c.challenge_time)
+    group.misfit_limit = keep * group.misfit_limit + (1.0 - keep) * c.respawn_nis
+
+
+@kernel
+def alignment_ratio(c, s):
+    """Misfit of the only hypothesis over its limit; 0 where a node or the layout is to blame."""
+    group, n_faulty = s.group[0], 0
+    if group.n_alive != 1 or group.alignment < CANDIDATES or group.misfit < group.misfit_limit:
+        return 0.0
+    for i in range(s.nodes.shape[0]):
+        n_faulty += s.nodes[i].present and s.nodes[i].fault != NONE
+    if n_faulty == 1 or degeneracy_ratio(c, s, group.best, True) == math.inf:
+        return 0.0
+    return group.misfit / group.misfit_limit

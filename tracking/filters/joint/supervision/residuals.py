@@ -1,0 +1,149 @@
+"""Residual statistics: one store, running means for every pair; those of nodes and group follow.
+
+All are of the best hypothesis, with one gain a range, and begin anew when another becomes the best.
+"""
+
+from __future__ import annotations
+
+import math
+
+from tracking.jit import kernel, small_kernel
+
+
+@small_kernel
+def reset_residuals(pair):
+    """Forget how well the ranges of a pair fit."""
+    pair.n_ranges, pair.mean_nis, pair.outlier_ratio = 0, 1.0, 0.0
+    pair.mean_residual, pair.mean_abs_residual, pair.rate_violation = 0.0, 0.0, 0.0
+
+
+@small_kernel
+def update_residuals(c, s, p, dt, distance, nu, misfit, sane):
+    """Count a range of pair p.
+
+    Args:
+        c: Coefficients.
+        s: JointState of one environment.
+        p: Pair.
+        dt: Time since its last range [s].
+        distance: The range [m].
+        nu: By how much it is longer than predicted [m].
+        misfit: Square of that over its variance [-].
+        sane: Probability that the range means anything.
+    """
+    pair, gain = s.pairs[p], c.residual_gain
+    if pair.n_ranges > 0:
+        jump = max(abs(distance - pair.last_used) - c.fastest * dt, 0.0)
+        pair.rate_violation += gain * (min(jump, c.residual_clip) - pair.rate_violation)
+    pair.last_used = distance
+    outlier = 0.0 if sane > 0.5 and misfit < c.outlier_nis else 1.0
+    pair.outlier_ratio += gain * (outlier - pair.outlier_ratio)
+    pair.mean_nis += gain * (sane * min(misfit, c.largest_nis) - pair.mean_nis)
+    off = min(max(nu - pair.mean_residual, -c.residual_clip), c.residual_clip)
+    pair.mean_residual += gain * off
+    pair.mean_abs_residual += gain * (abs(off) - pair.mean_abs_residual)
+
+
+@small_kernel
+def contradiction(c, pair):
+    """Mean NIS of all ranges of a pair, those that mean nothing with the largest [-]."""
+    return pair.mean_nis + c.largest_nis * pair.outlier_ratio
+
+
+@small_kernel
+def is_ranging(c, s, p, t):
+    """True if both nodes of pair p are there and it was ranged lately."""
+    pair = s.pairs[p]
+    both = s.nodes[pair.i].present and s.nodes[pair.j].present
+    waits = max(c.lost_after, c.missed_intervals * pair.interval)
+    return both and pair.n_ranges > 0 and t - pair.t_range < waits
+
+
+@kernel
+def node_outlier_ratio(c, s, layout, i, t):
+    """Mean share of outliers over the pairs of node i that range [-]."""
+    total, n = 0.0, 0
+    for k in range(s.nodes.shape[0]):
+        if k != i and is_ranging(c, s, layout.pair_index[i, k], t):
+            total += s.pairs[layout.pair_index[i, k]].outlier_ratio
+            n += 1
+    return total / max(n, 1)
+
+
+@kernel
+def others_fit(c, s, i, t):
+    """True if pairs without node i range, and none of them contradicts the rest."""
+    n = 0
+    for p in range(s.pairs.shape[0]):
+        pair = s.pairs[p]
+        if pair.i != i and pair.j != i and is_ranging(c, s, p, t):
+            n += 1
+            if contradiction(c, pair) > c.pair_nis_limit:
+                return False
+    return n > 0
+
+
+@kernel
+def common_range_error(c, s, layout, i, t):
+    """How many others node i ranges with; the least error of those, 0 if signs differ [m]."""
+    h, n, sign, least = s.group[0].best, 0, 0.0, math.inf
+    for k in range(s.nodes.shape[0]):
+        # Surveyed distances between static nodes are not of their radios.
+        if k == i or (s.nodes[i].static and s.nodes[k].static):
+            continue
+        p = layout.pair_index[i, k]
+        if not is_ranging(c, s, p, t):
+            continue
+        n += 1
+        error = s.pairs[p].mean_residual
+        if s.pairs[p].i_range_error >= 0:
+            error += s.x[h, s.pairs[p].i_range_error + 1]
+        if sign == 0.0:
+            sign = 1.0 if error > 0.0 else -1.0
+        least = min(least, sign * error)
+    return n, max(least, 0.0) if n > 0 else 0.0
+
+
+@small_kernel
+def group_nis(s):
+    """Mean NIS over the pairs of nodes that are not faulty [-]; 1 without any."""
+    total, n = 0.0, 0
+    for p in range(s.pairs.shape[0]):
+        pair = s.pairs[p]
+        node_i, node_j = s.nodes[pair.i], s.nodes[pair.j]
+        faulty = node_i.fault != 0 or node_j.fault != 0
+        if node_i.present and node_j.present and pair.n_ranges > 0 and not faulty:
+            total += pair.mean_nis
+            n += 1
+    return total / n if n > 0 else 1.0
+
+
+@small_kernel
+def has_large_residual(c, pair):
+    """True if plausible ranges have the ends of a pair metres from where they are."""
+    return abs(pair.mean_residual) > c.far_residual and pair.rate_violation < c.largest_jump
+
+
+@small_kernel
+def is_informative(c, s, layout, i, k, t):
+    """True if nodes i and k have ranged with each other for a while, steadily."""
+    p = layout.pair_index[i, k]
+    pair = s.pairs[p]
+    if not is_ranging(c, s, p, t) or pair.n_ranges < c.settled_ranges:
+        return False
+    return pair.mean_abs_residual < c.largest_scatter or has_large_residual(c, pair)
+
+
+@small_kernel
+def mean_range_error(c, s, p):
+    """By how much pair p lately ranges more than its distance [m], in the best hypothesis."""
+    pair, h = s.pairs[p], s.group[0].best
+    if has_large_residual(c, pair):
+        at_i, at_j, squared = s.nodes[pair.i].i_pos, s.nodes[pair.j].i_pos, 0.0
+        for k in range(c.d):
+            squared += (s.x[h, at_j + k] - s.x[h, at_i + k]) ** 2
+        return pair.last_used - math.sqrt(squared)
+    error = pair.mean_residual
+    if pair.i_range_error >= 0:
+        error += s.x[h, pair.i_range_error] + s.x[h, pair.i_range_error + 1]
+    return error
