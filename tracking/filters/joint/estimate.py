@@ -7,7 +7,6 @@ from tracking.filters.joint.hypotheses.alignment import LINEAR, MODES, NONE, STA
 from tracking.filters.joint.preintegration import preintegrate
 from tracking.filters.joint.propagation import predict
 from tracking.filters.joint.state import N_PRE, JointState
-from tracking.filters.joint.supervision.residuals import contradiction
 from tracking.jit import kernel
 from tracking.maths.covariance import apply_downdate
 from tracking.reference import by_reference
@@ -63,7 +62,7 @@ def write_estimate(c, s, work, t, e, o, out):
             age[e, o, p] > max(c.lost_after, c.missed_intervals * pair.interval) or worst > c.ok_var
         ):
             status[e, o, p] = LOST
-        elif contradiction(c, pair) > c.pair_nis_limit or node_i.fault != 0 or node_j.fault != 0:
+        elif pair.mean_nis > c.pair_nis_limit or node_i.fault != 0 or node_j.fault != 0:
             status[e, o, p] = DOUBTFUL
         else:
             status[e, o, p] = OK

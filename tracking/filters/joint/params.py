@@ -142,7 +142,7 @@ class UpdateParams:
     """[-] A sight that may have changed with a smaller probability is forgotten with the next
     prediction, which costs nothing."""
     contradiction_share: float = 0.7
-    """[-] A pair whose `contradiction` is above this share of `JointParams.pair_nis_limit` counts
+    """[-] A pair whose mean NIS is above this share of `JointParams.pair_nis_limit` counts
     less, by the fourth power."""
     jolt_nis: float = 25.0
     """[-] A motion constraint with a larger NIS counts less: a jolt, a skid."""

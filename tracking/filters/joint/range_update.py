@@ -23,7 +23,6 @@ from tracking.filters.joint.nlos_model import reset_bias_on_transition, update_n
 from tracking.filters.joint.observability import enforce_observability
 from tracking.filters.joint.propagation import displacement_since_epoch, time_since_epoch
 from tracking.filters.joint.scalar_update import compute_pht, kalman_update
-from tracking.filters.joint.supervision.residuals import contradiction
 from tracking.jit import kernel, small_kernel
 from tracking.models.lever_arm import lever_arm_slope, rotate_lever_arm
 from tracking.models.range import range_model
@@ -201,7 +200,7 @@ def range_update(c, s, h, p, dt, distance, levers, sight, work):
     R = c.white_var + bent + s.nlos[h, p] * c.nlos_white_var
     nis = nu * nu / (variance + open_var + R)
     # Ranges of a pair that have long contradicted all others count less and less.
-    doubt = contradiction(c, s.pairs[p]) / (c.contradiction_share * c.pair_nis_limit)
+    doubt = s.pairs[p].mean_nis / (c.contradiction_share * c.pair_nis_limit)
     trust = sane
     if doubt > 1.0:
         trust /= doubt * doubt * doubt * doubt

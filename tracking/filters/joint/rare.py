@@ -82,7 +82,7 @@ def reinitialise(coefficients, layout, state, work, t):
     """Look for another position of a node."""
     cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
     s = by_reference(one_env(state, cursor[ENV]))
-    reinitialise_node(coefficients[0], s, layout, cursor[NODE], cursor[FLAG] != 0, t)
+    cursor[FLAG] = reinitialise_node(coefficients[0], s, layout, cursor[NODE], cursor[FLAG] != 0, t)
 
 
 @kernel

@@ -72,8 +72,8 @@ PAIR = np.dtype(
         ("t_used", "f8"),  # time of the last range that counted [s]
         ("interval", "f8"),  # running mean of the time between two ranges [s]
         ("nis", "f8"),  # NIS of the last range in the best hypothesis [-]
-        ("mean_nis", "f8"),  # running mean of it, by the probability that a range means anything
-        ("outlier_ratio", "f8"),  # running share of ranges that mean nothing [-]
+        ("mean_nis", "f8"),  # running mean of it, ranges that mean nothing with the largest [-]
+        ("outlier_ratio", "f8"),  # running share of ranges that do not fit [-]
         ("last_range", "f8"),  # its last range as reported [m]
         ("t_last", "f8"),  # when it came [s]
         ("n_equal", "i8"),  # ranges before it that were equal
@@ -108,7 +108,8 @@ GROUP = np.dtype(
         ("t_gauge", "f8"),
         ("t_scoring_starts", "f8"),  # until when no likelihood counts [s]
         ("heading_gauge_var", "f8"),  # of the rotation of a group in the plane; 0 in space [rad2]
-        ("misfit", "f8"),  # running mean of the NIS of all pairs [-]
+        ("mean_nis", "f8"),  # running mean of NIS, of nodes without a fault [-]
+        ("misfit", "f8"),  # slow running mean of that [-]
         ("misfit_limit", "f8"),  # how much of it brings up other rotations [-]
         ("nis_sum", "f8"),
         ("nis_n", "i8"),

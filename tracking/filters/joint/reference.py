@@ -242,13 +242,12 @@ class JointReference:
             self.x[slow] -= switched * off
             nu = z - model(self.x)
         R = c["white_var"] + bent + hidden * c["nlos_white_var"]
-        doubt = pair["mean_nis"] + c["largest_nis"] * pair["outlier_ratio"]
-        trust = sane / max(doubt / (c["contradiction_share"] * c["pair_nis_limit"]), 1.0) ** 4
+        doubt = pair["mean_nis"] / (c["contradiction_share"] * c["pair_nis_limit"])
+        trust = sane / max(doubt, 1.0) ** 4
         if trust > 1e-3:
             self.update(H, nu, R / trust)
-        gain, outlier = c["residual_gain"], sane <= 0.5 or nis >= c["outlier_nis"]
-        pair["mean_nis"] += gain * (sane * nis - pair["mean_nis"])
-        pair["outlier_ratio"] += gain * (outlier - pair["outlier_ratio"])
+        nis = nis if sane > 0.5 else c["largest_nis"]
+        pair["mean_nis"] += c["nis_gain"] * (nis - pair["mean_nis"])
         pair["t_range"] = t
 
     def second_order(self, p: int, H: F64) -> float:  # noqa: N803

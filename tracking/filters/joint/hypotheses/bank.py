@@ -133,6 +133,7 @@ def prune_bank(c, s):
         # Residuals are those of the other hypothesis.
         for p in range(s.pairs.shape[0]):
             reset_residuals(s.pairs[p])
+        group.mean_nis = 1.0
     top = s.loglik[best]
     for h in range(n_hyps):
         if s.alive[h] and h != group.best and s.loglik[h] < top - c.prune:

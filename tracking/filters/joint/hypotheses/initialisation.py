@@ -97,7 +97,7 @@ def start(c, s, layout, t):
         if s.nodes[members[a]].sideways_var > 0.0:
             group.t_scoring_starts = t + c.wheels_after
     group.heading_gauge_var = c.rotation_var if c.d == 2 else 0.0
-    group.misfit, group.misfit_limit = 0.0, c.respawn_nis
+    group.mean_nis, group.misfit, group.misfit_limit = 1.0, 0.0, c.respawn_nis
 
 
 @kernel

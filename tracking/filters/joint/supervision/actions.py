@@ -93,6 +93,9 @@ def reinitialise_node(c, s, layout, i, is_away, t):
     One that is metres away joins again instead, on both sides of the others where that is open.
     Ranges to others that are away as well do not count; where most that move are, the group starts
     again.
+
+    Returns:
+        True if anything was moved or removed.
     """
     n = s.nodes.shape[0]
     others, m, n_moving, n_away = np.empty(n, np.int64), 0, 0, 0
@@ -104,18 +107,19 @@ def reinitialise_node(c, s, layout, i, is_away, t):
             others[m] = k
             m += 1
     if is_away and c.n > c.n_own:
-        return  # a smoother would lose the past that it holds
+        return False  # a smoother would lose the past that it holds
     if is_away and (2 * n_away > n_moving or m < c.d):
         for k in range(n):
             again = 2 * n_away > n_moving and s.nodes[k].present and not s.nodes[k].static
             if k == i or again:
                 remove_node(c, s, layout, k)
-        return
+        return True
     known, distance, pos = np.zeros((m, 3)), np.empty(m), np.zeros(3)
     read_positions(c, s, s.group[0].best, i, others, known, pos)
     for a in range(m):
         way = np.sqrt(np.sum((known[a] - pos) ** 2))
         distance[a] = max(way + mean_range_error(c, s, layout.pair_index[i, others[a]]), 0.0)
+    moved = False
     for h in range(s.alive.shape[0]):
         if s.alive[h]:
             read_positions(c, s, h, i, others, known, pos)
@@ -126,8 +130,10 @@ def reinitialise_node(c, s, layout, i, is_away, t):
             ):
                 if is_away:
                     remove_node(c, s, layout, i)
-                    return
+                    return True
                 add_node(c, s, layout, h, i, pos, c.position_var, t)
+                moved = True
+    return moved
 
 
 @kernel

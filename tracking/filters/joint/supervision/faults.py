@@ -17,7 +17,6 @@ from tracking.filters.joint.hypotheses.alignment import CANDIDATES
 from tracking.filters.joint.hypotheses.geometric_degeneracy import degeneracy_ratio
 from tracking.filters.joint.supervision.residuals import (
     common_range_error,
-    group_nis,
     has_large_residual,
     is_informative,
     mean_range_error,
@@ -60,8 +59,16 @@ NONE, BIAS, OUTLIERS, POSITION, DIVERGED, ALIGNMENT = (f.value for f in Fault)
 
 
 @kernel
-def find_fault(c, s, layout, t):
-    """The fault that is most beyond its limit, and the node; `NONE` and -1 where none is."""
+def find_fault(c, s, layout, t, but_positions):
+    """The fault that is most beyond its limit, and the node; `NONE` and -1 where none is.
+
+    Args:
+        c: Coefficients.
+        s: JointState of one environment without pending updates.
+        layout: Tables.
+        t: Time [s].
+        but_positions: Whether wrong positions are left out.
+    """
     found, at, most = NONE, -1, 1.0
     ratio = alignment_ratio(c, s)
     if ratio > most:
@@ -72,8 +79,9 @@ def find_fault(c, s, layout, t):
         if not node.present:
             continue
         total, is_away = position_misfit(c, s, layout, i, t)
-        if total / c.position_misfit > most:
-            found, at, most = DIVERGED if is_away else POSITION, i, total / c.position_misfit
+        ratio = 0.0 if but_positions else total / c.position_misfit
+        if ratio > most:
+            found, at, most = DIVERGED if is_away else POSITION, i, ratio
         if node.fault == NONE:
             ratio = bias_ratio(c, s, layout, i, t)
             if ratio > most:
@@ -130,7 +138,7 @@ def position_misfit(c, s, layout, i, t):
 def update_group_misfit(c, s, dt):
     """Carry the group's misfit, and the limit that rises with each challenge, over dt [s]."""
     group = s.group[0]
-    group.misfit += (1.0 - decay(dt / c.misfit_time)) * (group_nis(s) - group.misfit)
+    group.misfit += (1.0 - decay(dt / c.misfit_time)) * (group.mean_nis - group.misfit)
     keep = decay(dt / c.challenge_time)
     group.misfit_limit = keep * group.misfit_limit + (1.0 - keep) * c.respawn_nis
 

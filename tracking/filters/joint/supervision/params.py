@@ -14,12 +14,16 @@ class SupervisionParams:
     All are the authors' choice, on simulated runs, where no other source is given.
     """
 
+    nis_gain: float = 0.05
+    """[-] Weight of a range in the running means of a pair's NIS and outliers."""
+    group_nis_gain: float = 0.01
+    """[-] The same in that of all pairs."""
     residual_gain: float = 0.1
-    """[-] Weight of a range in the running means of a pair's residuals."""
+    """[-] The same of its residuals, which have to follow those who drift away."""
     largest_nis: float = 25.0
     """[-] A single range moves the mean NIS by no more; one that means nothing counts as this."""
-    outlier_nis: float = 16.0
-    """[-] A range with a larger NIS does not fit, four standard deviations."""
+    outlier_nis: float = 6.0
+    """[-] A range with a larger NIS does not fit, one in seventy."""
     residual_clip: float = 1.0
     """[m] A single range moves these means by no more."""
     fastest: float = 10.0

@@ -1,6 +1,6 @@
-"""Residual statistics: one store, running means for every pair; those of nodes and group follow.
+"""Residual statistics: one store, running means for every pair and the group.
 
-All are of the best hypothesis, with one gain a range, and begin anew when another becomes the best.
+All are of the best hypothesis, and begin anew when another becomes the best.
 """
 
 from __future__ import annotations
@@ -31,23 +31,21 @@ def update_residuals(c, s, p, dt, distance, nu, misfit, sane):
         misfit: Square of that over its variance [-].
         sane: Probability that the range means anything.
     """
-    pair, gain = s.pairs[p], c.residual_gain
+    pair, gain = s.pairs[p], c.nis_gain
+    is_sane, nis = sane > 0.5, min(misfit, c.largest_nis)
+    pair.mean_nis += gain * ((nis if is_sane else c.largest_nis) - pair.mean_nis)
+    outlier = 0.0 if is_sane and misfit < c.outlier_nis else 1.0
+    pair.outlier_ratio += gain * (outlier - pair.outlier_ratio)
+    if s.nodes[pair.i].fault == 0 and s.nodes[pair.j].fault == 0:
+        s.group[0].mean_nis += c.group_nis_gain * (sane * nis - s.group[0].mean_nis)
+    gain = c.residual_gain
     if pair.n_ranges > 0:
         jump = max(abs(distance - pair.last_used) - c.fastest * dt, 0.0)
         pair.rate_violation += gain * (min(jump, c.residual_clip) - pair.rate_violation)
     pair.last_used = distance
-    outlier = 0.0 if sane > 0.5 and misfit < c.outlier_nis else 1.0
-    pair.outlier_ratio += gain * (outlier - pair.outlier_ratio)
-    pair.mean_nis += gain * (sane * min(misfit, c.largest_nis) - pair.mean_nis)
     off = min(max(nu - pair.mean_residual, -c.residual_clip), c.residual_clip)
     pair.mean_residual += gain * off
     pair.mean_abs_residual += gain * (abs(off) - pair.mean_abs_residual)
-
-
-@small_kernel
-def contradiction(c, pair):
-    """Mean NIS of all ranges of a pair, those that mean nothing with the largest [-]."""
-    return pair.mean_nis + c.largest_nis * pair.outlier_ratio
 
 
 @small_kernel
@@ -78,7 +76,7 @@ def others_fit(c, s, i, t):
         pair = s.pairs[p]
         if pair.i != i and pair.j != i and is_ranging(c, s, p, t):
             n += 1
-            if contradiction(c, pair) > c.pair_nis_limit:
+            if pair.mean_nis > c.pair_nis_limit:
                 return False
     return n > 0
 
@@ -102,20 +100,6 @@ def common_range_error(c, s, layout, i, t):
             sign = 1.0 if error > 0.0 else -1.0
         least = min(least, sign * error)
     return n, max(least, 0.0) if n > 0 else 0.0
-
-
-@small_kernel
-def group_nis(s):
-    """Mean NIS over the pairs of nodes that are not faulty [-]; 1 without any."""
-    total, n = 0.0, 0
-    for p in range(s.pairs.shape[0]):
-        pair = s.pairs[p]
-        node_i, node_j = s.nodes[pair.i], s.nodes[pair.j]
-        faulty = node_i.fault != 0 or node_j.fault != 0
-        if node_i.present and node_j.present and pair.n_ranges > 0 and not faulty:
-            total += pair.mean_nis
-            n += 1
-    return total / n if n > 0 else 1.0
 
 
 @small_kernel

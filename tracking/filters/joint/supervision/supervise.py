@@ -49,9 +49,12 @@ def supervise(c, s, layout, work, t, done):
         update_heading_variance(c, s)
         if needs_reflection(c, s):
             return REFLECT
-    if done < CHALLENGE:
-        update_group_misfit(c, s, t - s.group[0].t_check)
-        fault, node = find_fault(c, s, layout, t)
+    is_helpless = done == REINITIALISE and work.cursor[FLAG] == 0
+    if done < CHALLENGE or is_helpless:
+        if not is_helpless:
+            update_group_misfit(c, s, t - s.group[0].t_check)
+        # Where no other position fits better, it is the ranges that are wrong.
+        fault, node = find_fault(c, s, layout, t, is_helpless)
         if fault == ALIGNMENT:
             return CHALLENGE
         if fault in (POSITION, DIVERGED):
