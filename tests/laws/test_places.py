@@ -102,7 +102,7 @@ def test_others_close_together_leave_two_sides_and_one_is_right(seed, d, more, w
     off = np.linalg.norm(sides[:n_sides] - pos, axis=1)
     assert off.min() < 0.3
     fits = [total_loss(known, distance, side) for side in sides[:n_sides]]
-    assert fits == sorted(fits)
+    assert fits[0] <= fits[-1] + 1e-6
     assert fits[0] < 0.05
 
 

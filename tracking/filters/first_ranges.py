@@ -10,8 +10,6 @@ N_FIRST = 8
 """Ranges of a pair that are kept until it runs, the newest."""
 FEWEST = 3
 """Fewer say nothing of how far they are to be trusted: one may be absurd."""
-MIN_EXTENT = 0.1
-"""[m] Along an axis of which others extend less, the errors of ranges are all that they tell."""
 
 
 @kernel
@@ -83,14 +81,24 @@ def forget_first(pair):
     pair.start_n = 0
 
 
-@kernel
+@allocating_kernel
 def choose_members(c, s, layout, members, t):
-    """Nodes of which all pairs are ready, written; returns how many, 0 if too few to start."""
+    """Nodes of which all pairs are ready, written; returns how many, 0 if too few to start.
+
+    The readiest come first, so that their numbers decide nothing.
+    """
     n = s.nodes.shape[0]
-    for first in range(n):
-        members[0] = first
+    rank, order = np.empty(n), np.empty(n, np.int64)
+    for i in range(n):
+        rank[i], place = readiness(c, s, layout, i, t), i
+        while place > 0 and rank[order[place - 1]] < rank[i]:
+            order[place] = order[place - 1]
+            place -= 1
+        order[place] = i
+    for first in order:
         m = 1
-        for k in range(n):
+        members[0] = first
+        for k in order:
             fits = k != first
             for a in range(m):
                 if fits and (members[a] == k or not is_ready(c, s, layout, members[a], k, t)):
@@ -99,86 +107,22 @@ def choose_members(c, s, layout, members, t):
                 members[m] = k
                 m += 1
         if m >= min(3, n):
+            members[:m] = np.sort(members[:m])
             return m
     return 0
 
 
-@allocating_kernel
-def place(d, min_spread, merge_distance, known, distance, sides):
-    """Where a node is, from its distances to known ones; both candidates if a mirror fits too.
-
-    Args:
-        d: 2 or 3.
-        min_spread: A layout with less extent along an axis does not span it [m].
-        merge_distance: A node nearer than this to the plane of the others has no other side [m].
-        known: Positions, (known, 3) [m].
-        distance: Distances to them, (known) [m].
-        sides: The candidates, (2, 3), written.
-
-    Returns:
-        1 if the known nodes span the space, 2 if they are too flat to tell the side.
-    """
-    _, _, extent, _ = main_axes(d, known)
-    flat = extent[d - 1] <= min_spread
-    height = place_across(d, known, distance, d - 1 if flat else d, sides)
-    return 2 if flat and height >= merge_distance else 1
-
-
-@allocating_kernel
-def main_axes(d, known):
-    """Centre of positions, what they are from it, extent along their main axes, and the axes.
-
-    Extents are root mean squares [m], the longest first; axes are rows.
-    """
-    centre = np.zeros(d)
-    for a in range(known.shape[0]):
-        centre += known[a, :d] / known.shape[0]
-    A = known[:, :d].copy() - centre
-    _, S, axes = np.linalg.svd(A.T.copy() @ A)
-    return centre, A, np.sqrt(S / known.shape[0]), axes
-
-
-@allocating_kernel
-def place_across(d, known, distance, axis, sides):
-    """Where a node is by least squares of squared distances, with one axis of the others left open.
-
-    On both sides along it, so far away that the distances are right in the mean.
-
-    Args:
-        d: 2 or 3.
-        known: Positions, (known, 3) [m].
-        distance: Distances to them, (known) [m].
-        axis: Which of their main axes is open, the longest first; d for none. Others along which
-            they hardly extend say nothing either.
-        sides: The places, (2, 3), written.
-
-    Returns:
-        How far from the others the places are along that axis [m].
-    """
-    m = known.shape[0]
-    centre, A, extent, axes = main_axes(d, known)
-    # |p|^2 - 2 a.p + |a|^2 = d^2: its differences from the mean are linear in p.
-    b = np.zeros(m)
-    for a in range(m):
-        b[a] = 0.5 * (np.sum(A[a] * A[a]) - distance[a] ** 2)
-    b -= np.mean(b)
-    p = np.zeros(d)
-    for k in range(d):
-        if k != axis and extent[k] > MIN_EXTENT:
-            along = axes[k].copy()
-            p += along * (np.sum((A @ along) * b) / (m * extent[k] ** 2))
-    height2 = 0.0
-    for a in range(m):
-        height2 += (distance[a] ** 2 - np.sum((p - A[a]) ** 2)) / m
-    height = np.sqrt(max(height2, 0.0)) if axis < d else 0.0
-    sides[:, :] = 0.0
-    for side in range(2):
-        up = height if side == 0 else -height
-        for k in range(d):
-            sides[side, k] = centre[k] + p[k]
-            if axis < d:
-                sides[side, k] += up * axes[axis, k]
-    return height
+@kernel
+def readiness(c, s, layout, i, t):
+    """How many pairs of node i are ready; of equals, those are before that are nearer to others."""
+    n, way = 0, 0.0
+    for k in range(s.nodes.shape[0]):
+        if k != i and is_ready(c, s, layout, i, k, t):
+            pair = s.pairs[layout.pair_index[i, k]]
+            newest = pair.start_r[(pair.start_n - 1) % N_FIRST]
+            way += pair.surveyed if pair.surveyed > 0.0 else newest
+            n += 1
+    return n + 1.0 / (2.0 + way)
 
 
 @allocating_kernel
@@ -193,5 +137,8 @@ def first_shape(c, s, layout, members, m):
     eigenvalues, E = np.linalg.eigh(-0.5 * J @ D2 @ J)
     X = np.zeros((m, 3))
     for k in range(min(c.d, m)):
-        X[:, k] = E[:, m - 1 - k] * np.sqrt(max(eigenvalues[m - 1 - k], 0.0))
+        along = E[:, m - 1 - k]
+        # LAPACK's signs differ with machine and numbering; here the longer tail is ahead.
+        sign = -1.0 if np.sum(along**3) < 0.0 else 1.0
+        X[:, k] = sign * along * np.sqrt(max(eigenvalues[m - 1 - k], 0.0))
     return X

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.filters.first_ranges import main_axes, place_across
 from tracking.jit import allocating_kernel, kernel, small_kernel
+from tracking.maths.linear_multilateration import main_axes, place_across, sort_sides
 
 JOIN_SPREAD = 0.75
 """[m] Others that extend less than this along an axis leave the side of a node open: along it, an
@@ -19,6 +19,8 @@ error of a range counts several times."""
 WORSE = 9.0
 """[-] A second side that the distances say so much more against is none: three standard deviations
 of a single one."""
+EQUAL, ON_EDGE = 1e-6, 1e-9
+"""[-, m2] Less than this is rounding: of what distances say, and of on which side a place is."""
 SHORT, LONG = 0.12, 0.3
 """[m] Scales of ranges shorter and longer than they should be."""
 MOST = 16.0
@@ -96,9 +98,11 @@ def best_positions(d, merge_distance, known, distance, sides):
     side = np.sum((sides[0, :d] - centre) * across)
     for a in order[1:]:
         relative_covariance = np.sum((places[a] - sides[0]) ** 2) >= merge_distance**2
-        beyond = np.sum((places[a, :d] - centre) * across) * side < 0.0
+        beyond = np.sum((places[a, :d] - centre) * across) * side < -ON_EDGE
         if relative_covariance and beyond and said[a] < said[order[0]] + WORSE:
             sides[1] = places[a]
+            if said[a] < said[order[0]] + EQUAL:
+                sort_sides(d, known, sides)
             return 2
     return 1
 

@@ -47,6 +47,8 @@ def apply_motion_constraints(c, s, h, t, dt, work):
 @small_kernel
 def constrain_nodes(c, s, h, t, work):
     """Nodes that rest do not move, and the axles of cars do not slide."""
+    for r in range(c.n):
+        work.x[0, r] = s.x[h, r]
     for i in range(s.nodes.shape[0]):
         node = s.nodes[i]
         if not node.present or node.static or t - node.t_state > c.imu_timeout:
@@ -98,8 +100,8 @@ def apply_constraint(c, s, h, nu, m, variance, work):
 @small_kernel
 def nonholonomic_constraint(c, s, h, i, work):
     """The rear axle moves sideways by the slip of its tyres only; wheeled nodes do not rise."""
-    node = s.nodes[i]
-    error = s.x[h, node.i_heading]
+    node, x = s.nodes[i], work.x[0]
+    error = x[node.i_heading]
     cos_e, sin_e = math.cos(error), math.sin(error)
     cos_y, sin_y = (
         node.cos_yaw * cos_e - node.sin_yaw * sin_e,
@@ -108,9 +110,11 @@ def nonholonomic_constraint(c, s, h, i, work):
     idx, val = work.idx, work.val
     idx[0], idx[1], idx[2] = node.i_vel, node.i_vel + 1, node.i_heading
     predicted, val[0], val[1], val[2] = nonholonomic_model(
-        s.x[h, node.i_vel], s.x[h, node.i_vel + 1], error, cos_y, sin_y, node.slip * node.yaw_rate
+        x[node.i_vel], x[node.i_vel + 1], error, cos_y, sin_y, node.slip * node.yaw_rate
     )
     nu = node.rear_axle * node.yaw_rate - predicted
+    for k in range(3):
+        nu -= val[k] * (s.x[h, idx[k]] - x[idx[k]])
     if is_linear(s.group[0]):
         velocity_sensitivity(s, h, node.i_vel, val[0], val[1], 0.0, work)
     apply_constraint(c, s, h, nu, 3, node.sideways_var, work)

@@ -101,6 +101,7 @@ GROUP = np.dtype(
         ("degenerate", "?"),  # the layout could not be told from its mirror image
         ("n_alive", "i8"),
         ("best", "i8"),
+        ("undecided", "?"),  # all hypotheses were one, turned: nothing has spoken for it yet
         ("t", "f8"),  # time of the states [s]
         ("t_alignment", "f8"),  # since when other turns are looked for [s]
         ("t_check", "f8"),

@@ -265,9 +265,10 @@ class JointReference:
         """Zero velocity of nodes at rest, axles that do not slide, the mean velocity of a group."""
         c, n = self.c, len(self.x)
         dt, self.group["t_constraints"] = t - self.group["t_constraints"], t
+        before = self.x.copy()  # axles are linearised at one state: their order decides nothing
         for node, (_, v, _, y) in zip(self.nodes, self.indices, strict=True):
             if node["rests"] and t - node["t_moved"] > c["rest_after"]:
-                floor = 9.0 * (c["rest_var"] + np.diagonal(self.P)[v : v + 2])
+                floor = c["glide_nis"] * (c["rest_var"] + np.diagonal(self.P)[v : v + 2])
                 if (self.x[v : v + 2] ** 2 > floor).any():
                     node["t_moved"] = t
                     continue
@@ -275,20 +276,19 @@ class JointReference:
                     self.update(np.eye(n)[v + k], -self.x[v + k], c["rest_var"], c["jolt_nis"])
             elif node["sideways_var"] > 0.0:
                 model = partial(self.slides, node, v, y)
-                nu = node["rear_axle"] * node["yaw_rate"] - model(self.x)
-                self.update(jacobian(model, self.x), nu, node["sideways_var"], c["jolt_nis"])
+                H = jacobian(model, before)
+                nu = node["rear_axle"] * node["yaw_rate"] - model(before) - H @ (self.x - before)
+                self.update(H, nu, node["sideways_var"], c["jolt_nis"])
         for k in range(2):
-            H = np.zeros(n)
-            H[self.nodes["i_vel"] + k] = 1.0 / len(self.nodes)
+            H = np.isin(np.arange(n), self.nodes["i_vel"] + k) / len(self.nodes)
             self.update(H, -(H @ self.x), self.nodes["speed_var"].mean() / max(dt, 1e-3))
 
     @staticmethod
     def slides(node: Any, v: int, y: int, x: Any) -> Any:
         """Sideways velocity of an axle and of the slip of its tyres."""
         yaw = np.arctan2(node["sin_yaw"], node["cos_yaw"]) + x[y]
-        forward = np.cos(yaw) * x[v] + np.sin(yaw) * x[v + 1]
-        slip = node["slip"] * node["yaw_rate"] * forward**2
-        return slip - np.sin(yaw) * x[v] + np.cos(yaw) * x[v + 1]
+        cos, sin, slip = np.cos(yaw), np.sin(yaw), node["slip"] * node["yaw_rate"]
+        return slip * (cos * x[v] + sin * x[v + 1]) ** 2 - sin * x[v] + cos * x[v + 1]
 
     def centre(self, t: float) -> None:
         """Move the centre of the group to the origin, with a fixed uncertainty."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from tracking.filters.best_hypothesis import choose_best
 from tracking.filters.first_ranges import forget_first
 from tracking.filters.pair.initialisation import (
     copy_hypothesis,
@@ -124,13 +125,7 @@ def prune_bank(c, s):
     if group.n_alive < 2:
         return
     n_hyps = s.alive.shape[0]
-    best = -1
-    for h in range(n_hyps):
-        if s.alive[h] and (best < 0 or s.loglik[h] > s.loglik[best]):
-            best = h
-    # The report changes only for a clear gain, or equal hypotheses would take turns.
-    if not s.alive[group.best] or s.loglik[best] > s.loglik[group.best] + c.report_lead:
-        group.best = best
+    best, _ = choose_best(s, c.report_lead)
     top = s.loglik[best]
     for h in range(n_hyps):
         if s.alive[h] and h != group.best and s.loglik[h] < top - c.prune:

@@ -15,11 +15,11 @@ from tracking.filters.first_ranges import (
     choose_members,
     first_shape,
     is_ready,
-    place,
     start_distance,
 )
 from tracking.filters.pair.nlos_model import E
 from tracking.jit import allocating_kernel, kernel
+from tracking.maths.linear_multilateration import place
 
 
 @kernel
@@ -81,7 +81,7 @@ def try_start(c, s, layout, t):
     group.started = True
     group.flat = False
     group.n_alive = layout.rotations.shape[0]
-    group.best = 0
+    group.best, group.undecided = 0, True
     group.t_check = t
     group.t_mds = t
     group.t_wheels = t

@@ -68,6 +68,7 @@ GROUP = np.dtype(
         ("flat", "?"),  # the layout was too flat to tell its mirror image
         ("n_alive", "i8"),  # hypotheses still considered
         ("best", "i8"),  # the hypothesis reported
+        ("undecided", "?"),  # nothing has spoken for it yet
         ("t_mds", "f8"),  # time of the last refinement [s]
         ("t_wheels", "f8"),  # time of the last use of the wheels [s]
         ("dv0", "f8"),  # sum over nodes of what their acceleration added since then [m/s]

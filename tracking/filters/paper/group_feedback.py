@@ -29,8 +29,9 @@ def mds(c, D):
     X = np.zeros((n, 3))
     for axis in range(min(c.d, n)):
         k = n - 1 - axis
-        # LAPACK's signs differ between machines; the first node decides here.
-        scale = max(eigenvalues[k], 0.0) ** c.power * (-1.0 if E[0, k] < 0.0 else 1.0)
+        # LAPACK's signs differ with machine and numbering; here the longer tail is ahead.
+        sign = -1.0 if np.sum(E[:, k] ** 3) < 0.0 else 1.0
+        scale = max(eigenvalues[k], 0.0) ** c.power * sign
         X[:, axis] = E[:, k] * scale
     return X
 

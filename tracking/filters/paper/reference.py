@@ -175,8 +175,9 @@ class PaperReference:
         power = 0.5 if self.c.scaling == "root" else 0.25
         for axis in range(min(self.d, len(D))):
             largest = max(eigenvalues[-1 - axis], 0.0)
-            # LAPACK's signs differ between machines; the first node decides here.
-            X[:, axis] = E[:, -1 - axis] * largest**power * (-1.0 if E[0, -1 - axis] < 0.0 else 1.0)
+            # LAPACK's signs differ with machine and numbering; here the longer tail is ahead.
+            sign = -1.0 if np.sum(E[:, -1 - axis] ** 3) < 0.0 else 1.0
+            X[:, axis] = sign * E[:, -1 - axis] * largest**power
         return X
 
     def positions(self, members: list[int]) -> F64:

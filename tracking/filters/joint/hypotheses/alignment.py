@@ -55,7 +55,7 @@ TRANSITIONS: dict[Alignment, dict[Alignment, str]] = {
         Alignment.NONE: "fewer than two nodes are left",
     },
     Alignment.MODES: {
-        Alignment.CANDIDATES: "each mode is known to 0.2 rad",
+        Alignment.CANDIDATES: "each mode is known to 0.15 rad",
         Alignment.LINEAR: "the group has just started on wheels in motion",
         Alignment.NONE: "fewer than two nodes are left",
     },

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from tracking.filters.best_hypothesis import choose_best
 from tracking.filters.first_ranges import forget_first
 from tracking.filters.joint.gyro_bias import last_state
 from tracking.filters.joint.hypotheses.alignment import (
@@ -120,20 +121,16 @@ def prune_bank(c, s):
             group.alignment = FILTERED
         return
     n_hyps = s.alive.shape[0]
-    if group.alignment != STATIC and group.t < group.t_scoring_starts - TIE:
-        for h in range(n_hyps):
-            s.loglik[h] = 0.0
-    best = -1
-    for h in range(n_hyps):
-        if s.alive[h] and (best < 0 or s.loglik[h] > s.loglik[best]):
-            best = h
-    # The report changes only for a clear gain, or equal hypotheses would take turns.
-    if not s.alive[group.best] or s.loglik[best] > s.loglik[group.best] + c.report_lead:
-        group.best = best
+    is_scored = group.alignment == STATIC or group.t >= group.t_scoring_starts - TIE
+    best, changes = choose_best(s, c.report_lead if is_scored else np.inf)
+    if changes:
         # Residuals are those of the other hypothesis.
         for p in range(s.pairs.shape[0]):
             reset_residuals(s.pairs[p])
         group.mean_nis = 1.0
+    if not is_scored:
+        for h in range(n_hyps):
+            s.loglik[h] = 0.0
     top = s.loglik[best]
     for h in range(n_hyps):
         if s.alive[h] and h != group.best and s.loglik[h] < top - c.prune:

@@ -27,7 +27,11 @@ from tracking.filters.joint.hypotheses.alignment_sensitivity import (
     start_alignment,
 )
 from tracking.filters.joint.hypotheses.copying import copy_hypothesis
-from tracking.filters.joint.hypotheses.static_initialisation import all_static, is_at_rest
+from tracking.filters.joint.hypotheses.static_initialisation import (
+    all_static,
+    is_at_rest,
+    is_settling,
+)
 from tracking.filters.joint.propagation import initial_tilt_variance
 from tracking.filters.joint.scalar_update import reset_state
 from tracking.filters.joint.supervision.residuals import reset_residuals
@@ -90,7 +94,7 @@ def start(c, s, layout, t):
     if opens:
         start_alignment(c, s, layout, 0)
     group.n_alive = n_first
-    group.best = 0
+    group.best, group.undecided = 0, n_first > 1
     group.t, group.t_check, group.t_constraints, group.t_gauge = t, t, t, t
     group.t_scoring_starts = t
     for a in range(m):
@@ -109,7 +113,7 @@ def is_motion_unknown(c, s, members, m, t):
     """
     for a in range(m):
         node = s.nodes[members[a]]
-        if node.has_state and not node.static and t - node.t_first <= c.settling:
+        if node.has_state and not node.static and is_settling(c, node, t):
             return True
     return False
 

@@ -54,9 +54,17 @@ def may_move(c, s, t):
     """True while it is too early to know whether the present nodes move."""
     for i in range(s.nodes.shape[0]):
         node = s.nodes[i]
-        if node.present and not node.static and t - node.t_first <= c.settling:
+        if node.present and not node.static and is_settling(c, node, t):
             return True
     return False
+
+
+@small_kernel
+def is_settling(c, node, t):
+    """True until a node has a sample that tells whether it moves, or is silent."""
+    if t - node.t_first <= c.settling:
+        return True
+    return t - node.t_state <= c.imu_timeout and node.t_state - node.t_first <= c.settling
 
 
 @allocating_kernel
@@ -67,7 +75,7 @@ def spawn_rotation_hypotheses(c, s, layout, work):
     room for a few rotations of the second.
     """
     group = s.group[0]
-    group.alignment = FILTERED
+    group.alignment, group.undecided = FILTERED, not has_linear_alignment(c, s)
     if group.t > group.t_scoring_starts - c.wheels_after + c.stood_for + TIE:
         group.t_scoring_starts = group.t
     was_alive = s.alive.copy()

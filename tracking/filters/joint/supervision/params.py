@@ -117,7 +117,7 @@ class AlignmentParams:
     """[s] A challenge ends after so long without a likelier mode."""
     mode_std: float = 0.7
     """[rad] Each mode is filtered by itself once it is known so well."""
-    candidate_std: float = 0.2
+    candidate_std: float = 0.15
     """[rad] Its rotation goes into the covariance once it is known so well."""
 
     def __post_init__(self) -> None:
