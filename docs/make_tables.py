@@ -39,6 +39,8 @@ from relpos_env.tasks import DEFAULT_WEIGHTS, TASKS
 from relpos_env.tasks.needs import DEFAULT_SCENARIO
 from tracking.filters.joint.hypotheses.alignment import TRANSITIONS, Alignment
 from tracking.filters.joint.params import JointParams
+from tracking.filters.joint.supervision.faults import ACTIONS as REMEDIES
+from tracking.filters.joint.supervision.faults import Fault
 
 DOCS = Path(__file__).resolve().parent
 CARS = 3
@@ -253,12 +255,19 @@ def alignment() -> str:
     return markdown(("state", "what it is", "then"), rows)
 
 
+def faults() -> str:
+    """The catalogue of faults, and what is done about each."""
+    told = docstrings(Fault)
+    rows = [[f"`{f.name}`", " ".join(told[f.name].split()), do] for f, do in REMEDIES.items()]
+    return markdown(("fault", "what it is", "action"), rows)
+
+
 def filter_parameters() -> str:
     """Parameters of the joint filter, those of its parts among them."""
     rows = []
     params = JointParams()
-    for part in (params, params.range_error, params.nlos, params.start, params.alignment,
-                 params.supervision):  # fmt: skip
+    for part in (params, params.range_error, params.nlos, params.update, params.start,
+                 params.alignment, params.supervision):  # fmt: skip
         told = docstrings(type(part))
         for f in fields(part):
             value = getattr(part, f.name)
@@ -271,6 +280,7 @@ def filter_parameters() -> str:
 
 TABLES: dict[str, Callable[[], str]] = {
     "alignment": alignment,
+    "faults": faults,
     "filter-parameters": filter_parameters,
     "sizes": sizes,
     **{f"observation-{mode}": partial(observations, mode) for mode in OBSERVATIONS},

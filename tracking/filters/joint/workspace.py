@@ -40,7 +40,7 @@ class Workspace(NamedTuple):
     step: F64
     """(node, 42)"""
     derivatives: F64
-    """Of position and velocity by the states behind, see `block_propagation`."""
+    """Of position and velocity by the states behind, see `covariance`."""
     speed: F64
     """(node)"""
     x: F64
