@@ -60,10 +60,6 @@ for command in (
 
 def main() -> None:
     """Run the command line; what a user can mend ends in one line and status 2."""
-    from hardware_bridge.errors import BridgeError
-    from relpos_env.errors import EnvError
-    from tracking.errors import TrackingError
-
     try:
         cli(standalone_mode=False)
     except click.exceptions.Abort:
@@ -73,9 +69,21 @@ def main() -> None:
         sys.exit(2)
     except BrokenPipeError:
         sys.exit(1)
-    except (TrackingError, EnvError, BridgeError, UsageError, OSError) as error:
+    except Exception as error:
+        if not _is_expected(error):
+            raise
         click.echo(f"Error: {error}", err=True)
         sys.exit(2)
+
+
+def _is_expected(error: Exception) -> bool:
+    """True for errors that say what a user can mend."""
+    # The packages take longer to import than help takes to print.
+    from hardware_bridge.errors import BridgeError
+    from relpos_env.errors import EnvError
+    from tracking.errors import TrackingError
+
+    return isinstance(error, (TrackingError, EnvError, BridgeError, UsageError, OSError))
 
 
 if __name__ == "__main__":

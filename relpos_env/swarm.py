@@ -31,9 +31,9 @@ from relpos_env.timing import DT, SOON
 from relpos_env.world import World
 from relpos_env.world_state import WorldState
 from tracking.arrays import F64, Bool
-from tracking.filters.records import as_records
 from tracking.jit import bind
 from tracking.measurements import MeasurementBlock
+from tracking.records import as_records
 
 Physics = Literal["pymunk", "fast"]
 SPARE_BOXES = 8

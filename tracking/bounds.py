@@ -33,11 +33,11 @@ from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.state import JointState, make_layout, make_state, room_to_wait
 from tracking.filters.joint.workspace import make_workspace
-from tracking.filters.records import Records, as_records
 from tracking.geometry import quat_conjugate, quat_multiply, yaw_of
 from tracking.information_bound import run_bound
 from tracking.log import Log
 from tracking.measurements import Kind, MeasurementBlock
+from tracking.records import Records, as_records
 from tracking.short_repr import short_repr
 
 RATE = 5.0

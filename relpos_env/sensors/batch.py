@@ -17,8 +17,8 @@ from relpos_env.sensors.odometer import ODOMETER
 from relpos_env.sensors.proximity import PROXIMITY, fill_proximity
 from relpos_env.timing import DT
 from tracking.arrays import I64, Bool
-from tracking.filters.records import as_records
 from tracking.measurements import N_VALUES
+from tracking.records import as_records
 
 Array = NDArray[Any]
 

@@ -15,7 +15,7 @@ from relpos_env.interface.beams import FARTHEST, beam_directions, beam_starts
 from relpos_env.scenarios import scenario
 from relpos_env.sensors._proximity_kernels import read_proximity
 from relpos_env.sensors.proximity import PROXIMITY, ProximitySimParams, fill_proximity
-from tracking.filters.records import as_records
+from tracking.records import as_records
 
 EXACT = ProximitySimParams(noise_std=0.0, noise_share=0.0)
 SIZE = (0.21, 0.10)

@@ -17,9 +17,9 @@ from relpos_env.sensors._odometer_kernels import read_odometers
 from relpos_env.sensors.imu import IMU, ImuSimParams, fill_imu
 from relpos_env.sensors.magnetometer import MAG, MagSimParams, fill_mag
 from relpos_env.sensors.odometer import ODOMETER, OdometerSimParams
-from tracking.filters.records import as_records
 from tracking.geometry import GRAVITY, quat_conjugate, quat_from_yaw, quat_multiply, rotate
 from tracking.maths.angles import cosine_sine
+from tracking.records import as_records
 
 SEED = np.uint64(7)
 KEPT = ("drift_tau", "vibration_speed", "gyr_range", "acc_range")

@@ -18,7 +18,6 @@ from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.state import JointState, make_state
 from tracking.filters.joint.supervision.params import AlignmentParams
 from tracking.filters.level_vehicle import angle_between, direction
-from tracking.filters.records import as_records
 from tracking.geometry import quat_from_yaw
 from tracking.maths import covariance_loops as loops
 from tracking.maths import covariance_simd as simd
@@ -33,6 +32,7 @@ from tracking.maths.covariance import (
     sum_rows,
 )
 from tracking.maths.covariance_simd import SHAPES
+from tracking.records import as_records
 
 angles = st.floats(-3.1, 3.1)
 SAME_TURN = AlignmentParams().same_rotation

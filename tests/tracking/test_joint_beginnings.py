@@ -15,8 +15,8 @@ from tracking.filters.joint.hypotheses.initialisation import (
 from tracking.filters.joint.params import JointParams, NlosParams
 from tracking.filters.joint.preintegration import process_attitude
 from tracking.filters.joint.state import JointState, make_state
-from tracking.filters.records import as_records
 from tracking.measurements import N_VALUES
+from tracking.records import as_records
 from tracking.vehicles import VEHICLES
 
 

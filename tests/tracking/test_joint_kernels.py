@@ -20,8 +20,8 @@ from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.range_update import predict_range
 from tracking.filters.joint.state import JointState, make_layout, make_state
 from tracking.filters.joint.workspace import make_workspace
-from tracking.filters.records import as_records
 from tracking.geometry import GRAVITY
+from tracking.records import as_records
 
 
 def running(dimensions, vehicle="car", seed=0, static=()):

@@ -19,10 +19,10 @@ from tracking.filters.joint.preintegration import preintegrate
 from tracking.filters.joint.range_update import predict_range
 from tracking.filters.joint.state import JointState, make_state
 from tracking.filters.joint.tilt_correction import GAIN
-from tracking.filters.records import as_records
 from tracking.maths import rotation_modes
 from tracking.maths.starting_rotations import starting_rotations
 from tracking.measurements import Kind
+from tracking.records import as_records
 
 MIRROR = np.diag([1.0, 1.0, -1.0])
 

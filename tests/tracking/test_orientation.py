@@ -13,6 +13,7 @@ from tracking.constellation import Constellation, NodeConfig
 from tracking.geometry import GRAVITY, rotate, yaw_of
 from tracking.measurements import Kind, MeasurementBlock
 from tracking.sanity import imu, saturation
+from tracking.sanity.params import SanityParams
 
 
 def constellation(heading="magnetic", vehicle="hand"):
@@ -32,14 +33,19 @@ def recording(n=400, mag=True, seed=0):
     return MeasurementBlock.concatenate(parts).sorted(), imu, field
 
 
+SANITY = SanityParams().as_record()[0]
+
+
 def new_health():
     return np.zeros((1, 1, imu.N_HEALTH))
 
 
 def inspect(health, samples):
-    judged, usable = samples[None].copy(), np.zeros((1, len(samples)), dtype=bool)
-    imu.inspect(health, judged, usable)
-    return judged[0], usable[0]
+    judged, usable = samples.copy(), np.zeros(len(samples), dtype=bool)
+    for k in range(len(samples)):
+        usable[k] = imu.inspect_sample(SANITY, health, 0, 0, samples[None], 0, k)
+        judged[k] = health[0, 0, imu.GOOD : imu.GOOD + 6]
+    return judged, usable
 
 
 def new_limits():
@@ -47,9 +53,8 @@ def new_limits():
 
 
 def at_limit(limits, accel_b):
-    cut, upright = np.zeros((1, *accel_b.shape), dtype=bool), np.zeros((1, len(accel_b)), bool)
-    saturation.at_limit(limits, accel_b[None].copy(), cut, upright)
-    return cut[0], upright[0]
+    found = np.array([saturation.find_limits(SANITY, limits, 0, 0, *row) for row in accel_b])
+    return found[:, :3], found[:, 3]
 
 
 def states(block):

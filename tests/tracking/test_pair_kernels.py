@@ -9,8 +9,8 @@ from tracking.constellation import Constellation, NodeConfig
 from tracking.filters.pair import mds_feedback, motion_constraints, nlos_model, range_update
 from tracking.filters.pair.params import PairEkfParams
 from tracking.filters.pair.state import FilterState, make_coefficients, make_layout, make_state
-from tracking.filters.records import as_records
 from tracking.maths.mds import refine_positions, weighted_mds
+from tracking.records import as_records
 from tracking.tracker import Tracker
 
 Y = {2: [0, 1, 3, 4], 3: [0, 1, 2, 3, 4, 5]}

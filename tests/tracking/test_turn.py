@@ -16,7 +16,7 @@ from tracking.filters.joint.smoothing import with_clones
 from tracking.filters.joint.state import JointState, make_layout, make_state
 from tracking.filters.joint.surveyed_distance import surveyed_distance_update
 from tracking.filters.joint.workspace import make_workspace
-from tracking.filters.records import as_records
+from tracking.records import as_records
 
 N = 4
 

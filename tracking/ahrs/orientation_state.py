@@ -7,7 +7,7 @@ of each (`OrientationState.of`). The kernels write the arrays in place.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +22,9 @@ from tracking.arrays import F64, Bool
 from tracking.constellation import Constellation
 from tracking.geometry import GRAVITY
 from tracking.numbers import check_numbers
+from tracking.records import Records
 from tracking.sanity.imu import N_HEALTH
+from tracking.sanity.params import SanityParams
 from tracking.sanity.saturation import N_LIMIT
 from tracking.vehicles import VEHICLES
 
@@ -49,6 +51,8 @@ class OrientationParams:
     gravity_tau: float = 0.5
     """[s] Time constant with which a node at rest learns the length of gravity that its own
     accelerometer reads, which removes the vertical part of its offset."""
+    sanity: SanityParams = field(default_factory=SanityParams)
+    """Which samples are doubtful."""
     doubtful_psd: float = 1.5
     """[m/s2/sqrt(Hz)] Added noise of an acceleration that is saturated or stands in for a spike:
     that of a node without an IMU. Such a reading is nearer to the acceleration than none."""
@@ -98,6 +102,8 @@ class OrientationCoefficients(NamedTuple):
     """`OrientationParams.doubtful_psd`, (node) [m/s2/sqrt(Hz)]."""
     levelled: Bool
     """True for vehicles that stay level, (node)."""
+    sanity: Records
+    """`OrientationParams.sanity`, (1)."""
     magnetic: Bool
     """True where the heading comes from the magnetometer, (node)."""
 
@@ -184,6 +190,7 @@ def make_coefficients(
         heading=np.array([node.initial_heading or 0.0 for node in nodes]),
         doubtful_psd=np.full(len(nodes), params.doubtful_psd),
         levelled=np.array([v.levelled for v in vehicles]),
+        sanity=params.sanity.as_record(),
         magnetic=np.full(len(nodes), constellation.heading == "magnetic"),
     )
 

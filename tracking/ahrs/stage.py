@@ -75,11 +75,11 @@ def take_sample(c, s, e, n, t, kind, values, valid, k):
     m, good = s.node, s.health
     has_field = m[e, n, HAS_FIELD] != 0.0 and c.magnetic[n]
     m[e, n, HAS_FIELD] = 0.0
-    if not inspect_sample(s.health, e, n, values, e, k):
+    if not inspect_sample(c.sanity[0], s.health, e, n, values, e, k):
         valid[e, k] = False
         return
     ax, ay, az = good[e, n, GOOD + 3], good[e, n, GOOD + 4], good[e, n, GOOD + 5]
-    cut_x, cut_y, cut_z, upright = find_limits(s.limits, e, n, ax, ay, az)
+    cut_x, cut_y, cut_z, upright = find_limits(c.sanity[0], s.limits, e, n, ax, ay, az)
     n_lost = find_gap(c, s, e, n, t)
     integrate_over(c, s, e, n, n_lost, upright)
     if has_field:

@@ -16,20 +16,7 @@ from __future__ import annotations
 
 import math
 
-from tracking.jit import kernel, small_kernel
-
-CHANCE = math.log(1e-5)
-"""[-] A run of equal readings is chance as long as it is more likely than this."""
-RARE, COMMON = 0.02, 0.9
-"""[-] Share of readings that are equal to the one before: between these, however few came."""
-MEMORY, RECENT = 500.0, 100.0
-"""[-] Readings over which that share, and the mean of the axis, are taken."""
-AWAY = 0.5
-"""[m/s2] A limit is at least so far from the mean."""
-LONG, CHANGE = 20, 1.0
-"""[-], [m/s2] An axis that repeats itself so often while another changes so much is cut off."""
-WHOLE_AFTER = 100
-"""[-] Readings in a row within the scale before they tell the tilt again."""
+from tracking.jit import small_kernel
 
 LAST, RUN, MEAN, SHARE, LOW, HIGH, START = 0, 1, 2, 3, 4, 5, 6
 N_AXIS = 7
@@ -42,22 +29,23 @@ scale."""
 
 
 @small_kernel
-def start_limits(memory, e, n, x, y, z):
+def start_limits(q, memory, e, n, x, y, z):
     """Begin with a reading."""
     for a in range(3):
         at = a * N_AXIS
         first = (x, y, z)[a]
         memory[e, n, at + LAST] = first + 1.0  # equal to none
-        memory[e, n, at + MEAN], memory[e, n, at + SHARE] = first, RARE
+        memory[e, n, at + MEAN], memory[e, n, at + SHARE] = first, q.equal_least
         memory[e, n, at + LOW], memory[e, n, at + HIGH] = -math.inf, math.inf
-    memory[e, n, SEEN], memory[e, n, N_WHOLE] = 1.0, WHOLE_AFTER
+    memory[e, n, SEEN], memory[e, n, N_WHOLE] = 1.0, q.whole_after
 
 
 @small_kernel
-def is_at_limit(memory, e, n, at, x, others, held):
+def is_at_limit(q, memory, e, n, at, x, others, held):
     """Whether the reading of one axis is at its limit.
 
     Args:
+        q: Record of `SanityParams`.
         memory: Updated, (env, node, N_LIMIT).
         e: Environment.
         n: Node.
@@ -78,27 +66,28 @@ def is_at_limit(memory, e, n, at, x, others, held):
     if x > memory[e, n, at + HIGH] or x < memory[e, n, at + LOW]:
         memory[e, n, at + LOW], memory[e, n, at + HIGH] = -math.inf, math.inf
     if run > 0.0:
-        rare = min(max(memory[e, n, at + SHARE], RARE), COMMON)
-        if abs(x - mean) > AWAY and run * math.log(rare) < CHANCE:
+        rare = min(max(memory[e, n, at + SHARE], q.equal_least), q.equal_most)
+        if abs(x - mean) > q.limit_least and run * math.log(rare) < q.chance:
             if x > mean:
                 memory[e, n, at + HIGH] = x
             else:
                 memory[e, n, at + LOW] = x
-        if run >= LONG and abs(others - memory[e, n, at + START]) > CHANGE:
+        if run >= q.held_long and abs(others - memory[e, n, at + START]) > q.held_change:
             memory[e, n, at + LOW], memory[e, n, at + HIGH] = x, x
     if x == memory[e, n, at + LOW] or x == memory[e, n, at + HIGH]:
         return True
     share = memory[e, n, at + SHARE]
-    memory[e, n, at + SHARE] = share + ((1.0 if equal else 0.0) - share) / MEMORY
-    memory[e, n, at + MEAN] = mean + (x - mean) / RECENT
+    memory[e, n, at + SHARE] = share + ((1.0 if equal else 0.0) - share) / q.equal_memory
+    memory[e, n, at + MEAN] = mean + (x - mean) / q.mean_memory
     return False
 
 
 @small_kernel
-def find_limits(memory, e, n, x, y, z):
+def find_limits(q, memory, e, n, x, y, z):
     """Note which axes are at their limit.
 
     Args:
+        q: Record of `SanityParams`.
         memory: Updated, (env, node, N_LIMIT); zeros before the first sample.
         e: Environment.
         n: Node.
@@ -110,32 +99,15 @@ def find_limits(memory, e, n, x, y, z):
         True for each axis that is cut off; True if the sample tells the tilt.
     """
     if memory[e, n, SEEN] == 0.0:
-        start_limits(memory, e, n, x, y, z)
+        start_limits(q, memory, e, n, x, y, z)
     held = (
         x == memory[e, n, LAST]
         and y == memory[e, n, N_AXIS + LAST]
         and z == memory[e, n, 2 * N_AXIS + LAST]
     )
-    cut_x = is_at_limit(memory, e, n, 0, x, y + z, held)
-    cut_y = is_at_limit(memory, e, n, N_AXIS, y, z + x, held)
-    cut_z = is_at_limit(memory, e, n, 2 * N_AXIS, z, x + y, held)
+    cut_x = is_at_limit(q, memory, e, n, 0, x, y + z, held)
+    cut_y = is_at_limit(q, memory, e, n, N_AXIS, y, z + x, held)
+    cut_z = is_at_limit(q, memory, e, n, 2 * N_AXIS, z, x + y, held)
     whole = not (cut_x or cut_y or cut_z)
     memory[e, n, N_WHOLE] = memory[e, n, N_WHOLE] + 1.0 if whole else 0.0
-    return cut_x, cut_y, cut_z, memory[e, n, N_WHOLE] >= WHOLE_AFTER
-
-
-@kernel
-def at_limit(memory, accel_b, cut, upright):
-    """Note where the accelerometer is at the end of its scale, and where it tells the tilt.
-
-    Args:
-        memory: Updated, (env, node, N_LIMIT); zeros before the first sample.
-        accel_b: Specific force, (env, sample, 3) [m/s2], in order, all of node 0.
-        cut: Written, True for axes that are cut off, (env, sample, 3).
-        upright: Written, True for samples that tell the tilt, (env, sample).
-    """
-    for e in range(accel_b.shape[0]):
-        for k in range(accel_b.shape[1]):
-            x, y, z = accel_b[e, k, 0], accel_b[e, k, 1], accel_b[e, k, 2]
-            found = find_limits(memory, e, 0, x, y, z)
-            cut[e, k, 0], cut[e, k, 1], cut[e, k, 2], upright[e, k] = found
+    return cut_x, cut_y, cut_z, memory[e, n, N_WHOLE] >= q.whole_after

@@ -10,7 +10,7 @@ from tracking.arrays import Bool, whole_lines
 from tracking.constellation import Constellation
 from tracking.filters.joint.params import JointParams, UpdateParams
 from tracking.filters.joint.supervision.params import AlignmentParams, SupervisionParams
-from tracking.filters.records import Records
+from tracking.records import Records
 
 _NUMBERS = (
     "nonlinearity_gain",

@@ -30,9 +30,9 @@ from tracking.filters.joint.rare import compile_all, run_to_end
 from tracking.filters.joint.smoothing import read_clones, with_clones
 from tracking.filters.joint.state import Layout, make_layout, make_state
 from tracking.filters.joint.workspace import Workspace, make_workspace
-from tracking.filters.records import as_records, with_records
 from tracking.jit import bind
 from tracking.measurements import MeasurementBlock
+from tracking.records import as_records, with_records
 
 
 class JointEkf(BatchedFilter):

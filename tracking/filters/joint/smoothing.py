@@ -19,7 +19,7 @@ from tracking.arrays import F64, aligned, whole_lines
 from tracking.estimate import Status, TeamEstimate
 from tracking.filters.joint.hypotheses.alignment import Alignment
 from tracking.filters.joint.state import JointState, room_to_wait
-from tracking.filters.records import Records
+from tracking.records import Records
 
 
 def with_clones(state: JointState, coefficients: Records) -> tuple[JointState, Records]:

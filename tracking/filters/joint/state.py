@@ -29,9 +29,9 @@ from tracking.filters.joint.coefficients import (
 )
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.records import GROUP, NODE, PAIR
-from tracking.filters.records import Records
 from tracking.jit import kernel
 from tracking.maths.starting_rotations import starting_rotations
+from tracking.records import Records
 
 N_PRE = 39
 """Columns of `JointState.preintegrated`."""

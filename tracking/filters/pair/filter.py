@@ -24,7 +24,7 @@ from tracking.filters.batched import BatchedFilter
 from tracking.filters.pair.event_loop import run_events
 from tracking.filters.pair.params import PairEkfParams
 from tracking.filters.pair.state import make_coefficients, make_layout, make_state
-from tracking.filters.records import as_records, with_records
+from tracking.records import as_records, with_records
 
 
 class PairEkf(BatchedFilter):

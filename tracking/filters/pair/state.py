@@ -15,8 +15,8 @@ import numpy as np
 from tracking.arrays import F64, I64, Bool
 from tracking.constellation import Constellation
 from tracking.filters.pair.params import PairEkfParams
-from tracking.filters.records import Records
 from tracking.maths.starting_rotations import starting_rotations
+from tracking.records import Records
 from tracking.vehicles import VEHICLES
 
 SPEED_MODELS = {"none": 0, "range-rate": 1, "speed-norm": 2}

@@ -22,7 +22,7 @@ from tracking.filters.batched import BatchedFilter
 from tracking.filters.paper.event_loop import run_events
 from tracking.filters.paper.params import PaperParams
 from tracking.filters.paper.state import make_constants, make_layout, make_state
-from tracking.filters.records import as_records, with_records
+from tracking.records import as_records, with_records
 
 
 class PaperEkf(BatchedFilter):

@@ -9,7 +9,7 @@ import numpy as np
 from tracking.arrays import F64, I64
 from tracking.constellation import Constellation
 from tracking.filters.paper.params import CHOICES, PaperParams
-from tracking.filters.records import Records
+from tracking.records import Records
 
 NODE = np.dtype(
     [
