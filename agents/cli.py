@@ -25,6 +25,7 @@ from agents.commands.simulate import simulate
 from agents.commands.sniff import sniff
 from agents.commands.track import track
 from agents.commands.train import train
+from agents.commands.warmup import warmup
 from agents.errors import UsageError
 
 
@@ -54,6 +55,7 @@ for command in (
     live,
     replay,
     bench,
+    warmup,
 ):
     cli.add_command(command)
 

@@ -49,6 +49,18 @@ def compile_as_unit(compiled: Any) -> None:
     compiled.get_call_template = resolve_without_constants
 
 
+def load_unit(compiled: Any, args: tuple[Any, ...]) -> bool:
+    """Load a dispatcher's code for some types from the disk; false if it has to be compiled."""
+    if args in compiled.overloads:
+        return True
+    found = compiled._cache.load_overload(args, compiled.targetctx)
+    if found is None:
+        return False
+    compiled.targetctx.insert_user_function(found.entry_point, found.fndesc, [found.library])
+    compiled.add_overload(found)
+    return True
+
+
 class _Unit(JITCodeLibrary):  # type: ignore[misc]
     """Machine code of one kernel for one set of types."""
 

@@ -12,9 +12,11 @@ from typing import Any, TypeVar
 import numpy as np
 from numba import config, njit, typeof
 
-from tracking.compile_units import compile_as_unit
+from tracking.compile_units import compile_as_unit, load_unit
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+Call = tuple[Callable[..., Any], tuple[Any, ...]]
+"""A kernel and arguments of the types that it is compiled for."""
 
 
 def kernel(function: Function) -> Function:
@@ -59,6 +61,13 @@ def bind(kernel: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
     compiled: Any = kernel
     entry = compiled.compile(tuple(_type_of(argument) for argument in arguments))
     return partial(entry, *arguments)
+
+
+def is_compiled(kernel: Callable[..., Any], *arguments: Any) -> bool:
+    """Load a kernel for arguments of some types; false if it has yet to be compiled."""
+    if config.DISABLE_JIT:
+        return True
+    return load_unit(kernel, tuple(_type_of(argument) for argument in arguments))
 
 
 _types: dict[Any, Any] = {}

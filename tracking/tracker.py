@@ -23,6 +23,7 @@ from tracking.filters import DEFAULT_FILTER, FilterBuilder, filter_builder
 from tracking.filters.joint import JointEkf
 from tracking.filters.params import FilterParams
 from tracking.horizon import HorizonParams
+from tracking.jit import Call
 from tracking.measurements import MeasurementBlock
 from tracking.sanity.blocks import check, usable
 
@@ -112,6 +113,15 @@ class Tracker:
         """
         follow = self._filter.bind(block, estimate.with_time_axis())
         return self._orientation.bind(block), follow
+
+    def calls(self) -> list[list[Call]]:
+        """All kernels that it runs, with arguments of their types, to compile them ahead.
+
+        In groups that share little code: those of the filter (`Filter.calls`), then orientations.
+        """
+        block = MeasurementBlock.empty(self.n_envs)
+        estimate = TeamEstimate.empty(self.constellation, np.zeros((self.n_envs, 1)))
+        return [*self._filter.calls(block, estimate), [self._orientation.call(block)]]
 
     def smooth(self, later: MeasurementBlock, t: F64 | float) -> TeamEstimate:
         """Report at one time with the help of later measurements, and stay where it is.

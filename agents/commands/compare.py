@@ -118,8 +118,11 @@ def _simulated(
     """The comparison in the simulator, and its films."""
     from agents.compare.compare import compare as run
     from agents.compare.film import median_films
+    from agents.warm_up import warm_up_first
+    from tracking.filters import DEFAULT_FILTER
 
     scenarios = options.pop("scenarios") or (None,)
+    warm_up_first([DEFAULT_FILTER])
     with progress_bar("compare") as tell:
         result = run(
             drivers=names, observations=observations, scenarios=scenarios, progress=tell, **options

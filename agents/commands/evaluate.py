@@ -50,14 +50,17 @@ def evaluate(
     from agents.evaluate.evaluate import evaluate as run
     from agents.output import check_folder, check_new, write_results
     from agents.report import evaluate_report as report
+    from agents.warm_up import warm_up_first
 
     if out is not None:
         check_new(out)
         check_folder(out, ["report.html"])
+    names = [name.strip() for name in filters.split(",")]
+    warm_up_first(names)
     with progress_bar(f"evaluate {suite}") as tell:
         result = run(
             suite=suite,
-            filters=[name.strip() for name in filters.split(",")],
+            filters=names,
             seeds=seeds,
             seconds=seconds,
             jobs=jobs,

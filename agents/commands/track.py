@@ -55,6 +55,7 @@ def track(
     from agents.output import check_folder, write_results
     from agents.report.track_report import track_report
     from agents.track import TrackResult, estimates_csv, track_log
+    from agents.warm_up import warm_up_first
     from tracking.bounds import recorded_bound
     from tracking.filters import DEFAULT_FILTER, filter_builder
     from tracking.log import read_log
@@ -69,6 +70,7 @@ def track(
     if out is not None:
         check_folder(out, ["report.html"])
     read = [apply_calibrations(read_log(path), calibrations) for path in logs]
+    warm_up_first(names, everything=False)
     results: list[TrackResult] = []
     for log in read:
         expected = recorded_bound(log, skip=skip) if bound else None

@@ -38,8 +38,11 @@ def train(out: Path | None, resume: Path | None, as_json: bool, **given: str | N
     try:
         from agents.report.page import metres
         from agents.train.run import train_policy
+        from agents.warm_up import warm_up_first
+        from tracking.filters import DEFAULT_FILTER
     except ImportError as error:
         raise UsageError(f"training needs {error.name}: pip install 'relpos-env[train]'") from error
+    warm_up_first([DEFAULT_FILTER])
     with progress_bar(f"training {folder.name}") as tell:
 
         def report(share: float, row: dict[str, Any] | None) -> None:

@@ -31,7 +31,7 @@ from tracking.ahrs.orientation_state import (
 from tracking.ahrs.stage import forget, orient
 from tracking.constellation import Constellation
 from tracking.geometry import GRAVITY
-from tracking.jit import bind
+from tracking.jit import Call, bind
 from tracking.measurements import Kind, MeasurementBlock
 
 __all__ = [
@@ -89,8 +89,13 @@ class Orientation:
     def bind(self, block: MeasurementBlock) -> Callable[[], None]:
         """`step` in place, for a block that stays where it is and is filled anew every time."""
         block.in_place  # noqa: B018 -- refuses what is not contiguous
+        kernel, arguments = self.call(block)
+        return bind(kernel, *arguments)
+
+    def call(self, block: MeasurementBlock) -> Call:
+        """The kernel, with arguments of its types."""
         arrays = (block.t, block.kind, block.i, block.values, block.valid)
-        return bind(orient, self.coefficients, self.state, *arrays)
+        return orient, (self.coefficients, self.state, *arrays)
 
     def step(self, block: MeasurementBlock) -> MeasurementBlock:
         """The block with every IMU sample replaced by the state it leads to.

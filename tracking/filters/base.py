@@ -7,6 +7,7 @@ from typing import Any, Protocol
 
 from tracking.arrays import F64
 from tracking.estimate import TeamEstimate
+from tracking.jit import Call
 from tracking.measurements import MeasurementBlock
 
 
@@ -40,6 +41,12 @@ class Filter(Protocol):
         Args:
             block: Filled anew before every call, contiguous.
             estimate: Written by every call for its times `t`, (env, time), filled before.
+        """
+
+    def calls(self, block: MeasurementBlock, estimate: TeamEstimate) -> list[list[Call]]:
+        """Kernels, with arguments of their types, in groups that share little code.
+
+        The first group is needed by every event, the second to start, the rest now and then.
         """
 
     def reset(self, env: int) -> None:

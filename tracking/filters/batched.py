@@ -13,7 +13,7 @@ import numpy as np
 from tracking.arrays import F64
 from tracking.constellation import Constellation
 from tracking.estimate import TeamEstimate
-from tracking.jit import bind
+from tracking.jit import Call, bind
 from tracking.measurements import MeasurementBlock
 
 
@@ -56,6 +56,10 @@ class BatchedFilter(ABC):
     def bind(self, block: MeasurementBlock, estimate: TeamEstimate) -> Callable[[], None]:
         """`run` for arrays that stay where they are; see `Filter.bind`."""
         return bind(type(self).kernel, *self._arguments(block.in_place, estimate))
+
+    def calls(self, block: MeasurementBlock, estimate: TeamEstimate) -> list[list[Call]]:
+        """What is compiled for it; see `Filter.calls`."""
+        return [[(type(self).kernel, self._arguments(block.in_place, estimate))]]
 
     def reset(self, env: int) -> None:
         """Forget everything of one environment."""

@@ -26,11 +26,11 @@ from tracking.filters.batched import BatchedFilter
 from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.event_loop import predict_all, run_events
 from tracking.filters.joint.params import JointParams
-from tracking.filters.joint.rare import compile_all, run_to_end
+from tracking.filters.joint.rare import compile_all, rare_calls, run_to_end
 from tracking.filters.joint.smoothing import read_clones, with_clones
 from tracking.filters.joint.state import Layout, make_layout, make_state
 from tracking.filters.joint.workspace import Workspace, make_workspace
-from tracking.jit import bind
+from tracking.jit import Call, bind
 from tracking.measurements import MeasurementBlock
 from tracking.records import as_records, with_records
 
@@ -58,6 +58,11 @@ class JointEkf(BatchedFilter):
         arguments = self._arguments(block.in_place, estimate)
         compile_all(arguments)
         return partial(run_to_end, bind(run_events, *arguments), arguments)
+
+    def calls(self, block: MeasurementBlock, estimate: TeamEstimate) -> list[list[Call]]:
+        """What is compiled for it; see `Filter.calls`."""
+        arguments = self._arguments(block.in_place, estimate)
+        return [[(run_events, arguments)], *rare_calls(arguments)]
 
     def smooth(self, later: MeasurementBlock, t: F64) -> TeamEstimate:
         """Report at one time with the help of later measurements, and stay where it is.

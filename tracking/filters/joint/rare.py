@@ -25,7 +25,7 @@ from tracking.filters.joint.supervision.actions import reinitialise_node
 from tracking.filters.joint.supervision.staleness import drop_stale
 from tracking.filters.joint.surveyed_distance import apply_surveys
 from tracking.filters.joint.workspace import ENV, EVENT, FLAG, NODE
-from tracking.jit import bind, kernel
+from tracking.jit import Call, bind, kernel
 from tracking.reference import by_reference
 
 
@@ -146,6 +146,15 @@ def run_to_end(run: Callable[[], int], arguments: tuple[Any, ...]) -> None:
 
 def compile_all(arguments: tuple[Any, ...]) -> None:
     """Compile everything ahead, for those that cannot wait later."""
+    for group in rare_calls(arguments):
+        for kernel_, given in group:
+            bind(kernel_, *given)
+
+
+def rare_calls(arguments: tuple[Any, ...]) -> list[list[Call]]:
+    """Kernels and their arguments: those that begin and end groups, then the others."""
     coefficients, layout, state, work, *_ = arguments
-    for action in set(RARE.values()):
-        bind(action, coefficients, layout, state, work, 0.0)
+    given = coefficients, layout, state, work, 0.0
+    begin = (start_group, join_group, spawn, time_out, stale, remove)
+    others = [action for action in dict.fromkeys(RARE.values()) if action not in begin]
+    return [[(action, given) for action in group] for group in (begin, others)]
