@@ -10,7 +10,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
@@ -25,6 +25,8 @@ SECONDS = {"joint": (35.0, 25.0, 20.0, 6.0)}
 """[s] Time of each group of a filter on one core of a laptop, for the progress that is shown."""
 OTHERS = 8.0
 """[s] Time of a group that is not in the table."""
+Group = tuple[str, int]
+"""A filter, and which group of its kernels."""
 PERIOD = 0.1
 """[s] Time between two looks at the processes."""
 
@@ -33,9 +35,9 @@ PERIOD = 0.1
 class WarmUp:
     """What was done."""
 
-    filter: str
+    filters: tuple[str, ...]
     n_kernels: int
-    """Kernels that the filter calls."""
+    """Kernels that they call."""
     n_compiled: int
     """Those of them that had to be compiled."""
     seconds: float
@@ -44,7 +46,7 @@ class WarmUp:
     def summary(self) -> dict[str, Any]:
         """As a line of JSON."""
         return {
-            "filter": self.filter,
+            "filters": list(self.filters),
             "kernels": self.n_kernels,
             "compiled": self.n_compiled,
             "seconds": round(self.seconds, 2),
@@ -52,16 +54,16 @@ class WarmUp:
 
 
 def warm_up(
-    name: str = "joint",
+    names: Sequence[str],
     *,
     everything: bool = True,
     jobs: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> WarmUp:
-    """Compile what a filter needs, unless it is on the disk.
+    """Compile what filters need, unless it is on the disk.
 
     Args:
-        name: One of `tracking.filters.FILTERS`, or ``package.module:Name``.
+        names: Some of `tracking.filters.FILTERS`, or ``package.module:Name``.
         everything: Also what is needed now and then only; else that is compiled when it is.
         jobs: Processes, by default as many as there are cores.
         progress: Called with the share done, several times a second, if anything is compiled.
@@ -70,47 +72,48 @@ def warm_up(
         ConfigError: No filter of that name.
         UsageError: A process failed.
     """
-    began = time.monotonic()
-    groups = calls_of(name)
-    wanted = [k for k in range(len(groups)) if everything or k in (0, 1, len(groups) - 1)]
-    missing = [
-        k for k in wanted if not all(is_compiled(kernel, *given) for kernel, given in groups[k])
-    ]
-    seconds = [*SECONDS.get(name, ()), *[OTHERS] * len(groups)]
-    missing.sort(key=lambda k: -seconds[k])
-    _run(name, missing, seconds, jobs or os.cpu_count() or 1, progress)
+    began, names = time.monotonic(), tuple(dict.fromkeys(names))
+    wanted: dict[Group, list[Call]] = {}
+    known: set[int] = set()  # kernels that filters share have the same types in all of them
+    for name in names:
+        groups = calls_of(name)
+        for k, group in enumerate(groups):
+            is_rare = 1 < k < len(groups) - 1
+            if (everything or not is_rare) and not known.issuperset(id(c) for c, _ in group):
+                wanted[name, k] = group
+                known.update(id(c) for c, _ in group)
+    missing = [g for g, calls in wanted.items() if not all(is_compiled(k, *a) for k, a in calls)]
+    missing.sort(key=_seconds, reverse=True)
+    if missing:
+        _run(missing, jobs or os.cpu_count() or 1, progress)
     return WarmUp(
-        filter=name,
-        n_kernels=sum(len(groups[k]) for k in wanted),
-        n_compiled=sum(len(groups[k]) for k in missing),
+        filters=names,
+        n_kernels=sum(map(len, wanted.values())),
+        n_compiled=sum(len(wanted[group]) for group in missing),
         seconds=time.monotonic() - began,
     )
 
 
-def warm_up_first(names: Sequence[str], *, everything: bool = True) -> None:
+def warm_up_first(names: Iterable[str], *, everything: bool = True) -> None:
     """`warm_up` for a command: with a bar, or a line where there is no terminal, if it takes time.
 
     Args:
         names: Filters; those that do not come with the package are compiled when they run.
         everything: As of `warm_up`.
     """
-    for name in dict.fromkeys(names):
-        if name in FILTERS:
-            _warm_up_shown(name, everything)
-
-
-def _warm_up_shown(name: str, everything: bool) -> None:
-    label, bars = f"compiling {name}, once", list[Callable[[float], None]]()
+    names = [name for name in names if name in FILTERS]
+    label, bars = "compiling the tracker, once", list[Callable[[float], None]]()
     with ExitStack() as stack:
 
         def tell(share: float) -> None:
             if not bars:
                 if not sys.stderr.isatty():
-                    print(f"{label}: a minute or less", file=sys.stderr, flush=True)
+                    print(f"{label}: about a minute", file=sys.stderr, flush=True)
                 bars.append(stack.enter_context(progress_bar(label)))
             bars[0](share)
 
-        warm_up(name, everything=everything, progress=tell)
+        if names:
+            warm_up(names, everything=everything, progress=tell)
 
 
 def calls_of(name: str) -> list[list[Call]]:
@@ -120,39 +123,36 @@ def calls_of(name: str) -> list[list[Call]]:
     return Tracker(Constellation(nodes=nodes, dimensions=2), filter=name).calls()
 
 
-def _run(
-    name: str,
-    missing: Sequence[int],
-    seconds: Sequence[float],
-    jobs: int,
-    progress: Callable[[float], None] | None,
-) -> None:
-    """Compile groups in processes, the longest first."""
-    waiting, running, began = list(missing), dict[int, "subprocess.Popen[str]"](), time.monotonic()
-    jobs = max(min(jobs, len(waiting)), 1)
-    times = [seconds[k] for k in waiting]
-    expected = max(sum(times) / jobs, *times, PERIOD)
+def _seconds(group: Group) -> float:
+    """How long a group takes, about."""
+    name, k = group
+    known = SECONDS.get(name, ())
+    return known[k] if k < len(known) else OTHERS
+
+
+def _run(missing: Sequence[Group], jobs: int, progress: Callable[[float], None] | None) -> None:
+    """Compile groups in processes, one after the other."""
+    began, waiting, running = time.monotonic(), list(missing), list["subprocess.Popen[str]"]()
+    times = [_seconds(group) for group in missing]
+    expected = max(sum(times) / min(jobs, len(missing)), *times)
     try:
         while waiting or running:
             while waiting and len(running) < jobs:
-                k = waiting.pop(0)
-                running[k] = subprocess.Popen(
-                    _run_command(name, k), stderr=subprocess.PIPE, text=True
-                )
+                command = _run_command(*waiting.pop(0))
+                running.append(subprocess.Popen(command, stderr=subprocess.PIPE, text=True))
             time.sleep(PERIOD)
-            for k, process in list(running.items()):
-                if process.poll() is not None:
-                    del running[k]
-                    _, said = process.communicate()
-                    if process.returncode:
-                        last = said.strip().splitlines()[-1:] or ["without a word"]
-                        raise UsageError(f"compiling {name} failed: {last[0]}")
+            for process in [p for p in running if p.poll() is not None]:
+                running.remove(process)
+                _, said = process.communicate()
+                if process.returncode:
+                    last = said.strip().splitlines()[-1:] or ["without a word"]
+                    raise UsageError(f"compiling failed: {last[0]}")
             if progress is not None:
-                # What is left is not known; the bar slows down instead of standing at its end.
+                # How long it takes is a guess: the bar slows down, it does not stand at its end.
                 passed = (time.monotonic() - began) / expected
-                progress(passed / (0.3 + passed) if passed > 0.7 else passed)
+                progress(passed if passed < 0.7 else passed / (0.3 + passed))
     finally:
-        for process in running.values():
+        for process in running:
             process.kill()
             process.wait()
 

@@ -57,6 +57,7 @@ def demo(
     from agents.report.demo_report import demo_report
     from agents.report.page import metres
     from agents.warm_up import warm_up_first
+    from tracking.filters import FILTERS
 
     if not 15.0 <= seconds <= 3600.0:
         raise UsageError(f"--seconds: expected 15 to 3600, got {seconds:g}")
@@ -69,7 +70,7 @@ def demo(
     if names["policy"] is not None and names["controller"] is not None:
         raise UsageError("--policy: expected either a policy or a --controller, got both")
     check_folder(out, ["report.html"])
-    warm_up_first([names["filter"]])
+    warm_up_first([names["filter"], *FILTERS])
     with progress_bar(f"{names['task'] or names['policy'] or 'ring'}, seed {seed}") as report:
         result = run(seconds=seconds, seed=seed, cars=cars, progress=report, **names)
     write_results(out, {"report.html": demo_report(result)})

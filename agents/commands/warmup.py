@@ -27,15 +27,15 @@ def warmup(filters: tuple[str, ...], jobs: int | None, as_json: bool) -> None:
     names = tuple(dict.fromkeys(filters)) or (DEFAULT_FILTER,)
     if "all" in names:
         names = tuple(FILTERS)
-    found = []
-    for name in names:
-        with progress_bar(f"compiling {name}, once") as tell:
-            found.append(warm_up(name, jobs=jobs, progress=tell))
+    with progress_bar("compiling the tracker, once") as tell:
+        found = warm_up(names, jobs=jobs, progress=tell)
     if as_json:
-        emit_json(each.summary for each in found)
+        emit_json([found.summary])
         return
+    done = f"{found.n_compiled} of {found.n_kernels}"
     rows = [
-        [each.filter, f"{each.n_compiled} of {each.n_kernels}", f"{each.seconds:.1f}"]
-        for each in found
+        ["filters", ", ".join(found.filters)],
+        ["kernels compiled now", done],
+        ["time [s]", f"{found.seconds:.1f}"],
     ]
-    print_table("Compiled now", ["filter", "kernels", "time [s]"], rows)
+    print_table("Warm-up", ["", ""], rows)

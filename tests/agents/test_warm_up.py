@@ -29,7 +29,7 @@ def compiled():
 
 def test_nothing_is_compiled_twice_and_nothing_is_said_then(compiled, capsys):
     shares = []
-    found = warm_up("joint", progress=shares.append)
+    found = warm_up(["joint"], progress=shares.append)
     assert (found.n_compiled, shares) == (0, [])
     assert found.n_kernels == sum(map(len, calls_of("joint")))
     warm_up_first(["joint", "joint", "package.module:Name"])
@@ -60,14 +60,14 @@ def test_what_a_process_has_compiled_is_found_by_the_next(tmp_path):
 def test_a_process_that_fails_says_why(monkeypatch):
     monkeypatch.setattr(module, "is_compiled", lambda *_: False)
     monkeypatch.setattr(module, "_run_command", lambda name, k: [sys.executable, "-c", "1 / 0"])
-    with pytest.raises(UsageError, match="compiling joint failed: ZeroDivisionError"):
-        warm_up("joint", jobs=1)
+    with pytest.raises(UsageError, match="compiling failed: ZeroDivisionError"):
+        warm_up(["joint"], jobs=1)
 
 
 def test_command(compiled):
     done = CliRunner().invoke(cli, ["warmup", "--json"])
     (line,) = map(json.loads, done.stdout.splitlines())
-    assert line["filter"] == "joint"
+    assert line["filters"] == ["joint"]
     assert line["compiled"] == 0
     wrong = CliRunner().invoke(cli, ["warmup", "--filter", "nobody"])
     assert wrong.exit_code != 0
