@@ -111,7 +111,7 @@ def spoiled(block: Any, fault: str, seed: int) -> Any:
     mean nothing. ``silent``: nothing of it for 3 s. ``frozen``: a pair of it repeats a range, 10 s.
     """
     rng, node = np.random.default_rng(seed), 0
-    block = block.take(slice(None))
+    block = replace(block, values=block.values.copy())  # the run without the fault is kept
     t, ranges = block.t[0], block.kind[0] == Kind.RANGE
     of_node = (block.i[0] == node) | (ranges & (block.j[0] == node))
     late = t > FAULT_AT
