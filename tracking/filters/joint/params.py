@@ -107,6 +107,20 @@ class JointStartParams:
     """[m] Error of a node in the first shape."""
     speed_std: float = 1.5
     """[m/s] Of a node that was not seen at rest."""
+    short_error: float = 0.12
+    """[m] Scale of the errors of ranges that are too short, in the search for a node's position."""
+    long_error: float = 0.3
+    """[m] The same of ranges that are too long: obstacles lengthen them."""
+    largest_loss: float = 16.0
+    """[-] A single range says no more than this against a position, in squares of these scales."""
+    far_weight: float = 0.01
+    """[-] How much such a range still pulls."""
+    join_spread: float = 0.75
+    """[m] Others that extend less than this along an axis leave the side of a node open: along it,
+    an error of a range counts several times."""
+    second_side_loss: float = 9.0
+    """[-] A second side that ranges say so much more against is none: three standard deviations of
+    a single one."""
     prune: float = 20.0
     """[-] A hypothesis so much less likely than the best (log-likelihood) is dropped."""
     merge_distance: float = 0.15

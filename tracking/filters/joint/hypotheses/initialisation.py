@@ -226,7 +226,7 @@ def join(c, s, layout, new, t):
                 known[a, k] = s.x[h, at + k]
             distance[a], scatter = start_distance(c, s, layout, new, ready[a])
             variance = max(variance, scatter * scatter)
-        n_sides = best_positions(c.d, c.merge_distance, known, distance, sides)
+        n_sides = best_positions(c, known, distance, sides)
         for side in range(n_sides):
             target = h if side == 0 else copy_hypothesis(s, h)
             if target >= 0:

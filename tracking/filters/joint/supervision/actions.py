@@ -123,10 +123,10 @@ def reinitialise_node(c, s, layout, i, is_away, t):
     for h in range(s.alive.shape[0]):
         if s.alive[h]:
             read_positions(c, s, h, i, others, known, pos)
-            before = total_loss(known, distance, pos)
+            before = total_loss(c, known, distance, pos)
             if (
                 before > c.position_misfit
-                and best_position(c.d, known, distance, pos) < c.position_gain * before
+                and best_position(c, known, distance, pos) < c.position_gain * before
             ):
                 if is_away:
                     remove_node(c, s, layout, i)

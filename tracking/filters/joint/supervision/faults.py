@@ -25,7 +25,7 @@ from tracking.filters.joint.supervision.residuals import (
 )
 from tracking.jit import kernel
 from tracking.maths.exponentials import decay
-from tracking.maths.multilateration import SHORT, misfit
+from tracking.maths.multilateration import misfit
 
 
 class Fault(IntEnum):
@@ -124,14 +124,14 @@ def position_misfit(c, s, layout, i, t):
     for k in range(s.nodes.shape[0]):
         if k != i and is_informative(c, s, layout, i, k, t):
             error = mean_range_error(c, s, layout.pair_index[i, k])
-            total += misfit(error)
+            total += misfit(c, error)
             least, greatest = min(least, error), max(greatest, error)
             n += 1
             n_far += has_large_residual(c, s.pairs[layout.pair_index[i, k]])
     # In the plane a layout that is turned the wrong way looks like it, and is found as such.
     if c.d == 3 and n >= c.d and 2 * n_far > n and least < -c.far_residual:
         return total, True
-    return total if n > c.d and least < -SHORT and greatest > SHORT else 0.0, False
+    return total if n > c.d and least < -c.short_error and greatest > c.short_error else 0.0, False
 
 
 @kernel
