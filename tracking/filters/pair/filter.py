@@ -43,9 +43,9 @@ class PairEkf(BatchedFilter):
     ) -> None:
         self._coefficients = make_coefficients(constellation, params, use_mds=use_mds)
         self._layout = make_layout(constellation, params)
-        state, blank = (
-            make_state(constellation, params, n, len(self._layout.rotations)) for n in (n_envs, 1)
-        )
+        # Room for both sides of a newcomer in every rotation.
+        room = 2 * len(self._layout.rotations)
+        state, blank = (make_state(constellation, params, n, room) for n in (n_envs, 1))
         super().__init__(constellation, state, blank)
 
     def _arguments(self, events: tuple[Any, ...], estimate: TeamEstimate) -> tuple[Any, ...]:
