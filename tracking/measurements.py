@@ -22,7 +22,7 @@ N_VALUES = 16
 N_MEASURED = 8
 """The first of them: what devices send. The rest is told by the tracker's own orientations."""
 ACCEL_NOISE, TOLD, UPRIGHT, GYRO_BIAS, GYRO_VAR = 7, 8, 9, 11, 14
-"""Columns of a STATE event beside orientation and acceleration, see `Kind`."""
+"""Columns of a STATE event behind orientation and acceleration, see `Kind`."""
 
 
 class Kind(IntEnum):
@@ -40,7 +40,7 @@ class Kind(IntEnum):
     STATE = 3
     """Node i's own orientation filter: q_wb (w x y z), gravity-free accel_w x y z [m/s2], then
     the noise density of the acceleration beyond that of its vehicle [m/s2/sqrt(Hz)], 0 unless the
-    sample is doubted. Then 1 if the rest is told, as the tracker's own
+    sample is doubted. Then 1 if the rest is reported, as the tracker's own
     orientations do, 2 if it is and the body rests: by how much it has been turned upright so far,
     about x and y of the world [rad]; the bias that is taken off its gyroscope, x y z in the body
     [rad/s], and the variance of that about one axis [(rad/s)^2]."""

@@ -66,4 +66,4 @@ def _counterpart(
             return torch.tensor(given[name])
         if np.array_equal(array.T, own):
             return torch.tensor(given[name].T)
-    raise UsageError(f"--begin {policy}: written by another exporter; train it anew")
+    raise UsageError(f"--begin {policy}: written by another exporter, expected one of this version")

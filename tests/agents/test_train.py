@@ -84,7 +84,7 @@ def test_a_run_begins_with_a_policy(run, policy, tmp_path):
 @pytest.mark.parametrize(
     ("begin", "other", "message"),
     [
-        ("nobody", {}, "no such file"),
+        ("missing", {}, "no such file"),
         ("hold", {}, "other numbers"),
         (None, {"width": "16"}, "another shape"),
     ],

@@ -69,8 +69,9 @@ def test_command(compiled):
     (line,) = map(json.loads, done.stdout.splitlines())
     assert line["filters"] == ["joint"]
     assert line["compiled"] == 0
-    wrong = CliRunner().invoke(cli, ["warmup", "--filter", "nobody"])
+    wrong = CliRunner().invoke(cli, ["warmup", "--filter", "missing"])
     assert wrong.exit_code != 0
+    assert "missing" in str(wrong.exception)
 
 
 def test_code_is_loaded_for_its_types_only(compiled):

@@ -69,7 +69,7 @@ def case(group):
 
 
 def make_tracker(name, constellation, first, n_envs=1):
-    """The paper's filter is told a first layout, and without the norm of the velocity.
+    """The filter of the paper has a first layout, and not the norm of the velocity.
 
     With it any rounding grows a thousandfold in two seconds.
     """

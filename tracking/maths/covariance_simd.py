@@ -55,7 +55,7 @@ def matrix_at(target, builder, kind, array, index):
 
 
 def row_at(builder, matrix, row, below, length):
-    """Where a row begins, so many below another."""
+    """Where a row begins, `below` rows after another."""
     return builder.gep(matrix, [builder.mul(builder.add(row, INT(below)), length)])
 
 

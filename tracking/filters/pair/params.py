@@ -185,7 +185,7 @@ class PairEkfParams:
     lost_after: float = 1.0
     """[s] A pair without an accepted range for so long is lost."""
     missed_intervals: float = 3.0
-    """[-] Or without one for so many of its usual intervals, where those are long."""
+    """[-] Or without one for this many of its usual intervals, where those are long."""
     node_timeout: float = 5.0
     """[s] A node not heard for so long has left; its filters are destroyed."""
     largest_bend: float = 0.1

@@ -1,6 +1,6 @@
 """Residual statistics: one store, running means for every pair and the group.
 
-All are of the best hypothesis, and begin anew when another becomes the best.
+All are of the best hypothesis, and are reset when another becomes the best.
 """
 
 from __future__ import annotations
