@@ -37,6 +37,7 @@ from relpos_env.scenarios import LEVELS, SCENARIOS, Scenario
 from relpos_env.sensors.radio.channel import CHANNELS
 from relpos_env.tasks import DEFAULT_WEIGHTS, TASKS
 from relpos_env.tasks.needs import DEFAULT_SCENARIO
+from tracking.ahrs.params import OrientationParams
 from tracking.filters.joint.hypotheses.alignment import TRANSITIONS, Alignment
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.supervision.faults import ACTIONS as REMEDIES
@@ -262,18 +263,17 @@ def faults() -> str:
     return markdown(("fault", "what it is", "action"), rows)
 
 
-def filter_parameters() -> str:
-    """Parameters of the joint filter, those of its parts among them."""
+def parameters(params: Any, names: tuple[str, ...]) -> str:
+    """Parameters of a stage, those of its parts among them."""
     rows = []
-    params = JointParams()
-    for part in (params, params.range_error, params.nlos, params.update, params.start,
-                 params.alignment, params.supervision):  # fmt: skip
+    for name in ("", *names):
+        part = getattr(params, name) if name else params
         told = docstrings(type(part))
         for f in fields(part):
             value = getattr(part, f.name)
             if not is_dataclass(value) and not isinstance(value, dict):
-                unit, _, meaning = told[f.name].replace("\n", " ").rpartition("] ")
-                named = [f"`{f.name}`", f"`{value:g}`", unit.lstrip("[")]
+                unit, _, meaning = told[f.name].replace("\n", " ").partition("]")
+                named = [f"`{name}{'.' * bool(name)}{f.name}`", f"`{value:g}`", unit.lstrip("[")]
                 rows.append([*named, " ".join(meaning.split())])
     return markdown(("parameter", "default", "unit", "meaning"), rows)
 
@@ -281,7 +281,14 @@ def filter_parameters() -> str:
 TABLES: dict[str, Callable[[], str]] = {
     "alignment": alignment,
     "faults": faults,
-    "filter-parameters": filter_parameters,
+    "filter-parameters": partial(
+        parameters,
+        JointParams(),
+        ("range_error", "nlos", "update", "start", "alignment", "supervision"),
+    ),
+    "orientation-parameters": partial(
+        parameters, OrientationParams(), ("bias", "rest", "magnetic", "sanity")
+    ),
     "sizes": sizes,
     **{f"observation-{mode}": partial(observations, mode) for mode in OBSERVATIONS},
     "actions-continuous": continuous,

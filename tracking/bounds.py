@@ -24,7 +24,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tracking.ahrs.orientation import Orientation, OrientationParams
+from tracking.ahrs.orientation import Orientation
+from tracking.ahrs.params import OrientationParams
 from tracking.arrays import F64, Bool, aligned, whole_lines
 from tracking.calibration.range_errors import measure_range_errors
 from tracking.constellation import Constellation

@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from tracking.ahrs.orientation import Orientation, OrientationParams
+from tracking.ahrs.orientation import Orientation
+from tracking.ahrs.params import OrientationParams
 from tracking.arrays import F64
 from tracking.constellation import Constellation
 from tracking.errors import ConfigError

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from agents.track import track_log
-from tracking.ahrs.orientation import Orientation, OrientationParams
+from tracking.ahrs.orientation import Orientation
+from tracking.ahrs.params import OrientationParams
 from tracking.bounds import recorded_bound
 from tracking.constellation import Constellation, NodeConfig
 from tracking.filters import FILTERS

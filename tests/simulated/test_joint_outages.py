@@ -5,7 +5,8 @@ import pytest
 
 from agents.simulate import simulate
 from tracking import Tracker
-from tracking.ahrs.orientation import Orientation, OrientationParams
+from tracking.ahrs.orientation import Orientation
+from tracking.ahrs.params import OrientationParams
 from tracking.estimate import Status
 from tracking.measurements import Kind, MeasurementBlock
 

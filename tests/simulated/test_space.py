@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from tracking import Constellation, NodeConfig, Tracker
-from tracking.ahrs.orientation import Orientation, OrientationParams
+from tracking.ahrs.orientation import Orientation
+from tracking.ahrs.params import OrientationParams
 from tracking.geometry import rotate
 from tracking.measurements import Kind, MeasurementBlock
 

@@ -67,10 +67,10 @@ def test_a_frame_goes_to_the_peak_near_it(seed):
         known = alignment_modes.move_to_mode(c, s, 0)
     assert known
     # What was the turn R is none in the frame now, to what a frame is not turned by.
-    np.testing.assert_allclose(places(s, 0), before @ R, atol=6.0 * alignment_modes.SMALL)
+    np.testing.assert_allclose(places(s, 0), before @ R, atol=6.0 * c["mode_step"])
     peak, H = np.eye(3), np.zeros((3, 3))
     rotation_modes.climb_to_mode(s.alignment_information[0], s.alignment_score[0], peak, H)
-    assert Rotation.from_matrix(peak).magnitude() < 2.0 * alignment_modes.SMALL
+    assert Rotation.from_matrix(peak).magnitude() < 2.0 * c["mode_step"]
 
 
 def test_a_frame_does_not_turn_about_an_axis_of_which_nothing_is_known():
@@ -87,7 +87,7 @@ def test_a_frame_does_not_turn_about_an_axis_of_which_nothing_is_known():
     for _ in range(5):
         assert not alignment_modes.move_to_mode(c, s, 0)
     turn, _ = Rotation.align_vectors(before - before.mean(0), places(s, 0) - places(s, 0).mean(0))
-    np.testing.assert_allclose(turn.as_rotvec(), [0.2, 0.0, 0.0], atol=alignment_modes.SMALL)
+    np.testing.assert_allclose(turn.as_rotvec(), [0.2, 0.0, 0.0], atol=c["mode_step"])
 
 
 def test_every_turn_that_may_be_has_a_frame():

@@ -7,10 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tracking.filters.joint.params import NlosParams
 from tracking.geometry import rotate
 from tracking.models import MODELS
 from tracking.models.lever_arm import antenna_in_world
 from tracking.models.nlos import nlos_posterior, transition_probs
+from tracking.records import record_of
 
 STEP = 1e-6
 
@@ -72,7 +74,8 @@ def test_transitions_over_a_time_are_those_over_its_parts(enter, leave, dt, n):
 @given(st.lists(st.floats(1e-3, 1.0), min_size=8, max_size=8))
 def test_the_nlos_posterior_is_bayes_rule(numbers):
     before, enter, leave, los, entered, left, nlos, odds = numbers
-    after, switched, total, _ = nlos_posterior(*numbers)
+    least = record_of(NlosParams())[0]
+    after, switched, total, _ = nlos_posterior(least, *numbers)
     prior = np.array([[1.0 - before], [before]]) * [[1.0 - enter, enter], [leave, 1.0 - leave]]
     joint = prior * np.array([[los, entered * odds], [left, nlos * odds]])
     assert total == pytest.approx(joint.sum())

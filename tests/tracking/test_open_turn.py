@@ -81,7 +81,7 @@ def test_derivatives_of_the_likelihood_by_a_turn_are_its_differences(seed):
 def test_no_turn_is_likelier_than_the_first_peak(seed):
     rng = np.random.default_rng(seed)
     information, score, _ = evidence(rng)
-    turns, values = rotation_modes.find_modes(information, score, starting_rotations(3, 16))
+    turns, values = rotation_modes.find_modes(information, score, starting_rotations(3, 16), 0.3)
     assert np.all(np.diff(values) <= 0.0)
     for R, value in zip(turns, values, strict=True):
         np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-9)
@@ -294,7 +294,7 @@ def test_fixed_nodes_of_a_room_are_rather_flat_than_tall():
         s.x[0, at[k] : at[k] + 3] = place
     alignment_sensitivity.start_alignment(c, s, layout, 0)
     turns, _ = rotation_modes.find_modes(
-        s.alignment_information[0], s.alignment_score[0], layout.rotations
+        s.alignment_information[0], s.alignment_score[0], layout.rotations, c["same_mode"]
     )
     alignment_modes.rotate_frame(c, s, 0, turns[0])
     heights = s.x[0, at + 2]

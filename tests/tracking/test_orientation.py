@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from vqf import VQF
 
-from tracking.ahrs.orientation import Orientation, OrientationParams
+from tracking.ahrs.orientation import Orientation
+from tracking.ahrs.params import OrientationParams, RestParams
 from tracking.constellation import Constellation, NodeConfig
 from tracking.geometry import GRAVITY, rotate, yaw_of
 from tracking.measurements import Kind, MeasurementBlock
@@ -68,7 +69,7 @@ def test_it_is_vqf(mag):
     c = constellation("magnetic" if mag else "initial")
     out = states(Orientation(c, OrientationParams()).step(block))
     args = [np.ascontiguousarray(imu[:, :3]), np.ascontiguousarray(imu[:, 3:])]
-    twin = VQF(0.01, restThGyr=np.degrees(OrientationParams().rest_rate))
+    twin = VQF(0.01, restThGyr=np.degrees(RestParams().rate))
     expected = twin.updateBatch(*args, *([field] if mag else []))
     if mag:
         np.testing.assert_allclose(out[:, :4], expected["quat9D"], atol=1e-12)
@@ -203,8 +204,10 @@ def test_a_noisy_gyroscope_is_seen_to_rest():
     imu = np.concatenate([gyr, force + 0.03 * rng.standard_normal((n, 3))], axis=1)
     t, node = np.arange(1, n + 1) / 100.0, np.zeros(n, dtype=np.int64)
     block = MeasurementBlock.of_kind(Kind.IMU, t, node, imu)
-    for rest_rate, most in ((OrientationParams().rest_rate, 0.05), (np.radians(2.0), np.inf)):
-        stage = Orientation(constellation("initial"), OrientationParams(rest_rate=rest_rate))
+    for rest_rate, most in ((RestParams().rate, 0.05), (np.radians(2.0), np.inf)):
+        stage = Orientation(
+            constellation("initial"), OrientationParams(rest=RestParams(rate=rest_rate))
+        )
         out = states(stage.step(block))
         accel = np.abs(out[-200:, 4:8].mean(axis=0))
         assert (accel < most).all()

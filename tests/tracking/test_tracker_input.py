@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tracking import Constellation, NodeConfig, Tracker
-from tracking.ahrs.orientation import OrientationParams
+from tracking.ahrs.params import OrientationParams
 from tracking.constellation import Antenna
 from tracking.errors import ConfigError
 from tracking.filters.joint.params import JointParams

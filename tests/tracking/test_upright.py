@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from tracking import Constellation, NodeConfig, Tracker, TrackerParams
-from tracking.ahrs.orientation import Orientation, OrientationParams
+from tracking.ahrs.orientation import Orientation
+from tracking.ahrs.params import OrientationParams
 from tracking.filters import FilterParams
 from tracking.filters.joint.params import JointParams
 from tracking.geometry import GRAVITY

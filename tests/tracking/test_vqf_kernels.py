@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 from vqf import VQF
 
 from tracking.ahrs.gyro_bias import BIAS
-from tracking.ahrs.orientation import Orientation, OrientationParams, make_coefficients, make_state
+from tracking.ahrs.orientation import Orientation, make_coefficients, make_state
+from tracking.ahrs.params import OrientationParams
+from tracking.ahrs.stage import forget
 from tracking.ahrs.vqf import run_vqf
 from tracking.constellation import Constellation, NodeConfig
 from tracking.geometry import GRAVITY, quat_conjugate, rotate
@@ -76,7 +78,9 @@ def run(samples, field, hz, params, every=1):
     out = [np.zeros((1, 1, n, d)) for d in (4, 4, 3)]
     resting = np.zeros((1, 1, n), dtype=bool)
     has_field = (np.arange(n) % every == 0)[None, None]
-    run_vqf(coefficients, make_state(1, 1), samples, field, has_field, *out, resting)
+    state = make_state(1, 1)
+    forget(coefficients, state, GRAVITY)
+    run_vqf(coefficients, state, samples, field, has_field, *out, resting)
     return [*(a[0, 0] for a in out), resting[0, 0]]
 
 
@@ -85,7 +89,7 @@ def of_the_library(params):
     return {
         "tauAcc": params.tau_acc,
         "tauMag": params.tau_mag,
-        "restThGyr": np.degrees(params.rest_rate),
+        "restThGyr": np.degrees(params.rest.rate),
         "biasSigmaMotion": 0.1 * np.sqrt(params.tau_acc / 3.0),
     }
 

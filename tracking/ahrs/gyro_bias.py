@@ -17,11 +17,8 @@ from __future__ import annotations
 import math
 
 from tracking.ahrs.lowpass import low_pass
-from tracking.ahrs.rest import GYR, MAX_BIAS, RESTING
+from tracking.ahrs.rest import GYR, RESTING
 from tracking.jit import small_kernel
-
-START_VAR = 50.0**2
-"""[(0.01 deg/s)^2] Variance before any measurement."""
 
 UNIT = 0.01 * math.pi / 180.0
 """[rad/s] What it is counted in."""
@@ -43,7 +40,7 @@ def start_bias(bias, e, n, var):
 
 
 @small_kernel
-def worst_variance(bias, e, n):
+def worst_variance(bias, c, e, n):
     """A bound of the variance in the worst direction, by Gershgorin [(0.01 deg/s)^2]."""
     p01, p02 = abs(bias[e, n, P + 1]), abs(bias[e, n, P + 2])
     p12 = abs(bias[e, n, P + 4])
@@ -52,7 +49,7 @@ def worst_variance(bias, e, n):
         abs(bias[e, n, P + 3]) + p01 + p12,
         abs(bias[e, n, P + 5]) + p02 + p12,
     )
-    return min(rows, START_VAR)
+    return min(rows, c.start_var[n])
 
 
 @small_kernel
@@ -62,9 +59,10 @@ def mean_variance(bias, e, n):
 
 
 @small_kernel
-def clip(x):
+def clip(c, x):
     """A rate within what a bias can be [rad/s]."""
-    return min(max(x, -MAX_BIAS), MAX_BIAS)
+    largest = c.rest[0].largest_bias
+    return min(max(x, -largest), largest)
 
 
 @small_kernel
@@ -100,25 +98,26 @@ def estimate_bias(bias, rest, c, e, n, count, qw, qx, qy, qz, tilt_x, tilt_y):
         r00, r01, r02 = 1.0, 0.0, 0.0
         r10, r11, r12 = 0.0, 1.0, 0.0
         r20, r21, r22 = 0.0, 0.0, 1.0
-        e0 = clip(rest[e, n, GYR] - b0)
-        e1 = clip(rest[e, n, GYR + 1] - b1)
-        e2 = clip(rest[e, n, GYR + 2] - b2)
+        e0 = clip(c, rest[e, n, GYR] - b0)
+        e1 = clip(c, rest[e, n, GYR + 1] - b1)
+        e2 = clip(c, rest[e, n, GYR + 2] - b2)
         w0 = w2 = c.rest_var[n]
     else:
         r00, r01, r02 = bias[e, n, at], bias[e, n, at + 1], bias[e, n, at + 2]
         r10, r11, r12 = bias[e, n, at + 3], bias[e, n, at + 4], bias[e, n, at + 5]
         r20, r21, r22 = bias[e, n, at + 6], bias[e, n, at + 7], bias[e, n, at + 8]
         rate = 1.0 / c.dt[n]
-        e0 = clip(bias[e, n, LEAN] - tilt_y * rate - (r00 * b0 + r01 * b1 + r02 * b2))
-        e1 = clip(bias[e, n, LEAN + 1] + tilt_x * rate - (r10 * b0 + r11 * b1 + r12 * b2))
-        e2 = clip(-(r20 * b0 + r21 * b1 + r22 * b2))
+        e0 = clip(c, bias[e, n, LEAN] - tilt_y * rate - (r00 * b0 + r01 * b1 + r02 * b2))
+        e1 = clip(c, bias[e, n, LEAN + 1] + tilt_x * rate - (r10 * b0 + r11 * b1 + r12 * b2))
+        e2 = clip(c, -(r20 * b0 + r21 * b1 + r22 * b2))
         w0, w2 = c.motion_var[n], c.vertical_var[n]
 
     p00, p01, p02 = bias[e, n, P], bias[e, n, P + 1], bias[e, n, P + 2]
     p11, p12, p22 = bias[e, n, P + 3], bias[e, n, P + 4], bias[e, n, P + 5]
-    p00 += c.drift_var[n] if p00 < START_VAR else 0.0
-    p11 += c.drift_var[n] if p11 < START_VAR else 0.0
-    p22 += c.drift_var[n] if p22 < START_VAR else 0.0
+    start_var = c.start_var[n]
+    p00 += c.drift_var[n] if p00 < start_var else 0.0
+    p11 += c.drift_var[n] if p11 < start_var else 0.0
+    p22 += c.drift_var[n] if p22 < start_var else 0.0
     # A = R P and S = A R' + W, which W keeps far from singular.
     a00, a01, a02 = along(r00, r01, r02, p00, p01, p02, p11, p12, p22)
     a10, a11, a12 = along(r10, r11, r12, p00, p01, p02, p11, p12, p22)
@@ -138,9 +137,9 @@ def estimate_bias(bias, rest, c, e, n, count, qw, qx, qy, qz, tilt_x, tilt_y):
     k00, k10, k20 = along(a00, a10, a20, i00, i01, i02, i11, i12, i22)
     k01, k11, k21 = along(a01, a11, a21, i00, i01, i02, i11, i12, i22)
     k02, k12, k22 = along(a02, a12, a22, i00, i01, i02, i11, i12, i22)
-    bias[e, n, BIAS] = clip(b0 + k00 * e0 + k10 * e1 + k20 * e2)
-    bias[e, n, BIAS + 1] = clip(b1 + k01 * e0 + k11 * e1 + k21 * e2)
-    bias[e, n, BIAS + 2] = clip(b2 + k02 * e0 + k12 * e1 + k22 * e2)
+    bias[e, n, BIAS] = clip(c, b0 + k00 * e0 + k10 * e1 + k20 * e2)
+    bias[e, n, BIAS + 1] = clip(c, b1 + k01 * e0 + k11 * e1 + k21 * e2)
+    bias[e, n, BIAS + 2] = clip(c, b2 + k02 * e0 + k12 * e1 + k22 * e2)
     bias[e, n, P] = p00 - (k00 * a00 + k10 * a10 + k20 * a20)
     bias[e, n, P + 1] = p01 - (k00 * a01 + k10 * a11 + k20 * a21)
     bias[e, n, P + 2] = p02 - (k00 * a02 + k10 * a12 + k20 * a22)

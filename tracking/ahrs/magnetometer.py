@@ -17,25 +17,6 @@ import math
 from tracking.ahrs.lowpass import low_pass
 from tracking.jit import small_kernel
 
-FIELD_TAU = 0.05
-"""[s] Low pass of length and dip."""
-REFERENCE_TAU = 20.0
-"""[s] Time constant with which what is known of the field follows."""
-MAX_NORM_CHANGE = 0.1
-"""[-] Relative difference in length of a field that is not disturbed."""
-MAX_DIP_CHANGE = math.radians(10.0)
-"""[rad] The same of the dip."""
-NEW_AFTER, FIRST_AFTER = 20.0, 5.0
-"""[s] A new field is accepted after so much turning; the first one."""
-MIN_TURN = math.radians(20.0)
-"""[rad/s] What counts as turning."""
-UNDISTURBED_AFTER = 0.5
-"""[s] So long the field must be as known before it is believed again."""
-MAX_REJECTION = 60.0
-"""[s] So long a disturbed field is left out; twice as much undisturbed time makes up for it."""
-REJECTION_FACTOR = 2.0
-"""[-] How much slower the heading follows a field that stays disturbed."""
-
 DELTA, COS, SIN, GAIN, DISTURBED, REJECTED_T, UNDISTURBED_T = 0, 1, 2, 3, 4, 5, 6
 NORM, DIP, NEW_NORM, NEW_DIP, NEW_T, COUNT, FIELD = 7, 8, 9, 10, 11, 12, 13
 N_MAGNETIC = 19
@@ -46,20 +27,20 @@ and how long the sensor turned in that [s]; number of readings; low pass of leng
 
 
 @small_kernel
-def start_magnetic(magnetic, e, n):
+def start_magnetic(magnetic, c, e, n):
     """Before any reading: no field is known, and the first ones are believed as they are."""
     for k in range(N_MAGNETIC):
         magnetic[e, n, k] = 0.0
     magnetic[e, n, COS] = magnetic[e, n, GAIN] = magnetic[e, n, DISTURBED] = 1.0
-    magnetic[e, n, REJECTED_T] = MAX_REJECTION
+    magnetic[e, n, REJECTED_T] = c.field[0].longest_rejection
     magnetic[e, n, NEW_NORM] = -1.0
 
 
 @small_kernel
-def is_near(norm, dip, known_norm, known_dip):
+def is_near(c, norm, dip, known_norm, known_dip):
     """Whether a field is the one that is known."""
-    near = abs(norm - known_norm) < MAX_NORM_CHANGE * known_norm
-    return near and abs(dip - known_dip) < MAX_DIP_CHANGE
+    near = abs(norm - known_norm) < c.field[0].norm_change * known_norm
+    return near and abs(dip - known_dip) < c.field[0].dip_change
 
 
 @small_kernel
@@ -75,31 +56,31 @@ def watch_field(magnetic, c, e, n, norm, dip, rate):
         dip: Its angle below the horizon [rad].
         rate: Low-passed turn rate [rad/s].
     """
-    dt, gain = c.mag_dt[n], c.reference_gain[n]
+    dt, gain, limits = c.mag_dt[n], c.reference_gain[n], c.field[0]
     magnetic[e, n, COUNT] += 1.0
     magnetic[e, n, FIELD], magnetic[e, n, FIELD + 1] = norm, dip
     low_pass(magnetic, e, n, FIELD, 2, magnetic[e, n, COUNT], c.field_pass, n)
     norm, dip = magnetic[e, n, FIELD], magnetic[e, n, FIELD + 1]
-    if is_near(norm, dip, magnetic[e, n, NORM], magnetic[e, n, DIP]):
+    if is_near(c, norm, dip, magnetic[e, n, NORM], magnetic[e, n, DIP]):
         magnetic[e, n, UNDISTURBED_T] += dt
-        if magnetic[e, n, UNDISTURBED_T] >= UNDISTURBED_AFTER:
+        if magnetic[e, n, UNDISTURBED_T] >= limits.undisturbed_after:
             magnetic[e, n, DISTURBED] = 0.0
             magnetic[e, n, NORM] += gain * (norm - magnetic[e, n, NORM])
             magnetic[e, n, DIP] += gain * (dip - magnetic[e, n, DIP])
     else:
         magnetic[e, n, UNDISTURBED_T] = 0.0
         magnetic[e, n, DISTURBED] = 1.0
-    if is_near(norm, dip, magnetic[e, n, NEW_NORM], magnetic[e, n, NEW_DIP]):
-        if rate >= MIN_TURN:
+    if is_near(c, norm, dip, magnetic[e, n, NEW_NORM], magnetic[e, n, NEW_DIP]):
+        if rate >= limits.least_turn:
             magnetic[e, n, NEW_T] += dt
         magnetic[e, n, NEW_NORM] += gain * (norm - magnetic[e, n, NEW_NORM])
         magnetic[e, n, NEW_DIP] += gain * (dip - magnetic[e, n, NEW_DIP])
-        needed = FIRST_AFTER if magnetic[e, n, NORM] == 0.0 else NEW_AFTER
+        needed = limits.first_after if magnetic[e, n, NORM] == 0.0 else limits.new_after
         if magnetic[e, n, DISTURBED] != 0.0 and magnetic[e, n, NEW_T] >= needed:
             magnetic[e, n, NORM] = magnetic[e, n, NEW_NORM]
             magnetic[e, n, DIP] = magnetic[e, n, NEW_DIP]
             magnetic[e, n, DISTURBED] = 0.0
-            magnetic[e, n, UNDISTURBED_T] = UNDISTURBED_AFTER
+            magnetic[e, n, UNDISTURBED_T] = limits.undisturbed_after
     else:
         magnetic[e, n, NEW_T] = 0.0
         magnetic[e, n, NEW_NORM], magnetic[e, n, NEW_DIP] = norm, dip
@@ -132,14 +113,15 @@ def correct_heading(magnetic, c, e, n, mx, my, mz, rate):
     norm = math.sqrt(mx * mx + my * my + mz * mz)
     watch_field(magnetic, c, e, n, norm, -math.asin(min(max(mz / norm, -1.0), 1.0)), rate)
     angle = wrapped(math.atan2(mx, my) - magnetic[e, n, DELTA])
-    gain, dt = c.mag_gain[n], c.mag_dt[n]
+    gain, dt, limits = c.mag_gain[n], c.mag_dt[n], c.field[0]
     if magnetic[e, n, DISTURBED] == 0.0:
-        magnetic[e, n, REJECTED_T] = max(magnetic[e, n, REJECTED_T] - REJECTION_FACTOR * dt, 0.0)
-    elif magnetic[e, n, REJECTED_T] <= MAX_REJECTION:
+        left = magnetic[e, n, REJECTED_T] - limits.rejection_factor * dt
+        magnetic[e, n, REJECTED_T] = max(left, 0.0)
+    elif magnetic[e, n, REJECTED_T] <= limits.longest_rejection:
         magnetic[e, n, REJECTED_T] += dt
         gain = 0.0
     else:
-        gain /= REJECTION_FACTOR
+        gain /= limits.rejection_factor
     # The first readings are averaged, whatever the field: 1, 1/2, 1/3, ...
     least = magnetic[e, n, GAIN]
     if least != 0.0:

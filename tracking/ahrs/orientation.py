@@ -23,11 +23,11 @@ import numpy as np
 
 from tracking.ahrs.orientation_state import (
     OrientationCoefficients,
-    OrientationParams,
     OrientationState,
     make_coefficients,
     make_state,
 )
+from tracking.ahrs.params import OrientationParams
 from tracking.ahrs.stage import forget, orient
 from tracking.constellation import Constellation
 from tracking.geometry import GRAVITY
@@ -37,7 +37,6 @@ from tracking.measurements import Kind, MeasurementBlock
 __all__ = [
     "Orientation",
     "OrientationCoefficients",
-    "OrientationParams",
     "OrientationState",
     "make_coefficients",
     "make_state",
@@ -66,10 +65,11 @@ class Orientation:
         """Constants of the kernels."""
         self.state = make_state(n_envs, constellation.n_nodes)
         """Everything that evolves, arrays over (env, node, ...)."""
+        forget(self.coefficients, self.state, GRAVITY)
 
     def reset(self, env: int) -> None:
         """Forget everything of one environment."""
-        forget(self.state.of(slice(env, env + 1)), GRAVITY)
+        forget(self.coefficients, self.state.of(slice(env, env + 1)), GRAVITY)
 
     def part(self, envs: slice) -> Orientation:
         """Some of the environments; shares their memory."""

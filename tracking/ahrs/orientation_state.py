@@ -7,58 +7,23 @@ of each (`OrientationState.of`). The kernels write the arrays in place.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
-from tracking.ahrs.gyro_bias import N_BIAS
+from tracking.ahrs.gyro_bias import N_BIAS, UNIT
 from tracking.ahrs.lowpass import N_LOW_PASS
-from tracking.ahrs.magnetometer import FIELD_TAU, N_MAGNETIC, REFERENCE_TAU
-from tracking.ahrs.rest import N_REST, REST_TAU
-from tracking.ahrs.stage import N_NODE, forget
+from tracking.ahrs.magnetometer import N_MAGNETIC
+from tracking.ahrs.params import VQF_TAU_ACC, OrientationParams
+from tracking.ahrs.rest import N_REST
+from tracking.ahrs.stage import N_NODE
 from tracking.ahrs.vqf import N_TILT
 from tracking.arrays import F64, Bool
 from tracking.constellation import Constellation
-from tracking.geometry import GRAVITY
-from tracking.numbers import check_numbers
-from tracking.records import Records
+from tracking.records import Records, record_of
 from tracking.sanity.imu import N_HEALTH
-from tracking.sanity.params import SanityParams
 from tracking.sanity.saturation import N_LIMIT
 from tracking.vehicles import VEHICLES
-
-VQF_TAU_ACC = 3.0
-"""[s] VQF's accelerometer time constant."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OrientationParams:
-    """What the orientation stage believes."""
-
-    tau_acc: float = VQF_TAU_ACC
-    """[s] VQF's accelerometer time constant. Longer trusts the gyroscope more. VQF default."""
-    tau_mag: float = 9.0
-    """[s] VQF's magnetometer time constant. VQF default."""
-    rest_rate: float = math.radians(4.0)
-    """[rad/s] A gyroscope that reads within this of its own low pass for 1.5 s, as the
-    accelerometer does within 0.5 m/s2, is at rest. VQF's 2 deg/s are passed by the noise alone of
-    `isas_walk1`, 0.5 to 0.8 deg/s along each axis, so that its bias was never learned."""
-    max_gap: float = 0.5
-    """[s] Missing samples up to here are filled by interpolation, so that the gyroscope is
-    integrated over them. After a longer silence the orientation is found anew, where there is a
-    magnetometer; elsewhere it goes on from where it was."""
-    gravity_tau: float = 0.5
-    """[s] Time constant with which a node at rest learns the length of gravity that its own
-    accelerometer reads, which removes the vertical part of its offset."""
-    sanity: SanityParams = field(default_factory=SanityParams)
-    """Which samples are doubtful."""
-    doubtful_psd: float = 1.5
-    """[m/s2/sqrt(Hz)] Added noise of an acceleration that is saturated or stands in for a spike:
-    that of a node without an IMU. Such a reading is nearer to the acceleration than none."""
-
-    def __post_init__(self) -> None:
-        check_numbers(self)
 
 
 class OrientationCoefficients(NamedTuple):
@@ -82,8 +47,12 @@ class OrientationCoefficients(NamedTuple):
     """Time constant behind it, (node) [s]."""
     reference_gain: F64
     """Share by which a reading moves what is known of the field, (node)."""
-    rest_rate: F64
-    """`OrientationParams.rest_rate`, (node) [rad/s]."""
+    rest: Records
+    """`OrientationParams.rest`, (1)."""
+    field: Records
+    """`OrientationParams.magnetic`, (1)."""
+    start_var: F64
+    """Variance of a gyroscope's bias before any measurement, (node) [(0.01 deg/s)^2]."""
     drift_var: F64
     """What the variance of a gyroscope's bias gains per sample, (node) [(0.01 deg/s)^2]."""
     rest_var: F64
@@ -136,11 +105,9 @@ class OrientationState(NamedTuple):
 
 
 def make_state(n_envs: int, n_nodes: int) -> OrientationState:
-    """The state before any measurement."""
+    """Room for the state; `forget` brings it to where it is before any measurement."""
     columns = (N_NODE, N_HEALTH, N_LIMIT, N_TILT, N_REST, N_BIAS, N_MAGNETIC)
-    state = OrientationState(*(np.zeros((n_envs, n_nodes, n)) for n in columns))
-    forget(state, GRAVITY)
-    return state
+    return OrientationState(*(np.zeros((n_envs, n_nodes, n)) for n in columns))
 
 
 def make_coefficients(
@@ -152,12 +119,6 @@ def make_coefficients(
         constellation: The nodes.
         params: What is believed.
         follows_bias: As of `Filter.follows_bias`.
-
-    The noises of the gyroscope's bias are the defaults of VQF: a drift of 0.1 deg/s in 100 s,
-    and steady states of 0.1 deg/s in motion and 0.03 deg/s at rest. In motion a bias is told by
-    corrections of the tilt, which come later the longer the time constant of the accelerometer
-    is. What follows them as fast all the same swings, by tilts of 5 to 10 degrees at 30 s: so the
-    variance of what they tell is in proportion to the square of that time constant.
     """
     nodes = constellation.nodes
     dt = np.array([1.0 / node.imu_hz for node in nodes])
@@ -167,24 +128,29 @@ def make_coefficients(
     tau_acc = np.array(
         [b or v.ahrs_accel_tau or params.tau_acc for b, v in zip(with_bias, vehicles, strict=True)]
     )
-    drift_var = 10.0**2 * dt / 100.0
-    motion_sigma2 = 10.0**2 * tau_acc / VQF_TAU_ACC
+    b = params.bias
+    # Steady states of the filter of the bias, in its unit.
+    drift_var = (b.drift_std / UNIT) ** 2 * dt / b.drift_time
+    rest_sigma2 = (b.rest_std / UNIT) ** 2
+    motion_sigma2 = (b.motion_std / UNIT) ** 2 * tau_acc / VQF_TAU_ACC
     motion_var = motion_sigma2**2 / drift_var + motion_sigma2
     return OrientationCoefficients(
         dt=dt,
         rate=np.array([node.imu_hz for node in nodes], dtype=np.float64),
         mag_dt=mag_dt,
         tilt_pass=np.array([low_pass_of(*pair) for pair in zip(tau_acc, dt, strict=True)]),
-        rest_pass=np.array([low_pass_of(REST_TAU, each) for each in dt]),
-        field_pass=np.array([low_pass_of(FIELD_TAU, each) for each in mag_dt]),
+        rest_pass=np.array([low_pass_of(params.rest.tau, each) for each in dt]),
+        field_pass=np.array([low_pass_of(params.magnetic.tau, each) for each in mag_dt]),
         mag_gain=1.0 - np.exp(-mag_dt / params.tau_mag),
         tau_mag=np.full(len(nodes), params.tau_mag),
-        reference_gain=1.0 - np.exp(-mag_dt / REFERENCE_TAU),
-        rest_rate=np.full(len(nodes), params.rest_rate),
+        reference_gain=1.0 - np.exp(-mag_dt / params.magnetic.reference_tau),
+        rest=record_of(params.rest),
+        field=record_of(params.magnetic),
+        start_var=np.full(len(nodes), (b.start_std / UNIT) ** 2),
         drift_var=drift_var,
-        rest_var=3.0**4 / drift_var + 3.0**2,
+        rest_var=rest_sigma2**2 / drift_var + rest_sigma2,
         motion_var=motion_var,
-        vertical_var=motion_var / 1e-4,
+        vertical_var=motion_var / b.vertical_share,
         gravity_gain=dt / params.gravity_tau,
         max_gap=np.full(len(nodes), params.max_gap),
         heading=np.array([node.initial_heading or 0.0 for node in nodes]),

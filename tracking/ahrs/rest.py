@@ -6,19 +6,8 @@ References:
 
 from __future__ import annotations
 
-import math
-
 from tracking.ahrs.lowpass import low_pass
 from tracking.jit import small_kernel
-
-REST_TAU = 0.5
-"""[s] Time constant of both low passes."""
-REST_AFTER = 1.5
-"""[s] So long the readings must stay near, the gyroscope's by `OrientationParams.rest_rate`."""
-MAX_ACC_CHANGE = 0.5
-"""[m/s2] How near, of the accelerometer."""
-MAX_BIAS = math.radians(2.0)
-"""[rad/s] A steady rate above this is no bias of a gyroscope: something turns."""
 
 GYR, ACC, REST_T, RESTING = 0, 9, 18, 19
 N_REST = 20
@@ -33,8 +22,9 @@ def watch_gyroscope(rest, c, e, n, count, gx, gy, gz):
     low_pass(rest, e, n, GYR, 3, count, c.rest_pass, n)
     mx, my, mz = rest[e, n, GYR], rest[e, n, GYR + 1], rest[e, n, GYR + 2]
     dx, dy, dz = gx - mx, gy - my, gz - mz
-    turns = max(abs(mx), abs(my), abs(mz)) > MAX_BIAS
-    if turns or dx * dx + dy * dy + dz * dz >= c.rest_rate[n] * c.rest_rate[n]:
+    limits = c.rest[0]
+    turns = max(abs(mx), abs(my), abs(mz)) > limits.largest_bias
+    if turns or dx * dx + dy * dy + dz * dz >= limits.rate * limits.rate:
         rest[e, n, REST_T] = rest[e, n, RESTING] = 0.0
 
 
@@ -44,9 +34,9 @@ def watch_accelerometer(rest, c, e, n, count, ax, ay, az):
     rest[e, n, ACC], rest[e, n, ACC + 1], rest[e, n, ACC + 2] = ax, ay, az
     low_pass(rest, e, n, ACC, 3, count, c.rest_pass, n)
     dx, dy, dz = ax - rest[e, n, ACC], ay - rest[e, n, ACC + 1], az - rest[e, n, ACC + 2]
-    if dx * dx + dy * dy + dz * dz >= MAX_ACC_CHANGE * MAX_ACC_CHANGE:
+    if dx * dx + dy * dy + dz * dz >= c.rest[0].accel * c.rest[0].accel:
         rest[e, n, REST_T] = rest[e, n, RESTING] = 0.0
     else:
         rest[e, n, REST_T] += c.dt[n]
-        if rest[e, n, REST_T] >= REST_AFTER:
+        if rest[e, n, REST_T] >= c.rest[0].after:
             rest[e, n, RESTING] = 1.0

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from tracking.ahrs.gyro_bias import BIAS, START_VAR, mean_variance, worst_variance
+from tracking.ahrs.gyro_bias import BIAS, mean_variance, worst_variance
 from tracking.ahrs.magnetometer import COS, SIN
 from tracking.ahrs.rest import RESTING
 from tracking.ahrs.vqf import (
@@ -138,7 +138,7 @@ def find_gap(c, s, e, n, t):
         return round(gap * c.rate[n]) - 1
     if c.magnetic[n]:
         # Where it points now, nobody knows; what its gyroscope reads at rest is still true.
-        start_vqf(s, e, n, worst_variance(s.bias, e, n))
+        start_vqf(s, c, e, n, worst_variance(s.bias, c, e, n))
         m[e, n, SEEN_FIELD] = 0.0
     return 0
 
@@ -176,10 +176,11 @@ def start_heading(c, s, e, n):
 
 
 @kernel
-def forget(s, gravity):
+def forget(c, s, gravity):
     """Bring every environment and node of `s` to where it was before any measurement.
 
     Args:
+        c: OrientationCoefficients.
         s: OrientationState, written.
         gravity: Length of gravity assumed [m/s2].
     """
@@ -188,5 +189,5 @@ def forget(s, gravity):
             for memory in (s.node, s.health, s.limits, s.bias):
                 for k in range(memory.shape[2]):
                     memory[e, n, k] = 0.0
-            start_vqf(s, e, n, START_VAR)
+            start_vqf(s, c, e, n, c.start_var[n])
             s.node[e, n, GRAVITY], s.node[e, n, COS_YAW] = gravity, 1.0

@@ -33,7 +33,7 @@ y [rad]."""
 
 
 @small_kernel
-def start_vqf(s, e, n, var):
+def start_vqf(s, c, e, n, var):
     """Forget everything but the bias of the gyroscope, which has a variance [(0.01 deg/s)^2]."""
     for k in range(N_TILT):
         s.tilt[e, n, k] = 0.0
@@ -41,7 +41,7 @@ def start_vqf(s, e, n, var):
         s.rest[e, n, k] = 0.0
     s.tilt[e, n, Q_GYR] = s.tilt[e, n, Q_ACC] = s.tilt[e, n, Q_6D] = 1.0
     start_bias(s.bias, e, n, var)
-    start_magnetic(s.magnetic, e, n)
+    start_magnetic(s.magnetic, c, e, n)
 
 
 @small_kernel

@@ -8,8 +8,6 @@ from tracking.jit import allocating_kernel, kernel
 
 N_FIRST = 8
 """Ranges of a pair that are kept until it runs, the newest."""
-FEWEST = 3
-"""Fewer say nothing of how far they are to be trusted: one may be absurd."""
 
 
 @kernel
@@ -34,12 +32,12 @@ def is_ready(c, s, layout, i, j, t):
     if pair.surveyed > 0.0:
         return True
     n = min(pair.start_n, N_FIRST)
-    if n < FEWEST:
+    if n < c.min_ranges:
         return False
     oldest, newest = pair.start_t[(pair.start_n - n) % N_FIRST], newest_first(pair)
     if pair.start_n >= c.start_k and t - oldest <= c.start_max_age:
         return True
-    is_recent = t - newest <= max(c.start_max_age, FEWEST * (newest - oldest) / (n - 1))
+    is_recent = t - newest <= max(c.start_max_age, c.min_ranges * (newest - oldest) / (n - 1))
     return is_recent and t - pair.t_start >= c.start_max_age
 
 
@@ -68,7 +66,7 @@ def start_distance(c, s, layout, i, j):
     kept, m = np.zeros(N_FIRST), 0
     for k in range(n):
         at = (pair.start_n - 1 - k) % N_FIRST
-        if k < FEWEST or newest - pair.start_t[at] <= c.start_max_age:
+        if k < c.min_ranges or newest - pair.start_t[at] <= c.start_max_age:
             kept[m] = pair.start_r[at]
             m += 1
     middle = np.median(kept[:m])

@@ -6,7 +6,7 @@ import numpy as np
 
 from tracking.arrays import Bool
 from tracking.estimate import Status, TeamEstimate
-from tracking.filters.first_ranges import FEWEST
+from tracking.filters.joint.params import JointStartParams
 from tracking.log.folder import Log
 from tracking.measurements import Kind
 
@@ -51,21 +51,21 @@ def notes_on_estimate(log: Log, estimate: TeamEstimate) -> list[str]:
     a, b = block.i[0, is_range], block.j[0, is_range]
     found = [n for n in range(constellation.n_nodes) if ever[(i == n) | (j == n)].any()]
     needed = min(constellation.dimensions + 1, len(found))
-    notes = []
+    notes, least = [], round(JointStartParams().min_ranges)
     for n in range(constellation.n_nodes):
         if n in found:
             continue
         partners = np.concatenate([b[a == n], a[b == n]])
         others, counts = np.unique(partners, return_counts=True)
-        enough = int((counts >= FEWEST).sum())
+        enough = int((counts >= least).sum())
         lacks = (
-            f"a node joins by {FEWEST} ranges or more with each of {needed} placed nodes"
+            f"a node joins by {least} ranges or more with each of {needed} placed nodes"
             if found
-            else f"a group starts by {FEWEST} ranges or more of every pair of three nodes"
+            else f"a group starts by {least} ranges or more of every pair of three nodes"
         )
         notes.append(
             f"node {constellation.ids[n]} was never placed: {len(partners)} ranges with "
-            f"{len(others)} nodes, {FEWEST} or more with {enough}; {lacks}"
+            f"{len(others)} nodes, {least} or more with {enough}; {lacks}"
         )
     return notes
 

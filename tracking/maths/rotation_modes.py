@@ -16,8 +16,6 @@ from tracking.jit import allocating_kernel
 
 STEPS, SMALL = 30, 1e-4
 """[-, rad] Steps of a climb at most; it ends with one as small as this."""
-APART = 0.3
-"""[rad] Peaks that are nearer to each other are one."""
 
 
 @allocating_kernel
@@ -126,19 +124,20 @@ def least_curvature(H):
 
 
 @allocating_kernel
-def is_near(R, other):
-    """True for turns less than `APART` from each other; no rotation is that near a mirror image."""
-    return np.sum(R * other) > 1.0 + 2.0 * math.cos(APART)
+def is_near(R, other, angle):
+    """True for rotations that are less than an angle [rad] from each other."""
+    return np.sum(R * other) > 1.0 + 2.0 * math.cos(angle)
 
 
 @allocating_kernel
-def find_modes(information, score, starts):
+def find_modes(information, score, starts, apart):
     """All peaks that are found from the given starts, and f there, the highest first.
 
     Args:
         information: (9, 9).
         score: (9).
         starts: Orthogonal matrices, (start, 3, 3).
+        apart: Peaks that are nearer to each other are one [rad].
 
     Returns:
         Peaks (peak, 3, 3) and values (peak).
@@ -150,7 +149,7 @@ def find_modes(information, score, starts):
         value = climb_to_mode(information, score, R, H)
         at = n
         for a in range(n):
-            if is_near(turns[a], R):
+            if is_near(turns[a], R, apart):
                 at = a
         if at == n:
             n += 1

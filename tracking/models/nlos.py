@@ -21,10 +21,7 @@ import math
 from tracking.jit import small_kernel
 from tracking.maths.exponentials import exponential
 
-MIN_PROB = 1e-4
 SQRT_2PI = math.sqrt(2.0 * math.pi)
-MOST_EVIDENCE = 4.0
-"""[-] Of the powers of a single range."""
 
 
 @small_kernel
@@ -33,7 +30,7 @@ def power_evidence(c, gap):
     los = max(gap - c.power_diff_los, 0.0) / c.power_diff_los_std
     nlos = min(gap - c.power_diff_nlos, 0.0) / c.power_diff_nlos_std
     ratio = 0.5 * (los * los - nlos * nlos) - math.log(c.power_diff_nlos_std / c.power_diff_los_std)
-    return min(max(c.power_diff_weight * ratio, -MOST_EVIDENCE), MOST_EVIDENCE)
+    return min(max(c.power_diff_weight * ratio, -c.power_diff_most), c.power_diff_most)
 
 
 @small_kernel
@@ -46,10 +43,11 @@ def transition_probs(los_to_nlos_rate, nlos_to_los_rate, dt):
 
 
 @small_kernel
-def nlos_posterior(before, enter, leave, los_like, enter_like, leave_like, nlos_like, odds):
+def nlos_posterior(c, before, enter, leave, los_like, enter_like, leave_like, nlos_like, odds):
     """Bayes' rule over the four transitions.
 
     Args:
+        c: Coefficients.
         before: Probability of NLOS before.
         enter: Probability of a transition to NLOS.
         leave: Probability of a transition to LOS.
@@ -71,7 +69,7 @@ def nlos_posterior(before, enter, leave, los_like, enter_like, leave_like, nlos_
     total = los_los + los_nlos + nlos_los + nlos_nlos
     if total < 1e-300:
         return before, 0.0, 0.0, 0.0
-    after = min(max((los_nlos + nlos_nlos) / total, MIN_PROB), 1.0 - MIN_PROB)
+    after = min(max((los_nlos + nlos_nlos) / total, c.least_prob), 1.0 - c.least_prob)
     norm = 1.0 + after * (odds - 1.0) if odds > 1.0 else 1.0
     return after, (los_nlos + nlos_los) / total, total, total / norm
 

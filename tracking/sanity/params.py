@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
 from tracking.numbers import check_numbers
-from tracking.records import Records, as_records
+from tracking.records import Records, record_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,8 +49,6 @@ class SanityParams:
 
     def as_record(self) -> Records:
         """For kernels, (1); `chance` is its logarithm."""
-        record = np.zeros(1, dtype=[(f.name, "f8") for f in fields(self)])
-        for f in fields(self):
-            record[f.name] = getattr(self, f.name)
+        record = record_of(self)
         record["chance"] = np.log(self.chance)
-        return as_records(record)
+        return record

@@ -49,6 +49,7 @@ def update_nlos_posterior(c, s, h, p, dt, nu, variance, sight, w):
         S_leave += max(covariance(s, h, at, at) - 2.0 * w[at], -0.9 * variance) + c.slow_var
     stays = likelihood(nu, S)
     s.nlos[h, p], switched, total, of_range = nlos_posterior(
+        c,
         s.nlos[h, p],
         enter,
         leave,

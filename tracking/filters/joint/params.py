@@ -72,6 +72,10 @@ class NlosParams:
     """[dB]"""
     power_diff_weight: float = 0.2
     """[-] Gaps of successive ranges are alike, so that each counts for less than one."""
+    power_diff_most: float = 4.0
+    """[-] Log-likelihood ratio that the powers of a single range make at most."""
+    least_prob: float = 1e-4
+    """[-] Neither NLOS nor its contrary is less probable."""
     outlier_prob: float = 1e-2
     """[-] Share of ranges that mean nothing."""
     outlier_span: float = 20.0
@@ -101,6 +105,9 @@ class JointStartParams:
     """[-] Ranges per pair whose mean starts the shape, the paper's first k measurements."""
     max_age: float = 2.0
     """[s] The first k measurements must come within this time."""
+    min_ranges: float = 3.0
+    """[-] Or those that came in a longer time, if there are so many. Fewer say nothing of how far
+    they are to be trusted: one may be absurd."""
     rotations_2d: int = 16
     """[-] Rotations tried in the plane, each with its mirror image."""
     position_std: float = 0.25

@@ -61,6 +61,7 @@ def update_nlos_posterior(c, s, p, h, dt, nu, variance, w_e, evidence):
     S_leave = S + max(s.P[p, h, E, E] - 2.0 * w_e, -0.9 * variance) + c.slow_var
     stays = likelihood(nu, S)
     s.nlos[p, h], switched, total, of_range = nlos_posterior(
+        c,
         s.nlos[p, h],
         enter,
         leave,

@@ -46,9 +46,6 @@ from tracking.maths.rotation_modes import (
     rotation_exp,
 )
 
-SMALL = 0.02
-"""[rad] A frame is not turned by less."""
-
 
 @allocating_kernel
 def challenge_alignment(c, s, layout, h):
@@ -90,7 +87,7 @@ def resolve_challenge(c, s, layout):
     turns, values = likely_modes(c, s, layout, group.best)
     if values[0] > value + c.challenger_lead:
         R[:], value = turns[0], values[0]
-    if value < c.challenger_lead or is_near(R, np.eye(3)):
+    if value < c.challenger_lead or is_near(R, np.eye(3), c.same_mode):
         # A mode near it is measured by these seconds alone; the filter knows it better.
         if len(values) == 1 or group.t - group.t_alignment > c.challenge_longest:
             group.alignment = FILTERED
@@ -128,7 +125,9 @@ def track_all_modes(c, s, layout):
 @allocating_kernel
 def likely_modes(c, s, layout, h):
     """The turns of hypothesis h that may be, (turn, 3, 3), and how likely, the likeliest first."""
-    turns, values = find_modes(s.alignment_information[h], s.alignment_score[h], layout.rotations)
+    turns, values = find_modes(
+        s.alignment_information[h], s.alignment_score[h], layout.rotations, c.same_mode
+    )
     n = 1
     while n < len(values) and values[n] > values[0] - c.prune:
         n += 1
@@ -177,8 +176,8 @@ def move_to_mode(c, s, h):
             axis = axes[:, a].copy()
             move += axis * (np.sum(axis * w) / values[a])
     length = math.sqrt(np.sum(move * move))
-    R = rotation_exp(move * min(1.0, c.mode_std / max(length, SMALL)))
-    if length > SMALL and gain(s.alignment_information[h], s.alignment_score[h], R, g) > 0.0:
+    R = rotation_exp(move * min(1.0, c.mode_std / max(length, c.mode_step)))
+    if length > c.mode_step and gain(s.alignment_information[h], s.alignment_score[h], R, g) > 0.0:
         rotate_frame(c, s, h, R)
     return known
 

@@ -9,7 +9,6 @@ import numpy as np
 from tracking.filters.joint.hypotheses.alignment import CHALLENGED, STATIC, has_modes
 from tracking.filters.joint.hypotheses.alignment_sensitivity import has_linear_alignment
 from tracking.jit import allocating_kernel, kernel, small_kernel
-from tracking.maths.rotation_modes import APART
 
 
 @kernel
@@ -73,7 +72,7 @@ def rotation_between(c, s, a, b, turn):
         u[:, c.d - 1] *= -1.0
     nearest = u @ v
     # The trace is 2 cos in the plane, 1 + 2 cos in space.
-    limit = APART if has_modes(s.group[0]) else c.same_rotation
+    limit = c.same_mode if has_modes(s.group[0]) else c.same_rotation
     if np.trace(nearest) > (c.d - 2) + 2.0 * math.cos(limit):
         turn[:] = nearest
 

@@ -29,14 +29,13 @@ from tracking.filters.joint.supervision.residuals import (
 )
 from tracking.jit import allocating_kernel, kernel
 from tracking.maths.multilateration import best_position, total_loss
-from tracking.models.nlos import MIN_PROB
 
 
 @kernel
 def begin_node_fault(c, s, layout, i, fault, t):
     """Note a fault of node i, and let the errors of its ranges move together."""
     s.nodes[i].fault, s.nodes[i].t_fault = fault, t
-    activate_node_bias(s, layout, i, c.offset_std**2)
+    activate_node_bias(c, s, layout, i, c.offset_std**2)
 
 
 @kernel
@@ -49,7 +48,7 @@ def follow_node_faults(c, s, layout, t):
             continue
         has_outliers = i == worst and node_outlier_ratio(c, s, layout, i, t) > c.outlier_ratio
         if has_outliers or bias_ratio(c, s, layout, i, t) > c.fault_hysteresis**2:
-            activate_node_bias(s, layout, i, c.offset_rate**2 * dt)
+            activate_node_bias(c, s, layout, i, c.offset_rate**2 * dt)
             if has_outliers:
                 inflate_node(c, s, i, c.fault_rate**2 * dt)
             node.t_fault = t
@@ -69,7 +68,7 @@ def inflate_node(c, s, i, variance):
 
 
 @kernel
-def activate_node_bias(s, layout, i, variance):
+def activate_node_bias(c, s, layout, i, variance):
     """Let the slow errors of all ranges of node i move together; none is for want of sight."""
     n = s.nodes.shape[0]
     for h in range(s.alive.shape[0]):
@@ -79,7 +78,7 @@ def activate_node_bias(s, layout, i, variance):
             p = layout.pair_index[i, k] if k != i else -1
             if p < 0 or s.pairs[p].i_range_error < 0 or not s.nodes[k].present:
                 continue
-            s.nlos[h, p] = 1.0 - MIN_PROB
+            s.nlos[h, p] = 1.0 - c.least_prob
             for m in range(n):
                 q = layout.pair_index[i, m] if m != i else -1
                 if q >= 0 and s.pairs[q].i_range_error >= 0 and s.nodes[m].present:

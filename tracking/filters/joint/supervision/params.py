@@ -115,6 +115,11 @@ class AlignmentParams:
     """[-] The same where a rotation was known and is challenged."""
     challenge_longest: float = 20.0
     """[s] A challenge ends after so long without a likelier mode."""
+    same_mode: float = 0.3
+    """[rad] Modes that differ by a smaller rotation are one; no rotation is that near a mirror
+    image."""
+    mode_step: float = 0.02
+    """[rad] The frame is turned to its mode by no smaller a step."""
     mode_std: float = 0.7
     """[rad] Each mode is filtered by itself once it is known so well."""
     candidate_std: float = 0.15
