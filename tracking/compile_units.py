@@ -16,20 +16,30 @@ Everything of numba that is not public is used in this file only (numba 0.61 to 
 from __future__ import annotations
 
 import hashlib
+import logging
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import llvmlite.binding as llvm
+from numba.core.bytecode import FunctionIdentity
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, Flags
 from numba.core.types.misc import unliteral
+from numba.core.untyped_passes import ExtractByteCode
 
 from tracking.fingerprint import fingerprint
+from tracking.processors import fitting_levels
 
 _FORMAT = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
 """How code is compiled and kept is a part of what it was compiled from."""
+SHIPPED = "__compiled__"
+"""Folder beside modules with code that was compiled ahead, for several kinds of processors."""
+MANY = 5
+"""So many kernels that are compiled take seconds."""
+_log = logging.getLogger("tracking.jit")
 _kernels: dict[tuple[str, str], Any] = {}
 """Dispatchers by module and name, for units that are called by cached code."""
 
@@ -59,6 +69,20 @@ def load_unit(compiled: Any, args: tuple[Any, ...]) -> bool:
     compiled.targetctx.insert_user_function(found.entry_point, found.fndesc, [found.library])
     compiled.add_overload(found)
     return True
+
+
+def units_of(package: str) -> list[Any]:
+    """Dispatchers of the units in the imported modules of a package."""
+    return [
+        unit
+        for (module, _), unit in _kernels.items()
+        if f"{module}.".startswith(f"{package}.") and not unit.targetoptions.get("forceinline")
+    ]
+
+
+def is_kept(compiled: Any) -> bool:
+    """True if the disk has a dispatcher's code, for some types and this processor."""
+    return bool(compiled._cache.has_code(compiled.targetctx))
 
 
 class _Unit(JITCodeLibrary):  # type: ignore[misc]
@@ -120,13 +144,28 @@ class _UnitCompiler(Compiler):  # type: ignore[misc]
                  flags: Any, names: Any) -> None:  # fmt: skip
         super().__init__(typing, target, library, args, result, _Flags(flags), names)
 
+    n_compiled = 0
+    """In this process."""
+
     def compile_extra(self, func: Any) -> Any:
+        _UnitCompiler.n_compiled += 1
+        if _UnitCompiler.n_compiled == MANY:
+            _log.warning("compiling, once, for up to a minute; `relpos warmup` does it ahead")
         codegen = self.state.targetctx.codegen()
         self.state.library = library = _Unit(codegen, func.__qualname__)
         library.enable_object_caching()
         if not self.state.flags.forceinline:
             library.key = (func.__module__, func.__qualname__), tuple(self.state.args)
-        return super().compile_extra(func)
+        self.state.func_id = identity = FunctionIdentity.from_function(func)
+        kernel = _kernels.get((func.__module__, func.__qualname__))
+        if kernel is not None:
+            # Numba counts functions. Processes that compile side by side have to agree on names.
+            identity.unique_id = int(fingerprint(kernel)[:15], 16)
+            identity.unique_name = f"{identity.func_qualname}${identity.unique_id}"
+        ExtractByteCode().run_pass(self.state)
+        self.state.lifted = ()
+        self.state.lifted_from = None
+        return self._compile_bytecode()
 
 
 class _UnitCacheImpl(CompileResultCacheImpl):  # type: ignore[misc]
@@ -180,12 +219,19 @@ class _UnitCache(FunctionCache):  # type: ignore[misc]
         super().__init__(compiled.py_func)
         self._cache_file = _CacheFile(compiled, self._impl)
 
+    def has_code(self, target_context: Any) -> bool:
+        """Whether there is code for some types, which runs on this processor."""
+        return self._cache_file.has_code(target_context.codegen().magic_tuple())
+
 
 class _CacheFile(IndexDataCacheFile):  # type: ignore[misc]
     """The file of one kernel; each entry says what it was compiled from, and for which types.
 
     Entries are numbered files. Where several processes compile at a time, one can find under a
     number what another has saved for other types, or what is left from before a change.
+
+    What is not found is looked for in what the package brought along, in the folder `SHIPPED`
+    beside the kernel's module, in a folder for each kind of processor.
     """
 
     def __init__(self, compiled: Any, impl: Any) -> None:
@@ -193,24 +239,51 @@ class _CacheFile(IndexDataCacheFile):  # type: ignore[misc]
         base = re.sub(r"-\d+\.", ".", impl.filename_base, count=1)
         super().__init__(impl.locator.get_cache_path(), base, None)
         self._kernel = compiled
+        folder = Path(compiled.py_func.__code__.co_filename).parent / SHIPPED
+        self._shipped: dict[str, IndexDataCacheFile] = {}
+        if folder.is_dir():
+            for level in fitting_levels():
+                self._shipped[level] = IndexDataCacheFile(str(folder / level), base, None)
 
     def load(self, key: Any) -> Any:
         """The compiled code for a key, None if there is none, or none that can be read."""
-        self._source_stamp = self._stamp()
-        try:
-            stamp, data = super().load(key) or (None, None)
-        except Exception:
-            # A class that has moved, a file that was cut short: what cannot be read is no code.
-            return None
-        return data if stamp == (self._source_stamp, key) else None
+        stamp = self._stamp()
+        for file, at in self._places(key):
+            try:
+                found, data = file.load(at) or (None, None)
+            except Exception:
+                # A class that has moved, a file that was cut short: what cannot be read is no code.
+                continue
+            if found == (stamp, at):
+                return data
+        return None
 
     def save(self, key: Any, data: Any) -> None:
         """Keep compiled code under a key."""
-        self._source_stamp = self._stamp()
-        super().save(key, ((self._source_stamp, key), data))
+        super().save(key, ((self._stamp(), key), data))
+
+    def has_code(self, processor: Any) -> bool:
+        """Whether there is code for some types, and a processor as codegen names it."""
+        self._stamp()
+        for file, (_, of, _) in self._places((None, processor, None)):
+            try:
+                if any(kept == of for _, kept, _ in file._load_index()):
+                    return True
+            except Exception:
+                continue
+        return False
+
+    def _places(self, key: Any) -> Iterator[tuple[Any, Any]]:
+        """Files to look into, and the key there."""
+        types, (triple, *_), code = key
+        yield super(), key
+        for level, file in self._shipped.items():
+            file._source_stamp = self._source_stamp
+            yield file, (types, (triple, level, ""), code)
 
     def _stamp(self) -> str:
-        return _FORMAT + fingerprint(self._kernel)
+        self._source_stamp = _FORMAT + fingerprint(self._kernel)
+        return self._source_stamp
 
     def _load_index(self) -> Any:
         try:

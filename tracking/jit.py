@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numba import config, njit, typeof
 
-from tracking.compile_units import compile_as_unit, load_unit
+from tracking.compile_units import compile_as_unit, is_kept, load_unit, units_of
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 Call = tuple[Callable[..., Any], tuple[Any, ...]]
@@ -59,7 +59,7 @@ def bind(kernel: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
     if config.DISABLE_JIT:
         return partial(kernel, *arguments)
     compiled: Any = kernel
-    entry = compiled.compile(tuple(_type_of(argument) for argument in arguments))
+    entry = compiled.compile(types_of(arguments))
     return partial(entry, *arguments)
 
 
@@ -67,7 +67,19 @@ def is_compiled(kernel: Callable[..., Any], *arguments: Any) -> bool:
     """Load a kernel for arguments of some types; false if it has yet to be compiled."""
     if config.DISABLE_JIT:
         return True
-    return load_unit(kernel, tuple(_type_of(argument) for argument in arguments))
+    return load_unit(kernel, types_of(arguments))
+
+
+def missing_in(package: str) -> list[str]:
+    """Kernels of a package, as far as it is imported, of which nothing is on the disk."""
+    if config.DISABLE_JIT:
+        return []
+    return [unit.py_func.__qualname__ for unit in units_of(package) if not is_kept(unit)]
+
+
+def types_of(arguments: tuple[Any, ...]) -> tuple[Any, ...]:
+    """What a kernel is compiled for when it is called with these arguments."""
+    return tuple(_type_of(argument) for argument in arguments)
 
 
 _types: dict[Any, Any] = {}

@@ -70,7 +70,7 @@ def track(
     if out is not None:
         check_folder(out, ["report.html"])
     read = [apply_calibrations(read_log(path), calibrations) for path in logs]
-    warm_up_first(names, everything=False)
+    warm_up_first(names)
     results: list[TrackResult] = []
     for log in read:
         expected = recorded_bound(log, skip=skip) if bound else None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from agents.console import emit_json, print_table, progress_bar
+from agents.console import emit_json, print_table
 
 
 @click.command()
@@ -12,30 +12,33 @@ from agents.console import emit_json, print_table, progress_bar
     "--filter",
     "filters",
     multiple=True,
-    help="joint (default), ekf-mds, ekf, paper-ekf-mds, paper-ekf or all; may be given again.",
+    help="joint (default), ekf-mds, ekf, paper-ekf-mds or paper-ekf; may be given again.",
+)
+@click.option(
+    "--for",
+    "purpose",
+    default="track",
+    show_default=True,
+    help="track, env (also the simulated world), hardware (also the bridge) or all.",
 )
 @click.option("--jobs", type=click.IntRange(1, 64), help="Processes; default: one for each core.")
 @click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
-def warmup(filters: tuple[str, ...], jobs: int | None, as_json: bool) -> None:
-    """Compile trackers ahead: for containers, CI and laptops before a demo.
+def warmup(purpose: str, filters: tuple[str, ...], jobs: int | None, as_json: bool) -> None:
+    """Compile ahead: for containers, CI and laptops before a demo.
 
     What is compiled is kept on the disk until the package, numba or the processor change.
     """
-    from agents.warm_up import warm_up
-    from tracking.filters import DEFAULT_FILTER, FILTERS
+    from agents.warm_up import parts_of, warm_up
+    from agents.warm_up.processes import shown_progress
 
-    names = tuple(dict.fromkeys(filters)) or (DEFAULT_FILTER,)
-    if "all" in names:
-        names = tuple(FILTERS)
-    with progress_bar("compiling the tracker, once") as tell:
-        found = warm_up(names, jobs=jobs, progress=tell)
+    with shown_progress() as tell:
+        found = warm_up(parts_of(purpose, filters), jobs=jobs, progress=tell)
     if as_json:
         emit_json([found.summary])
         return
-    done = f"{found.n_compiled} of {found.n_kernels}"
     rows = [
-        ["filters", ", ".join(found.filters)],
-        ["kernels compiled now", done],
-        ["time [s]", f"{found.seconds:.1f}"],
+        [part, "compiled now" if part in found.compiled else "on the disk"] for part in found.parts
     ]
-    print_table("Warm-up", ["", ""], rows)
+    print_table("Warm-up", ["part", ""], rows)
+    memory = f", at most {found.largest_mb:.0f} MB a process" if found.largest_mb else ""
+    click.echo(f"{found.seconds:.1f} s{memory}")

@@ -46,7 +46,7 @@ class Filter(Protocol):
     def calls(self, block: MeasurementBlock, estimate: TeamEstimate) -> list[list[Call]]:
         """Kernels, with arguments of their types, in groups that share little code.
 
-        The first group is needed by every event, the second to start, the rest now and then.
+        The first group is needed by every event, the others now and then.
         """
 
     def reset(self, env: int) -> None:

@@ -43,7 +43,8 @@ class BatchedFilter(ABC):
 
     def run(self, block: MeasurementBlock, t_out: F64) -> TeamEstimate:
         """Handle the events and report at the given times; see `Filter.run`."""
-        t_out = np.ascontiguousarray(t_out, dtype=np.float64)
+        # Writable, as all arrays that kernels are compiled for.
+        t_out = np.array(t_out, dtype=np.float64, order="C")
         estimate = TeamEstimate.empty(self._constellation, t_out)
         arguments = self._arguments(block.arrays, estimate)
         self._complete(partial(type(self).kernel, *arguments), arguments)

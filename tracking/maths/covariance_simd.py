@@ -7,24 +7,15 @@ the same in plain loops.
 
 from __future__ import annotations
 
-import llvmlite.binding
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
 from tracking.maths.covariance_loops import STATES
+from tracking.processors import has_wide_registers
 
-
-def _wide_registers():
-    """Whether registers of this machine hold eight numbers."""
-    try:
-        return bool(llvmlite.binding.get_host_cpu_features().get("avx512f"))
-    except RuntimeError:  # unknown here
-        return False
-
-
-LANES = 8 if _wide_registers() else 4
+LANES = 8 if has_wide_registers() else 4
 """Numbers of a vector."""
 LONG, SHORT = 48, 16
 """Numbers of a row that are summed at a time: as many as registers hold, or few in short rows."""

@@ -146,15 +146,12 @@ def run_to_end(run: Callable[[], int], arguments: tuple[Any, ...]) -> None:
 
 def compile_all(arguments: tuple[Any, ...]) -> None:
     """Compile everything ahead, for those that cannot wait later."""
-    for group in rare_calls(arguments):
-        for kernel_, given in group:
-            bind(kernel_, *given)
+    for kernel_, given in rare_calls(arguments):
+        bind(kernel_, *given)
 
 
-def rare_calls(arguments: tuple[Any, ...]) -> list[list[Call]]:
-    """Kernels and their arguments: those that begin and end groups, then the others."""
+def rare_calls(arguments: tuple[Any, ...]) -> list[Call]:
+    """These kernels and their arguments."""
     coefficients, layout, state, work, *_ = arguments
     given = coefficients, layout, state, work, 0.0
-    begin = (start_group, join_group, spawn, time_out, stale, remove)
-    others = [action for action in dict.fromkeys(RARE.values()) if action not in begin]
-    return [[(action, given) for action in group] for group in (begin, others)]
+    return [(action, given) for action in dict.fromkeys(RARE.values())]

@@ -1,0 +1,6 @@
+"""Compiling ahead, in as many processes as there are cores: what `relpos warmup` does."""
+
+from agents.warm_up.parts import PURPOSES, Part, parts_of
+from agents.warm_up.processes import WarmUp, warm_up, warm_up_first
+
+__all__ = ["PURPOSES", "Part", "WarmUp", "parts_of", "warm_up", "warm_up_first"]

@@ -1,0 +1,222 @@
+"""What there is to compile: trackers, the simulated world, tasks, the hardware bridge.
+
+Each part is compiled by a process of its own (`python -m agents.warm_up NAME`), and shares little
+code with the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from agents.errors import UsageError
+from tracking import Constellation, NodeConfig, Tracker
+from tracking.estimate import TeamEstimate
+from tracking.filters import DEFAULT_FILTER, FILTERS, filter_builder
+from tracking.jit import Call, bind, is_compiled, missing_in, types_of
+from tracking.measurements import MeasurementBlock
+
+SECONDS = {"joint.0": 45.0, "joint.1": 42.0, "env": 32.0, "ekf-mds.0": 28.0,
+           "paper-ekf-mds.0": 15.0, "hardware": 6.0, "tasks": 6.0}  # fmt: skip
+"""[s] Time of a part on one core of a laptop, for the progress that is shown."""
+OTHERS = 10.0
+"""[s] Time of a part that is not in the table."""
+SWARM = """
+[nodes.1]
+[nodes.2]
+[nodes.3]
+[links.n1]
+port = "none"
+format = "relpos"
+"""
+"""A swarm that is never opened."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Part:
+    """Kernels that are compiled one after the other."""
+
+    name: str
+    is_kept: Callable[[], bool]
+    """Whether the disk has its code."""
+    compile: Callable[[], None]
+    """Load the code of the part from the disk, or compile it."""
+    needs_others: bool = False
+    """True if it uses what other parts compile, and so comes after them."""
+
+    @property
+    def seconds(self) -> float:
+        """About how long it takes [s]."""
+        return SECONDS.get(self.name, OTHERS)
+
+
+def parts_of(purpose: str, filters: tuple[str, ...] = ()) -> list[Part]:
+    """Parts that something needs.
+
+    Args:
+        purpose: One of `PURPOSES`.
+        filters: Some of `tracking.filters.FILTERS`, by default `DEFAULT_FILTER`.
+
+    Raises:
+        ConfigError: No filter of that name.
+        UsageError: No such purpose.
+    """
+    if purpose not in PURPOSES:
+        raise UsageError(f"--for: expected one of {', '.join(PURPOSES)}, got {purpose!r}")
+    names = tuple(FILTERS) if purpose == "all" else filters or (DEFAULT_FILTER,)
+    return [*_tracker_parts(names), *(OTHER_PARTS[name] for name in PURPOSES[purpose])]
+
+
+def _tracker_parts(filters: Iterable[str]) -> Iterator[Part]:
+    """Of trackers; what filters share is told once."""
+    told = set[frozenset[Any]]()
+    for name in dict.fromkeys(filters):
+        for part_name, calls in _kernel_groups(name):
+            code = frozenset((id(kernel), types_of(given)) for kernel, given in calls)
+            if code not in told:
+                told.add(code)
+                kept, compiles = partial(_are_kept, calls), partial(_bind_all, calls)
+                yield Part(name=part_name, is_kept=kept, compile=compiles)
+
+
+def _kernel_groups(name: str) -> Iterator[tuple[str, list[Call]]]:
+    """Of one tracker, the same for all groups of nodes."""
+    filter_builder(name)
+    nodes = tuple(NodeConfig(id=k) for k in range(3))
+    groups = Tracker(Constellation(nodes=nodes, dimensions=2), filter=name).calls()
+    for k, group in enumerate(groups):
+        # The last is that of the orientations, the same for all filters.
+        named = f"{name}.{k}" if k < len(groups) - 1 else "orientation"
+        yield named, group
+
+
+def _bind_all(calls: list[Call]) -> None:
+    for kernel, given in calls:
+        bind(kernel, *given)
+
+
+def _are_kept(calls: list[Call]) -> bool:
+    return all(is_compiled(kernel, *given) for kernel, given in calls)
+
+
+class NoFilter:
+    """Knows nothing: with it the world is compiled without a tracker, beside one that is."""
+
+    follows_bias = False
+
+    def __init__(self, constellation: Constellation, params: Any, n_envs: int) -> None:
+        self._constellation, self._n_envs = constellation, n_envs
+
+    def run(self, block: MeasurementBlock, t_out: Any) -> TeamEstimate:
+        """An estimate of nothing."""
+        return TeamEstimate.empty(self._constellation, np.array(t_out, dtype=np.float64))
+
+    def bind(self, block: MeasurementBlock, estimate: TeamEstimate) -> Callable[[], None]:
+        """Leaves the estimate as it is."""
+        return lambda: None
+
+    def calls(self, block: MeasurementBlock, estimate: TeamEstimate) -> list[list[Call]]:
+        """None."""
+        return []
+
+    def reset(self, env: int) -> None:
+        """Nothing is known before, either."""
+
+    def part(self, envs: slice) -> Self:
+        """The same."""
+        return self
+
+    def save(self) -> None:
+        """Nothing."""
+
+    def restore(self, saved: None) -> None:
+        """Nothing."""
+
+    def mean_nis(self) -> Any:
+        """Not a number."""
+        return np.full(self._n_envs, np.nan)
+
+    def n_rejected(self) -> Any:
+        """None."""
+        return np.zeros(self._n_envs)
+
+
+def _drive(**arguments: Any) -> None:
+    from relpos_env import formation_v0
+
+    env = formation_v0.parallel_env(**arguments)
+    env.reset(seed=0)
+    for _ in range(3):
+        env.step({agent: np.zeros(2, dtype=np.float32) for agent in env.agents})
+    env.close()
+
+
+def _compile_world() -> None:
+    from relpos_env.interface.observations import OBSERVATIONS
+
+    for observation in OBSERVATIONS:
+        _drive(filter=NoFilter, observation=observation, record=True)
+
+
+def _compile_tasks() -> None:
+    from relpos_env.tasks import TASKS
+
+    for task in TASKS:
+        _drive(filter=NoFilter, task=task, proximity=4)
+
+
+def _swarm() -> Any:
+    from hardware_bridge.config.read import parse_config
+
+    return parse_config(SWARM, file="swarm.toml", beside=Path(), with_files=False)
+
+
+def _compile_hardware() -> None:
+    from agents.emulate.options import EmulateOptions
+    from agents.emulate.warm_up import warm_up as drive_emulated_cars
+    from hardware_bridge.live.warm_up import warm_up as drive_live
+
+    drive_live(_swarm())
+    drive_emulated_cars(EmulateOptions())
+
+
+def _has_world() -> bool:
+    import relpos_env.formation  # noqa: F401
+
+    driven = ("_step_kernels", "_result_kernels", "interface", "tasks._ring_kernels")
+    return not any(missing_in(f"relpos_env.{name}") for name in driven)
+
+
+def _has_tasks() -> bool:
+    import relpos_env.tasks  # noqa: F401
+
+    return not missing_in("relpos_env.tasks")
+
+
+def _has_hardware() -> bool:
+    import hardware_bridge.live.swarm
+    import hardware_bridge.wire.codec  # noqa: F401
+
+    return not missing_in("hardware_bridge.wire._codec_kernels")
+
+
+OTHER_PARTS = {
+    part.name: part
+    for part in (
+        Part(name="env", is_kept=_has_world, compile=_compile_world),
+        Part(name="tasks", is_kept=_has_tasks, compile=_compile_tasks, needs_others=True),
+        Part(name="hardware", is_kept=_has_hardware, compile=_compile_hardware, needs_others=True),
+    )
+}
+PURPOSES: dict[str, tuple[str, ...]] = {
+    "track": (),
+    "env": ("env", "tasks"),
+    "hardware": ("env", "hardware"),
+    "all": ("env", "tasks", "hardware"),
+}
+"""What is needed beside trackers, by what it is for."""
