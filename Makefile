@@ -4,7 +4,11 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
-.PHONY: demo demo-hardware test check lowest format clean
+# What `make wheel` compiles for and what: levels of x86-64, or `generic` elsewhere.
+LEVELS ?= $(if $(filter x86_64 amd64,$(shell uname -m)),x86-64-v2 x86-64-v3 x86-64-v4,generic)
+WARM   ?= --for all
+
+.PHONY: demo demo-hardware test check lowest format wheel clean
 
 demo: $(VENV)/.core
 	$(BIN)/relpos demo --out demo
@@ -33,6 +37,18 @@ lowest: .venv-lowest/.installed
 	.venv-lowest/bin/python -m pip --disable-pip-version-check --quiet install $$($(PYTHON) tests/lowest_versions.py)
 	@touch $@
 
+# A wheel with compiled kernels for common processors; two minutes on two cores for each of them.
+wheel: $(VENV)/.dev
+	@rm -rf build/kernels
+	@for level in $(LEVELS); do \
+	  echo "compiling for $$level ..."; mkdir -p build/kernels/$$level; \
+	  tar c --exclude=__pycache__ --exclude=__compiled__ tracking relpos_env agents hardware_bridge \
+	    | tar x -C build/kernels/$$level; \
+	  (cd build/kernels/$$level && env -u NUMBA_CACHE_DIR NUMBA_CPU_NAME=$$level NUMBA_CPU_FEATURES= \
+	    PYTHONPATH=. $(abspath $(BIN))/python -m agents.cli warmup $(WARM)) || exit 1; \
+	done
+	RELPOS_KERNELS=build/kernels $(PIP) wheel --no-deps --no-build-isolation --wheel-dir dist .
+
 format: $(VENV)/.dev
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
@@ -58,5 +74,5 @@ $(VENV)/.hardware: pyproject.toml constraints.txt | $(BIN)/python
 	@touch $@ $(VENV)/.core
 
 clean:
-	rm -rf $(VENV) .venv-lowest demo demo-hardware .mypy_cache .ruff_cache .pytest_cache .import_linter_cache
+	rm -rf build dist $(VENV) .venv-lowest demo demo-hardware .mypy_cache .ruff_cache .pytest_cache .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

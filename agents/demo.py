@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from relpos_env import formation_v0
 from relpos_env.parallel_env import FormationEnv
 from relpos_env.timing import DECISION
 from tracking.filters import DEFAULT_FILTER, FILTERS, filter_builder
+from tracking.log.folder import Log
 from tracking.short_repr import short_repr
 
 TOLD = ("estimate", "truth", "nothing")
@@ -58,9 +59,17 @@ class DemoResult:
     collisions: int
     """[-] Contacts that cars began, with each other, obstacles and walls."""
     tracks: tuple[TrackResult, ...]
-    """The same drive tracked by every filter."""
+    """The same drive tracked by some filters."""
     frames: dict[str, Any]
     """What the animation shows."""
+    log: Log
+    """Measurements and truth of the drive on estimates."""
+    film: tuple[Any, ...]
+    """Pictures of it, (height, width, 3), if they were asked for."""
+
+    def tracked_by(self, filters: Sequence[str]) -> DemoResult:
+        """With the drive tracked by other filters."""
+        return replace(self, tracks=tuple(track_log(self.log, filter=name) for name in filters))
 
     @property
     def summary(self) -> list[dict[str, Any]]:
@@ -96,7 +105,10 @@ def demo(
     controller: str | None = None,
     policy: str | Path | None = None,
     filter: str = DEFAULT_FILTER,
+    filters: Sequence[str] = tuple(FILTERS),
+    render: str | None = None,
     progress: Callable[[float], None] | None = None,
+    watch: Callable[[dict[str, Any], str], None] | None = None,
 ) -> DemoResult:
     """Drive a formation on estimates and, for comparison, on the truth and on nothing.
 
@@ -113,7 +125,11 @@ def demo(
         policy: A trained policy in its place, as for `load_policy`; the cars observe what it
             was trained on.
         filter: The cars' tracker, one of `tracking.filters.FILTERS`.
+        filters: Those that track the drive afterwards, for comparison.
+        render: ``human`` shows the drive on estimates in a window, ``rgb_array`` keeps pictures of
+            it; needs pygame.
         progress: Called with the share done, 0 to 1.
+        watch: Called after every decision with the frames so far and what the cars are told.
 
     Raises:
         ConfigError: No such filter.
@@ -145,6 +161,10 @@ def demo(
             if progress is not None:
                 progress((n + share) / len(modes))
 
+        def show(frames: dict[str, Any], told: str = told) -> None:
+            if watch is not None:
+                watch(frames, told)
+
         env = formation_v0.parallel_env(
             scenario=scenario,
             task=task,
@@ -155,13 +175,21 @@ def demo(
             max_cycles=round(seconds / DECISION),
             record=told == "estimate",
             filter=filter,
+            render_mode=render if told == "estimate" else None,
         )
         driver: Driver
         if trained is None:
             driver = controller_builder(controller)(env.fields)
         else:
             driver = trained.driver(Layout(mode, len(env.possible_agents), history, proximity or 0))
-        drives[told] = drive(env, driver, seed, blind=told == "nothing", progress=tell)
+        drives[told] = drive(
+            env,
+            driver,
+            seed,
+            blind=told == "nothing",
+            progress=tell,
+            watch=show,
+        )
         if told == "estimate":
             name = env.scenario.name
             log = env.recorded_log(f"{name}-{seed}")
@@ -180,8 +208,10 @@ def demo(
         formation_error_blind=drives["nothing"].formation_error,
         nlos_share=float(log.nlos.mean()) if len(log.nlos) else 0.0,
         collisions=ours.collisions,
-        tracks=tuple(track_log(log, filter=name) for name in FILTERS),
+        tracks=tuple(track_log(log, filter=name) for name in filters),
         frames=ours.frames,
+        log=log,
+        film=tuple(ours.film),
     )
 
 
@@ -213,6 +243,7 @@ class Drive:
     """[m] Mean from `SETTLE` on, or that of the end if it came before."""
     collisions: int
     frames: dict[str, Any]
+    film: list[Any]
 
 
 def drive(
@@ -222,6 +253,7 @@ def drive(
     *,
     blind: bool,
     progress: Callable[[float], None],
+    watch: Callable[[dict[str, Any]], None] | None = None,
 ) -> Drive:
     """Drive one episode.
 
@@ -231,11 +263,13 @@ def drive(
         seed: Of the episode.
         blind: Whether the observations are changed so that no other car is known.
         progress: Called with the share done, 0 to 1.
+        watch: Called after every decision with the frames so far.
     """
     observations, _ = env.reset(seed=seed)
     formation, blindfold = env.formation, Blindfold(Layout.of(env.formation.parts))
     recorder = FrameRecorder(formation)
     formed: list[float] = []
+    film: list[Any] = []
     collisions = 0.0
     while env.agents:
         if blind:
@@ -244,6 +278,10 @@ def drive(
         formed.append(errors(formation)[1])
         collisions += formation.loop.swarm.contacts[0].sum()
         recorder.add()
+        if env.render_mode == "rgb_array":
+            film.append(env.render())
+        if watch is not None:
+            watch(recorder.frames)
         progress(len(formed) / formation.parts.config.max_cycles)
     settled = formed[round(SETTLE / DECISION) :] or formed[-1:]
     return Drive(
@@ -252,4 +290,5 @@ def drive(
         formation_error=float(np.mean(settled)),
         collisions=int(collisions),
         frames=recorder.frames,
+        film=film,
     )

@@ -26,7 +26,7 @@ from tracking.filters.params import FilterParams
 from tracking.horizon import HorizonParams
 from tracking.jit import Call
 from tracking.measurements import MeasurementBlock
-from tracking.sanity.blocks import check, usable
+from tracking.sanity.blocks import check, usable, usable_call
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -118,11 +118,13 @@ class Tracker:
     def calls(self) -> list[list[Call]]:
         """All kernels that it runs, with arguments of their types, to compile them ahead.
 
-        In groups that share little code: those of the filter (`Filter.calls`), then orientations.
+        In groups that share little code: those of the filter (`Filter.calls`), then what trackers
+        with all filters need.
         """
         block = MeasurementBlock.empty(self.n_envs)
         estimate = TeamEstimate.empty(self.constellation, np.zeros((self.n_envs, 1)))
-        return [*self._filter.calls(block, estimate), [self._orientation.call(block)]]
+        common = [self._orientation.call(block), usable_call(block)]
+        return [*self._filter.calls(block, estimate), common]
 
     def smooth(self, later: MeasurementBlock, t: F64 | float) -> TeamEstimate:
         """Report at one time with the help of later measurements, and stay where it is.

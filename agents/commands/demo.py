@@ -45,18 +45,30 @@ from agents.errors import UsageError
     show_default=True,
     help="The cars' tracker: joint, ekf-mds, ekf, paper-ekf-mds or paper-ekf.",
 )
+@click.option("--window", is_flag=True, help="Show the drive in a window; needs pygame.")
+@click.option("--gif", is_flag=True, help="Also write drive.gif; needs pygame.")
 @click.option("--out", type=Path, default=Path("demo"), show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
 def demo(
-    seconds: float, seed: int, cars: int | None, out: Path, as_json: bool, **names: Any
+    seconds: float,
+    seed: int,
+    cars: int | None,
+    window: bool,
+    gif: bool,
+    out: Path,
+    as_json: bool,
+    **names: Any,
 ) -> None:
     """Cars keep a formation on estimated relative positions; writes report.html."""
-    from agents.demo import SETTLE
+    from agents.demo import SETTLE, TASK, DemoResult
     from agents.demo import demo as run
+    from agents.live_room import LiveRoom
     from agents.output import check_folder, write_results
     from agents.report.demo_report import demo_report
+    from agents.report.gif import gif_of
     from agents.report.page import metres
-    from agents.warm_up import warm_up_first
+    from agents.warm_up import BackgroundWarmUp, warm_up_first
+    from relpos_env.timing import DECISION
     from tracking.filters import FILTERS
 
     if not 15.0 <= seconds <= 3600.0:
@@ -69,10 +81,37 @@ def demo(
         raise UsageError(f"--proximity: expected 0 to 32, got {names['proximity']}")
     if names["policy"] is not None and names["controller"] is not None:
         raise UsageError("--policy: expected either a policy or a --controller, got both")
-    check_folder(out, ["report.html"])
-    warm_up_first([names["filter"], *FILTERS])
-    with progress_bar(f"{names['task'] or names['policy'] or 'ring'}, seed {seed}") as report:
-        result = run(seconds=seconds, seed=seed, cars=cars, progress=report, **names)
+    if window and gif:
+        raise UsageError("--gif: expected without --window, which shows what would be written")
+    check_folder(out, ["report.html", "drive.gif"] if gif else ["report.html"])
+    ours = names["filter"]
+    warm_up_first([ours], purpose="env", leave_out=("tasks",) if names["task"] == TASK else ())
+    with BackgroundWarmUp(FILTERS) as others, LiveRoom() as room:
+        titles = {"estimate": "on estimates", "truth": "on the truth", "nothing": "on nothing"}
+
+        def watch(frames: dict[str, Any], told: str) -> None:
+            room.show(frames, f"cars drive {titles[told]}")
+
+        with progress_bar("drives", shown=not room.shown) as tell:
+            result: DemoResult = run(
+                seconds=seconds,
+                seed=seed,
+                cars=cars,
+                filters=[ours],
+                render="human" if window else "rgb_array" if gif else None,
+                progress=tell,
+                watch=watch,
+                **names,
+            )
+        files: dict[str, str | bytes] = {"report.html": demo_report(result, others.missing)}
+        if gif:
+            files["drive.gif"] = gif_of(result.film[::2], interval=2.0 * DECISION)
+        write_results(out, files)
+        if others.missing:
+            click.echo(f"open {out / 'report.html'}; its last table follows", err=True)
+        room.replay(result.frames, "compiling other filters for the last table", others.is_done)
+        others.wait()
+    result = result.tracked_by(tuple(dict.fromkeys([*FILTERS, ours])))
     write_results(out, {"report.html": demo_report(result)})
     if as_json:
         emit_json(result.summary)

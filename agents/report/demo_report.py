@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,13 +10,19 @@ import numpy as np
 from agents.demo import SETTLE, DemoResult
 from agents.report.animation import animation_markup
 from agents.report.page import Page, metres
+from tracking.filters import DESCRIPTIONS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def demo_report(result: DemoResult) -> str:
-    """One page."""
+def demo_report(result: DemoResult, missing: Sequence[str] = ()) -> str:
+    """One page.
+
+    Args:
+        result: What is shown.
+        missing: Filters that will be in it later.
+    """
     page = Page(
         "Three cars, one formation, no anchors"
         if len(result.frames["pos"][0]) == 3
@@ -26,12 +33,6 @@ def demo_report(result: DemoResult) -> str:
         "each other only through simulated UWB ranges, inertial sensors and the tracker.",
     )
     page.raw(animation_markup(result.frames))
-    page.heading("Tracking error by filter")
-    rows = [
-        [r.filter, *(metres(r.summary[k]) for k in ("rmse", "rmse_yaw", "rmse_shape"))]
-        for r in result.tracks
-    ]
-    page.table(["filter", "rmse [m]", "rmse_yaw [m]", "rmse_shape [m]"], rows)
     page.heading("Formation error")
     page.table(
         ["the cars are told", f"mean after {SETTLE:.0f} s [m]"],
@@ -46,6 +47,18 @@ def demo_report(result: DemoResult) -> str:
         f"cars touched something {result.collisions} times."
     )
     page.figure(_over_time(result), "Errors over time, the tracker in the loop.")
+    page.heading("The same drive, tracked by other filters")
+    rows = [
+        [
+            r.filter,
+            DESCRIPTIONS.get(r.filter, ""),
+            *(metres(r.summary[k]) for k in ("rmse", "rmse_yaw", "rmse_shape")),
+        ]
+        for r in result.tracks
+    ]
+    page.table(["filter", "which is", "rmse [m]", "rmse_yaw [m]", "rmse_shape [m]"], rows)
+    if missing:
+        page.text(f"Others are being compiled, once; this table will have {', '.join(missing)}.")
     return page.render()
 
 

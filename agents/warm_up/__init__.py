@@ -1,6 +1,7 @@
 """Compiling ahead, in as many processes as there are cores: what `relpos warmup` does."""
 
+from agents.warm_up.background import BackgroundWarmUp
 from agents.warm_up.parts import PURPOSES, Part, parts_of
 from agents.warm_up.processes import WarmUp, warm_up, warm_up_first
 
-__all__ = ["PURPOSES", "Part", "WarmUp", "parts_of", "warm_up", "warm_up_first"]
+__all__ = ["PURPOSES", "BackgroundWarmUp", "Part", "WarmUp", "parts_of", "warm_up", "warm_up_first"]

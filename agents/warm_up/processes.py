@@ -49,7 +49,11 @@ class WarmUp:
 
 
 def warm_up(
-    parts: Iterable[Part], *, jobs: int | None = None, progress: Progress | None = None
+    parts: Iterable[Part],
+    *,
+    jobs: int | None = None,
+    progress: Progress | None = None,
+    is_stopped: Callable[[], bool] = lambda: False,
 ) -> WarmUp:
     """Compile parts, unless they are on the disk.
 
@@ -57,6 +61,7 @@ def warm_up(
         parts: Of `parts_of`; those of one name count once.
         jobs: Processes, by default as many as there are cores.
         progress: Called several times a second, if anything is compiled.
+        is_stopped: Asked several times a second whether to give up.
 
     Raises:
         UsageError: A process failed.
@@ -64,7 +69,7 @@ def warm_up(
     began, named = time.monotonic(), {part.name: part for part in parts}
     missing = _missing(named.values())
     if missing:
-        _run(missing, jobs or os.cpu_count() or 1, progress)
+        _run(missing, jobs or os.cpu_count() or 1, progress, is_stopped)
     return WarmUp(
         parts=tuple(named),
         compiled=tuple(part.name for part in missing),
@@ -73,18 +78,22 @@ def warm_up(
     )
 
 
-def warm_up_first(filters: Iterable[str], *, purpose: str = "track") -> None:
+def warm_up_first(
+    filters: Iterable[str], *, purpose: str = "track", leave_out: Sequence[str] = ()
+) -> None:
     """`warm_up` for a command: with a bar, or lines where there is no terminal, if it takes time.
 
     Args:
         filters: Those that do not come with the package are compiled when they run.
         purpose: One of `agents.warm_up.parts.PURPOSES`.
+        leave_out: Names of parts that are not needed.
     """
     names = tuple(name for name in dict.fromkeys(filters) if name in FILTERS)
     if not names:
         return
     with shown_progress() as tell:
-        warm_up(parts_of(purpose, names), progress=tell)
+        parts = [part for part in parts_of(purpose, names) if part.name not in leave_out]
+        warm_up(parts, progress=tell)
 
 
 @contextmanager
@@ -118,14 +127,19 @@ def _missing(parts: Iterable[Part]) -> list[Part]:
     return sorted(missing, key=lambda part: (part.needs_others, -part.seconds))
 
 
-def _run(missing: Sequence[Part], jobs: int, progress: Progress | None) -> None:
+def _run(
+    missing: Sequence[Part],
+    jobs: int,
+    progress: Progress | None,
+    is_stopped: Callable[[], bool],
+) -> None:
     """Compile parts in processes, one after the other."""
     began, waiting = time.monotonic(), list(missing)
     running: dict[str, subprocess.Popen[str]] = {}
     times = [part.seconds for part in missing]
     expected = max(sum(times) / min(jobs, len(missing)), *times)
     try:
-        while waiting or running:
+        while (waiting or running) and not is_stopped():
             while waiting and len(running) < jobs and not (waiting[0].needs_others and running):
                 part = waiting.pop(0)
                 running[part.name] = subprocess.Popen(
@@ -151,7 +165,7 @@ def _run(missing: Sequence[Part], jobs: int, progress: Progress | None) -> None:
     finally:
         for process in running.values():
             process.kill()
-            process.wait()
+            process.communicate()
 
 
 def _command(name: str) -> list[str]:

@@ -26,6 +26,15 @@ FILTERS: dict[str, FilterBuilder] = {
 }
 """Name to builder ``(constellation, params, n_envs) -> Filter``."""
 
+DESCRIPTIONS = {
+    "joint": "one filter over the whole group",
+    "ekf-mds": "a filter for each pair, corrected by MDS over the group",
+    "ekf": "a filter for each pair, alone",
+    "paper-ekf-mds": "Armani and Holz, as the text of their paper has it",
+    "paper-ekf": "the same without MDS",
+}
+"""What each of them is, in a few words."""
+
 DEFAULT_FILTER = "joint"
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from tracking.arrays import F64
 from tracking.constellation import Constellation
 from tracking.errors import ConfigError
+from tracking.jit import Call
 from tracking.measurements import Kind, MeasurementBlock
 from tracking.sanity.measurements import mark_usable
 
@@ -23,13 +24,19 @@ def usable(block: MeasurementBlock) -> MeasurementBlock:
     `FARTHEST`, and orientations that are no rotation. A range whose powers are not finite is one
     without powers. Quaternions that are nearly unit ones are normalised.
     """
-    valid, has_power = block.valid.copy(), block.has_power.copy()
-    odd = np.empty_like(valid)
-    if not mark_usable(block.t, block.kind, block.i, block.j, block.values, valid, has_power, odd):
+    kernel, given = usable_call(block)
+    if not kernel(*given):
         return block
+    *_, valid, has_power, odd = given
     values = block.values.copy()
     values[odd, :4] /= np.linalg.norm(values[odd, :4], axis=-1, keepdims=True)
     return replace(block, values=values, has_power=has_power, valid=valid)
+
+
+def usable_call(block: MeasurementBlock) -> Call:
+    """The kernel that looks at a block, with copies of its flags that it changes."""
+    flags = block.valid.copy(), block.has_power.copy(), np.empty_like(block.valid)
+    return mark_usable, (block.t, block.kind, block.i, block.j, block.values, *flags)
 
 
 def check(

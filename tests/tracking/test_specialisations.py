@@ -1,0 +1,73 @@
+"""Every kernel is compiled for one set of types, whatever is tracked and however it is called."""
+
+import numpy as np
+import pytest
+from numba import config
+
+from relpos_env import formation_v0
+from tracking import Constellation, NodeConfig, Tracker, compile_units
+from tracking.filters import FILTERS
+from tracking.measurements import Kind, MeasurementBlock
+
+pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
+OF_TWO_FILTERS = {"tracking.filters.first_ranges", "tracking.filters.best_hypothesis"}
+"""Modules whose kernels work on the records of both the joint filter and the pair filters."""
+WITH_AND_WITHOUT_SCALE = {"apply_downdate", "_apply_downdate"}
+
+
+@pytest.fixture
+def specialisations():
+    """Function that gives kernels with more than one set of types."""
+
+    def found():
+        return {
+            f"{module}.{name}"
+            for (module, name), unit in compile_units._kernels.items()
+            if len(unit.overloads) > (2 if module in OF_TWO_FILTERS else 1)
+            and module.startswith(("tracking.filters", "tracking.ahrs", "relpos_env"))
+            and not unit.targetoptions.get("forceinline")
+        }
+
+    return found
+
+
+def block(n_nodes, dimensions):
+    """Nodes that jitter about their places."""
+    rng = np.random.default_rng(0)
+    t = np.repeat(np.arange(0.0, 3.0, 0.02), n_nodes)
+    node = np.tile(np.arange(n_nodes), len(t) // n_nodes)
+    samples = rng.standard_normal((len(t), 6)) * 0.1 + [0.0, 0.0, 0.0, 0.0, 0.0, 9.81]
+    first, second = np.triu_indices(n_nodes, 1)
+    at = np.repeat(np.arange(0.01, 3.0, 0.05), len(first))
+    i, j = (np.tile(of, len(at) // len(first)) for of in (first, second))
+    place = rng.uniform(-3.0, 3.0, (n_nodes, dimensions))
+    distance = np.linalg.norm(place[j] - place[i], axis=1)[:, None]
+    imu = MeasurementBlock.of_kind(Kind.IMU, t, node, samples)
+    return MeasurementBlock.concatenate(
+        [imu, MeasurementBlock.of_kind(Kind.RANGE, at, i, distance, j=j)]
+    ).sorted()
+
+
+@pytest.mark.parametrize("filter_name", FILTERS)
+def test_groups_of_any_size_and_dimension_share_their_code(filter_name, specialisations):
+    for n_nodes, dimensions, vehicle in ((3, 2, "car"), (5, 3, "drone"), (4, 3, "human")):
+        nodes = tuple(NodeConfig(id=k, vehicle=vehicle) for k in range(n_nodes))
+        tracker = Tracker(Constellation(nodes=nodes, dimensions=dimensions), filter=filter_name)
+        tracker.run(block(n_nodes, dimensions), np.arange(0.5, 3.0, 0.5))
+        tracker.step(MeasurementBlock.empty(1), 3.5)
+    assert specialisations() == set()
+
+
+def test_environments_of_any_number_share_it_too(specialisations):
+    from relpos_env.vector_env import FormationVectorEnv
+
+    for env in (FormationVectorEnv(1), FormationVectorEnv(3)):
+        env.reset(seed=0)
+        for _ in range(20):
+            env.step(env.action_space.sample())
+        env.close()
+    single = formation_v0.parallel_env(scenario="swarm-nlos")
+    single.reset(seed=1)
+    for _ in range(50):
+        single.step({agent: single.action_space(agent).sample() for agent in single.agents})
+    assert specialisations() == set()
