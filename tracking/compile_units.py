@@ -142,7 +142,9 @@ class _UnitCompiler(Compiler):  # type: ignore[misc]
 
     def __init__(self, typing: Any, target: Any, library: Any, args: Any, result: Any,
                  flags: Any, names: Any) -> None:  # fmt: skip
-        super().__init__(typing, target, library, args, result, _Flags(flags), names)
+        flags = _Flags(flags)
+        flags.no_cfunc_wrapper = True  # nothing takes kernels as functions of C
+        super().__init__(typing, target, library, args, result, flags, names)
 
     n_compiled = 0
     """In this process."""

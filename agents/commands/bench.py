@@ -111,6 +111,18 @@ def bench_train(updates: int, threads: int, after: int, as_json: bool) -> None:
     _show_bench("Frames per second of training", rows, as_json)
 
 
+@bench.command("cold")
+@click.option("--install", is_flag=True, help="Also install into a new environment, with pip.")
+@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+def bench_cold(install: bool, as_json: bool) -> None:
+    """Seconds that everything takes the first time, beside the second; some minutes."""
+    from agents.bench.cold import bench_cold as run
+
+    with progress_bar("first time") as report:
+        rows = run(install=install, progress=report)
+    _show_bench("The first time", rows, as_json)
+
+
 @bench.command("env")
 @click.option("--quick", is_flag=True, help="Fewer and shorter figures.")
 @click.option("--out", type=Path, help="Folder for a picture of the curves and the parts.")
