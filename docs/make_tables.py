@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import json
 import re
 import sys
 from collections.abc import Callable, Iterable
@@ -46,6 +47,8 @@ from tracking.filters.joint.supervision.faults import Fault
 DOCS = Path(__file__).resolve().parent
 CARS = 3
 """So many cars have the observations whose indices are shown."""
+RESULTS = DOCS / "tracker-results.jsonl"
+"""Figures of the filters, of `measure_results.py`."""
 BLOCK = re.compile(r"(<!-- table: ([\w-]+) -->\n).*?(<!-- end of table -->)", re.DOTALL)
 
 
@@ -263,6 +266,49 @@ def faults() -> str:
     return markdown(("fault", "what it is", "action"), rows)
 
 
+def results(is_recording: bool) -> list[dict[str, Any]]:
+    """Lines of the recordings, or those of the simulated rooms."""
+    lines = [json.loads(line) for line in RESULTS.read_text().splitlines()]
+    return [line for line in lines if ("from" in line) == is_recording]
+
+
+def room_results() -> str:
+    """Errors of all filters in the rooms of the paper."""
+    head = ("room", "filter", "the paper's number (hardware)", "rmse", "rmse_yaw", "rmse_shape",
+            "bound yaw / shape", "ratio yaw / shape", "lost", "`ok`", "`ok` and wrong",
+            "NEES")  # fmt: skip
+    rows, before = [], ""
+    for r in results(is_recording=False):
+        bold = "**" if r["filter"] == "joint" else ""
+        bounds = r["bound_yaw"], r["bound_shape"]
+        ratios = (r[f"rmse_{name}"] / r[f"bound_{name}"] for name in ("yaw", "shape"))
+        rows.append([
+            r["case"] if r["case"] != before else "",
+            f"{bold}{r['filter']}{bold}",
+            "-" if r["paper"] is None else f"{r['paper']:.3f}",
+            f"{r['rmse']:.3f}", f"{r['rmse_yaw']:.3f}", f"{bold}{r['rmse_shape']:.3f}{bold}",
+            " / ".join(f"{x:.3f}" for x in bounds), " / ".join(f"{x:.2f}" for x in ratios),
+            f"{r['lost_runs']}/{r['seeds']}", f"{100.0 * r['ok_share']:.0f} %",
+            f"{100.0 * r['integrity_share']:.2f} %", f"{r['nees']:.1f}",
+        ])  # fmt: skip
+        before = r["case"]
+    return markdown(head, rows, right=", ".join(head[2:]))
+
+
+def recording_results() -> str:
+    """Errors on recordings, beside those expected of an efficient estimator."""
+    found: dict[tuple[str, float], dict[str, str]] = {}
+    for r in results(is_recording=True):
+        errors = f"{r['rmse']:.2f} / {r['rmse_yaw']:.3f} / {r['rmse_shape']:.3f}"
+        found.setdefault((r["case"], r["from"]), {})[r["filter"]] = errors
+    names = ("joint", "efficient", "ekf-mds", "ekf")
+    rows = [
+        [f"{case}, from {first:g} s on", *(of[name] for name in names)]
+        for (case, first), of in found.items()
+    ]
+    return markdown(("recording", *names), rows)
+
+
 def parameters(params: Any, names: tuple[str, ...]) -> str:
     """Parameters of a stage, those of its parts among them."""
     rows = []
@@ -281,6 +327,8 @@ def parameters(params: Any, names: tuple[str, ...]) -> str:
 TABLES: dict[str, Callable[[], str]] = {
     "alignment": alignment,
     "faults": faults,
+    "room-results": room_results,
+    "recording-results": recording_results,
     "filter-parameters": partial(
         parameters,
         JointParams(),
@@ -319,7 +367,7 @@ def rewrite(text: str) -> str:
 def main(check: bool) -> list[str]:
     """Rewrite all pages, or only say which differ; returns their names."""
     differ = []
-    for page in sorted(DOCS.glob("*.md")):
+    for page in (*sorted(DOCS.glob("*.md")), DOCS.parent / "README.md"):
         old = page.read_text()
         new = rewrite(old)
         if new != old:
