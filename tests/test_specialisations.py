@@ -5,14 +5,14 @@ import pytest
 from numba import config
 
 from relpos_env import formation_v0
-from tracking import Constellation, NodeConfig, Tracker, compile_units
+from tracking import Constellation, NodeConfig, Tracker
+from tracking.compile_units import units_of
 from tracking.filters import FILTERS
 from tracking.measurements import Kind, MeasurementBlock
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
 OF_TWO_FILTERS = {"tracking.filters.first_ranges", "tracking.filters.best_hypothesis"}
 """Modules whose kernels work on the records of both the joint filter and the pair filters."""
-WITH_AND_WITHOUT_SCALE = {"apply_downdate", "_apply_downdate"}
 
 
 @pytest.fixture
@@ -21,11 +21,10 @@ def specialisations():
 
     def found():
         return {
-            f"{module}.{name}"
-            for (module, name), unit in compile_units._kernels.items()
-            if len(unit.overloads) > (2 if module in OF_TWO_FILTERS else 1)
-            and module.startswith(("tracking.filters", "tracking.ahrs", "relpos_env"))
-            and not unit.targetoptions.get("forceinline")
+            f"{unit.py_func.__module__}.{unit.py_func.__name__}"
+            for package in ("tracking.filters", "tracking.ahrs", "relpos_env")
+            for unit in units_of(package)
+            if len(unit.overloads) > (2 if unit.py_func.__module__ in OF_TWO_FILTERS else 1)
         }
 
     return found
