@@ -2,7 +2,8 @@
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
-PIP    := $(BIN)/python -m pip --disable-pip-version-check --quiet
+# On a terminal pip shows what it does; in a log it is quiet.
+PIP    := $(BIN)/python -m pip --disable-pip-version-check $(if $(MAKE_TERMOUT),,--quiet)
 
 # What `make wheel` compiles for and what: levels of x86-64, or `generic` elsewhere.
 LEVELS ?= $(if $(filter x86_64 amd64,$(shell uname -m)),x86-64-v2 x86-64-v3 x86-64-v4,generic)
