@@ -117,7 +117,9 @@ def test_a_wheel_in_an_empty_environment_compiles_nothing(tmp_path):
     shutil.copytree(ROOT, tmp_path / "source", ignore=shutil.ignore_patterns(*left_out))
     packages = sysconfig.get_path("purelib")
     (tmp_path / "source" / ".venv").symlink_to(Path(sys.prefix), target_is_directory=True)
-    env = {k: v for k, v in os.environ.items() if not k.startswith(("NUMBA", "PYTEST"))}
+    env = {
+        k: v for k, v in os.environ.items() if not k.startswith(("NUMBA", "PYTEST", "PYTHONPATH"))
+    }
     given = {"capture_output": True, "text": True, "check": False, "env": env}
     wanted = [f"LEVELS={fitting_levels()[0]}", "WARM=--filter paper-ekf"]
     # The environment is there already: nothing is to be installed.

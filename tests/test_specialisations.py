@@ -1,33 +1,26 @@
-"""Every kernel is compiled for one set of types, whatever is tracked and however it is called."""
+"""Every kernel is compiled for one set of types, whatever is tracked and however it is called.
+
+Seen in a process of its own: other tests call kernels with arrays of their own.
+"""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 from numba import config
 
 from relpos_env import formation_v0
+from relpos_env.vector_env import FormationVectorEnv
 from tracking import Constellation, NodeConfig, Tracker
 from tracking.compile_units import units_of
 from tracking.filters import FILTERS
 from tracking.measurements import Kind, MeasurementBlock
 
-pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
 OF_TWO_FILTERS = {"tracking.filters.first_ranges", "tracking.filters.best_hypothesis"}
 """Modules whose kernels work on the records of both the joint filter and the pair filters."""
-
-
-@pytest.fixture
-def specialisations():
-    """Function that gives kernels with more than one set of types."""
-
-    def found():
-        return {
-            f"{unit.py_func.__module__}.{unit.py_func.__name__}"
-            for package in ("tracking.filters", "tracking.ahrs", "relpos_env")
-            for unit in units_of(package)
-            if len(unit.overloads) > (2 if unit.py_func.__module__ in OF_TWO_FILTERS else 1)
-        }
-
-    return found
 
 
 def block(n_nodes, dimensions):
@@ -47,19 +40,17 @@ def block(n_nodes, dimensions):
     ).sorted()
 
 
-@pytest.mark.parametrize("filter_name", FILTERS)
-def test_groups_of_any_size_and_dimension_share_their_code(filter_name, specialisations):
+def track(filter_name):
+    """Groups of several sizes and dimensions."""
     for n_nodes, dimensions, vehicle in ((3, 2, "car"), (5, 3, "drone"), (4, 3, "human")):
         nodes = tuple(NodeConfig(id=k, vehicle=vehicle) for k in range(n_nodes))
         tracker = Tracker(Constellation(nodes=nodes, dimensions=dimensions), filter=filter_name)
         tracker.run(block(n_nodes, dimensions), np.arange(0.5, 3.0, 0.5))
         tracker.step(MeasurementBlock.empty(1), 3.5)
-    assert specialisations() == set()
 
 
-def test_environments_of_any_number_share_it_too(specialisations):
-    from relpos_env.vector_env import FormationVectorEnv
-
+def drive():
+    """Environments of several numbers, and cars that come and go."""
     for env in (FormationVectorEnv(1), FormationVectorEnv(3)):
         env.reset(seed=0)
         for _ in range(20):
@@ -69,4 +60,33 @@ def test_environments_of_any_number_share_it_too(specialisations):
     single.reset(seed=1)
     for _ in range(50):
         single.step({agent: single.action_space(agent).sample() for agent in single.agents})
-    assert specialisations() == set()
+
+
+def several():
+    """Kernels that this process has for more than one set of types."""
+    return sorted(
+        f"{unit.py_func.__module__}.{unit.py_func.__name__}"
+        for package in ("tracking.filters", "tracking.ahrs", "relpos_env")
+        for unit in units_of(package)
+        if len(unit.overloads) > (2 if unit.py_func.__module__ in OF_TWO_FILTERS else 1)
+    )
+
+
+@pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
+@pytest.mark.parametrize("what", [*FILTERS, "environments"])
+def test_kernels_have_one_set_of_types(what):
+    root = str(Path(__file__).resolve().parent.parent)
+    done = subprocess.run(
+        [sys.executable, __file__, what],
+        env={**os.environ, "PYTHONPATH": root},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == []
+
+
+if __name__ == "__main__":
+    drive() if sys.argv[1] == "environments" else track(sys.argv[1])
+    print("\n".join(several()))
