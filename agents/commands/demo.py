@@ -85,7 +85,9 @@ def demo(
         raise UsageError("--gif: expected without --window, which shows what would be written")
     check_folder(out, ["report.html", "drive.gif"] if gif else ["report.html"])
     ours = names["filter"]
-    warm_up_first([ours], purpose="env", leave_out=("tasks",) if names["task"] == TASK else ())
+    warm_up_first(
+        [ours], purpose="env", leave_out=("tasks",) if names["task"] in (None, TASK) else ()
+    )
     with BackgroundWarmUp(FILTERS) as others, LiveRoom() as room:
         titles = {"estimate": "on estimates", "truth": "on the truth", "nothing": "on nothing"}
 
