@@ -64,8 +64,6 @@ class DemoResult:
     """What the animation shows."""
     log: Log
     """Measurements and truth of the drive on estimates."""
-    film: tuple[Any, ...]
-    """Pictures of it, (height, width, 3), if they were asked for."""
 
     def tracked_by(self, filters: Sequence[str]) -> DemoResult:
         """With the drive tracked by other filters."""
@@ -106,7 +104,8 @@ def demo(
     policy: str | Path | None = None,
     filter: str = DEFAULT_FILTER,
     filters: Sequence[str] = tuple(FILTERS),
-    render: str | None = None,
+    window: bool = False,
+    film: Callable[[Any], None] | None = None,
     progress: Callable[[float], None] | None = None,
     watch: Callable[[dict[str, Any], str], None] | None = None,
 ) -> DemoResult:
@@ -126,8 +125,9 @@ def demo(
             was trained on.
         filter: The cars' tracker, one of `tracking.filters.FILTERS`.
         filters: Those that track the drive afterwards, for comparison.
-        render: ``human`` shows the drive on estimates in a window, ``rgb_array`` keeps pictures of
-            it; needs pygame.
+        window: Show the drive on estimates in a window; needs pygame.
+        film: Called with a picture of it after every decision, uint8 (height, width, 3), where
+            there is no window; needs pygame.
         progress: Called with the share done, 0 to 1.
         watch: Called after every decision with the frames so far and what the cars are told.
 
@@ -147,6 +147,7 @@ def demo(
         scenario = trained_scenario
     filter_builder(filter)
     drives: dict[str, Drive] = {}
+    render = "human" if window else None if film is None else "rgb_array"
     modes, history = _modes(trained), 1 if trained is None else trained.layout.history
     if trained is not None:
         if proximity not in (None, trained.layout.proximity):
@@ -189,6 +190,7 @@ def demo(
             blind=told == "nothing",
             progress=tell,
             watch=show,
+            film=film,
         )
         if told == "estimate":
             name = env.scenario.name
@@ -211,7 +213,6 @@ def demo(
         tracks=tuple(track_log(log, filter=name) for name in filters),
         frames=ours.frames,
         log=log,
-        film=tuple(ours.film),
     )
 
 
@@ -243,7 +244,6 @@ class Drive:
     """[m] Mean from `SETTLE` on, or that of the end if it came before."""
     collisions: int
     frames: dict[str, Any]
-    film: list[Any]
 
 
 def drive(
@@ -254,6 +254,7 @@ def drive(
     blind: bool,
     progress: Callable[[float], None],
     watch: Callable[[dict[str, Any]], None] | None = None,
+    film: Callable[[Any], None] | None = None,
 ) -> Drive:
     """Drive one episode.
 
@@ -264,12 +265,12 @@ def drive(
         blind: Whether the observations are changed so that no other car is known.
         progress: Called with the share done, 0 to 1.
         watch: Called after every decision with the frames so far.
+        film: Called with pictures of an environment that makes them.
     """
     observations, _ = env.reset(seed=seed)
     formation, blindfold = env.formation, Blindfold(Layout.of(env.formation.parts))
     recorder = FrameRecorder(formation)
     formed: list[float] = []
-    film: list[Any] = []
     collisions = 0.0
     while env.agents:
         if blind:
@@ -278,8 +279,8 @@ def drive(
         formed.append(errors(formation)[1])
         collisions += formation.loop.swarm.contacts[0].sum()
         recorder.add()
-        if env.render_mode == "rgb_array":
-            film.append(env.render())
+        if film is not None and env.render_mode == "rgb_array":
+            film(env.render())
         if watch is not None:
             watch(recorder.frames)
         progress(len(formed) / formation.parts.config.max_cycles)
@@ -290,5 +291,4 @@ def drive(
         formation_error=float(np.mean(settled)),
         collisions=int(collisions),
         frames=recorder.frames,
-        film=film,
     )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
@@ -37,8 +36,8 @@ def draw_room(
     Args:
         frames: Of `agents.frames.FrameRecorder`.
         k: Which of them.
-        width: At most so many characters in a line.
-        height: At most so many lines.
+        width: Maximum number of characters in a line.
+        height: Maximum number of lines.
         plain: ASCII alone.
     """
     across, deep = frames["room"]
@@ -84,7 +83,7 @@ def draw_room(
 
 
 def _boxes(frames: dict[str, Any], k: int) -> Any:
-    """Corners of the obstacles, which are told only when they change."""
+    """Corners of the obstacles; frames have them only where they change."""
     while k > 0 and frames["boxes"][k] is None:
         k -= 1
     return frames["boxes"][k] or ()
@@ -113,12 +112,7 @@ class LiveRoom:
             self._live.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         if self.shown:
             self._live.stop()
 

@@ -296,7 +296,7 @@ def room_results() -> str:
 
 
 def recording_results() -> str:
-    """Errors on recordings, beside those expected of an efficient estimator."""
+    """Errors on recordings, and those expected of an efficient estimator."""
     found: dict[tuple[str, float], dict[str, str]] = {}
     for r in results(is_recording=True):
         errors = f"{r['rmse']:.2f} / {r['rmse_yaw']:.3f} / {r['rmse_shape']:.3f}"

@@ -52,7 +52,7 @@ def folder(tmp_path):
 
 
 def ship(folder, level):
-    """Keep what is compiled for a level beside the module, and nothing else."""
+    """Keep what is compiled for a level next to the module, and nothing else."""
     run(folder, "shipped.outer(1.0)", NUMBA_CPU_NAME=level, NUMBA_CPU_FEATURES="")
     target = folder / "__compiled__" / level
     target.mkdir(parents=True, exist_ok=True)

@@ -36,9 +36,9 @@ from tracking.processors import fitting_levels
 _FORMAT = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
 """How code is compiled and kept is a part of what it was compiled from."""
 SHIPPED = "__compiled__"
-"""Folder beside modules with code that was compiled ahead, for several kinds of processors."""
+"""Folder next to modules with code that was compiled ahead, for several kinds of processors."""
 MANY = 5
-"""So many kernels that are compiled take seconds."""
+"""Number of kernels whose compilation takes seconds."""
 _log = logging.getLogger("tracking.jit")
 _kernels: dict[tuple[str, str], Any] = {}
 """Dispatchers by module and name, for units that are called by cached code."""
@@ -233,7 +233,7 @@ class _CacheFile(IndexDataCacheFile):  # type: ignore[misc]
     number what another has saved for other types, or what is left from before a change.
 
     What is not found is looked for in what the package brought along, in the folder `SHIPPED`
-    beside the kernel's module, in a folder for each kind of processor.
+    next to the kernel's module, in a folder for each kind of processor.
     """
 
     def __init__(self, compiled: Any, impl: Any) -> None:

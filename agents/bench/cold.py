@@ -1,13 +1,14 @@
 """How long everything takes the first time: installing, importing, compiling, running.
 
-Each figure stands beside that of the second time, in the same environment. Nothing of this machine
-is used but what pip keeps of packages: environment, byte code, and compiled kernels are new.
+The second time, in the same environment, is the peer. Nothing of this machine is used but what pip
+keeps of packages: environment, byte code and compiled kernels are new.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import shlex
 import subprocess
 import sys
 import tempfile
@@ -20,6 +21,16 @@ from agents.errors import UsageError
 
 SOURCE = Path(__file__).resolve().parents[2]
 """What is installed where it is a source tree."""
+COMMANDS = {
+    "import relpos_env": "-c 'import relpos_env'",
+    "relpos --help": "-m agents.cli --help",
+    "compile for track": "-m agents.cli warmup --json",
+    "compile for env": "-m agents.cli warmup --for env",
+    "simulate a log": "-m agents.cli simulate log{n} --seconds 30",
+    "relpos track LOG, compiled": "-m agents.cli track log1",
+    "relpos demo, compiled for env": "-m agents.cli demo --out demo",
+}
+"""Commands of Python by what they are."""
 Tell = Callable[[float], None]
 
 
@@ -35,31 +46,18 @@ def bench_cold(*, install: bool = False, progress: Tell | None = None) -> list[d
         UsageError: There is nothing to install from, or a step failed; the message has its words.
     """
     with tempfile.TemporaryDirectory(prefix="relpos-cold-") as folder:
-        cold = _Cold(Path(folder))
-        steps: list[tuple[str, Callable[[], tuple[float, float]]]] = []
+        cold, rows = _Cold(Path(folder)), list[dict[str, Any]]()
         if install:
-            steps.append(("install", cold.install))
-        for case, *command in (
-            ("import relpos_env", "-c", "import relpos_env"),
-            ("relpos --help", "-m", "agents.cli", "--help"),
-        ):
-            steps.append((case, lambda given=tuple(command): cold.twice(*given)))  # type: ignore[misc]
-        for case, *command in (
-            ("compile for track", "warmup"),
-            ("compile for env", "warmup", "--for", "env"),
-            ("simulate a log", "simulate", str(Path(folder) / "{n}"), "--seconds", "30"),
-            ("relpos track LOG, compiled", "track", str(Path(folder) / "1")),
-            ("relpos demo, compiled for env", "demo", "--out", str(Path(folder) / "demo")),
-        ):
-            given = ("-m", "agents.cli", *command)
-            steps.append((case, lambda given=given: cold.twice(*given)))  # type: ignore[misc]
-        rows = []
-        for k, (case, measure) in enumerate(steps):
-            first, second = measure()
+            rows.append(_row("install", "s", *cold.install()))
+        for k, (case, command) in enumerate(COMMANDS.items()):
+            (first, said), (second, _) = cold.run(command, 1), cold.run(command, 2)
             rows.append(_row(case, "s", first, second))
+            if "--json" in command:
+                largest = json.loads(said)["largest_mb"]
+                case = f"{case}, memory of the largest process"
+                rows.append(_row(case, "MB", largest, cold.loading_mb()))
             if progress is not None:
-                progress((k + 1) / len(steps))
-        rows.append(_row("memory of the largest process that compiles", "MB", *cold.memory()))
+                progress((k + 1) / len(COMMANDS))
     return rows
 
 
@@ -91,26 +89,20 @@ class _Cold:
         self._run(*command, str(SOURCE))
         return first, time.perf_counter() - began
 
-    def twice(self, *arguments: str) -> tuple[float, float]:
-        """Time of a command, and of the same again [s]; ``{n}`` in it becomes 1 and 2."""
-        times = []
-        for n in ("1", "2"):
-            began = time.perf_counter()
-            self._run(*(argument.replace("{n}", n) for argument in arguments))
-            times.append(time.perf_counter() - began)
-        return times[0], times[1]
+    def run(self, command: str, n: int) -> tuple[float, str]:
+        """Time of a command [s], whose ``{n}`` is replaced, and what it writes."""
+        began = time.perf_counter()
+        said = self._run(*shlex.split(command.format(n=n)))
+        return time.perf_counter() - began, said
 
-    def memory(self) -> tuple[float, float]:
-        """Of the largest process of `relpos warmup`, and of one that only loads its code [MB]."""
-        self._env["NUMBA_CACHE_DIR"] = str(self._folder / "kernels-again")
-        said = self._run("-m", "agents.cli", "warmup", "--json")
+    def loading_mb(self) -> float:
+        """Memory of a process that only loads the code of the tracker [MB]."""
         code = (
             "import resource; from agents.warm_up import parts_of;"
             "[part.compile() for part in parts_of('track')];"
             "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)"
         )
-        scale = 1e6 if sys.platform == "darwin" else 1e3
-        return json.loads(said)["largest_mb"], float(self._run("-c", code)) / scale
+        return float(self._run("-c", code)) / (1e6 if sys.platform == "darwin" else 1e3)
 
     def _run(self, *arguments: str) -> str:
         done = subprocess.run(

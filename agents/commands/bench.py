@@ -115,7 +115,7 @@ def bench_train(updates: int, threads: int, after: int, as_json: bool) -> None:
 @click.option("--install", is_flag=True, help="Also install into a new environment, with pip.")
 @click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
 def bench_cold(install: bool, as_json: bool) -> None:
-    """Seconds that everything takes the first time, beside the second; some minutes."""
+    """Seconds that everything takes the first and the second time; some minutes."""
     from agents.bench.cold import bench_cold as run
 
     with progress_bar("first time") as report:

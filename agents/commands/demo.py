@@ -65,7 +65,7 @@ def demo(
     from agents.live_room import LiveRoom
     from agents.output import check_folder, write_results
     from agents.report.demo_report import demo_report
-    from agents.report.gif import gif_of
+    from agents.report.gif import Gif
     from agents.report.page import metres
     from agents.warm_up import BackgroundWarmUp, warm_up_first
     from relpos_env.timing import DECISION
@@ -89,6 +89,7 @@ def demo(
         [ours], purpose="env", leave_out=("tasks",) if names["task"] in (None, TASK) else ()
     )
     with BackgroundWarmUp(FILTERS) as others, LiveRoom() as room:
+        pictures = Gif(every=2, interval=DECISION)
         titles = {"estimate": "on estimates", "truth": "on the truth", "nothing": "on nothing"}
 
         def watch(frames: dict[str, Any], told: str) -> None:
@@ -100,14 +101,15 @@ def demo(
                 seed=seed,
                 cars=cars,
                 filters=[ours],
-                render="human" if window else "rgb_array" if gif else None,
+                window=window,
+                film=pictures.add if gif else None,
                 progress=tell,
                 watch=watch,
                 **names,
             )
         files: dict[str, str | bytes] = {"report.html": demo_report(result, others.missing)}
         if gif:
-            files["drive.gif"] = gif_of(result.film[::2], interval=2.0 * DECISION)
+            files["drive.gif"] = pictures.to_bytes()
         write_results(out, files)
         if others.missing:
             click.echo(f"open {out / 'report.html'}; its last table follows", err=True)

@@ -30,9 +30,10 @@ def warmup(purpose: str, filters: tuple[str, ...], jobs: int | None, as_json: bo
     """
     from agents.warm_up import parts_of, warm_up
     from agents.warm_up.processes import shown_progress
+    from tracking.filters import DEFAULT_FILTER
 
     with shown_progress() as tell:
-        found = warm_up(parts_of(purpose, filters), jobs=jobs, progress=tell)
+        found = warm_up(parts_of(purpose, filters or (DEFAULT_FILTER,)), jobs=jobs, progress=tell)
     if as_json:
         emit_json([found.summary])
         return

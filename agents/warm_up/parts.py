@@ -55,12 +55,12 @@ class Part:
         return SECONDS.get(self.name, OTHERS)
 
 
-def parts_of(purpose: str, filters: tuple[str, ...] = ()) -> list[Part]:
+def parts_of(purpose: str, filters: tuple[str, ...] = (DEFAULT_FILTER,)) -> list[Part]:
     """Parts that something needs.
 
     Args:
         purpose: One of `PURPOSES`.
-        filters: Some of `tracking.filters.FILTERS`, by default `DEFAULT_FILTER`.
+        filters: Some of `tracking.filters.FILTERS`; all of them for the purpose ``all``.
 
     Raises:
         ConfigError: No filter of that name.
@@ -68,18 +68,18 @@ def parts_of(purpose: str, filters: tuple[str, ...] = ()) -> list[Part]:
     """
     if purpose not in PURPOSES:
         raise UsageError(f"--for: expected one of {', '.join(PURPOSES)}, got {purpose!r}")
-    names = tuple(FILTERS) if purpose == "all" else filters or (DEFAULT_FILTER,)
+    names = tuple(FILTERS) if purpose == "all" else filters
     return [*_tracker_parts(names), *(OTHER_PARTS[name] for name in PURPOSES[purpose])]
 
 
 def _tracker_parts(filters: Iterable[str]) -> Iterator[Part]:
-    """Of trackers; what filters share is told once."""
-    told = set[frozenset[Any]]()
+    """Parts of trackers; what filters share is one part."""
+    known = set[frozenset[Any]]()
     for name in dict.fromkeys(filters):
         for part_name, calls in _kernel_groups(name):
             code = frozenset((id(kernel), types_of(given)) for kernel, given in calls)
-            if code not in told:
-                told.add(code)
+            if code not in known:
+                known.add(code)
                 kept, compiles = partial(_are_kept, calls), partial(_bind_all, calls)
                 yield Part(name=part_name, is_kept=kept, compile=compiles)
 
@@ -105,7 +105,7 @@ def _are_kept(calls: list[Call]) -> bool:
 
 
 class NoFilter:
-    """Knows nothing: with it the world is compiled without a tracker, beside one that is."""
+    """Estimates nothing: with it the world is compiled while others compile the tracker."""
 
     follows_bias = False
 
@@ -219,4 +219,4 @@ PURPOSES: dict[str, tuple[str, ...]] = {
     "hardware": ("env", "hardware"),
     "all": ("env", "tasks", "hardware"),
 }
-"""What is needed beside trackers, by what it is for."""
+"""Parts that are needed in addition to trackers, by purpose."""

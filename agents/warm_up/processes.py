@@ -89,8 +89,6 @@ def warm_up_first(
         leave_out: Names of parts that are not needed.
     """
     names = tuple(name for name in dict.fromkeys(filters) if name in FILTERS)
-    if not names:
-        return
     with shown_progress() as tell:
         parts = [part for part in parts_of(purpose, names) if part.name not in leave_out]
         warm_up(parts, progress=tell)
@@ -98,7 +96,7 @@ def warm_up_first(
 
 @contextmanager
 def shown_progress() -> Iterator[Progress]:
-    """A bar on a terminal, lines elsewhere; nothing until something is told."""
+    """A bar on a terminal, lines elsewhere; nothing until progress is reported."""
     bars: list[Callable[[float], None]] = []
     said: list[str] = []
     label = "compiling, once"

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from agents.live_room import ARROWS, PLAIN_ARROWS, LiveRoom, draw_room
-from agents.report.gif import WIDTH, gif_of
+from agents.report.gif import WIDTH, Gif
 
 ROOM = 8.0, 4.0
 
@@ -55,7 +55,7 @@ def test_a_wall_thinner_than_a_letter_is_seen():
     assert 10 <= text.count("#") <= 20
 
 
-def test_a_belief_is_beside_its_car_and_an_absent_car_is_nowhere():
+def test_an_estimate_is_drawn_and_an_absent_car_is_not():
     text = "".join(lines_of(frames([0.0, 0.0], estimate=[1.0, 1.0, 0.1, 0.1, 0.0, 0.0])))
     assert sorted(text.replace(" ", "")) == sorted("→o")
     assert not "".join(lines_of(frames([0.0, 0.0], present=0))).strip()
@@ -68,8 +68,10 @@ def test_nothing_is_shown_where_there_is_no_terminal(capsys):
 
 
 def test_a_gif_has_its_pictures_and_its_pace():
-    pictures = [np.full((300, 900, 3), 40 * k, dtype=np.uint8) for k in range(5)]
-    film = Image.open(io.BytesIO(gif_of(pictures, interval=0.2)))
+    gif = Gif(every=2, interval=0.1)
+    for k in range(10):
+        gif.add(np.full((300, 900, 3), 20 * k, dtype=np.uint8))
+    film = Image.open(io.BytesIO(gif.to_bytes()))
     assert (film.n_frames, film.size) == (5, (WIDTH, 213))
     assert film.info["duration"] == 200
     film.seek(3)

@@ -106,8 +106,8 @@ class OrientationParams:
     """When a magnetic field is disturbed."""
     max_gap: float = 0.5
     """[s] Missing samples up to here are filled by interpolation, so that the gyroscope is
-    integrated over them. After a longer silence the orientation is found anew, where there is a
-    magnetometer; elsewhere it goes on from where it was."""
+    integrated over them. After a longer silence the orientation is initialised again, where there
+    is a magnetometer; elsewhere it goes on from where it was."""
     gravity_tau: float = 0.5
     """[s] Time constant with which a node at rest learns the length of gravity that its own
     accelerometer reads, which removes the vertical part of its offset."""

@@ -24,7 +24,7 @@ class SanityParams:
     acc_jump: float = 400.0
     """[m/s2] The same of the specific force."""
     odd_most: float = 3.0
-    """[-] So many odd readings in a row are believed after all."""
+    """[-] Odd readings in a row after which they are used after all."""
     chance: float = 1e-5
     """[-] A run of equal readings is chance as long as it is more likely than this."""
     equal_least: float = 0.02

@@ -61,7 +61,7 @@ class NlosParams:
     white_std: float = 0.25
     """[m] White noise that is added behind an obstacle: the excess jumps where paths change."""
     repeats: float = 20.0
-    """[-] So many ranges in a row have the same excess: together they count as one."""
+    """[-] Number of ranges in a row with the same excess: together they count as one."""
     power_diff_los: float = 3.0
     """[dB] Received minus first-path power in sight."""
     power_diff_los_std: float = 1.2
@@ -106,8 +106,8 @@ class JointStartParams:
     max_age: float = 2.0
     """[s] The first k measurements must come within this time."""
     min_ranges: float = 3.0
-    """[-] Or those that came in a longer time, if there are so many. Fewer say nothing of how far
-    they are to be trusted: one may be absurd."""
+    """[-] Minimum number of ranges of a pair that came in a longer time. The scatter of fewer is
+    unknown: one may be absurd."""
     rotations_2d: int = 16
     """[-] Rotations tried in the plane, each with its mirror image."""
     position_std: float = 0.25

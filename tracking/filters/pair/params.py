@@ -141,8 +141,8 @@ class StartParams:
     max_age: float = 2.0
     """[s] The first k measurements must come within this time."""
     min_ranges: float = 3.0
-    """[-] Or those that came in a longer time, if there are so many. Fewer say nothing of how far
-    they are to be trusted: one may be absurd."""
+    """[-] Minimum number of ranges of a pair that came in a longer time. The scatter of fewer is
+    unknown: one may be absurd."""
     rotations_2d: int = 16
     """[-] Rotations tried in the plane, each with its mirror image."""
     prune: float = 40.0
