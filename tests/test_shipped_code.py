@@ -146,3 +146,18 @@ def test_a_wheel_in_an_empty_environment_compiles_nothing(tmp_path):
     file, *rest = done.stdout.split()
     assert Path(file).is_relative_to(tmp_path / "empty")
     assert rest == ["()", "0"]
+
+
+def test_compiling_that_takes_seconds_is_announced_once(folder):
+    """A few kernels are not worth a word."""
+    many = "@kernel\ndef f{0}(x):\n    return x + {0}.0\n\n"
+    (folder / "shipped.py").write_text(MODULE + "".join(many.format(k) for k in range(8)))
+    for calls, times in (
+        ("shipped.outer(1.0)", 0),
+        ("[getattr(shipped, f'f{k}')(1.0) for k in range(8)]", 1),
+    ):
+        done = subprocess.run(
+            [sys.executable, "-c", f"import shipped; {calls}"],
+            cwd=folder, capture_output=True, text=True, check=True,
+        )  # fmt: skip
+        assert done.stderr.count("`relpos warmup` does it ahead") == times

@@ -147,17 +147,17 @@ class _UnitCompiler(Compiler):  # type: ignore[misc]
         super().__init__(typing, target, library, args, result, flags, names)
 
     n_compiled = 0
-    """In this process."""
+    """Units in this process."""
 
     def compile_extra(self, func: Any) -> Any:
-        _UnitCompiler.n_compiled += 1
-        if _UnitCompiler.n_compiled == MANY:
-            _log.warning("compiling, once, for up to a minute; `relpos warmup` does it ahead")
         codegen = self.state.targetctx.codegen()
         self.state.library = library = _Unit(codegen, func.__qualname__)
         library.enable_object_caching()
         if not self.state.flags.forceinline:
             library.key = (func.__module__, func.__qualname__), tuple(self.state.args)
+            _UnitCompiler.n_compiled += 1
+            if _UnitCompiler.n_compiled == MANY:
+                _log.warning("compiling, once, for up to a minute; `relpos warmup` does it ahead")
         self.state.func_id = identity = FunctionIdentity.from_function(func)
         kernel = _kernels.get((func.__module__, func.__qualname__))
         if kernel is not None:
