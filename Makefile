@@ -19,6 +19,7 @@ demo-hardware: $(VENV)/.hardware
 	$(BIN)/relpos demo-hardware --out demo-hardware
 
 test: $(VENV)/.dev
+	$(BIN)/relpos warmup --for all
 	$(BIN)/python -m pytest -n auto -m 'not realtime'
 	$(BIN)/python -m pytest -m realtime
 

@@ -160,7 +160,8 @@ def test_bench_lines_have_a_peer():
 
 def test_it_drives_where_no_trainer_is_installed(tmp_path):
     code = f"""
-import sys
+import logging, sys
+logging.getLogger("tracking.jit").setLevel(logging.ERROR)  # compiling may be announced
 class Block:
     def find_spec(self, name, path=None, target=None):
         if name in ("torch", "stable_baselines3", "onnx", "onnxscript", "cloudpickle"):
