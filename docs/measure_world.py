@@ -54,7 +54,7 @@ def sight(log: Log) -> tuple[np.ndarray, np.ndarray]:
     return total, np.stack([values[:, 1] - values[:, 2], ~log.nlos], axis=1)
 
 
-def slips(log: Log, slip: float) -> list[np.ndarray]:
+def slips(log: Log, ahead: float, slip: float) -> list[np.ndarray]:
     """Mean sideways speed beyond what the filter foresees, by length of time [m/s]."""
     out: list[list[np.ndarray]] = [[] for _ in SPANS]
     for node in range(log.constellation.n_nodes):
@@ -65,7 +65,7 @@ def slips(log: Log, slip: float) -> list[np.ndarray]:
         vx, vy, rate = (np.gradient(of, at) for of in (x, y, yaw))
         forward = np.cos(yaw) * vx + np.sin(yaw) * vy
         left = np.cos(yaw) * vy - np.sin(yaw) * vx
-        rest = left - (VEHICLES["car"].rear_axle - slip * forward**2) * rate
+        rest = left - (ahead - slip * forward**2) * rate
         for means, span in zip(out, SPANS, strict=True):
             n = round(span / PERIOD)
             means.append(rest[: len(rest) // n * n].reshape(-1, n).mean(axis=1))
@@ -76,14 +76,15 @@ def main() -> None:
     """Print what was measured."""
     given = dict(enumerate(sys.argv[1:]))
     name, first = given.get(0, "cars-nlos"), int(given.get(1, 7000))
-    slip = 1.0 / (look_up(name).car.rear_cornering * GRAVITY)
+    car = look_up(name).car
+    slip = 1.0 / (car.rear_cornering * GRAVITY)
     total, gaps, rests = np.zeros(4), [], []
     for seed in range(first, first + int(given.get(2, 20))):
         log = simulate(scenario=name, seconds=SECONDS, seed=seed)
         found, gap = sight(log)
         total += found
         gaps.append(gap)
-        rests.append(slips(log, slip))
+        rests.append(slips(log, car.rear_axle, slip))
     gap, clear = np.concatenate(gaps).T
     white = [
         float(np.sqrt(np.mean(np.concatenate(of) ** 2) * span / PERIOD))

@@ -23,7 +23,6 @@ from tracking.filters.joint.params import (
     NlosParams,
     RangeErrorParams,
 )
-from tracking.geometry import GRAVITY
 from tracking.ranging.timestamps import SPEED_OF_LIGHT
 from tracking.vehicles import VEHICLES
 
@@ -72,7 +71,6 @@ def matched_params(scenario: Scenario | HumanScenario) -> JointParams:
             first_heading_std=0.1,
             heading_std=0.022,
             heading_tau=8.0,
-            slip=1.0 / (scenario.car.rear_cornering * GRAVITY),
             sideways_std=SIDEWAYS,
         )
     nlos = NlosParams(

@@ -50,7 +50,7 @@ class ExactGroup:
         forward = (0.8 + 0.15 * np.sin(0.7 * s + k)) * pace
         turn = rate * (0.8 + 0.2 * np.cos(0.5 * s + 2 * k)) * pace
         yaw = np.cumsum(turn, axis=0) / FINE + k
-        sideways = car.rear_axle * turn - car.slip * turn * forward**2
+        sideways = car.ahead * turn - car.slip * turn * forward**2
         c, s = np.cos(yaw), np.sin(yaw)
         vel = np.stack([forward * c - sideways * s, forward * s + sideways * c, 0.0 * c], -1)
         pos = np.cumsum(vel, axis=0) / FINE

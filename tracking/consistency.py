@@ -12,7 +12,7 @@ References:
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from tracking.arrays import F64, Bool
 from tracking.errors import ConfigError
@@ -39,7 +39,7 @@ def chi_square_band(n: int, dof: int, probability: float = 0.95) -> tuple[float,
         raise ConfigError(f"probability: expected 0 to 1, got {probability:g}")
     tail = 0.5 * (1.0 - probability)
     total = n * dof
-    return float(chi2.ppf(tail, total)) / total, float(chi2.ppf(1.0 - tail, total)) / total
+    return float(chdtri(total, 1.0 - tail)) / total, float(chdtri(total, tail)) / total
 
 
 def pair_nees(estimate: TeamEstimate, truth_ij_w: F64) -> tuple[F64, Bool]:

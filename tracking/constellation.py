@@ -11,6 +11,7 @@ import numpy as np
 
 from tracking.arrays import F64, I64, Bool
 from tracking.errors import ConfigError
+from tracking.mount import Mount
 from tracking.vehicles import VEHICLES
 
 MOST_NODES = 256
@@ -45,6 +46,8 @@ class NodeConfig:
     """[Hz] Nominal rate of the IMU; the orientation filter is built for it."""
     mag_hz: float | None = None
     """[Hz] Nominal rate of the magnetometer where it is not that of the IMU."""
+    mount: Mount = Mount()
+    """Where it sits on a vehicle that cannot move sideways."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,6 +95,7 @@ class Constellation:
                 f"nodes.{node.id}.mag_hz: expected above 0 and at most {FASTEST_HZ:g}, "
                 f"got {node.mag_hz}",
             )
+            node.mount.check(f"nodes.{node.id}.mount")
             _expect(
                 node.initial_heading is None or math.isfinite(node.initial_heading),
                 f"nodes.{node.id}.initial_heading: expected a finite angle, "

@@ -59,6 +59,8 @@ def put_on_truth(c, s, truth, k):
                 s.x[0, node.i_vel + a] = vel[k, i, a]
         if not node.static:
             s.x[0, node.i_heading] = heading[k, i]
+        if node.i_mount >= 0:
+            s.x[0, node.i_mount], s.x[0, node.i_mount + 1] = node.ahead, node.slip
 
 
 @kernel

@@ -52,11 +52,14 @@ class VehicleParams:
     """[m/s] Speed of the group as a whole; keeps a group without any reference from drifting."""
     sideways_std: float | None = None
     """[m/s] Sideways speed of the rear axle, 20 times a second; None for what may move sideways."""
-    rear_axle: float = 0.0
-    """[m] How far the tracker is ahead of the axle that cannot move sideways."""
+    ahead: float = 0.0
+    """[m] How far the tracker is expected ahead of that axle, where `Mount.ahead` is unknown."""
+    ahead_std: float = 0.0
+    """[m] Standard deviation of that."""
     slip: float = 0.0
-    """[s2/m] How fast that axle drifts outwards in a curve, per squared speed and yaw rate: the
-    inverse of its cornering stiffness per load [1/rad] times gravity."""
+    """[s2/m] `Mount.slip` where it is unknown: none is as likely as that of soft tyres."""
+    slip_std: float = 0.0
+    """[s2/m] Standard deviation of that."""
     impact_threshold: float | None = None
     """[m/s2] More is a blow: what carries it runs into something and stops within a sample or two,
     that may have been cut off at the end of the scale, 8 or 16 g. None for what moves by blows."""
@@ -79,7 +82,7 @@ class VehicleParams:
     vibration and the slow error of a wrong tilt."""
 
     def __post_init__(self) -> None:
-        check_numbers(self, may_be_zero=("rear_axle", "slip", "initial_tilt_speed"))
+        check_numbers(self, may_be_zero=("ahead", "ahead_std", "slip", "slip_std", "initial_tilt_speed"))
 
 
 _TURNED = VehicleParams(
@@ -98,8 +101,10 @@ VEHICLES = {
         heading_tau=5.0,
         first_heading_std=0.1,
         sideways_std=0.08,
-        rear_axle=0.15,
-        slip=0.018,
+        ahead=0.15,
+        ahead_std=0.15,
+        slip=0.01,
+        slip_std=0.01,
         impact_threshold=70.0,
         propagation_period=0.05,
     ),

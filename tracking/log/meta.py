@@ -10,6 +10,7 @@ from typing import Any
 from tracking.constellation import Antenna, Constellation, NodeConfig
 from tracking.errors import ConfigError, LogError
 from tracking.log.folder import FORMAT
+from tracking.mount import Mount
 
 MOST = 1e12
 """Numbers beyond this mean nothing in any unit."""
@@ -86,7 +87,20 @@ def _node(key: str, table: Any) -> NodeConfig:
         initial_heading=None
         if heading is None
         else _number(f"{where}.initial_heading_rad", heading),
+        mount=_mount(f"{where}.mount", table.get("mount", {})),
     )
+
+
+def _mount(where: str, table: Any) -> Mount:
+    names = {"ahead_m": "ahead", "aside_m": "aside", "wheelbase_m": "wheelbase"}
+    names["slip_s2_per_m"] = "slip"
+    unknown = set(_table(where, table)) - set(names)
+    if unknown:
+        raise LogError(
+            f"meta.toml, {where}: expected {', '.join(names)}, found {', '.join(sorted(unknown))}"
+        )
+    given = {names[key]: _number(f"{where}.{key}", value) for key, value in table.items()}
+    return Mount(**given)
 
 
 def _antenna(key: str, table: Any) -> Antenna:

@@ -13,9 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
+from tracking.constellation import NodeConfig
 from tracking.errors import LogError
 from tracking.log.folder import ACC, FORMAT, GYR, MAG, POWERS, QUAT, Log
 from tracking.measurements import Kind, MeasurementBlock
+from tracking.mount import Mount
 
 
 def write_log(folder: Path | str, log: Log) -> Path:
@@ -87,11 +89,21 @@ def _meta(log: Log) -> str:
         lines += ["", f"[nodes.{node.id}]", f'kind = "{node.kind}"', f'vehicle = "{node.vehicle}"']
         if node.initial_heading is not None:
             lines.append(f"initial_heading_rad = {float(node.initial_heading)!r}")
+        if node.mount != Mount():
+            lines += _mount(node)
     for antenna in c.antennas:
         offset = ", ".join(repr(float(v)) for v in antenna.offset_b)
         lines += ["", f"[antennas.{antenna.id}]", f"node = {antenna.node}"]
         lines.append(f"offset_m = [{offset}]")
     return "\n".join(lines) + "\n"
+
+
+def _mount(node: NodeConfig) -> list[str]:
+    mount = node.mount
+    given = {"ahead_m": mount.ahead, "aside_m": mount.aside, "wheelbase_m": mount.wheelbase}
+    given["slip_s2_per_m"] = mount.slip
+    known = [f"{name} = {float(value)!r}" for name, value in given.items() if value is not None]
+    return ["", f"[nodes.{node.id}.mount]", *known]
 
 
 def _quoted(text: str) -> str:

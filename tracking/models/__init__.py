@@ -42,7 +42,7 @@ MODELS: dict[str, Model] = {
     "range rate": Model(range_rate_model, 6, 0, "PairEkfParams.speed_std"),
     "relative speed": Model(relative_speed_model, 3, 0, "PairEkfParams.speed_std"),
     "zero velocity": Model(zero_velocity_model, 1, 0, "JointParams.rest_std"),
-    "non-holonomic": Model(nonholonomic_model, 3, 3, "VehicleParams.sideways_std"),
+    "non-holonomic": Model(nonholonomic_model, 5, 4, "VehicleParams.sideways_std"),
     "mean velocity": Model(mean_velocity_model, 1, 1, "VehicleParams.speed_std"),
 }
 """By name. A surveyed distance is a range between two origins, without bias or lever arm."""

@@ -136,7 +136,8 @@ def count_states(constellation: Constellation, params: JointParams) -> int:
     """How many states there are."""
     d = constellation.dimensions
     n = count_motion(constellation) + (d + 1) * int((~constellation.is_static).sum())
-    n += 6 * sum(has_offset(constellation, params, k) for k in range(constellation.n_nodes))
+    for k in range(constellation.n_nodes):
+        n += 6 * has_offset(constellation, params, k) + 2 * has_mount(constellation, params, k)
     if has_range_errors(constellation, params):
         n += 2 * int(moving_pairs(constellation).sum())
     return n
@@ -166,6 +167,15 @@ def has_offset(constellation: Constellation, params: JointParams, node: int) -> 
     config = constellation.nodes[node]
     moves = config.kind != "static" and constellation.dimensions == 3
     return moves and params.vehicles[config.vehicle].offset_std is not None
+
+
+def has_mount(constellation: Constellation, params: JointParams, node: int) -> bool:
+    """True if where a node sits on its vehicle has states: where that matters and is unknown."""
+    config = constellation.nodes[node]
+    vehicle = params.vehicles[config.vehicle]
+    slides = config.kind == "static" or vehicle.sideways_std is None
+    _, ahead_std, _, slip_std = config.mount.prior(vehicle)
+    return not slides and max(ahead_std, slip_std) > 0.0
 
 
 def has_range_errors(constellation: Constellation, params: JointParams) -> bool:

@@ -107,17 +107,21 @@ def nonholonomic_constraint(c, s, h, i, work):
         node.cos_yaw * cos_e - node.sin_yaw * sin_e,
         node.sin_yaw * cos_e + node.cos_yaw * sin_e,
     )
+    ahead, slip, m = node.ahead, node.slip, 3
     idx, val = work.idx, work.val
     idx[0], idx[1], idx[2] = node.i_vel, node.i_vel + 1, node.i_heading
-    predicted, val[0], val[1], val[2] = nonholonomic_model(
-        x[node.i_vel], x[node.i_vel + 1], error, cos_y, sin_y, node.slip * node.yaw_rate
+    if node.i_mount >= 0:
+        ahead, slip, m = x[node.i_mount], x[node.i_mount + 1], 5
+        idx[3], idx[4] = node.i_mount, node.i_mount + 1
+    predicted, val[0], val[1], val[2], val[3], val[4] = nonholonomic_model(
+        x[idx[0]], x[idx[1]], error, ahead, slip, cos_y, sin_y, node.yaw_rate, node.aside
     )
-    nu = node.rear_axle * node.yaw_rate - predicted
-    for k in range(3):
+    nu = -predicted
+    for k in range(m):
         nu -= val[k] * (s.x[h, idx[k]] - x[idx[k]])
     if is_linear(s.group[0]):
         velocity_sensitivity(s, h, node.i_vel, val[0], val[1], 0.0, work)
-    apply_constraint(c, s, h, nu, 3, node.sideways_var, work)
+    apply_constraint(c, s, h, nu, m, node.sideways_var, work)
     if c.d == 3:
         idx[0], val[0] = node.i_vel + 2, 1.0
         if is_linear(s.group[0]):

@@ -56,14 +56,18 @@ NODE = np.dtype(
         ("first_heading_var", "f8"),
         ("speed_var", "f8"),
         ("sideways_var", "f8"),  # 0 for what may move sideways
-        ("rear_axle", "f8"),
+        ("ahead", "f8"),  # of its mount: mean and variance of what is not known
+        ("ahead_var", "f8"),
         ("slip", "f8"),
+        ("slip_var", "f8"),
+        ("aside", "f8"),
         ("i_pos", "i8"),  # first state of its position
         ("i_vel", "i8"),  # of its velocity; -1 for static nodes, like the next two
         ("i_tilt_bias", "i8"),
         ("i_acc_bias", "i8"),  # of the offset of its accelerometer; -1 for none
         ("i_heading", "i8"),
         ("i_gyro_bias", "i8"),  # of what the bias of its gyroscope is off; -1 for none
+        ("i_mount", "i8"),  # of its mount, `ahead` and `slip`; -1 where both are known
     ]
 )
 PAIR = np.dtype(

@@ -277,7 +277,7 @@ class JointReference:
             elif node["sideways_var"] > 0.0:
                 model = partial(self.slides, node, v, y)
                 H = jacobian(model, before)
-                nu = node["rear_axle"] * node["yaw_rate"] - model(before) - H @ (self.x - before)
+                nu = -model(before) - H @ (self.x - before)
                 self.update(H, nu, node["sideways_var"], c["jolt_nis"])
         for k in range(2):
             H = np.isin(np.arange(n), self.nodes["i_vel"] + k) / len(self.nodes)
@@ -285,10 +285,12 @@ class JointReference:
 
     @staticmethod
     def slides(node: Any, v: int, y: int, x: Any) -> Any:
-        """Sideways velocity of an axle and of the slip of its tyres."""
-        yaw = np.arctan2(node["sin_yaw"], node["cos_yaw"]) + x[y]
-        cos, sin, slip = np.cos(yaw), np.sin(yaw), node["slip"] * node["yaw_rate"]
-        return slip * (cos * x[v] + sin * x[v + 1]) ** 2 - sin * x[v] + cos * x[v + 1]
+        """Sideways velocity of an axle beside the slip of its tyres."""
+        yaw, w, m = np.arctan2(node["sin_yaw"], node["cos_yaw"]) + x[y], node["yaw_rate"], node["i_mount"]
+        ahead, slip = (x[m], x[m + 1]) if m >= 0 else (node["ahead"], node["slip"])
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        forward = cos * x[v] + sin * x[v + 1] + node["aside"] * w
+        return cos * x[v + 1] - sin * x[v] - ahead * w + slip * w * forward**2
 
     def centre(self, t: float) -> None:
         """Move the centre of the group to the origin, with a fixed uncertainty."""

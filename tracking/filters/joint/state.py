@@ -23,6 +23,7 @@ from tracking.constellation import Constellation
 from tracking.filters.joint.coefficients import (
     count_motion,
     count_rows,
+    has_mount,
     has_offset,
     has_range_errors,
     moving_pairs,
@@ -153,6 +154,8 @@ def make_state(
         static = node.kind == "static"
         initial, offset = constellation.heading == "initial", has_offset(constellation, params, k)
         heading_std = params.initial_heading_std if initial else carrier.heading_std
+        ahead, ahead_std, slip, slip_std = node.mount.prior(carrier)
+        mount = has_mount(constellation, params, k)
         first_heading_std = heading_std if initial else carrier.first_heading_std or heading_std
         constants = {
             "static": static,
@@ -177,19 +180,23 @@ def make_state(
             "heading_tau": params.initial_heading_tau if initial else carrier.heading_tau,
             "speed_var": carrier.speed_std**2,
             "sideways_var": (carrier.sideways_std or 0.0) ** 2,
-            "rear_axle": carrier.rear_axle,
-            "slip": carrier.slip,
+            "ahead": ahead,
+            "ahead_var": ahead_std**2,
+            "slip": slip,
+            "slip_var": slip_std**2,
+            "aside": node.mount.aside,
             "i_pos": at,
             "i_vel": -1 if static else at + d,
             "i_tilt_bias": -1 if static else fades,
             "i_acc_bias": fades + d if offset else -1,
             "i_heading": -1 if static else fades + d + 3 * offset,
             "i_gyro_bias": fades + d + 4 if offset else -1,
+            "i_mount": fades + d + 1 if mount else -1,
         }
         for name, value in constants.items():
             nodes[name][:, k] = value
         at += d if static else 2 * d
-        fades += 0 if static else d + 1 + 6 * offset
+        fades += 0 if static else d + 1 + 6 * offset + 2 * mount
     pairs = np.zeros((n_envs, p), dtype=PAIR)
     pairs["i"], pairs["j"] = constellation.pairs.T
     pairs["i_range_error"] = -1

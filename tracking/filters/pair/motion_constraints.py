@@ -3,9 +3,9 @@
 The pair filters hold differences of velocities, a wheel speaks of the velocity itself. So each
 hypothesis also holds the mean velocity of the group, u, dead reckoned with the mean of all
 accelerations. With n the direction to the left of car i, l how far the tracker is ahead of the
-axle, k the slip, v the speed forward and w the yaw rate,
+axle, k the slip, f the speed of the axle forward and w the yaw rate,
 
-    n . v_i = (l - k v^2) w,    v_i = u + mean over k of v_ki
+    n . v_i = (l - k f^2) w,    v_i = u + mean over k of v_ki
 
 corrects u, and every pair of i by its own covariance: the variance of the innovation is that
 of u and of the velocity in the group together, so each takes its share. Of a pair, i has a
@@ -99,10 +99,12 @@ def hold(c, s, layout, h, i, m, work):
     node, u, Pu = s.nodes[i], s.mean_v[h], s.mean_cov[h]
     n0, n1 = -math.sin(node.yaw), math.cos(node.yaw)
     r0, r1 = velocity_in_group(s, layout, h, i, m)
-    predicted, _, _, _ = nonholonomic_model(
-        u[0] + r0, u[1] + r1, 0.0, n1, -n0, node.slip * node.yaw_rate
+    predicted, _, _, _, by_ahead, by_slip = nonholonomic_model(
+        u[0] + r0, u[1] + r1, 0.0, node.ahead, node.slip, n1, -n0, node.yaw_rate, node.aside
     )
-    nu = node.rear_axle * node.yaw_rate - predicted
+    nu = -predicted
+    # What is unknown of the mount has no states here: it is noise.
+    unknown = by_ahead * by_ahead * node.ahead_var + by_slip * by_slip * node.slip_var
     # Variance of the velocity in the group: half of that of a pair is each end's.
     own = 0.0
     for k in range(s.nodes.shape[0]):
@@ -111,7 +113,7 @@ def hold(c, s, layout, h, i, m, work):
     own *= 0.5 / m
     w0, w1 = Pu[0, 0] * n0 + Pu[0, 1] * n1, Pu[1, 0] * n0 + Pu[1, 1] * n1
     common = n0 * w0 + n1 * w1
-    S = common + own + node.sideways_var
+    S = common + own + node.sideways_var + unknown
     nis = nu * nu / S
     s.loglik[h] -= 0.5 * (min(nis, c.nis_cap) + math.log(S))
     if nis > c.jolt_nis:

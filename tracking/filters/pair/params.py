@@ -111,10 +111,6 @@ class WheelParams:
 
     std: float = 0.15
     """[m/s] Sideways speed of the axle, each time it is used: slip, and a heading that is wrong."""
-    rear_axle: float = 0.15
-    """[m] How far the tracker is ahead of the axle."""
-    slip: float = 0.018
-    """[s2/m] How fast that axle drifts outwards in a curve, per squared speed and yaw rate."""
     period: float = 0.05
     """[s] Time between two uses."""
     jolt_nis: float = 25.0
@@ -125,7 +121,7 @@ class WheelParams:
     """[m/s] Mean velocity of a group before its wheels tell."""
 
     def __post_init__(self) -> None:
-        check_numbers(self, may_be_zero=("rear_axle", "slip"))
+        check_numbers(self)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

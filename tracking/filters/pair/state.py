@@ -36,8 +36,11 @@ NODE = np.dtype(
         ("accel_noise", "f8"),  # added noise density of its last sample [m/s2/sqrt(Hz)]
         ("psd", "f8"),  # constant: acceleration noise with an IMU [m/s2/sqrt(Hz)]
         ("sideways_var", "f8"),  # constant: of its rear axle [m2/s2]; 0 if it may slide
-        ("slip", "f8"),  # constant: how fast that axle drifts out in a curve [s2/m]
-        ("rear_axle", "f8"),  # constant: how far the tracker is ahead of it [m]
+        ("ahead", "f8"),  # constants of its mount: means and variances
+        ("ahead_var", "f8"),
+        ("slip", "f8"),
+        ("slip_var", "f8"),
+        ("aside", "f8"),
     ]
 )
 PAIR = np.dtype(
@@ -243,8 +246,11 @@ def make_state(
     nodes["levelled"] = [vehicle.levelled for vehicle in vehicles]
     cars = [node.vehicle == "car" and node.kind == "moving" for node in constellation.nodes]
     nodes["sideways_var"] = np.where(cars, params.wheels.std**2, 0.0)
-    nodes["rear_axle"] = params.wheels.rear_axle
-    nodes["slip"] = params.wheels.slip
+    priors = [n.mount.prior(v) for n, v in zip(constellation.nodes, vehicles, strict=True)]
+    ahead, ahead_std, slip, slip_std = np.array(priors).T
+    nodes["ahead"], nodes["ahead_var"] = ahead, ahead_std**2
+    nodes["slip"], nodes["slip_var"] = slip, slip_std**2
+    nodes["aside"] = [node.mount.aside for node in constellation.nodes]
     held = np.zeros((n_envs, n, 7))
     held[..., 0] = 1.0
     pairs = np.zeros((n_envs, p), dtype=PAIR)

@@ -165,6 +165,10 @@ def initialise_node(c, s, h, i, t):
     for k in range(node.i_acc_bias, node.i_acc_bias + (3 if node.i_acc_bias >= 0 else 0)):
         reset_state(s, h, c.n, k, node.offset_var)
     reset_state(s, h, c.n, node.i_heading, heading_var)
+    if node.i_mount >= 0:
+        reset_state(s, h, c.n, node.i_mount, node.ahead_var)
+        reset_state(s, h, c.n, node.i_mount + 1, node.slip_var)
+        s.x[h, node.i_mount], s.x[h, node.i_mount + 1] = node.ahead, node.slip
     for k in range(node.i_gyro_bias, node.i_gyro_bias + (3 if node.i_gyro_bias >= 0 else 0)):
         reset_state(
             s, h, c.n, k, min(node.gyro_var, node.first_gyro_var) if node.has_ahrs_feedback else 0.0

@@ -1,0 +1,52 @@
+"""Where on its vehicle a tracker sits, relative to the axle that cannot slip sideways."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+from tracking.errors import ConfigError
+from tracking.vehicles import VehicleParams
+
+FARTHEST = 10.0
+"""[m] No vehicle that this is for is larger."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mount:
+    """What is known of it; None where it is not, and is estimated."""
+
+    ahead: float | None = None
+    """[m] Tracker ahead of the axle that does not steer; negative behind it."""
+    aside: float = 0.0
+    """[m] Tracker left of the middle of the vehicle; negative right of it."""
+    wheelbase: float | None = None
+    """[m] Between the axles. A tracker is expected between them where `ahead` is not known."""
+    slip: float | None = None
+    """[s2/m] How fast that axle drifts outwards in a curve, per squared speed and yaw rate: the
+    inverse of its cornering stiffness per load [1/rad] times gravity. 0 where tyres do not slip."""
+
+    def check(self, where: str) -> None:
+        """See that the numbers make sense.
+
+        Raises:
+            ConfigError: One does not.
+        """
+        for name in (f.name for f in fields(self)):
+            value = getattr(self, name)
+            low = 0.0 if name in ("wheelbase", "slip") else -FARTHEST
+            high = 1.0 if name == "slip" else FARTHEST
+            if value is not None and not (math.isfinite(value) and low <= value <= high):
+                raise ConfigError(f"{where}.{name}: expected {low:g} to {high:g}, got {value!r}")
+
+    def prior(self, vehicle: VehicleParams) -> tuple[float, float, float, float]:
+        """Mean and standard deviation of `ahead` [m], and of `slip` [s2/m]; 0 for what is known."""
+        ahead, ahead_std = vehicle.ahead, vehicle.ahead_std
+        if self.wheelbase is not None:
+            ahead, ahead_std = 0.5 * self.wheelbase, 0.5 * self.wheelbase
+        slip, slip_std = vehicle.slip, vehicle.slip_std
+        if self.ahead is not None:
+            ahead, ahead_std = self.ahead, 0.0
+        if self.slip is not None:
+            slip, slip_std = self.slip, 0.0
+        return ahead, ahead_std, slip, slip_std
