@@ -16,11 +16,9 @@ import sys
 import numpy as np
 
 from agents.simulate import simulate
-from relpos_env.scenarios import scenario as look_up
-from tracking.geometry import GRAVITY, yaw_of
+from tracking.geometry import yaw_of
 from tracking.log.folder import Log
 from tracking.measurements import Kind
-from tracking.vehicles import VEHICLES
 
 SECONDS = 120.0
 PERIOD = 0.05
@@ -54,8 +52,8 @@ def sight(log: Log) -> tuple[np.ndarray, np.ndarray]:
     return total, np.stack([values[:, 1] - values[:, 2], ~log.nlos], axis=1)
 
 
-def slips(log: Log, ahead: float, slip: float) -> list[np.ndarray]:
-    """Mean sideways speed beyond what the filter foresees, by length of time [m/s]."""
+def slips(log: Log) -> list[np.ndarray]:
+    """Mean sideways speed beside that of the mount that fits each car, by length of time [m/s]."""
     out: list[list[np.ndarray]] = [[] for _ in SPANS]
     for node in range(log.constellation.n_nodes):
         row = log.truth.node == node
@@ -65,7 +63,8 @@ def slips(log: Log, ahead: float, slip: float) -> list[np.ndarray]:
         vx, vy, rate = (np.gradient(of, at) for of in (x, y, yaw))
         forward = np.cos(yaw) * vx + np.sin(yaw) * vy
         left = np.cos(yaw) * vy - np.sin(yaw) * vx
-        rest = left - (ahead - slip * forward**2) * rate
+        mount = np.stack([rate, -rate * forward**2], axis=1)
+        rest = left - mount @ np.linalg.lstsq(mount, left)[0]
         for means, span in zip(out, SPANS, strict=True):
             n = round(span / PERIOD)
             means.append(rest[: len(rest) // n * n].reshape(-1, n).mean(axis=1))
@@ -76,15 +75,13 @@ def main() -> None:
     """Print what was measured."""
     given = dict(enumerate(sys.argv[1:]))
     name, first = given.get(0, "cars-nlos"), int(given.get(1, 7000))
-    car = look_up(name).car
-    slip = 1.0 / (car.rear_cornering * GRAVITY)
     total, gaps, rests = np.zeros(4), [], []
     for seed in range(first, first + int(given.get(2, 20))):
         log = simulate(scenario=name, seconds=SECONDS, seed=seed)
         found, gap = sight(log)
         total += found
         gaps.append(gap)
-        rests.append(slips(log, car.rear_axle, slip))
+        rests.append(slips(log))
     gap, clear = np.concatenate(gaps).T
     white = [
         float(np.sqrt(np.mean(np.concatenate(of) ** 2) * span / PERIOD))

@@ -33,10 +33,9 @@ ENTER_RATE, LEAVE_RATE = 0.15, 0.3
 often it gets it back; taken for other rooms with obstacles and for bodies, too."""
 NEVER = 1e-9
 """[1/s] or [-] What does not happen; the filter takes logarithms of it."""
-SIDEWAYS = 0.05
-"""[m/s] Slip of rear axles that the filter does not foresee, as white noise 20 times a second. It
-lasts, so that a drive's mean weighs more than its standard deviation: what is white and has the
-same mean over 8 s is 0.046 m/s."""
+SIDEWAYS = 0.027
+"""[m/s] Slip of rear axles that no mount and cornering stiffness explains, as white noise 20 times a
+second: what is white and has the same mean over 8 s."""
 
 
 def matched_params(scenario: Scenario | HumanScenario) -> JointParams:

@@ -181,7 +181,7 @@ def learn_range(c, s, layout, work, p, a_i, a_j, is_hidden, what):
         s.nlos[0, p] = 1.0 if is_hidden else 0.0
         if was_hidden != is_hidden:
             reset_bias_on_transition(c, s, 0, p, 1.0, c.nlos_large_share)
-        variance = c.white_var + s.nlos[0, p] * c.nlos_white_var
+        variance = s.group[0].white_var + s.nlos[0, p] * c.nlos_white_var
     _, m = predict_range(c, s, 0, p, (i0, i1, i2), (j0, j1, j2), work.idx, work.val)
     S = compute_pht(s, 0, m, work) + variance
     kalman_update(s, 0, work.w, 0.0, S)

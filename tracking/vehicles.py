@@ -82,7 +82,9 @@ class VehicleParams:
     vibration and the slow error of a wrong tilt."""
 
     def __post_init__(self) -> None:
-        check_numbers(self, may_be_zero=("ahead", "ahead_std", "slip", "slip_std", "initial_tilt_speed"))
+        check_numbers(
+            self, may_be_zero=("ahead", "ahead_std", "slip", "slip_std", "initial_tilt_speed")
+        )
 
 
 _TURNED = VehicleParams(
@@ -94,7 +96,7 @@ VEHICLES = {
         ahrs_accel_tau=30.0,
         pair_accel_psd=0.07,
         accel_psd=0.045,
-        bias_std=0.05,
+        bias_std=0.1,
         bias_tau=100.0,
         levelled=True,
         heading_std=0.03,

@@ -1,4 +1,4 @@
-"""How the cars of the second world drive: wanted speeds and curves, followed on kinematic bicycles."""
+"""How cars of the second world drive: wanted speeds and curves, on kinematic bicycles."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ from tests.exact_motion import ExactGroup
 from tracking.filters.joint import JointEkf
 from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.hypotheses.alignment import Alignment
-from tracking.filters.joint.params import JointParams
+from tracking.filters.joint.params import JointParams, NoiseLearningParams
 from tracking.filters.joint.reference import JointReference
 from tracking.measurements import Kind
 from tracking.models.nlos import power_evidence
@@ -83,7 +83,7 @@ def follow(reference, block, first, last):
 )
 def test_runs_match_the_reference(vehicle, at_rest, powers):
     group, block = noisy(vehicle, at_rest, powers)
-    params = JointParams()
+    params = JointParams(noise_learning=NoiseLearningParams(learns=False))
     tracker = JointEkf(group.constellation, params)
     tracker.run(block.take(block.t[0] <= START), np.array([[START]]))
     state = tracker.save()

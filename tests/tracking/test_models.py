@@ -22,9 +22,9 @@ def function(name):
     if name != "non-holonomic":
         return MODELS[name].function
 
-    def with_yaw(v0, v1, error, yaw, yaw_rate, slip):
-        cos_yaw, sin_yaw = math.cos(yaw + error), math.sin(yaw + error)
-        return MODELS[name].function(v0, v1, error, cos_yaw, sin_yaw, slip * yaw_rate)
+    def with_yaw(v0, v1, error, ahead, slip, yaw, _, yaw_rate, aside):
+        c, s = math.cos(yaw + error), math.sin(yaw + error)
+        return MODELS[name].function(v0, v1, error, ahead, slip, c, s, yaw_rate, aside)
 
     return with_yaw
 

@@ -10,16 +10,20 @@ from tracking.filters.pair import mds_feedback, motion_constraints, nlos_model, 
 from tracking.filters.pair.params import PairEkfParams
 from tracking.filters.pair.state import FilterState, make_coefficients, make_layout, make_state
 from tracking.maths.mds import refine_positions, weighted_mds
+from tracking.mount import Mount
 from tracking.records import as_records
 from tracking.tracker import Tracker
 
 Y = {2: [0, 1, 3, 4], 3: [0, 1, 2, 3, 4, 5]}
 
 
+MOUNT = Mount(ahead=0.15, slip=0.018)
+
+
 def team(n=3, d=2, vehicle="car", params=None):
     """Coefficients, tables and the state of one running hypothesis with covariance 0.1."""
     params = params or PairEkfParams()
-    nodes = tuple(NodeConfig(id=k, vehicle=vehicle) for k in range(n))
+    nodes = tuple(NodeConfig(id=k, vehicle=vehicle, mount=MOUNT) for k in range(n))
     constellation = Constellation(nodes=nodes, dimensions=d)
     c = as_records(make_coefficients(constellation, params, use_mds=True))[0]
     s = make_state(constellation, params, 1, 1)
@@ -150,7 +154,7 @@ def test_a_right_range_with_a_strong_first_path_is_in_sight():
     assert x[0] == pytest.approx(2.0, abs=0.01)
 
 
-def roll(s, speeds, yaws, axle=0.15, slip=0.018, rates=(0.3, -0.2, 0.5)):
+def roll(s, speeds, yaws, axle=MOUNT.ahead, slip=MOUNT.slip, rates=(0.3, -0.2, 0.5)):
     """Let cars roll as their wheels allow; returns their velocities, (3, 2)."""
     s.nodes["yaw"], s.nodes["yaw_rate"] = yaws, rates
     f = np.stack([np.cos(yaws), np.sin(yaws)], axis=-1)

@@ -8,7 +8,7 @@ import numpy as np
 
 from tracking.arrays import Bool, whole_lines
 from tracking.constellation import Constellation
-from tracking.filters.joint.params import JointParams, UpdateParams
+from tracking.filters.joint.params import JointParams, NoiseLearningParams, UpdateParams
 from tracking.filters.joint.supervision.params import AlignmentParams, SupervisionParams
 from tracking.records import Records
 
@@ -77,7 +77,9 @@ _NUMBERS = (
     "node_bias_limit",
 )
 _DECISIONS = tuple(
-    f.name for kind in (SupervisionParams, AlignmentParams, UpdateParams) for f in fields(kind)
+    f.name
+    for kind in (SupervisionParams, AlignmentParams, UpdateParams, NoiseLearningParams)
+    for f in fields(kind)
 )
 COEFFICIENTS = np.dtype(
     [
@@ -126,7 +128,16 @@ def make_coefficients(constellation: Constellation, params: JointParams) -> Reco
     c["n"] = c["n_own"] = count_rows(constellation, params)
     c["n_motion"] = count_motion(constellation)
     for name in (*_NUMBERS, *_DECISIONS):
-        every = (e, v, s, params, params.supervision, params.alignment, params.update)
+        every = (
+            e,
+            v,
+            s,
+            params,
+            params.supervision,
+            params.alignment,
+            params.update,
+            params.noise_learning,
+        )
         sources = [p for p in every if hasattr(p, name)]
         c[name] = values[name] if name in values else getattr(sources[0], name)
     return c

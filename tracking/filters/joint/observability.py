@@ -62,7 +62,7 @@ def enforce_observability(c, s, h, work):
         s.accumulated_correction[h, :] = 0.0
         return
     is_far = moved2 > c.follow_share**2 * extent2
-    if is_far or moved2 * s.group[0].heading_gauge_var > c.follow_false**2 * c.white_var:
+    if is_far or moved2 * s.group[0].heading_gauge_var > c.follow_false**2 * s.group[0].white_var:
         flush_updates(s, h)
         shift_nullspace(c, s, h, min(1.0, c.follow_most * math.sqrt(extent2 / moved2)), work)
 

@@ -190,6 +190,23 @@ class UpdateParams:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class NoiseLearningParams:
+    """How the white noise of ranges is learned (`range_noise`); all are the authors' choice."""
+
+    learns: bool = True
+    """Whether it is; it stays that of `RangeErrorParams` otherwise."""
+    white_step: float = 0.01
+    """[-] Share by which a range moves the standard deviation."""
+    white_gap: float = 0.3
+    """[s] Two ranges of a pair are compared if they follow each other within this time."""
+    most_learned: float = 5.0
+    """[-] It becomes no more than this factor larger or smaller."""
+
+    def __post_init__(self) -> None:
+        check_numbers(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class JointParams:
     """One filter over all nodes."""
 
@@ -199,6 +216,7 @@ class JointParams:
     nlos: NlosParams = field(default_factory=NlosParams)
     """In the plane."""
     nlos_in_space: NlosParams = NLOS_IN_SPACE
+    noise_learning: NoiseLearningParams = field(default_factory=NoiseLearningParams)
     update: UpdateParams = field(default_factory=UpdateParams)
     start: JointStartParams = field(default_factory=JointStartParams)
     alignment: AlignmentParams = field(default_factory=AlignmentParams)

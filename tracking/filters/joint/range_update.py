@@ -22,6 +22,7 @@ from tracking.filters.joint.lever_arm import lever_arm_sensitivity
 from tracking.filters.joint.nlos_model import reset_bias_on_transition, update_nlos_posterior
 from tracking.filters.joint.observability import enforce_observability
 from tracking.filters.joint.propagation import displacement_since_epoch, time_since_epoch
+from tracking.filters.joint.range_noise import learn_white_noise, learns_noise
 from tracking.filters.joint.scalar_update import compute_pht, kalman_update
 from tracking.jit import kernel, small_kernel
 from tracking.models.lever_arm import lever_arm_slope, rotate_lever_arm
@@ -117,7 +118,7 @@ def second_order_variance(c, s, h, p, val):
         r2 = s.x[h, j + 2] - s.x[h, i + 2]
         trace += relative_covariance(s.P, h, i, j, 2, 2)
     gain = 0.5 * c.nonlinearity_gain / math.sqrt(r0 * r0 + r1 * r1 + r2 * r2 + 0.01)
-    if (gain * trace) ** 2 < NEGLIGIBLE * c.white_var:
+    if (gain * trace) ** 2 < NEGLIGIBLE * s.group[0].white_var:
         return 0.0  # and less by pending updates
     u0, u1, u2 = val[2], val[3], val[5] if c.d == 3 else 0.0
     along = u0 * u0 * relative_covariance(s.P, h, i, j, 0, 0) + u1 * u1 * relative_covariance(
@@ -148,6 +149,27 @@ def relative_covariance(P, h, i, j, a, b):
     return P[h, i + a, i + b] + P[h, j + a, j + b] - P[h, i + a, j + b] - P[h, j + a, i + b]
 
 
+@small_kernel
+def lasting_error(s, h, p):
+    """What is taken for the lasting error of the ranges of a pair [m]."""
+    at = s.pairs[p].i_range_error
+    return s.x[h, at] + s.x[h, at + 1] if at >= 0 else 0.0
+
+
+@small_kernel
+def distance_covariance(s, p, variance, w):
+    """Covariance of a predicted range and the distance in it, its lasting errors left out [m2].
+
+    Args:
+        s: JointState of one environment.
+        p: Pair.
+        variance: Of the range [m2].
+        w: ``P H``.
+    """
+    at = s.pairs[p].i_range_error
+    return variance - w[at] - w[at + 1] if at >= 0 else variance
+
+
 @kernel
 def range_update(c, s, h, p, dt, distance, levers, sight, work):
     """Correct hypothesis h with a range of pair p.
@@ -172,6 +194,7 @@ def range_update(c, s, h, p, dt, distance, levers, sight, work):
         enforce_observability(c, s, h, work)
     predicted, m = predict_range(c, s, h, p, levers[:3], levers[3:], work.idx, work.val)
     nu = distance - predicted
+    longer = nu + lasting_error(s, h, p)
     variance = compute_pht(s, h, m, work)
     open_var = 0.0
     if is_linear(s.group[0]):
@@ -179,7 +202,7 @@ def range_update(c, s, h, p, dt, distance, levers, sight, work):
         open_var = innovation_sensitivity(s, h, m, work)
     bent = second_order_variance(c, s, h, p, work.val)
     expected = variance + open_var + bent
-    S = expected + c.white_var
+    S = expected + s.group[0].white_var
     switched, sane, likelihood, is_far = update_nlos_posterior(
         c, s, h, p, dt, nu, expected, sight, work.w
     )
@@ -197,7 +220,7 @@ def range_update(c, s, h, p, dt, distance, levers, sight, work):
         variance = compute_pht(s, h, m, work)
         if is_linear(s.group[0]):
             open_var = innovation_sensitivity(s, h, m, work)
-    R = c.white_var + bent + s.nlos[h, p] * c.nlos_white_var
+    R = s.group[0].white_var + bent + s.nlos[h, p] * c.nlos_white_var
     nis = nu * nu / (variance + open_var + R)
     # Ranges of a pair that have long contradicted all others count less and less.
     doubt = s.pairs[p].mean_nis / (c.contradiction_share * c.pair_nis_limit)
@@ -208,4 +231,7 @@ def range_update(c, s, h, p, dt, distance, levers, sight, work):
         if is_linear(s.group[0]):
             accumulate_alignment_information(s, h, work, nu, variance + R / trust)
         kalman_update(s, h, work.w, nu, variance + R / trust)
+    if learns_noise(c, s):
+        gain = distance_covariance(s, p, variance, work.w) / (variance + R / max(trust, 1e-9))
+        learn_white_noise(c, s.group[0], s.pairs[p], longer, longer - gain * nu, dt)
     return before, misfit, nis, sane

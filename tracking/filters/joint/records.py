@@ -93,6 +93,8 @@ PAIR = np.dtype(
         ("surveyed", "f8"),  # surveyed distance [m]; 0 for none
         ("start_nlos_llr", "f8"),  # what their powers say: log-likelihood ratio of no sight
         ("n_ranges", "i8"),
+        ("residual", "f8"),  # its last range less the distance after it [m]
+        ("has_residual", "?"),
         ("n_rejected", "i8"),  # ranges that hardly counted
         ("i", "i8"),  # constant: node indices, i < j
         ("j", "i8"),
@@ -118,5 +120,6 @@ GROUP = np.dtype(
         ("misfit_limit", "f8"),  # how much of it brings up other rotations [-]
         ("nis_sum", "f8"),
         ("nis_n", "i8"),
+        ("white_var", "f8"),  # of ranges, as it is learned [m2]
     ]
 )

@@ -2,8 +2,8 @@
 
 One hypothesis of a running group of moving nodes in the plane, without lever arms: what is
 predicted, how ranges with NLOS, the non-holonomic constraint, zero velocity, the mean velocity and
-the gauge correct it. No hypotheses, no supervision, no start. Derivatives are complex
-steps [1], covariances are full products, updates have the Joseph form.
+the gauge correct it. No hypotheses, supervision, start or learning of noise. Derivatives are
+complex steps [1], covariances are full products, updates have the Joseph form.
 `tests/tracking/test_joint_reference.py` runs both on the same events.
 
 References:
@@ -222,9 +222,8 @@ class JointReference:
         prior = np.array([[1.0 - self.nlos[p]], [self.nlos[p]]]) * [[1.0 - a, a], [b, 1.0 - b]]
         enters = normal(nu - c["nlos_bias"], S + c["nlos_bias_var"])
         leaves = normal(nu + self.x[slow], leave_var)
-        chance = (
-            prior * [[normal(nu, S), enters], [leaves, normal(nu, S)]] * [1.0, np.exp(evidence)]
-        )
+        like = [[normal(nu, S), enters], [leaves, normal(nu, S)]]
+        chance = prior * like * [1.0, np.exp(evidence)]
         total = chance.sum()
         switched = (chance[0, 1] + chance[1, 0]) / total
         self.nlos[p] = hidden = np.clip(chance[:, 1].sum() / total, 1e-4, 1.0 - 1e-4)
@@ -286,9 +285,9 @@ class JointReference:
     @staticmethod
     def slides(node: Any, v: int, y: int, x: Any) -> Any:
         """Sideways velocity of an axle beside the slip of its tyres."""
-        yaw, w, m = np.arctan2(node["sin_yaw"], node["cos_yaw"]) + x[y], node["yaw_rate"], node["i_mount"]
+        yaw, w = np.arctan2(node["sin_yaw"], node["cos_yaw"]) + x[y], node["yaw_rate"]
+        m, cos, sin = node["i_mount"], np.cos(yaw), np.sin(yaw)
         ahead, slip = (x[m], x[m + 1]) if m >= 0 else (node["ahead"], node["slip"])
-        cos, sin = np.cos(yaw), np.sin(yaw)
         forward = cos * x[v] + sin * x[v + 1] + node["aside"] * w
         return cos * x[v + 1] - sin * x[v] - ahead * w + slip * w * forward**2
 

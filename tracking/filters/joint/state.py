@@ -26,6 +26,7 @@ from tracking.filters.joint.coefficients import (
     has_mount,
     has_offset,
     has_range_errors,
+    make_coefficients,
     moving_pairs,
 )
 from tracking.filters.joint.params import JointParams
@@ -204,6 +205,8 @@ def make_state(
         for pair in np.nonzero(moving_pairs(constellation))[0]:
             pairs["i_range_error"][:, pair] = fades
             fades += 2
+    group = np.zeros((n_envs, 1), dtype=GROUP)
+    group["white_var"] = make_coefficients(constellation, params)["white_var"]
     held = np.zeros((n_envs, n, 7))
     held[..., 0] = 1.0
     P = aligned(n_envs, n_hyps, n_states, n_states)  # noqa: N806
@@ -213,7 +216,7 @@ def make_state(
         last_attitude_accel=held,
         preintegrated=np.zeros((n_envs, n, N_PRE)),
         pairs=pairs,
-        group=np.zeros((n_envs, 1), dtype=GROUP),
+        group=group,
         x=aligned(n_envs, n_hyps, n_states),
         P=P,
         pending_updates=aligned(n_envs, n_hyps, room_to_wait(n_states), n_states),

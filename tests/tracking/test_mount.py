@@ -1,0 +1,83 @@
+"""Where a tracker sits on a car: what is given, what is expected, what is estimated."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.second_world.record import record
+from tests.second_world.world import draw
+from tracking.constellation import Constellation, NodeConfig
+from tracking.errors import ConfigError, LogError
+from tracking.filters.joint import JointEkf
+from tracking.filters.joint.params import JointParams
+from tracking.log import read_log, write_log
+from tracking.mount import Mount
+from tracking.tracker import Tracker
+from tracking.vehicles import VEHICLES
+
+CAR = VEHICLES["car"]
+
+
+def group(**mounts):
+    nodes = (NodeConfig(id=1, vehicle="car", **mounts), NodeConfig(id=2, vehicle="robot"))
+    return Constellation(nodes=nodes, dimensions=2)
+
+
+def test_what_is_given_has_no_variance_and_no_state():
+    known = Mount(ahead=0.2, slip=0.0)
+    assert known.prior(CAR) == (0.2, 0.0, 0.0, 0.0)
+    n = [
+        JointEkf(group(mount=m), JointParams())._state.nodes["i_mount"][0] for m in (known, Mount())
+    ]
+    assert n[0].tolist() == [-1, -1]
+    assert n[1][0] >= 0
+    assert n[1][1] == -1
+
+
+def test_a_tracker_is_expected_between_the_axles():
+    ahead, std, slip, slip_std = Mount(wheelbase=0.4).prior(CAR)
+    assert (ahead, std) == (0.2, 0.2)
+    assert (slip, slip_std) == (CAR.slip, CAR.slip_std)
+
+
+@pytest.mark.parametrize("name", ["ahead", "aside", "wheelbase", "slip"])
+@pytest.mark.parametrize("value", [np.nan, np.inf, -20.0, 20.0])
+def test_what_cannot_be_is_refused_by_name(name, value):
+    with pytest.raises(ConfigError, match=rf"nodes\.1\.mount\.{name}: expected"):
+        group(mount=Mount(**{name: value}))
+
+
+@pytest.fixture(scope="module")
+def run():
+    return record(draw(14, seconds=40.0, long_share=0.0))
+
+
+def test_a_log_keeps_it(run, tmp_path):
+    mounts = Mount(ahead=-0.1, aside=0.02), Mount(wheelbase=0.3, slip=0.01), Mount()
+    nodes = tuple(replace(n, mount=m) for n, m in zip(run.constellation.nodes, mounts, strict=True))
+    log = replace(run, constellation=replace(run.constellation, nodes=nodes))
+    write_log(tmp_path / "log", log)
+    assert [n.mount for n in read_log(tmp_path / "log").constellation.nodes] == list(mounts)
+    meta = tmp_path / "log" / "meta.toml"
+    meta.write_text(meta.read_text().replace("ahead_m", "ahead"))
+    with pytest.raises(LogError, match=r"nodes\.1\.mount: expected ahead_m, .*found ahead"):
+        read_log(tmp_path / "log")
+
+
+def test_curves_tell_how_far_ahead_of_its_axle_it_is(run):
+    """Within three standard deviations, which have become less than at first."""
+    world, filters = draw(14, seconds=40.0, long_share=0.0), []
+
+    def built(constellation, params, n_envs=1):
+        filters.append(JointEkf(constellation, JointParams(), n_envs))
+        return filters[-1]
+
+    Tracker(run.constellation, filter=built).run(run.block, np.array([39.0]))
+    state = filters[0].save()
+    h = int(state.group["best"][0, 0])
+    for node, vehicle in zip(state.nodes[0], world.vehicles, strict=True):
+        at = node["i_mount"]
+        std = np.sqrt(state.P[0, h, at, at])
+        assert std < 0.6 * CAR.ahead_std
+        assert abs(state.x[0, h, at] - vehicle.ahead) < 3.0 * std

@@ -1,0 +1,47 @@
+"""The white noise of ranges is learned from how two of a pair in a row differ."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tracking.constellation import Constellation, NodeConfig
+from tracking.filters.joint.coefficients import make_coefficients
+from tracking.filters.joint.params import JointParams
+from tracking.filters.joint.range_noise import learn_white_noise
+from tracking.filters.joint.records import GROUP, PAIR
+
+PLAIN = Constellation(nodes=(NodeConfig(id=1), NodeConfig(id=2)), dimensions=2)
+
+
+def learned(residuals, dt=0.05, **params):
+    c = make_coefficients(PLAIN, JointParams(**params)).view(np.recarray)[0]
+    group, pair = (np.zeros(1, kind).view(np.recarray)[0] for kind in (GROUP, PAIR))
+    group.white_var = c.white_var
+    for residual in residuals:
+        learn_white_noise(c, group, pair, residual, residual, dt)
+    return float(np.sqrt(group.white_var))
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    std=st.floats(0.015, 0.2), offset=st.floats(-1.0, 1.0), share=st.floats(0.0, 0.1),
+    seed=st.integers(0, 2**31),
+)  # fmt: skip
+def test_it_is_found_beside_what_lasts_and_beside_what_is_long(std, offset, share, seed):
+    """One in ten ranges is metres long, for twenty ranges at a time: two differences each."""
+    rng = np.random.default_rng(seed)
+    long = np.repeat(rng.random(100) < share, 20) * 1.5
+    found = learned(offset + long + std * rng.standard_normal(2000))
+    assert found == pytest.approx(std, rel=0.25)
+
+
+def test_it_stays_within_its_limits():
+    first, most = JointParams().range_error.white_std, JointParams().noise_learning.most_learned
+    assert learned(np.zeros(3000)) == pytest.approx(first / most)
+    assert learned(1e3 * np.resize([1.0, -1.0], 3000)) == pytest.approx(first * most)
+
+
+def test_ranges_that_follow_late_tell_nothing():
+    first = JointParams().range_error.white_std
+    assert learned(np.resize([1.0, -1.0], 100), dt=1.0) == pytest.approx(first)
