@@ -24,8 +24,8 @@ MEASURES = runpy.run_path(str(Path(__file__).parents[2] / "docs" / "measure_worl
 
 @pytest.fixture(scope="module")
 def drives():
-    """Eight drives of cars-nlos."""
-    return [simulate(scenario="cars-nlos", seconds=60.0, seed=seed) for seed in range(400, 408)]
+    """Sixteen drives of cars-nlos."""
+    return [simulate(scenario="cars-nlos", seconds=60.0, seed=seed) for seed in range(400, 416)]
 
 
 @pytest.mark.parametrize(("name", "hides"), [

@@ -221,8 +221,7 @@ class JointReference:
         a, b = np.array(rates) / sum(rates) * -np.expm1(-sum(rates) * (t - pair["t_range"]))
         prior = np.array([[1.0 - self.nlos[p]], [self.nlos[p]]]) * [[1.0 - a, a], [b, 1.0 - b]]
         enters = normal(nu - c["nlos_bias"], S + c["nlos_bias_var"])
-        leaves = normal(nu + self.x[slow], leave_var)
-        like = [[normal(nu, S), enters], [leaves, normal(nu, S)]]
+        like = [[normal(nu, S), enters], [normal(nu + self.x[slow], leave_var), normal(nu, S)]]
         chance = prior * like * [1.0, np.exp(evidence)]
         total = chance.sum()
         switched = (chance[0, 1] + chance[1, 0]) / total
