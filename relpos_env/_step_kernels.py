@@ -145,28 +145,35 @@ def sense(bodies, sensors, radio, members, scenes, dt, events, e):
         accel[e, n, 0] = (body[e, n, 3] - accel[e, n, 0]) / dt
         accel[e, n, 1] = (body[e, n, 4] - accel[e, n, 1]) / dt
         turn[e, n] = (body[e, n, 2] - turn[e, n]) / dt
+        spin_up = (turn[e, n] - bodies.turned[e, n]) / dt
+        bodies.turned[e, n] = turn[e, n]
         heading, roll, pitch = body[e, n, 2], drive[e, n, ROLL], drive[e, n, PITCH]
-        events.pose[e, step, n, 0] = body[e, n, 0]
-        events.pose[e, step, n, 1] = body[e, n, 1]
+        level = (math.cos(heading), math.sin(heading))
+        ahead, aside = sensors.mount[e, n, 0], sensors.mount[e, n, 1]
+        x = body[e, n, 0] + level[0] * ahead - level[1] * aside
+        y = body[e, n, 1] + level[1] * ahead + level[0] * aside
+        events.pose[e, step, n, 0] = x
+        events.pose[e, step, n, 1] = y
         events.pose[e, step, n, 2] = heading
         events.pose[e, step, n, 3] = roll
         events.pose[e, step, n, 4] = pitch
-        level = (math.cos(heading), math.sin(heading))
         roll, pitch = cosine_sine(roll), cosine_sine(pitch)
-        place_antenna(sensors, scenes, body, level, roll, pitch, e, n)
+        place_antenna(sensors, scenes, (x, y), level, roll, pitch, e, n)
         if not bodies.powered[e, n] or k + 2 > events.t.shape[1]:
             continue
         c, s = level
         forward = c * accel[e, n, 0] + s * accel[e, n, 1]
         left = c * accel[e, n, 1] - s * accel[e, n, 0]
+        # The tracker goes round the centre of mass.
+        forward -= turn[e, n] * turn[e, n] * ahead + spin_up * aside
+        left += spin_up * ahead - turn[e, n] * turn[e, n] * aside
         truth = felt_on_car(
             turn[e, n], forward, left, roll, pitch, drive[e, n, ROLL_RATE], drive[e, n, PITCH_RATE],
         )  # fmt: skip
         velocity = c * body[e, n, 3] + s * body[e, n, 4]
-        at = (body[e, n, 0], body[e, n, 1])
         read_magnetometer(
-            sensors.mag[e], sensors.mag_seed[e], tick, sensors.waves, sensors.hard_iron, e, n, at,
-            level, roll, pitch, events.values, k,
+            sensors.mag[e], sensors.mag_seed[e], tick, sensors.waves, sensors.hard_iron, e, n,
+            (x, y), level, roll, pitch, events.values, k,
         )  # fmt: skip
         write_own(events, e, k, t, MAG, n)
         read_imu(
@@ -208,10 +215,10 @@ def write_own(events, e, k, t, kind, n):
 
 
 @small_kernel
-def place_antenna(sensors, scenes, body, heading, roll, pitch, e, n):
+def place_antenna(sensors, scenes, at, heading, roll, pitch, e, n):
     """Move the antenna of a car on: where it was, and where it is on its mast.
 
-    The angles are pairs of cosine and sine.
+    The angles are pairs of cosine and sine, `at` is where the tracker is [m].
     """
     before, now, h = scenes.pos0, scenes.pos1, sensors.mast[e]
     for a in range(3):
@@ -220,6 +227,6 @@ def place_antenna(sensors, scenes, body, heading, roll, pitch, e, n):
     cr, sr = roll
     cp, sp = pitch
     ahead, left = h * sp * cr, -h * sr
-    now[e, n, 0] = body[e, n, 0] + c * ahead - s * left
-    now[e, n, 1] = body[e, n, 1] + s * ahead + c * left
+    now[e, n, 0] = at[0] + c * ahead - s * left
+    now[e, n, 1] = at[1] + s * ahead + c * left
     now[e, n, 2] = h * cp * cr

@@ -32,6 +32,8 @@ class Bodies(NamedTuple):
     """Mean acceleration over the last step, world frame, (env, car, 2) [m/s2]."""
     turn: Array
     """Mean yaw rate over the last step, (env, car) [rad/s]."""
+    turned: Array
+    """The same over the step before, (env, car) [rad/s]."""
     present: Array
     """The car is in the room, (env, car)."""
     powered: Array
@@ -72,6 +74,7 @@ def make_bodies(n_envs: int, n_cars: int, n_boxes: int) -> Bodies:
         wrench=np.zeros((e, n, 3)),
         accel=np.zeros((e, n, 2)),
         turn=np.zeros((e, n)),
+        turned=np.zeros((e, n)),
         present=np.zeros((e, n), dtype=bool),
         powered=np.zeros((e, n), dtype=bool),
         contacts=np.zeros((e, n)),
@@ -98,7 +101,17 @@ def place_bodies(b: Bodies, env: int, episode: Episode, room: tuple[float, float
         episode: What it is made of.
         room: Width and depth [m].
     """
-    for array in (b.body, b.drive, b.wrench, b.accel, b.turn, b.contacts, b.boxes, b.box_body):
+    for array in (
+        b.body,
+        b.drive,
+        b.wrench,
+        b.accel,
+        b.turn,
+        b.turned,
+        b.contacts,
+        b.boxes,
+        b.box_body,
+    ):
         array[env] = 0.0
     b.touched[env] = LONG_AGO
     b.boxes[env] = NO_BOX

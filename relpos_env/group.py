@@ -136,7 +136,7 @@ class Group:
             if not _makes_sense(event, b.present[env]):
                 continue
             if event.what == "join":
-                b.body[env, n], b.drive[env, n] = 0.0, 0.0
+                b.body[env, n], b.drive[env, n], b.turned[env, n] = 0.0, 0.0, 0.0
                 b.body[env, n, :3] = event.pose
                 antennas[env, n, :2] = b.body[env, n, :2]
                 b.present[env, n] = True

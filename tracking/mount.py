@@ -10,6 +10,13 @@ from tracking.vehicles import VehicleParams
 
 FARTHEST = 10.0
 """[m] No vehicle that this is for is larger."""
+KEYS = {
+    "ahead_m": "ahead",
+    "aside_m": "aside",
+    "wheelbase_m": "wheelbase",
+    "slip_s2_per_m": "slip",
+}
+"""Of a table ``[nodes.ID.mount]`` in meta.toml or swarm.toml, and the fields that they are."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

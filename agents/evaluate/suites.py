@@ -68,6 +68,10 @@ class Suite:
     """[s] Length of a run by default."""
 
 
+MOUNTS = Randomisation(
+    mount_ahead=(-0.15, 0.2), mount_aside=(-0.05, 0.05), friction=(0.8, 1.1), mass=(0.85, 1.2)
+)
+"""Trackers from the rear axle to the front bumper, and cars as at level 2."""
 PAPER = (
     Case(
         name="cars-los",
@@ -82,6 +86,14 @@ PAPER = (
         scenario=CARS_NLOS,
         paper={"paper-ekf": 0.428, "paper-ekf-mds": 0.102},
         asked={"ekf-mds": {"rmse_shape": 0.102}, "joint": {"rmse_yaw": 0.051, "rmse_shape": 0.030}},
+    ),
+    *(
+        Case(
+            name=f"{scenario.name}-mount",
+            about=f"{scenario.name}, every tracker somewhere else on its car, grip and load drawn",
+            scenario=replace(scenario, randomisation=MOUNTS),
+        )
+        for scenario in (CARS_LOS, CARS_NLOS)
     ),
     Case(
         name="human",

@@ -9,10 +9,21 @@ from typing import Any, Literal
 from hardware_bridge.config.keys import node_id, tables_of
 from tracking.constellation import Antenna, Constellation, NodeConfig
 from tracking.errors import ConfigError
+from tracking.mount import KEYS, Mount
 from tracking.tables import TableReader, Where
 
 FARTHEST = 10.0
 """[m] From a node to its antenna."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Mount:
+    """Its fields are the keys of `tracking.mount.KEYS`."""
+
+    ahead_m: float | None = None
+    aside_m: float = 0.0
+    wheelbase_m: float | None = None
+    slip_s2_per_m: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,6 +33,7 @@ class _Node:
     initial_heading_rad: float | None = None
     imu_hz: float = 100.0
     mag_hz: float | None = None
+    mount: _Mount = _Mount()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,6 +59,11 @@ def read_constellation(
         node = TableReader().read(_Node, table, at)
         if node.mag_hz is not None and not node.mag_hz > 0.0:
             raise at.key("mag_hz").error(f"expected above 0, got {node.mag_hz:g}")
+        mount = Mount(**{name: getattr(node.mount, name_m) for name_m, name in KEYS.items()})
+        try:
+            mount.check("mount")
+        except ConfigError as error:
+            raise at.error(str(error)) from error
         nodes.append(
             NodeConfig(
                 id=node_id(key, at),
@@ -55,6 +72,7 @@ def read_constellation(
                 initial_heading=node.initial_heading_rad,
                 imu_hz=node.imu_hz,
                 mag_hz=node.mag_hz,
+                mount=mount,
             )
         )
     for key, table in tables_of(raw, "antennas", where):

@@ -13,6 +13,7 @@ from relpos_env.sensors.magnetometer import MagSimParams
 from relpos_env.sensors.odometer import OdometerSimParams
 from relpos_env.sensors.radio.params import RadioSimParams
 from relpos_env.vehicle import CarParams
+from tracking.arrays import F64
 
 MOST_LOST = 0.9
 """[1] Share of messages lost, at most."""
@@ -31,6 +32,12 @@ def draw_car(car: CarParams, what: Randomisation, rng: np.random.Generator) -> C
     """Grip and mass."""
     grip, load = factor(what.friction, rng), factor(what.mass, rng)
     return replace(car, friction=grip * car.friction, mass=load * car.mass)
+
+
+def draw_mounts(n: int, what: Randomisation, rng: np.random.Generator) -> F64:
+    """Where trackers sit, ahead and left of the centre of mass, (car, 2) [m]."""
+    low, high = np.transpose([what.mount_ahead, what.mount_aside])
+    return rng.uniform(low, high, (n, 2))
 
 
 def draw_imu(imu: ImuSimParams, what: Randomisation, rng: np.random.Generator) -> ImuSimParams:

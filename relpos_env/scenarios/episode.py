@@ -10,7 +10,14 @@ from relpos_env.errors import EnvError
 from relpos_env.scenarios.base import Scenario
 from relpos_env.scenarios.checks import MOST_CARS
 from relpos_env.scenarios.clutter import draw_clutter
-from relpos_env.scenarios.draws import draw_car, draw_imu, draw_mag, draw_odometer, draw_radio
+from relpos_env.scenarios.draws import (
+    draw_car,
+    draw_imu,
+    draw_mag,
+    draw_mounts,
+    draw_odometer,
+    draw_radio,
+)
 from relpos_env.scenarios.floor import Floor
 from relpos_env.scenarios.life import LifeEvent, Pose, draw_life
 from relpos_env.scenarios.obstacle import Obstacle, boxes_of
@@ -23,7 +30,8 @@ from relpos_env.vehicle import CarParams
 from tracking.arrays import F64, Bool
 from tracking.short_repr import short_repr
 
-KINDS = ("number", "clutter", "car", "imu", "mag", "odometer", "radio", "leaving", "power", "joins")
+KINDS = ("number", "clutter", "car", "imu", "mag", "odometer", "radio", "leaving", "power", "joins",
+         "mounts")  # fmt: skip
 """What has a generator of its own. New kinds go to the end, so that the others stay."""
 DOORS = 8
 """[-] Places that cars join at, one after the other."""
@@ -44,6 +52,8 @@ class Episode:
     events: tuple[LifeEvent, ...]
     """By rising time."""
     car: CarParams
+    mounts: F64
+    """Where trackers sit, ahead and left of the centre of mass, (car, 2) [m]."""
     imu: ImuSimParams
     mag: MagSimParams
     odometer: OdometerSimParams
@@ -88,7 +98,8 @@ def draw_episode(
     start = np.zeros((n_slots, 3))
     start[:n] = poses
     present = np.arange(n_slots) < n
-    for array in (start, present):
+    mounts = draw_mounts(n_slots, what, rngs["mounts"])
+    for array in (start, present, mounts):
         array.setflags(write=False)
     places = _places_to_join(s, joins, poses, rngs["joins"]) if what.has_life and joins else []
     return Episode(
@@ -97,6 +108,7 @@ def draw_episode(
         present=present,
         events=draw_life(what, present, seconds, places, rngs["leaving"], rngs["power"]),
         car=draw_car(s.car, what, rngs["car"]),
+        mounts=mounts,
         imu=draw_imu(s.imu, what, rngs["imu"]),
         mag=draw_mag(s.mag, what, rngs["mag"]),
         odometer=draw_odometer(s.odometer, what, rngs["odometer"]),

@@ -63,6 +63,11 @@ class Randomisation:
     mass: Interval = SAME
     """[1] Factor on the mass of all cars."""
 
+    mount_ahead: Interval = NONE
+    """[m] How far the tracker of each car is ahead of its centre of mass."""
+    mount_aside: Interval = NONE
+    """[m] How far it is left of it."""
+
     leave_rate: Interval = NONE
     """[1/min] How often one of the cars is taken out of the room. Two always stay."""
     absence: Interval = (5.0, 20.0)
@@ -98,6 +103,8 @@ _LIMITS: dict[str, Interval] = {
     "obstacles": (0, 50),
     "obstacle_size": (0.05, 20.0),
     "antenna_delay": (0.0, 10.0),
+    "mount_ahead": (-1.0, 1.0),
+    "mount_aside": (-1.0, 1.0),
     "leave_rate": (0.0, 60.0),
     "absence": (0.1, 3600.0),
     "power_off_rate": (0.0, 60.0),

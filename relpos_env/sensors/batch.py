@@ -42,6 +42,8 @@ class Sensors(NamedTuple):
     """(env, car, 3)"""
     mast: Array
     """Height of the antenna over the tracker [m], (env)."""
+    mount: Array
+    """Tracker ahead and left of the centre of mass [m], (env, car, 2)."""
     odometer: Array
     """ODOMETER, (env)."""
     odometer_seed: Array
@@ -83,6 +85,7 @@ def make_sensors(n_envs: int, n_cars: int, n_waves: int) -> Sensors:
         waves=np.zeros((e, n_waves, N_WAVE)),
         hard_iron=np.zeros((e, n, 3)),
         mast=np.zeros(e),
+        mount=np.zeros((e, n, 2)),
         odometer=np.zeros(e, dtype=ODOMETER),
         odometer_seed=np.zeros(e, dtype=np.uint64),
         proximity=np.zeros(e, dtype=PROXIMITY),
@@ -107,6 +110,7 @@ def start_sensors(s: Sensors, env: int, episode: Episode, rng: np.random.Generat
     start_imus(as_records(s.imu)[env], s.imu_seed[env], s.bias, s.drift, env)
     start_magnetometers(as_records(s.mag)[env], s.mag_seed[env], s.waves, s.hard_iron, env)
     s.mast[env] = episode.radio.antenna_height
+    s.mount[env] = episode.mounts
 
 
 def make_events(n_envs: int, n_cars: int, n_steps: int, n_ranges: int) -> Events:

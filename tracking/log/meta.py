@@ -10,7 +10,7 @@ from typing import Any
 from tracking.constellation import Antenna, Constellation, NodeConfig
 from tracking.errors import ConfigError, LogError
 from tracking.log.folder import FORMAT
-from tracking.mount import Mount
+from tracking.mount import KEYS, Mount
 
 MOST = 1e12
 """Numbers beyond this mean nothing in any unit."""
@@ -92,15 +92,12 @@ def _node(key: str, table: Any) -> NodeConfig:
 
 
 def _mount(where: str, table: Any) -> Mount:
-    names = {"ahead_m": "ahead", "aside_m": "aside", "wheelbase_m": "wheelbase"}
-    names["slip_s2_per_m"] = "slip"
-    unknown = set(_table(where, table)) - set(names)
+    unknown = set(_table(where, table)) - set(KEYS)
     if unknown:
         raise LogError(
-            f"meta.toml, {where}: expected {', '.join(names)}, found {', '.join(sorted(unknown))}"
+            f"meta.toml, {where}: expected {', '.join(KEYS)}, found {', '.join(sorted(unknown))}"
         )
-    given = {names[key]: _number(f"{where}.{key}", value) for key, value in table.items()}
-    return Mount(**given)
+    return Mount(**{KEYS[key]: _number(f"{where}.{key}", v) for key, v in table.items()})
 
 
 def _antenna(key: str, table: Any) -> Antenna:

@@ -17,7 +17,7 @@ from tracking.constellation import NodeConfig
 from tracking.errors import LogError
 from tracking.log.folder import ACC, FORMAT, GYR, MAG, POWERS, QUAT, Log
 from tracking.measurements import Kind, MeasurementBlock
-from tracking.mount import Mount
+from tracking.mount import KEYS, Mount
 
 
 def write_log(folder: Path | str, log: Log) -> Path:
@@ -99,10 +99,8 @@ def _meta(log: Log) -> str:
 
 
 def _mount(node: NodeConfig) -> list[str]:
-    mount = node.mount
-    given = {"ahead_m": mount.ahead, "aside_m": mount.aside, "wheelbase_m": mount.wheelbase}
-    given["slip_s2_per_m"] = mount.slip
-    known = [f"{name} = {float(value)!r}" for name, value in given.items() if value is not None]
+    given = ((key, getattr(node.mount, name)) for key, name in KEYS.items())
+    known = [f"{key} = {float(value)!r}" for key, value in given if value is not None]
     return ["", f"[nodes.{node.id}.mount]", *known]
 
 
