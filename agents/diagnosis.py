@@ -6,9 +6,14 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from agents.hearing import Formats, Hearing, Voice, why_nothing_fits
 from hardware_bridge.live.naming import node_of
 from hardware_bridge.live.sample_rates import PAUSE, WINDOW, is_off
+from tracking.constellation import NodeConfig
+from tracking.findings import KINDS
+from tracking.findings.at_rest import find_in_samples
 
 if TYPE_CHECKING:
     from agents.doctor import CarLike, LinkLike
@@ -83,7 +88,7 @@ def diagnose_link(
     seconds: float,
     down: str,
     losses: int,
-    imu_hz: Mapping[int, float],
+    nodes: Mapping[int, NodeConfig],
 ) -> LinkReport:
     """A stream that measures.
 
@@ -94,7 +99,7 @@ def diagnose_link(
         seconds: How long [s].
         down: Why the port is not open; empty if it is.
         losses: How often the port was lost meanwhile.
-        imu_hz: How often inertial samples come, as configured, by id of the node [1/s].
+        nodes: Those of the configuration, by id.
     """
     report = _report(link.port.name, link.port.port, link.format, hearing, seconds, down)
     voices = hearing.voices.get(link.format, {})
@@ -107,7 +112,8 @@ def diagnose_link(
         report.problems.append(fatal)
     else:
         report.problems += _flaws(report, hearing, seconds)
-        report.problems += _wrong_rates(report, imu_hz, seconds)
+        report.problems += _wrong_rates(report, nodes, seconds)
+        report.problems += _wrong_samples(link, voices, nodes)
         report.problems += _strangers(link, voices)
     if losses:
         report.problems.append(_lost(losses))
@@ -237,15 +243,32 @@ def _flaws(report: LinkReport, hearing: Hearing, seconds: float) -> list[str]:
     return flaws
 
 
-def _wrong_rates(report: LinkReport, imu_hz: Mapping[int, float], seconds: float) -> list[str]:
+def _wrong_samples(
+    link: LinkLike, voices: Mapping[str | None, Voice], nodes: Mapping[int, NodeConfig]
+) -> list[str]:
+    """What IMUs read that they cannot at rest."""
+    problems = []
+    for device, voice in voices.items():
+        known = _node_of(device, link)
+        if known is None or known not in nodes or not voice.samples:
+            continue
+        node = nodes[known]
+        values = np.array(voice.samples)
+        for found in find_in_samples(node, np.arange(len(values)) / node.imu_hz, values):
+            if found.severity != "note":
+                problems.append(f"{found.text}: {KINDS[found.name].remedy}")
+    return problems
+
+
+def _wrong_rates(report: LinkReport, nodes: Mapping[int, NodeConfig], seconds: float) -> list[str]:
     """Nodes whose samples come at another rate than the configured one."""
     if seconds < WINDOW or report.gap_s > PAUSE:
         return []  # too short to say, or there were none for a while
     return [
         f"node {node.node}: {node.imu_hz:.0f} inertial samples a second, configured "
-        f"{imu_hz[int(node.node)]:g}: set imu_hz, or every turn is taken for another"
+        f"{nodes[int(node.node)].imu_hz:g}: set imu_hz, or every turn is taken for another"
         for node in report.nodes
-        if node.known and node.imu_hz > 0.0 and is_off(node.imu_hz, imu_hz[int(node.node)])
+        if node.known and node.imu_hz > 0.0 and is_off(node.imu_hz, nodes[int(node.node)].imu_hz)
     ]
 
 

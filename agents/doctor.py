@@ -192,7 +192,7 @@ def doctor(
             seconds=listened,
             down=reasons[link.port.name],
             losses=losses[link.port.name],
-            imu_hz={node.id: node.imu_hz for node in config.constellation.nodes},
+            nodes={node.id: node for node in config.constellation.nodes},
         )
         for link in config.links
     ]

@@ -62,12 +62,18 @@ def known_formats() -> Formats:
     return formats
 
 
+MOST_SAMPLES = 5000
+"""[-] Of an IMU, that are looked at."""
+
+
 @dataclass(slots=True)
 class Voice:
     """One device on a port."""
 
     readings: int = 0
     imu: int = 0
+    samples: list[tuple[float, ...]] = field(default_factory=list)
+    """Angular rates and specific forces of the first `MOST_SAMPLES`."""
     ranges: dict[tuple[str | None, str], int] = field(default_factory=dict)
     """How many between which ends; the first is None where it is the speaker."""
     positions: int = 0
@@ -83,7 +89,7 @@ class Voice:
 
 
 class Hearing:
-    """Takes the bytes of one port; keeps numbers, no bytes and no readings."""
+    """Takes the bytes of one port; keeps numbers and some inertial samples, no bytes."""
 
     def __init__(self, formats: Formats, key: bytes | None = None) -> None:
         """Listen with every format.
@@ -210,6 +216,8 @@ def _count(voices: dict[str | None, Voice], reading: Reading) -> None:
     voice.readings += 1
     if isinstance(reading, ImuReading | StateReading):
         voice.imu += 1
+        if isinstance(reading, ImuReading) and len(voice.samples) < MOST_SAMPLES:
+            voice.samples.append((*reading.gyr, *reading.acc))
     elif isinstance(reading, RangeReading):
         ends = reading.nearer, reading.to
         voice.ranges[ends] = voice.ranges.get(ends, 0) + 1

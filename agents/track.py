@@ -17,8 +17,9 @@ from tracking.bounds import Bound
 from tracking.constellation import Constellation
 from tracking.estimate import Status, TeamEstimate
 from tracking.filters import DEFAULT_FILTER
+from tracking.findings import Finding, examine, find_unplaced, refuse_errors
 from tracking.horizon import HorizonParams
-from tracking.log import Log, notes_on, notes_on_estimate, read_log
+from tracking.log import Log, read_log
 from tracking.measurements import MeasurementBlock
 from tracking.metrics import Score, score
 from tracking.short_repr import short_repr
@@ -60,6 +61,8 @@ class TrackResult:
     """[-] Duration of the log over the time that tracking took."""
     bound: Bound | None = None
     """The expected errors of an efficient estimator, where asked for."""
+    findings: tuple[Finding, ...] = ()
+    """What a reader should know of the recording and of what became of it."""
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -90,15 +93,10 @@ class TrackResult:
             "ok_share": s.ok_share,
             "integrity_share": s.integrity_share,
             "integrity_worst_s": s.integrity_worst_s,
-            "notes": self.notes,
+            "findings": [f.record for f in self.findings],
             "rejected": self.n_rejected,
             "skipped": sum(self.log.skipped.values()),
         }
-
-    @property
-    def notes(self) -> list[str]:
-        """What a reader should know of the recording and of what became of it, a line each."""
-        return [*notes_on(self.log), *notes_on_estimate(self.log, self.estimate)]
 
     @property
     def expected(self) -> dict[str, float]:
@@ -116,6 +114,7 @@ def track_log(
     smooth: bool = False,
     bound: Bound | None = None,
     params: TrackerParams | None = None,
+    findings: Sequence[Finding] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> TrackResult:
     """Track a recorded run and score it where there is truth.
@@ -129,13 +128,18 @@ def track_log(
         bound: The expected errors of an efficient estimator, kept beside those there are
             (`tracking.bounds.recorded_bound`).
         params: What the tracker believes.
+        findings: What `tracking.findings.examine` found of the log already, or nothing, for a log
+            that is to be taken as it is; None examines it, and corrects its clocks.
         progress: Called with the share done, 0 to 1.
 
     Raises:
-        LogError: The folder cannot be read.
+        LogError: The folder cannot be read, or estimates would be wrong (`refuse_errors`).
         ConfigError: No such filter, or one that cannot smooth.
     """
     log = log if isinstance(log, Log) else read_log(log)
+    if findings is None:
+        log, findings = examine(log)
+        refuse_errors(findings)
     constellation, block = log.constellation, log.block
     tracker = Tracker(constellation, params, filter=filter)
     first, last = log.t_range
@@ -164,6 +168,7 @@ def track_log(
     elapsed = time.perf_counter() - started
     estimate = _join(constellation, parts)
 
+    found = (*findings, *find_unplaced(log, estimate))
     truth, has_truth = log.truth.pairs(constellation, t_out)
     at_truth = np.isin(t_out, t_truth)
     on_grid = np.isin(t_out, grid)
@@ -181,6 +186,7 @@ def track_log(
         skip=skip,
         realtime_factor=log.duration / max(elapsed, 1e-9),
         bound=bound,
+        findings=found,
     )
 
 

@@ -34,9 +34,9 @@ often it gets it back; taken for other rooms with obstacles and for bodies, too.
 NEVER = 1e-9
 """[1/s] or [-] What does not happen; the filter takes logarithms of it."""
 SIDEWAYS = 0.035
-"""[m/s] Slip of rear axles that no mount and cornering stiffness explains, as white noise 20 times a
-second: what is white and has the same mean over 8 s, 40 drives. In half of them it is below 0.015; a
-crash is most of it."""
+"""[m/s] Slip of rear axles that no mount and cornering stiffness explains, as white noise 20 times
+a second: what is white and has the same mean over 8 s, 40 drives. In half of them it is below
+0.015; a crash is most of it."""
 
 
 def matched_params(scenario: Scenario | HumanScenario) -> JointParams:

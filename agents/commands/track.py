@@ -37,6 +37,11 @@ from agents.errors import UsageError
     is_flag=True,
     help="Also show the expected errors of an efficient estimator; needs truth.",
 )
+@click.option(
+    "--no-checks",
+    is_flag=True,
+    help="Track the log as it is, whatever its sensors, clocks and ranges look like.",
+)
 @click.option("--skip", default=10.0, show_default=True, help="Seconds that are not scored.")
 @click.option("--out", type=Path, help="Folder for estimates.csv and report.html.")
 @click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
@@ -46,6 +51,7 @@ def track(
     calibrations: tuple[Path, ...],
     smooth: bool,
     bound: bool,
+    no_checks: bool,
     skip: float,
     out: Path | None,
     as_json: bool,
@@ -58,6 +64,7 @@ def track(
     from agents.warm_up import warm_up_first
     from tracking.bounds import recorded_bound
     from tracking.filters import DEFAULT_FILTER, filter_builder
+    from tracking.findings import examine, refuse_errors
     from tracking.log import read_log
 
     if not 0.0 <= skip < float("inf"):
@@ -65,25 +72,33 @@ def track(
     names = tuple(dict.fromkeys(filters)) or (DEFAULT_FILTER,)
     for name in names:
         filter_builder(name)
-        if smooth and name != "joint":
-            raise UsageError(f"--smooth: expected filter joint, {name} cannot look back")
+    if smooth and names != ("joint",):
+        raise UsageError(f"--smooth: expected filter joint alone, not {', '.join(names)}")
     if out is not None:
         check_folder(out, ["report.html"])
     read = [apply_calibrations(read_log(path), calibrations) for path in logs]
-    warm_up_first(names)
+    warm_up_first(names if no_checks else (*names, DEFAULT_FILTER))
     results: list[TrackResult] = []
-    for log in read:
+    checked = [(log, []) if no_checks else examine(log) for log in read]
+    refuse_errors([finding for _, found in checked for finding in found])
+    for log, found in checked:
         expected = recorded_bound(log, skip=skip) if bound else None
         for name in names:
             label = f"{log.name}, {name}"
             with progress_bar(label, shown=log.duration > 20.0) as report:
                 results.append(
                     track_log(
-                        log, filter=name, skip=skip, smooth=smooth, bound=expected, progress=report
+                        log,
+                        filter=name,
+                        skip=skip,
+                        smooth=smooth,
+                        bound=expected,
+                        findings=found,
+                        progress=report,
                     )
                 )
-    for line in dict.fromkeys(f"{r.log.name}: {note}" for r in results for note in r.notes):
-        click.echo(line, err=True)
+    told = {f"{r.log.name}, {f.severity}: {f.text}": None for r in results for f in r.findings}
+    click.echo("\n".join(told), err=True, nl=bool(told))
     if out is not None:
         many = len(results) > 1
         files = {"report.html": track_report(results)}

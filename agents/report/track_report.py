@@ -10,6 +10,7 @@ import numpy as np
 from agents.report.page import Page, metres, percent
 from agents.track import ERRORS, TrackResult, pair_name
 from tracking.estimate import Status
+from tracking.findings import KINDS
 from tracking.integrity import LIMIT, SIGMAS
 from tracking.measurements import Kind
 from tracking.metrics import errors_after
@@ -65,8 +66,8 @@ def _add_result(page: Page, r: TrackResult) -> None:
         f"was an estimate for {percent(r.score.coverage)}, with status ok for "
         f"{percent(r.score.ok_share)}."
     )
-    for note in r.notes:
-        page.text(f"Note: {note}.")
+    for found in r.findings:
+        page.text(f"{found.severity.capitalize()}: {found.text}; {KINDS[found.name].remedy}.")
     constellation = log.constellation
     rows = []
     for p in range(constellation.n_pairs):

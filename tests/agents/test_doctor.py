@@ -27,6 +27,7 @@ from hardware_bridge.readings import (
     ScanReading,
     Source,
 )
+from tracking.constellation import NodeConfig
 
 
 def link(port="p", format="alpha", name="left", baud=115200, node=None, ids=None, key=None):
@@ -39,7 +40,7 @@ def car(port, node=1, driver="vesc"):
 
 
 def config(*links, cars=()):
-    group = SimpleNamespace(nodes=[SimpleNamespace(id=4, imu_hz=100.0)])
+    group = SimpleNamespace(nodes=[NodeConfig(id=4, vehicle="car")])
     return SimpleNamespace(links=links, cars=cars, constellation=group)
 
 
@@ -60,7 +61,7 @@ def diagnose(pieces, formats=FORMATS, down="", losses=0, seconds=None, imu_hz=10
         seconds=seconds or 0.01 * max(1, len(pieces)),
         down=down,
         losses=losses,
-        imu_hz=dict.fromkeys(range(10), imu_hz),
+        nodes={k: NodeConfig(id=k, vehicle="car", imu_hz=imu_hz) for k in range(10)},
     )
 
 
@@ -135,7 +136,13 @@ def test_damage_gaps_and_losses():
     hearing.silent_until(5_000_000_000)
     each = link()
     report = diagnose_link(
-        each, hearing, FORMATS, seconds=5.0, down="", losses=2, imu_hz={4: 100.0}
+        each,
+        hearing,
+        FORMATS,
+        seconds=5.0,
+        down="",
+        losses=2,
+        nodes={4: NodeConfig(id=4, vehicle="car")},
     )
     assert report.problems[0].startswith("silent for 4.0 s")
     assert report.problems[1].startswith("lost 2 times while listening")

@@ -5,7 +5,8 @@ import pytest
 
 from tracking import Constellation, NodeConfig
 from tracking.errors import LogError
-from tracking.log import Log, notes_on, read_log, write_log
+from tracking.findings import find_unused
+from tracking.log import Log, read_log, write_log
 from tracking.log.inertial import with_rates
 from tracking.measurements import Kind, MeasurementBlock
 
@@ -65,12 +66,14 @@ def test_a_magnetometer_on_another_clock_is_refused(tmp_path, scale):
 
 def test_what_cannot_be_used_is_said():
     t = np.arange(0.0, SECONDS, 0.01)
-    assert notes_on(log_of([(0, t), (1, t)], [(0, t), (1, t)])) == []
-    assert notes_on(log_of([(0, t)], heading="initial", headings=(0.3, None))) == []
-    [note] = notes_on(log_of([(0, t), (1, t)], [(0, t)]))
-    assert note.startswith("node 2: no magnetometer")
-    [note] = notes_on(log_of([(0, t), (1, t)], heading="initial"))
-    assert note.startswith("nodes 1, 2: no initial_heading_rad")
+    assert find_unused(log_of([(0, t), (1, t)], [(0, t), (1, t)])) == []
+    assert find_unused(log_of([(0, t)], heading="initial", headings=(0.3, None))) == []
+    [found] = find_unused(log_of([(0, t), (1, t)], [(0, t)]))
+    assert (found.name, found.nodes) == ("no-magnetometer", (2,))
+    assert found.text.startswith("node 2: no magnetometer")
+    [found] = find_unused(log_of([(0, t), (1, t)], heading="initial"))
+    assert (found.name, found.nodes) == ("no-heading", (1, 2))
+    assert found.text.startswith("nodes 1, 2: no initial_heading_rad")
 
 
 def test_a_log_is_written_where_one_stands(tmp_path, monkeypatch):

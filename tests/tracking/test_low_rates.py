@@ -7,8 +7,9 @@ import pytest
 
 from tests.exact_motion import ExactGroup
 from tracking import Status, Tracker
+from tracking.findings import find_unplaced, find_unused
 from tracking.integrity import wrong_while_ok
-from tracking.log import Log, notes_on, notes_on_estimate
+from tracking.log import Log
 from tracking.measurements import Kind
 
 
@@ -57,15 +58,16 @@ def test_what_was_never_placed_is_told_with_what_it_lacks():
     block = block.take(~few)
     log = Log(name="one-pair", constellation=group.constellation, block=block)
     estimate = Tracker(group.constellation).run(block, np.arange(0.5, 7.9, 0.1)).take(0)
-    (note,) = notes_on_estimate(log, estimate)
-    assert "node 13 was never placed" in note
-    assert "with 1 nodes" in note
-    assert "each of 3 placed nodes" in note
+    (found,) = find_unplaced(log, estimate)
+    assert found.nodes == (13,)
+    assert "node 13 was never placed" in found.text
+    assert "with 1 nodes" in found.text
+    assert "each of 3 placed nodes" in found.text
 
 
 def test_without_any_imu_the_notes_say_what_cannot_be_known():
     group = ExactGroup("robot", range(3), hz=20.0, seconds=4.0)
     block = group.block.take(group.block.kind[0] == Kind.RANGE)
     log = Log(name="no-imu", constellation=group.constellation, block=block)
-    assert "mirror" in " ".join(notes_on(log))
-    assert notes_on(replace(log, block=group.block)) == []
+    assert [f.name for f in find_unused(log)] == ["no-imu"]
+    assert find_unused(replace(log, block=group.block)) == []

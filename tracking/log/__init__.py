@@ -1,9 +1,8 @@
 """The log folder: a recorded run as plain files, format 1 (`docs/log-format.md`)."""
 
 from tracking.log.folder import Log
-from tracking.log.notes import notes_on, notes_on_estimate
 from tracking.log.read import read_log
 from tracking.log.truth import Truth
 from tracking.log.write import check_target, write_log
 
-__all__ = ["Log", "Truth", "check_target", "notes_on", "notes_on_estimate", "read_log", "write_log"]
+__all__ = ["Log", "Truth", "check_target", "read_log", "write_log"]

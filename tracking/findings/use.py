@@ -1,4 +1,4 @@
-"""What a reader of a recording should know: what in it cannot be used, or has to be assumed."""
+"""What of a recording can be used: which sensors, and which nodes are placed."""
 
 from __future__ import annotations
 
@@ -7,37 +7,42 @@ import numpy as np
 from tracking.arrays import Bool
 from tracking.estimate import Status, TeamEstimate
 from tracking.filters.joint.params import JointStartParams
+from tracking.findings.finding import Finding, names
 from tracking.log.folder import Log
 from tracking.measurements import Kind
 
 
-def notes_on(log: Log) -> list[str]:
-    """A line for each thing that is amiss with sensors, none if all is well."""
-    block, constellation, notes = log.block, log.constellation, list[str]()
+def find_unused(log: Log) -> list[Finding]:
+    """Sensors that are missing or cannot be used."""
+    block, constellation, found = log.block, log.constellation, list[Finding]()
     kind, node = block.kind[0], block.i[0]
-    ids = np.array(constellation.ids)
     with_imu = np.unique(node[kind == Kind.IMU])
     if not np.isin(kind, (Kind.IMU, Kind.STATE)).any():
-        notes.append(
+        text = (
             "no IMU samples and no orientations: ranges alone tell neither the rotation nor the "
             "mirror image of the group, so pairs stay ambiguous; rmse_mirror is what can be judged"
         )
+        found.append(Finding("no-imu", (), text))
     if constellation.heading == "initial":
         unknown = [n for n in with_imu if constellation.nodes[n].initial_heading is None]
-        if unknown:
-            notes.append(
-                f"{_names(ids[unknown])}: no initial_heading_rad in meta.toml, taken for 0 rad; "
-                "where they began otherwise, positions are wrong and the tracker does not know"
+        ids = tuple(constellation.ids[n] for n in unknown)
+        if ids:
+            text = (
+                f"{names(ids)}: no initial_heading_rad in meta.toml, taken for 0 rad; where they "
+                "began otherwise, positions are wrong and the tracker does not know"
             )
+            found.append(Finding("no-heading", ids, text))
     else:
         deaf = np.setdiff1d(with_imu, np.unique(node[kind == Kind.MAG]))
-        if len(deaf):
-            notes.append(f"{_names(ids[deaf])}: no magnetometer readings, so the IMU is not used")
-    return notes
+        ids = tuple(constellation.ids[n] for n in deaf)
+        if ids:
+            text = f"{names(ids)}: no magnetometer readings, so the IMU is not used"
+            found.append(Finding("no-magnetometer", ids, text))
+    return found
 
 
-def notes_on_estimate(log: Log, estimate: TeamEstimate) -> list[str]:
-    """A line for each node that was never placed, and what it lacks.
+def find_unplaced(log: Log, estimate: TeamEstimate) -> list[Finding]:
+    """Nodes that were never placed, and what they lack.
 
     Args:
         log: The recording.
@@ -49,26 +54,23 @@ def notes_on_estimate(log: Log, estimate: TeamEstimate) -> list[str]:
     ever: Bool = np.asarray(placed.any(axis=0))
     is_range = np.isin(block.kind[0], (Kind.RANGE, Kind.SURVEY)) & block.valid[0]
     a, b = block.i[0, is_range], block.j[0, is_range]
-    found = [n for n in range(constellation.n_nodes) if ever[(i == n) | (j == n)].any()]
-    needed = min(constellation.dimensions + 1, len(found))
-    notes, least = [], round(JointStartParams().min_ranges)
+    present = [n for n in range(constellation.n_nodes) if ever[(i == n) | (j == n)].any()]
+    needed = min(constellation.dimensions + 1, len(present))
+    found, least = list[Finding](), round(JointStartParams().min_ranges)
     for n in range(constellation.n_nodes):
-        if n in found:
+        if n in present:
             continue
         partners = np.concatenate([b[a == n], a[b == n]])
         others, counts = np.unique(partners, return_counts=True)
         enough = int((counts >= least).sum())
         lacks = (
             f"a node joins by {least} ranges or more with each of {needed} placed nodes"
-            if found
+            if present
             else f"a group starts by {least} ranges or more of every pair of three nodes"
         )
-        notes.append(
+        text = (
             f"node {constellation.ids[n]} was never placed: {len(partners)} ranges with "
             f"{len(others)} nodes, {least} or more with {enough}; {lacks}"
         )
-    return notes
-
-
-def _names(ids: np.ndarray) -> str:
-    return f"node{'s' if len(ids) > 1 else ''} {', '.join(str(i) for i in ids)}"
+        found.append(Finding("never-placed", (constellation.ids[n],), text))
+    return found

@@ -1,0 +1,174 @@
+"""Wrong units, axes, clocks and calibrations are found; right ones are not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from agents.simulate import simulate
+from agents.track import track_log
+from tests.second_world.record import record
+from tests.second_world.world import draw
+from tracking.constellation import NodeConfig
+from tracking.errors import LogError
+from tracking.findings import KINDS, Finding, examine, refuse_errors
+from tracking.findings.at_rest import find_in_samples, rest_of
+from tracking.findings.gyroscope import find_gyroscope
+from tracking.measurements import Kind
+
+
+@pytest.fixture(scope="module")
+def drive():
+    return simulate(scenario="cars-los", seconds=60.0, seed=11)
+
+
+def with_samples(log, kind, change):
+    block = log.block
+    values, rows = block.values.copy(), block.kind[0] == kind
+    values[0, rows] = change(values[0, rows])
+    return replace(log, block=replace(block, values=values))
+
+
+def scaled(*factors):
+    """Columns of an IMU sample times factors."""
+    return lambda values: values * np.r_[factors, np.ones(values.shape[1] - len(factors))]
+
+
+def stamped(log, late, node=None):
+    block = log.block
+    own = np.isin(block.kind[0], (Kind.IMU, Kind.MAG))
+    if node is not None:
+        own &= block.i[0] == node
+    t = block.t.copy()
+    t[0, own] += late
+    block = replace(block, t=t)
+    return replace(log, block=block.take(block.order()[0]))
+
+
+def found_in(log):
+    return {f.name for f in examine(log)[1]}
+
+
+@pytest.mark.parametrize("name", ["cars-los", "cars-nlos", "human"])
+@pytest.mark.parametrize("seed", [20, 21])
+def test_nothing_is_wrong_with_what_is_right(name, seed):
+    log = simulate(scenario=name, seconds=40.0, seed=seed)
+    corrected, found = examine(log)
+    assert [f for f in found if f.severity != "note"] == []
+    assert corrected is log
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_nothing_is_wrong_with_strangers_cars(seed):
+    assert all(KINDS[name].severity == "note" for name in found_in(record(draw(seed))))
+
+
+@pytest.mark.parametrize(
+    ("factors", "name"),
+    [
+        ((1, 1, 1, 1 / 9.81, 1 / 9.81, 1 / 9.81), "accel-units"),
+        ((1, 1, 1, 1e3 / 9.81, 1e3 / 9.81, 1e3 / 9.81), "accel-units"),
+        ((1, 1, 1, 3.28, 3.28, 3.28), "accel-units"),
+        ((1, -1, -1, 1, -1, -1), "gravity-axis"),
+        ((57.3, 57.3, 57.3, 1, 1, 1), "gyro-units"),
+        ((-1, -1, -1, 1, 1, 1), "gyro-axes"),
+    ],
+)
+def test_units_and_axes_that_make_estimates_wrong_are_refused(drive, factors, name):
+    wrong = with_samples(drive, Kind.IMU, scaled(*factors))
+    assert name in found_in(wrong)
+    with pytest.raises(LogError, match=r"node \d.*expected|node \d.*explains"):
+        track_log(wrong)
+
+
+def test_a_length_of_gravity_that_is_a_little_wrong_is_a_warning(drive):
+    long = with_samples(drive, Kind.IMU, scaled(1, 1, 1, 1.08, 1.08, 1.08))
+    assert "gravity-length" in found_in(long)
+    assert track_log(long).findings
+
+
+def test_a_gyroscope_that_reads_a_rotation_at_rest_is_a_warning(drive):
+    def add(values):
+        return values + np.r_[0.0, 0.0, 0.114, np.zeros(values.shape[1] - 3)]
+
+    assert found_in(with_samples(drive, Kind.IMU, add)) == {"gyro-bias"}
+
+
+@pytest.mark.parametrize("order", [(1, 0, 2), (0, 2, 1), (2, 1, 0)])
+def test_axes_of_a_magnetometer_are_named_where_bodies_turn_about_all(order):
+    log = simulate(scenario="human", seconds=30.0, seed=2)
+    sign = np.array([1.0, 1.0, -1.0])
+
+    def turn(values):
+        out = values.copy()
+        out[:, :3] = values[:, order] * sign
+        return out
+
+    assert find_gyroscope(log) == []
+    found = find_gyroscope(with_samples(log, Kind.MAG, turn))
+    assert len(found) >= 4
+    # Its own axes, seen from those that it is read with.
+    back = np.argsort(order)
+    named = ", ".join(("-" if sign[k] < 0.0 else "") + "mag_" + "xyz"[k] for k in back)
+    assert all(f"were {named}, or all three" in f.text for f in found)
+
+
+@pytest.mark.parametrize("late", [0.2, -0.2])
+def test_a_clock_that_is_a_little_late_is_corrected(drive, late):
+    log, found = examine(stamped(drive, late))
+    assert [f.name for f in found] == ["clock-corrected"]
+    assert f"{abs(late):.2f} s {'later' if late > 0.0 else 'earlier'}" in found[0].text
+    before = drive.block.t[0][drive.block.kind[0] == Kind.IMU]
+    after = log.block.t[0][log.block.kind[0] == Kind.IMU]
+    assert np.abs(after - before).max() < 0.03
+    assert (np.diff(log.block.t[0]) >= 0.0).all()
+
+
+@pytest.mark.parametrize(("late", "node"), [(3.1, None), (-1.5, None), (3.0, 1)])
+def test_a_clock_that_is_seconds_late_is_refused(drive, late, node):
+    wrong = stamped(drive, late, node)
+    assert "clock-offset" in found_in(wrong)
+    with pytest.raises(LogError, match="expected one clock"):
+        track_log(wrong)
+
+
+def test_what_is_refused_is_tracked_if_asked_for(drive):
+    wrong = with_samples(drive, Kind.IMU, scaled(1, 1, 1, 1 / 9.81, 1 / 9.81, 1 / 9.81))
+    assert track_log(wrong, findings=[]).findings == ()
+
+
+def test_ranges_that_are_long_are_told():
+    people = simulate(scenario="human", seconds=60.0, seed=2)
+    long = with_samples(people, Kind.RANGE, lambda v: v + np.r_[0.4, np.zeros(v.shape[1] - 1)])
+    [found] = [f for f in examine(long)[1] if f.name == "range-offset"]
+    assert 0.15 < float(found.text.split(" when ")[1].split(" m shorter")[0]) < 0.45
+    assert found.severity == "warning"
+
+
+def test_rest_is_found_by_what_varies_not_by_what_is_read():
+    rng, t = np.random.default_rng(0), np.arange(0.0, 6.0, 0.01)
+    values = np.zeros((len(t), 6))
+    values[:, :3] = [0.1, 0.0, 0.0] + 0.003 * rng.standard_normal((len(t), 3))
+    values[:, 3:] = [0.0, 0.0, 9.7] + 0.03 * rng.standard_normal((len(t), 3))
+    values[t > 3.0, :3] += rng.standard_normal((int((t > 3.0).sum()), 3))
+    rest = rest_of(t, values)
+    assert rest.seconds == pytest.approx(3.0, abs=1.0)
+    np.testing.assert_allclose(rest.rate, [0.1, 0.0, 0.0], atol=0.01)
+    assert rest.length == pytest.approx(9.7, abs=0.02)
+
+
+@pytest.mark.parametrize(("vehicle", "count"), [("car", 1), ("hand", 0)])
+def test_only_what_stays_level_has_an_upside(vehicle, count):
+    t = np.arange(0.0, 3.0, 0.01)
+    values = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, -9.81], (len(t), 1))
+    values += 1e-3 * np.random.default_rng(1).standard_normal(values.shape)
+    found = find_in_samples(NodeConfig(id=3, vehicle=vehicle), t, values)
+    assert [f.name for f in found] == ["gravity-axis"] * count
+
+
+def test_all_errors_are_told_at_once():
+    errors = [Finding("gyro-axes", (k,), f"node {k}: off") for k in (1, 2)]
+    refuse_errors([Finding("never-still", (1,), "node 1 never rests")])
+    with pytest.raises(LogError, match=r"node 1: off.*\n.*node 2: off"):
+        refuse_errors(errors)
+    assert all(kind.meaning and kind.remedy for kind in KINDS.values())

@@ -1,0 +1,27 @@
+"""Findings: what is wrong with a recording, told before estimates are (`docs/findings.md`)."""
+
+from __future__ import annotations
+
+from tracking.findings.at_rest import find_at_rest
+from tracking.findings.clock_offset import correct_clocks
+from tracking.findings.finding import KINDS, Finding, refuse_errors
+from tracking.findings.gyroscope import find_gyroscope
+from tracking.findings.ranges import find_range_errors
+from tracking.findings.use import find_unplaced, find_unused
+from tracking.log.folder import Log
+
+
+def examine(log: Log) -> tuple[Log, list[Finding]]:
+    """Look at what sensors read, at clocks and at ranges.
+
+    Returns:
+        The log, with clocks corrected where that can be done, and what was found.
+    """
+    found = [*find_unused(log), *find_at_rest(log), *find_gyroscope(log)]
+    if any(f.severity == "error" or f.name == "gyro-bias" for f in found):
+        return log, found  # what follows needs sensors that are right
+    log, of_clocks = correct_clocks(log)
+    return log, [*found, *of_clocks, *find_range_errors(log)]
+
+
+__all__ = ["KINDS", "Finding", "examine", "find_unplaced", "find_unused", "refuse_errors"]

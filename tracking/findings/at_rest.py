@@ -1,0 +1,134 @@
+"""What an IMU must read at rest: gravity, upwards, of the right length, and no rotation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tracking.arrays import F64
+from tracking.constellation import NodeConfig
+from tracking.findings.finding import Finding
+from tracking.geometry import GRAVITY
+from tracking.log.folder import Log
+from tracking.measurements import Kind
+from tracking.vehicles import VEHICLES
+
+WINDOW = 0.5
+"""[s] A node rests if its readings hardly change for so long."""
+FEWEST = 8
+"""[-] Samples in such a time."""
+STEADY_ACCEL = 0.02
+"""[-] Scatter of accelerations over their mean length, so that it holds in any unit."""
+STEADY_GYRO = 0.05
+"""[rad/s] Scatter of rates at rest; or a thirtieth of the largest, in whatever unit."""
+MEANT = {"g": GRAVITY, "mg": 1e-3 * GRAVITY}
+"""Units that accelerations come in by mistake [m/s2]."""
+MOST_LENGTH = 0.05
+"""[-] Relative error of gravity that calibration would have taken off."""
+ABSURD_LENGTH = 0.3
+"""[-] Relative error that is none of an accelerometer in m/s2."""
+ASKEW, OVERTURNED = np.radians(8.0), np.radians(45.0)
+"""[rad] Between z and gravity."""
+MOST_BIAS = 0.035
+"""[rad/s] A steady rate above this is not learned as a bias (`RestParams.largest_bias`)."""
+
+
+@dataclass(frozen=True, slots=True)
+class AtRest:
+    """Means over the time at rest of one IMU."""
+
+    seconds: float
+    force: F64
+    """(3) As recorded; over the whole run where it never rests, then only its length means
+    something."""
+    length: float
+    rate: F64
+    """(3) As recorded."""
+
+
+def rest_of(t: F64, values: F64) -> AtRest:
+    """Find when an IMU rests, by how little its readings vary.
+
+    Args:
+        t: Times, (sample) [s].
+        values: Angular rate and specific force, (sample, 6), in whatever unit.
+    """
+    start = np.searchsorted(t, np.arange(t[0], t[-1] - WINDOW, WINDOW))
+    windows = [slice(a, b) for a, b in zip(start[:-1], start[1:], strict=True) if b - a >= FEWEST]
+    size = np.linalg.norm(values[:, 3:], axis=1)
+    steady = max(STEADY_GYRO, float(np.quantile(np.abs(values[:, :3]), 0.99)) / 30.0)
+    rests = [
+        w
+        for w in windows
+        if values[w, :3].std(axis=0).max() < steady
+        and values[w, 3:].std(axis=0).max() < STEADY_ACCEL * size[w].mean()
+    ]
+    if not rests:
+        return AtRest(0.0, values[:, 3:].mean(axis=0), float(np.median(size)), np.zeros(3))
+    means = np.array([values[w].mean(axis=0) for w in rests])
+    # A steady curve reads as steadily as rest: what turns least is at rest.
+    rest = np.median(means[np.argsort(np.linalg.norm(means[:, :3], axis=1))[:3]], axis=0)
+    return AtRest(WINDOW * len(rests), rest[3:], float(np.linalg.norm(rest[3:])), rest[:3])
+
+
+def find_at_rest(log: Log) -> list[Finding]:
+    """Units, axes and biases of every IMU of a recording."""
+    found, block = list[Finding](), log.block
+    for n, node in enumerate(log.constellation.nodes):
+        rows = (block.kind[0] == Kind.IMU) & (block.i[0] == n) & block.valid[0]
+        found += find_in_samples(node, block.t[0, rows], block.values[0, rows, :6])
+    return found
+
+
+def find_in_samples(node: NodeConfig, t: F64, values: F64) -> list[Finding]:
+    """Units, axes and biases of one IMU.
+
+    Args:
+        node: Whose.
+        t: Times, (sample) [s].
+        values: Angular rate and specific force as they are read, (sample, 6).
+    """
+    if len(t) < 4 * FEWEST or t[-1] - t[0] < 2.0 * WINDOW:
+        return []
+    rest, found = rest_of(t, values), list[Finding]()
+    if not rest.seconds:
+        text = f"node {node.id} never rests: the bias of its gyroscope is not known at first"
+        found.append(Finding("never-still", (node.id,), text))
+    found += _of_gravity(node, rest)
+    if np.linalg.norm(rest.rate) > MOST_BIAS:
+        rate = ", ".join(f"{v:.3f}" for v in rest.rate)
+        text = f"node {node.id}: gyr_x, gyr_y, gyr_z at rest are {rate}, expected 0 rad/s"
+        found.append(Finding("gyro-bias", (node.id,), text))
+    return found
+
+
+def _of_gravity(node: NodeConfig, rest: AtRest) -> list[Finding]:
+    length = rest.length
+    where = "at rest" if rest.seconds else "in the middle of the run"
+    said = f"node {node.id}: accelerations are {length:.3g} {where}, expected 9.81 m/s2"
+    for unit, meant in MEANT.items():
+        if abs(length * meant / GRAVITY - 1.0) < ABSURD_LENGTH:
+            return [Finding("accel-units", (node.id,), f"{said}; they seem to be in {unit}")]
+    off = abs(length / GRAVITY - 1.0)
+    if off > (ABSURD_LENGTH if rest.seconds else 2.0 * ABSURD_LENGTH):
+        return [Finding("accel-units", (node.id,), said)]
+    if not rest.seconds:
+        return []
+    found = [Finding("gravity-length", (node.id,), said)] if off > MOST_LENGTH else []
+    if not VEHICLES[node.vehicle].levelled:
+        return found
+    tilt = np.arccos(np.clip(rest.force[2] / length, -1.0, 1.0))
+    axis = int(np.argmax(np.abs(rest.force)))
+    name = ("-" if rest.force[axis] < 0.0 else "+") + "xyz"[axis]
+    force = ", ".join(f"{v:.2f}" for v in rest.force)
+    said = f"node {node.id}: acc_x, acc_y, acc_z at rest are {force}"
+    if tilt > OVERTURNED:
+        text = (
+            f"{said}: gravity is on {name}, expected on +z of a {node.vehicle}, which stays level"
+        )
+        found.append(Finding("gravity-axis", (node.id,), text))
+    elif tilt > ASKEW:
+        text = f"{said}: z leans by {np.degrees(tilt):.0f} degrees, expected none"
+        found.append(Finding("gravity-tilt", (node.id,), text))
+    return found

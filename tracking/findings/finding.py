@@ -1,0 +1,128 @@
+"""What is amiss with a recording: one table, whoever says it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+from tracking.errors import LogError
+
+Severity = Literal["error", "warning", "note"]
+
+
+class Kind(NamedTuple):
+    """One kind of finding."""
+
+    severity: Severity
+    """What is tracked all the same is wrong and says `ok` (error), worse than it need be (warning),
+    or just so (note)."""
+    meaning: str
+    remedy: str
+
+
+KINDS: dict[str, Kind] = {
+    "accel-units": Kind(
+        "error", "accelerations are not in m/s2", "multiply them, or calibrate the IMU"
+    ),
+    "gravity-axis": Kind(
+        "error",
+        "gravity is not on +z of a vehicle that stays level",
+        "turn the IMU, or its axes where it is read: x forward, y left, z up",
+    ),
+    "gravity-tilt": Kind(
+        "warning",
+        "the IMU of a vehicle that stays level is mounted askew",
+        "mount it flat: what it leans by is taken for an acceleration",
+    ),
+    "gravity-length": Kind(
+        "warning", "an IMU at rest reads too much or too little", "`relpos calibrate imu`"
+    ),
+    "gyro-bias": Kind("warning", "a gyroscope at rest reads a rotation", "`relpos calibrate imu`"),
+    "gyro-units": Kind("error", "angular rates are not in rad/s", "multiply them by pi / 180"),
+    "gyro-axes": Kind(
+        "error",
+        "gyroscope and magnetometer of a node have different axes or signs",
+        "turn the axes of one of them: both have x forward, y left, z up",
+    ),
+    "clock-offset": Kind(
+        "error",
+        "an IMU has another clock than the ranges, by more than is corrected",
+        "stamp both on one clock",
+    ),
+    "clock-corrected": Kind(
+        "warning",
+        "an IMU is stamped too late or too early; its samples are moved",
+        "stamp both on one clock",
+    ),
+    "range-offset": Kind(
+        "warning", "ranges are longer or shorter than fits", "`relpos calibrate uwb`"
+    ),
+    "range-scale": Kind(
+        "warning", "ranges are longer by a factor than surveyed distances", "`relpos calibrate uwb`"
+    ),
+    "never-still": Kind(
+        "note",
+        "a node never rests, so the bias of its gyroscope is not known at first",
+        "leave it alone for two seconds before it moves",
+    ),
+    "no-imu": Kind(
+        "note",
+        "ranges alone tell neither the rotation nor the mirror image of a group",
+        "record the IMU",
+    ),
+    "no-heading": Kind(
+        "note", "a heading that nobody gave is taken for 0", "`initial_heading_rad` in meta.toml"
+    ),
+    "no-magnetometer": Kind(
+        "note",
+        "an IMU without a magnetometer is not used where the heading is magnetic",
+        '`heading = "initial"` in meta.toml',
+    ),
+    "never-placed": Kind("note", "a node was never placed", "range it with more of the others"),
+}
+"""By name. `docs/findings.md` shows it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One of them."""
+
+    name: str
+    """One of `KINDS`."""
+    nodes: tuple[int, ...]
+    """Ids of the nodes that it is about; none for the whole group."""
+    text: str
+    """What was found and what was expected, a line."""
+
+    @property
+    def severity(self) -> Severity:
+        """How bad it is."""
+        return KINDS[self.name].severity
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """Ready for JSON."""
+        return {
+            "name": self.name,
+            "severity": self.severity,
+            "nodes": list(self.nodes),
+            "text": self.text,
+            "remedy": KINDS[self.name].remedy,
+        }
+
+
+def refuse_errors(findings: Sequence[Finding]) -> None:
+    """See that nothing is found with which estimates would be `ok` and wrong.
+
+    Raises:
+        LogError: Something is; all of it is told.
+    """
+    errors = [f"{f.text}; {KINDS[f.name].remedy}" for f in findings if f.severity == "error"]
+    if errors:
+        raise LogError("\n".join(errors))
+
+
+def names(ids: Sequence[int]) -> str:
+    """Nodes by their ids: "node 3", "nodes 1, 2"."""
+    return f"node{'s' if len(ids) > 1 else ''} {', '.join(str(i) for i in ids)}"
