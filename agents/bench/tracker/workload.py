@@ -20,6 +20,8 @@ REAR_AXLE = 0.15
 """[m] Axle of the cars behind their tracker: what they do fits what the filter knows of cars."""
 TURN = 0.8
 """[rad/s] Of the first node round its circle of 1 m; the others are up to a half faster."""
+SWAY, SWAY_RATE = 0.6, 0.9
+"""[rad], [rad/s] They go faster and slower: a steady curve does not tell where a tracker sits."""
 
 
 @dataclass(frozen=True)
@@ -78,8 +80,13 @@ class Workload:
     def _rates(self) -> F64:
         return TURN * (1.0 + 0.5 * np.arange(self.n) / self.n)
 
+    def _phase(self, t: F64) -> F64:
+        """Where on their circles, now faster and now slower, (time, node) [rad]."""
+        k = np.arange(self.n)
+        return self._rates * t[:, None] + k + SWAY * np.sin(SWAY_RATE * t[:, None] + k)
+
     def _on_circle(self, t: F64) -> F64:
-        phase = self._rates * t[:, None] + np.arange(self.n)
+        phase = self._phase(t)
         heave = 0.4 * np.sin(1.3 * phase) if self.dimensions == 3 else 0.0 * phase
         return np.stack([np.cos(phase), np.sin(phase), heave], axis=-1)
 
@@ -89,8 +96,13 @@ class Workload:
 
     def accel(self, t: F64) -> F64:
         """Accelerations, (time, node, 3) [m/s2]."""
-        scale = self._rates[:, None] * np.array([1.0, 1.0, 1.3])
-        accel: F64 = -(scale**2) * self._on_circle(t)
+        phase, sway = self._phase(t), SWAY_RATE * t[:, None] + np.arange(self.n)
+        rate = self._rates + SWAY * SWAY_RATE * np.cos(sway)
+        faster = -SWAY * SWAY_RATE**2 * np.sin(sway)
+        heave = 0.52 * np.cos(1.3 * phase) if self.dimensions == 3 else 0.0 * phase
+        along = np.stack([-np.sin(phase), np.cos(phase), heave], axis=-1)
+        inwards = -((rate[..., None] * [1.0, 1.0, 1.3]) ** 2) * self._on_circle(t)
+        accel: F64 = inwards + faster[..., None] * along
         return accel
 
     def times(self, first: int, steps: int) -> F64:
@@ -122,7 +134,7 @@ class Workload:
         t = self.times(first, steps)
         values = np.zeros((steps, self.n, 7))
         slip = np.arcsin(REAR_AXLE) if self.dimensions == 2 else 0.0
-        yaw: F64 = self._rates * t[:, None] + np.arange(self.n) + 0.5 * np.pi - slip
+        yaw: F64 = self._phase(t) + 0.5 * np.pi - slip
         values[..., :4], values[..., 4:] = quat_from_yaw(yaw), self.accel(t)
         node = np.broadcast_to(np.arange(self.n), (steps, self.n)).ravel()
         states = MeasurementBlock.of_kind(

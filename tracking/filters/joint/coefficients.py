@@ -186,7 +186,8 @@ def has_mount(constellation: Constellation, params: JointParams, node: int) -> b
     vehicle = params.vehicles[config.vehicle]
     slides = config.kind == "static" or vehicle.sideways_std is None
     _, ahead_std, _, slip_std = config.mount.prior(vehicle)
-    return not slides and max(ahead_std, slip_std) > 0.0
+    is_small = constellation.n_nodes <= params.max_mounts
+    return is_small and not slides and max(ahead_std, slip_std) > 0.0
 
 
 def has_range_errors(constellation: Constellation, params: JointParams) -> bool:

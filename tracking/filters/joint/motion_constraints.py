@@ -116,12 +116,14 @@ def nonholonomic_constraint(c, s, h, i, work):
     predicted, val[0], val[1], val[2], val[3], val[4] = nonholonomic_model(
         x[idx[0]], x[idx[1]], error, ahead, slip, cos_y, sin_y, node.yaw_rate, node.aside
     )
-    nu = -predicted
+    nu, variance = -predicted, node.sideways_var
+    if m == 3:  # what is not known of it is noise
+        variance += val[3] * val[3] * node.ahead_var + val[4] * val[4] * node.slip_var
     for k in range(m):
         nu -= val[k] * (s.x[h, idx[k]] - x[idx[k]])
     if is_linear(s.group[0]):
         velocity_sensitivity(s, h, node.i_vel, val[0], val[1], 0.0, work)
-    apply_constraint(c, s, h, nu, m, node.sideways_var, work)
+    apply_constraint(c, s, h, nu, m, variance, work)
     if c.d == 3:
         idx[0], val[0] = node.i_vel + 2, 1.0
         if is_linear(s.group[0]):

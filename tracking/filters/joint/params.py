@@ -257,6 +257,8 @@ class JointParams:
     """[-] A pair whose ranges misfit so badly, as a running mean of NIS, is doubtful."""
     node_bias_limit: float = 0.33
     """[m] A node all of whose ranges err by so much, over the root of their number, is doubted."""
+    max_mounts: int = 20
+    """[-] Larger groups have no states for where trackers sit on cars: it counts as noise."""
     ok_std: float = 1.0
     """[m] A pair is not ok while its position is less certain than this along an axis."""
 
