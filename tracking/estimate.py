@@ -25,9 +25,10 @@ class Status(IntEnum):
     AMBIGUOUS = 2
     """The shape is known, its rotation or mirror image is not."""
     OK = 3
-    """Position, velocity and covariance hold."""
+    """Position, velocity and covariance hold, within the accuracy that is asked for."""
     LOST = 4
-    """No range for so long that the position is dead reckoning."""
+    """No range for so long that the position is dead reckoning, or one less certain than the
+    accuracy that is asked for (`VehicleParams.accuracy`)."""
     DOUBTFUL = 5
     """Its ranges contradict all else: a liar, a wrong calibration, or a filter gone astray."""
 

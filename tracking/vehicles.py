@@ -65,6 +65,9 @@ class VehicleParams:
     that may have been cut off at the end of the scale, 8 or 16 g. None for what moves by blows."""
     impact_noise_ratio: float = 0.25
     """[-] Error of what such a sample adds to the velocity, in terms of that."""
+    accuracy: float = 0.5
+    """[m] A pair is OK while the position error that it expects, as a root mean square over all
+    directions, is at most this; of two vehicles the larger."""
     rests: bool = True
     """It stands still now and then, and its IMU shows it."""
     propagation_period: float = 0.02
@@ -103,6 +106,7 @@ VEHICLES = {
         heading_tau=5.0,
         first_heading_std=0.1,
         sideways_std=0.08,
+        accuracy=0.3,
         ahead=0.15,
         ahead_std=0.15,
         slip=0.01,

@@ -38,6 +38,13 @@ from agents.errors import UsageError
     help="Also show the expected errors of an efficient estimator; needs truth.",
 )
 @click.option(
+    "--accuracy",
+    type=float,
+    metavar="METRES",
+    help="A pair is ok while it expects to be off by no more, 0.01 to 10; by default 0.3 with a "
+    "car, 0.5 without; joint only.",
+)
+@click.option(
     "--no-checks",
     is_flag=True,
     help="Track the log as it is, whatever its sensors, clocks and ranges look like.",
@@ -51,6 +58,7 @@ def track(
     calibrations: tuple[Path, ...],
     smooth: bool,
     bound: bool,
+    accuracy: float | None,
     no_checks: bool,
     skip: float,
     out: Path | None,
@@ -64,11 +72,17 @@ def track(
     from agents.warm_up import warm_up_first
     from tracking.bounds import recorded_bound
     from tracking.filters import DEFAULT_FILTER, filter_builder
+    from tracking.filters.joint.params import JointParams
+    from tracking.filters.params import FilterParams
     from tracking.findings import examine, refuse_errors
     from tracking.log import read_log
+    from tracking.tracker import TrackerParams
 
     if not 0.0 <= skip < float("inf"):
         raise UsageError(f"--skip: expected 0 or more seconds, got {skip:g}")
+    if accuracy is not None and not 0.01 <= accuracy <= 10.0:
+        raise UsageError(f"--accuracy: expected 0.01 to 10 m, got {accuracy:g}")
+    params = TrackerParams(filter=FilterParams(joint=JointParams(accuracy=accuracy)))
     names = tuple(dict.fromkeys(filters)) or (DEFAULT_FILTER,)
     for name in names:
         filter_builder(name)
@@ -93,6 +107,7 @@ def track(
                         skip=skip,
                         smooth=smooth,
                         bound=expected,
+                        params=params,
                         findings=found,
                         progress=report,
                     )

@@ -72,7 +72,7 @@ _NUMBERS = (
     "range_timeout",
     "lost_after",
     "node_timeout",
-    "ok_var",
+    "stale_var",
     "pair_nis_limit",
     "node_bias_limit",
 )
@@ -120,7 +120,7 @@ def make_coefficients(constellation: Constellation, params: JointParams) -> Reco
         "static_drift2": params.static_drift**2,
         "survey_var": params.survey_std**2,
         "rest_var": params.rest_std**2,
-        "ok_var": params.ok_std**2,
+        "stale_var": params.stale_std**2,
         "propagation_period": min(params.vehicles[n.vehicle].propagation_period for n in moving),
     }
     c = np.zeros(1, dtype=COEFFICIENTS)

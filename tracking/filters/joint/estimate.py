@@ -39,7 +39,7 @@ def write_estimate(c, s, work, t, e, o, out):
             continue
         nlos[e, o, p] = s.nlos[h, p]
         age[e, o, p] = t - pair.t_used
-        worst = 0.0
+        squared_error = 0.0
         for k in range(d):
             pos[e, o, p, k] = x[node_j.i_pos + k] - x[node_i.i_pos + k]
             if not node_j.static:
@@ -53,13 +53,14 @@ def write_estimate(c, s, work, t, e, o, out):
                 cov[e, o, p, r, q] = v
                 cov[e, o, p, q, r] = v
             if a < d:
-                worst = max(worst, cov[e, o, p, a, a])
+                squared_error += cov[e, o, p, a, a]
         if group.n_alive > 1 or group.alignment in (STATIC, LINEAR, MODES):
             status[e, o, p] = AMBIGUOUS
         elif node_i.static and node_j.static:
             status[e, o, p] = OK
         elif (
-            age[e, o, p] > max(c.lost_after, c.missed_intervals * pair.interval) or worst > c.ok_var
+            age[e, o, p] > max(c.lost_after, c.missed_intervals * pair.interval)
+            or squared_error > max(node_i.accuracy, node_j.accuracy) ** 2
         ):
             status[e, o, p] = LOST
         elif pair.mean_nis > c.pair_nis_limit or node_i.fault != 0 or node_j.fault != 0:

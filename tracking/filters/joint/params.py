@@ -248,7 +248,7 @@ class JointParams:
     """[s] Time between two uses of what is known about the carriers."""
     range_timeout: float = 0.5
     """[s] A node without a range for so long joins again, if its distances to all others are less
-    certain than 0.7 `ok_std` by now. More than the time between two ranges of a node."""
+    certain than 0.7 `stale_std` by now. More than the time between two ranges of a node."""
     lost_after: float = 1.0
     """[s] A pair without a range for so long is lost."""
     node_timeout: float = 5.0
@@ -259,8 +259,10 @@ class JointParams:
     """[m] A node all of whose ranges err by so much, over the root of their number, is doubted."""
     max_mounts: int = 20
     """[-] Larger groups have no states for where trackers sit on cars: it counts as noise."""
-    ok_std: float = 1.0
-    """[m] A pair is not ok while its position is less certain than this along an axis."""
+    stale_std: float = 1.0
+    """[m] Of positions of nodes that were silent, see `range_timeout`."""
+    accuracy: float | None = None
+    """[m] That of all pairs, in place of `VehicleParams.accuracy`."""
 
     def __post_init__(self) -> None:
         check_numbers(self)

@@ -61,6 +61,7 @@ NODE = np.dtype(
         ("slip", "f8"),
         ("slip_var", "f8"),
         ("aside", "f8"),
+        ("accuracy", "f8"),  # 0 of static nodes [m]
         ("i_pos", "i8"),  # first state of its position
         ("i_vel", "i8"),  # of its velocity; -1 for static nodes, like the next two
         ("i_tilt_bias", "i8"),

@@ -35,8 +35,8 @@ class SupervisionParams:
     longest_interval: float = 5.0
     """[s] A longer one counts as this."""
     stale_share: float = 0.5
-    """[-] Share of the variance of a pair that is not ok, from which on a node that was silent
-    starts again: the line of sight at 2 m may be off by 20 degrees."""
+    """[-] Share of `JointParams.stale_std` squared, from which on a node that was silent starts
+    again: the line of sight at 2 m may be off by 20 degrees."""
     outlier_ratio: float = 0.6
     """[-] A node of whose ranges a larger share does not fit is faulty, if the others fit."""
     fault_hysteresis: float = 0.5

@@ -75,6 +75,6 @@ def is_stale(c, s, i):
                 across = s.P[h, at + a, other + b] + s.P[h, other + a, at + b]
                 relative_covariance = s.P[h, at + a, at + b] + s.P[h, other + a, other + b] - across
                 along += off * (s.x[h, other + b] - s.x[h, at + b]) * relative_covariance
-        if along <= c.stale_share * c.ok_var * squared:
+        if along <= c.stale_share * c.stale_var * squared:
             return False
     return True
