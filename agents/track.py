@@ -8,13 +8,14 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from tracking.arrays import F64, Bool
 from tracking.bounds import Bound
 from tracking.constellation import Constellation
+from tracking.errors import ConfigError
 from tracking.estimate import Status, TeamEstimate
 from tracking.filters import DEFAULT_FILTER
 from tracking.findings import Finding, examine, find_unplaced, refuse_errors
@@ -24,6 +25,7 @@ from tracking.measurements import MeasurementBlock
 from tracking.metrics import Score, score
 from tracking.short_repr import short_repr
 from tracking.tracker import Tracker, TrackerParams
+from tracking.whole_smoother import smooth_whole
 
 CSV_HZ = 20.0
 """[Hz] Rate of estimates.csv."""
@@ -31,6 +33,7 @@ ERRORS = ("rmse", "rmse_yaw", "rmse_shape", "rmse_mirror")
 """The errors of a run, in the order they are shown."""
 LAG = HorizonParams().delay
 """[s] So much later is what smoothed estimates know."""
+Smoothing = Literal["lag", "all"]
 N_CHUNKS = 50
 """A log is tracked in so many pieces, so that progress can be shown."""
 
@@ -111,7 +114,7 @@ def track_log(
     *,
     filter: str = DEFAULT_FILTER,
     skip: float = 10.0,
-    smooth: bool = False,
+    smooth: Smoothing | None = None,
     bound: Bound | None = None,
     params: TrackerParams | None = None,
     findings: Sequence[Finding] | None = None,
@@ -123,8 +126,8 @@ def track_log(
         log: A log, or its folder.
         filter: One of `tracking.filters.FILTERS`.
         skip: Times until so many seconds after the first range are not scored.
-        smooth: Whether estimates know what was measured in the `LAG` after them, too; the filter
-            goes its way as without.
+        smooth: Estimates know what was measured in the `LAG` after them, too ("lag"), or all that
+            was measured ("all", `tracking.whole_smoother`).
         bound: The expected errors of an efficient estimator, kept beside those there are
             (`tracking.bounds.recorded_bound`).
         params: What the tracker believes.
@@ -150,6 +153,45 @@ def track_log(
     t_out = np.union1d(grid, t_truth)
 
     started = time.perf_counter()
+    if smooth == "all":
+        if filter != DEFAULT_FILTER:
+            raise ConfigError(f"smooth: expected filter '{DEFAULT_FILTER}', got '{filter}'")
+        estimate, nis, n_rejected = smooth_whole(constellation, block, t_out, params, progress)
+    else:
+        estimate = _in_parts(tracker, block, t_out, smooth is not None, progress)
+        nis, n_rejected = float(tracker.mean_nis()[0]), int(tracker.n_rejected()[0])
+    elapsed = time.perf_counter() - started
+
+    found = (*findings, *find_unplaced(log, estimate))
+    truth, has_truth = log.truth.pairs(constellation, t_out)
+    at_truth = np.isin(t_out, t_truth)
+    on_grid = np.isin(t_out, grid)
+    return TrackResult(
+        log=log,
+        filter=filter,
+        estimate=_at_times(estimate, on_grid),
+        truth_ij_w=truth[on_grid],
+        has_truth=has_truth[on_grid],
+        score=score(
+            _at_times(estimate, at_truth), truth[at_truth], has_truth[at_truth], first + skip
+        ),
+        nis=nis,
+        n_rejected=n_rejected,
+        skip=skip,
+        realtime_factor=log.duration / max(elapsed, 1e-9),
+        bound=bound,
+        findings=found,
+    )
+
+
+def _in_parts(
+    tracker: Tracker,
+    block: MeasurementBlock,
+    t_out: F64,
+    smooth: bool,
+    progress: Callable[[float], None] | None,
+) -> TeamEstimate:
+    """Estimates of a log, arrays over (time, ...); in pieces, so that progress can be shown."""
     edges = np.linspace(block.t[0, 0], block.t[0, -1], N_CHUNKS + 1)[1:]
     edges[-1] = max(block.t[0, -1], t_out[-1])
     parts, event, out = [], 0, 0
@@ -165,29 +207,7 @@ def track_log(
         event, out = next_event, next_out
         if progress is not None:
             progress((k + 1) / N_CHUNKS)
-    elapsed = time.perf_counter() - started
-    estimate = _join(constellation, parts)
-
-    found = (*findings, *find_unplaced(log, estimate))
-    truth, has_truth = log.truth.pairs(constellation, t_out)
-    at_truth = np.isin(t_out, t_truth)
-    on_grid = np.isin(t_out, grid)
-    return TrackResult(
-        log=log,
-        filter=filter,
-        estimate=_at_times(estimate, on_grid),
-        truth_ij_w=truth[on_grid],
-        has_truth=has_truth[on_grid],
-        score=score(
-            _at_times(estimate, at_truth), truth[at_truth], has_truth[at_truth], first + skip
-        ),
-        nis=float(tracker.mean_nis()[0]),
-        n_rejected=int(tracker.n_rejected()[0]),
-        skip=skip,
-        realtime_factor=log.duration / max(elapsed, 1e-9),
-        bound=bound,
-        findings=found,
-    )
+    return _join(tracker.constellation, parts)
 
 
 def _smoothed(tracker: Tracker, block: MeasurementBlock, chunk: slice, t_out: F64) -> TeamEstimate:

@@ -43,6 +43,7 @@ from tracking.filters.joint.hypotheses.alignment import TRANSITIONS, Alignment
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.supervision.faults import ACTIONS as REMEDIES
 from tracking.filters.joint.supervision.faults import Fault
+from tracking.findings import KINDS
 
 DOCS = Path(__file__).resolve().parent
 CARS = 3
@@ -266,6 +267,30 @@ def faults() -> str:
     return markdown(("fault", "what it is", "action"), rows)
 
 
+def findings() -> str:
+    """What may be amiss with a recording."""
+    order = ("error", "warning", "note")
+    kinds = sorted(KINDS.items(), key=lambda item: order.index(item[1].severity))
+    rows = [[f"`{name}`", kind.severity, kind.meaning, kind.remedy] for name, kind in kinds]
+    return markdown(("name", "severity", "meaning", "remedy"), rows)
+
+
+def second_world() -> str:
+    """Errors in the second world."""
+    head = ("", "worlds", "rmse_yaw / shape", "over the bound", "NEES", "`ok`", "`ok` and wrong",
+            "`ok` and within 0.3 m")  # fmt: skip
+    rows = []
+    for line in (DOCS / "second-world.jsonl").read_text().splitlines():
+        r = json.loads(line)
+        rows.append([
+            r["kind"], f"{r['worlds']}", f"{r['yaw']:.3f} / {r['shape']:.3f}",
+            f"{r['yaw_ratio']:.2f} / {r['shape_ratio']:.2f}", f"{r['nees']:.2f}",
+            f"{100.0 * r['ok']:.0f} %", f"{100.0 * r['wrong']:.2f} %",
+            f"{100.0 * r['within']:.1f} %",
+        ])  # fmt: skip
+    return markdown(head, rows, right=", ".join(head[1:]))
+
+
 def results(is_recording: bool) -> list[dict[str, Any]]:
     """Lines of the recordings, or those of the simulated rooms."""
     lines = [json.loads(line) for line in RESULTS.read_text().splitlines()]
@@ -319,7 +344,11 @@ def parameters(params: Any, names: tuple[str, ...]) -> str:
             value = getattr(part, f.name)
             if not is_dataclass(value) and not isinstance(value, dict):
                 unit, _, meaning = told[f.name].replace("\n", " ").partition("]")
-                named = [f"`{name}{'.' * bool(name)}{f.name}`", f"`{value:g}`", unit.lstrip("[")]
+                named = [
+                    f"`{name}{'.' * bool(name)}{f.name}`",
+                    f"`{value}`" if value in (None, True, False) else f"`{value:g}`",
+                    unit.lstrip("["),
+                ]
                 rows.append([*named, " ".join(meaning.split())])
     return markdown(("parameter", "default", "unit", "meaning"), rows)
 
@@ -327,12 +356,14 @@ def parameters(params: Any, names: tuple[str, ...]) -> str:
 TABLES: dict[str, Callable[[], str]] = {
     "alignment": alignment,
     "faults": faults,
+    "findings": findings,
+    "second-world": second_world,
     "room-results": room_results,
     "recording-results": recording_results,
     "filter-parameters": partial(
         parameters,
         JointParams(),
-        ("range_error", "nlos", "update", "start", "alignment", "supervision"),
+        ("range_error", "nlos", "noise_learning", "update", "start", "alignment", "supervision"),
     ),
     "orientation-parameters": partial(
         parameters, OrientationParams(), ("bias", "rest", "magnetic", "sanity")

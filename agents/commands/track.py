@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import click
 
@@ -29,8 +29,9 @@ from agents.errors import UsageError
 )
 @click.option(
     "--smooth",
-    is_flag=True,
-    help="Estimates know what was measured in the 0.1 s after them, too; joint only.",
+    type=click.Choice(["lag", "all"]),
+    help="Estimates know what was measured in the 0.1 s after them, too (lag), or all that was "
+    "measured, before and after (all); joint only.",
 )
 @click.option(
     "--bound",
@@ -56,7 +57,7 @@ def track(
     logs: tuple[Path, ...],
     filters: tuple[str, ...],
     calibrations: tuple[Path, ...],
-    smooth: bool,
+    smooth: Literal["lag", "all"] | None,
     bound: bool,
     accuracy: float | None,
     no_checks: bool,
