@@ -9,6 +9,7 @@ import click
 from agents.commands.bench import bench
 from agents.commands.calibrate import calibrate
 from agents.commands.compare import compare
+from agents.commands.convert import convert
 from agents.commands.demo import demo
 from agents.commands.demo_hardware import demo_hardware
 from agents.commands.doctor import doctor
@@ -39,6 +40,7 @@ for command in (
     track,
     calibrate,
     simulate,
+    convert,
     demo,
     emulate,
     drive,

@@ -1,0 +1,48 @@
+"""`relpos convert`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from agents.console import emit_json, progress_bar
+
+
+@click.command()
+@click.argument("source", type=Path)
+@click.argument("out", type=Path)
+@click.option("--preset", help="A public data set: sfuise, starloc or tiers.")
+@click.option("--mapping", type=Path, help="A file that says what is what, instead of a preset.")
+@click.option(
+    "--restamp", is_flag=True, help="Stamp IMU samples anew, at the steady rate that they have."
+)
+@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+def convert(
+    source: Path,
+    out: Path,
+    preset: str | None,
+    mapping: Path | None,
+    restamp: bool,
+    as_json: bool,
+) -> None:
+    """Make a log folder of a bag of ROS or of tables."""
+    from agents.convert import convert as run
+
+    with progress_bar(f"reading {source}") as report:
+        log = run(source, out, preset=preset, mapping=mapping, restamp=restamp, progress=report)
+    record = {
+        "log": log.name,
+        "out": str(out),
+        "nodes": log.constellation.n_nodes,
+        "duration_s": log.duration,
+        "ranges": log.n_ranges,
+        "truth_rows": len(log.truth.t),
+    }
+    if as_json:
+        emit_json([record])
+    else:
+        click.echo(
+            f"{out}: {record['nodes']} nodes, {log.duration:.0f} s, {log.n_ranges} ranges, "
+            f"{len(log.truth.t)} rows of truth"
+        )
