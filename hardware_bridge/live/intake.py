@@ -17,6 +17,7 @@ from hardware_bridge.drivers import make_driver
 from hardware_bridge.identity import Identities, Verdict
 from hardware_bridge.identity.verdict import Mark
 from hardware_bridge.links.ports import Chunk
+from hardware_bridge.live.at_rest import AtRest
 from hardware_bridge.live.events import Events
 from hardware_bridge.live.naming import Naming
 from hardware_bridge.live.near import Near
@@ -84,6 +85,7 @@ class Intake:
         """Time [ns] and what the user should read; whoever takes them clears the list."""
         rates = [node.imu_hz for node in self.group.nodes]
         self.sample_rates = SampleRates(rates)
+        self.at_rest = AtRest(self.group.nodes)
         self._repeated = RepeatedSamples(rates)
         self._naming = Naming(self.group, self.refused, self.notices)
         self.trims = Trims(self._naming, self.refused)
@@ -213,6 +215,7 @@ class Intake:
                 self.events.add(t, Kind.IMU, node, (*gyr, *acc))
                 if self.sample_rates.note(node, arrival_ns):
                     self.notices.append((arrival_ns, self.wrong_rate(node)))
+                self.notices += self.at_rest.note(node, (*gyr, *acc), arrival_ns)
                 self.sensed_ns[node] = arrival_ns
             case StateReading(q_wb=q, accel_w=accel):
                 if not self.plausibility.allows_state(reading) or self._repeats(

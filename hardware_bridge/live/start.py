@@ -148,13 +148,15 @@ class Start:
         """Whether it is known that samples come as often as configured.
 
         Raises:
-            BridgeError: Those of a car do not.
+            BridgeError: Those of a car do not, or read at rest what no IMU does.
         """
         swarm = group.swarm
         if swarm.config.tracker.source == "positions":
             return True
         rates = swarm.intake.sample_rates
         for slot in slots:
+            if slot in swarm.intake.at_rest.wrong:
+                raise BridgeError(swarm.intake.at_rest.wrong[slot])
             if rates.is_off(slot):
                 raise BridgeError(swarm.intake.wrong_rate(slot))
         return not any(rates.is_open(slot) for slot in slots)

@@ -87,6 +87,26 @@ def test_cars_are_not_armed_by_turns_of_another_size(hz):
     assert len(swarm.intake.notices) == 1
 
 
+@pytest.mark.parametrize(
+    ("acc", "reason"),
+    [
+        ((0.0, 0.0, 1.0), "seem to be in g"),
+        ((0.0, 0.0, -9.8), r"gravity is on -z, expected on \+z"),
+    ],
+)
+def test_cars_are_not_armed_by_an_imu_that_reads_at_rest_what_none_does(acc, reason):
+    nodes = NODES + "[cars.1]\nport = '/dev/c'\ndriver = 'relpos'\n"
+    swarm = LiveSwarm(parsed(nodes), 0)
+    samples = [
+        (round(k * S / 100.0) + S, ImuReading(Source(), (1e-4 * (k % 7), 0.0, 0.0), acc))
+        for k in range(300)
+    ]
+    relpos(swarm.intake, 1, samples)
+    with pytest.raises(BridgeError, match=reason):
+        Start(None, arm=True)._rates_fit(type("Group", (), {"swarm": swarm}), [0])
+    assert len(swarm.intake.notices) == 1
+
+
 def test_faults_are_told_when_they_change():
     intake = Intake(parsed(NODES), 0)
     said = [StatusReading(Source(), 12.0, fault) for fault in (0, 0, 5, 5, 5, 0)]
