@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from relpos_env.interface.perception import Perception
+from relpos_env.interface.perception import FOR_POLICIES, Perception
 from relpos_env.interface.views import View
 from relpos_env.scenarios import Scenario
 from relpos_env.scenarios.episode import Episode
@@ -29,7 +29,8 @@ def default_params(scenario: Scenario, n_cars: int) -> TrackerParams:
     """What the trackers believe by default: they wait for ranges as long as a round takes."""
     radio = scenario.radio.for_nodes(n_cars)
     rounds = 1.5 / round_rate(radio.session.phy, n_cars)
-    return TrackerParams(horizon=HorizonParams(delay=max(HorizonParams().delay, rounds)))
+    horizon = HorizonParams(delay=max(HorizonParams().delay, rounds))
+    return TrackerParams(filter=FOR_POLICIES, horizon=horizon)
 
 
 def waiting_at_most(scenario: Scenario, n_cars: int, params: TrackerParams, n_steps: int) -> int:

@@ -21,6 +21,7 @@ from tracking.filters.joint.params import (
     JointParams,
     JointStartParams,
     NlosParams,
+    NoiseLearningParams,
     RangeErrorParams,
 )
 from tracking.ranging.timestamps import SPEED_OF_LIGHT
@@ -100,6 +101,7 @@ def matched_params(scenario: Scenario | HumanScenario) -> JointParams:
         ),
         nlos=nlos,
         nlos_in_space=nlos,
+        noise_learning=NoiseLearningParams(learns=False),  # it is known
         # The NIS is 1 where noise is what it is believed to be.
         start=JointStartParams(respawn_nis=2.0),
     )

@@ -17,7 +17,7 @@ from hardware_bridge.live.ready import ReadyPerception
 from hardware_bridge.live.silent_cars import SilentCars
 from hardware_bridge.live.stuck_places import DRIVES
 from hardware_bridge.safety.picture import largest_std
-from relpos_env.interface.perception import Perception
+from relpos_env.interface.perception import FOR_POLICIES, Perception
 from relpos_env.interface.views import View
 from tracking.arrays import F64, I64, Bool
 from tracking.calibration.calibration import Calibration, merge
@@ -156,7 +156,7 @@ class LiveSwarm:
             return ReadyPerception(
                 group, tracker.positions, told, self._block, self._powered, n_beams
             )
-        params = TrackerParams(horizon=HorizonParams(delay=tracker.delay))
+        params = TrackerParams(filter=FOR_POLICIES, horizon=HorizonParams(delay=tracker.delay))
         return Perception(
             group,
             params,

@@ -17,11 +17,17 @@ from relpos_env.interface.views import View, bind_view, make_view
 from tracking.arrays import F64, I64, Bool
 from tracking.constellation import Constellation
 from tracking.estimate import TeamEstimate
-from tracking.filters import FilterBuilder
+from tracking.filters import FilterBuilder, FilterParams
+from tracking.filters.joint.params import JointParams
 from tracking.horizon import Horizon
 from tracking.jit import bind
 from tracking.measurements import MeasurementBlock
 from tracking.tracker import Tracker, TrackerParams
+
+OK_WITHIN = 1.0
+"""[m] The accuracy within which a pair is ok to those who act: the shipped policies learned so."""
+FOR_POLICIES = FilterParams(joint=JointParams(accuracy=OK_WITHIN))
+"""What the filters of a simulated or real swarm believe."""
 
 
 class Perception:

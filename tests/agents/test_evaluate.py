@@ -46,7 +46,7 @@ def relpos(*args, cwd=None):
 
 def small_suite():
     """Cars in and out of sight, and one run whose log is changed."""
-    los, nlos, _ = SUITES["paper"].cases
+    los, nlos, *_ = SUITES["paper"].cases
     changed = next(c for c in SUITES["robustness"].cases if c.change is range_outliers)
     return Suite(name="small", title="Small", cases=(los, nlos, changed), seeds=2, seconds=15.0)
 

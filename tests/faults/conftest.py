@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from agents.simulate import simulate
+from relpos_env.interface.perception import FOR_POLICIES
 from relpos_env.matched import matched_params
 from relpos_env.scenarios import recordable
-from tracking import Status, Tracker, bounds
+from tracking import Status, Tracker, TrackerParams, bounds
 from tracking.geometry import best_rotation
 from tracking.measurements import Kind, MeasurementBlock
 
@@ -69,7 +70,8 @@ class Run:
         self.t = np.arange(SETTLED, 60.0, 0.05)
         constellation = logs[0].constellation
         blocks = MeasurementBlock.stack([fault(Edit(log.block)) for log in logs])
-        tracker = Tracker(constellation, n_envs=len(logs))
+        # Faults are looked for by pairs that are ok to a metre, as those who drive are told.
+        tracker = Tracker(constellation, TrackerParams(filter=FOR_POLICIES), n_envs=len(logs))
         self.estimate = tracker.run(blocks, self.t)
         self.touched = (constellation.pairs == BAD).any(axis=1)
         truth = [log.truth.pairs(constellation, self.t)[0] for log in logs]

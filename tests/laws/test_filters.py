@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from tracking import Status, TeamEstimate, Tracker, TrackerParams
 from tracking.filters import FILTERS, FilterParams
+from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.state import JointState
 from tracking.filters.pair.params import PairEkfParams
 from tracking.filters.paper import PaperParams
@@ -227,7 +228,8 @@ def test_a_node_that_is_silent_leaves_and_returns(name, make_group):
     group = make_group(n=4, seconds=30.0)
     b = group.block
     silent = (b.t[0] > 10.0) & (b.t[0] < 18.0) & ((b.i[0] == 3) | (b.j[0] == 3))
-    tracker = Tracker(group.constellation, filter=name)
+    params = TrackerParams(filter=FilterParams(joint=JointParams(accuracy=1.0)))
+    tracker = Tracker(group.constellation, params, filter=name)
     pair = group.constellation.pair_index[0, 3]
     estimate = tracker.run(b.take(~silent), np.array([9.9, 12.0, 17.5, 29.0]))
     status = estimate.status[0, :, pair]

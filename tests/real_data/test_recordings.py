@@ -12,9 +12,12 @@ from tracking.ahrs.params import OrientationParams
 from tracking.bounds import recorded_bound
 from tracking.constellation import Constellation, NodeConfig
 from tracking.filters import FILTERS
+from tracking.filters.joint.params import JointParams
+from tracking.filters.params import FilterParams
 from tracking.geometry import quat_conjugate, quat_multiply
 from tracking.log import read_log
 from tracking.measurements import Kind, MeasurementBlock
+from tracking.tracker import TrackerParams
 
 LOGS = ("isas_walk1", "inrol_env1", "tiers_run01", "tiers_short")
 
@@ -61,13 +64,14 @@ def test_one_filter_over_all_nodes_follows_a_hand_among_reflections(results):
     assert found.ok_share >= 0.95
 
 
-@pytest.mark.xfail(strict=True, reason="it takes 12 s to find the heading: 0.171 m from 10 s on")
-@pytest.mark.parametrize("limit", [0.15, 0.165])
+FINDING = pytest.mark.xfail(strict=True, reason="it takes 12 s to find the heading: 0.159 m")
+
+
+@pytest.mark.parametrize("limit", [pytest.param(0.15, marks=FINDING), 0.165])
 def test_it_does_so_from_ten_seconds_on(results, limit):
     assert results["inrol_env1", "joint"].score.rmse_yaw <= limit
 
 
-@pytest.mark.xfail(strict=True, reason="0.1515 m; 0.147 to 0.157 m while numbers decided")
 def test_once_it_is_found_how_the_group_is_turned_it_is_so_for_good(data):
     found = track_log(data / "logs" / "inrol_env1", skip=20.0).score
     assert found.rmse_yaw <= 0.15
@@ -75,8 +79,9 @@ def test_once_it_is_found_how_the_group_is_turned_it_is_so_for_good(data):
 
 @pytest.fixture(scope="module")
 def settled_walk(data):
-    """Its score once it is found how the group is turned."""
-    return track_log(data / "logs" / "isas_walk1", skip=20.0).score
+    """Its score once it is found how the group is turned; ok to a metre."""
+    params = TrackerParams(filter=FilterParams(joint=JointParams(accuracy=1.0)))
+    return track_log(data / "logs" / "isas_walk1", skip=20.0, params=params).score
 
 
 def test_a_walk_is_followed_once_it_is_found_how_the_group_is_turned(settled_walk):

@@ -10,7 +10,12 @@ from tests.second_world.motion import drive
 from tests.second_world.sensors import G, read_imu, read_ranges
 from tests.second_world.world import World
 from tracking.constellation import Constellation, NodeConfig
-from tracking.filters.joint.params import JointParams, NlosParams, RangeErrorParams
+from tracking.filters.joint.params import (
+    JointParams,
+    NlosParams,
+    NoiseLearningParams,
+    RangeErrorParams,
+)
 from tracking.geometry import quat_from_yaw
 from tracking.log import Log
 from tracking.log.truth import Truth
@@ -106,4 +111,5 @@ def matched(world: World) -> JointParams:
         ),
         nlos=nlos,
         nlos_in_space=nlos,
+        noise_learning=NoiseLearningParams(learns=False),
     )
