@@ -200,7 +200,8 @@ class NoiseLearningParams:
     white_gap: float = 0.3
     """[s] Two ranges of a pair are compared if they follow each other within this time."""
     most_learned: float = 5.0
-    """[-] It becomes no more than this factor larger or smaller."""
+    """[-] It becomes no larger than by this factor, and no smaller than at first: ranges that are
+    rounded to a decimetre repeat themselves, and err all the same."""
 
     def __post_init__(self) -> None:
         check_numbers(self)

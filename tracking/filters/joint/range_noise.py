@@ -1,4 +1,4 @@
-"""The white noise of ranges is learned while they come.
+"""The white noise of ranges is learned while they come, where it is more than at first.
 
 Two ranges of a pair in a row differ by how the pair has moved, which is predicted, and by the
 difference of two white errors; what lasts is the same in both. Half of these differences are
@@ -44,6 +44,5 @@ def learn_white_noise(c, group, pair, before, after, dt):
         std = math.sqrt(group.white_var)
         is_larger = abs(before - pair.residual) > MEDIAN * std
         std *= 1.0 + (c.white_step if is_larger else -c.white_step)
-        least, most = c.white_var / c.most_learned**2, c.white_var * c.most_learned**2
-        group.white_var = min(max(std * std, least), most)
+        group.white_var = min(max(std * std, c.white_var), c.white_var * c.most_learned**2)
     pair.residual, pair.has_residual = after, True
