@@ -91,6 +91,8 @@ MECHANISMS: dict[str, Callable[[JointParams], JointParams]] = {
         nlos_in_space=replace(p.nlos_in_space, power_diff_weight=ALWAYS),
     ),
     "fast range error": part("range_error", fast_std=0.0),
+    "states of mounts": vehicles(ahead_std=0.0, slip_std=0.0),
+    "learned noise": part("noise_learning", learns=False),
     "patience with wheels": part("alignment", wheels_after=ALWAYS),
 }
 """Name to parameters without it."""

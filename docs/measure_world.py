@@ -53,7 +53,7 @@ def sight(log: Log) -> tuple[np.ndarray, np.ndarray]:
 
 
 def slips(log: Log) -> list[np.ndarray]:
-    """Mean sideways speed beside that of the mount that fits each car, by length of time [m/s]."""
+    """Mean sideways speed less that of the mount that fits each car, by length of time [m/s]."""
     out: list[list[np.ndarray]] = [[] for _ in SPANS]
     for node in range(log.constellation.n_nodes):
         row = log.truth.node == node

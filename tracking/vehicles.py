@@ -110,7 +110,7 @@ VEHICLES = {
         ahead=0.15,
         ahead_std=0.15,
         slip=0.01,
-        slip_std=0.01,
+        slip_std=0.02,
         impact_threshold=70.0,
         propagation_period=0.05,
     ),

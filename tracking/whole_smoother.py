@@ -30,7 +30,7 @@ from tracking.sanity.blocks import usable
 from tracking.tracker import TrackerParams
 
 CONTRADICTION = 25.0
-"""[-] Squared difference of both passes over its variance beyond which one of them is astray."""
+"""[-] Squared difference of both passes over its variance; beyond it they contradict each other."""
 KNOWN = (Status.OK, Status.LOST, Status.DOUBTFUL)
 
 
@@ -64,11 +64,11 @@ def smooth_whole(
     params = params or TrackerParams()
     states = Orientation(constellation, params.orientation, follows_bias=True).step(usable(block))
     passes = [JointEkf(constellation, params.filter.joint) for _ in range(2)]
-    tell = progress or (lambda _: None)
+    report = progress or (lambda _: None)
     forward = passes[0].run(states, t_out[None]).take(0)
-    tell(0.5)
+    report(0.5)
     back = passes[1].run(backwards(states), -t_out[None, ::-1]).take(0)
-    tell(1.0)
+    report(1.0)
     accuracy = passes[0].save().nodes["accuracy"][0]
     return Smoothed(
         _together(forward, back, accuracy[constellation.pairs].max(axis=1)),
@@ -104,7 +104,7 @@ def _together(forward: TeamEstimate, back: TeamEstimate, accuracy: F64) -> TeamE
     cov_b = back.cov[::-1][..., axes, :][..., axes] * np.outer(sign, sign)
     known_f = np.isin(forward.status, KNOWN)
     known_b = np.isin(back.status[::-1], KNOWN)
-    known_f, known_b, astray = _agree(
+    known_f, known_b, differ = _agree(
         forward.t, (ahead, cov_f, known_f), (behind, cov_b, known_b), d
     )
     eye = np.eye(2 * d)
@@ -123,7 +123,7 @@ def _together(forward: TeamEstimate, back: TeamEstimate, accuracy: F64) -> TeamE
     error = np.sqrt(np.trace(full[..., :d, :d], axis1=-2, axis2=-1))
     status = np.where(error <= accuracy, Status.OK, Status.LOST)
     doubted = (forward.status == Status.DOUBTFUL) & (back.status[::-1] == Status.DOUBTFUL)
-    status = np.where(doubted | astray, Status.DOUBTFUL, status)
+    status = np.where(doubted | differ, Status.DOUBTFUL, status)
     both_static = forward.constellation.is_static[forward.constellation.pairs].all(axis=1)
     status = np.where(both_static, Status.OK, status)
     status = np.where(none, forward.status, status).astype(forward.status.dtype)
@@ -141,9 +141,9 @@ def _agree(
     off = (forward[0] - back[0])[..., :d]
     variance = (forward[1] + back[1])[..., :d, :d] + 1e-12 * np.eye(d)
     squared = np.einsum("...i,...i->...", off, np.linalg.solve(variance, off[..., None])[..., 0])
-    astray = forward[2] & back[2] & (squared > CONTRADICTION)
+    differ = forward[2] & back[2] & (squared > CONTRADICTION)
     is_late = (t - t[0] > t[-1] - t)[:, None]
-    return forward[2] & ~(astray & ~is_late), back[2] & ~(astray & is_late), np.asarray(astray)
+    return forward[2] & ~(differ & ~is_late), back[2] & ~(differ & is_late), np.asarray(differ)
 
 
 def _inverse(cov: F64, known: Bool) -> F64:

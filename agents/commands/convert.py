@@ -15,7 +15,7 @@ from agents.console import emit_json, progress_bar
 @click.option("--preset", help="A public data set: sfuise, starloc or tiers.")
 @click.option("--mapping", type=Path, help="A file that says what is what, instead of a preset.")
 @click.option(
-    "--restamp", is_flag=True, help="Stamp IMU samples anew, at the steady rate that they have."
+    "--restamp", is_flag=True, help="Replace the times of IMU samples by those of a steady rate."
 )
 @click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
 def convert(

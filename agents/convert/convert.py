@@ -19,7 +19,7 @@ from tracking.log.truth import Truth as TruthRows
 from tracking.measurements import Kind, MeasurementBlock
 
 LONG_GAP = 10.0
-"""[-] Periods of an IMU: after a longer silence it is stamped anew."""
+"""[-] Periods of an IMU: after a longer silence another line is fitted."""
 
 
 def convert(
@@ -38,7 +38,7 @@ def convert(
         out: Folder to write; None writes nothing.
         preset: One of `PRESETS`.
         mapping: A mapping file, where there is no preset.
-        restamp: IMU samples are stamped anew at the steady rate that they have.
+        restamp: Times of IMU samples are replaced by those of a steady rate.
         progress: Called with the share of streams done.
 
     Raises:

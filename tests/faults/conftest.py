@@ -70,7 +70,7 @@ class Run:
         self.t = np.arange(SETTLED, 60.0, 0.05)
         constellation = logs[0].constellation
         blocks = MeasurementBlock.stack([fault(Edit(log.block)) for log in logs])
-        # Faults are looked for by pairs that are ok to a metre, as those who drive are told.
+        # Faults are looked for by pairs that are ok to a metre, as policies are.
         tracker = Tracker(constellation, TrackerParams(filter=FOR_POLICIES), n_envs=len(logs))
         self.estimate = tracker.run(blocks, self.t)
         self.touched = (constellation.pairs == BAD).any(axis=1)

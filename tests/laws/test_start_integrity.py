@@ -83,7 +83,7 @@ def with_absurd(group, add, count, seed):
 @pytest.mark.parametrize("vehicle", ["robot", "car", "human"])
 def test_absurd_first_ranges_make_nothing_ok_and_wrong_and_delay_little(vehicle, count, add):
     for seed in range(4):
-        # Cars that are in motion from the start take 12 s to tell how they are turned.
+        # Cars that are in motion from the start need 12 s to find their rotation.
         group, t = (
             ExactGroup(vehicle, (0, 1, 2, 3), hz=50.0, seconds=16.0),
             np.arange(0.2, 15.5, 0.05),

@@ -7,6 +7,7 @@ import pytest
 
 from relpos_env import formation_v0
 from relpos_env.drivers import LoopDrivers
+from relpos_env.interface.perception import FOR_POLICIES
 from relpos_env.recording import Recording
 from relpos_env.scenarios import draw_episode, scenario
 from relpos_env.swarm import Swarm
@@ -71,7 +72,8 @@ def test_environment_is_replayed_log(tmp_path, arguments, name):
             live.append(copy(env.loop.estimate))
     log = read_log(write_log(tmp_path / "run", env.recorded_log("run")))
     t_out = np.array([e.t[0] for e in live])
-    assert_same_run(live, Tracker(log.constellation, filter=name).run(log.block, t_out))
+    params = TrackerParams(filter=FOR_POLICIES)
+    assert_same_run(live, Tracker(log.constellation, params, filter=name).run(log.block, t_out))
 
 
 def test_a_recording_begins_with_the_episode():

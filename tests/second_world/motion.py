@@ -40,7 +40,7 @@ def drive(world, rng) -> list[Motion]:
             stands = rng.random() < 0.12
             wanted[i] = 0.0 if stands else rng.uniform(0.25, 1.0) * top[i]
             wanted_bend[i] = rng.uniform(-1.0, 1.0) * sharpest[i]
-        # Who is far out turns home.
+        # Cars that are far out turn back.
         away = np.linalg.norm(at, axis=1)
         home = np.arctan2(-at[:, 1], -at[:, 0]) - yaw
         home = np.arctan2(np.sin(home), np.cos(home))

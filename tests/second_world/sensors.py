@@ -11,7 +11,7 @@ G = 9.81
 def read_imu(world, vehicle, motion, t, rng):
     """Angular rate, specific force and magnetic field in the IMU's axes, (time, 9)."""
     imu, field = world.imu, world.field
-    mount = Rotation.from_euler("ZYX", vehicle.lean[::-1])
+    mount = Rotation.from_euler("ZYX", vehicle.tilt[::-1])
     body = Rotation.from_euler("Z", motion.yaw(t)[:, None])
     sensor = body * mount
     speed = np.linalg.norm(motion.place(t, 1), axis=1) / vehicle.top_speed

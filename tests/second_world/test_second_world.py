@@ -42,7 +42,7 @@ def test_rear_axles_do_not_slide(world, motions):
 
 
 def test_exact_sensors_read_the_motion(world, motions):
-    level = replace(world.vehicles[0], lean=(0.0, 0.0, 0.0))
+    level = replace(world.vehicles[0], tilt=(0.0, 0.0, 0.0))
     none = {"gyr_noise": 0.0, "gyr_bias": 0.0, "acc_noise": 0.0, "acc_bias": 0.0, "vibration": 0.0}
     exact = replace(
         world,

@@ -21,8 +21,8 @@ class Vehicle:
     """[m/s]"""
     acceleration: float
     """[m/s2] Along and across."""
-    lean: tuple[float, float, float]
-    """[rad] How the IMU is mounted off level and off straight: roll, pitch, yaw."""
+    tilt: tuple[float, float, float]
+    """[rad] Mounting error of the IMU: roll, pitch, yaw."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,9 +93,9 @@ class World:
     field: Field
     radio: Radio
     radius: float
-    """[m] Nobody stays farther from the middle."""
+    """[m] Cars turn back from there."""
     at_rest: float
-    """[s] Nobody moves before."""
+    """[s] Nothing moves before."""
 
 
 def draw(seed: int, *, seconds: float = 60.0, long_share: float | None = None) -> World:
@@ -121,7 +121,7 @@ def draw(seed: int, *, seconds: float = 60.0, long_share: float | None = None) -
                 aside=between(-0.06, 0.06),
                 top_speed=between(0.8, 3.0),
                 acceleration=between(1.0, 4.0),
-                lean=tuple(rng.normal(0.0, np.radians([0.7, 0.7, 1.0])).tolist()),
+                tilt=tuple(rng.normal(0.0, np.radians([0.7, 0.7, 1.0])).tolist()),
             )
         )
     cheap = between(0.0, 1.0)

@@ -28,7 +28,7 @@ MOST_LENGTH = 0.05
 """[-] Relative error of gravity that calibration would have taken off."""
 ABSURD_LENGTH = 0.3
 """[-] Relative error that is none of an accelerometer in m/s2."""
-ASKEW, OVERTURNED = np.radians(8.0), np.radians(45.0)
+TILTED, OVERTURNED = np.radians(8.0), np.radians(45.0)
 """[rad] Between z and gravity."""
 MOST_BIAS = 0.035
 """[rad/s] A steady rate above this is not learned as a bias (`RestParams.largest_bias`)."""
@@ -96,7 +96,7 @@ def find_in_samples(node: NodeConfig, t: F64, values: F64) -> list[Finding]:
         text = f"node {node.id} never rests: the bias of its gyroscope is not known at first"
         found.append(Finding("never-still", (node.id,), text))
     found += _of_gravity(node, rest)
-    if np.linalg.norm(rest.rate) > MOST_BIAS:
+    if np.abs(rest.rate).max() > MOST_BIAS:
         rate = ", ".join(f"{v:.3f}" for v in rest.rate)
         text = f"node {node.id}: gyr_x, gyr_y, gyr_z at rest are {rate}, expected 0 rad/s"
         found.append(Finding("gyro-bias", (node.id,), text))
@@ -128,7 +128,7 @@ def _of_gravity(node: NodeConfig, rest: AtRest) -> list[Finding]:
             f"{said}: gravity is on {name}, expected on +z of a {node.vehicle}, which stays level"
         )
         found.append(Finding("gravity-axis", (node.id,), text))
-    elif tilt > ASKEW:
-        text = f"{said}: z leans by {np.degrees(tilt):.0f} degrees, expected none"
+    elif tilt > TILTED:
+        text = f"{said}: tilted by {np.degrees(tilt):.0f} degrees, expected 0"
         found.append(Finding("gravity-tilt", (node.id,), text))
     return found

@@ -32,8 +32,8 @@ KINDS: dict[str, Kind] = {
     ),
     "gravity-tilt": Kind(
         "warning",
-        "the IMU of a vehicle that stays level is mounted askew",
-        "mount it flat: what it leans by is taken for an acceleration",
+        "the IMU of a vehicle that stays level is tilted",
+        "mount it flat: its tilt is taken for an acceleration",
     ),
     "gravity-length": Kind(
         "warning", "an IMU at rest reads too much or too little", "`relpos calibrate imu`"
@@ -68,11 +68,13 @@ KINDS: dict[str, Kind] = {
     ),
     "no-imu": Kind(
         "note",
-        "ranges alone tell neither the rotation nor the mirror image of a group",
+        "ranges alone determine neither the rotation nor the reflection of a group",
         "record the IMU",
     ),
     "no-heading": Kind(
-        "note", "a heading that nobody gave is taken for 0", "`initial_heading_rad` in meta.toml"
+        "note",
+        "an initial heading that is not given is taken for 0",
+        "`initial_heading_rad` in meta.toml",
     ),
     "no-magnetometer": Kind(
         "note",
@@ -116,7 +118,7 @@ def refuse_errors(findings: Sequence[Finding]) -> None:
     """See that nothing is found with which estimates would be `ok` and wrong.
 
     Raises:
-        LogError: Something is; all of it is told.
+        LogError: Something is; names all of it.
     """
     errors = [f"{f.text}; {KINDS[f.name].remedy}" for f in findings if f.severity == "error"]
     if errors:

@@ -1,4 +1,4 @@
-"""A gyroscope against the magnetometer beside it: both must see the same rotation.
+"""A gyroscope against the magnetometer of the same node: both must see the same rotation.
 
 A field that is the same everywhere turns in the body as the body turns in the world,
 ``dm/dt = -w x m``. Rates in another unit, or axes that differ, do not fit that; which ones would is

@@ -19,8 +19,8 @@ def find_unused(log: Log) -> list[Finding]:
     with_imu = np.unique(node[kind == Kind.IMU])
     if not np.isin(kind, (Kind.IMU, Kind.STATE)).any():
         text = (
-            "no IMU samples and no orientations: ranges alone tell neither the rotation nor the "
-            "mirror image of the group, so pairs stay ambiguous; rmse_mirror is what can be judged"
+            "no IMU samples and no orientations: ranges alone determine neither the rotation nor "
+            "the reflection of the group: pairs stay ambiguous; rmse_mirror is what can be judged"
         )
         found.append(Finding("no-imu", (), text))
     if constellation.heading == "initial":

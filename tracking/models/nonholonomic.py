@@ -18,7 +18,7 @@ from tracking.jit import small_kernel
 
 @small_kernel
 def nonholonomic_model(v0, v1, error, ahead, slip, cos_yaw, sin_yaw, yaw_rate, aside):
-    """Predict the sideways velocity of the axle beside its slip, which is none [m/s].
+    """Predict the sideways velocity of the axle without its slip, which is 0 [m/s].
 
     Args:
         v0: Velocity [m/s].

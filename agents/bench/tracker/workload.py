@@ -21,7 +21,7 @@ REAR_AXLE = 0.15
 TURN = 0.8
 """[rad/s] Of the first node round its circle of 1 m; the others are up to a half faster."""
 SWAY, SWAY_RATE = 0.6, 0.9
-"""[rad], [rad/s] They go faster and slower: a steady curve does not tell where a tracker sits."""
+"""[rad], [rad/s] They go faster and slower: a steady curve does not show where a tracker sits."""
 
 
 @dataclass(frozen=True)

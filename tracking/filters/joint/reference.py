@@ -283,7 +283,7 @@ class JointReference:
 
     @staticmethod
     def slides(node: Any, v: int, y: int, x: Any) -> Any:
-        """Sideways velocity of an axle beside the slip of its tyres."""
+        """Sideways velocity of an axle without the slip of its tyres."""
         yaw, w = np.arctan2(node["sin_yaw"], node["cos_yaw"]) + x[y], node["yaw_rate"]
         m, cos, sin = node["i_mount"], np.cos(yaw), np.sin(yaw)
         ahead, slip = (x[m], x[m + 1]) if m >= 0 else (node["ahead"], node["slip"])
