@@ -71,7 +71,7 @@ class Radio:
     slow: float
     """[m]"""
     slow_time: float
-    """[s] How long a slow error lasts, whoever moves."""
+    """[s] How long a slow error lasts, in motion or at rest."""
     long_share: float
     """[-] Share of the time at which ranges of a pair are long."""
     long_time: float

@@ -1,4 +1,4 @@
-"""What is amiss with a recording: one table, whoever says it."""
+"""What is amiss with a recording: the one table of findings."""
 
 from __future__ import annotations
 
