@@ -4,6 +4,8 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 # On a terminal pip shows what it does; in a log it is quiet.
 PIP    := $(BIN)/python -m pip --disable-pip-version-check $(if $(MAKE_TERMOUT),,--quiet)
+# Bytecode is made when a module is first imported: for all of them it takes as long as the rest.
+INSTALL := $(PIP) install --no-compile -c constraints.txt
 
 # What `make wheel` compiles for and what: levels of x86-64, or `generic` elsewhere.
 LEVELS ?= $(if $(filter x86_64 amd64,$(shell uname -m)),x86-64-v2 x86-64-v3 x86-64-v4,generic)
@@ -62,17 +64,17 @@ $(BIN)/python:
 # A stamp per set of dependencies: a second run installs nothing.
 $(VENV)/.core: pyproject.toml constraints.txt | $(BIN)/python
 	@[ -e $(VENV)/.dev ] && [ $(VENV)/.dev -nt pyproject.toml ] && [ $(VENV)/.dev -nt constraints.txt ] \
-	  || { echo "installing relpos-env into $(VENV) ..."; $(PIP) install -c constraints.txt -e .; }
+	  || { echo "installing relpos-env into $(VENV) ..."; $(INSTALL) -e .; }
 	@touch $@
 
 $(VENV)/.dev: pyproject.toml constraints.txt | $(BIN)/python
 	@echo "installing relpos-env and its development tools into $(VENV) ..."
-	$(PIP) install -c constraints.txt -e '.[dev]'
+	$(INSTALL) -e '.[dev]'
 	@touch $@ $(VENV)/.core
 
 $(VENV)/.hardware: pyproject.toml constraints.txt | $(BIN)/python
 	@[ -e $(VENV)/.dev ] && [ $(VENV)/.dev -nt pyproject.toml ] && [ $(VENV)/.dev -nt constraints.txt ] \
-	  || { echo "installing relpos-env for hardware into $(VENV) ..."; $(PIP) install -c constraints.txt -e '.[hardware]'; }
+	  || { echo "installing relpos-env for hardware into $(VENV) ..."; $(INSTALL) -e '.[hardware]'; }
 	@touch $@ $(VENV)/.core
 
 clean:

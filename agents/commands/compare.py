@@ -122,7 +122,7 @@ def _simulated(
     from tracking.filters import DEFAULT_FILTER
 
     scenarios = options.pop("scenarios") or (None,)
-    warm_up_first([DEFAULT_FILTER], purpose="env")
+    warm_up_first([DEFAULT_FILTER], purpose="env", in_space=False)
     with progress_bar("compare") as tell:
         result = run(
             drivers=names, observations=observations, scenarios=scenarios, progress=tell, **options

@@ -85,9 +85,8 @@ def demo(
         raise UsageError("--gif: expected without --window, which shows what would be written")
     check_folder(out, ["report.html", "drive.gif"] if gif else ["report.html"])
     ours = names["filter"]
-    warm_up_first(
-        [ours], purpose="env", leave_out=("tasks",) if names["task"] in (None, TASK) else ()
-    )
+    is_usual = names["task"] in (None, TASK)
+    warm_up_first([ours], purpose="env", in_space=False, leave_out=("tasks",) if is_usual else ())
     with BackgroundWarmUp(FILTERS) as others, LiveRoom() as room:
         pictures = Gif(every=2, interval=DECISION)
         titles = {"estimate": "on estimates", "truth": "on the truth", "nothing": "on nothing"}

@@ -92,7 +92,8 @@ def track(
     if out is not None:
         check_folder(out, ["report.html"])
     read = [apply_calibrations(read_log(path), calibrations) for path in logs]
-    warm_up_first(names if no_checks else (*names, DEFAULT_FILTER))
+    needed = names if no_checks else (*names, DEFAULT_FILTER)
+    warm_up_first(needed, in_space=any(log.constellation.dimensions == 3 for log in read))
     results: list[TrackResult] = []
     checked = [(log, []) if no_checks else examine(log) for log in read]
     refuse_errors([finding for _, found in checked for finding in found])

@@ -42,7 +42,7 @@ def train(out: Path | None, resume: Path | None, as_json: bool, **given: str | N
         from tracking.filters import DEFAULT_FILTER
     except ImportError as error:
         raise UsageError(f"training needs {error.name}: pip install 'relpos-env[train]'") from error
-    warm_up_first([DEFAULT_FILTER], purpose="env")
+    warm_up_first([DEFAULT_FILTER], purpose="env", in_space=False)
     with progress_bar(f"training {folder.name}") as tell:
 
         def report(share: float, row: dict[str, Any] | None) -> None:

@@ -11,10 +11,13 @@ from agents.warm_up.processes import warm_up
 
 
 class BackgroundWarmUp:
-    """Compiles trackers in processes of their own from `__enter__` on; ends them on `__exit__`."""
+    """Compiles trackers of groups in a plane in processes of their own from `__enter__` on.
+
+    Ends them on `__exit__`.
+    """
 
     def __init__(self, filters: Iterable[str]) -> None:
-        self._parts = {name: parts_of("track", (name,)) for name in filters}
+        self._parts = {name: parts_of("track", (name,), in_space=False) for name in filters}
         self._stop, self._error = threading.Event(), list[BaseException]()
         self._thread = threading.Thread(target=self._compile, name="warm-up", daemon=True)
         self.missing = tuple(

@@ -21,8 +21,8 @@ from tracking.filters import DEFAULT_FILTER, FILTERS, filter_builder
 from tracking.jit import Call, bind, is_compiled, missing_in, types_of
 from tracking.measurements import MeasurementBlock
 
-SECONDS = {"joint.0": 45.0, "joint.1": 42.0, "env": 32.0, "ekf-mds.0": 28.0,
-           "paper-ekf-mds.0": 15.0, "hardware": 6.0, "tasks": 6.0}  # fmt: skip
+SECONDS = {"joint.0": 41.0, "joint.1": 36.0, "env": 31.0, "ekf-mds.0": 30.0, "joint.2": 22.0,
+           "paper-ekf-mds.0": 16.0, "hardware": 6.0, "tasks": 6.0}  # fmt: skip
 """[s] Time of a part on one core of a laptop, for the progress that is shown."""
 OTHERS = 10.0
 """[s] Time of a part that is not in the table."""
@@ -55,12 +55,15 @@ class Part:
         return SECONDS.get(self.name, OTHERS)
 
 
-def parts_of(purpose: str, filters: tuple[str, ...] = (DEFAULT_FILTER,)) -> list[Part]:
+def parts_of(
+    purpose: str, filters: tuple[str, ...] = (DEFAULT_FILTER,), *, in_space: bool = True
+) -> list[Part]:
     """Parts that something needs.
 
     Args:
         purpose: One of `PURPOSES`.
         filters: Some of `tracking.filters.FILTERS`; all of them for the purpose ``all``.
+        in_space: Whether groups move in space, too, or in a plane only.
 
     Raises:
         ConfigError: No filter of that name.
@@ -69,14 +72,14 @@ def parts_of(purpose: str, filters: tuple[str, ...] = (DEFAULT_FILTER,)) -> list
     if purpose not in PURPOSES:
         raise UsageError(f"--for: expected one of {', '.join(PURPOSES)}, got {purpose!r}")
     names = tuple(FILTERS) if purpose == "all" else filters
-    return [*_tracker_parts(names), *(OTHER_PARTS[name] for name in PURPOSES[purpose])]
+    return [*_tracker_parts(names, in_space), *(OTHER_PARTS[name] for name in PURPOSES[purpose])]
 
 
-def _tracker_parts(filters: Iterable[str]) -> Iterator[Part]:
+def _tracker_parts(filters: Iterable[str], in_space: bool) -> Iterator[Part]:
     """Parts of trackers; what filters share is one part."""
     known = set[frozenset[Any]]()
     for name in dict.fromkeys(filters):
-        for part_name, calls in _kernel_groups(name):
+        for part_name, calls in _kernel_groups(name, in_space):
             code = frozenset((id(kernel), types_of(given)) for kernel, given in calls)
             if code not in known:
                 known.add(code)
@@ -84,11 +87,12 @@ def _tracker_parts(filters: Iterable[str]) -> Iterator[Part]:
                 yield Part(name=part_name, is_kept=kept, compile=compiles)
 
 
-def _kernel_groups(name: str) -> Iterator[tuple[str, list[Call]]]:
-    """Of one tracker, the same for all groups of nodes."""
+def _kernel_groups(name: str, in_space: bool) -> Iterator[tuple[str, list[Call]]]:
+    """Of one tracker, the same for all groups of nodes in a plane, and for all in space."""
     filter_builder(name)
-    nodes = tuple(NodeConfig(id=k) for k in range(3))
-    groups = Tracker(Constellation(nodes=nodes, dimensions=2), filter=name).calls()
+    nodes = tuple(NodeConfig(id=k) for k in range(4))
+    who = Constellation(nodes=nodes, dimensions=3 if in_space else 2)
+    groups = Tracker(who, filter=name).calls()
     for k, group in enumerate(groups):
         # The last is that of the orientations, the same for all filters.
         named = f"{name}.{k}" if k < len(groups) - 1 else "orientation"

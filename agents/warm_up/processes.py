@@ -79,18 +79,24 @@ def warm_up(
 
 
 def warm_up_first(
-    filters: Iterable[str], *, purpose: str = "track", leave_out: Sequence[str] = ()
+    filters: Iterable[str],
+    *,
+    purpose: str = "track",
+    in_space: bool = True,
+    leave_out: Sequence[str] = (),
 ) -> None:
     """`warm_up` for a command: with a bar, or lines where there is no terminal, if it takes time.
 
     Args:
         filters: Those that do not come with the package are compiled when they run.
         purpose: One of `agents.warm_up.parts.PURPOSES`.
+        in_space: Whether groups move in space, too, or in a plane only.
         leave_out: Names of parts that are not needed.
     """
     names = tuple(name for name in dict.fromkeys(filters) if name in FILTERS)
     with shown_progress() as tell:
-        parts = [part for part in parts_of(purpose, names) if part.name not in leave_out]
+        needed = parts_of(purpose, names, in_space=in_space)
+        parts = [part for part in needed if part.name not in leave_out]
         warm_up(parts, progress=tell)
 
 

@@ -22,9 +22,9 @@ from tracking.jit import bind, is_compiled
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
 
 
-def calls(name="joint"):
-    nodes = tuple(NodeConfig(id=k) for k in range(3))
-    return Tracker(Constellation(nodes=nodes, dimensions=2), filter=name).calls()
+def calls(name="joint", dimensions=3):
+    nodes = tuple(NodeConfig(id=k) for k in range(4))
+    return Tracker(Constellation(nodes=nodes, dimensions=dimensions), filter=name).calls()
 
 
 @pytest.fixture
@@ -44,7 +44,7 @@ def test_nothing_is_compiled_twice_and_nothing_is_said_then(compiled, capsys):
     shares = []
     found = warm_up(parts_of("track"), progress=lambda *said: shares.append(said))
     assert (found.compiled, shares, found.largest_mb) == ((), [], 0.0)
-    assert found.parts == ("joint.0", "joint.1", "orientation")
+    assert found.parts == ("joint.0", "joint.1", "joint.2", "orientation")
     warm_up_first(["joint", "joint", "package.module:Name"])
     assert capsys.readouterr().err == ""
 
@@ -54,6 +54,14 @@ def test_every_purpose_has_its_parts_once(purpose):
     names = [part.name for part in parts_of(purpose)]
     assert len(names) == len(set(names))
     assert {"joint.0", "orientation", *PURPOSES[purpose]} <= set(names)
+
+
+def test_groups_in_a_plane_compile_nothing_that_is_for_space():
+    needed = {kernel.py_func.__name__ for group in calls(dimensions=2) for kernel, _ in group}
+    others = {kernel.py_func.__name__ for group in calls() for kernel, _ in group} - needed
+    assert others == {"align", "modes", "challenge_in_space"}
+    names = [part.name for part in parts_of("track", in_space=False)]
+    assert names == ["joint.0", "joint.1", "orientation"]
 
 
 def test_an_unknown_purpose_is_named():
@@ -114,7 +122,7 @@ def test_parts_that_need_others_come_last_and_alone(monkeypatch):
 def test_what_is_compiled_in_the_background_ends_with_its_block(monkeypatch):
     sleep = [sys.executable, "-c", "import time; time.sleep(60)"]
     monkeypatch.setattr(processes, "_command", lambda name: sleep)
-    monkeypatch.setattr("agents.warm_up.background.parts_of", lambda *_: [a_part("slow")])
+    monkeypatch.setattr("agents.warm_up.background.parts_of", lambda *_, **__: [a_part("slow")])
     began = time.monotonic()
     with BackgroundWarmUp(["joint"]) as others:
         assert others.missing == ("joint",)
@@ -134,7 +142,7 @@ def test_the_world_is_driven_without_a_tracker():
 def test_command(compiled):
     done = CliRunner().invoke(cli, ["warmup", "--json"])
     (line,) = map(json.loads, done.stdout.splitlines())
-    assert line["parts"] == ["joint.0", "joint.1", "orientation"]
+    assert line["parts"] == ["joint.0", "joint.1", "joint.2", "orientation"]
     assert line["compiled"] == []
     wrong = CliRunner().invoke(cli, ["warmup", "--filter", "missing"])
     assert wrong.exit_code != 0

@@ -1,7 +1,8 @@
 """What is rare and large: each is compiled by itself, when it is first needed.
 
-`event_loop.run_events` returns the number of one of them and is called again when it is done. So
-those that track a log compile what the log needs, and a range reaches little code.
+`event_loop.run_events` returns the number of an action and is called again when its kernels are
+done. So those that track a log compile what the log needs, and a range reaches little code; what is
+for groups in space alone is not compiled for groups in the plane.
 """
 
 from __future__ import annotations
@@ -10,7 +11,8 @@ from collections.abc import Callable
 from typing import Any
 
 from tracking.filters.joint import workspace
-from tracking.filters.joint.hypotheses.alignment_modes import monitor_modes
+from tracking.filters.joint.hypotheses.alignment_modes import challenge_alignment, monitor_modes
+from tracking.filters.joint.hypotheses.alignment_sensitivity import start_alignments
 from tracking.filters.joint.hypotheses.bank import (
     add_mirror_image,
     challenge,
@@ -48,6 +50,13 @@ def spawn(coefficients, layout, state, work, t):
 
 
 @kernel
+def align(coefficients, layout, state, work, t):
+    """Start the alignment of a group in space that has just started, or moved."""
+    cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
+    start_alignments(coefficients[0], by_reference(one_env(state, cursor[ENV])), layout)
+
+
+@kernel
 def stale(coefficients, layout, state, work, t):
     """Remove nodes that were silent and may be anywhere."""
     cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
@@ -71,10 +80,17 @@ def reflect(coefficients, layout, state, work, t):
 
 
 @kernel
-def challenge_alignment(coefficients, layout, state, work, t):
+def challenge_in_plane(coefficients, layout, state, work, t):
     """Follow all rotations and mirror images again."""
     cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
     challenge(coefficients[0], by_reference(one_env(state, cursor[ENV])), layout)
+
+
+@kernel
+def challenge_in_space(coefficients, layout, state, work, t):
+    """Look for a likelier rotation or mirror image."""
+    cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
+    challenge_alignment(coefficients[0], by_reference(one_env(state, cursor[ENV])), layout)
 
 
 @kernel
@@ -89,8 +105,14 @@ def reinitialise(coefficients, layout, state, work, t):
 def start_group(coefficients, layout, state, work, t):
     """Start the group."""
     cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
+    start(coefficients[0], by_reference(one_env(state, cursor[ENV])), layout, t)
+
+
+@kernel
+def survey_group(coefficients, layout, state, work, t):
+    """Use the surveyed distances of a group that has just started."""
+    cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
     c, s = coefficients[0], by_reference(one_env(state, cursor[ENV]))
-    start(c, s, layout, t)
     for a in range(s.nodes.shape[0]):
         apply_surveys(c, s, layout, work, a, a)
 
@@ -114,20 +136,35 @@ def remove(coefficients, layout, state, work, t):
     remove_node(coefficients[0], s, layout, cursor[NODE])
 
 
-RARE: dict[int, Callable[..., None]] = {
-    workspace.TIME_OUT: time_out,
-    workspace.SPAWN: spawn,
-    workspace.STALE: stale,
-    workspace.TIME_OUT_LATER: time_out,
-    workspace.MODES_STEP: modes,
-    workspace.REFLECT: reflect,
-    workspace.CHALLENGE: challenge_alignment,
-    workspace.REINITIALISE: reinitialise,
-    workspace.START: start_group,
-    workspace.JOIN: join_group,
-    workspace.JOIN_OTHER: join_group,
-    workspace.REMOVE: remove,
+Rare = Callable[..., None]
+ACTIONS: dict[int, tuple[Rare, ...]] = {
+    workspace.TIME_OUT: (time_out,),
+    workspace.SPAWN: (spawn,),
+    workspace.STALE: (stale,),
+    workspace.TIME_OUT_LATER: (time_out,),
+    workspace.REFLECT: (reflect,),
+    workspace.CHALLENGE: (challenge_in_plane,),
+    workspace.REINITIALISE: (reinitialise,),
+    workspace.START: (start_group, survey_group),
+    workspace.JOIN: (join_group,),
+    workspace.JOIN_OTHER: (join_group,),
+    workspace.REMOVE: (remove,),
 }
+"""What an action is, one kernel after the other."""
+ACTIONS_IN_SPACE: dict[int, tuple[Rare, ...]] = {
+    **ACTIONS,
+    workspace.SPAWN: (spawn, align),
+    workspace.MODES_STEP: (modes,),
+    workspace.CHALLENGE: (challenge_in_space,),
+    workspace.START: (start_group, align, survey_group),
+}
+"""The same for groups with a linear alignment (`alignment_sensitivity.has_linear_alignment`)."""
+
+
+def actions_of(coefficients: Any, state: Any) -> dict[int, tuple[Rare, ...]]:
+    """The actions that a group can need."""
+    n_nodes, has_slopes = state.nodes.shape[1], state.sensitivity.shape[2] > 0
+    return ACTIONS_IN_SPACE if has_slopes and n_nodes > coefficients[0]["d"] else ACTIONS
 
 
 def run_to_end(run: Callable[[], int], arguments: tuple[Any, ...]) -> None:
@@ -138,20 +175,29 @@ def run_to_end(run: Callable[[], int], arguments: tuple[Any, ...]) -> None:
         arguments: Its arguments.
     """
     coefficients, layout, state, work, events, *_ = arguments
+    actions = actions_of(coefficients, state)
     work.cursor[:] = 0
     while action := run():
         t = events[0][work.cursor[ENV], work.cursor[EVENT]]
-        RARE[action](coefficients, layout, state, work, t)
+        for rare in actions[action]:
+            rare(coefficients, layout, state, work, t)
 
 
 def compile_all(arguments: tuple[Any, ...]) -> None:
     """Compile everything ahead, for those that cannot wait later."""
-    for kernel_, given in rare_calls(arguments):
-        bind(kernel_, *given)
+    for calls in rare_calls(arguments):
+        for rare, given in calls:
+            bind(rare, *given)
 
 
-def rare_calls(arguments: tuple[Any, ...]) -> list[Call]:
-    """These kernels and their arguments."""
+def rare_calls(arguments: tuple[Any, ...]) -> list[list[Call]]:
+    """These kernels and their arguments: those of all groups, then those of groups in space."""
     coefficients, layout, state, work, *_ = arguments
     given = coefficients, layout, state, work, 0.0
-    return [(action, given) for action in dict.fromkeys(RARE.values())]
+    needed, common = _kernels(actions_of(coefficients, state)), _kernels(ACTIONS)
+    other = [rare for rare in needed if rare not in common]
+    return [[(rare, given) for rare in group] for group in (common, other) if group]
+
+
+def _kernels(actions: dict[int, tuple[Rare, ...]]) -> list[Rare]:
+    return list(dict.fromkeys(rare for one in actions.values() for rare in one))

@@ -48,16 +48,17 @@ from tracking.maths.rotation_modes import (
 
 
 @allocating_kernel
-def challenge_alignment(c, s, layout, h):
-    """Look for other turns of hypothesis h, the only one; until one is likelier it stays as it is.
+def challenge_alignment(c, s, layout):
+    """Look for other turns of the only hypothesis; until one is likelier it stays as it is.
 
     It has a head start, of which a mirror image feels all.
     """
+    h = s.group[0].best
     start_alignment(c, s, layout, h)
     for k in range(9):
         s.alignment_information[h, k, k] += 0.5 * c.challenger_penalty
     update_alignment_cov(c, s, h)
-    s.group[0].alignment = CHALLENGED
+    s.group[0].alignment, s.group[0].misfit = CHALLENGED, 0.0
 
 
 @allocating_kernel

@@ -23,7 +23,7 @@ from __future__ import annotations
 import numpy as np
 
 from tracking.filters.joint.gyro_bias import STEP, propagate_gyro_bias_sensitivity
-from tracking.filters.joint.hypotheses.alignment import LINEAR, has_modes
+from tracking.filters.joint.hypotheses.alignment import FILTERED, LINEAR, has_modes
 from tracking.filters.joint.lever_arm import attach_to_world
 from tracking.filters.joint.propagation import moves, n_bias_states
 from tracking.jit import allocating_kernel, kernel, small_kernel
@@ -35,12 +35,21 @@ LOOSE = 3.0
 
 @small_kernel
 def has_linear_alignment(c, s):
-    """True for groups in space of more than three nodes: too little holds a layout of three.
+    """True for groups in space of more than three nodes (`rare.actions_of`).
 
-    Those that start are few at first, the others join at once. A smoother, which has no slopes,
-    takes the turn as it is.
+    Too little holds a layout of three. Those that start are few at first, the others join at once.
+    A smoother, which has no slopes, takes the turn as it is.
     """
     return s.sensitivity.shape[1] > 0 and s.nodes.shape[0] > c.d
+
+
+@allocating_kernel
+def start_alignments(c, s, layout):
+    """Let one filter stand for all rotations from now on, if the group does not rest."""
+    if s.group[0].alignment == FILTERED:
+        for h in range(s.alive.shape[0]):
+            if s.alive[h]:
+                start_alignment(c, s, layout, h)
 
 
 @allocating_kernel

@@ -23,8 +23,6 @@ from tracking.filters.joint.hypotheses.alignment import (
     STATIC,
     has_modes,
 )
-from tracking.filters.joint.hypotheses.alignment_modes import challenge_alignment
-from tracking.filters.joint.hypotheses.alignment_sensitivity import has_linear_alignment
 from tracking.filters.joint.hypotheses.copying import copy_hypothesis, rotate_hypothesis
 from tracking.filters.joint.hypotheses.geometric_degeneracy import (
     degeneracy_ratio,
@@ -74,10 +72,6 @@ def challenge(c, s, layout):
     """Follow all rotations and mirror images again, and the only hypothesis."""
     group = s.group[0]
     h = group.best
-    if has_linear_alignment(c, s):
-        group.misfit = 0.0
-        challenge_alignment(c, s, layout, h)
-        return
     group.misfit_limit = c.challenge_raise * max(group.misfit, group.misfit_limit)
     group.misfit = 0.0
     for i in range(s.nodes.shape[0]):

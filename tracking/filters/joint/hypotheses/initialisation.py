@@ -22,10 +22,7 @@ from tracking.filters.first_ranges import (
 )
 from tracking.filters.joint.heading_gauge import add_rotation_uncertainty, heading_functional
 from tracking.filters.joint.hypotheses.alignment import FILTERED, STATIC
-from tracking.filters.joint.hypotheses.alignment_sensitivity import (
-    has_linear_alignment,
-    start_alignment,
-)
+from tracking.filters.joint.hypotheses.alignment_sensitivity import has_linear_alignment
 from tracking.filters.joint.hypotheses.copying import copy_hypothesis
 from tracking.filters.joint.hypotheses.static_initialisation import (
     all_static,
@@ -50,7 +47,10 @@ def can_start(c, s, layout, members, t):
 
 @allocating_kernel
 def start(c, s, layout, t):
-    """Start the group with the nodes whose pairs are all ready."""
+    """Start the group with the nodes whose pairs are all ready.
+
+    In space its alignment is started next (`alignment_sensitivity.start_alignments`).
+    """
     members = np.empty(s.nodes.shape[0], np.int64)
     m = can_start(c, s, layout, members, t)
     X = first_shape(c, s, layout, members, m)
@@ -91,8 +91,6 @@ def start(c, s, layout, t):
     group = s.group[0]
     group.alignment = STATIC if asleep else FILTERED
     group.degenerate = False
-    if opens:
-        start_alignment(c, s, layout, 0)
     group.n_alive = n_first
     group.best, group.undecided = 0, n_first > 1
     group.t, group.t_check, group.t_constraints, group.t_gauge = t, t, t, t

@@ -11,10 +11,7 @@ import numpy as np
 
 from tracking.filters.joint.heading_gauge import add_rotation_uncertainty, heading_variance
 from tracking.filters.joint.hypotheses.alignment import FILTERED
-from tracking.filters.joint.hypotheses.alignment_sensitivity import (
-    has_linear_alignment,
-    start_alignment,
-)
+from tracking.filters.joint.hypotheses.alignment_sensitivity import has_linear_alignment
 from tracking.filters.joint.hypotheses.copying import copy_hypothesis, rotate_hypothesis
 from tracking.filters.joint.observability import shift_nullspace
 from tracking.filters.joint.scalar_update import reset_state
@@ -69,7 +66,9 @@ def is_settling(c, node, t):
 
 @allocating_kernel
 def spawn_rotation_hypotheses(c, s, layout, work):
-    """Follow all rotations and mirror images from now on, in space by one filter for all.
+    """Follow all rotations and mirror images from now on.
+
+    In space one filter follows all of them: its alignment is started next.
 
     Where a node that joined may be on two sides there are two layouts; in the plane the bank has
     room for a few rotations of the second.
@@ -88,9 +87,6 @@ def spawn_rotation_hypotheses(c, s, layout, work):
         if was_alive[h]:
             reset_heading_uncertainty(c, s, h, work)
     if has_linear_alignment(c, s):
-        for h in range(s.alive.shape[0]):
-            if s.alive[h]:
-                start_alignment(c, s, layout, h)
         return
     for _ in range(s.alive.shape[0]):
         # The likelier layout first.
