@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -67,7 +68,7 @@ def demo(
     from agents.report.demo_report import demo_report
     from agents.report.gif import Gif
     from agents.report.page import metres
-    from agents.warm_up import BackgroundWarmUp, warm_up_first
+    from agents.warm_up import BackgroundWarmUp, parts_of, shown_progress
     from relpos_env.timing import DECISION
     from tracking.filters import FILTERS
 
@@ -86,8 +87,15 @@ def demo(
     check_folder(out, ["report.html", "drive.gif"] if gif else ["report.html"])
     ours = names["filter"]
     is_usual = names["task"] in (None, TASK)
-    warm_up_first([ours], purpose="env", in_space=False, leave_out=("tasks",) if is_usual else ())
-    with BackgroundWarmUp(FILTERS) as others, LiveRoom() as room:
+    known = (ours,) if ours in FILTERS else ()
+    needed = parts_of("env", known, in_space=False)
+    later = {name: parts_of("track", (name,), in_space=False) for name in FILTERS}
+    if is_usual:
+        needed = [part for part in needed if part.name != "tasks"]
+    with BackgroundWarmUp(needed, later) as others, ExitStack() as stack:
+        with shown_progress() as tell_compiled:
+            others.wait_for_needed(tell_compiled)
+        room = stack.enter_context(LiveRoom())
         pictures = Gif(every=2, interval=DECISION)
         titles = {"estimate": "on estimates", "truth": "on the truth", "nothing": "on nothing"}
 

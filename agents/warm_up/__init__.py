@@ -2,6 +2,15 @@
 
 from agents.warm_up.background import BackgroundWarmUp
 from agents.warm_up.parts import PURPOSES, Part, parts_of
-from agents.warm_up.processes import WarmUp, warm_up, warm_up_first
+from agents.warm_up.processes import WarmUp, shown_progress, warm_up, warm_up_first
 
-__all__ = ["PURPOSES", "BackgroundWarmUp", "Part", "WarmUp", "parts_of", "warm_up", "warm_up_first"]
+__all__ = [
+    "PURPOSES",
+    "BackgroundWarmUp",
+    "Part",
+    "WarmUp",
+    "parts_of",
+    "shown_progress",
+    "warm_up",
+    "warm_up_first",
+]

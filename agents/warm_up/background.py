@@ -1,43 +1,64 @@
-"""Filters compiled while something else runs: what is shown last need not be waited for."""
+"""Trackers compiled while something else runs: what is shown last need not be waited for."""
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Self
 
-from agents.warm_up.parts import parts_of
-from agents.warm_up.processes import warm_up
+from agents.warm_up.parts import Part
+from agents.warm_up.processes import PERIOD, Progress, warm_up
 
 
 class BackgroundWarmUp:
-    """Compiles trackers of groups in a plane in processes of their own from `__enter__` on.
+    """Compiles parts in processes of their own from `__enter__` on; ends them on `__exit__`.
 
-    Ends them on `__exit__`.
+    Args:
+        needed: Compiled first; `wait_for_needed` returns once they are.
+        later: Name to parts, compiled as soon as a process is free.
     """
 
-    def __init__(self, filters: Iterable[str]) -> None:
-        self._parts = {name: parts_of("track", (name,), in_space=False) for name in filters}
+    def __init__(self, needed: Iterable[Part], later: Mapping[str, Iterable[Part]]) -> None:
+        self._needed = [part for part in needed if not part.is_kept()]
+        self._left = {part.name for part in self._needed}
+        known, missing = set(self._left), {}
+        for name, parts in later.items():
+            missing[name] = [part for part in parts if part.name in known or not part.is_kept()]
+        self._later = [part for parts in missing.values() for part in parts]
         self._stop, self._error = threading.Event(), list[BaseException]()
+        self._said = 0.0, ""
         self._thread = threading.Thread(target=self._compile, name="warm-up", daemon=True)
-        self.missing = tuple(
-            name for name, parts in self._parts.items() if not all(part.is_kept() for part in parts)
-        )
-        """Filters whose code was not on the disk."""
+        self.missing = tuple(name for name, parts in missing.items() if parts)
+        """Names of `later` whose code was not on the disk."""
 
     def __enter__(self) -> Self:
-        if self.missing:
+        if self._needed or self._later:
             self._thread.start()
         return self
 
     def __exit__(self, *error: object) -> None:
         self._stop.set()
-        if self.missing:
+        if self._thread.ident is not None:
             self._thread.join()
 
     def is_done(self) -> bool:
         """Whether nothing is being compiled any more."""
         return not self._thread.is_alive()
+
+    def wait_for_needed(self, progress: Progress) -> None:
+        """Return once all that is needed is compiled.
+
+        Args:
+            progress: Called several times a second until then.
+
+        Raises:
+            UsageError: A process failed.
+        """
+        while self._left and not self.is_done():
+            self._thread.join(PERIOD)
+            if self._said[1]:
+                progress(*self._said)
+        self._raise_error()
 
     def wait(self) -> None:
         """Return once all is compiled.
@@ -45,14 +66,25 @@ class BackgroundWarmUp:
         Raises:
             UsageError: A process failed.
         """
-        if self.missing:
+        if self._thread.ident is not None:
             self._thread.join()
+        self._raise_error()
+
+    def _raise_error(self) -> None:
         if self._error:
             raise self._error[0]
 
     def _compile(self) -> None:
-        parts = [part for name in self.missing for part in self._parts[name]]
         try:
-            warm_up(parts, is_stopped=self._stop.is_set)
+            warm_up(
+                self._needed,
+                later=self._later,
+                progress=self._say,
+                finished=self._left.discard,
+                is_stopped=self._stop.is_set,
+            )
         except BaseException as error:  # shown by those who wait
             self._error.append(error)
+
+    def _say(self, share: float, what: str) -> None:
+        self._said = share, what

@@ -51,16 +51,20 @@ class WarmUp:
 def warm_up(
     parts: Iterable[Part],
     *,
+    later: Iterable[Part] = (),
     jobs: int | None = None,
     progress: Progress | None = None,
+    finished: Callable[[str], None] = lambda name: None,
     is_stopped: Callable[[], bool] = lambda: False,
 ) -> WarmUp:
     """Compile parts, unless they are on the disk.
 
     Args:
         parts: Of `parts_of`; those of one name count once.
+        later: Parts that are begun once a process is free and none of the others is left.
         jobs: Processes, by default as many as there are cores.
-        progress: Called several times a second, if anything is compiled.
+        progress: Called several times a second until `parts` are done, if any is compiled.
+        finished: Called with the name of each part that has been compiled.
         is_stopped: Asked several times a second whether to give up.
 
     Raises:
@@ -68,11 +72,12 @@ def warm_up(
     """
     began, named = time.monotonic(), {part.name: part for part in parts}
     missing = _missing(named.values())
-    if missing:
-        _run(missing, jobs or os.cpu_count() or 1, progress, is_stopped)
+    others = _missing({p.name: p for p in later if p.name not in named}.values())
+    if missing or others:
+        _run(missing, others, jobs or os.cpu_count() or 1, progress, finished, is_stopped)
     return WarmUp(
         parts=tuple(named),
-        compiled=tuple(part.name for part in missing),
+        compiled=tuple(part.name for part in (*missing, *others)),
         seconds=time.monotonic() - began,
         largest_mb=_largest_child() if missing else 0.0,
     )
@@ -83,7 +88,6 @@ def warm_up_first(
     *,
     purpose: str = "track",
     in_space: bool = True,
-    leave_out: Sequence[str] = (),
 ) -> None:
     """`warm_up` for a command: with a bar, or lines where there is no terminal, if it takes time.
 
@@ -91,13 +95,10 @@ def warm_up_first(
         filters: Those that do not come with the package are compiled when they run.
         purpose: One of `agents.warm_up.parts.PURPOSES`.
         in_space: Whether groups move in space, too, or in a plane only.
-        leave_out: Names of parts that are not needed.
     """
     names = tuple(name for name in dict.fromkeys(filters) if name in FILTERS)
     with shown_progress() as tell:
-        needed = parts_of(purpose, names, in_space=in_space)
-        parts = [part for part in needed if part.name not in leave_out]
-        warm_up(parts, progress=tell)
+        warm_up(parts_of(purpose, names, in_space=in_space), progress=tell)
 
 
 @contextmanager
@@ -133,15 +134,18 @@ def _missing(parts: Iterable[Part]) -> list[Part]:
 
 def _run(
     missing: Sequence[Part],
+    others: Sequence[Part],
     jobs: int,
     progress: Progress | None,
+    finished: Callable[[str], None],
     is_stopped: Callable[[], bool],
 ) -> None:
     """Compile parts in processes, one after the other."""
-    began, waiting = time.monotonic(), list(missing)
+    began, waiting = time.monotonic(), [*missing, *others]
+    left = {part.name for part in missing}
     running: dict[str, subprocess.Popen[str]] = {}
-    times = [part.seconds for part in missing]
-    expected = max(sum(times) / min(jobs, len(missing)), *times)
+    times = [part.seconds for part in missing or others]
+    expected = max(sum(times) / min(jobs, len(times)), *times)
     try:
         while (waiting or running) and not is_stopped():
             while waiting and len(running) < jobs and not (waiting[0].needs_others and running):
@@ -160,12 +164,14 @@ def _run(
                     if process.returncode:
                         last = said.strip().splitlines()[-1:] or ["without a word"]
                         raise UsageError(f"compiling {name} failed: {last[0]}")
-            if progress is not None and running:
+                    left.discard(name)
+                    finished(name)
+            if progress is not None and left:
                 # How long it takes is a guess: the bar slows down, it does not stand at its end.
                 passed = (time.monotonic() - began) / expected
-                left = f"{len(waiting) + len(running)} of {len(missing)} parts left"
                 share = passed if passed < 0.7 else passed / (0.3 + passed)
-                progress(share, f"{left}: {', '.join(running)}")
+                what = ", ".join(name for name in running if name in left)
+                progress(share, f"{len(left)} of {len(missing)} parts left: {what}")
     finally:
         for process in running.values():
             process.kill()

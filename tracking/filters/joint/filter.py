@@ -62,7 +62,8 @@ class JointEkf(BatchedFilter):
     def calls(self, block: MeasurementBlock, estimate: TeamEstimate) -> list[list[Call]]:
         """What is compiled for it; see `Filter.calls`."""
         arguments = self._arguments(block.in_place, estimate)
-        return [[(run_events, arguments)], *rare_calls(arguments)]
+        with_ranges, *others = rare_calls(arguments)
+        return [[(run_events, arguments), *with_ranges], *others]
 
     def smooth(self, later: MeasurementBlock, t: F64) -> TeamEstimate:
         """Report at one time with the help of later measurements, and stay where it is.

@@ -124,6 +124,13 @@ def join_group(coefficients, layout, state, work, t):
     c, s, new = coefficients[0], by_reference(one_env(state, cursor[ENV])), cursor[NODE]
     flush_all_updates(s)
     join(c, s, layout, new, t)
+
+
+@kernel
+def survey_newcomer(coefficients, layout, state, work, t):
+    """Use the surveyed distances of a node that has just joined."""
+    cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
+    c, s, new = coefficients[0], by_reference(one_env(state, cursor[ENV])), cursor[NODE]
     apply_surveys(c, s, layout, work, new, s.nodes.shape[0])
 
 
@@ -146,11 +153,13 @@ ACTIONS: dict[int, tuple[Rare, ...]] = {
     workspace.CHALLENGE: (challenge_in_plane,),
     workspace.REINITIALISE: (reinitialise,),
     workspace.START: (start_group, survey_group),
-    workspace.JOIN: (join_group,),
-    workspace.JOIN_OTHER: (join_group,),
+    workspace.JOIN: (join_group, survey_newcomer),
+    workspace.JOIN_OTHER: (join_group, survey_newcomer),
     workspace.REMOVE: (remove,),
 }
 """What an action is, one kernel after the other."""
+WITH_RANGES = (survey_group, survey_newcomer)
+"""Those that share most of their code with what a range reaches."""
 ACTIONS_IN_SPACE: dict[int, tuple[Rare, ...]] = {
     **ACTIONS,
     workspace.SPAWN: (spawn, align),
@@ -191,12 +200,17 @@ def compile_all(arguments: tuple[Any, ...]) -> None:
 
 
 def rare_calls(arguments: tuple[Any, ...]) -> list[list[Call]]:
-    """These kernels and their arguments: those of all groups, then those of groups in space."""
+    """These kernels and their arguments, in groups that share little code.
+
+    Those that go with the ranges, the others of all groups of nodes, and those of groups in space.
+    """
     coefficients, layout, state, work, *_ = arguments
     given = coefficients, layout, state, work, 0.0
     needed, common = _kernels(actions_of(coefficients, state)), _kernels(ACTIONS)
-    other = [rare for rare in needed if rare not in common]
-    return [[(rare, given) for rare in group] for group in (common, other) if group]
+    rest = [rare for rare in common if rare not in WITH_RANGES]
+    in_space = [rare for rare in needed if rare not in common]
+    groups = list(WITH_RANGES), rest, in_space
+    return [[(rare, given) for rare in group] for group in groups if group]
 
 
 def _kernels(actions: dict[int, tuple[Rare, ...]]) -> list[Rare]:
