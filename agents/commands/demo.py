@@ -68,7 +68,7 @@ def demo(
     from agents.report.demo_report import demo_report
     from agents.report.gif import Gif
     from agents.report.page import metres
-    from agents.warm_up import BackgroundWarmUp, parts_of, shown_progress
+    from agents.warm_up import ORIENTATION, BackgroundWarmUp, Part, parts_of, shown_progress
     from relpos_env.timing import DECISION
     from tracking.filters import FILTERS
 
@@ -87,11 +87,15 @@ def demo(
     check_folder(out, ["report.html", "drive.gif"] if gif else ["report.html"])
     ours = names["filter"]
     is_usual = names["task"] in (None, TASK)
-    known = (ours,) if ours in FILTERS else ()
-    needed = parts_of("env", known, in_space=False)
-    later = {name: parts_of("track", (name,), in_space=False) for name in FILTERS}
-    if is_usual:
-        needed = [part for part in needed if part.name != "tasks"]
+    # Driving compiles what orientations need.
+    spared = {ORIENTATION, "tasks"} if is_usual else {ORIENTATION}
+
+    def parts(purpose: str, *filters: str) -> list[Part]:
+        every = parts_of(purpose, filters, in_space=False)
+        return [part for part in every if part.name not in spared]
+
+    needed = parts("env", *({ours} & set(FILTERS)))
+    later = {name: parts("track", name) for name in FILTERS}
     with BackgroundWarmUp(needed, later) as others, ExitStack() as stack:
         with shown_progress() as tell_compiled:
             others.wait_for_needed(tell_compiled)

@@ -1,10 +1,11 @@
 """Compiling ahead, in as many processes as there are cores: what `relpos warmup` does."""
 
 from agents.warm_up.background import BackgroundWarmUp
-from agents.warm_up.parts import PURPOSES, Part, parts_of
+from agents.warm_up.parts import ORIENTATION, PURPOSES, Part, parts_of
 from agents.warm_up.processes import WarmUp, shown_progress, warm_up, warm_up_first
 
 __all__ = [
+    "ORIENTATION",
     "PURPOSES",
     "BackgroundWarmUp",
     "Part",

@@ -2,7 +2,7 @@
 
 import sys
 
-from agents.warm_up.parts import OTHER_PARTS, parts_of
+from agents.warm_up.parts import ORIENTATION, OTHER_PARTS, parts_of
 from tracking.filters import DEFAULT_FILTER
 
 
@@ -11,7 +11,7 @@ def main(name: str) -> None:
     if name in OTHER_PARTS:
         OTHER_PARTS[name].compile()
         return
-    filters = (DEFAULT_FILTER if name == "orientation" else name.rpartition(".")[0],)
+    filters = (DEFAULT_FILTER if name == ORIENTATION else name.rpartition(".")[0],)
     found = {part.name: part for part in parts_of("track", filters)}
     found[name].compile()
 

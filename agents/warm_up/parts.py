@@ -7,7 +7,7 @@ code with the others.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Self
@@ -24,6 +24,8 @@ from tracking.measurements import MeasurementBlock
 SECONDS = {"joint.0": 41.0, "joint.1": 36.0, "env": 31.0, "ekf-mds.0": 30.0, "joint.2": 22.0,
            "paper-ekf-mds.0": 16.0, "hardware": 6.0, "tasks": 6.0}  # fmt: skip
 """[s] Time of a part on one core of a laptop, for the progress that is shown."""
+ORIENTATION = "orientation"
+"""Part that trackers with all filters have."""
 OTHERS = 10.0
 """[s] Time of a part that is not in the table."""
 SWARM = """
@@ -72,7 +74,14 @@ def parts_of(
     if purpose not in PURPOSES:
         raise UsageError(f"--for: expected one of {', '.join(PURPOSES)}, got {purpose!r}")
     names = tuple(FILTERS) if purpose == "all" else filters
-    return [*_tracker_parts(names, in_space), *(OTHER_PARTS[name] for name in PURPOSES[purpose])]
+    others = [OTHER_PARTS[name] for name in PURPOSES[purpose]]
+    trackers = list(_tracker_parts(names, in_space))
+    if others:
+        # The world is driven with orientations: little is left of that part.
+        of_world = [part for part in trackers if part.name == ORIENTATION]
+        late = [replace(part, needs_others=True) for part in of_world]
+        trackers = [*(part for part in trackers if part.name != ORIENTATION), *late]
+    return [*trackers, *others]
 
 
 def _tracker_parts(filters: Iterable[str], in_space: bool) -> Iterator[Part]:
@@ -95,7 +104,7 @@ def _kernel_groups(name: str, in_space: bool) -> Iterator[tuple[str, list[Call]]
     groups = Tracker(who, filter=name).calls()
     for k, group in enumerate(groups):
         # The last is that of the orientations, the same for all filters.
-        named = f"{name}.{k}" if k < len(groups) - 1 else "orientation"
+        named = f"{name}.{k}" if k < len(groups) - 1 else ORIENTATION
         yield named, group
 
 

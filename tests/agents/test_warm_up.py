@@ -122,9 +122,8 @@ def test_parts_that_need_others_come_last_and_alone(monkeypatch):
 def test_what_is_compiled_in_the_background_ends_with_its_block(monkeypatch):
     sleep = [sys.executable, "-c", "import time; time.sleep(60)"]
     monkeypatch.setattr(processes, "_command", lambda name: sleep)
-    monkeypatch.setattr("agents.warm_up.background.parts_of", lambda *_, **__: [a_part("slow")])
     began = time.monotonic()
-    with BackgroundWarmUp(["joint"]) as others:
+    with BackgroundWarmUp([], {"joint": [a_part("slow")]}) as others:
         assert others.missing == ("joint",)
         assert not others.is_done()
     assert time.monotonic() - began < 30.0
@@ -153,3 +152,30 @@ def test_code_is_loaded_for_its_types_only(compiled):
     kernel, given = calls()[0][0]
     assert is_compiled(kernel, *given)
     assert not is_compiled(kernel, *given[:-1], 1.5)
+
+
+def test_what_is_needed_comes_first_and_is_all_that_is_waited_for(monkeypatch):
+    began = []
+
+    def command(name):
+        began.append(name)
+        wait = 0.2 if name.startswith("needed") else 60
+        return [sys.executable, "-c", f"import time; time.sleep({wait})"]
+
+    monkeypatch.setattr(processes, "_command", command)
+    needed, later = [a_part("needed 1"), a_part("needed 2")], {"other": [a_part("later")]}
+    since = time.monotonic()
+    with BackgroundWarmUp(needed, later) as others:
+        said = []
+        others.wait_for_needed(lambda share, what: said.append(what))
+        assert began[:2] == ["needed 1", "needed 2"]
+        assert said and not any("later" in what for what in said)
+        assert not others.is_done()
+    assert time.monotonic() - since < 30.0
+
+
+def test_who_waits_is_told_of_what_failed(monkeypatch):
+    monkeypatch.setattr(processes, "_command", lambda name: [sys.executable, "-c", "1 / 0"])
+    with BackgroundWarmUp([a_part("bad")], {}) as others:
+        with pytest.raises(UsageError, match="compiling bad failed: ZeroDivisionError"):
+            others.wait_for_needed(lambda share, what: None)
