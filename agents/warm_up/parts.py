@@ -21,7 +21,7 @@ from tracking.filters import DEFAULT_FILTER, FILTERS, filter_builder
 from tracking.jit import Call, bind, is_compiled, missing_in, types_of
 from tracking.measurements import MeasurementBlock
 
-SECONDS = {"joint.0": 41.0, "joint.1": 36.0, "env": 31.0, "ekf-mds.0": 30.0, "joint.2": 22.0,
+SECONDS = {"env": 38.0, "joint.0": 33.0, "ekf-mds.0": 30.0, "joint.1": 29.0, "joint.2": 18.0,
            "paper-ekf-mds.0": 16.0, "hardware": 6.0, "tasks": 6.0}  # fmt: skip
 """[s] Time of a part on one core of a laptop, for the progress that is shown."""
 ORIENTATION = "orientation"

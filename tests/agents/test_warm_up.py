@@ -169,13 +169,14 @@ def test_what_is_needed_comes_first_and_is_all_that_is_waited_for(monkeypatch):
         said = []
         others.wait_for_needed(lambda share, what: said.append(what))
         assert began[:2] == ["needed 1", "needed 2"]
-        assert said and not any("later" in what for what in said)
+        assert said
+        assert not any("later" in what for what in said)
         assert not others.is_done()
     assert time.monotonic() - since < 30.0
 
 
 def test_who_waits_is_told_of_what_failed(monkeypatch):
     monkeypatch.setattr(processes, "_command", lambda name: [sys.executable, "-c", "1 / 0"])
-    with BackgroundWarmUp([a_part("bad")], {}) as others:
-        with pytest.raises(UsageError, match="compiling bad failed: ZeroDivisionError"):
-            others.wait_for_needed(lambda share, what: None)
+    failing = BackgroundWarmUp([a_part("bad")], {})
+    with failing, pytest.raises(UsageError, match="compiling bad failed: ZeroDivisionError"):
+        failing.wait_for_needed(lambda share, what: None)
