@@ -12,7 +12,6 @@ References:
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import chdtri
 
 from tracking.arrays import F64, Bool
 from tracking.errors import ConfigError
@@ -33,6 +32,8 @@ def chi_square_band(n: int, dof: int, probability: float = 0.95) -> tuple[float,
     Raises:
         ConfigError: A number is out of range.
     """
+    from scipy.special import chdtri  # a tenth of a second, which those do not need who only track
+
     if n < 1 or dof < 1:
         raise ConfigError(f"chi-square band: expected n and dof of 1 or more, got {n} and {dof}")
     if not 0.0 < probability < 1.0:
