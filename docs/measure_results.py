@@ -16,6 +16,7 @@ from measure_ablation import RECORDINGS, recording
 
 from agents.track import track_log
 from tracking.bounds import recorded_bound
+from tracking.findings import examine
 
 FILE = Path(__file__).with_name("tracker-results.jsonl")
 SUITE = (
@@ -40,10 +41,10 @@ def recording_lines() -> list[dict[str, Any]]:
     """Lines of the recordings, those of an efficient estimator among them."""
     lines = []
     for name in RECORDINGS:
-        log = recording(name)
+        log, checked = examine(recording(name))
         for skip in FIRST:
             for filter_name in FILTERS:
-                found = track_log(log, filter=filter_name, skip=skip)
+                found = track_log(log, filter=filter_name, skip=skip, findings=checked)
                 line = {"case": name, "from": skip, "filter": filter_name, **found.summary}
                 lines.append(rounded(line, RECORDING))
             bound = recorded_bound(log, skip=skip)

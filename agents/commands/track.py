@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
 from agents.console import emit_json, print_table, progress_bar
 from agents.errors import UsageError
+
+if TYPE_CHECKING:
+    from tracking.findings import Finding
+    from tracking.log import Log
 
 
 @click.command()
@@ -75,7 +79,7 @@ def track(
     from tracking.filters import DEFAULT_FILTER, filter_builder
     from tracking.filters.joint.params import JointParams
     from tracking.filters.params import FilterParams
-    from tracking.findings import examine, refuse_errors
+    from tracking.findings import refuse_errors
     from tracking.log import read_log
     from tracking.tracker import TrackerParams
 
@@ -95,7 +99,7 @@ def track(
     needed = names if no_checks else (*names, DEFAULT_FILTER)
     warm_up_first(needed, in_space=any(log.constellation.dimensions == 3 for log in read))
     results: list[TrackResult] = []
-    checked = [(log, []) if no_checks else examine(log) for log in read]
+    checked = [(log, []) if no_checks else _examined(log) for log in read]
     refuse_errors([finding for _, found in checked for finding in found])
     for log, found in checked:
         expected = recorded_bound(log, skip=skip) if bound else None
@@ -166,6 +170,13 @@ def print_tracks(results: Sequence[Any]) -> None:
                 else (f"no estimated pair has truth from {r.skip:g} s after the first range")
             )
             click.echo(f"{r.log.name}, {r.filter}: no errors, since {reason}")
+
+
+def _examined(log: Log) -> tuple[Log, list[Finding]]:
+    from tracking.findings import examine
+
+    with progress_bar(f"{log.name}, checks", shown=log.duration > 10.0) as report:
+        return examine(log, report)
 
 
 def _longest(score: Any) -> str:

@@ -171,7 +171,8 @@ def _run(
                 passed = (time.monotonic() - began) / expected
                 share = passed if passed < 0.7 else passed / (0.3 + passed)
                 what = ", ".join(name for name in running if name in left)
-                progress(share, f"{len(left)} of {len(missing)} parts left: {what}")
+                if what:
+                    progress(share, f"{len(left)} of {len(missing)} parts left: {what}")
     finally:
         for process in running.values():
             process.kill()

@@ -1,12 +1,7 @@
 """`relpos calibrate` and `relpos track --calibration` as a user meets them."""
 
-import io
 import json
-import sys
 import tomllib
-from contextlib import redirect_stderr, redirect_stdout
-from types import SimpleNamespace
-from unittest import mock
 
 import numpy as np
 import pytest
@@ -17,23 +12,11 @@ from agents.calibrate import (
     calibrate_magnetometers,
     calibrate_ranges,
 )
-from agents.cli import main
 from agents.simulate import simulate
+from tests.command_line import relpos
 from tracking.calibration import CalibrationError
 from tracking.log import Log, write_log
 from tracking.measurements import Kind, MeasurementBlock
-
-
-def relpos(*args):
-    """The command line in this process, so that imports are paid once."""
-    out, err, code = io.StringIO(), io.StringIO(), 0
-    argv = ["relpos", *map(str, args)]
-    with mock.patch.object(sys, "argv", argv), redirect_stdout(out), redirect_stderr(err):
-        try:
-            main()
-        except SystemExit as error:
-            code = int(error.code or 0)
-    return SimpleNamespace(returncode=code, stdout=out.getvalue(), stderr=err.getvalue())
 
 
 @pytest.fixture(scope="module")

@@ -9,14 +9,8 @@ from pathlib import Path
 import pytest
 
 from agents.frames import NAMES
+from tests.command_line import relpos
 from tracking.filters import FILTERS
-
-RELPOS = Path(sys.executable).with_name("relpos")
-
-
-def relpos(*args, cwd=None):
-    command = [str(RELPOS), *map(str, args)]
-    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, check=False)
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +48,8 @@ def test_track_writes_results_and_json(recording, tmp_path):
 
 
 def test_track_prints_a_table(recording):
-    done = relpos("track", recording, "--skip", 5)
+    command = [Path(sys.executable).with_name("relpos"), "track", recording, "--skip", "5"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0
     for word in ("rmse_yaw", "rmse_shape", "1-2", "all", "bad rows skipped: 0"):
         assert word in done.stdout

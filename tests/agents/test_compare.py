@@ -1,10 +1,8 @@
 """Drivers compared: figures of an episode are its own, and claims come with intervals."""
 
 import json
-import subprocess
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -37,8 +35,8 @@ from relpos_env.interface.observations import OBSERVATIONS
 from relpos_env.sb3_vec_env import FormationVecEnv
 from relpos_env.scenarios import SCENARIOS
 from relpos_env.tasks import TASKS
+from tests.command_line import relpos
 
-RELPOS = Path(sys.executable).with_name("relpos")
 ON_ESTIMATE = Contender("consensus", "estimate")
 SHORT = Setting(scenario="cars-nlos", seconds=4.0, settle=2.0)
 KEYS = {
@@ -47,11 +45,6 @@ KEYS = {
     "time_in_formation", "energy", "seconds",
     "done_share", "cars", "task", "level", "operator",
 }  # fmt: skip
-
-
-def relpos(*args):
-    command = [str(RELPOS), "compare", *map(str, args)]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
 def same(one, other):
@@ -241,14 +234,14 @@ def test_unknown_names_are_refused():
 
 
 def test_help_names_what_there_is():
-    page = "".join(relpos("--help").stdout.split())  # lines break at hyphens
+    page = "".join(relpos("compare", "--help").stdout.split())  # lines break at hyphens
     names = (*CONTROLLERS, *OBSERVATIONS, *SCENARIOS, *TASKS)
     assert [name for name in names if name not in page] == []
 
 
 def test_the_command_line_writes_a_report_and_rows(tmp_path):
     args = ("consensus", "--scenario", "cars-nlos", "--episodes", 2, "--seconds", 2, "--settle", 1)
-    done = relpos(*args, "--json", "--out", tmp_path / "out")
+    done = relpos("compare", *args, "--json", "--out", tmp_path / "out")
     assert done.returncode == 0, done.stderr
     (row,) = [json.loads(line) for line in done.stdout.splitlines()]
     assert set(row) >= KEYS

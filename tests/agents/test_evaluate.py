@@ -1,10 +1,7 @@
 """Many simulated runs: the same figures however they are shared out, and lost runs found."""
 
 import json
-import subprocess
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -27,21 +24,16 @@ from agents.evaluate.targets import outcomes
 from agents.report.evaluate_report import target_rows
 from agents.simulate import record, simulate
 from relpos_env.scenarios.cars import CARS_NLOS
+from tests.command_line import relpos
 from tracking.constellation import Constellation, NodeConfig
 from tracking.estimate import Status, TeamEstimate
 from tracking.measurements import Kind
 
-RELPOS = Path(sys.executable).with_name("relpos")
 KEYS = {
     "suite", "scenario", "filter", "seeds", "rmse", "rmse_yaw", "rmse_shape", "bound",
     "bound_yaw", "bound_shape", "ratio_bound", "ratio_shape", "lost_runs", "nees", "nis",
     "us_per_round", "paper", "gospa",
 }  # fmt: skip
-
-
-def relpos(*args, cwd=None):
-    command = [str(RELPOS), "evaluate", *map(str, args)]
-    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, check=False)
 
 
 def small_suite():
@@ -128,7 +120,7 @@ def test_a_recorded_run_is_that_of_relpos_simulate():
 
 def test_command_line_writes_a_report_and_rows(tmp_path):
     args = ("--seconds", 15, "--seeds", 1, "--suite", "scaling", "--filters", "ekf")
-    done = relpos(*args, "--json", "--out", tmp_path / "out")
+    done = relpos("evaluate", *args, "--json", "--out", tmp_path / "out")
     assert done.returncode == 0, done.stderr
     rows = [json.loads(line) for line in done.stdout.splitlines()]
     assert [r["nodes"] for r in rows] == [2, 3, 4, 6, 8, 10]
@@ -141,7 +133,7 @@ def test_command_line_writes_a_report_and_rows(tmp_path):
     assert "evaluate-scaling.png" in pictures
     page = (tmp_path / "out" / "report.html").read_text()
     assert page.count("data:image/png;base64") == 5
-    again = relpos(*args, "--out", tmp_path / "out")
+    again = relpos("evaluate", *args, "--out", tmp_path / "out")
     assert again.returncode == 2
     assert "exists already, expected a new or empty folder" in again.stderr
 
@@ -160,7 +152,7 @@ def test_command_line_writes_a_report_and_rows(tmp_path):
     ],
 )  # fmt: skip
 def test_faults_end_in_one_line_and_write_nothing(args, message, tmp_path):
-    done = relpos(*args, "--out", "out", cwd=tmp_path)
+    done = relpos("evaluate", *args, "--out", "out", cwd=tmp_path)
     assert done.returncode == 2
     assert message in done.stderr
     assert "Traceback" not in done.stderr

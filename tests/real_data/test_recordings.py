@@ -14,6 +14,7 @@ from tracking.constellation import Constellation, NodeConfig
 from tracking.filters import FILTERS
 from tracking.filters.joint.params import JointParams
 from tracking.filters.params import FilterParams
+from tracking.findings import examine
 from tracking.geometry import quat_conjugate, quat_multiply
 from tracking.log import read_log
 from tracking.measurements import Kind, MeasurementBlock
@@ -24,7 +25,12 @@ LOGS = ("isas_walk1", "inrol_env1", "tiers_run01", "tiers_short")
 
 @pytest.fixture(scope="module")
 def results(data):
-    return {(n, f): track_log(data / "logs" / n, filter=f) for n in LOGS for f in FILTERS}
+    checked = {name: examine(read_log(data / "logs" / name)) for name in LOGS}
+    return {
+        (name, filter_name): track_log(log, filter=filter_name, findings=found)
+        for name, (log, found) in checked.items()
+        for filter_name in FILTERS
+    }
 
 
 def test_every_log_gives_finite_figures(results):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from tracking.findings.at_rest import find_at_rest
 from tracking.findings.clock_offset import correct_clocks
 from tracking.findings.finding import KINDS, Finding, refuse_errors
@@ -11,8 +13,14 @@ from tracking.findings.use import find_unplaced, find_unused
 from tracking.log.folder import Log
 
 
-def examine(log: Log) -> tuple[Log, list[Finding]]:
+def examine(
+    log: Log, progress: Callable[[float], None] = lambda share: None
+) -> tuple[Log, list[Finding]]:
     """Look at what sensors read, at clocks and at ranges.
+
+    Args:
+        log: A recording.
+        progress: Called with the share done, 0 to 1, where clocks are looked at.
 
     Returns:
         The log, with clocks corrected where that can be done, and what was found.
@@ -20,7 +28,7 @@ def examine(log: Log) -> tuple[Log, list[Finding]]:
     found = [*find_unused(log), *find_at_rest(log), *find_gyroscope(log)]
     if any(f.severity == "error" or f.name == "gyro-bias" for f in found):
         return log, found  # what follows needs sensors that are right
-    log, of_clocks = correct_clocks(log)
+    log, of_clocks = correct_clocks(log, progress)
     return log, [*found, *of_clocks, *find_range_errors(log)]
 
 

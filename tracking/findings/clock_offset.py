@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -26,11 +27,15 @@ OFTEN_OK, SELDOM_OK = 0.3, 0.6
 """[-] Shares of time with pairs ok: with a right clock at least; with suspected ones at most."""
 
 
-def correct_clocks(log: Log) -> tuple[Log, list[Finding]]:
+def correct_clocks(log: Log, progress: Callable[[float], None]) -> tuple[Log, list[Finding]]:
     """Find by how much IMUs are stamped late, and move them back.
 
     That of a single node is looked for where pairs are seldom ok: among others that are right, a
     tenth of a second of one is lost in the noise.
+
+    Args:
+        log: A recording.
+        progress: Called with the share done, 0 to 1.
 
     Returns:
         The log with what could be corrected, and what was found.
@@ -42,7 +47,8 @@ def correct_clocks(log: Log) -> tuple[Log, list[Finding]]:
     groups, found = [tuple(carriers.tolist())], list[Finding]()
     if is_suspected and len(carriers) > 1:
         groups += [(n,) for n in carriers.tolist()]
-    for nodes in groups:
+    for k, nodes in enumerate(groups):
+        progress(k / len(groups))
         offset, is_carried = _offset(log, nodes, ALL if is_suspected else NEAR)
         ids = tuple(log.constellation.ids[n] for n in nodes)
         way = "later" if offset > 0.0 else "earlier"
