@@ -27,7 +27,7 @@ from tracking.log import Log
 
 
 class FormationEnv(CarsEnv):
-    """Cars in a room keep a formation, each on its own tracker's estimates.
+    """Cars in a room keep a formation on the estimates of the tracker that serves the group.
 
     Agents come and go as `CarsEnv` says. `reset` takes the options of
     `relpos_env.reset_options.ResetOptions`: ``poses``, ``goals`` and ``scenario``.
