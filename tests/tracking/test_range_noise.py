@@ -17,10 +17,11 @@ PLAIN = Constellation(nodes=(NodeConfig(id=1), NodeConfig(id=2)), dimensions=2)
 def learned(residuals, dt=0.05, **params):
     c = make_coefficients(PLAIN, JointParams(**params)).view(np.recarray)[0]
     group, pair = (np.zeros(1, kind).view(np.recarray)[0] for kind in (GROUP, PAIR))
-    group.white_var = c.white_var
+    group.white_var, found = c.white_var, []
     for residual in residuals:
         learn_white_noise(c, group, pair, residual, residual, dt)
-    return float(np.sqrt(group.white_var))
+        found.append(group.white_var)
+    return np.sqrt(found)
 
 
 @settings(max_examples=30, deadline=None)
@@ -29,20 +30,25 @@ def learned(residuals, dt=0.05, **params):
     seed=st.integers(0, 2**31),
 )  # fmt: skip
 def test_it_is_found_beside_what_lasts_and_beside_what_is_long(std, offset, share, seed):
-    """One in ten ranges is metres long, for twenty ranges at a time: two differences each."""
+    """One in ten ranges is metres long, for twenty ranges at a time: two differences each.
+
+    What is learned goes up and down by 8 % for good, its mean over a thousand ranges by 4 %: limits
+    are five times that.
+    """
     rng = np.random.default_rng(seed)
     long = np.repeat(rng.random(100) < share, 20) * 1.5
     found = learned(offset + long + std * rng.standard_normal(2000))
-    assert found == pytest.approx(std, rel=0.25)
+    assert np.sqrt(np.mean(found[1000:] ** 2)) == pytest.approx(std, rel=0.2)
+    assert found[-1] == pytest.approx(std, rel=0.4)
 
 
 def test_it_stays_within_its_limits():
     first, limits = JointParams().range_error.white_std, JointParams().noise_learning
-    assert learned(np.zeros(3000)) == pytest.approx(first)
+    assert learned(np.zeros(3000))[-1] == pytest.approx(first)
     long = learned(1e3 * np.resize([1.0, -1.0], 3000))
-    assert long == pytest.approx(first * limits.most_learned)
+    assert long[-1] == pytest.approx(first * limits.most_learned)
 
 
 def test_ranges_that_follow_late_tell_nothing():
     first = JointParams().range_error.white_std
-    assert learned(np.resize([1.0, -1.0], 100), dt=1.0) == pytest.approx(first)
+    assert learned(np.resize([1.0, -1.0], 100), dt=1.0)[-1] == pytest.approx(first)
