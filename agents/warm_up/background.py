@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Self
 
 from agents.warm_up.parts import Part
@@ -15,21 +15,18 @@ class BackgroundWarmUp:
 
     Args:
         needed: Compiled first; `wait_for_needed` returns once they are.
-        later: Name to parts, compiled as soon as a process is free.
+        later: Compiled as soon as a process is free.
     """
 
-    def __init__(self, needed: Iterable[Part], later: Mapping[str, Iterable[Part]]) -> None:
+    def __init__(self, needed: Iterable[Part], later: Iterable[Part]) -> None:
         self._needed = [part for part in needed if not part.is_kept()]
         self._left = {part.name for part in self._needed}
-        known, missing = set(self._left), {}
-        for name, parts in later.items():
-            missing[name] = [part for part in parts if part.name in known or not part.is_kept()]
-        self._later = [part for parts in missing.values() for part in parts]
+        self._later = [part for part in later if not part.is_kept()]
         self._stop, self._error = threading.Event(), list[BaseException]()
         self._said = 0.0, ""
         self._thread = threading.Thread(target=self._compile, name="warm-up", daemon=True)
-        self.missing = tuple(name for name, parts in missing.items() if parts)
-        """Names of `later` whose code was not on the disk."""
+        self.missing = tuple(part.name for part in self._later)
+        """Names of those of `later` that were not on the disk."""
 
     def __enter__(self) -> Self:
         if self._needed or self._later:

@@ -123,8 +123,8 @@ def test_what_is_compiled_in_the_background_ends_with_its_block(monkeypatch):
     sleep = [sys.executable, "-c", "import time; time.sleep(60)"]
     monkeypatch.setattr(processes, "_command", lambda name: sleep)
     began = time.monotonic()
-    with BackgroundWarmUp([], {"joint": [a_part("slow")]}) as others:
-        assert others.missing == ("joint",)
+    with BackgroundWarmUp([], [a_part("slow")]) as others:
+        assert others.missing == ("slow",)
         assert not others.is_done()
     assert time.monotonic() - began < 30.0
     assert others.is_done()
@@ -163,7 +163,7 @@ def test_what_is_needed_comes_first_and_is_all_that_is_waited_for(monkeypatch):
         return [sys.executable, "-c", f"import time; time.sleep({wait})"]
 
     monkeypatch.setattr(processes, "_command", command)
-    needed, later = [a_part("needed 1"), a_part("needed 2")], {"other": [a_part("later")]}
+    needed, later = [a_part("needed 1"), a_part("needed 2")], [a_part("later")]
     since = time.monotonic()
     with BackgroundWarmUp(needed, later) as others:
         said = []
@@ -177,6 +177,6 @@ def test_what_is_needed_comes_first_and_is_all_that_is_waited_for(monkeypatch):
 
 def test_who_waits_is_told_of_what_failed(monkeypatch):
     monkeypatch.setattr(processes, "_command", lambda name: [sys.executable, "-c", "1 / 0"])
-    failing = BackgroundWarmUp([a_part("bad")], {})
+    failing = BackgroundWarmUp([a_part("bad")], [])
     with failing, pytest.raises(UsageError, match="compiling bad failed: ZeroDivisionError"):
         failing.wait_for_needed(lambda share, what: None)

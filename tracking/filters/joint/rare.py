@@ -184,11 +184,10 @@ def run_to_end(run: Callable[[], int], arguments: tuple[Any, ...]) -> None:
         arguments: Its arguments.
     """
     coefficients, layout, state, work, events, *_ = arguments
-    actions = actions_of(coefficients, state)
     work.cursor[:] = 0
     while action := run():
         t = events[0][work.cursor[ENV], work.cursor[EVENT]]
-        for rare in actions[action]:
+        for rare in actions_of(coefficients, state)[action]:
             rare(coefficients, layout, state, work, t)
 
 
