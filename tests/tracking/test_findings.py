@@ -174,3 +174,10 @@ def test_all_errors_are_told_at_once():
     with pytest.raises(LogError, match=r"node 1: off.*\n.*node 2: off"):
         refuse_errors(errors)
     assert all(kind.meaning and kind.remedy for kind in KINDS.values())
+
+
+def test_progress_of_checks_goes_up_and_covers_every_node_that_is_suspected():
+    """Cars that have driven for seconds are seldom ok: each clock is looked at by itself."""
+    shares = []
+    examine(simulate(scenario="cars-los", seconds=8.0, seed=2), shares.append)
+    assert shares == [0.0, 0.25, 0.5, 0.75]
