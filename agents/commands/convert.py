@@ -8,12 +8,19 @@ import click
 
 from agents.console import emit_json, progress_bar
 
+FOLDER = Path(__file__).parents[1] / "convert" / "presets"
+PRESETS = ", ".join(sorted(path.stem for path in FOLDER.glob("*.toml")))
+
 
 @click.command()
 @click.argument("source", type=Path)
 @click.argument("out", type=Path)
-@click.option("--preset", help="A public data set: sfuise, starloc or tiers.")
-@click.option("--mapping", type=Path, help="A file that says what is what, instead of a preset.")
+@click.option("--preset", help=f"A public data set: {PRESETS}.")
+@click.option(
+    "--mapping",
+    type=Path,
+    help="A file that names streams and fields, instead of a preset.",
+)
 @click.option(
     "--restamp", is_flag=True, help="Replace the times of IMU samples by those of a steady rate."
 )
@@ -26,7 +33,7 @@ def convert(
     restamp: bool,
     as_json: bool,
 ) -> None:
-    """Make a log folder of a bag of ROS or of tables."""
+    """Make a log folder of a bag of ROS, CSV tables, a file of arrays or a serial capture."""
     from agents.convert import convert as run
 
     with progress_bar(f"reading {source}") as report:

@@ -1,11 +1,11 @@
-"""What of a recording is what: a mapping file, or a preset of a public data set."""
+"""Which stream of a recording holds which measurements: a mapping file, or a preset."""
 
 from __future__ import annotations
 
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from agents.errors import UsageError
 from tracking.log.meta import Meta, read_meta
@@ -15,98 +15,146 @@ FOLDER = Path(__file__).parent / "presets"
 PRESETS = tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
 OF_META = ("format", "name", "source", "licence", "dimensions", "heading", "nodes", "antennas")
 """Keys of meta.toml, which a mapping has as well."""
+Fields = tuple[str, ...]
+"""Names of fields whose numbers are joined; a minus before a name changes the sign."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Imu:
-    """A stream of inertial samples."""
+class Stream:
+    """Keys of every kind of stream."""
 
     stream: str
-    """A topic or a file, parts of its name in braces: ``/robot{node}/imu``."""
+    """A topic, a file or an array, parts of its name in braces: ``/robot{node}/imu``."""
+    rate: float = 0.0
+    """[Hz] Record k is of the time k / rate; 0 takes the time of the record."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Oriented(Stream):
+    """Keys of streams with an orientation, body to world; at most one of them is given."""
+
+    quat: Fields = ()
+    """w, x, y, z"""
+    matrix: Fields = ()
+    """Rotation matrix, row by row."""
+    euler_deg: Fields = ()
+    """[deg] Roll, pitch, yaw, applied in this order about the axes of the world."""
+    yaw: Fields = ()
+    """[rad]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Imu(Stream):
+    """Samples of a gyroscope and an accelerometer."""
+
     node: str = "node"
     """A number, a part of the name, or a field."""
-    gyr: tuple[str, str, str]
-    acc: tuple[str, str, str]
+    gyr: Fields
+    acc: Fields
     gyr_scale: float = 1.0
-    """To rad/s."""
+    """Factor to rad/s."""
     acc_scale: float = 1.0
-    """To m/s2."""
+    """Factor to m/s2."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Mag:
-    """A stream of magnetometer readings."""
+class Mag(Stream):
+    """Readings of a magnetometer."""
 
-    stream: str
     node: str = "node"
-    mag: tuple[str, str, str]
+    mag: Fields
     scale: float = 1.0
-    """To uT."""
+    """Factor to uT."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ranges:
-    """A stream of ranges."""
+class State(Oriented):
+    """Orientations and accelerations that a node filtered itself."""
 
-    stream: str
+    node: str = "node"
+    acc: Fields
+    """[m/s2] In the world frame, without gravity."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ranges(Stream):
+    """Ranges."""
+
     i: str = "i"
     j: str = "j"
-    range: str
+    range: str = ""
+    mean_of: Fields = ()
+    """Several fields in place of `range`: their mean."""
+    pairs: tuple[tuple[str, str], ...] = ()
+    """In place of `range`, `i` and `j`: numbers of the record are ranges of these nodes."""
     scale: float = 1.0
-    """To metres."""
+    """Factor to metres."""
     each: str = ""
-    """A field that is a list, each of which is a range; other fields are looked for there first."""
+    """A field that is a list of ranges; other fields are looked up in its items first."""
     valid: str = ""
-    """A field that is 0 where the range is not to be used."""
+    """A field that is 0 where the range is invalid."""
     rx_power: str = ""
     """[dBm]"""
     fp_power: str = ""
+    """[dBm] Of the first path."""
     antenna_i: str = ""
     antenna_j: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Truth:
-    """A stream of true poses."""
+class Truth(Oriented):
+    """True poses."""
 
-    stream: str
     node: str = "node"
-    pos: tuple[str, str, str]
-    quat: tuple[str, str, str, str] | None = None
-    """w, x, y, z"""
+    pos: Fields
+    """x, y, or x, y, z [m]"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Mapping:
-    """Which streams are read, and how."""
+    """Streams of a recording."""
 
-    kind: Literal["bag", "tables"]
-    time: str
+    kind: Literal["bag", "tables", "arrays", "capture"]
+    time: str = ""
     """Field with the time of a record [s]; of bags `stamp` (of the header) or `receipt`."""
-    ranges: tuple[Ranges, ...]
+    capture: str = ""
+    """Format of a capture, such as `linktrack`."""
+    up: Literal["z", "y"] = "z"
+    """Axis of the recording's world frame that points up."""
+    ranges: tuple[Ranges, ...] = ()
     imu: tuple[Imu, ...] = ()
     mag: tuple[Mag, ...] = ()
+    state: tuple[State, ...] = ()
     truth: tuple[Truth, ...] = ()
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A mapping, the group, ids of nodes and places of those that never move."""
+    """A mapping, the constellation, ids of nodes and places of static nodes."""
 
     mapping: Mapping
     meta: Meta
     ids: dict[str, int]
-    """What the recording calls a node, and its id in the log where that differs."""
+    """Name of a node in the recording to its id in the log, where they differ."""
     places: dict[int, tuple[float, float, float]]
-    """[m] Of static nodes, by id in the log: truth, and surveyed distances between them."""
+    """[m] By id in the log: truth, and surveyed distances between static nodes."""
+
+
+OF_CAPTURES: dict[str, Any] = {
+    "ranges": (
+        Ranges(stream="ranges", range="distance", rx_power="rx_power", fp_power="fp_power"),
+    ),
+    "imu": (Imu(stream="imu", gyr=("gyr",), acc=("acc",)),),
+}
+"""Streams of every capture."""
 
 
 def read_plan(preset: str | None, file: Path | None) -> Plan:
     """Read a mapping.
 
     Raises:
-        UsageError: Neither or both are given, no such preset, or something in the file makes no
-            sense; names the key.
+        UsageError: Neither or both are given, no such preset, or a key of the file is wrong; names
+            the key.
     """
     if (preset is None) == (file is None):
         raise UsageError("--preset or --mapping: expected one of them")
@@ -127,4 +175,9 @@ def read_plan(preset: str | None, file: Path | None) -> Plan:
         right = isinstance(value, list) and len(value) == 3 and key.isdigit() and int(key) in known
         if not right or not all(isinstance(x, (int, float)) for x in value):
             raise where.key("places").key(key).error("expected a node of [nodes] and [x, y, z]")
+    if mapping.kind != "capture" and not mapping.ranges:
+        raise where.key("ranges").error("missing, expected [[ranges]]")
+    for k, ranges in enumerate(mapping.ranges):
+        if bool(ranges.range) + bool(ranges.mean_of) + bool(ranges.pairs) != 1:
+            raise where.key(f"ranges[{k}]").error("expected one of range, mean_of, pairs")
     return Plan(mapping, meta, ids, {int(k): (v[0], v[1], v[2]) for k, v in places.items()})

@@ -3,13 +3,19 @@
 import csv
 import gzip
 import json
+import os
+import pickle
+import shutil
+import struct
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from scipy.spatial.transform import Rotation
 
 from agents.cli import cli
 from agents.convert import PRESETS, convert
+from agents.convert.arrays import Arrays
 from agents.convert.sources import pattern
 from agents.errors import UsageError
 from tracking.log import read_log
@@ -163,6 +169,14 @@ def _variance(kind):
         (lambda s: s.replace("beacon = 101", "beacon = 103"), r"ids\.beacon: expected one of"),
         (lambda s: s.replace("[0.0, 0.0, 0.0]", "[0.0]"), r"places\.101: expected a node"),
         (lambda s: s.replace('kind = "tables"', 'kind = "pickle"'), "kind: expected one of"),
+        (
+            lambda s: s.replace('range = "mm"', 'range = "mm"\nmean_of = ["mm"]'),
+            "one of range, mean",
+        ),
+        (
+            lambda s: s.replace('["gx", "gy", "gz"]', '["gx", "gy"]'),
+            "gyr: expected 3 numbers, got 2",
+        ),
     ],
 )
 def test_what_makes_no_sense_is_refused_by_name(folder, change, message):
@@ -171,6 +185,147 @@ def test_what_makes_no_sense_is_refused_by_name(folder, change, message):
     with pytest.raises(UsageError, match=message):
         convert(folder / "tables", folder / "log", mapping=path)
     assert not (folder / "log").exists()
+
+
+def test_a_minus_turns_an_axis_and_nodes_without_measurements_are_left_out(folder):
+    path = folder / "map.toml"
+    text = path.read_text().replace('["gx", "gy", "gz"]', '["gy", "-gx", "gz"]')
+    path.write_text(text.replace("[ids]", '[nodes.9]\nvehicle = "car"\n[ids]'))
+    log = convert(folder / "tables", mapping=path)
+    imu = log.block.values[0][log.block.kind[0] == Kind.IMU]
+    np.testing.assert_allclose(imu[0, :3], [0.2, -0.1, 1.0])
+    assert log.constellation.ids == (1, 2, 101, 102)
+
+
+def body_arrays(n_nodes, rng):
+    """States at 60 Hz and ranges at 20 Hz of trackers in a world whose y axis points up."""
+    turns = Rotation.random(30 * n_nodes, random_state=rng)
+    n_pairs = n_nodes * (n_nodes - 1) // 2
+    return turns, {
+        "imu_ori": turns.as_matrix().reshape(30, n_nodes, 3, 3),
+        "imu_acc": rng.normal(size=(30, n_nodes, 3)),
+        "uwb": rng.uniform(0.3, 2.0, (10, n_pairs)).astype(np.float32),
+        "gender": "neutral",
+    }
+
+
+def test_a_pickle_of_arrays_of_a_body_becomes_a_log(tmp_path):
+    turns, arrays = body_arrays(6, np.random.default_rng(1))
+    with (tmp_path / "processed_0.pkl").open("wb") as file:
+        pickle.dump(arrays, file)
+    log = convert(tmp_path / "processed_0.pkl", tmp_path / "log", preset="uip")
+    back = read_log(tmp_path / "log")
+    states = log.block.take(log.block.kind[0] == Kind.STATE)
+    assert back.block.count(Kind.STATE) == states.n_events == 180
+    third = states.take(states.i[0] == 2)
+    np.testing.assert_allclose(third.t[0], np.arange(30) / 60.0)
+    upright = Rotation.from_euler("x", 90.0, degrees=True)
+    expected = (upright * turns[2::6]).as_matrix()
+    found = Rotation.from_quat(third.values[0, :, [1, 2, 3, 0]].T).as_matrix()
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+    x, y, z = arrays["imu_acc"][:, 2].T
+    np.testing.assert_allclose(third.values[0, :, 4:7], np.stack((x, -z, y), axis=1), atol=1e-12)
+    ranges = log.block.take(log.block.kind[0] == Kind.RANGE)
+    assert ranges.n_events == 150
+    first = ranges.take(ranges.t[0] == 0.0)
+    order = np.lexsort((first.j[0], first.i[0]))
+    np.testing.assert_allclose(first.values[0, order, 0], arrays["uwb"][0], rtol=1e-6)
+
+
+def test_two_bodies_are_twelve_nodes_and_sixty_six_pairs(tmp_path):
+    _, arrays = body_arrays(12, np.random.default_rng(2))
+    np.savez(tmp_path / "two.npz", **{k: v for k, v in arrays.items() if k != "gender"})
+    pairs = [[str(a), str(b)] for a in range(12) for b in range(a + 1, 12)]
+    parts = ['format = 1\nkind = "arrays"\nheading = "initial"\nup = "y"']
+    parts += [f'[nodes.{k}]\nvehicle = "human"' for k in range(12)]
+    parts += [f'[[ranges]]\nstream = "uwb"\nrate = 20.0\npairs = {json.dumps(pairs)}']
+    parts += [
+        f'[[state]]\nstream = "imu_ori"\nrate = 60.0\nnode = "{k}"\n'
+        f'matrix = ["imu_ori.{k}"]\nacc = ["imu_acc.{k}"]'
+        for k in range(12)
+    ]
+    (tmp_path / "two.toml").write_text("\n".join(parts))
+    log = convert(tmp_path / "two.npz", mapping=tmp_path / "two.toml")
+    assert log.constellation.n_nodes == 12
+    assert log.n_ranges == 660
+    assert log.block.count(Kind.STATE) == 360
+
+
+def test_a_pickle_runs_no_code(tmp_path):
+    class Trap:
+        def __reduce__(self):
+            return (os.mkdir, (str(tmp_path / "made"),))
+
+    with (tmp_path / "trap.pkl").open("wb") as file:
+        pickle.dump({"uwb": Trap()}, file)
+    with pytest.raises(UsageError, match="is no array of numbers"):
+        Arrays(tmp_path / "trap.pkl", "")
+    assert not (tmp_path / "made").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "data"),
+    [("a.mat", b"nothing"), ("a.npz", b"nothing"), ("a.pkl", b"\x80"), ("a.txt", b"1 2")],
+)
+def test_files_without_arrays_are_refused(tmp_path, name, data):
+    (tmp_path / name).write_bytes(data)
+    with pytest.raises(UsageError, match="no arrays that can be read"):
+        Arrays(tmp_path / name, "")
+
+
+CAPTURE = """
+format = 1
+kind = "capture"
+capture = "{form}"
+heading = "initial"
+[nodes.1]
+[nodes.2]
+[nodes.3]
+[ids]
+{ids}
+"""
+
+
+def linktrack_frame(ticks, ranges):
+    """Node_Frame3 of node 2 of mode DR: 2.85 m is 2850."""
+    body = struct.pack("<2BI4x4xHB", 0, 2, ticks % (1 << 32), 4960, len(ranges))
+    for other, metres in ranges:
+        body += bytes((0, other)) + round(1000 * metres).to_bytes(3, "little") + bytes((180, 160))
+    frame = b"\x55\x05" + struct.pack("<H", len(body) + 5) + body
+    return frame + bytes((sum(frame) % 256,))
+
+
+def test_a_capture_is_dated_by_the_clock_of_its_device(tmp_path):
+    start = (1 << 32) - 30  # milliseconds: the counter wraps
+    frames = [linktrack_frame(start + 20 * k, [(0, 2.85), (1, 6.0 + k)]) for k in range(4)]
+    (tmp_path / "node.bin").write_bytes(b"\x12" + b"".join(frames))
+    path = tmp_path / "map.toml"
+    path.write_text(CAPTURE.format(form="linktrack", ids="0 = 1\n2 = 3\n1 = 2"))
+    log = convert(tmp_path / "node.bin", mapping=path)
+    ranges = log.block.take(log.block.kind[0] == Kind.RANGE)
+    np.testing.assert_allclose(np.unique(ranges.t[0]), [0.0, 0.02, 0.04, 0.06], atol=1e-9)
+    assert sorted(ranges.values[0, :, 0].tolist()) == [2.85] * 4 + [6.0, 7.0, 8.0, 9.0]
+    assert ranges.values[0, 0, 1:3].tolist() == [-80.0, -90.0]
+    assert ranges.has_power.all()
+    path.write_text(CAPTURE.format(form="dw1000", ids=""))
+    with pytest.raises(UsageError, match="format: expected one of"):
+        convert(tmp_path / "node.bin", mapping=path)
+
+
+def test_a_capture_of_lines_names_nodes_by_their_hexadecimal_ids(tmp_path):
+    lines = [
+        '{"utime": 3505358,"c": 278,"uid": 39068,"ouid": 4660,"raz": [4.561713],"rssi": [-88.5]}',
+        "> boot",
+        '{"utime": 3636526,"c": 274,"uid": 39068,"ouid": 4660,"raz": [4.602430],"rssi": [-88.2]}',
+    ]
+    (tmp_path / "a.txt").write_text("\n".join(lines) + "\n")
+    (tmp_path / "map.toml").write_text(CAPTURE.format(form="uwb-core", ids="989C = 1\n1234 = 2"))
+    log = convert(tmp_path / "a.txt", mapping=tmp_path / "map.toml")
+    assert log.n_ranges == 2
+    np.testing.assert_allclose(log.block.t[0], [0.0, 0.131168], atol=1e-9)
+    (tmp_path / "a.txt").write_text("nothing\n")
+    with pytest.raises(UsageError, match="expected ranges in the format"):
+        convert(tmp_path / "a.txt", mapping=tmp_path / "map.toml")
 
 
 def test_parts_of_a_name_are_nodes():
@@ -214,3 +369,46 @@ def test_robots_without_imu_are_followed_but_for_rotation_and_mirror(data):
     assert found.score.rmse_mirror is not None
     assert found.score.rmse_mirror < 0.6
     assert {"no-imu", "range-offset"} <= {f.name for f in found.findings}
+
+
+def residuals(log):
+    """Ranges less true distances of their nodes [m], where truth is known."""
+    ranges = log.block.take(log.block.kind[0] == Kind.RANGE)
+    pos, known = log.truth.positions(log.constellation, ranges.t[0])
+    row, i, j = np.arange(ranges.n_events), ranges.i[0], ranges.j[0]
+    distance = np.linalg.norm(pos[row, i] - pos[row, j], axis=1)
+    return (ranges.values[0, :, 0] - distance)[known[row, i] & known[row, j]]
+
+
+@pytest.mark.parametrize(
+    ("preset", "source", "n_ranges", "median"),
+    [("murp", "murp", 768, 0.1), ("plaza2", "plaza/Plaza2.mat", 1816, 3.0)],
+)
+def test_presets_agree_with_the_truth_of_the_recording(data, preset, source, n_ranges, median):
+    """The authors' ranges are long by centimetres (murp) and by metres (plaza2)."""
+    log = convert(data / "raw" / source, preset=preset)
+    assert log.n_ranges == n_ranges
+    assert len(residuals(log)) == n_ranges
+    assert 0.0 < np.median(residuals(log)) < median
+
+
+def test_a_drone_with_two_radios_has_two_antennas(data, tmp_path):
+    """The folder has tables of one drone, those of its IMU from another run."""
+    folder = tmp_path / "ifo001"
+    folder.mkdir()
+    for path in (data / "raw" / "miluv").glob("*.gz"):
+        shutil.copy(path, folder / path.name.replace("_first_rows", ""))
+    log = convert(tmp_path, preset="miluv")
+    assert log.constellation.ids == (1, 100, 101, 102, 103, 104, 105)
+    assert (log.n_ranges, log.block.count(Kind.IMU)) == (954, 1999)
+    assert sorted(set(log.block.antenna_i[0][log.block.kind[0] == Kind.RANGE].tolist())) == [0, 1]
+    # Places of the fixed radios, constellation 0 of the data set's config/uwb/anchors.yaml.
+    known = {
+        100: [3.274, 3.464, 1.809], 101: [3.186, 0.274, 1.588], 102: [2.851, -2.923, 1.897],
+        103: [-2.498, -3.502, 1.773], 104: [-2.958, 0.613, 1.657], 105: [-2.735, 3.659, 1.89],
+    }  # fmt: skip
+    ranges = log.block.take(log.block.kind[0] == Kind.RANGE)
+    pos, has = log.truth.positions(log.constellation, ranges.t[0])
+    far = [known[log.constellation.ids[j]] for j in ranges.j[0]]
+    error = ranges.values[0, :, 0] - np.linalg.norm(pos[:, 0] - np.array(far), axis=1)
+    assert abs(np.median(error[has[:, 0]])) < 0.1
