@@ -18,7 +18,7 @@ from tracking.constellation import Constellation
 from tracking.errors import ConfigError
 from tracking.estimate import Status, TeamEstimate
 from tracking.filters import DEFAULT_FILTER
-from tracking.findings import Finding, examine, find_unplaced, refuse_errors
+from tracking.findings import Finding, examine, find_refused, find_unplaced, refuse_errors
 from tracking.horizon import HorizonParams
 from tracking.log import Log, read_log
 from tracking.measurements import MeasurementBlock
@@ -162,7 +162,7 @@ def track_log(
         nis, n_rejected = float(tracker.mean_nis()[0]), int(tracker.n_rejected()[0])
     elapsed = time.perf_counter() - started
 
-    found = (*findings, *find_unplaced(log, estimate))
+    found = (*findings, *find_unplaced(log, estimate), *find_refused(log, n_rejected))
     truth, has_truth = log.truth.pairs(constellation, t_out)
     at_truth = np.isin(t_out, t_truth)
     on_grid = np.isin(t_out, grid)

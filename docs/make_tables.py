@@ -334,6 +334,16 @@ def recording_results() -> str:
     return markdown(("recording", *names), rows)
 
 
+def mds_results() -> str:
+    """Errors of `joint` and of multidimensional scaling of each instant."""
+    rows = []
+    for line in map(json.loads, (DOCS / "mds-results.jsonl").read_text().splitlines()):
+        errors = ["-" if line[k] is None else f"{line[k]:.2f}" for k in ("joint", "mds")]
+        rows.append([line["case"], str(line["nodes"]), *errors, str(line["instants"])])
+    head = ("recording", "nodes", "joint [m]", "MDS [m]", "instants with all pairs")
+    return markdown(head, rows, right=", ".join(head[1:]))
+
+
 def parameters(params: Any, names: tuple[str, ...]) -> str:
     """Parameters of a stage, those of its parts among them."""
     rows = []
@@ -360,6 +370,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "second-world": second_world,
     "room-results": room_results,
     "recording-results": recording_results,
+    "mds-results": mds_results,
     "filter-parameters": partial(
         parameters,
         JointParams(),

@@ -11,7 +11,7 @@ from tests.second_world.record import record
 from tests.second_world.world import draw
 from tracking.constellation import NodeConfig
 from tracking.errors import LogError
-from tracking.findings import KINDS, Finding, examine, refuse_errors
+from tracking.findings import KINDS, Finding, examine, find_refused, refuse_errors
 from tracking.findings.at_rest import find_in_samples, rest_of
 from tracking.findings.gyroscope import find_gyroscope
 from tracking.measurements import Kind
@@ -181,3 +181,17 @@ def test_progress_of_checks_goes_up_and_covers_every_node_that_is_suspected():
     shares = []
     examine(simulate(scenario="cars-los", seconds=8.0, seed=2), shares.append)
     assert shares == [0.0, 0.25, 0.5, 0.75]
+
+
+def test_ranges_that_the_filter_refuses_are_named(drive):
+    """Ranges with errors of metres lose the group; ordinary ones do not."""
+    rng = np.random.default_rng(3)
+
+    def scatter(values):
+        rows = rng.random(len(values)) < 0.5
+        return np.where(rows[:, None], values + 20.0 * rng.random((len(values), 1)), values)
+
+    refused = track_log(with_samples(drive, Kind.RANGE, scatter), findings=())
+    assert [f.name for f in refused.findings] == ["ranges-refused"]
+    assert track_log(drive, findings=()).findings == ()
+    assert find_refused(drive, 0) == []

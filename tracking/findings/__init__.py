@@ -9,7 +9,7 @@ from tracking.findings.clock_offset import correct_clocks
 from tracking.findings.finding import KINDS, Finding, refuse_errors
 from tracking.findings.gyroscope import find_gyroscope
 from tracking.findings.ranges import find_range_errors
-from tracking.findings.use import find_unplaced, find_unused
+from tracking.findings.use import find_refused, find_unplaced, find_unused
 from tracking.log.folder import Log
 
 
@@ -32,4 +32,6 @@ def examine(
     return log, [*found, *of_clocks, *find_range_errors(log)]
 
 
-__all__ = ["KINDS", "Finding", "examine", "find_unplaced", "find_unused", "refuse_errors"]
+__all__ = [
+    "KINDS", "Finding", "examine", "find_refused", "find_unplaced", "find_unused", "refuse_errors",
+]  # fmt: skip

@@ -81,6 +81,11 @@ KINDS: dict[str, Kind] = {
         "an IMU without a magnetometer is not used where the heading is magnetic",
         '`heading = "initial"` in meta.toml',
     ),
+    "ranges-refused": Kind(
+        "warning",
+        "the filter refused many ranges as outliers: they are worse than it assumes",
+        "look for reflections and calibration; estimates of such a recording are not to be used",
+    ),
     "never-placed": Kind("note", "a node was never placed", "range it with more of the others"),
 }
 """By name. `docs/findings.md` shows it."""

@@ -11,6 +11,9 @@ from tracking.findings.finding import Finding, names
 from tracking.log.folder import Log
 from tracking.measurements import Kind
 
+MOST_REFUSED = 0.2
+"""[-] Share of ranges; recordings that are tracked have up to 0.02, one that is lost has 0.65."""
+
 
 def find_unused(log: Log) -> list[Finding]:
     """Sensors that are missing or cannot be used."""
@@ -74,3 +77,20 @@ def find_unplaced(log: Log, estimate: TeamEstimate) -> list[Finding]:
         )
         found.append(Finding("never-placed", (constellation.ids[n],), text))
     return found
+
+
+def find_refused(log: Log, n_refused: int) -> list[Finding]:
+    """Find ranges that contradict the filter's model of them.
+
+    Args:
+        log: The recording.
+        n_refused: Ranges that the filter refused as outliers.
+    """
+    share = n_refused / max(log.n_ranges, 1)
+    if share <= MOST_REFUSED:
+        return []
+    text = (
+        f"{share:.0%} of the ranges were refused as outliers: their errors are larger than the "
+        "filter assumes (decimetres, longer behind obstacles), or the group was lost"
+    )
+    return [Finding("ranges-refused", (), text)]
