@@ -2,7 +2,8 @@
 
 The layout of an instant follows from the newest range of each pair alone, by classical MDS. Both
 are scored after the best rotation and reflection of each instant, which is all that ranges can
-tell. Run `python docs/measure_mds.py`, which writes docs/mds-results.jsonl, then `docs/make_tables.py`.
+tell. Run `python docs/measure_mds.py`, which writes docs/mds-results.jsonl, then
+`docs/make_tables.py`.
 """
 
 from __future__ import annotations
