@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
 
 HZ = 200.0
 """[Hz] Of the integration."""
@@ -19,6 +20,14 @@ class Motion:
     """[m] Over (x, y)."""
     yaw: CubicSpline
     """[rad]"""
+
+    def turns(self, t):
+        """Return body to world, (time)."""
+        return Rotation.from_euler("Z", self.yaw(t)[:, None])
+
+    def rates(self, t):
+        """Return the angular velocity in the body, (time, 3) [rad/s]."""
+        return np.column_stack([np.zeros((len(t), 2)), self.yaw(t, 1)])
 
 
 def drive(world, rng) -> list[Motion]:

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from tests.second_world.motion import drive
-from tests.second_world.sensors import G, read_imu, read_ranges
+from tests.second_world.sensors import G, in_space, read_imu, read_ranges
+from tests.second_world.space import fly
 from tests.second_world.world import World
 from tracking.constellation import Constellation, NodeConfig
 from tracking.filters.joint.params import (
@@ -16,7 +17,6 @@ from tracking.filters.joint.params import (
     NoiseLearningParams,
     RangeErrorParams,
 )
-from tracking.geometry import quat_from_yaw
 from tracking.log import Log
 from tracking.log.truth import Truth
 from tracking.measurements import Kind, MeasurementBlock
@@ -26,16 +26,16 @@ from tracking.vehicles import VEHICLES
 TRUTH_HZ = 25.0
 
 
-def record(world: World, *, vehicle: str = "car", is_known: bool = False) -> Log:
-    """Drive and read everything.
+def record(world: World, *, vehicle: str | None = None, is_known: bool = False) -> Log:
+    """Move and read everything.
 
     Args:
         world: What to run.
-        vehicle: What the nodes are said to be.
+        vehicle: What the nodes are said to be; None for what they are.
         is_known: Whether the log says where the trackers sit.
     """
     rng = np.random.default_rng([world.seed, 2])
-    motions = drive(world, rng)
+    motions = drive(world, rng) if world.kind == "car" else fly(world, rng)
     n = len(motions)
     blocks, truths = [], []
     for k, (motion, v) in enumerate(zip(motions, world.vehicles, strict=True)):
@@ -44,8 +44,8 @@ def record(world: World, *, vehicle: str = "car", is_known: bool = False) -> Log
         blocks.append(MeasurementBlock.of_kind(Kind.IMU, t, node, values[:, :6]))
         blocks.append(MeasurementBlock.of_kind(Kind.MAG, t, node, values[:, 6:]))
         t = np.arange(int(world.seconds * TRUTH_HZ)) / TRUTH_HZ
-        pos = np.column_stack([motion.place(t), np.zeros(len(t))])
-        truths.append((t, np.full(len(t), k), pos, quat_from_yaw(motion.yaw(t))))
+        quat = motion.turns(t).as_quat()[:, [3, 0, 1, 2]]
+        truths.append((t, np.full(len(t), k), in_space(motion.place(t)), quat))
     rows = read_ranges(world, motions, rng)
     i, j = rows[:, 1].astype(np.int64), rows[:, 2].astype(np.int64)
     blocks.append(
@@ -63,13 +63,16 @@ def record(world: World, *, vehicle: str = "car", is_known: bool = False) -> Log
     mounts = [Mount(ahead=v.ahead, aside=v.aside, slip=0.0) for v in world.vehicles]
     nodes = tuple(
         NodeConfig(
-            id=k + 1, vehicle=vehicle, imu_hz=world.imu.hz, mount=mounts[k] if is_known else Mount()
+            id=k + 1,
+            vehicle=vehicle or world.kind,
+            imu_hz=world.imu.hz,
+            mount=mounts[k] if is_known else Mount(),
         )
         for k in range(n)
     )
     return Log(
         name=f"second-world-{world.seed}",
-        constellation=Constellation(nodes=nodes, dimensions=2),
+        constellation=Constellation(nodes=nodes, dimensions=2 if world.kind == "car" else 3),
         block=block,
         truth=Truth(t[order], node[order], pos[order], q[order], yes, yes),
         nlos=rows[by_pair, 4] > 0.0,
@@ -80,15 +83,17 @@ def matched(world: World) -> JointParams:
     """What is true in this world, in the terms of the joint filter: for the bound."""
     imu, radio, field = world.imu, world.radio, world.field
     ways = 2.0 * np.mean([0.5 * v.top_speed for v in world.vehicles])
-    car = replace(
-        VEHICLES["car"],
-        accel_psd=float(np.hypot(imu.acc_noise, 0.6 * imu.vibration) / np.sqrt(imu.hz)),
+    noise = float(np.hypot(imu.acc_noise, 0.6 * imu.vibration) / np.sqrt(imu.hz))
+    known = replace(
+        VEHICLES[world.kind],
+        accel_psd=noise,
         bias_std=float(np.hypot(imu.acc_bias, G * np.radians(0.7))),
         heading_std=float(np.hypot(np.hypot(field.bend, field.iron) / field.level, 0.018)),
         heading_tau=5.0,
         first_heading_std=None,
-        sideways_std=0.005,
     )
+    if world.kind == "car":
+        known = replace(known, sideways_std=0.005)
     never = 1e-9
     share = max(radio.long_share, never)
     mean, spread = 1.25, 0.43
@@ -102,7 +107,7 @@ def matched(world: World) -> JointParams:
         outlier_prob=never,
     )
     return JointParams(
-        vehicles={**VEHICLES, "car": car},
+        vehicles={**VEHICLES, world.kind: known},
         range_error=RangeErrorParams(
             white_std=radio.white,
             fast_std=1e-4,

@@ -12,12 +12,10 @@ def read_imu(world, vehicle, motion, t, rng):
     """Angular rate, specific force and magnetic field in the IMU's axes, (time, 9)."""
     imu, field = world.imu, world.field
     mount = Rotation.from_euler("ZYX", vehicle.tilt[::-1])
-    body = Rotation.from_euler("Z", motion.yaw(t)[:, None])
-    sensor = body * mount
+    sensor = motion.turns(t) * mount
     speed = np.linalg.norm(motion.place(t, 1), axis=1) / vehicle.top_speed
-    flat = motion.place(t, 2)
-    force = np.column_stack([flat, np.full(len(t), G)])
-    rate = np.column_stack([np.zeros((len(t), 2)), motion.yaw(t, 1)])
+    force = in_space(motion.place(t, 2)) + [0.0, 0.0, G]
+    rate = motion.rates(t)
     iron = rng.normal(0.0, field.iron, 3)
     earth = np.array([0.0, field.level, -field.down]) + steel(world, motion.place(t))
     n = (len(t), 3)
@@ -30,13 +28,18 @@ def read_imu(world, vehicle, motion, t, rng):
     return np.column_stack([gyr, acc, mag])
 
 
+def in_space(vectors):
+    """Return vectors with a third axis, 0 where they have none."""
+    return np.column_stack([vectors, np.zeros((len(vectors), 3 - vectors.shape[1]))])
+
+
 def steel(world, place):
     """What the building adds to the field, (time, 3) [uT]: the same for every car."""
     rng = np.random.default_rng([world.seed, 1])
     total = np.zeros((len(place), 3))
     for _ in range(6):
         heading, phase = rng.uniform(0.0, 2.0 * np.pi, 2)
-        along = place @ np.array([np.cos(heading), np.sin(heading)])
+        along = place[:, :2] @ np.array([np.cos(heading), np.sin(heading)])
         wave = np.sin(2.0 * np.pi * along / world.field.length + phase)
         total += wave[:, None] * rng.normal(0.0, world.field.bend / np.sqrt(3.0), 3)
     return total

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -96,13 +96,18 @@ class World:
     """[m] Cars turn back from there."""
     at_rest: float
     """[s] Nothing moves before."""
+    kind: str = "car"
+    """Or `hand`, `drone`, `human`: three to six in space, a body with six nodes."""
 
 
-def draw(seed: int, *, seconds: float = 60.0, long_share: float | None = None) -> World:
-    """Draw a world of cars.
+def draw(
+    seed: int, *, kind: str = "car", seconds: float = 60.0, long_share: float | None = None
+) -> World:
+    """Draw a world.
 
     Args:
-        seed: Same seed, same world.
+        seed: Same seed and kind, same world.
+        kind: What carries the nodes.
         seconds: Length of the run [s].
         long_share: Share of long ranges; drawn as well where None.
     """
@@ -152,7 +157,7 @@ def draw(seed: int, *, seconds: float = 60.0, long_share: float | None = None) -
         long_excess=(0.5, 2.0),
         loss=between(0.0, 0.2),
     )
-    return World(
+    world = World(
         seed=seed,
         seconds=seconds,
         vehicles=tuple(vehicles),
@@ -161,4 +166,22 @@ def draw(seed: int, *, seconds: float = 60.0, long_share: float | None = None) -
         radio=radio,
         radius=between(3.0, 8.0),
         at_rest=between(0.5, 4.0),
+    )
+    if kind == "car":
+        return world
+    n_nodes = 6 if kind == "human" else int(rng.integers(4, 7))
+    carriers = [
+        replace(
+            vehicles[0],
+            top_speed=between(1.0, 2.0) if kind != "drone" else between(1.5, 4.0),
+            tilt=tuple(rng.normal(0.0, np.radians([0.7, 0.7, 1.0])).tolist()),
+        )
+        for _ in range(n_nodes)
+    ]
+    return replace(
+        world,
+        kind=kind,
+        vehicles=tuple(carriers),
+        imu=replace(imu, hz=max(imu.hz, 100.0), vibration=0.3 * imu.vibration),
+        radius=between(1.5, 4.0),
     )
