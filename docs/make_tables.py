@@ -278,7 +278,7 @@ def findings() -> str:
 def second_world() -> str:
     """Errors in the second world."""
     head = ("", "worlds", "rmse_yaw / shape", "over the bound", "NEES", "`ok`", "`ok` and wrong",
-            "`ok` and within 0.3 m")  # fmt: skip
+            "`ok` and within its accuracy")  # fmt: skip
     rows = []
     for line in (DOCS / "second-world.jsonl").read_text().splitlines():
         r = json.loads(line)

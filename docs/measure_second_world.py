@@ -1,8 +1,8 @@
 """The default filter in the second world (`tests/second_world`), which shares nothing with ours.
 
-For `docs/tracker.md`: worlds are drawn with all that they have at random, and tracked with the
-mounts of their trackers given, unknown, and with cars that are said to be robots. The bound of each
-is that of an efficient estimator that knows the world's noise, and as much of the mounts.
+For `docs/tracker.md`: worlds are drawn at random and tracked: cars with the mounts of their
+trackers given, unknown, and labelled robots; hands, drones and bodies in space. The bound of each
+world is that of an efficient estimator that knows the world's noise and the mounts.
 
 Run `python docs/measure_second_world.py [WORLDS] [FIRST]` from the top folder; writes
 `docs/second-world.jsonl`.
@@ -23,26 +23,29 @@ from agents.track import track_log
 from tests.second_world.record import matched, record
 from tests.second_world.world import draw
 from tracking.bounds import posterior_bound
+from tracking.vehicles import VEHICLES
 
 OUT = Path(__file__).parent / "second-world.jsonl"
-KINDS: dict[str, dict[str, Any]] = {
-    "mounts given": {"is_known": True},
-    "mounts unknown": {},
-    "said to be robots": {"vehicle": "robot"},
+KINDS: dict[str, tuple[str, dict[str, Any]]] = {
+    "cars, mounts given": ("car", {"is_known": True}),
+    "cars, mounts unknown": ("car", {}),
+    "cars, labelled robots": ("car", {"vehicle": "robot"}),
+    "hands": ("hand", {}),
+    "drones": ("drone", {}),
+    "bodies": ("human", {}),
 }
-WITHIN = 0.3
-"""[m] The accuracy of cars."""
 
 
-def figures(seed: int, how: dict[str, Any]) -> list[float]:
-    """Errors, bounds, NEES, ok, ok and wrong, ok and within `WITHIN`, of one world."""
-    world = draw(seed)
+def figures(seed: int, carrier: str, how: dict[str, Any]) -> list[float]:
+    """Errors, bounds, NEES, ok, ok and wrong, ok and within its accuracy, of one world."""
+    world = draw(seed, kind=carrier)
     log = record(world, **how)
     result, bound = track_log(log, findings=[]), posterior_bound(log, matched(world))
     s, has = result.score, result.has_truth
-    off = np.linalg.norm((result.estimate.pos_ij_w - result.truth_ij_w)[..., :2], axis=-1)
+    off = np.linalg.norm((result.estimate.pos_ij_w - result.truth_ij_w), axis=-1)
     ok = result.estimate.ok & has
-    within = float(np.mean(off[ok] < WITHIN)) if ok.any() else np.nan
+    promised = VEHICLES[how.get("vehicle", carrier)].accuracy
+    within = float(np.mean(off[ok] < promised)) if ok.any() else np.nan
     shares = s.ok_share or 0.0, s.integrity_share or 0.0, within
     errors = s.rmse_yaw or np.inf, s.rmse_shape or np.inf
     return [*errors, bound.rmse_yaw, bound.rmse_shape, s.nees or np.nan, *shares]
@@ -51,10 +54,10 @@ def figures(seed: int, how: dict[str, Any]) -> list[float]:
 def main() -> None:
     """Measure and write."""
     given = [int(x) for x in sys.argv[1:]]
-    n, first = [*given, *(100, 0)[len(given) :]][:2]
+    n, first = [*given, *(100, 1000)[len(given) :]][:2]
     lines = []
-    for kind, how in KINDS.items():
-        rows = np.array([figures(seed, how) for seed in range(first, first + n)])
+    for kind, (carrier, how) in KINDS.items():
+        rows = np.array([figures(seed, carrier, how) for seed in range(first, first + n)])
         yaw, shape = rows[:, 0] / rows[:, 2], rows[:, 1] / rows[:, 3]
         lines.append(
             {

@@ -56,8 +56,10 @@ class NlosParams:
     """[m] What they add, in the mean."""
     nlos_bias_large_std: float = 0.5
     """[m] Its standard deviation."""
-    nlos_bias_length: float = 2.0
-    """[m] Way of both ends after which the excess is another."""
+    nlos_bias_length: float = 5.0
+    """[m] Distance travelled by both ends after which the excess is another. Too short a length
+    moves the layout where an obstacle lasts; the excess of one that passes is forgotten anyway when
+    the line of sight is back."""
     white_std: float = 0.25
     """[m] White noise that is added behind an obstacle: the excess jumps where paths change."""
     repeats: float = 20.0
@@ -90,7 +92,11 @@ class NlosParams:
 
 
 NLOS_IN_SPACE = NlosParams(
-    los_to_nlos_rate=0.5, nlos_to_los_rate=2.0, nlos_large_share=0.2, white_std=0.2
+    los_to_nlos_rate=0.5,
+    nlos_to_los_rate=2.0,
+    nlos_large_share=0.2,
+    nlos_bias_length=10.0,
+    white_std=0.2,
 )
 """Published sets of ranges in buildings have an excess of 0.23 +- 0.38 m, 17 % beyond 0.5 m; these
 numbers make it 0.20 +- 0.35 m and 13 %. Groups in the plane, with fewer ranges to spare, would take
