@@ -20,6 +20,7 @@ from tracking.estimate import Status, TeamEstimate
 from tracking.filters import DEFAULT_FILTER
 from tracking.findings import Finding, examine, find_refused, find_unplaced, refuse_errors
 from tracking.horizon import HorizonParams
+from tracking.integrity import protection_radius
 from tracking.log import Log, read_log
 from tracking.measurements import MeasurementBlock
 from tracking.metrics import Score, score
@@ -96,6 +97,7 @@ class TrackResult:
             "ok_share": s.ok_share,
             "integrity_share": s.integrity_share,
             "integrity_worst_s": s.integrity_worst_s,
+            "protection_share": s.protection_share,
             "findings": [f.record for f in self.findings],
             "rejected": self.n_rejected,
             "skipped": sum(self.log.skipped.values()),
@@ -239,16 +241,18 @@ def estimates_csv(estimate: TeamEstimate) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(
-        ["t_s", "node_i", "node_j", "x", "y", "z", "vx", "vy", "vz", "sx", "sy", "sz", "status"]
-    )
-    std = estimate.pos_std
+        ["t_s", "node_i", "node_j", "x", "y", "z", "vx", "vy", "vz", "sx", "sy", "sz",
+         "protection", "status"]
+    )  # fmt: skip
+    std, radius = estimate.pos_std, protection_radius(estimate)
     for k, t in enumerate(estimate.t):
         for p, (i, j) in enumerate(ids):
             status = Status(int(estimate.status[k, p]))
             if status in (Status.ABSENT, Status.STARTING):
                 continue
             numbers = (*estimate.pos_ij_w[k, p], *estimate.vel_ij_w[k, p], *std[k, p])
-            row = [f"{t:.6f}", i, j, *(f"{v:.5f}" for v in numbers), status.name.lower()]
+            within = f"{radius[k, p]:.5f}" if np.isfinite(radius[k, p]) else ""
+            row = [f"{t:.6f}", i, j, *(f"{v:.5f}" for v in numbers), within, status.name.lower()]
             writer.writerow(row)
     return text.getvalue()
 

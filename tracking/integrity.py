@@ -1,4 +1,4 @@
-"""Integrity: how long a pair is reported OK and is wrong by more than its covariance allows.
+"""Integrity: how far an OK pair may be off, and how long it is wrong.
 
 A position error e is *wrong while OK* where the pair's status is OK, ``|e|`` exceeds `LIMIT` and
 ``|e|`` exceeds `SIGMAS` standard deviations along e, ``sqrt(e^T P e) / |e|``. The whole run counts,
@@ -11,11 +11,32 @@ import numpy as np
 
 from tracking.arrays import F64, Bool
 from tracking.estimate import TeamEstimate
+from tracking.vehicles import VEHICLES
 
 LIMIT = 0.3
 """[m] Smaller errors do no harm."""
 SIGMAS = 3.0
 """[-] Standard deviations along the error."""
+
+
+def protection_radius(estimate: TeamEstimate) -> F64:
+    """Return how far a pair that is OK may be off.
+
+    Args:
+        estimate: Arrays over (..., pair), of `joint` with the vehicles of `VEHICLES`.
+
+    Returns:
+        Radius about the estimated relative position, (..., pair) [m]: the expected error times
+        `VehicleParams.protection`; infinite where the pair is not OK.
+    """
+    constellation = estimate.constellation
+    of_node = np.array(
+        [0.0 if n.kind == "static" else VEHICLES[n.vehicle].protection for n in constellation.nodes]
+    )
+    d = constellation.dimensions
+    expected = np.sqrt(np.trace(estimate.cov[..., :d, :d], axis1=-2, axis2=-1))
+    radius = of_node[constellation.pairs].max(axis=1) * expected
+    return np.asarray(np.where(estimate.ok, radius, np.inf))
 
 
 def wrong_while_ok(estimate: TeamEstimate, truth_ij_w: F64) -> Bool:
@@ -31,6 +52,22 @@ def wrong_while_ok(estimate: TeamEstimate, truth_ij_w: F64) -> Bool:
     along = np.einsum("...i,...ij,...j->...", e, estimate.cov[..., :d, :d], e)
     std = np.sqrt(np.maximum(along, 0.0)) / np.maximum(error, 1e-12)
     return np.asarray(estimate.ok & (error > LIMIT) & (error > SIGMAS * std))
+
+
+def beyond_protection(estimate: TeamEstimate, truth_ij_w: F64, judged: Bool) -> float | None:
+    """Return the share of OK positions that are off by more than their protection radius.
+
+    Args:
+        estimate: Of one run, arrays over (time, pair).
+        truth_ij_w: True relative positions in the frame of the estimate, (time, pair, 3) [m].
+        judged: Where they are known, (time, pair).
+    """
+    d = estimate.constellation.dimensions
+    counted = judged & estimate.ok
+    if not counted.any():
+        return None
+    error = np.linalg.norm((estimate.pos_ij_w - truth_ij_w)[..., :d], axis=-1)
+    return float(np.mean((error > protection_radius(estimate))[counted]))
 
 
 def longest(t: F64, flags: Bool) -> float:

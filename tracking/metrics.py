@@ -11,6 +11,8 @@ Relative positions are scored in the world frame over the pairs with at least on
 - ``nees``: mean of e^T P^-1 e over the position errors e after that yaw, per dimension: 1 where
   the covariance P is right, larger where the filter is too sure [1]. P is meant in the frame of
   the filter's own north, which no measurement can compare with another.
+- ``protection_share``: share of what is OK that is off by more than its protection radius, after
+  that yaw.
 - ``integrity_share`` and ``integrity_worst_s``: how long pairs are OK and wrong, after that yaw and
   over the whole run (`tracking.integrity`).
 
@@ -29,7 +31,7 @@ from tracking.arrays import F64, Bool
 from tracking.consistency import pair_nees
 from tracking.estimate import Status, TeamEstimate
 from tracking.geometry import best_rotation
-from tracking.integrity import longest, wrong_while_ok
+from tracking.integrity import beyond_protection, longest, wrong_while_ok
 from tracking.short_repr import short_repr
 
 
@@ -69,6 +71,9 @@ class Score:
     wrong. None where nothing could be scored."""
     integrity_worst_s: float | None
     """[s] Longest time in one go that a pair was so."""
+    protection_share: float | None
+    """[-] Share of the relative positions with truth that were ok and off by more than their
+    protection radius, of those that were ok. None where none was."""
 
 
 def score(estimate: TeamEstimate, truth_ij_w: F64, has_truth: Bool, skip_until: float) -> Score:
@@ -94,7 +99,9 @@ def score(estimate: TeamEstimate, truth_ij_w: F64, has_truth: Bool, skip_until: 
     n_pairs = constellation.n_pairs
     if not scored.any():
         nothing = np.full(n_pairs, np.nan)
-        return Score(*(None,) * 6, nothing, nothing, nothing, 0, coverage, ok_share, None, None)
+        return Score(
+            *(None,) * 6, nothing, nothing, nothing, 0, coverage, ok_share, None, None, None
+        )
     x = np.where(scored[..., None], x, 0.0)
     truth = np.where(scored[..., None], truth, 0.0)
     if planar:
@@ -134,6 +141,7 @@ def score(estimate: TeamEstimate, truth_ij_w: F64, has_truth: Bool, skip_until: 
         ok_share=ok_share,
         integrity_share=float(wrong.sum() / judged.sum()),
         integrity_worst_s=longest(estimate.t, wrong),
+        protection_share=beyond_protection(estimate, turned, judged),
     )
 
 

@@ -68,6 +68,9 @@ class VehicleParams:
     accuracy: float = 0.5
     """[m] A pair is OK while the position error that it expects, as a root mean square over all
     directions, is at most this; of two vehicles the larger."""
+    protection: float = 13.0
+    """[-] Protection radius of an OK pair over its expected error; of two vehicles the larger. It
+    was set so that fewer than 1 of 1000 OK samples of simulated runs are off by more."""
     rests: bool = True
     """It stands still now and then, and its IMU shows it."""
     propagation_period: float = 0.02
@@ -107,6 +110,7 @@ VEHICLES = {
         first_heading_std=0.1,
         sideways_std=0.08,
         accuracy=0.3,
+        protection=5.0,
         ahead=0.15,
         ahead_std=0.15,
         slip=0.01,
@@ -115,6 +119,7 @@ VEHICLES = {
         propagation_period=0.05,
     ),
     "robot": VehicleParams(
+        protection=5.0,
         accel_psd=0.07,
         bias_std=0.1,
         bias_tau=30.0,
@@ -124,6 +129,7 @@ VEHICLES = {
     ),
     # Limbs: larger slow errors are measured, but a filter that may move them also makes them up.
     "human": VehicleParams(
+        protection=5.0,
         accel_psd=0.1,
         bias_std=0.03,
         bias_tau=5.0,
@@ -132,7 +138,7 @@ VEHICLES = {
         heading_std=0.02,
         heading_tau=30.0,
     ),
-    "hand": replace(_TURNED, pair_accel_psd=0.25),
+    "hand": replace(_TURNED, pair_accel_psd=0.25, protection=8.0),
     "drone": replace(_TURNED, accel_psd=0.1, speed_std=10.0, rests=False),
     "none": replace(_TURNED, accel_psd=0.1, speed_std=10.0, rests=False),
 }

@@ -43,7 +43,7 @@ def test_track_writes_results_and_json(recording, tmp_path):
     assert "http" not in page.replace("http-equiv", "")
     tables = sorted(out.rglob("estimates.csv"))
     assert len(tables) == 2
-    header = "t_s,node_i,node_j,x,y,z,vx,vy,vz,sx,sy,sz,status"
+    header = "t_s,node_i,node_j,x,y,z,vx,vy,vz,sx,sy,sz,protection,status"
     assert tables[0].read_text().splitlines()[0] == header
 
 

@@ -5,8 +5,14 @@ import pytest
 
 from tracking import Constellation, NodeConfig, Status, TeamEstimate
 from tracking.consistency import pair_nees
-from tracking.integrity import longest, wrong_while_ok
+from tracking.integrity import (
+    beyond_protection,
+    longest,
+    protection_radius,
+    wrong_while_ok,
+)
 from tracking.metrics import score
+from tracking.vehicles import VEHICLES
 
 GROUP = Constellation(nodes=tuple(NodeConfig(id=k) for k in range(3)), dimensions=2)
 T = np.arange(0.0, 10.0, 0.5)
@@ -45,6 +51,20 @@ def test_the_standard_deviation_counts_along_the_error():
     e.pos_ij_w[:, 0, 0] += 1.0
     e.pos_ij_w[:, 1, 1] += 1.0
     assert wrong_while_ok(e, truth)[0].tolist() == [False, True, False]
+
+
+def test_the_protection_radius_is_the_expected_error_times_that_of_the_vehicle():
+    e, truth = estimate(0.1)
+    d = e.constellation.dimensions
+    expected = VEHICLES["none"].protection * 0.1 * np.sqrt(d)
+    np.testing.assert_allclose(protection_radius(e), expected)
+    everything = np.ones(e.status.shape, dtype=bool)
+    assert beyond_protection(e, truth, everything) == 0.0
+    e.pos_ij_w[:3, 0, 0] += 1.01 * expected
+    assert beyond_protection(e, truth, everything) == pytest.approx(3 / e.status.size)
+    e.status[:] = Status.LOST
+    assert np.isinf(protection_radius(e)).all()
+    assert beyond_protection(e, truth, everything) is None
 
 
 def test_the_longest_stretch_is_that_of_one_pair():
