@@ -1,7 +1,7 @@
 """How a drive begins: all is well, the cars are armed, and they find out where the others are.
 
 While they stand, ranges leave open how the group is turned or mirrored. So at first every car
-wriggles within a hand's breadth or two of its place, each in its own rhythm, until the trackers
+wriggles within 0.4 m of its place (three cars), each in its own rhythm, until the trackers
 are sure; only then is it asked for anything. Every car ends where it began, and pointing as it
 did: what somebody has put down in a formation is still one, and not turned towards a wall.
 """
