@@ -49,7 +49,7 @@ wheel: $(VENV)/.dev
 	  tar c --exclude=__pycache__ --exclude=__compiled__ tracking relpos_env agents hardware_bridge \
 	    | tar x -C build/kernels/$$level; \
 	  (cd build/kernels/$$level && env -u NUMBA_CACHE_DIR NUMBA_CPU_NAME=$$level NUMBA_CPU_FEATURES= \
-	    PYTHONPATH=. $(abspath $(BIN))/python -m agents.cli warmup $(WARM)) || exit 1; \
+	    PYTHONPATH=. $(abspath $(BIN))/python -m agents.cli.main warmup $(WARM)) || exit 1; \
 	done
 	RELPOS_KERNELS=build/kernels $(PIP) wheel --no-deps --no-build-isolation --wheel-dir dist .
 

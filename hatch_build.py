@@ -14,7 +14,7 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 CACHE, SHIPPED = "__pycache__", "__compiled__"
-"""Where numba keeps code, and where `tracking.compile_units` finds what a package brings along."""
+"""Where numba keeps code, and where `tracking.kernels.compile_units` finds shipped code."""
 
 
 class KernelHook(BuildHookInterface):  # type: ignore[misc]

@@ -11,9 +11,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from agents.report.page import png
-from agents.report.train_report import curves
-from agents.train.run_folder import LOG, RunFolder
+from agents.reports.page import png
+from agents.reports.train_report import curves
+from agents.training.run_folder import LOG, RunFolder
 
 DOCS = Path(__file__).resolve().parent
 ROWS, PICTURE = DOCS / "learning-curves.jsonl", DOCS / "images" / "learning-curves.png"

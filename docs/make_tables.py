@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from agents.settings import leaves
-from agents.train.config import TrainConfig
+from agents.training.config import TrainConfig
 from hardware_bridge.decoders import DECODERS
 from hardware_bridge.drivers import DRIVERS
 from hardware_bridge.safety.params import SafetyParams

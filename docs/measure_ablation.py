@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 import space_runs
 
-from agents.simulate import simulate
+from agents.simulation.simulate import simulate
 from tracking import Tracker, TrackerParams
 from tracking.arrays import F64
 from tracking.filters.joint.params import JointParams
@@ -30,7 +30,7 @@ from tracking.filters.params import FilterParams
 from tracking.geometry import quat_from_yaw, rotate
 from tracking.log import read_log
 from tracking.measurements import Kind
-from tracking.metrics import score
+from tracking.metrics.score import score
 
 NEVER, ALWAYS = 1e9, 1e-9
 FIRST = 7000

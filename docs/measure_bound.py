@@ -2,8 +2,8 @@
 
 Places are relative positions. Whoever drives by what the tracker measures cannot put another car
 nearer to its place than the spread of where it may be: formation errors are bounded by the
-posterior Cramer-Rao bound of the relative positions (`tracking.bounds`), along the drives that
-are measured, in the task that the policy was trained for. That is a root mean square; the mean
+posterior Cramer-Rao bound of the relative positions (`tracking.metrics.bound`), along the drives
+that are measured, in the task that the policy was trained for. That is a root mean square; the mean
 length of a Gaussian is at least sqrt(2 / pi) of it, where it lies on a line. What beams tell of
 walls is not in it.
 
@@ -18,11 +18,11 @@ import sys
 
 import numpy as np
 
-from agents.policy import Layout, load_policy
+from agents.policies import Layout, load_policy
 from relpos_env import formation_v0
-from relpos_env.matched import matched_params
+from relpos_env.core.oracle_params import matched_params
 from relpos_env.timing import DECISION
-from tracking.bounds import posterior_bound
+from tracking.metrics.bound import posterior_bound
 
 SCENARIO, N_CARS = "cars-nlos", 3
 SECONDS, SETTLE = 60.0, 10.0

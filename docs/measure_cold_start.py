@@ -3,7 +3,8 @@
 Cars stand for two seconds and then drive. A start is judged three seconds later, over all pairs:
 the error in the world frame, and that after the best rotation, which magnetic north has no share
 in. Beside both stands the posterior Cramer-Rao bound of the same drive at the same moment
-(`tracking.bounds`), with the errors that headings have here at first (`relpos_env.matched`).
+(`tracking.metrics.bound`), with the errors that headings have here at first
+(`relpos_env.core.oracle_params`).
 
 Run `python docs/measure_cold_start.py [SCENARIO] [FIRST SEED] [DRIVES] [JOBS] [FILE]`; some tenths
 of a second a drive, and writes a line of JSON for each into the file.
@@ -18,15 +19,15 @@ from pathlib import Path
 
 import numpy as np
 
-from agents.engines.local import local
-from agents.simulate import simulate
-from relpos_env.matched import matched_params
+from agents.jobs.local import local
+from agents.simulation.simulate import simulate
+from relpos_env.core.oracle_params import matched_params
 from relpos_env.scenarios import recordable
 from relpos_env.timing import STAND_STILL
 from tracking import Tracker
-from tracking.bounds import posterior_bound
 from tracking.estimate import Status
 from tracking.geometry import best_rotation
+from tracking.metrics.bound import posterior_bound
 
 JUDGED = STAND_STILL + 3.0
 """[s] Since the start of the recording."""

@@ -1,8 +1,9 @@
 """How wrong the joint filter believes itself to be, beside how wrong it is, for `docs/tracker.md`.
 
-NEES and NIS of `joint` with the parameters of the simulated world (`relpos_env.matched`), means
-over drives: 1 where errors are as large as the covariance says, more where it is too sure. The
-second case turns the magnetometer of one car by an angle that the filter knows nothing of.
+NEES and NIS of `joint` with the parameters of the simulated world
+(`relpos_env.core.oracle_params`), means over drives: 1 where errors are as large as the
+covariance says, more where it is too sure. The second case turns the magnetometer of one car by
+an angle that the filter knows nothing of.
 
 Run `python docs/measure_consistency.py [SCENARIO] [FIRST SEED] [DRIVES] [JOBS] [DEGREES]`; some
 tenths of a second a drive of 40 s.
@@ -15,14 +16,14 @@ import sys
 
 import numpy as np
 
-from agents.engines.local import local
-from agents.simulate import simulate
-from relpos_env.matched import matched_params
+from agents.jobs.local import local
+from agents.simulation.simulate import simulate
+from relpos_env.core.oracle_params import matched_params
 from relpos_env.scenarios import recordable
 from tracking import Tracker, TrackerParams
 from tracking.filters import FilterParams
 from tracking.measurements import Kind
-from tracking.metrics import score
+from tracking.metrics.score import score
 
 SECONDS, SKIP = 40.0, 10.0
 """[s] Of a drive, and of it before errors count."""

@@ -11,9 +11,9 @@ import numpy as np
 from gymnasium.utils import seeding
 
 from agents.controllers import CONTROLLERS
-from agents.demo import SETTLE
+from agents.simulation.demo import SETTLE
 from relpos_env.config import configure
-from relpos_env.formation import Formation
+from relpos_env.core.env_core import Formation
 from relpos_env.timing import DECISION
 
 SEEDS = range(16)

@@ -204,7 +204,7 @@ def virtual(seconds: float, cars: int, scenario: str) -> None:
     sys.path[:0] = [str(TESTS), str(ROOT)]
     from virtual_drive import VirtualDrive
 
-    from agents.emulate import EmulateOptions
+    from agents.hardware.emulate import EmulateOptions
 
     options = EmulateOptions(scenario=scenario, cars=cars, seed=3, seconds=seconds + START)
     drive = VirtualDrive(options).start()

@@ -17,13 +17,13 @@ import numpy as np
 from measure_ablation import data, recording
 
 from agents.convert import convert
-from agents.track import track_log
+from agents.evaluation.track import track_log
 from tracking.arrays import F64
 from tracking.estimate import Status, TeamEstimate
 from tracking.log import Log
 from tracking.maths.mds import classical_mds
 from tracking.measurements import Kind
-from tracking.metrics import Score, score
+from tracking.metrics.score import Score, score
 
 FILE = Path(__file__).with_name("mds-results.jsonl")
 SKIP = 10.0

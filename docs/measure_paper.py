@@ -14,12 +14,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from agents.evaluate.suites import PAPER
+from agents.evaluation.suites import PAPER
 from tracking import Tracker, TrackerParams
 from tracking.filters import FilterParams
 from tracking.filters.paper import PaperParams
 from tracking.log import Log
-from tracking.metrics import Score, score
+from tracking.metrics.score import Score, score
 
 FIGURES = ("rmse_yaw", "rmse_shape", "rmse_mirror", "integrity_share")
 READINGS: dict[str, tuple[str, dict[str, object], bool]] = {

@@ -15,7 +15,7 @@ import numpy as np
 from measure_ablation import Case, case
 
 from tracking import Tracker
-from tracking.integrity import beyond_protection
+from tracking.metrics.integrity import beyond_protection
 
 KINDS = ("cars-los", "cars-nlos", "human", "hand", "drones")
 PER_RUN = 10

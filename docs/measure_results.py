@@ -14,9 +14,9 @@ from typing import Any
 
 from measure_ablation import RECORDINGS, recording
 
-from agents.track import track_log
-from tracking.bounds import recorded_bound
+from agents.evaluation.track import track_log
 from tracking.findings import examine
+from tracking.metrics.bound import recorded_bound
 
 FILE = Path(__file__).with_name("tracker-results.jsonl")
 SUITE = (

@@ -19,10 +19,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from agents.track import track_log
+from agents.evaluation.track import track_log
 from tests.second_world.record import matched, record
 from tests.second_world.world import draw
-from tracking.bounds import posterior_bound
+from tracking.metrics.bound import posterior_bound
 from tracking.vehicles import VEHICLES
 
 OUT = Path(__file__).parent / "second-world.jsonl"

@@ -19,7 +19,7 @@ from tracking import Tracker, TrackerParams
 from tracking.filters import FilterParams
 from tracking.filters.joint.params import JointParams
 from tracking.geometry import quat_from_yaw, rotate
-from tracking.metrics import score
+from tracking.metrics.score import score
 
 SKIP, SETTLED = 10.0, 30.0
 """[s] Not scored; from where on a run is scored once more."""

@@ -18,7 +18,7 @@ import numpy as np
 from tracking import Tracker
 from tracking.geometry import quat_from_yaw, rotate
 from tracking.log import Log, read_log
-from tracking.metrics import score
+from tracking.metrics.score import score
 
 SECONDS, SKIP = 30.0, 10.0
 """[s] Length of what is tracked; not scored."""

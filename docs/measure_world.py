@@ -1,4 +1,4 @@
-"""What the simulated world does that no parameter of it says, for `relpos_env/matched.py`.
+"""Measure the simulated motion that no parameter states, for `relpos_env.core.oracle_params`.
 
 How often a pair of cars loses sight of each other and gets it back, the scatter of power gaps, and
 how fast rear axles slip beyond what the filter foresees. Slip lasts, and the filter takes what it
@@ -15,7 +15,7 @@ import sys
 
 import numpy as np
 
-from agents.simulate import simulate
+from agents.simulation.simulate import simulate
 from tracking.geometry import yaw_of
 from tracking.log.folder import Log
 from tracking.measurements import Kind

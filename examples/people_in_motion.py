@@ -9,11 +9,11 @@ import sys
 
 import numpy as np
 
-from relpos_env.body.clips import find_recordings, load_clips
-from relpos_env.body.exercises import EXERCISES
-from relpos_env.body.motion import SITES, BodyMotion
-from relpos_env.body.procedural import procedural_body
-from relpos_env.body.recorded import recorded_body
+from relpos_env.people.clips import find_recordings, load_clips
+from relpos_env.people.exercises import EXERCISES
+from relpos_env.people.motion import SITES, BodyMotion
+from relpos_env.people.procedural import procedural_body
+from relpos_env.people.recorded import recorded_body
 from relpos_env.sensors.radio._occlusion_kernels import crosses_capsule
 from relpos_env.sensors.radio._path_kernels import SKIN
 

@@ -1,7 +1,7 @@
 """Record a short simulated drive, track the recording, and look at the result."""
 
-from agents.simulate import simulate
-from agents.track import track_log
+from agents.evaluation.track import track_log
+from agents.simulation.simulate import simulate
 
 log = simulate(scenario="cars-los", seconds=30, seed=1)
 result = track_log(log)

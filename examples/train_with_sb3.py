@@ -6,7 +6,7 @@ Needs Stable-Baselines3: ``pip install "relpos-env[train]"``.
 import numpy as np
 from stable_baselines3 import PPO
 
-from relpos_env.sb3_vec_env import FormationVecEnv
+from relpos_env.api.sb3_vec_env import FormationVecEnv
 
 envs = FormationVecEnv(n_envs=4, observation="estimate_cov", max_cycles=100)
 model = PPO("MlpPolicy", envs, n_steps=32, batch_size=64, n_epochs=2, seed=0, device="cpu")

@@ -4,8 +4,8 @@ import heapq
 from itertools import count
 
 from tracking.ranging import RangeEvent, Reception, Session, SessionParams, Transmission
-from tracking.ranging.airtime import PAPER_PHY, airtime
-from tracking.ranging.timestamps import MODULUS, SPEED_OF_LIGHT, TICK_HZ, unwrap
+from tracking.ranging.frames.airtime import PAPER_PHY, airtime
+from tracking.ranging.frames.timestamps import MODULUS, SPEED_OF_LIGHT, TICK_HZ, unwrap
 
 DISTANCE = 7.5  # m
 SECONDS = 2.0

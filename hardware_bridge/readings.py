@@ -2,7 +2,7 @@
 
 Decoders make readings of bytes, the emulator makes bytes of readings. A reading holds what the
 device itself said: its own name for itself and others, its own clock. Names become nodes and
-clocks become the host's in `hardware_bridge.live.intake`.
+clocks become the host's in `hardware_bridge.ingest.intake`.
 """
 
 from __future__ import annotations

@@ -2,9 +2,10 @@
 
 Importing this package registers ``relpos_env/Formation-v0`` with Gymnasium and
 ``relpos_env/formation-v0`` with PettingZoo. `relpos_env.formation_v0.parallel_env` is the
-environment of the latter; `relpos_env.sim` is the simulation without any interface around it.
+environment of the latter; `relpos_env.simulation.simulation` is the simulation without any
+interface around it.
 """
 
-from relpos_env.registration import register_environments
+from relpos_env.api.registration import register_environments
 
 register_environments()

@@ -9,18 +9,18 @@ from typing import Any, get_args
 
 import numpy as np
 
+from relpos_env.core.tracked_world import default_params
 from relpos_env.errors import EnvError, UnknownArgument
 from relpos_env.interface.actions import ActionMode, action_mode
 from relpos_env.interface.beams import MOST_BEAMS
 from relpos_env.interface.observations import ModeBuilder, ObservationMode, observation_mode
-from relpos_env.loop import default_params
 from relpos_env.registry import look_up
 from relpos_env.scenarios import Scenario
 from relpos_env.scenarios import scenario as find_scenario
 from relpos_env.sensors.operator import OperatorSimParams
-from relpos_env.swarm import Physics
 from relpos_env.tasks import Task, TaskBuilder, make_task, reward_weights, task_builder
 from relpos_env.tasks.needs import DEFAULT_SCENARIO, needs_of
+from relpos_env.world.world import Physics
 from tracking.arrays import F64
 from tracking.errors import ConfigError
 from tracking.filters import DEFAULT_FILTER, FilterBuilder, filter_builder
@@ -39,7 +39,7 @@ KINDS: dict[str, tuple[type, ...]] = {
 
 
 RewardTerm = Callable[[Any], F64]
-"""Takes the `relpos_env.formation.Formation` after a step."""
+"""Takes the `relpos_env.core.env_core.Formation` after a step."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,14 +70,14 @@ class FormationConfig:
     filter: str | FilterBuilder = DEFAULT_FILTER
     """Position filter of the trackers, one of `tracking.filters.FILTERS`, or of your own."""
     params: TrackerParams | None = None
-    """What the trackers believe; by default `relpos_env.loop.default_params`."""
+    """What the trackers believe; by default `relpos_env.core.tracked_world.default_params`."""
     operator: OperatorSimParams = field(default_factory=OperatorSimParams)
     """The operator who tells the group where to go."""
     weights: Mapping[str, float] | None = None
     """Weights of reward terms that differ from `relpos_env.tasks.DEFAULT_WEIGHTS`."""
     physics: Physics | None = None
-    """``pymunk``: a space that is kept for the episode, see `relpos_env.world`; ``fast``: the same
-    motion while nothing touches, for batches. By default ``pymunk`` in the PettingZoo and
+    """``pymunk``: a space that is kept for the episode, see `world.pymunk_space`; ``fast``: the
+    same motion while nothing touches, for batches. By default ``pymunk`` in the PettingZoo and
     Gymnasium environments, ``fast`` in the vector forms."""
     reward: str | RewardTerm | None = None
     """A reward term of your own, ``(formation) -> (env, car)``, which is added to the others; infos

@@ -12,7 +12,7 @@ from pettingzoo import AECEnv
 from pettingzoo.utils import OrderEnforcingWrapper
 from pettingzoo.utils.conversions import parallel_to_aec
 
-from relpos_env.parallel_env import FormationEnv
+from relpos_env.api.parallel_env import FormationEnv
 
 parallel_env = FormationEnv
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from functools import partial
 
 from relpos_env.errors import EnvError
-from tracking.registry import look_up as find
+from tracking.params.registry import look_up as find
 
 look_up = partial(find, raises=EnvError)
-"""`tracking.registry.look_up`; its errors are `EnvError`."""
+"""`tracking.params.registry.look_up`; its errors are `EnvError`."""
 
 
 def name_of(thing: object) -> str:

@@ -7,7 +7,7 @@ import traceback
 from dataclasses import dataclass
 from unittest import mock
 
-from agents.cli import main
+from agents.cli.main import main
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Done:
 
 
 def relpos(*args, cwd="."):
-    """Run ``relpos ARGS`` in a folder, as `agents.cli.main` of a process of its own would."""
+    """Run ``relpos ARGS`` in a folder, as `agents.cli.main.main` of a process of its own would."""
     out, err, code = io.StringIO(), io.StringIO(), 0
     with (
         mock.patch.object(sys, "argv", ["relpos", *map(str, args)]),

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from agents.emulate import EmulatedRig, EmulateOptions
-from agents.emulate.rig import STEP_NS
-from agents.live.history import History
+from agents.hardware.emulate import EmulatedRig, EmulateOptions
+from agents.hardware.emulate.rig import STEP_NS
+from agents.hardware.live.history import History
 from hardware_bridge.config import read_config
 from hardware_bridge.drivers import make_driver
 from hardware_bridge.emulator.ports import MemoryPort
@@ -97,7 +97,7 @@ def run_live(
     record_truth: bool = False,
     edit=lambda text: text,
 ) -> LiveRun:
-    """Track an emulation by hand, decision by decision, as `agents.live.live` does."""
+    """Track an emulation by hand, decision by decision, as `agents.hardware.live.live` does."""
     (folder / "e").mkdir(parents=True)
     rig = EmulatedRig(options, folder / "e", ports=lambda name: MemoryPort(), record=record_truth)
     file = folder / "e" / "swarm.toml"

@@ -1,5 +1,5 @@
-"""What `tracking.compile_units` uses of numba that is not public: the first test to look at when a
-new numba breaks the others. Each name says what it is for."""
+"""What `tracking.kernels.compile_units` uses of numba that is not public: the first test to look
+at when a new numba breaks the others. Each name says what it is for."""
 
 import inspect
 

@@ -25,7 +25,7 @@ HEAVY = (
 
 
 @pytest.mark.parametrize(
-    "module", ["tracking", "relpos_env", "relpos_env.formation_v0", "agents", "agents.cli",
+    "module", ["tracking", "relpos_env", "relpos_env.formation_v0", "agents", "agents.cli.main",
                "hardware_bridge"]
 )  # fmt: skip
 def test_imports_nothing_heavy(module):

@@ -11,13 +11,13 @@ from pathlib import Path
 import pytest
 from numba import config
 
-from tracking.processors import LEVELS, fitting_levels, has_wide_registers
+from tracking.kernels.processors import LEVELS, fitting_levels, has_wide_registers
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
 ROOT = Path(__file__).resolve().parent.parent
 MODULE = """
 from tracking import compile_units
-from tracking.jit import kernel
+from tracking.kernels.jit import kernel
 
 @kernel
 def inner(x):

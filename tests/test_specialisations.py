@@ -13,10 +13,10 @@ import pytest
 from numba import config
 
 from relpos_env import formation_v0
-from relpos_env.vector_env import FormationVectorEnv
+from relpos_env.api.vector_env import FormationVectorEnv
 from tracking import Constellation, NodeConfig, Tracker
-from tracking.compile_units import units_of
 from tracking.filters import FILTERS
+from tracking.kernels.compile_units import units_of
 from tracking.measurements import Kind, MeasurementBlock
 
 OF_TWO_FILTERS = {"tracking.filters.first_ranges", "tracking.filters.best_hypothesis"}

@@ -12,7 +12,7 @@ from tracking.arrays import F64, I64, Bool
 from tracking.constellation import Constellation
 from tracking.errors import ConfigError
 from tracking.geometry import quat_conjugate, quat_multiply, quat_to_matrix
-from tracking.short_repr import short_repr
+from tracking.params.short_repr import short_repr
 
 
 class Status(IntEnum):

@@ -15,7 +15,7 @@ import numpy as np
 
 from tracking.arrays import F64, I64, Bool
 from tracking.errors import ConfigError
-from tracking.short_repr import short_repr
+from tracking.params.short_repr import short_repr
 
 N_VALUES = 16
 """Columns of `MeasurementBlock.values`."""

@@ -23,8 +23,8 @@ from tracking.estimate import TeamEstimate
 from tracking.filters import DEFAULT_FILTER, FilterBuilder, filter_builder
 from tracking.filters.joint import JointEkf
 from tracking.filters.params import FilterParams
-from tracking.horizon import HorizonParams
-from tracking.jit import Call
+from tracking.kernels.jit import Call
+from tracking.late_data.horizon import HorizonParams
 from tracking.measurements import MeasurementBlock
 from tracking.sanity.blocks import check, usable, usable_call
 

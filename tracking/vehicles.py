@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from tracking.numbers import check_numbers
+from tracking.params.checks import check_numbers
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

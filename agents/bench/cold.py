@@ -23,12 +23,12 @@ SOURCE = Path(__file__).resolve().parents[2]
 """What is installed where it is a source tree."""
 COMMANDS = {
     "import relpos_env": "-c 'import relpos_env'",
-    "relpos --help": "-m agents.cli --help",
-    "compile for track": "-m agents.cli warmup --json",
-    "compile for env": "-m agents.cli warmup --for env",
-    "simulate a log": "-m agents.cli simulate log{n} --seconds 30",
-    "relpos track LOG, compiled": "-m agents.cli track log1",
-    "relpos demo, compiled for env": "-m agents.cli demo --out demo",
+    "relpos --help": "-m agents.cli.main --help",
+    "compile for track": "-m agents.cli.main warmup --json",
+    "compile for env": "-m agents.cli.main warmup --for env",
+    "simulate a log": "-m agents.cli.main simulate log{n} --seconds 30",
+    "relpos track LOG, compiled": "-m agents.cli.main track log1",
+    "relpos demo, compiled for env": "-m agents.cli.main demo --out demo",
 }
 """Commands of Python by what they are."""
 Tell = Callable[[float], None]

@@ -13,7 +13,7 @@ from relpos_env.sensors.radio.air import Air
 from relpos_env.sensors.radio.params import RadioSimParams
 from relpos_env.sensors.radio.radio import Radio
 from tracking.arrays import F64
-from tracking.ranging.airtime import PAPER_PHY, round_rate
+from tracking.ranging.frames.airtime import PAPER_PHY, round_rate
 from tracking.ranging.params import SessionParams
 
 DT = 0.01

@@ -10,7 +10,7 @@ from agents.errors import UsageError
 from relpos_env.interface.observations import OBSERVATIONS, Field, observation_mode, total_size
 from relpos_env.interface.observations.base import F32
 from tracking.arrays import F64, Bool
-from tracking.short_repr import short_repr
+from tracking.params.short_repr import short_repr
 
 TINY = 1e-9
 """Divisions by what may be zero are by this at least."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from agents.controllers.base import Plane
 from tracking.arrays import F64
-from tracking.short_repr import short_repr
+from tracking.params.short_repr import short_repr
 
 
 @dataclass(frozen=True, slots=True)

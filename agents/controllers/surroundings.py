@@ -21,7 +21,7 @@ import numpy as np
 from agents.controllers.base import TINY, Plane, Sight
 from relpos_env.interface.beams import FARTHEST, beam_directions, beam_starts
 from tracking.arrays import F64
-from tracking.short_repr import short_repr
+from tracking.params.short_repr import short_repr
 
 HALF_LENGTH, HALF_WIDTH = 0.21, 0.10
 """[m] Of a car."""

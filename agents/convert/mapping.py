@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from agents.errors import UsageError
 from tracking.log.meta import Meta, read_meta
-from tracking.tables import TableReader, Where
+from tracking.params.tables import TableReader, Where
 
 FOLDER = Path(__file__).parent / "presets"
 PRESETS = tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))

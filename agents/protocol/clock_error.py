@@ -11,8 +11,8 @@ from agents.protocol.group import DT, radio_params
 from relpos_env.sensors.radio.channel import CALIBRATED, EXACT
 from relpos_env.sensors.radio.radio import Radio
 from tracking.arrays import F64
-from tracking.ranging.airtime import PAPER_PHY, message_time
-from tracking.ranging.timestamps import SPEED_OF_LIGHT
+from tracking.ranging.frames.airtime import PAPER_PHY, message_time
+from tracking.ranging.frames.timestamps import SPEED_OF_LIGHT
 
 PPM = (0.0, 5.0, 10.0, 20.0)
 SPEED = 2.0

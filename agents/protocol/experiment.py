@@ -12,8 +12,8 @@ from agents.protocol.clock_error import measure_clock_error
 from agents.protocol.rates import NODES, measure_rates
 from agents.protocol.recovery import MODES, measure_recovery
 from agents.protocol.timeline import Timeline, run_timeline
+from tracking.params.short_repr import short_repr
 from tracking.ranging.members import MAX_MEMBERS
-from tracking.short_repr import short_repr
 
 
 @dataclass(frozen=True, slots=True)

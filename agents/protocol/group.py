@@ -9,9 +9,9 @@ import numpy as np
 from agents.errors import UsageError
 from relpos_env.sensors.radio.air import Air
 from relpos_env.sensors.radio.params import RadioSimParams
-from tracking.ranging.airtime import airtime
+from tracking.ranging.frames.airtime import airtime
+from tracking.ranging.frames.wire import Frame, decode
 from tracking.ranging.params import SessionParams
-from tracking.ranging.wire import Frame, decode
 
 DT = 0.01
 """[s] One window of the air."""

@@ -10,9 +10,9 @@ import numpy as np
 
 from agents.protocol.group import Group, radio_params
 from relpos_env.sensors.radio.channel import EXACT
-from tracking.ranging.airtime import PHYS, round_rate
 from tracking.ranging.exchange import RangeEvent
-from tracking.ranging.wire import Type
+from tracking.ranging.frames.airtime import PHYS, round_rate
+from tracking.ranging.frames.wire import Type
 
 PAPER_HZ = {("110k", 3): 81.83, ("110k", 6): 28.6}
 """Armani and Holz, ICRA 2024."""

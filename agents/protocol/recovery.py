@@ -19,7 +19,7 @@ import numpy as np
 
 from agents.errors import UsageError
 from agents.protocol.group import DT, Group, Heard, radio_params
-from tracking.ranging.wire import Type
+from tracking.ranging.frames.wire import Type
 
 EVENTS = ("responder-join", "responder-leave", "initiator-loss")
 MODES = ("watchdog", "succession")

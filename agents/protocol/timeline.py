@@ -8,8 +8,8 @@ import numpy as np
 
 from agents.protocol.group import Group, radio_params
 from tracking.arrays import F64
-from tracking.ranging.wire import Type
-from tracking.short_repr import short_repr
+from tracking.params.short_repr import short_repr
+from tracking.ranging.frames.wire import Type
 
 SCRIPT = (
     (1.0, "a responder joins", 5, True),

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from agents.errors import UsageError
-from agents.policy.layout import Layout
+from agents.policies.layout import Layout
 from relpos_env.config import configure
 from relpos_env.scenarios import Scenario
 

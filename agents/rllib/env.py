@@ -15,8 +15,8 @@ import numpy as np
 import ray
 from ray.rllib.env.multi_agent_env import MultiAgentEnv
 
-from agents.demo import SETTLE
-from relpos_env.parallel_env import FormationEnv
+from agents.simulation.demo import SETTLE
+from relpos_env.api.parallel_env import FormationEnv
 from relpos_env.timing import DECISION
 
 ALL = "__all__"
@@ -26,7 +26,7 @@ OWN_SEEDS = 1 << 63
 
 
 class FormationMultiAgentEnv(MultiAgentEnv):  # type: ignore[misc]
-    """`relpos_env.parallel_env.FormationEnv` for RLlib; spaces and numbers are the same.
+    """`relpos_env.api.parallel_env.FormationEnv` for RLlib; spaces and numbers are the same.
 
     | a car | in the dicts of a step |
     |---|---|

@@ -11,9 +11,9 @@ import onnx
 from onnx import TensorProto, helper, numpy_helper
 from torch import nn
 
-from agents.policy.card import Card
-from agents.policy.layout import Layout
-from agents.policy.write import write_policy
+from agents.policies.card import Card
+from agents.policies.layout import Layout
+from agents.policies.write import write_policy
 from agents.rllib.module import LIMIT, N_ACTIONS, CarModule
 
 OPSET, IR = 17, 8

@@ -16,7 +16,7 @@ from ray.rllib.core.rl_module.apis.value_function_api import ValueFunctionAPI
 from ray.rllib.core.rl_module.torch import TorchRLModule
 from torch import Tensor, nn
 
-from agents.policy.layout import Layout
+from agents.policies.layout import Layout
 from relpos_env.interface.observations.base import F32
 
 SCALES = {"pos": 2.0, "target": 2.0, "range": 2.0, "std": 0.3, "gap": 10.0}

@@ -20,10 +20,10 @@ from ray.rllib.callbacks.callbacks import RLlibCallback
 from ray.rllib.core.rl_module.multi_rl_module import MultiRLModuleSpec
 from ray.rllib.core.rl_module.rl_module import RLModuleSpec
 
-from agents.engines.ray_engine import cluster
 from agents.errors import UsageError
+from agents.jobs.ray_engine import cluster
 from agents.output import check_folder, check_new, write_results
-from agents.policy.layout import Layout
+from agents.policies.layout import Layout
 from agents.rllib.config import RllibConfig
 from agents.rllib.env import SeededEnv
 from agents.rllib.export import export_module

@@ -18,7 +18,7 @@ from agents.errors import UsageError
 from tracking import Constellation, NodeConfig, Tracker
 from tracking.estimate import TeamEstimate
 from tracking.filters import DEFAULT_FILTER, FILTERS, filter_builder
-from tracking.jit import Call, bind, is_compiled, missing_in, types_of
+from tracking.kernels.jit import Call, bind, is_compiled, missing_in, types_of
 from tracking.measurements import MeasurementBlock
 
 SECONDS = {"env": 38.0, "joint.0": 33.0, "ekf-mds.0": 30.0, "joint.1": 29.0, "joint.2": 18.0,
@@ -190,8 +190,8 @@ def _swarm() -> Any:
 
 
 def _compile_hardware() -> None:
-    from agents.emulate.options import EmulateOptions
-    from agents.emulate.warm_up import warm_up as drive_emulated_cars
+    from agents.hardware.emulate.options import EmulateOptions
+    from agents.hardware.emulate.warm_up import warm_up as drive_emulated_cars
     from hardware_bridge.live.warm_up import warm_up as drive_live
 
     drive_live(_swarm())
@@ -199,7 +199,7 @@ def _compile_hardware() -> None:
 
 
 def _has_world() -> bool:
-    import relpos_env.formation  # noqa: F401
+    import relpos_env.core.env_core  # noqa: F401
 
     driven = ("_step_kernels", "_result_kernels", "interface", "tasks._ring_kernels")
     return not any(missing_in(f"relpos_env.{name}") for name in driven)

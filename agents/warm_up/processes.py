@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from agents.console import progress_bar
+from agents.cli.console import progress_bar
 from agents.errors import UsageError
 from agents.warm_up.parts import Part, parts_of
 from tracking.filters import FILTERS

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from tracking.constellation import Constellation
-from tracking.tables import Where
+from tracking.params.tables import Where
 
 MOST_ID = 65534
 """The largest id of our own wire is that of the host."""

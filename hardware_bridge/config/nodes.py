@@ -10,7 +10,7 @@ from hardware_bridge.config.keys import node_id, tables_of
 from tracking.constellation import Antenna, Constellation, NodeConfig
 from tracking.errors import ConfigError
 from tracking.mount import KEYS, Mount
-from tracking.tables import TableReader, Where
+from tracking.params.tables import TableReader, Where
 
 FARTHEST = 10.0
 """[m] From a node to its antenna."""

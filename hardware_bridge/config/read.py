@@ -21,7 +21,7 @@ from relpos_env.tasks import TASKS, make_task
 from tracking.constellation import Constellation
 from tracking.errors import ConfigError
 from tracking.filters import FILTERS, filter_builder
-from tracking.tables import TableReader, Where
+from tracking.params.tables import TableReader, Where
 
 SECTIONS = (
     "name", "dimensions", "heading", "nodes", "antennas", "links", "cars", "calibration", "task",

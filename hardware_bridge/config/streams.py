@@ -11,12 +11,12 @@ from typing import Any
 from hardware_bridge.config.keys import check_node, node_id, tables_of, without
 from hardware_bridge.config.swarm import CarConfig, LinkConfig
 from hardware_bridge.errors import BridgeError
+from hardware_bridge.ingest.scanner import ScannerMount
 from hardware_bridge.links.ports import PortSpec
-from hardware_bridge.live.scanner import ScannerMount
 from hardware_bridge.readings import ScanReading
 from hardware_bridge.wire.key import parse_key
 from tracking.constellation import Constellation
-from tracking.tables import TableReader, Where
+from tracking.params.tables import TableReader, Where
 
 SLOWEST_WATCHDOG = 2.0
 """[s]"""

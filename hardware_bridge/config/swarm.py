@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+from hardware_bridge.external_tracker.params import ReadyParams
+from hardware_bridge.ingest.scanner import ScannerMount
 from hardware_bridge.links.ports import PortSpec
-from hardware_bridge.live.ready_params import ReadyParams
-from hardware_bridge.live.scanner import ScannerMount
 from hardware_bridge.safety.params import SafetyParams
 from tracking.constellation import Constellation
 from tracking.filters import DEFAULT_FILTER

@@ -22,7 +22,7 @@ from typing import Any
 
 from hardware_bridge.emulator.faults import FaultParams
 from hardware_bridge.errors import BridgeError
-from tracking.tables import TableReader, Where
+from tracking.params.tables import TableReader, Where
 
 NODES, CARS, LINKS = "nodes", "cars", "links"
 FAULT_KINDS: Mapping[str, tuple[str, ...]] = {

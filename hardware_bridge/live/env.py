@@ -9,7 +9,7 @@ from hardware_bridge.live.group import Feed, LiveGroup
 from hardware_bridge.live.swarm import LiveSwarm
 from relpos_env.errors import EnvError
 from relpos_env.interface.actions import action_mode
-from relpos_env.interface.cars_env import CarsEnv
+from relpos_env.interface.base_parallel_env import CarsEnv
 from relpos_env.interface.observations import observation_mode
 
 

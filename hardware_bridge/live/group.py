@@ -42,7 +42,7 @@ class Feed(Protocol):
 
 
 class LiveGroup:
-    """One environment of real cars; see `relpos_env.interface.cars_env.Group`."""
+    """One environment of real cars; see `relpos_env.interface.base_parallel_env.Group`."""
 
     def __init__(
         self,

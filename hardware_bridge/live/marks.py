@@ -14,7 +14,7 @@ from typing import TypeAlias
 
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.identity.verdict import Mark
-from hardware_bridge.live.intake import Intake
+from hardware_bridge.ingest.intake import Intake
 from hardware_bridge.safe_file import write_safely
 
 EVERY_NS = 10_000_000_000

@@ -11,11 +11,11 @@ import numpy as np
 
 from hardware_bridge.config.swarm import SwarmConfig
 from hardware_bridge.errors import BridgeError
+from hardware_bridge.external_tracker.frozen_positions import DRIVES
+from hardware_bridge.external_tracker.perception import ReadyPerception
+from hardware_bridge.ingest.intake import Intake
 from hardware_bridge.links.ports import Chunk
-from hardware_bridge.live.intake import Intake
-from hardware_bridge.live.ready import ReadyPerception
 from hardware_bridge.live.silent_cars import SilentCars
-from hardware_bridge.live.stuck_places import DRIVES
 from hardware_bridge.safety.picture import largest_std
 from relpos_env.interface.perception import FOR_POLICIES, Perception
 from relpos_env.interface.views import View
@@ -23,7 +23,7 @@ from tracking.arrays import F64, I64, Bool
 from tracking.calibration.calibration import Calibration, merge
 from tracking.calibration.file import read_calibration
 from tracking.estimate import TeamEstimate
-from tracking.horizon import HorizonParams
+from tracking.late_data.horizon import HorizonParams
 from tracking.measurements import Kind, MeasurementBlock
 from tracking.tracker import TrackerParams
 

@@ -19,7 +19,7 @@ from hardware_bridge.safety.recent import Recent, at_rest
 from hardware_bridge.safety.rules import RULES
 from hardware_bridge.safety.telemetry import Told, nothing_told
 from tracking.arrays import F64, I64, Bool
-from tracking.short_repr import short_repr
+from tracking.params.short_repr import short_repr
 
 NO_REASON = -1
 NOT_ARMED = -2

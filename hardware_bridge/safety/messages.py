@@ -13,7 +13,7 @@ import numpy as np
 
 from hardware_bridge.safety.picture import Picture
 from tracking.arrays import F64
-from tracking.short_repr import short_repr
+from tracking.params.short_repr import short_repr
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from hardware_bridge.errors import BridgeError
-from hardware_bridge.safety.polygon import area
+from hardware_bridge.safety.geometry.polygon import area
 
 LIMITS = {
     "max_speed": (0.05, 20.0),

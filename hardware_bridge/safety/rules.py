@@ -12,13 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hardware_bridge.safety.approach import REAR, age_of, ahead_of, approach, bearing
-from hardware_bridge.safety.braking import stopping_speed, stopping_way
+from hardware_bridge.safety.geometry.approach import REAR, age_of, ahead_of, approach, bearing
+from hardware_bridge.safety.geometry.braking import stopping_speed, stopping_way
+from hardware_bridge.safety.geometry.polygon import outwards, to_edges
+from hardware_bridge.safety.geometry.turning import gain
 from hardware_bridge.safety.moment import FREE, Moment, Verdict
 from hardware_bridge.safety.params import SafetyParams
 from hardware_bridge.safety.picture import Picture
-from hardware_bridge.safety.polygon import outwards, to_edges
-from hardware_bridge.safety.turning import gain
 from tracking.arrays import F64, Bool
 from tracking.estimate import Status
 

@@ -12,7 +12,7 @@ References:
 
 import numpy as np
 
-from tracking.jit import kernel, small_kernel
+from tracking.kernels.jit import kernel, small_kernel
 
 
 @small_kernel

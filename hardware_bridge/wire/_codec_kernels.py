@@ -11,7 +11,7 @@ References:
 import numpy as np
 
 from hardware_bridge.wire._check_kernels import crc32, siphash
-from tracking.jit import kernel, small_kernel
+from tracking.kernels.jit import kernel, small_kernel
 
 HEADER, MAC, CRC = 16, 8, 4
 VERSION, MOST_FRAME, MOST_CODED, MOST_ROWS = 1, 512, 515, 32

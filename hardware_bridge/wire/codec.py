@@ -19,7 +19,7 @@ from hardware_bridge.wire.layout import (
     MESSAGE_TABLE,
     Records,
 )
-from tracking.short_repr import short_repr
+from tracking.params.short_repr import short_repr
 
 MOST_CODED = MOST_FRAME + 3
 """[bytes] Longest frame when it is stuffed, without the zero that ends it."""

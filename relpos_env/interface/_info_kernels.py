@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from tracking.jit import kernel
+from tracking.kernels.jit import kernel
 
 
 @kernel

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from relpos_env.interface.beams import FARTHEST
-from tracking.jit import kernel, small_kernel
+from tracking.kernels.jit import kernel, small_kernel
 
 FAR, FAST = 20.0, 10.0
 """[m], [m/s] Positions and velocities are cut at these."""

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from tracking.jit import kernel, small_kernel
+from tracking.kernels.jit import kernel, small_kernel
 
 ABSENT, OK = 0, 3
 RANGE = 5

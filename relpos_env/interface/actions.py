@@ -12,7 +12,7 @@ from gymnasium import spaces
 from relpos_env.errors import EnvError
 from relpos_env.registry import look_up
 from tracking.arrays import F64
-from tracking.short_repr import short_repr
+from tracking.params.short_repr import short_repr
 
 MAX_SPEED = 2.0
 """[m/s] Asked of a car at most."""

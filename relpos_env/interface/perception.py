@@ -19,8 +19,8 @@ from tracking.constellation import Constellation
 from tracking.estimate import TeamEstimate
 from tracking.filters import FilterBuilder, FilterParams
 from tracking.filters.joint.params import JointParams
-from tracking.horizon import Horizon
-from tracking.jit import bind
+from tracking.kernels.jit import bind
+from tracking.late_data.horizon import Horizon
 from tracking.measurements import MeasurementBlock
 from tracking.tracker import Tracker, TrackerParams
 

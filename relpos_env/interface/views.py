@@ -11,7 +11,7 @@ from relpos_env.interface._view_kernels import see_estimate, see_truth
 from relpos_env.interface.beams import FARTHEST
 from tracking.arrays import F64, I64, Bool
 from tracking.estimate import TeamEstimate
-from tracking.jit import bind
+from tracking.kernels.jit import bind
 
 
 class View(NamedTuple):

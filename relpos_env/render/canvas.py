@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from relpos_env.render.backend import load_pygame
-from relpos_env.render.dashes import dashed
 from relpos_env.render.layout import Rect
 from relpos_env.render.palette import Colour
+from relpos_env.render.parts.dashes import dashed
 from tracking.arrays import F64
 
 if TYPE_CHECKING:

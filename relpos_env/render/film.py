@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from relpos_env.core.env_core import Formation
 from relpos_env.errors import EnvError
-from relpos_env.formation import Formation
 from relpos_env.render.backend import load_pygame
 from relpos_env.render.renderer import RENDER_MODES, Renderer
 from relpos_env.render.snapshot import LINE_OF_SIGHT, NO_LINE_OF_SIGHT, NO_RANGE, Snapshot

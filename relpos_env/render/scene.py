@@ -8,17 +8,17 @@ import numpy as np
 
 from relpos_env.render import palette
 from relpos_env.render.backend import load_pygame
-from relpos_env.render.boxes import draw_box
 from relpos_env.render.canvas import Canvas
-from relpos_env.render.cars import draw_cars, draw_viewer, write_numbers
-from relpos_env.render.error_plot import draw_errors, write_errors
-from relpos_env.render.floor import draw_floor, write_scale
-from relpos_env.render.formation import draw_formation, draw_plan
-from relpos_env.render.ghosts import draw_ghosts
 from relpos_env.render.layout import Layout, Rect
-from relpos_env.render.legend import draw_legend, entries, write_legend
-from relpos_env.render.lettering import Lettering
-from relpos_env.render.links import draw_links
+from relpos_env.render.parts.boxes import draw_box
+from relpos_env.render.parts.cars import draw_cars, draw_viewer, write_numbers
+from relpos_env.render.parts.error_plot import draw_errors, write_errors
+from relpos_env.render.parts.estimates import draw_ghosts
+from relpos_env.render.parts.floor import draw_floor, write_scale
+from relpos_env.render.parts.formation import draw_formation, draw_plan
+from relpos_env.render.parts.legend import draw_legend, entries, write_legend
+from relpos_env.render.parts.lettering import Lettering
+from relpos_env.render.parts.links import draw_links
 from relpos_env.render.snapshot import Snapshot
 
 if TYPE_CHECKING:

@@ -14,12 +14,12 @@ from relpos_env.errors import EnvError
 from relpos_env.scenarios.base import Scenario
 from relpos_env.scenarios.catalogue import SHIPPED, is_path, load_scenario
 from relpos_env.scenarios.episode import Episode, draw_episode
-from relpos_env.scenarios.gap import Gap
 from relpos_env.scenarios.levels import LEVELS
 from relpos_env.scenarios.life import LifeEvent
-from relpos_env.scenarios.obstacle import Obstacle
 from relpos_env.scenarios.people import HUMAN, HUMAN_MOCAP, HumanScenario
 from relpos_env.scenarios.randomisation import Randomisation
+from relpos_env.scenarios.rooms.gap import Gap
+from relpos_env.scenarios.rooms.obstacle import Obstacle
 
 Entry = TypeVar("Entry")
 

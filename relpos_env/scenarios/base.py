@@ -10,22 +10,22 @@ import numpy as np
 
 from relpos_env.errors import EnvError
 from relpos_env.scenarios.checks import check_scenario, most_that_start
-from relpos_env.scenarios.floor import Area, Floor
-from relpos_env.scenarios.gap import Gap
 from relpos_env.scenarios.layout import Layout, line_poses, ring_poses
 from relpos_env.scenarios.levels import level
-from relpos_env.scenarios.obstacle import Obstacle, boxes_of
 from relpos_env.scenarios.randomisation import Randomisation
+from relpos_env.scenarios.rooms.floor import Area, Floor
+from relpos_env.scenarios.rooms.gap import Gap
+from relpos_env.scenarios.rooms.obstacle import Obstacle, boxes_of
 from relpos_env.sensors.imu import ImuSimParams
 from relpos_env.sensors.magnetometer import MagSimParams
 from relpos_env.sensors.odometer import OdometerSimParams
 from relpos_env.sensors.proximity import ProximitySimParams
 from relpos_env.sensors.radio.params import RadioSimParams
-from relpos_env.vehicle import CarParams
+from relpos_env.world.car import CarParams
 from tracking.arrays import F64
 
 Furnish = Callable[[Any, np.random.Generator], None]
-"""``(relpos_env.world.World, generator)``"""
+"""``(relpos_env.world.pymunk_space.World, generator)``"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -12,13 +12,13 @@ from typing import Any
 from relpos_env.errors import EnvError
 from relpos_env.registry import look_up
 from relpos_env.scenarios.base import Scenario
-from relpos_env.scenarios.floor_plan import read_floor_plan
-from relpos_env.scenarios.gap import Gap
 from relpos_env.scenarios.levels import level
 from relpos_env.scenarios.randomisation import Randomisation
+from relpos_env.scenarios.rooms.floor_plan import read_floor_plan
+from relpos_env.scenarios.rooms.gap import Gap
 from relpos_env.sensors.radio.channel import CHANNELS, ChannelParams
-from tracking.ranging.airtime import PHYS, Phy
-from tracking.tables import Preset, TableReader, Where
+from tracking.params.tables import Preset, TableReader, Where
+from tracking.ranging.frames.airtime import PHYS, Phy
 
 FILES = Path(__file__).parent / "files"
 SUFFIX = ".toml"

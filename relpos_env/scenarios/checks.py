@@ -7,12 +7,12 @@ import re
 from typing import TYPE_CHECKING
 
 from relpos_env.errors import EnvError
-from relpos_env.scenarios.floor import Area, Floor
-from relpos_env.scenarios.gap import Gap
 from relpos_env.scenarios.layout import LAYOUTS, first_in_the_way, most_cars, track
 from relpos_env.scenarios.limits import check_params
-from relpos_env.scenarios.obstacle import Obstacle, boxes_of
-from relpos_env.scenarios.overlap import overlap
+from relpos_env.scenarios.rooms.floor import Area, Floor
+from relpos_env.scenarios.rooms.gap import Gap
+from relpos_env.scenarios.rooms.obstacle import Obstacle, boxes_of
+from relpos_env.scenarios.rooms.overlap import overlap
 from tracking.arrays import F64
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from relpos_env.sensors.imu import ImuSimParams
 from relpos_env.sensors.magnetometer import MagSimParams
 from relpos_env.sensors.odometer import OdometerSimParams
 from relpos_env.sensors.radio.params import RadioSimParams
-from relpos_env.vehicle import CarParams
+from relpos_env.world.car import CarParams
 from tracking.arrays import F64
 
 MOST_LOST = 0.9

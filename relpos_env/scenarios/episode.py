@@ -9,7 +9,6 @@ import numpy as np
 from relpos_env.errors import EnvError
 from relpos_env.scenarios.base import Scenario
 from relpos_env.scenarios.checks import MOST_CARS
-from relpos_env.scenarios.clutter import draw_clutter
 from relpos_env.scenarios.draws import (
     draw_car,
     draw_imu,
@@ -18,17 +17,18 @@ from relpos_env.scenarios.draws import (
     draw_odometer,
     draw_radio,
 )
-from relpos_env.scenarios.floor import Floor
 from relpos_env.scenarios.life import LifeEvent, Pose, draw_life
-from relpos_env.scenarios.obstacle import Obstacle, boxes_of
+from relpos_env.scenarios.rooms.clutter import draw_clutter
+from relpos_env.scenarios.rooms.floor import Floor
+from relpos_env.scenarios.rooms.obstacle import Obstacle, boxes_of
 from relpos_env.sensors.imu import ImuSimParams
 from relpos_env.sensors.magnetometer import MagSimParams
 from relpos_env.sensors.odometer import OdometerSimParams
 from relpos_env.sensors.proximity import ProximitySimParams
 from relpos_env.sensors.radio.params import RadioSimParams
-from relpos_env.vehicle import CarParams
+from relpos_env.world.car import CarParams
 from tracking.arrays import F64, Bool
-from tracking.short_repr import short_repr
+from tracking.params.short_repr import short_repr
 
 KINDS = ("number", "clutter", "car", "imu", "mag", "odometer", "radio", "leaving", "power", "joins",
          "mounts")  # fmt: skip

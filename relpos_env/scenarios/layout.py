@@ -7,8 +7,8 @@ from typing import Literal
 
 import numpy as np
 
-from relpos_env.scenarios.overlap import SKIN, beyond_walls, car_boxes, overlap
-from relpos_env.vehicle import CarParams
+from relpos_env.scenarios.rooms.overlap import SKIN, beyond_walls, car_boxes, overlap
+from relpos_env.world.car import CarParams
 from tracking.arrays import F64
 
 Layout = Literal["ring", "line", "scattered"]

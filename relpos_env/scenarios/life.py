@@ -18,7 +18,7 @@ from relpos_env.errors import EnvError
 from relpos_env.scenarios.randomisation import Interval, Randomisation
 from relpos_env.timing import STAND_STILL
 from tracking.arrays import Bool
-from tracking.short_repr import short_repr
+from tracking.params.short_repr import short_repr
 
 Happening = Literal["join", "leave", "power-off", "power-on"]
 Pose = tuple[float, float, float]

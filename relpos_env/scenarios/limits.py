@@ -17,8 +17,8 @@ from relpos_env.sensors.odometer import OdometerSimParams
 from relpos_env.sensors.proximity import ProximitySimParams
 from relpos_env.sensors.radio.channel import ChannelParams
 from relpos_env.sensors.radio.params import RadioSimParams
-from relpos_env.vehicle import CarParams
-from tracking.ranging.airtime import Phy
+from relpos_env.world.car import CarParams
+from tracking.ranging.frames.airtime import Phy
 
 Range = tuple[float, float]
 _ANY: Range = (-1e6, 1e6)

@@ -27,7 +27,7 @@ class HumanScenario:
     motion: Literal["procedural", "recorded"] = "procedural"
     """From a moving skeleton, or from motion capture."""
     exercises: tuple[str, ...] = ("walking", "jumping-jacks", "squats")
-    """Names in `relpos_env.body.exercises.EXERCISES`, gone through again and again; recorded
+    """Names in `relpos_env.people.exercises.EXERCISES`, gone through again and again; recorded
     motion has its own."""
     imu: ImuSimParams = field(default=HUMAN_IMU)
     mag: MagSimParams = field(default_factory=MagSimParams)

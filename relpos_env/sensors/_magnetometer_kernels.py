@@ -9,7 +9,7 @@ import numpy as np
 from relpos_env.sensors._imu_kernels import STARTS, quantise, steps_per_unit
 from relpos_env.sensors.radio._normal_kernels import normal
 from relpos_env.sensors.radio._random_kernels import draw_key, uniform
-from tracking.jit import kernel, small_kernel
+from tracking.kernels.jit import kernel, small_kernel
 
 N_WAVE = 6
 """Columns of a wave: wave vector x, y [turns/m], phase [turns], amplitude x, y, z [uT]."""

@@ -9,7 +9,7 @@ import numpy as np
 from relpos_env.sensors._imu_kernels import STARTS
 from relpos_env.sensors.radio._normal_kernels import normal
 from relpos_env.sensors.radio._random_kernels import draw_key
-from tracking.jit import kernel
+from tracking.kernels.jit import kernel
 
 
 @kernel

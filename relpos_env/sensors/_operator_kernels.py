@@ -8,7 +8,7 @@ import numpy as np
 
 from relpos_env.sensors.radio._normal_kernels import normal
 from relpos_env.sensors.radio._random_kernels import draw_key, uniform
-from tracking.jit import kernel
+from tracking.kernels.jit import kernel
 
 _WHO = np.uint64(0xFFFFFFFFFFFFFFFF)
 """Counts no sample: the draw of whether there is an operator."""

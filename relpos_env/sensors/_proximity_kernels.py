@@ -8,7 +8,7 @@ import numpy as np
 
 from relpos_env.sensors.radio._normal_kernels import normal
 from relpos_env.sensors.radio._random_kernels import draw_key
-from tracking.jit import kernel, small_kernel
+from tracking.kernels.jit import kernel, small_kernel
 
 
 @kernel

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from relpos_env.records import fill_numbers
 from relpos_env.scenarios.episode import Episode
 from relpos_env.sensors._imu_kernels import start_imus
 from relpos_env.sensors._magnetometer_kernels import N_WAVE, start_magnetometers
@@ -16,6 +15,7 @@ from relpos_env.sensors.magnetometer import MAG, fill_mag
 from relpos_env.sensors.odometer import ODOMETER
 from relpos_env.sensors.proximity import PROXIMITY, fill_proximity
 from relpos_env.timing import DT
+from relpos_env.world.parameter_records import fill_numbers
 from tracking.arrays import I64, Bool
 from tracking.measurements import N_VALUES
 from tracking.records import as_records

@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from relpos_env.records import fill_numbers, numbers_dtype
 from relpos_env.sensors._imu_kernels import DRIFT_EVERY
+from relpos_env.world.parameter_records import fill_numbers, numbers_dtype
 from tracking.arrays import F64
 from tracking.geometry import GRAVITY, quat_conjugate, rotate
 

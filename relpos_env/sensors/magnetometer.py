@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from relpos_env.records import fill_numbers, numbers_dtype
 from relpos_env.sensors.imu import quantise
+from relpos_env.world.parameter_records import fill_numbers, numbers_dtype
 from tracking.arrays import F64
 from tracking.geometry import quat_conjugate, rotate
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from relpos_env.records import numbers_dtype
+from relpos_env.world.parameter_records import numbers_dtype
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,7 +15,7 @@ from math import cos, radians, sin
 from typing import Any
 
 from relpos_env.interface.beams import FARTHEST
-from relpos_env.records import fill_numbers, numbers_dtype
+from relpos_env.world.parameter_records import fill_numbers, numbers_dtype
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

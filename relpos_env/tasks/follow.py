@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from relpos_env.errors import EnvError
-from relpos_env.tasks.curves import make_curve
+from relpos_env.tasks.geometry.curves import make_curve
+from relpos_env.tasks.geometry.shapes import Formation
 from relpos_env.tasks.moving import MARGIN, Motion, MovingFormation
 from relpos_env.tasks.options import half_room, not_negative, positive
-from relpos_env.tasks.shapes import Formation
 from tracking.arrays import F64
 
 TOLD = ("all", "leader")

@@ -8,13 +8,13 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from relpos_env.errors import EnvError
-from relpos_env.scenarios.gap import Gap as Opening
-from relpos_env.tasks._gap_kernels import update_gap
-from relpos_env.tasks.assignment import assign
+from relpos_env.scenarios.rooms.gap import Gap as Opening
 from relpos_env.tasks.base import COMMON_TERMS, Task, Truth
+from relpos_env.tasks.geometry.assignment import assign
+from relpos_env.tasks.geometry.shapes import Formation
+from relpos_env.tasks.kernels.gap import update_gap
 from relpos_env.tasks.moving import ERROR_SCALE, MARGIN, TOLERANCE
 from relpos_env.tasks.options import half_room, points, positive
-from relpos_env.tasks.shapes import Formation
 from tracking.arrays import F64, I64, Bool
 
 APPROACH = 0.6

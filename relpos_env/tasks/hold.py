@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from relpos_env.tasks.curves import Curve
+from relpos_env.tasks.geometry.curves import Curve
+from relpos_env.tasks.geometry.shapes import Formation
 from relpos_env.tasks.moving import MARGIN, Motion, MovingFormation, Stand
 from relpos_env.tasks.options import finite, half_room
-from relpos_env.tasks.shapes import Formation
 from tracking.arrays import F64
 
 

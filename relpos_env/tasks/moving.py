@@ -7,15 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from relpos_env.errors import EnvError
-from relpos_env.tasks._frame_kernels import frame_now, update_frame
-from relpos_env.tasks.anchor import free_anchor
-from relpos_env.tasks.assignment import assign
 from relpos_env.tasks.base import COMMON_TERMS, Task, Truth
-from relpos_env.tasks.curves import Curve
-from relpos_env.tasks.shapes import Formation
-from relpos_env.tasks.ways import Ways
+from relpos_env.tasks.geometry.anchor import free_anchor
+from relpos_env.tasks.geometry.assignment import assign
+from relpos_env.tasks.geometry.curves import Curve
+from relpos_env.tasks.geometry.shapes import Formation
+from relpos_env.tasks.geometry.shortest_paths import Ways
+from relpos_env.tasks.kernels.frame import frame_now, update_frame
 from tracking.arrays import F64, I64, Bool
-from tracking.short_repr import short_repr
+from tracking.params.short_repr import short_repr
 
 ERROR_SCALE = 0.5
 """[m] Formation error over which half of the formation term falls off to exp(-1)."""

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from relpos_env.errors import EnvError
-from relpos_env.tasks._meeting_kernels import update_meeting
 from relpos_env.tasks.base import COMMON_TERMS, Task, Truth
+from relpos_env.tasks.kernels.rendezvous import update_meeting
 from relpos_env.tasks.moving import ERROR_SCALE, MARGIN
 from relpos_env.tasks.options import half_room, not_negative, points, positive
 from tracking.arrays import F64, I64, Bool

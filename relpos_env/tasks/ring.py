@@ -11,13 +11,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from relpos_env.errors import EnvError
-from relpos_env.tasks._ring_kernels import update_ring
-from relpos_env.tasks.assignment import assign_round
 from relpos_env.tasks.base import COMMON_TERMS, Task, Truth
-from relpos_env.tasks.curves import Curve, rounded
+from relpos_env.tasks.geometry.assignment import assign_round
+from relpos_env.tasks.geometry.curves import Curve, rounded
+from relpos_env.tasks.geometry.shapes import MIN_SPACING
+from relpos_env.tasks.kernels.ring import update_ring
 from relpos_env.tasks.moving import ERROR_SCALE
 from relpos_env.tasks.options import half_room, not_negative, positive
-from relpos_env.tasks.shapes import MIN_SPACING
 from tracking.arrays import F64, I64, Bool
 
 SHARE = 0.28

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from relpos_env.tasks.curves import make_curve
+from relpos_env.tasks.geometry.curves import make_curve
+from relpos_env.tasks.geometry.shapes import Formation
 from relpos_env.tasks.moving import MARGIN, Motion, MovingFormation
 from relpos_env.tasks.options import finite, flag, half_room, not_negative, positive
-from relpos_env.tasks.shapes import Formation
 from tracking.arrays import F64
 
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 from onnx import TensorProto, helper, numpy_helper
 
-from agents.policy.card import Card
-from agents.policy.layout import Layout
+from agents.policies.card import Card
+from agents.policies.layout import Layout
 
 LAYOUT = Layout("estimate", 3)
 

@@ -3,8 +3,8 @@
 import torch
 
 from agents.settings import from_options
-from agents.train.config import TrainConfig
-from agents.train.run_folder import LAST, RunFolder
+from agents.training.config import TrainConfig
+from agents.training.run_folder import LAST, RunFolder
 
 SMALL = {
     "frames": "1400", "leg": "2", "envs": "3", "steps": "16", "batch": "64", "epochs": "2",

@@ -6,7 +6,7 @@ import torch
 from gymnasium.spaces import Box
 from stable_baselines3.common.buffers import RolloutBuffer
 
-from agents.train.buffer import SwarmRolloutBuffer
+from agents.training.ppo.buffer import SwarmRolloutBuffer
 
 STEPS, SEATS = 12, 3
 SPACE = Box(-np.inf, np.inf, (2,), np.float32)

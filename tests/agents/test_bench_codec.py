@@ -5,7 +5,7 @@ import json
 import pytest
 from click.testing import CliRunner
 
-from agents.cli import cli
+from agents.cli.main import cli
 from agents.errors import UsageError
 
 

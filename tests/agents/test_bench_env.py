@@ -145,14 +145,14 @@ def test_every_figure_is_a_row(monkeypatch):
 
 
 def check_picture(found):
-    from agents.report.bench_env_figures import env_figure
-    from agents.report.page import png
+    from agents.reports.bench.env_figures import env_figure
+    from agents.reports.page import png
 
     assert png(env_figure(found)).startswith(b"\x89PNG")
 
 
 def check_table(found, monkeypatch):
-    from agents.cli import cli
+    from agents.cli.main import cli
 
     monkeypatch.setattr("agents.bench.env.bench_env", lambda *_, **__: found)
     shown = CliRunner().invoke(cli, ["bench", "env", "--quick"])

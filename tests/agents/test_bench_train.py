@@ -29,12 +29,12 @@ def test_the_peer_computes_the_same(monkeypatch):
 
     from agents.bench.train.plain import make_plain
     from agents.settings import from_options
-    from agents.train import learner, network
-    from agents.train.config import TrainConfig
-    from agents.train.environments import make_rooms
-    from agents.train.hyperbolic import FromLogistic
-    from agents.train.learner import make_model
-    from agents.train.network import SwarmFeatures
+    from agents.training.config import TrainConfig
+    from agents.training.environments import make_rooms
+    from agents.training.ppo import learner, network
+    from agents.training.ppo.hyperbolic import FromLogistic
+    from agents.training.ppo.learner import make_model
+    from agents.training.ppo.network import SwarmFeatures
 
     # As on processors where torch's own tangent is slow.
     for module in (learner, network):

@@ -6,13 +6,13 @@ import tomllib
 import numpy as np
 import pytest
 
-from agents.calibrate import (
+from agents.evaluation.calibrate import (
     apply_calibrations,
     calibrate_imus,
     calibrate_magnetometers,
     calibrate_ranges,
 )
-from agents.simulate import simulate
+from agents.simulation.simulate import simulate
 from tests.command_line import relpos
 from tracking.calibration import CalibrationError
 from tracking.log import Log, write_log

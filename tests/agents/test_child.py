@@ -14,7 +14,7 @@ pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="ne
 
 CODE = """
 import os, sys, time
-from agents.engines import find_engine
+from agents.jobs import find_engine
 
 def work(k):
     print(os.getpid(), flush=True)
@@ -46,7 +46,7 @@ def test_jobs_end_with_a_command_that_is_ended(tmp_path, how):
 
 def test_a_policy_tells_nobody_and_leaves_nothing(tmp_path):
     """Its runtime would keep an identifier in the home folder, and send what it saw."""
-    code = "from agents.policy import load_policy; load_policy('ring')"
+    code = "from agents.policies import load_policy; load_policy('ring')"
     env = {k: v for k, v in os.environ.items() if k != "ORT_DISABLE_TELEMETRY"}
     env |= {"HOME": str(tmp_path), "TMPDIR": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path)}
     subprocess.run([sys.executable, "-c", code], env=env, check=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from agents.frames import NAMES
+from agents.simulation.frames import NAMES
 from tests.command_line import relpos
 from tracking.filters import FILTERS
 
@@ -77,8 +77,8 @@ def test_without_truth_no_bound_is_told(recording, tmp_path):
 
 
 def test_smoothed_estimates_are_better(recording):
-    from agents.simulate import simulate
-    from agents.track import track_log
+    from agents.evaluation.track import track_log
+    from agents.simulation.simulate import simulate
 
     told = json.loads(relpos("track", recording, "--json", "--smooth", "lag").stdout)
     assert told["rmse_shape"] == track_log(recording, smooth="lag").score.rmse_shape
@@ -115,7 +115,7 @@ def test_a_folder_that_may_not_be_written_to_is_found_first(monkeypatch, tmp_pat
 
 
 def test_no_figure_is_cut_off(capsys, monkeypatch):
-    from agents.console import print_table
+    from agents.cli.console import print_table
 
     monkeypatch.setenv("COLUMNS", "80")
     cells = [f"figure-{k}-of-a-long-row" for k in range(12)]
@@ -328,7 +328,7 @@ def test_demo_tells_errors_and_draws_the_drive(tmp_path):
 
 
 def test_a_demonstration_of_a_task_that_ends(tmp_path):
-    from agents.demo import demo
+    from agents.simulation.demo import demo
 
     result = demo(task="gap", seconds=40.0, seed=1)
     assert result.scenario == "gap"
@@ -341,7 +341,7 @@ def test_a_demonstration_of_a_task_that_ends(tmp_path):
 def test_contacts_of_a_demonstration_are_those_of_its_steps():
     """Counted once more from the outside."""
     from agents.controllers import Consensus
-    from agents.demo import demo
+    from agents.simulation.demo import demo
     from relpos_env import formation_v0
 
     result = demo(task="follow", seconds=15.0, seed=2)
@@ -365,7 +365,7 @@ def test_bench_lines_have_a_peer():
 
 
 def test_an_unknown_controller_is_named():
-    from agents.demo import demo
+    from agents.simulation.demo import demo
     from relpos_env.errors import EnvError
 
     with pytest.raises(EnvError, match="controller: expected one of consensus"):

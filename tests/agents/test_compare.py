@@ -8,21 +8,21 @@ import numpy as np
 import pytest
 from gymnasium.utils import seeding
 
-from agents.cli import main
-from agents.compare import contender as contenders
-from agents.compare.compare import compare
-from agents.compare.contender import Contender, ControllerEntry, find_entry, line_up
-from agents.compare.episode import run_episodes
-from agents.compare.film import median_films
-from agents.compare.meter import IN_FORMATION, Meter
-from agents.compare.setting import Setting
-from agents.compare.simulated import Simulated
-from agents.compare.statistics import Interval
+from agents.cli.main import main
+from agents.comparison import contender as contenders
+from agents.comparison.compare import compare
+from agents.comparison.contender import Contender, ControllerEntry, find_entry, line_up
+from agents.comparison.episode import run_episodes
+from agents.comparison.film import median_films
+from agents.comparison.meter import IN_FORMATION, Meter
+from agents.comparison.setting import Setting
+from agents.comparison.simulated import Simulated
+from agents.comparison.statistics import Interval
 from agents.controllers import CONTROLLERS, Consensus
 from agents.errors import UsageError
-from agents.report.animation import player_markup
-from agents.report.compare_figures import _limits
-from agents.report.compare_report import (
+from agents.reports.animation import player_markup
+from agents.reports.compare_figures import _limits
+from agents.reports.compare_report import (
     HEADER,
     SHORT_HEADER,
     compare_files,
@@ -30,9 +30,9 @@ from agents.report.compare_report import (
     rows,
     short_rows,
 )
-from relpos_env.formation import Formation
+from relpos_env.api.sb3_vec_env import FormationVecEnv
+from relpos_env.core.env_core import Formation
 from relpos_env.interface.observations import OBSERVATIONS
-from relpos_env.sb3_vec_env import FormationVecEnv
 from relpos_env.scenarios import SCENARIOS
 from relpos_env.tasks import TASKS
 from tests.command_line import relpos

@@ -6,17 +6,17 @@ import sys
 import numpy as np
 import pytest
 
-from agents.cli import main
-from agents.compare import hardware
-from agents.compare.contender import Contender
-from agents.compare.hardware import compare_hardware
-from agents.compare.meter import IN_FORMATION
+from agents.cli.main import main
+from agents.comparison import hardware
+from agents.comparison.contender import Contender
+from agents.comparison.hardware import compare_hardware
+from agents.comparison.meter import IN_FORMATION
 from agents.controllers import Consensus
-from agents.drive import keys
-from agents.emulate import EmulateOptions
-from agents.emulate.virtual import VirtualBridge
 from agents.errors import UsageError
-from agents.report.compare_report import (
+from agents.hardware.drive import keys
+from agents.hardware.emulate import EmulateOptions
+from agents.hardware.emulate.virtual import VirtualBridge
+from agents.reports.compare_report import (
     HEADER,
     SHORT_HEADER,
     compare_files,
@@ -25,7 +25,7 @@ from agents.report.compare_report import (
     short_rows,
 )
 from hardware_bridge.errors import BridgeError
-from relpos_env.vehicle import CarParams
+from relpos_env.world.car import CarParams
 
 OPTIONS = EmulateOptions(scenario="cars-nlos", seed=3, seconds=600.0)
 CONFIG = VirtualBridge(OPTIONS).config

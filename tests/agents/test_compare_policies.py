@@ -5,12 +5,12 @@ from dataclasses import replace
 import pytest
 from policy_files import card_of, model, perceptron, put
 
-from agents.compare.compare import compare
-from agents.compare.contender import Contender, find_entry
-from agents.compare.episode import run_episodes
-from agents.compare.setting import Setting
+from agents.comparison.compare import compare
+from agents.comparison.contender import Contender, find_entry
+from agents.comparison.episode import run_episodes
+from agents.comparison.setting import Setting
 from agents.errors import UsageError
-from agents.policy import Layout
+from agents.policies import Layout
 
 SETTING = Setting(scenario="cars-nlos", seconds=3.0, settle=1.0)
 

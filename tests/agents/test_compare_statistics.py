@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from agents.compare.statistics import Interval, mean, ratio
+from agents.comparison.statistics import Interval, mean, ratio
 
 
 def test_the_value_is_the_mean_and_inside():

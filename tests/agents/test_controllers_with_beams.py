@@ -24,7 +24,7 @@ from agents.controllers.surroundings import (
     surroundings,
 )
 from relpos_env.config import configure
-from relpos_env.formation import Formation
+from relpos_env.core.env_core import Formation
 from relpos_env.interface.beams import FARTHEST, beam_directions, beam_starts
 from relpos_env.interface.observations import observation_mode, total_size
 

@@ -13,7 +13,7 @@ import pytest
 from click.testing import CliRunner
 from scipy.spatial.transform import Rotation
 
-from agents.cli import cli
+from agents.cli.main import cli
 from agents.convert import PRESETS, convert
 from agents.convert.arrays import Arrays
 from agents.convert.sources import pattern
@@ -363,7 +363,7 @@ def test_presets_read_what_was_recorded(data, preset, source, log):
 
 
 def test_robots_without_imu_are_followed_but_for_rotation_and_mirror(data):
-    from agents.track import track_log
+    from agents.evaluation.track import track_log
 
     found = track_log(convert(data / "raw" / "tiers_ros2", preset="tiers"))
     assert found.score.rmse_mirror is not None

@@ -10,11 +10,11 @@ import pytest
 from click.testing import CliRunner
 from line_formats import FORMATS, LineFormat, Talker, line
 
-from agents.cli import cli
-from agents.diagnosis import diagnose_link, share_a_device
-from agents.doctor import doctor
+from agents.cli.main import cli
 from agents.errors import UsageError
-from agents.hearing import Hearing, known_formats
+from agents.hardware.inspection.diagnosis import diagnose_link, share_a_device
+from agents.hardware.inspection.doctor import doctor
+from agents.hardware.inspection.hearing import Hearing, known_formats
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.port_list import SerialPortInfo
 from hardware_bridge.links.port_users import port_users

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from agents.drive.log import MOST_KEPT, DriveLog
+from agents.hardware.drive.log import MOST_KEPT, DriveLog
 
 N = 3
 

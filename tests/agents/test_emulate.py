@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from gymnasium.utils import seeding
 
-from agents.emulate import EmulatedRig, EmulateOptions, emulate
-from agents.emulate.interrupts import Interrupts
-from agents.emulate.pace import Pace
-from agents.emulate.rig import STEP_NS
-from agents.emulate.world import AT_REST, STEPS, EmulatedWorld
+from agents.hardware.emulate import EmulatedRig, EmulateOptions, emulate
+from agents.hardware.emulate.interrupts import Interrupts
+from agents.hardware.emulate.pace import Pace
+from agents.hardware.emulate.rig import STEP_NS
+from agents.hardware.emulate.world import AT_REST, STEPS, EmulatedWorld
 from hardware_bridge.decoders import make_decoder
 from hardware_bridge.drivers import make_driver
 from hardware_bridge.emulator.fault_plan import FAULT_KINDS, Fault, FaultPlan, parse_faults
@@ -28,8 +28,8 @@ from hardware_bridge.readings import (
     OperatorReading,
     RangeReading,
 )
+from relpos_env.core.env_core import Formation
 from relpos_env.errors import EnvError
-from relpos_env.formation import Formation
 from relpos_env.timing import STAND_STILL
 from tracking.log import read_log
 
@@ -418,7 +418,7 @@ def test_whoever_ends_it_from_outside_gets_its_log(tmp_path):
 
 INTERRUPTED = """
 import gzip, os, signal, sys
-from agents.cli import main
+from agents.cli.main import main
 
 compress = gzip.compress
 

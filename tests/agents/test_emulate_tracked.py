@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from agents.emulate import EmulatedRig, EmulateOptions
-from agents.emulate.rig import STEP_NS
-from agents.emulate.world import AT_REST, STEPS
+from agents.hardware.emulate import EmulatedRig, EmulateOptions
+from agents.hardware.emulate.rig import STEP_NS
+from agents.hardware.emulate.world import AT_REST, STEPS
 from hardware_bridge.config import read_config
 from hardware_bridge.drivers import make_driver
 from hardware_bridge.emulator.ports import MemoryPort
 from hardware_bridge.links.ports import Chunk
 from hardware_bridge.live.swarm import LiveSwarm
-from relpos_env.formation import Formation
+from relpos_env.core.env_core import Formation
 
 SETTLED = 40
 """[-] Decisions after which errors are compared."""

@@ -4,8 +4,8 @@ import os
 
 import pytest
 
-from agents.engines import check_jobs, find_engine
 from agents.errors import UsageError
+from agents.jobs import check_jobs, find_engine
 
 LOCAL = ["local"]
 """That of Ray has a file of its own."""

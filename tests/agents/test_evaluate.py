@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from agents.errors import UsageError
-from agents.evaluate.changes import (
+from agents.evaluation.changes import (
     CLOCK_OFFSET,
     OUTLIER_SPAN,
     clock_offset,
@@ -16,13 +16,13 @@ from agents.evaluate.changes import (
     range_outliers,
     without_powers,
 )
-from agents.evaluate.evaluate import evaluate
-from agents.evaluate.lost import lost_at
-from agents.evaluate.over_time import NIS_EDGES, over_time
-from agents.evaluate.suites import SUITES, Suite
-from agents.evaluate.targets import outcomes
-from agents.report.evaluate_report import target_rows
-from agents.simulate import record, simulate
+from agents.evaluation.evaluate import evaluate
+from agents.evaluation.lost import lost_at
+from agents.evaluation.over_time import NIS_EDGES, over_time
+from agents.evaluation.suites import SUITES, Suite
+from agents.evaluation.targets import outcomes
+from agents.reports.evaluate_report import target_rows
+from agents.simulation.simulate import record, simulate
 from relpos_env.scenarios.cars import CARS_NLOS
 from tests.command_line import relpos
 from tracking.constellation import Constellation, NodeConfig

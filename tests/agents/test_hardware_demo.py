@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from agents.cli import cli
-from agents.hardware_demo import _settled
+from agents.cli.main import cli
+from agents.hardware.demo import _settled
 
 
 def test_a_drive_that_was_over_early_is_scored_by_its_end():
@@ -19,7 +19,7 @@ def test_a_drive_that_was_over_early_is_scored_by_its_end():
 def test_the_mean_is_that_of_drives_with_both_errors():
     from types import SimpleNamespace
 
-    from agents.report.hardware_report import demo_rows
+    from agents.reports.hardware_report import demo_rows
 
     def drive(seed, ours, theirs):
         summary = {
@@ -37,7 +37,7 @@ def test_the_mean_is_that_of_drives_with_both_errors():
 
 
 def test_demo_looks_at_its_folder_before_it_drives(tmp_path, monkeypatch):
-    monkeypatch.setattr("agents.demo.demo", lambda **_: pytest.fail("it drove"))
+    monkeypatch.setattr("agents.simulation.demo.demo", lambda **_: pytest.fail("it drove"))
     (tmp_path / "file").write_text("")
     done = CliRunner().invoke(cli, ["demo", "--out", str(tmp_path / "file")])
     assert "is a file, expected a folder" in str(done.exception)

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from agents.drive.keys import HELP, NO_KEYS, TerminalKeys, key_by_key, orders_of
+from agents.hardware.drive.keys import HELP, NO_KEYS, TerminalKeys, key_by_key, orders_of
 
 
 @pytest.fixture
@@ -51,7 +51,7 @@ def test_without_any_input_no_key_is_pressed(monkeypatch):
 
 BACKGROUND = """
 import fcntl, os, signal, sys, termios, time
-from agents.drive.keys import TerminalKeys, check_stop_source, key_by_key
+from agents.hardware.drive.keys import TerminalKeys, check_stop_source, key_by_key
 from agents.errors import UsageError
 
 os.setsid()

@@ -14,15 +14,15 @@ import pytest
 from click.testing import CliRunner
 from recorded_runs import same_bits
 
-from agents.cli import cli
-from agents.emulate import EmulatedRig, EmulateOptions
-from agents.emulate.rig import STEP_NS
+from agents.cli.main import cli
 from agents.errors import UsageError
-from agents.live import live
-from agents.live.rates import Rates
-from agents.live.screen import LiveTable
-from agents.live.text import line, node_rows, pair_header, pair_rows
-from agents.replay import replay
+from agents.hardware.emulate import EmulatedRig, EmulateOptions
+from agents.hardware.emulate.rig import STEP_NS
+from agents.hardware.live import live
+from agents.hardware.live.rates import Rates
+from agents.hardware.live.screen import LiveTable
+from agents.hardware.live.text import line, node_rows, pair_header, pair_rows
+from agents.hardware.replay import replay
 from hardware_bridge.emulator.fault_plan import Fault, FaultPlan
 from hardware_bridge.emulator.faults import FaultParams
 from hardware_bridge.errors import BridgeError
@@ -96,7 +96,7 @@ def test_replay_is_live_over_ports_that_come_and_go(tmp_path):
 
 def test_a_process_that_was_killed_leaves_all_but_its_last_moment(tmp_path):
     file = tmp_path / "a.rec"
-    code = "from agents.cli import main; main()"
+    code = "from agents.cli.main import main; main()"
     with RunningRig(tmp_path / "e", seed=3) as running:
         args = ["live", "--config", str(running.config), "--record", str(file), "--json"]
         process = subprocess.Popen(

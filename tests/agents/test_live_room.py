@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from agents.live_room import ARROWS, PLAIN_ARROWS, LiveRoom, draw_room
-from agents.report.gif import WIDTH, Gif
+from agents.reports.gif import WIDTH, Gif
+from agents.simulation.terminal_view import ARROWS, PLAIN_ARROWS, LiveRoom, draw_room
 
 ROOM = 8.0, 4.0
 

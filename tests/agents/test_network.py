@@ -5,10 +5,10 @@ import pytest
 import torch
 
 from agents.settings import from_options
-from agents.train.config import TrainConfig
-from agents.train.environments import layout_of
-from agents.train.hyperbolic import FromLogistic, is_fast
-from agents.train.learner import make_policy
+from agents.training.config import TrainConfig
+from agents.training.environments import layout_of
+from agents.training.ppo.hyperbolic import FromLogistic, is_fast
+from agents.training.ppo.learner import make_policy
 
 
 def test_the_tangent_is_that_of_torch():

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agents.policy import Card, Layout, PolicyError
-from agents.policy.strict_json import Reader, parse_json
+from agents.policies import Card, Layout, PolicyError
+from agents.policies.strict_json import Reader, parse_json
 
 SHA = "0" * 64
 VALUES = st.recursive(

@@ -9,11 +9,11 @@ import pytest
 from click.testing import CliRunner
 from policy_files import LAYOUT, card_of, good_model, put
 
-from agents.blindfold import Blindfold
-from agents.cli import cli
-from agents.demo import demo
+from agents.cli.main import cli
+from agents.comparison.blindfold import Blindfold
 from agents.errors import UsageError
-from agents.policy import Layout, PolicyError, find, load_policy, shipped_names, write_policy
+from agents.policies import Layout, PolicyError, find, load_policy, shipped_names, write_policy
+from agents.simulation.demo import demo
 from relpos_env.errors import EnvError
 
 
@@ -161,13 +161,13 @@ def test_bench_lines_have_a_peer():
 def test_it_drives_where_no_trainer_is_installed(tmp_path):
     code = f"""
 import logging, sys
-logging.getLogger("tracking.jit").setLevel(logging.ERROR)  # compiling may be announced
+logging.getLogger("tracking.kernels.jit").setLevel(logging.ERROR)  # compiling may be announced
 class Block:
     def find_spec(self, name, path=None, target=None):
         if name in ("torch", "stable_baselines3", "onnx", "onnxscript", "cloudpickle"):
             raise ImportError(name)
 sys.meta_path.insert(0, Block())
-from agents.demo import demo
+from agents.simulation.demo import demo
 print(demo(scenario="cars-nlos", seconds=1.0, policy={str(small(tmp_path))!r}).driver)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)

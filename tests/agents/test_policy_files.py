@@ -27,10 +27,10 @@ from policy_files import (
 )
 
 from agents.errors import UsageError
-from agents.policy import Layout, PolicyError, find, load_policy, shipped_names, write_policy
-from agents.policy.graph import check_graph
-from agents.policy.patience import Patience
-from agents.policy.trained import check_policy
+from agents.policies import Layout, PolicyError, find, load_policy, shipped_names, write_policy
+from agents.policies.graph import check_graph
+from agents.policies.patience import Patience
+from agents.policies.trained import check_policy
 
 GOOD = good_model().SerializeToString()
 SIZE = LAYOUT.size
@@ -429,12 +429,12 @@ def test_nothing_is_printed_by_others(tmp_path, capfd):
 
 
 def test_large_files_are_not_read(good, monkeypatch):
-    import agents.policy.trained
+    import agents.policies.trained
 
-    monkeypatch.setattr(agents.policy.trained, "MOST_NETWORK", 100)
+    monkeypatch.setattr(agents.policies.trained, "MOST_NETWORK", 100)
     with pytest.raises(PolicyError, match="expected at most"):
         load_policy(good)
-    monkeypatch.setattr(agents.policy.trained, "MOST_CARD", 100)
+    monkeypatch.setattr(agents.policies.trained, "MOST_CARD", 100)
     with pytest.raises(PolicyError, match="good.json: expected at most"):
         load_policy(good)
 

@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agents.policy.layout import Layout
-from agents.policy.padding import PaddedDriver, Padding
+from agents.policies.layout import Layout
+from agents.policies.padding import PaddedDriver, Padding
 from relpos_env.config import configure
+from relpos_env.core.env_core import Formation
+from relpos_env.core.tracked_world import default_params
 from relpos_env.errors import EnvError
-from relpos_env.formation import Formation
 from relpos_env.interface.observations import OBSERVATIONS, observation_mode, total_size
 from relpos_env.interface.views import make_view
-from relpos_env.loop import default_params
 from relpos_env.scenarios import scenario
 
 MODES = tuple(OBSERVATIONS)

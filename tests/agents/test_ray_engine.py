@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from agents.engines import find_engine
-from agents.engines.ray_engine import start_ray
 from agents.errors import UsageError
+from agents.jobs import find_engine
+from agents.jobs.ray_engine import start_ray
 
 pytest.importorskip("ray", reason="ray is not installed: pip install 'relpos-env[ray]'")
 
@@ -115,7 +115,7 @@ def test_a_worker_that_is_always_lost_is_told(cluster):
 
 
 def test_a_comparison_is_the_same_bit_for_bit(cluster):
-    from agents.compare.compare import compare
+    from agents.comparison.compare import compare
 
     asked = {
         "drivers": ["consensus"],
@@ -137,7 +137,7 @@ def test_a_comparison_is_the_same_bit_for_bit(cluster):
 SCRIPT = """
 import ray
 from test_ray_engine import divided
-from agents.engines import find_engine
+from agents.jobs import find_engine
 engine = find_engine("ray", {address!r})
 found = dict(engine(divided, [(1.0, 2.0)] * 3, 2))
 print(sorted((n, r[0]) for n, r in found.items()), ray.is_initialized())

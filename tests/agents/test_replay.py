@@ -8,13 +8,13 @@ import pytest
 from click.testing import CliRunner
 from recorded_runs import START, WALL, run_live, same_bits
 
-from agents.cli import cli
-from agents.emulate import EmulateOptions
+from agents.cli.main import cli
 from agents.errors import UsageError
-from agents.replay import replay
-from agents.replay.exports import export_replay
-from agents.replay.truth import find_offset
-from agents.track import track_log
+from agents.evaluation.track import track_log
+from agents.hardware.emulate import EmulateOptions
+from agents.hardware.replay import replay
+from agents.hardware.replay.exports import export_replay
+from agents.hardware.replay.truth import find_offset
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.recording import Kind, Recorder, read_recording
 from tracking.log import read_log, write_log

@@ -22,15 +22,15 @@ from ray.rllib.env.multi_agent_env_runner import MultiAgentEnvRunner
 from ray.rllib.env.multi_agent_episode import MultiAgentEpisode
 from ray.rllib.utils.pre_checks.env import check_multiagent_environments
 
-from agents.compare.compare import compare
+from agents.comparison.compare import compare
 from agents.errors import UsageError
-from agents.policy import load_policy
-from agents.policy.layout import Layout
+from agents.policies import load_policy
+from agents.policies.layout import Layout
 from agents.rllib.config import RllibConfig
 from agents.rllib.env import OWN_SEEDS, FormationMultiAgentEnv, SeededEnv
 from agents.rllib.train import MODULE, ppo_config, rllib_train
-from relpos_env import formation
-from relpos_env.parallel_env import FormationEnv
+from relpos_env.api.parallel_env import FormationEnv
+from relpos_env.core import env_core as formation
 from relpos_env.scenarios import SCENARIOS, draw_episode
 from relpos_env.scenarios.life import LifeEvent
 from relpos_env.timing import STAND_STILL

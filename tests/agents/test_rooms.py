@@ -3,8 +3,8 @@
 import numpy as np
 from small_runs import small
 
-from agents.policy.layout import Layout
-from agents.train.environments import make_rooms
+from agents.policies.layout import Layout
+from agents.training.environments import make_rooms
 
 
 def test_rooms_of_several_scenarios_share_the_seats():

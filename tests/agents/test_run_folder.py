@@ -11,9 +11,9 @@ from small_runs import same, small, weights
 from stable_baselines3.common.logger import TensorBoardOutputFormat
 
 from agents.errors import UsageError
-from agents.train.export import export_policy
-from agents.train.run_folder import CONFIG, LAST, RunFolder
-from agents.train.train import train
+from agents.training.export import export_policy
+from agents.training.run_folder import CONFIG, LAST, RunFolder
+from agents.training.train import train
 
 
 @pytest.fixture(scope="module")

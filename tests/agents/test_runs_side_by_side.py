@@ -15,17 +15,17 @@ import torch
 from click.testing import CliRunner
 from processes import is_running
 
-from agents.cli import cli
+from agents.cli.main import cli
 from agents.errors import UsageError
-from agents.policy import load_policy
+from agents.policies import load_policy
 from agents.settings import from_options
-from agents.train.choice import FILE, choose, read_choice
-from agents.train.config import TrainConfig
-from agents.train.export import export_policy
-from agents.train.run import train_policy
-from agents.train.run_folder import BEST, LAST, RunFolder
-from agents.train.side_by_side import train_side_by_side
-from agents.train.train import train
+from agents.training.choice import FILE, choose, read_choice
+from agents.training.config import TrainConfig
+from agents.training.export import export_policy
+from agents.training.run import train_policy
+from agents.training.run_folder import BEST, LAST, RunFolder
+from agents.training.side_by_side import train_side_by_side
+from agents.training.train import train
 
 SMALL = {
     "frames": "1400", "leg": "2", "envs": "3", "steps": "16", "batch": "64", "epochs": "2",
@@ -139,8 +139,8 @@ def test_runs_end_with_the_process_that_began_them(tmp_path):
 import multiprocessing, sys, threading, time
 from pathlib import Path
 from agents.settings import from_options
-from agents.train.config import TrainConfig
-from agents.train.side_by_side import train_side_by_side
+from agents.training.config import TrainConfig
+from agents.training.side_by_side import train_side_by_side
 
 def tell():
     folder = Path(sys.argv[1])

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from agents.compare.contender import Contender
-from agents.compare.episode import run_episodes
-from agents.compare.meter import IN_FORMATION
-from agents.compare.setting import Setting
-from agents.policy import load_policy, shipped_names
-from agents.policy.find import find_policy
+from agents.comparison.contender import Contender
+from agents.comparison.episode import run_episodes
+from agents.comparison.meter import IN_FORMATION
+from agents.comparison.setting import Setting
+from agents.policies import load_policy, shipped_names
+from agents.policies.find import find_policy
 from agents.settings import from_json, to_json
-from agents.train.config import TrainConfig
+from agents.training.config import TrainConfig
 
 EPISODES = range(2000, 2004)
 

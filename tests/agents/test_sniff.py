@@ -7,10 +7,10 @@ import pytest
 from click.testing import CliRunner
 from line_formats import FORMATS, Talker, line
 
-from agents.cli import cli, main
+from agents.cli.main import cli, main
 from agents.errors import UsageError
-from agents.hearing import ENOUGH_FRAMES
-from agents.sniff import as_line, as_record, sniff
+from agents.hardware.inspection.hearing import ENOUGH_FRAMES
+from agents.hardware.inspection.sniff import as_line, as_record, sniff
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.readings import DriveReading, RangeReading, Source
 
@@ -124,7 +124,7 @@ def test_readings_as_records_and_lines():
 
 @pytest.fixture
 def formats(monkeypatch):
-    monkeypatch.setattr("agents.sniff.known_formats", lambda: FORMATS)
+    monkeypatch.setattr("agents.hardware.inspection.sniff.known_formats", lambda: FORMATS)
 
 
 def test_command_json(talker, formats):

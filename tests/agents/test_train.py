@@ -16,14 +16,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from small_runs import SMALL, same, small, weights
 
-from agents.cli import cli
+from agents.cli.main import cli
 from agents.errors import UsageError
-from agents.policy import load_policy
-from agents.policy.layout import Layout
+from agents.policies import load_policy
+from agents.policies.layout import Layout
 from agents.settings import as_options, from_options
-from agents.train.begin import begin_with
-from agents.train.config import TrainConfig
-from agents.train.environments import (
+from agents.training.begin import begin_with
+from agents.training.config import TrainConfig
+from agents.training.environments import (
     check_environments,
     choice_environments,
     layout_of,
@@ -31,13 +31,13 @@ from agents.train.environments import (
     shares,
     weights_of,
 )
-from agents.train.evaluation import Evaluation
-from agents.train.export import export_policy, read_results
-from agents.train.learner import level_of, make_model, make_policy, run_leg
-from agents.train.network import Actor
-from agents.train.run import train_policy
-from agents.train.run_folder import BEST, LAST, RunFolder, restore_weights
-from agents.train.train import train
+from agents.training.evaluation import Evaluation
+from agents.training.export import export_policy, read_results
+from agents.training.ppo.learner import level_of, make_model, make_policy, run_leg
+from agents.training.ppo.network import Actor
+from agents.training.run import train_policy
+from agents.training.run_folder import BEST, LAST, RunFolder, restore_weights
+from agents.training.train import train
 from relpos_env.errors import EnvError
 
 
@@ -212,7 +212,7 @@ def test_rooms_that_tell_which_policy_is_kept_are_not_learned_in():
 def test_a_run_that_was_killed_goes_on_as_if_it_had_not_been(run, tmp_path):
     folder = tmp_path / "run"
     options = [f"--{k.replace('_', '-')}={v}" for k, v in SMALL.items()]
-    code = "from agents.cli import main; main()"
+    code = "from agents.cli.main import main; main()"
     command = [sys.executable, "-c", code, "train", "--out", str(folder), *options]
     process = subprocess.Popen(command, stderr=subprocess.DEVNULL, env=dict(os.environ))
     until = time.monotonic() + 120.0

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from agents.errors import UsageError
-from agents.live.snapshot import NodeRow, PairRow, Snapshot
-from agents.view import open_viewer, scene
+from agents.hardware.live.snapshot import NodeRow, PairRow, Snapshot
+from agents.hardware.view import open_viewer, scene
 
 
 def pair(i, j, pos, status="ok", nlos=0.0):

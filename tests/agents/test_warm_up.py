@@ -10,14 +10,14 @@ import pytest
 from click.testing import CliRunner
 from numba import config
 
-from agents.cli import cli
+from agents.cli.main import cli
 from agents.errors import UsageError
 from agents.warm_up import PURPOSES, BackgroundWarmUp, parts_of, processes, warm_up, warm_up_first
 from agents.warm_up.parts import NoFilter, Part
 from relpos_env import formation_v0
 from tracking import Constellation, NodeConfig, Tracker
 from tracking.filters import FILTERS
-from tracking.jit import bind, is_compiled
+from tracking.kernels.jit import bind, is_compiled
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
 

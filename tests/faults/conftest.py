@@ -7,13 +7,14 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from agents.simulate import simulate
+from agents.simulation.simulate import simulate
+from relpos_env.core.oracle_params import matched_params
 from relpos_env.interface.perception import FOR_POLICIES
-from relpos_env.matched import matched_params
 from relpos_env.scenarios import recordable
-from tracking import Status, Tracker, TrackerParams, bounds
+from tracking import Status, Tracker, TrackerParams
 from tracking.geometry import best_rotation
 from tracking.measurements import Kind, MeasurementBlock
+from tracking.metrics import bound as bounds
 
 BAD = 1
 """The car that has the fault."""

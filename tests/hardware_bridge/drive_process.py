@@ -13,9 +13,9 @@ import threading
 import time
 from dataclasses import dataclass, field
 
-import agents.drive.run
-from agents.compare.contender import find_entry
-from agents.drive import drive
+import agents.hardware.drive.run
+from agents.comparison.contender import find_entry
+from agents.hardware.drive import drive
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.safety.gate import reason_text
 
@@ -98,7 +98,7 @@ def listen(orders):
 
 
 def main(config, options):
-    agents.drive.run.find_entry = lambda name: SleepyEntry(find_entry(name))
+    agents.hardware.drive.run.find_entry = lambda name: SleepyEntry(find_entry(name))
     watch = Watch()
     threading.Thread(target=listen, args=(watch.orders,), daemon=True).start()
     try:

@@ -15,10 +15,10 @@ import threading
 import time
 from pathlib import Path
 
-from agents.emulate import EmulatedRig, EmulateOptions
-from agents.emulate.pace import Pace
-from agents.emulate.rig import STEP_NS
-from agents.emulate.warm_up import warm_up
+from agents.hardware.emulate import EmulatedRig, EmulateOptions
+from agents.hardware.emulate.pace import Pace
+from agents.hardware.emulate.rig import STEP_NS
+from agents.hardware.emulate.warm_up import warm_up
 from hardware_bridge.emulator.fault_plan import Fault
 from hardware_bridge.emulator.pty import PtyPort
 

@@ -1,6 +1,6 @@
 """Cars for the tests of the gate: bicycles with a motor, a servo, a wire, and a deadman.
 
-Numbers of a 1:10 car as in `relpos_env.vehicle`; what differs from car to car is drawn. They do
+Numbers of a 1:10 car as in `relpos_env.world.car`; what differs from car to car is drawn. They do
 not collide: what is asked is how near they come.
 """
 

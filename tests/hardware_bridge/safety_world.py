@@ -13,8 +13,8 @@ from safety_faults import KINDS, Faults
 from safety_policies import Policies
 
 from hardware_bridge.safety.gate import Gate
+from hardware_bridge.safety.geometry.polygon import to_edges
 from hardware_bridge.safety.params import Fence
-from hardware_bridge.safety.polygon import to_edges
 
 DECISION = 10
 """[ticks]"""

@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from agents.calibrate import calibrate_ranges
+from agents.evaluation.calibrate import calibrate_ranges
 from hardware_bridge.config import parse_config, read_config
 from hardware_bridge.decoders.relpos import RelposDecoder
 from hardware_bridge.drivers.relpos import RelposDriver, RelposOptions
+from hardware_bridge.ingest.intake import Intake
 from hardware_bridge.links.ports import Chunk
-from hardware_bridge.live.intake import Intake
 from hardware_bridge.live.start import StartParams, wriggle
 from hardware_bridge.readings import (
     AckReading,
@@ -25,8 +25,8 @@ from hardware_bridge.readings import (
     RangeReading,
     StatusReading,
 )
-from hardware_bridge.safety.braking import stopping_way
 from hardware_bridge.safety.gate import REASONS
+from hardware_bridge.safety.geometry.braking import stopping_way
 from hardware_bridge.safety.params import SafetyParams
 from hardware_bridge.safety.rules import RULES
 from tracking.log import Log, read_log, write_log

@@ -10,14 +10,14 @@ from threading import Thread
 import numpy as np
 import pytest
 
-from agents.drive.keys import ALIVE, PATIENCE, PipedKeys, check_stop_source, orders_of
-from agents.emulate.options import EmulateOptions
-from agents.emulate.rig import EmulatedRig
 from agents.errors import UsageError
-from agents.hearing import Hearing, known_formats, why_nothing_fits
-from agents.live.rates import Rates
-from agents.sniff import sniff
-from agents.watchdog import Watchdog, with_watchdogs
+from agents.hardware.drive.keys import ALIVE, PATIENCE, PipedKeys, check_stop_source, orders_of
+from agents.hardware.emulate.options import EmulateOptions
+from agents.hardware.emulate.rig import EmulatedRig
+from agents.hardware.inspection.hearing import Hearing, known_formats, why_nothing_fits
+from agents.hardware.inspection.sniff import sniff
+from agents.hardware.inspection.watchdog import Watchdog, with_watchdogs
+from agents.hardware.live.rates import Rates
 from hardware_bridge.config import parse_config
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.ports import Chunk

@@ -8,8 +8,8 @@ from pettingzoo.utils.conversions import aec_to_parallel, parallel_to_aec
 from pettingzoo.utils.wrappers import BaseParallelWrapper
 
 from agents.controllers import Consensus
-from agents.emulate import EmulateOptions
-from agents.emulate.virtual import LAG, START_NS, VirtualBridge
+from agents.hardware.emulate import EmulateOptions
+from agents.hardware.emulate.virtual import LAG, START_NS, VirtualBridge
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.ports import Chunk
 from hardware_bridge.live.env import LiveFormationEnv
@@ -20,7 +20,7 @@ from hardware_bridge.recording import Kind as Record
 from relpos_env import formation_v0
 from relpos_env.errors import EnvError
 from relpos_env.interface.actions import ACTIONS
-from relpos_env.interface.cars_env import CarsEnv
+from relpos_env.interface.base_parallel_env import CarsEnv
 from relpos_env.interface.observations import OBSERVATIONS
 
 OPTIONS = EmulateOptions(scenario="cars-nlos", seed=3, seconds=600.0)

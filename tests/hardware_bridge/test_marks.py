@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from agents.emulate import EmulateOptions
-from agents.emulate.rig import STEP_NS, EmulatedRig
+from agents.hardware.emulate import EmulateOptions
+from agents.hardware.emulate.rig import STEP_NS, EmulatedRig
 from hardware_bridge.config import read_config
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.ports import Chunk

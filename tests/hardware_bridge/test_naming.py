@@ -4,9 +4,9 @@ import pytest
 
 from hardware_bridge.config.keys import node_id
 from hardware_bridge.errors import BridgeError
-from hardware_bridge.live.naming import node_of
+from hardware_bridge.ingest.naming import node_of
 from hardware_bridge.wire.definition import HOST
-from tracking.tables import Where
+from tracking.params.tables import Where
 
 IDS = {"0": 1, "1": 2, "989C": 3}
 

@@ -5,14 +5,14 @@ import math
 import numpy as np
 import pytest
 
-from agents.drive.run import drive_on
-from agents.emulate.options import EmulateOptions
-from agents.emulate.virtual import VirtualBridge
 from agents.errors import UsageError
+from agents.hardware.drive.run import drive_on
+from agents.hardware.emulate.options import EmulateOptions
+from agents.hardware.emulate.virtual import VirtualBridge
 from hardware_bridge.config import parse_config
 from hardware_bridge.decoders.relpos import RelposDecoder
 from hardware_bridge.errors import BridgeError
-from hardware_bridge.live.near import LASTS, Near
+from hardware_bridge.ingest.rangefinder import LASTS, Near
 from hardware_bridge.readings import MICROSECONDS_32, NearReading, Source
 from hardware_bridge.wire.encoder import RelposEncoder
 from relpos_env.errors import EnvError

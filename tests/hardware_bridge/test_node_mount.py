@@ -8,7 +8,7 @@ import pytest
 from hardware_bridge.config.nodes import read_constellation
 from tracking.errors import ConfigError
 from tracking.mount import Mount
-from tracking.tables import Where
+from tracking.params.tables import Where
 
 FILE = """
 [nodes.1]

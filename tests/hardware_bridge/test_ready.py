@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from hardware_bridge.errors import BridgeError
-from hardware_bridge.live.headings import FARTHEST, Headings
+from hardware_bridge.external_tracker.headings import FARTHEST, Headings
+from hardware_bridge.external_tracker.params import ReadyParams
+from hardware_bridge.external_tracker.pending import Told, ToldHeading, ToldPlace
+from hardware_bridge.external_tracker.perception import ReadyPerception
+from hardware_bridge.external_tracker.tracks import Tracks
 from hardware_bridge.live.picture import is_sound
-from hardware_bridge.live.ready import ReadyPerception
-from hardware_bridge.live.ready_params import ReadyParams
-from hardware_bridge.live.told import Told, ToldHeading, ToldPlace
-from hardware_bridge.live.tracks import Tracks
 from hardware_bridge.readings import UNNAMED, PairReading, PoseReading
 from tracking.constellation import Constellation, NodeConfig
 from tracking.estimate import Status

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from recorded_runs import run_live, same_bits
 
-from agents.emulate import EmulateOptions
-from agents.live.history import History
+from agents.hardware.emulate import EmulateOptions
+from agents.hardware.live.history import History
 from hardware_bridge.emulator.fault_plan import Fault, FaultPlan
 from hardware_bridge.emulator.faults import FaultParams
 from hardware_bridge.errors import BridgeError

@@ -10,10 +10,10 @@ import time
 import pytest
 from terminals import FakeDevice
 
-from agents.cli import main
-from agents.drive import drive
-from agents.emulate import EmulatedRig, EmulateOptions
-from agents.emulate.rig import STEP_NS
+from agents.cli.main import main
+from agents.hardware.drive import drive
+from agents.hardware.emulate import EmulatedRig, EmulateOptions
+from agents.hardware.emulate.rig import STEP_NS
 from hardware_bridge.errors import BridgeError
 
 pytestmark = pytest.mark.slow

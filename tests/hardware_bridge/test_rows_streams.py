@@ -11,7 +11,7 @@ import pytest
 from virtual_drive import VirtualDrive
 
 import hardware_bridge
-from agents.emulate import EmulateOptions
+from agents.hardware.emulate import EmulateOptions
 from hardware_bridge.emulator.fault_plan import FaultPlan
 from hardware_bridge.emulator.faults import FaultParams
 from hardware_bridge.readings import MICROSECONDS_32, ImuReading, OperatorReading, Source

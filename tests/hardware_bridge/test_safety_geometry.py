@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hardware_bridge.safety.braking import stopping_speed, stopping_way
-from hardware_bridge.safety.polygon import area, outwards, to_edges
+from hardware_bridge.safety.geometry.braking import stopping_speed, stopping_way
+from hardware_bridge.safety.geometry.polygon import area, outwards, to_edges
+from hardware_bridge.safety.geometry.turning import gain, way_within
 from hardware_bridge.safety.recent import at_rest
-from hardware_bridge.safety.turning import gain, way_within
 
 angles = st.floats(0.0, np.pi)
 ways = st.floats(0.0, 5.0)

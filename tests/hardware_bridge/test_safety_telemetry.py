@@ -7,8 +7,8 @@ import pytest
 from safety_group import TICK, check, picture
 from test_safety_supervisor import NEUTRAL, Drive
 
-from agents.emulate.options import EmulateOptions
-from agents.emulate.virtual import VirtualBridge
+from agents.hardware.emulate.options import EmulateOptions
+from agents.hardware.emulate.virtual import VirtualBridge
 from hardware_bridge.config.swarm import CarConfig
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.ports import PortSpec

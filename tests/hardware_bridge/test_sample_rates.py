@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from hardware_bridge.config import parse_config
 from hardware_bridge.errors import BridgeError
+from hardware_bridge.ingest.intake import Intake
+from hardware_bridge.ingest.sample_rates import SampleRates
 from hardware_bridge.links.ports import Chunk
-from hardware_bridge.live.intake import Intake
-from hardware_bridge.live.sample_rates import SampleRates
 from hardware_bridge.live.start import Start
 from hardware_bridge.live.swarm import LiveSwarm
 from hardware_bridge.readings import MICROSECONDS_32, ImuReading, Source, StatusReading

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from hardware_bridge.clocks import EvenTime
 from hardware_bridge.clocks.even_time import MOST
-from hardware_bridge.live.repeated import FEWEST, STUCK, RepeatedSamples
+from hardware_bridge.ingest.repeated_samples import FEWEST, STUCK, RepeatedSamples
 from hardware_bridge.readings import Source
 
 MS = 1_000_000

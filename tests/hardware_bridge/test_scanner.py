@@ -15,11 +15,11 @@ from hardware_bridge.config import parse_config
 from hardware_bridge.decoders.rplidar import REQUEST
 from hardware_bridge.emulator.encoders import make_encoder
 from hardware_bridge.errors import BridgeError
+from hardware_bridge.ingest.rangefinder import LASTS, Near
+from hardware_bridge.ingest.scanner import ScannerMount
 from hardware_bridge.links.links import Links
 from hardware_bridge.links.ports import Chunk, PortSpec
 from hardware_bridge.links.serial_port import SerialPort
-from hardware_bridge.live.near import LASTS, Near
-from hardware_bridge.live.scanner import ScannerMount
 from hardware_bridge.live.swarm import LiveSwarm
 from hardware_bridge.readings import UNNAMED, ScanReading
 from relpos_env.interface.beams import FARTHEST, beam_directions, beam_starts

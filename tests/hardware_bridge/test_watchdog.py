@@ -7,11 +7,11 @@ import time
 import pytest
 from click.testing import CliRunner
 
-from agents.cli import cli
-from agents.emulate.options import EmulateOptions
-from agents.emulate.rig import STEP_NS, EmulatedRig
+from agents.cli.main import cli
 from agents.errors import UsageError
-from agents.watchdog import measure_watchdogs
+from agents.hardware.emulate.options import EmulateOptions
+from agents.hardware.emulate.rig import STEP_NS, EmulatedRig
+from agents.hardware.inspection.watchdog import measure_watchdogs
 from hardware_bridge.config import read_config
 from hardware_bridge.decoders.relpos import RelposDecoder
 from hardware_bridge.errors import BridgeError
@@ -52,7 +52,7 @@ def test_what_is_measured_is_what_the_cars_do(tmp_path, driver, deadman):
 
 
 def test_a_car_that_never_stops_is_told(tmp_path, monkeypatch):
-    monkeypatch.setattr("agents.watchdog.LONGEST", 1.0)
+    monkeypatch.setattr("agents.hardware.inspection.watchdog.LONGEST", 1.0)
     with Emulation(tmp_path, deadman=10.0):
         config = read_config(tmp_path / "swarm.toml")
         assert [car.watchdog for car in config.cars] == [None, None]
@@ -101,7 +101,7 @@ class Interrupted:
 def test_whatever_ends_it_the_car_is_told_to_stand(tmp_path, monkeypatch):
     with Emulation(tmp_path):
         config = read_config(tmp_path / "swarm.toml")
-    monkeypatch.setattr("agents.watchdog.Links", Interrupted)
+    monkeypatch.setattr("agents.hardware.inspection.watchdog.Links", Interrupted)
     with pytest.raises(KeyboardInterrupt):
         measure_watchdogs(config)
     decoder = DriveDecoder(config.cars[0])

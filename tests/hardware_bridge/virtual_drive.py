@@ -4,8 +4,8 @@ from collections import deque
 
 import numpy as np
 
-from agents.compare.contender import find_entry
-from agents.emulate.virtual import VirtualBridge
+from agents.comparison.contender import find_entry
+from agents.hardware.emulate.virtual import VirtualBridge
 from hardware_bridge.emulator.fault_plan import Fault
 from hardware_bridge.emulator.ports import MemoryPort
 from hardware_bridge.live.env import LiveFormationEnv

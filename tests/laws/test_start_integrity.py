@@ -8,8 +8,8 @@ import pytest
 
 from tests.exact_motion import ExactGroup
 from tracking import Tracker
-from tracking.integrity import wrong_while_ok
 from tracking.measurements import Kind
+from tracking.metrics.integrity import wrong_while_ok
 
 T = np.arange(0.2, 11.5, 0.05)
 NUMBERINGS = (

@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from agents.simulate import simulate
+from agents.simulation.simulate import simulate
 from tests.exact_motion import ExactGroup
 from tracking import Status, TeamEstimate, Tracker, TrackerParams
 from tracking.filters import FILTERS, FilterParams

@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
-from agents.simulate import simulate
+from agents.simulation.simulate import simulate
 from tracking import Tracker
-from tracking.bounds import posterior_bound
-from tracking.filters.joint import smoothing, state
+from tracking.filters.joint import state
+from tracking.filters.joint.ekf import smoothing
 from tracking.filters.joint.params import JointParams, NoiseLearningParams
 from tracking.filters.params import FilterParams
 from tracking.measurements import Kind
+from tracking.metrics.bound import posterior_bound
 from tracking.tracker import TrackerParams
 
 

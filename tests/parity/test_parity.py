@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from relpos_env import formation_v0
-from relpos_env.drivers import LoopDrivers
 from relpos_env.interface.perception import FOR_POLICIES
-from relpos_env.recording import Recording
 from relpos_env.scenarios import draw_episode, scenario
-from relpos_env.swarm import Swarm
+from relpos_env.simulation.recorder import Recording
+from relpos_env.simulation.scripted_driver import LoopDrivers
 from relpos_env.timing import DT
+from relpos_env.world.world import Swarm
 from tracking import TeamEstimate, Tracker, TrackerParams
 from tracking.filters import FILTERS
-from tracking.horizon import Horizon
+from tracking.late_data.horizon import Horizon
 from tracking.log import read_log, write_log
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from agents.calibrate import calibrate_imus, calibrate_magnetometers, calibrate_ranges
+from agents.evaluation.calibrate import calibrate_imus, calibrate_magnetometers, calibrate_ranges
 from tracking.calibration import CalibrationError, range_table
 from tracking.log import read_log
 

@@ -6,10 +6,9 @@ import gzip
 import numpy as np
 import pytest
 
-from agents.track import track_log
+from agents.evaluation.track import track_log
 from tracking.ahrs.orientation import Orientation
 from tracking.ahrs.params import OrientationParams
-from tracking.bounds import recorded_bound
 from tracking.constellation import Constellation, NodeConfig
 from tracking.filters import FILTERS
 from tracking.filters.joint.params import JointParams
@@ -18,6 +17,7 @@ from tracking.findings import examine
 from tracking.geometry import quat_conjugate, quat_multiply
 from tracking.log import read_log
 from tracking.measurements import Kind, MeasurementBlock
+from tracking.metrics.bound import recorded_bound
 from tracking.tracker import TrackerParams
 
 LOGS = ("isas_walk1", "inrol_env1", "tiers_run01", "tiers_short")

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from relpos_env._vehicle_kernels import (
+from relpos_env.timing import DT
+from relpos_env.world._car_kernels import (
     HEADING,
     N_DRIVE,
     RATE,
@@ -11,8 +12,7 @@ from relpos_env._vehicle_kernels import (
     drive_cars,
     integrate_cars,
 )
-from relpos_env.timing import DT
-from relpos_env.vehicle import CarParams, car_record
+from relpos_env.world.car import CarParams, car_record
 
 
 class Car:

@@ -7,7 +7,7 @@ import numpy as np
 from relpos_env.formation_v0 import parallel_env
 from relpos_env.scenarios import SCENARIOS, draw_episode
 from relpos_env.scenarios.randomisation import Randomisation
-from relpos_env.swarm import Swarm
+from relpos_env.world.world import Swarm
 
 
 def busy(n_cars=5, rate=60.0):

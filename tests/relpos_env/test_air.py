@@ -12,8 +12,8 @@ from relpos_env.sensors.radio.channel import EXACT
 from relpos_env.sensors.radio.params import RadioSimParams
 from tracking.ranging.events import DuplicateId, Role
 from tracking.ranging.exchange import RangeEvent
+from tracking.ranging.frames.timestamps import MODULUS, TICK_HZ
 from tracking.ranging.params import SessionParams
-from tracking.ranging.timestamps import MODULUS, TICK_HZ
 
 DT = 0.01
 CORNERS = np.array([[0.0, 0, 0], [4, 0, 0], [0, 3, 0], [6, 5, 0], [-3, 4, 0], [2, -6, 0]])

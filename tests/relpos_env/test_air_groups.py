@@ -11,7 +11,7 @@ from relpos_env.sensors.radio.channel import EXACT
 from relpos_env.sensors.radio.params import RadioSimParams
 from tracking.errors import ConfigError
 from tracking.ranging import RangeEvent, SessionParams
-from tracking.ranging.airtime import FAST_PHY, PAPER_PHY
+from tracking.ranging.frames.airtime import FAST_PHY, PAPER_PHY
 
 DT = 0.01
 NOISY = replace(EXACT, stamp_std=156e-12)

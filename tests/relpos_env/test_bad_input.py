@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from relpos_env.api.gym_env import FormationGymEnv
+from relpos_env.api.sb3_vec_env import FormationVecEnv
+from relpos_env.api.vector_env import FormationVectorEnv
 from relpos_env.config import FormationConfig
 from relpos_env.errors import EnvError
 from relpos_env.formation_v0 import parallel_env
-from relpos_env.gym_env import FormationGymEnv
-from relpos_env.sb3_vec_env import FormationVecEnv
 from relpos_env.scenarios import SCENARIOS
 from relpos_env.sensors.operator import OperatorSimParams
-from relpos_env.vector_env import FormationVectorEnv
 
 BAD_ARGUMENTS = [
     ({"scenario": "moon"}, "scenario: expected one of .* got 'moon'"),
@@ -233,7 +233,7 @@ def test_a_scenario_as_an_object():
 
 def test_seats_are_checked():
     pytest.importorskip("stable_baselines3")
-    from relpos_env.sb3_vec_env import FormationVecEnv
+    from relpos_env.api.sb3_vec_env import FormationVecEnv
 
     with pytest.raises(EnvError, match="n_envs: expected a whole number from 1"):
         FormationVecEnv(0)

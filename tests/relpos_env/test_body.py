@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from agents.simulate import simulate
+from agents.simulation.simulate import simulate
 from relpos_env import formation_v0
-from relpos_env.body.clips import load_clips
-from relpos_env.body.exercises import EXERCISES, exercise
-from relpos_env.body.motion import SITES, BodyMotion
-from relpos_env.body.path import Path
-from relpos_env.body.pose import STANCE, Pose
-from relpos_env.body.procedural import procedural_body, procedural_pose
-from relpos_env.body.recorded import recorded_body
-from relpos_env.body.skeleton import LIMBS, SKIN, WORN_ON, body_samples, leg_stretch
-from relpos_env.body.skeleton_size import SkeletonSize
-from relpos_env.body_sim import BodySimulation, human_constellation
 from relpos_env.errors import EnvError
+from relpos_env.people.clips import load_clips
+from relpos_env.people.exercises import EXERCISES, exercise
+from relpos_env.people.motion import SITES, BodyMotion
+from relpos_env.people.path import Path
+from relpos_env.people.pose import STANCE, Pose
+from relpos_env.people.procedural import procedural_body, procedural_pose
+from relpos_env.people.recorded import recorded_body
+from relpos_env.people.simulation import BodySimulation, human_constellation
+from relpos_env.people.skeleton import LIMBS, SKIN, WORN_ON, body_samples, leg_stretch
+from relpos_env.people.skeleton_size import SkeletonSize
 from relpos_env.scenarios import HumanScenario, recordable, scenario
 from relpos_env.sensors import Imu, ImuSimParams
 from relpos_env.sensors._imu_kernels import felt_on_car

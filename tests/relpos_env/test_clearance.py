@@ -4,10 +4,10 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from relpos_env._clearance_kernels import FARTHEST, gap, read_clearances
 from relpos_env.formation_v0 import parallel_env
-from relpos_env.scenarios.overlap import distance, overlap
-from relpos_env.world import CAR_RADIUS, WALL_RADIUS
+from relpos_env.geometry._clearance_kernels import FARTHEST, gap, read_clearances
+from relpos_env.scenarios.rooms.overlap import distance, overlap
+from relpos_env.world.pymunk_space import CAR_RADIUS, WALL_RADIUS
 
 boxes = st.tuples(
     st.floats(-1.5, 1.5), st.floats(-1.5, 1.5), st.floats(0.05, 0.8), st.floats(0.05, 0.8),

@@ -7,16 +7,16 @@ import pymunk
 import pytest
 from pymunk.batch import BodyFields, Buffer, get_space_bodies, set_space_bodies
 
-from relpos_env import solver as solver_module
-from relpos_env._contact_kernels import solve
-from relpos_env.bodies import make_bodies, place_bodies
-from relpos_env.group import Group
 from relpos_env.scenarios import SCENARIOS, draw_episode
-from relpos_env.scenarios.obstacle import Obstacle
-from relpos_env.solver import connect, disconnect, make_solver
+from relpos_env.scenarios.rooms.obstacle import Obstacle
 from relpos_env.timing import DT
-from relpos_env.vehicle import CarParams
-from relpos_env.world import REST, World
+from relpos_env.world import solver as solver_module
+from relpos_env.world._contact_kernels import solve
+from relpos_env.world.arrays import make_bodies, place_bodies
+from relpos_env.world.car import CarParams
+from relpos_env.world.pymunk_space import REST, World
+from relpos_env.world.room_state import Group
+from relpos_env.world.solver import connect, disconnect, make_solver
 
 STATE = BodyFields.POSITION | BodyFields.ANGLE | BodyFields.VELOCITY | BodyFields.ANGULAR_VELOCITY
 INPUT = STATE | BodyFields.FORCE | BodyFields.TORQUE

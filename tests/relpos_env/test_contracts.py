@@ -9,11 +9,11 @@ from gymnasium.wrappers.vector import FlattenObservation, NormalizeObservation
 from pettingzoo.test import parallel_api_test
 from runs import busy
 
+from relpos_env.api.gym_env import FormationGymEnv
+from relpos_env.api.vector_env import FormationVectorEnv
 from relpos_env.errors import EnvError, UnknownArgument
 from relpos_env.formation_v0 import parallel_env
-from relpos_env.gym_env import FormationGymEnv
 from relpos_env.scenarios import SCENARIOS
-from relpos_env.vector_env import FormationVectorEnv
 
 POSES = [[-1.5, 0.0, 0.0], [1.5, 0.0, 3.0], [0.0, -1.5, 1.0]]
 KEYS = {"formation_error", "tracking_error", "tracked", "collisions", "present", "active"}

@@ -7,10 +7,10 @@ import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from runs import bits, busy, commands, gym_run, parallel_run, vector_run
 
+from relpos_env.api.gym_env import FormationGymEnv
+from relpos_env.api.vector_env import FormationVectorEnv
 from relpos_env.errors import EnvError
 from relpos_env.formation_v0 import parallel_env
-from relpos_env.gym_env import FormationGymEnv
-from relpos_env.vector_env import FormationVectorEnv
 
 HARD = {"scenario": "random", "level": 4, "n_cars": 5, "max_cycles": 30}
 BUSY = {"scenario": busy(), "max_cycles": 30, "observation": "estimate_cov"}
@@ -95,7 +95,7 @@ def test_a_vector_is_the_sync_vector_of_single_ones(n_envs, kwargs, mode):
 
 def test_one_seed_is_one_series_of_episodes_in_every_form():
     pytest.importorskip("stable_baselines3")
-    from relpos_env.sb3_vec_env import FormationVecEnv
+    from relpos_env.api.sb3_vec_env import FormationVecEnv
 
     kwargs = {"physics": "fast", "max_cycles": 5}
     one, team = parallel_env(**kwargs), FormationGymEnv(**kwargs)

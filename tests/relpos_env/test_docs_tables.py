@@ -9,12 +9,12 @@ import gymnasium
 import pytest
 
 from relpos_env import formation_v0
+from relpos_env.api.gym_env import FormationGymEnv
+from relpos_env.api.parallel_env import FormationEnv
+from relpos_env.api.vector_env import FormationVectorEnv
 from relpos_env.config import FormationConfig
-from relpos_env.gym_env import FormationGymEnv
 from relpos_env.interface.observations import OBSERVATIONS
-from relpos_env.parallel_env import FormationEnv
 from relpos_env.tasks import TASKS
-from relpos_env.vector_env import FormationVectorEnv
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"

@@ -5,7 +5,7 @@ import pytest
 from runs import busy, commands
 
 from relpos_env.config import configure
-from relpos_env.formation import Formation
+from relpos_env.core.env_core import Formation
 from relpos_env.formation_v0 import parallel_env
 from relpos_env.interface.actions import MAX_SPEED, MAX_STEERING
 from relpos_env.interface.observations import OBSERVATIONS, index_table

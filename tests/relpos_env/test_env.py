@@ -12,7 +12,7 @@ from pettingzoo.utils.wrappers import RecordVideoParallel
 from runs import busy
 
 from relpos_env import formation_v0
-from relpos_env.gym_env import FormationGymEnv
+from relpos_env.api.gym_env import FormationGymEnv
 from relpos_env.interface.actions import ACTIONS
 from relpos_env.interface.observations import OBSERVATIONS
 from relpos_env.render.renderer import RENDER_MODES

@@ -13,9 +13,9 @@ from relpos_env.scenarios import (
     draw_episode,
 )
 from relpos_env.scenarios.cars import CARS_LOS
-from relpos_env.scenarios.floor import Floor
-from relpos_env.scenarios.obstacle import boxes_of
-from relpos_env.scenarios.overlap import beyond_walls, car_boxes, overlap
+from relpos_env.scenarios.rooms.floor import Floor
+from relpos_env.scenarios.rooms.obstacle import boxes_of
+from relpos_env.scenarios.rooms.overlap import beyond_walls, car_boxes, overlap
 
 SLOTS = 8
 SECONDS = 180.0

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from agents.compare.simulated import Simulated
+from agents.comparison.simulated import Simulated
 from relpos_env.config import FormationConfig
-from relpos_env.scenarios.overlap import distance
-from relpos_env.tasks.anchor import CLEAR, STEP, free_anchor
-from relpos_env.tasks.curves import make_curve
+from relpos_env.scenarios.rooms.overlap import distance
+from relpos_env.tasks.geometry.anchor import CLEAR, STEP, free_anchor
+from relpos_env.tasks.geometry.curves import make_curve
 from relpos_env.tasks.moving import Motion, Stand
 
 SQUARE = 0.5 * np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]])

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
+from relpos_env.api.gym_env import FormationGymEnv
+from relpos_env.api.vector_env import FormationVectorEnv
 from relpos_env.errors import EnvError
 from relpos_env.formation_v0 import parallel_env
-from relpos_env.gym_env import FormationGymEnv
-from relpos_env.vector_env import FormationVectorEnv
 
 
 def drive(env, steps, action):

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from relpos_env import formation
+from relpos_env.api.gym_env import FormationGymEnv
+from relpos_env.core import env_core as formation
 from relpos_env.formation_v0 import parallel_env
-from relpos_env.gym_env import FormationGymEnv
 from relpos_env.interface.observations import index_table
 from relpos_env.scenarios import draw_episode
 from relpos_env.scenarios.life import LifeEvent

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from agents.simulate import simulate
-from relpos_env.matched import (
+from agents.simulation.simulate import simulate
+from relpos_env.core.oracle_params import (
     ENTER_RATE,
     LEAVE_RATE,
     NEVER,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from agents.evaluate.suites import SUITES
+from agents.evaluation.suites import SUITES
 from tracking.log import read_log, write_log
 from tracking.measurements import Kind
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from relpos_env.config import configure
-from relpos_env.formation import Formation
+from relpos_env.core.env_core import Formation
 
 
 @pytest.mark.parametrize("name", ["joint", "ekf-mds"])

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from relpos_env._nearness_kernels import MARGIN, is_far
-from relpos_env.scenarios.overlap import beyond_walls, car_boxes, overlap
-from relpos_env.vehicle import CarParams
+from relpos_env.geometry._broad_phase_kernels import MARGIN, is_far
+from relpos_env.scenarios.rooms.overlap import beyond_walls, car_boxes, overlap
+from relpos_env.world.car import CarParams
 
 ROOM = (6.0, 5.0)
 

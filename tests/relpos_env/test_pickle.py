@@ -11,10 +11,10 @@ from gymnasium.vector import AsyncVectorEnv
 from runs import bits, busy, commands, parallel_run, run_of_seed
 
 from relpos_env import formation_v0
+from relpos_env.api.gym_env import FormationGymEnv
+from relpos_env.api.vector_env import FormationVectorEnv
 from relpos_env.formation_v0 import parallel_env
-from relpos_env.gym_env import FormationGymEnv
 from relpos_env.scenarios import SCENARIOS
-from relpos_env.vector_env import FormationVectorEnv
 
 BUSY = {"scenario": busy(), "max_cycles": 40, "history": 2}
 COPIES = {"pickle": lambda env: pickle.loads(pickle.dumps(env)), "deepcopy": copy.deepcopy}
@@ -67,7 +67,7 @@ def test_a_copy_in_mid_episode_goes_on_bit_for_bit(make, way):
 
 def test_a_copy_of_the_seats_goes_on_bit_for_bit():
     pytest.importorskip("stable_baselines3")
-    from relpos_env.sb3_vec_env import FormationVecEnv
+    from relpos_env.api.sb3_vec_env import FormationVecEnv
 
     env = FormationVecEnv(2, threads=2, **BUSY)
     env.seed(3)

@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from relpos_env.bodies import box_row
 from relpos_env.config import configure
+from relpos_env.core.env_core import Formation
 from relpos_env.errors import EnvError
-from relpos_env.formation import Formation
 from relpos_env.interface.beams import FARTHEST, beam_directions, beam_starts
 from relpos_env.scenarios import scenario
 from relpos_env.sensors._proximity_kernels import read_proximity
 from relpos_env.sensors.proximity import PROXIMITY, ProximitySimParams, fill_proximity
+from relpos_env.world.arrays import box_row
 from tracking.records import as_records
 
 EXACT = ProximitySimParams(noise_std=0.0, noise_share=0.0)

@@ -7,16 +7,16 @@ import pymunk
 import pytest
 from runs import busy, drive, placed
 
-from relpos_env import group as group_module
-from relpos_env.bodies import NO_BOX
+from relpos_env.api.gym_env import FormationGymEnv
+from relpos_env.api.vector_env import FormationVectorEnv
 from relpos_env.errors import EnvError
 from relpos_env.formation_v0 import parallel_env
-from relpos_env.gym_env import FormationGymEnv
 from relpos_env.scenarios import SCENARIOS, load_scenario
-from relpos_env.sim import Simulation
-from relpos_env.swarm import SPARE_BOXES
-from relpos_env.vector_env import FormationVectorEnv
-from relpos_env.world import rectangle_of
+from relpos_env.simulation.simulation import Simulation
+from relpos_env.world import room_state as group_module
+from relpos_env.world.arrays import NO_BOX
+from relpos_env.world.pymunk_space import rectangle_of
+from relpos_env.world.world import SPARE_BOXES
 
 STILL = np.zeros(2, np.float32)
 FAR = (-3.0, -3.0, 0.0)

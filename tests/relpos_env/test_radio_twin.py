@@ -9,10 +9,10 @@ from relpos_env.sensors.radio.air import Air
 from relpos_env.sensors.radio.channel import CALIBRATED, INDOOR
 from relpos_env.sensors.radio.params import RadioSimParams
 from relpos_env.sensors.radio.radio import Radio
-from tracking.ranging.airtime import FAST_PHY, PAPER_PHY
 from tracking.ranging.exchange import RangeEvent
+from tracking.ranging.frames.airtime import FAST_PHY, PAPER_PHY
+from tracking.ranging.frames.timestamps import MODULUS
 from tracking.ranging.params import SessionParams
-from tracking.ranging.timestamps import MODULUS
 
 DT = 0.01
 ROLES = ["listening", "initiator", "responder"]

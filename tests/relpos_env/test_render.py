@@ -10,12 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from relpos_env.errors import EnvError
-from relpos_env.render import Renderer, Snapshot, car_shape, palette, save_snapshot
-from relpos_env.render.boxes import hatching
-from relpos_env.render.dashes import dashed
-from relpos_env.render.error_plot import error_axis, stretches
-from relpos_env.render.ghosts import ellipse, placed_belief
+from relpos_env.render import Renderer, Snapshot, palette, save_snapshot
 from relpos_env.render.layout import Layout, size_for
+from relpos_env.render.parts import car_shape
+from relpos_env.render.parts.boxes import hatching
+from relpos_env.render.parts.dashes import dashed
+from relpos_env.render.parts.error_plot import error_axis, stretches
+from relpos_env.render.parts.estimates import ellipse, placed_belief
 from tracking.estimate import Status
 
 SIZE = (480, 360)

@@ -11,12 +11,12 @@ from stable_baselines3.common.env_checker import check_env
 from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.vec_env import SubprocVecEnv, VecMonitor, VecNormalize
 
+from relpos_env.api.gym_env import FormationGymEnv
+from relpos_env.api.sb3_vec_env import FormationVecEnv
 from relpos_env.errors import EnvError
 from relpos_env.formation_v0 import parallel_env
-from relpos_env.gym_env import FormationGymEnv
 from relpos_env.interface.actions import ACTIONS
 from relpos_env.interface.observations import OBSERVATIONS
-from relpos_env.sb3_vec_env import FormationVecEnv
 from relpos_env.tasks import TASKS
 
 MATRIX = [(task, observation) for task in TASKS for observation in OBSERVATIONS]

@@ -23,8 +23,8 @@ from relpos_env.scenarios import (
 from relpos_env.scenarios.cars import CARS_NLOS
 from relpos_env.scenarios.catalogue import FILES, scenario_from
 from relpos_env.sensors.radio.channel import INDOOR
-from tracking.ranging.airtime import FAST_PHY
-from tracking.tables import readable
+from tracking.params.tables import readable
+from tracking.ranging.frames.airtime import FAST_PHY
 
 
 def save(tmp_path, text, name="my.toml"):

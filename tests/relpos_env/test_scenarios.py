@@ -21,9 +21,9 @@ from relpos_env.scenarios import (
 )
 from relpos_env.scenarios.cars import CARS_LOS, CARS_NLOS
 from relpos_env.scenarios.catalogue import FILES
-from relpos_env.scenarios.floor import Floor
-from relpos_env.scenarios.obstacle import boxes_of
-from relpos_env.scenarios.overlap import beyond_walls, car_boxes, distance, overlap
+from relpos_env.scenarios.rooms.floor import Floor
+from relpos_env.scenarios.rooms.obstacle import boxes_of
+from relpos_env.scenarios.rooms.overlap import beyond_walls, car_boxes, distance, overlap
 
 
 def rng(seed=0):

@@ -5,8 +5,6 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from relpos_env.recording import quat_from_tilt
-from relpos_env.records import fill_numbers
 from relpos_env.sensors._imu_kernels import STARTS, felt_on_car, read_imu, start_imus
 from relpos_env.sensors._magnetometer_kernels import (
     N_WAVE,
@@ -17,6 +15,8 @@ from relpos_env.sensors._odometer_kernels import read_odometers
 from relpos_env.sensors.imu import IMU, ImuSimParams, fill_imu
 from relpos_env.sensors.magnetometer import MAG, MagSimParams, fill_mag
 from relpos_env.sensors.odometer import ODOMETER, OdometerSimParams
+from relpos_env.simulation.recorder import quat_from_tilt
+from relpos_env.world.parameter_records import fill_numbers
 from tracking.geometry import GRAVITY, quat_conjugate, quat_from_yaw, quat_multiply, rotate
 from tracking.maths.angles import cosine_sine
 from tracking.records import as_records

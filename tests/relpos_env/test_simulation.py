@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from runs import bits
 
-from relpos_env.drivers import LoopDrivers
 from relpos_env.errors import EnvError
 from relpos_env.scenarios import SCENARIOS, draw_episode, scenario
 from relpos_env.sensors import RadioSimParams
 from relpos_env.sensors.radio.channel import EXACT
-from relpos_env.sim import Simulation
-from relpos_env.swarm import Swarm
+from relpos_env.simulation.scripted_driver import LoopDrivers
+from relpos_env.simulation.simulation import Simulation
+from relpos_env.world.world import Swarm
 from tracking.measurements import Kind
 
 

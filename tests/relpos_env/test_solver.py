@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from runs import busy
 
-from relpos_env.drivers import LoopDrivers
 from relpos_env.interface.actions import DriveCommand
 from relpos_env.scenarios import SCENARIOS, draw_episode
-from relpos_env.swarm import SPARE_BOXES, Swarm
+from relpos_env.simulation.scripted_driver import LoopDrivers
+from relpos_env.world.world import SPARE_BOXES, Swarm
 
 FIELDS = ("body", "drive", "accel", "contacts", "present")
 

@@ -7,9 +7,9 @@ from scipy.optimize import linear_sum_assignment
 from relpos_env.errors import EnvError
 from relpos_env.scenarios import Gap
 from relpos_env.tasks import DEFAULT_WEIGHTS, TASKS, make_task, reward_weights
-from relpos_env.tasks.assignment import assign
-from relpos_env.tasks.curves import CURVES, Curve, rounded
-from relpos_env.tasks.shapes import SHAPES, Formation
+from relpos_env.tasks.geometry.assignment import assign
+from relpos_env.tasks.geometry.curves import CURVES, Curve, rounded
+from relpos_env.tasks.geometry.shapes import SHAPES, Formation
 
 ROOM = (9.0, 8.0)
 

@@ -9,9 +9,9 @@ from relpos_env.scenarios import SCENARIOS, Obstacle
 from relpos_env.scenarios.episode import draw_episode
 from relpos_env.scenarios.life import LifeEvent
 from relpos_env.sensors import ImuSimParams
-from relpos_env.swarm import Swarm
-from relpos_env.vehicle import CarParams
-from relpos_env.world import BOX_DENSITY, BOX_FRICTION, ELASTICITY, FRICTION, World
+from relpos_env.world.car import CarParams
+from relpos_env.world.pymunk_space import BOX_DENSITY, BOX_FRICTION, ELASTICITY, FRICTION, World
+from relpos_env.world.world import Swarm
 from tracking.geometry import GRAVITY
 from tracking.measurements import Kind
 

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from one_car import Car, forward
 
-from relpos_env._vehicle_kernels import (
+from relpos_env.errors import EnvError
+from relpos_env.timing import DT
+from relpos_env.world._car_kernels import (
     ACCEL,
     HEADING,
     PITCH,
@@ -17,9 +19,7 @@ from relpos_env._vehicle_kernels import (
     VX,
     VY,
 )
-from relpos_env.errors import EnvError
-from relpos_env.timing import DT
-from relpos_env.vehicle import CarParams, car_record
+from relpos_env.world.car import CarParams, car_record
 from tracking.geometry import GRAVITY
 
 

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from one_car import Car, forward
 from scipy.integrate import solve_ivp
 
-from relpos_env._vehicle_kernels import (
+from relpos_env.timing import DT
+from relpos_env.world._car_kernels import (
     ACCEL,
     HEADING,
     N_DRIVE,
@@ -20,8 +21,7 @@ from relpos_env._vehicle_kernels import (
     drive_cars,
     integrate_cars,
 )
-from relpos_env.timing import DT
-from relpos_env.vehicle import CarParams, car_record
+from relpos_env.world.car import CarParams, car_record
 from tracking.geometry import GRAVITY
 
 state = st.tuples(

@@ -7,10 +7,10 @@ import pytest
 from scipy.sparse.csgraph import shortest_path
 
 from relpos_env.config import FormationConfig
-from relpos_env.formation import Formation
+from relpos_env.core.env_core import Formation
 from relpos_env.tasks import make_task
-from relpos_env.tasks._way_kernels import BERTH, CORNER
-from relpos_env.tasks.ways import Ways
+from relpos_env.tasks.geometry.shortest_paths import Ways
+from relpos_env.tasks.kernels.path import BERTH, CORNER
 
 HALF = (3.0, 2.5)
 WALL_ACROSS = np.array([[0.0, 0.0, 0.1, 1.0, 1.0, 0.0]])

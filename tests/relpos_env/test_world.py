@@ -6,9 +6,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from runs import drive, placed
 
-from relpos_env.scenarios.obstacle import Obstacle
-from relpos_env.scenarios.overlap import beyond_walls, car_boxes
-from relpos_env.vehicle import CarParams
+from relpos_env.scenarios.rooms.obstacle import Obstacle
+from relpos_env.scenarios.rooms.overlap import beyond_walls, car_boxes
+from relpos_env.world.car import CarParams
 from tracking.measurements import Kind
 
 CAR = CarParams()

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
-from agents.compare.contender import find_entry
+from agents.comparison.contender import find_entry
 from agents.controllers import CONTROLLERS, controller_builder
 from agents.errors import UsageError
+from relpos_env.api.gym_env import FormationGymEnv
 from relpos_env.errors import EnvError
 from relpos_env.formation_v0 import parallel_env
-from relpos_env.gym_env import FormationGymEnv
 from relpos_env.interface.actions import ContinuousActions
 from relpos_env.interface.observations.ranges import Ranges
 from relpos_env.tasks.rendezvous import Rendezvous

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agents.simulate import simulate
-from relpos_env.matched import matched_params
+from agents.simulation.simulate import simulate
+from relpos_env.core.oracle_params import matched_params
 from relpos_env.scenarios import recordable
 from tracking import (
     ConfigError,
@@ -19,15 +19,15 @@ from tracking import (
     Tracker,
     TrackerParams,
 )
-from tracking.bounds import posterior_bound
-from tracking.consistency import chi_square_band, pair_nees
 from tracking.filters import FilterParams
 from tracking.filters.joint.params import JointParams, RangeErrorParams
-from tracking.gospa import labelled_gospa
-from tracking.horizon import Horizon, HorizonParams
+from tracking.late_data.horizon import Horizon, HorizonParams
 from tracking.log import Log, Truth
 from tracking.measurements import Kind, MeasurementBlock
-from tracking.metrics import score
+from tracking.metrics.bound import posterior_bound
+from tracking.metrics.consistency import chi_square_band, pair_nees
+from tracking.metrics.gospa import labelled_gospa
+from tracking.metrics.score import score
 from tracking.vehicles import VEHICLES
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from agents.simulate import record
+from agents.simulation.simulate import record
 from relpos_env.scenarios import recordable
 from relpos_env.scenarios.episode import draw_episode
 from relpos_env.scenarios.randomisation import Randomisation

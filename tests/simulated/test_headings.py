@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from agents.simulate import simulate
-from relpos_env.matched import matched_params
+from agents.simulation.simulate import simulate
+from relpos_env.core.oracle_params import matched_params
 from relpos_env.scenarios import recordable
 from relpos_env.timing import STAND_STILL
 from tracking import Tracker, TrackerParams

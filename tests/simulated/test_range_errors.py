@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from agents.simulate import simulate
-from relpos_env.matched import matched_params
+from agents.simulation.simulate import simulate
+from relpos_env.core.oracle_params import matched_params
 from relpos_env.scenarios import recordable
-from tracking.bounds import UNKNOWN_TURN, posterior_bound, recorded_bound
 from tracking.calibration.distances import range_table
 from tracking.calibration.range_errors import measure_range_errors
 from tracking.errors import LogError
 from tracking.log import Truth
 from tracking.measurements import Kind
+from tracking.metrics.bound import UNKNOWN_TURN, posterior_bound, recorded_bound
 
 
 @pytest.fixture(scope="module")

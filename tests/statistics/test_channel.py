@@ -17,7 +17,7 @@ from relpos_env.sensors.radio._occlusion_kernels import crosses_box, crosses_cap
 from relpos_env.sensors.radio.channel import CALIBRATED, EXACT, HALL, INDOOR, OUTDOOR
 from relpos_env.sensors.radio.params import RadioSimParams
 from relpos_env.sensors.radio.radio import Radio
-from tracking.ranging.timestamps import METRES_PER_TICK, SPEED_OF_LIGHT
+from tracking.ranging.frames.timestamps import METRES_PER_TICK, SPEED_OF_LIGHT
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLE = run_path(str(ROOT / "examples" / "channel_against_data.py"))

@@ -6,7 +6,7 @@ from scipy.stats import chisquare, kstest, norm
 
 from relpos_env.sensors.radio._normal_kernels import DENSITIES, EDGES, TAIL, normal
 from relpos_env.sensors.radio._random_kernels import draw_key, uniform
-from tracking.jit import kernel
+from tracking.kernels.jit import kernel
 
 
 def key_of(seed, count):

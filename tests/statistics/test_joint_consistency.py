@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from agents.simulate import simulate
-from relpos_env.matched import matched_params
+from agents.simulation.simulate import simulate
+from relpos_env.core.oracle_params import matched_params
 from relpos_env.scenarios import recordable
 from tracking import Status, Tracker, TrackerParams
 from tracking.filters import FilterParams
-from tracking.metrics import score
+from tracking.metrics.score import score
 
 SECONDS, SEEDS = 40.0, range(500, 506)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from agents.simulate import simulate
+from agents.simulation.simulate import simulate
 from tracking import Status, Tracker
 
 SPOILED = 15.0

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from tracking.ranging.airtime import PAPER_PHY, message_time, round_rate
+from tracking.ranging.frames.airtime import PAPER_PHY, message_time, round_rate
 
 
 @pytest.mark.parametrize(("n", "paper_hz"), [(3, 81.83), (6, 28.6)])

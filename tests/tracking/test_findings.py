@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from agents.simulate import simulate
-from agents.track import track_log
+from agents.evaluation.track import track_log
+from agents.simulation.simulate import simulate
 from tests.second_world.record import record
 from tests.second_world.world import draw
 from tracking.constellation import NodeConfig

@@ -8,10 +8,11 @@ from scipy.spatial.transform import Rotation
 from test_joint_kernels import running
 from test_open_turn import MIRROR, anywhere, log_likelihood
 
-from tracking.filters.joint import motion_constraints, range_update, scalar_update
+from tracking.filters.joint.ekf import scalar_update
 from tracking.filters.joint.hypotheses import alignment_modes, alignment_sensitivity, bank
 from tracking.filters.joint.hypotheses.alignment import Alignment
 from tracking.filters.joint.state import JointState
+from tracking.filters.joint.updates import motion_constraints, range_update
 from tracking.maths import rotation_modes
 
 

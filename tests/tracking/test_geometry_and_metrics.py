@@ -14,7 +14,7 @@ from tracking.geometry import (
     rotate,
     yaw_of,
 )
-from tracking.metrics import score
+from tracking.metrics.score import score
 
 
 def random_quaternions(n, seed=0):

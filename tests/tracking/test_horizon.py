@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tracking.horizon import Horizon, HorizonParams
+from tracking.late_data.horizon import Horizon, HorizonParams
 from tracking.measurements import Kind, MeasurementBlock
 
 

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tracking.errors import ConfigError
-from tracking.horizon import Horizon, HorizonParams
-from tracking.horizon_queue import hand_on, take_in
+from tracking.late_data.horizon import Horizon, HorizonParams
+from tracking.late_data.queue import hand_on, take_in
 from tracking.measurements import N_MEASURED, MeasurementBlock
 
 NAMES = tuple(f.name for f in fields(MeasurementBlock))

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from tracking import Constellation, NodeConfig, Status, TeamEstimate
-from tracking.consistency import pair_nees
-from tracking.integrity import (
+from tracking.metrics.consistency import pair_nees
+from tracking.metrics.integrity import (
     beyond_protection,
     longest,
     protection_radius,
     wrong_while_ok,
 )
-from tracking.metrics import score
+from tracking.metrics.score import score
 from tracking.vehicles import VEHICLES
 
 GROUP = Constellation(nodes=tuple(NodeConfig(id=k) for k in range(3)), dimensions=2)

@@ -9,11 +9,11 @@ import pytest
 from numba import config, typeof
 from numba.core.errors import TypingError
 
-from tracking.jit import _type_of, kernel, small_kernel
-from tracking.reference import by_reference
+from tracking.kernels.addresses import by_reference
+from tracking.kernels.jit import _type_of, kernel, small_kernel
 
 KERNEL = """
-from tracking.jit import kernel
+from tracking.kernels.jit import kernel
 
 
 @kernel
@@ -59,11 +59,11 @@ def folder(tmp_path):
     """A kernel that calls a kernel of another file, which uses a constant of a third."""
     (tmp_path / "sizes.py").write_text("FACTOR = 2\nOTHER = 1\n")
     (tmp_path / "_times_kernels.py").write_text(
-        "from sizes import FACTOR\nfrom tracking.jit import kernel\n\n\n"
+        "from sizes import FACTOR\nfrom tracking.kernels.jit import kernel\n\n\n"
         "@kernel\ndef times(x):\n    return FACTOR * x\n"
     )
     (tmp_path / "_double_kernels.py").write_text(
-        "from _times_kernels import times\nfrom tracking.jit import kernel\n\n\n"
+        "from _times_kernels import times\nfrom tracking.kernels.jit import kernel\n\n\n"
         "@kernel\ndef double(x):\n    return times(x)\n"
     )
     return tmp_path

@@ -7,13 +7,13 @@ from hypothesis import strategies as st
 
 from tracking import Constellation, NodeConfig
 from tracking.filters.joint.coefficients import make_coefficients
+from tracking.filters.joint.ekf.preintegration import process_attitude
 from tracking.filters.joint.hypotheses.initialisation import (
     initial_nlos_prob,
     initialise_node,
     initialise_pair,
 )
 from tracking.filters.joint.params import JointParams, NlosParams
-from tracking.filters.joint.preintegration import process_attitude
 from tracking.filters.joint.state import JointState, make_state
 from tracking.measurements import N_VALUES
 from tracking.records import as_records

@@ -7,19 +7,14 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from tracking import Constellation, NodeConfig
-from tracking.filters.joint import (
-    motion_constraints,
-    observability,
-    preintegration,
-    propagation,
-    scalar_update,
-)
 from tracking.filters.joint.coefficients import make_coefficients
+from tracking.filters.joint.ekf import observability, preintegration, propagation, scalar_update
+from tracking.filters.joint.ekf.workspace import make_workspace
 from tracking.filters.joint.hypotheses.alignment import Alignment
 from tracking.filters.joint.params import JointParams
-from tracking.filters.joint.range_update import predict_range
 from tracking.filters.joint.state import JointState, make_layout, make_state
-from tracking.filters.joint.workspace import make_workspace
+from tracking.filters.joint.updates import motion_constraints
+from tracking.filters.joint.updates.range_update import predict_range
 from tracking.geometry import GRAVITY
 from tracking.records import as_records
 

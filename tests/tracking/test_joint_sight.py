@@ -8,8 +8,11 @@ from scipy.linalg import expm
 from scipy.stats import norm
 
 from tests.tracking.test_joint_kernels import running
-from tracking.filters.joint.nlos_model import reset_bias_on_transition, update_nlos_posterior
-from tracking.filters.joint.propagation import predict
+from tracking.filters.joint.ekf.propagation import predict
+from tracking.filters.joint.updates.nlos_model import (
+    reset_bias_on_transition,
+    update_nlos_posterior,
+)
 
 SHARES = st.floats(0.0, 0.99)
 

@@ -8,9 +8,9 @@ import pytest
 from tests.exact_motion import ExactGroup
 from tracking import Status, Tracker
 from tracking.findings import find_unplaced, find_unused
-from tracking.integrity import wrong_while_ok
 from tracking.log import Log
 from tracking.measurements import Kind
+from tracking.metrics.integrity import wrong_while_ok
 
 
 def thinned(group, rate, loss, seed):

@@ -8,17 +8,18 @@ from scipy.spatial.transform import Rotation
 from test_joint_kernels import running
 
 from tracking import Status, Tracker
-from tracking.filters.joint import motion_constraints, propagation, surveyed_distance
 from tracking.filters.joint.coefficients import make_coefficients
+from tracking.filters.joint.ekf import propagation
+from tracking.filters.joint.ekf.preintegration import preintegrate
+from tracking.filters.joint.ekf.tilt_correction import GAIN
 from tracking.filters.joint.hypotheses import alignment_modes, alignment_sensitivity
 from tracking.filters.joint.hypotheses.alignment import Alignment
 from tracking.filters.joint.hypotheses.geometric_degeneracy import degeneracy_ratio
-from tracking.filters.joint.lever_arm import antenna_offset, lever_arm_sensitivity
 from tracking.filters.joint.params import JointParams
-from tracking.filters.joint.preintegration import preintegrate
-from tracking.filters.joint.range_update import predict_range
 from tracking.filters.joint.state import JointState, make_state
-from tracking.filters.joint.tilt_correction import GAIN
+from tracking.filters.joint.updates import motion_constraints, surveyed_distance
+from tracking.filters.joint.updates.lever_arm import antenna_offset, lever_arm_sensitivity
+from tracking.filters.joint.updates.range_update import predict_range
 from tracking.maths import rotation_modes
 from tracking.maths.starting_rotations import starting_rotations
 from tracking.measurements import Kind

@@ -11,7 +11,7 @@ from tracking.constellation import Antenna
 from tracking.errors import ConfigError
 from tracking.filters.joint.params import JointParams
 from tracking.filters.pair.params import PairEkfParams
-from tracking.horizon import Horizon, HorizonParams
+from tracking.late_data.horizon import Horizon, HorizonParams
 from tracking.measurements import Kind, MeasurementBlock
 from tracking.vehicles import VehicleParams
 

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from agents.simulate import simulate
-from agents.track import track_log
+from agents.evaluation.track import track_log
+from agents.simulation.simulate import simulate
 from tests.exact_motion import ExactGroup
 from tracking import Status, Tracker
 from tracking.errors import ConfigError
 from tracking.measurements import Kind, MeasurementBlock
-from tracking.metrics import score
+from tracking.metrics.score import score
 from tracking.whole_smoother import backwards, smooth_whole
 
 

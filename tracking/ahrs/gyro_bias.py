@@ -18,7 +18,7 @@ import math
 
 from tracking.ahrs.lowpass import low_pass
 from tracking.ahrs.rest import GYR, RESTING
-from tracking.jit import small_kernel
+from tracking.kernels.jit import small_kernel
 
 UNIT = 0.01 * math.pi / 180.0
 """[rad/s] What it is counted in."""

@@ -12,7 +12,7 @@ References:
 
 from __future__ import annotations
 
-from tracking.jit import small_kernel
+from tracking.kernels.jit import small_kernel
 
 B0, B1, B2, A1, A2, N_MEAN = 0, 1, 2, 3, 4, 5
 N_LOW_PASS = 6

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 
 from tracking.ahrs.lowpass import low_pass
-from tracking.jit import small_kernel
+from tracking.kernels.jit import small_kernel
 
 DELTA, COS, SIN, GAIN, DISTURBED, REJECTED_T, UNDISTURBED_T = 0, 1, 2, 3, 4, 5, 6
 NORM, DIP, NEW_NORM, NEW_DIP, NEW_T, COUNT, FIELD = 7, 8, 9, 10, 11, 12, 13

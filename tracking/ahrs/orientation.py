@@ -31,7 +31,7 @@ from tracking.ahrs.params import OrientationParams
 from tracking.ahrs.stage import forget, orient
 from tracking.constellation import Constellation
 from tracking.geometry import GRAVITY
-from tracking.jit import Call, bind
+from tracking.kernels.jit import Call, bind
 from tracking.measurements import Kind, MeasurementBlock
 
 __all__ = [

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from tracking.numbers import check_numbers
+from tracking.params.checks import check_numbers
 from tracking.sanity.params import SanityParams
 
 VQF_TAU_ACC = 3.0

@@ -7,7 +7,7 @@ References:
 from __future__ import annotations
 
 from tracking.ahrs.lowpass import low_pass
-from tracking.jit import small_kernel
+from tracking.kernels.jit import small_kernel
 
 GYR, ACC, REST_T, RESTING = 0, 9, 18, 19
 N_REST = 20

@@ -20,7 +20,7 @@ from tracking.ahrs.vqf import (
     update_heading,
     update_vqf,
 )
-from tracking.jit import kernel, small_kernel
+from tracking.kernels.jit import kernel, small_kernel
 from tracking.measurements import ACCEL_NOISE, GYRO_BIAS, GYRO_VAR, TOLD, UPRIGHT
 from tracking.sanity.imu import GOOD, N_ODD, inspect_sample
 from tracking.sanity.saturation import find_limits

@@ -11,7 +11,7 @@ from tracking.constellation import Constellation
 from tracking.geometry import rotate
 from tracking.log.truth import MAX_GAP, Truth
 from tracking.measurements import Kind, MeasurementBlock
-from tracking.short_repr import short_repr
+from tracking.params.short_repr import short_repr
 
 
 @dataclass(frozen=True, slots=True)

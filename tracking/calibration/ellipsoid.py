@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tracking.arrays import F64, Bool
-from tracking.short_repr import short_repr
+from tracking.params.short_repr import short_repr
 
 N_TRIALS = 100
 N_SUBSET = 20

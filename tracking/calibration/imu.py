@@ -25,7 +25,7 @@ from tracking.calibration.calibration import NodeCalibration
 from tracking.calibration.errors import CalibrationError
 from tracking.calibration.rest import Rest, RestParams, find_rest
 from tracking.geometry import GRAVITY
-from tracking.short_repr import short_repr
+from tracking.params.short_repr import short_repr
 
 MIN_REST = 1.0
 """[s] Rest that is needed; white noise of a second is far below any offset."""

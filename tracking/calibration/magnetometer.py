@@ -20,7 +20,7 @@ from tracking.arrays import F64, I64, Bool
 from tracking.calibration.calibration import Matrix, NodeCalibration, Vector
 from tracking.calibration.ellipsoid import Ellipsoid, fit_circle, fit_ellipsoid
 from tracking.calibration.errors import CalibrationError
-from tracking.short_repr import short_repr
+from tracking.params.short_repr import short_repr
 
 MIN_SAMPLES = 100
 STILL = 0.05

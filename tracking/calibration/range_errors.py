@@ -26,7 +26,7 @@ from tracking.calibration.distances import range_table
 from tracking.errors import LogError
 from tracking.filters.joint.params import RangeErrorParams
 from tracking.log import Log
-from tracking.short_repr import short_repr
+from tracking.params.short_repr import short_repr
 
 EDGES = np.concatenate([[0.0], np.geomspace(0.005, 12.0, 19)])
 """[m] Ways between two ranges of a pair that are looked at together."""

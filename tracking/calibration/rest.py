@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tracking.arrays import F64, Bool
-from tracking.short_repr import short_repr
+from tracking.params.short_repr import short_repr
 
 MAX_GAP = 0.5
 """[s] A silence this long ends a phase."""

@@ -21,7 +21,7 @@ from tracking.arrays import F64, I64, Bool
 from tracking.calibration.calibration import RangeCalibration
 from tracking.calibration.distances import RangeTable
 from tracking.calibration.errors import CalibrationError
-from tracking.short_repr import short_repr
+from tracking.params.short_repr import short_repr
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,7 +11,7 @@ from tracking.filters.joint import JointEkf
 from tracking.filters.pair import PairEkf
 from tracking.filters.paper import PaperEkf
 from tracking.filters.params import FilterParams
-from tracking.registry import look_up
+from tracking.params.registry import look_up
 
 FilterBuilder = Callable[[Constellation, FilterParams, int], Filter]
 

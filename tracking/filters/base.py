@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 from tracking.arrays import F64
 from tracking.estimate import TeamEstimate
-from tracking.jit import Call
+from tracking.kernels.jit import Call
 from tracking.measurements import MeasurementBlock
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from tracking.arrays import F64
 from tracking.constellation import Constellation
 from tracking.estimate import TeamEstimate
-from tracking.jit import Call, bind
+from tracking.kernels.jit import Call, bind
 from tracking.measurements import MeasurementBlock
 
 

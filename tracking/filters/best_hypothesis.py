@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from tracking.jit import kernel
+from tracking.kernels.jit import kernel
 
 LEAST_LEAD = 1e-9
 """[-] Log-likelihoods that differ by less are equal but for rounding."""

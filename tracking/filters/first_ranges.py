@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.jit import allocating_kernel, kernel
+from tracking.kernels.jit import allocating_kernel, kernel
 
 N_FIRST = 8
 """Ranges of a pair that are kept until it runs, the newest."""

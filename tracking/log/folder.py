@@ -10,7 +10,7 @@ from tracking.arrays import Bool
 from tracking.constellation import Constellation
 from tracking.log.truth import Truth
 from tracking.measurements import Kind, MeasurementBlock
-from tracking.short_repr import short_repr
+from tracking.params.short_repr import short_repr
 
 FORMAT = 1
 GYR = ("gyr_x", "gyr_y", "gyr_z")

@@ -8,7 +8,7 @@ import numpy as np
 
 from tracking.arrays import F64, I64, Bool
 from tracking.constellation import Constellation
-from tracking.short_repr import short_repr
+from tracking.params.short_repr import short_repr
 
 MAX_GAP = 0.5
 """[s] Truth of a moving node is interpolated over gaps up to here."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from tracking.jit import small_kernel
+from tracking.kernels.jit import small_kernel
 
 SERIES = 0.25**2
 """[rad2] Square of an angle below which these terms are exact to rounding."""

@@ -26,7 +26,7 @@ import os
 
 from numba import config
 
-from tracking.jit import kernel, small_kernel
+from tracking.kernels.jit import kernel, small_kernel
 from tracking.maths import covariance_loops as loops
 from tracking.maths import covariance_simd as simd
 from tracking.maths.covariance_loops import ROOM, STATES, mirror

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tracking.jit import kernel, small_kernel
+from tracking.kernels.jit import kernel, small_kernel
 
 STATES, ROOM = 7, 8
 """States behind position and velocity, at most; numbers of a line of F."""

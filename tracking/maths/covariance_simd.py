@@ -12,8 +12,8 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+from tracking.kernels.processors import has_wide_registers
 from tracking.maths.covariance_loops import STATES
-from tracking.processors import has_wide_registers
 
 LANES = 8 if has_wide_registers() else 4
 """Numbers of a vector."""

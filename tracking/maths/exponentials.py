@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from tracking.jit import small_kernel
+from tracking.kernels.jit import small_kernel
 
 LEAST = -745.0
 """[-] Exponentials of less are taken for that of this, the smallest number there is."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.jit import allocating_kernel
+from tracking.kernels.jit import allocating_kernel
 
 MIN_EXTENT = 0.1
 """[m] Along an axis of which others extend less, the errors of ranges are all that they tell."""

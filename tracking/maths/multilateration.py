@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.jit import allocating_kernel, kernel, small_kernel
+from tracking.kernels.jit import allocating_kernel, kernel, small_kernel
 from tracking.maths.linear_multilateration import main_axes, place_across, sort_sides
 
 EQUAL, ON_EDGE = 1e-6, 1e-9

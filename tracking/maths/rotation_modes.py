@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from tracking.jit import allocating_kernel
+from tracking.kernels.jit import allocating_kernel
 
 STEPS, SMALL = 30, 1e-4
 """[-, rad] Steps of a climb at most; it ends with one as small as this."""

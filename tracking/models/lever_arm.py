@@ -8,7 +8,7 @@ part of the range that the lever arm of its second end adds.
 
 from __future__ import annotations
 
-from tracking.jit import small_kernel
+from tracking.kernels.jit import small_kernel
 from tracking.maths.angles import cosine_sine
 
 

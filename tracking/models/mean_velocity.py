@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from tracking.jit import small_kernel
+from tracking.kernels.jit import small_kernel
 
 
 @small_kernel

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 
-from tracking.jit import small_kernel
+from tracking.kernels.jit import small_kernel
 from tracking.maths.exponentials import exponential
 
 SQRT_2PI = math.sqrt(2.0 * math.pi)

@@ -13,7 +13,7 @@ References:
 
 from __future__ import annotations
 
-from tracking.jit import small_kernel
+from tracking.kernels.jit import small_kernel
 
 
 @small_kernel

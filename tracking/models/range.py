@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from tracking.jit import small_kernel
+from tracking.kernels.jit import small_kernel
 
 MIN_DISTANCE = 0.01
 """[m] Closer than this a direction has no meaning."""

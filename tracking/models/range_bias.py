@@ -9,7 +9,7 @@ it tends to: 0 in sight, the NLOS bias behind an obstacle (`nlos`).
 
 from __future__ import annotations
 
-from tracking.jit import small_kernel
+from tracking.kernels.jit import small_kernel
 
 
 @small_kernel

@@ -7,7 +7,7 @@ with r the position and v the velocity of one antenna relative to the other.
 
 from __future__ import annotations
 
-from tracking.jit import small_kernel
+from tracking.kernels.jit import small_kernel
 from tracking.models.range import MIN_DISTANCE, range_model
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from tracking.jit import small_kernel
+from tracking.kernels.jit import small_kernel
 
 MIN_SPEED = 1e-6
 """[m/s] A slower velocity has no direction."""

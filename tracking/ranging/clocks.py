@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tracking.ranging._exchange_kernels import (
+from tracking.ranging.compiled.exchange import (
     FIRST_VAR,
     ExchangeNumbers,
     predict_skew,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tracking.ranging.timestamps import ticks
+from tracking.ranging.frames.timestamps import ticks
 
 
 class Dice:

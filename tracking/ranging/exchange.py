@@ -15,8 +15,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from tracking.ranging._exchange_kernels import NO_INTERVAL, ExchangeNumbers, exchange_distance
 from tracking.ranging.clocks import ClockParams, SkewEstimate
+from tracking.ranging.compiled.exchange import NO_INTERVAL, ExchangeNumbers, exchange_distance
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from tracking.ranging.events import Reception
 from tracking.ranging.exchange import ExchangeParams, Exchanges, Passage, RangeEvent
+from tracking.ranging.frames.timestamps import MODULUS, difference
+from tracking.ranging.frames.wire import Entry, Frame
 from tracking.ranging.peers import Peer, Peers
-from tracking.ranging.timestamps import MODULUS, difference
-from tracking.ranging.wire import Entry, Frame
 
 
 class Listener:

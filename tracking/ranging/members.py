@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from tracking.ranging.frames.wire import Frame
 from tracking.ranging.peers import Peers
-from tracking.ranging.wire import Frame
 
 MAX_MEMBERS = 62
 """So many nodes take part in a round at most, those with the smallest IDs."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from tracking.errors import ConfigError
-from tracking.ranging.airtime import PAPER_PHY, Phy
 from tracking.ranging.exchange import ExchangeParams
+from tracking.ranging.frames.airtime import PAPER_PHY, Phy
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

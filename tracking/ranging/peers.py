@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from tracking.ranging.timestamps import MODULUS, ticks, unwrap
-from tracking.ranging.wire import Entry, Frame
+from tracking.ranging.frames.timestamps import MODULUS, ticks, unwrap
+from tracking.ranging.frames.wire import Entry, Frame
 
 SLACK = ticks(5e-6)
 """Two clocks agree on one message as far as this and `DRIFT`."""

@@ -18,15 +18,15 @@ from tracking.ranging.events import (
     Role,
     RoleChanged,
 )
+from tracking.ranging.frames.slots import Slots
+from tracking.ranging.frames.timestamps import MODULUS, OwnTime, ticks, unwrap
+from tracking.ranging.frames.wire import MAX_ID, Frame, Type, decode
 from tracking.ranging.joining import Joining
 from tracking.ranging.listening import Listener
 from tracking.ranging.members import Members
 from tracking.ranging.params import SessionParams
-from tracking.ranging.slots import Slots
 from tracking.ranging.speaker import Speaker, Words
-from tracking.ranging.timestamps import MODULUS, OwnTime, ticks, unwrap
 from tracking.ranging.turns import Turns, Waiting
-from tracking.ranging.wire import MAX_ID, Frame, Type, decode
 
 
 class Session:

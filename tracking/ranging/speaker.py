@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tracking.ranging.events import Transmission
-from tracking.ranging.params import SessionParams
-from tracking.ranging.slots import Slots
-from tracking.ranging.timestamps import MODULUS, on_grid
-from tracking.ranging.wire import (
+from tracking.ranging.frames.slots import Slots
+from tracking.ranging.frames.timestamps import MODULUS, on_grid
+from tracking.ranging.frames.wire import (
     MAX_PARTS,
     Entry,
     Frame,
@@ -18,6 +17,7 @@ from tracking.ranging.wire import (
     entries_per_frame,
     split,
 )
+from tracking.ranging.params import SessionParams
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from enum import Enum
 
 from tracking.ranging.dice import Dice
+from tracking.ranging.frames.slots import Slots
+from tracking.ranging.frames.timestamps import ticks
 from tracking.ranging.members import Members
 from tracking.ranging.params import SessionParams
 from tracking.ranging.peers import Peers
-from tracking.ranging.slots import Slots
-from tracking.ranging.timestamps import ticks
 
 OPEN = 128
 """Every so-manieth round ends with a free slot, for newcomers that the initiator cannot hear and

@@ -12,7 +12,7 @@ import numpy as np
 from tracking.arrays import F64
 from tracking.constellation import Constellation
 from tracking.errors import ConfigError
-from tracking.jit import Call
+from tracking.kernels.jit import Call
 from tracking.measurements import Kind, MeasurementBlock
 from tracking.sanity.measurements import mark_usable
 

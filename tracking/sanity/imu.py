@@ -7,7 +7,7 @@ seconds of magnetometer to undo.
 
 from __future__ import annotations
 
-from tracking.jit import small_kernel
+from tracking.kernels.jit import small_kernel
 
 SEEN, N_SAME, N_ODD, LAST, GOOD = 0, 1, 2, 3, 9
 N_HEALTH = 15

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from tracking.jit import kernel
+from tracking.kernels.jit import kernel
 
 # Plain numbers of `Kind`: kernels do not know enums.
 STATE, SURVEY, RANGE = 3, 4, 5

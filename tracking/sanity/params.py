@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tracking.numbers import check_numbers
+from tracking.params.checks import check_numbers
 from tracking.records import Records, record_of
 
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 
-from tracking.jit import small_kernel
+from tracking.kernels.jit import small_kernel
 
 LAST, RUN, MEAN, SHARE, LOW, HIGH, START = 0, 1, 2, 3, 4, 5, 6
 N_AXIS = 7

@@ -9,8 +9,8 @@ import numpy as np
 
 from agents.bench.env.drives import Drive
 from agents.bench.env.effort import EPISODE
-from relpos_env.swarm import Physics
-from relpos_env.vector_env import FormationVectorEnv
+from relpos_env.api.vector_env import FormationVectorEnv
+from relpos_env.world.world import Physics
 
 SCENARIO, TASK = "ring-los", "ring"
 

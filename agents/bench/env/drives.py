@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from relpos_env.formation import Formation
+from relpos_env.core.env_core import Formation
 from relpos_env.interface.actions import MAX_SPEED, MAX_STEERING
 from tracking.arrays import F64
 

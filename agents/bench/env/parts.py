@@ -10,11 +10,11 @@ from typing import Any
 from unittest.mock import patch
 
 from agents.bench.env.batch import Batch
-from relpos_env.formation import Formation
+from relpos_env.core.env_core import Formation
 from relpos_env.sensors.operator import Operator
-from relpos_env.swarm import Swarm
 from relpos_env.tasks.base import Task
 from relpos_env.timing import DECISION, DT
+from relpos_env.world.world import Swarm
 
 RESETS = "resets"
 METHODS: tuple[tuple[str, type, str], ...] = (

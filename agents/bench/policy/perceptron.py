@@ -7,9 +7,9 @@ import hashlib
 import numpy as np
 
 from agents.errors import UsageError
-from agents.policy.card import Card
-from agents.policy.layout import Layout
-from agents.policy.trained import TrainedPolicy, check_policy
+from agents.policies.card import Card
+from agents.policies.layout import Layout
+from agents.policies.trained import TrainedPolicy, check_policy
 from relpos_env.interface.observations.base import F32
 
 HIDDEN = (64, 64)

@@ -12,11 +12,11 @@ import numpy as np
 from agents.bench.env.turns import best_of_turns
 from agents.bench.policy.perceptron import HIDDEN, Perceptron
 from agents.driver import Driver
-from agents.policy import load_policy, shipped_names
-from agents.policy.layout import Layout
-from agents.policy.padding import PaddedDriver
+from agents.policies import load_policy, shipped_names
+from agents.policies.layout import Layout
+from agents.policies.padding import PaddedDriver
 from relpos_env.config import configure
-from relpos_env.formation import Formation
+from relpos_env.core.env_core import Formation
 from relpos_env.interface.observations.base import F32
 
 Row = dict[str, Any]

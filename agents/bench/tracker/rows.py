@@ -82,7 +82,7 @@ def _message(n: int, rounds: int, filterpy: str) -> list[Row]:
 
 def _hour(rounds: int, filterpy: str) -> Row:
     """A recording of a person; the peer has the rounds of it, and no orientation filter."""
-    from agents.simulate import simulate
+    from agents.simulation.simulate import simulate
 
     seconds = min(max(0.03 * rounds, 10.0), 60.0)
     hour = hour_cost(simulate(scenario="human", seconds=seconds))

@@ -12,7 +12,7 @@ from tracking.arrays import F64, I64
 from tracking.constellation import Constellation, NodeConfig
 from tracking.geometry import quat_from_yaw
 from tracking.measurements import Kind, MeasurementBlock
-from tracking.ranging.airtime import PAPER_PHY, round_rate
+from tracking.ranging.frames.airtime import PAPER_PHY, round_rate
 
 RANGE_STD = 0.05
 """[m]"""

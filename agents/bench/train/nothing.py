@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from relpos_env.api.sb3_attributes import SharedSeats
 from relpos_env.interface.observations.base import F32
-from relpos_env.sb3_seats import SharedSeats
 from tracking.arrays import Bool
 
 

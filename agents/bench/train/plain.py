@@ -6,8 +6,8 @@ import torch
 from stable_baselines3 import PPO
 from torch import nn
 
-from agents.train.hyperbolic import FromLogistic
-from agents.train.network import SwarmFeatures
+from agents.training.ppo.hyperbolic import FromLogistic
+from agents.training.ppo.network import SwarmFeatures
 
 
 def make_plain(model: PPO) -> PPO:

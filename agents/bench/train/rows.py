@@ -15,9 +15,9 @@ from stable_baselines3.common.vec_env import VecEnv
 from agents.bench.env.turns import best_of_turns
 from agents.bench.train.nothing import Nothing
 from agents.bench.train.plain import make_plain
-from agents.train.config import TrainConfig
-from agents.train.environments import make_rooms
-from agents.train.learner import learn, make_model, run_leg
+from agents.training.config import TrainConfig
+from agents.training.environments import make_rooms
+from agents.training.ppo.learner import learn, make_model, run_leg
 
 Row = dict[str, Any]
 TURNS = 3

@@ -8,7 +8,7 @@ from relpos_env.interface._observation_kernels import FAR, FAST, N_STATUS, OLD, 
 from relpos_env.interface.observations.base import F32, Field
 from relpos_env.interface.observations.standard_fields import own_fields, wish_fields
 from relpos_env.interface.views import View
-from tracking.jit import bind
+from tracking.kernels.jit import bind
 
 
 class RelativePositions:

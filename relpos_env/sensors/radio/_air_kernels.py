@@ -13,8 +13,8 @@ from relpos_env.sensors.radio._path_kernels import (
     true_time,
 )
 from relpos_env.sensors.radio._random_kernels import draw_key, uniform
-from tracking.jit import kernel
-from tracking.ranging.timestamps import TICK_HZ
+from tracking.kernels.jit import kernel
+from tracking.ranging.frames.timestamps import TICK_HZ
 
 
 @kernel

@@ -8,7 +8,7 @@ import numpy as np
 
 from relpos_env.sensors.radio._normal_kernels import normal
 from relpos_env.sensors.radio._random_kernels import draw_key, uniform
-from tracking.jit import small_kernel
+from tracking.kernels.jit import small_kernel
 
 _DECIBEL = 20.0 / math.log(10.0)
 KNOT = 0.05

@@ -7,10 +7,10 @@ node for some rounds is no reason to forget where it is.
 
 from __future__ import annotations
 
-from tracking.jit import small_kernel
+from tracking.kernels.jit import small_kernel
 
 INITIATOR = 1
-"""Role of a session, see `tracking.ranging._turn_kernels`."""
+"""Role of a session, see `tracking.ranging.compiled.turns`."""
 JOIN, LEAVE = 0, 6
 PATIENCE = 1.0
 """[s]"""

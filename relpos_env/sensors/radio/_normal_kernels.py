@@ -20,7 +20,7 @@ import numpy as np
 
 from relpos_env.sensors.radio._random_kernels import draw_key, uniform
 from tracking.arrays import F64
-from tracking.jit import kernel, small_kernel
+from tracking.kernels.jit import kernel, small_kernel
 
 N_LAYERS = 256
 TAIL = 3.6541528853610088

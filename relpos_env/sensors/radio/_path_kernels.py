@@ -16,8 +16,8 @@ from relpos_env.sensors.radio._channel_kernels import (
 from relpos_env.sensors.radio._normal_kernels import normal
 from relpos_env.sensors.radio._occlusion_kernels import crosses_box, crosses_capsule
 from relpos_env.sensors.radio._random_kernels import draw_key, uniform
-from tracking.jit import small_kernel
-from tracking.ranging.timestamps import SPEED_OF_LIGHT
+from tracking.kernels.jit import small_kernel
+from tracking.ranging.frames.timestamps import SPEED_OF_LIGHT
 
 MESSAGES, PAIRS, CLOCKS, STARTS = 1 << 40, 2 << 40, 3 << 40, 4 << 40
 """Counters of what random numbers are for."""

@@ -13,8 +13,8 @@ from relpos_env.sensors.radio._path_kernels import (
     receive,
     true_time,
 )
-from tracking.jit import kernel, small_kernel
-from tracking.ranging._session_kernels import (
+from tracking.kernels.jit import kernel, small_kernel
+from tracking.ranging.compiled.session import (
     may_insert,
     speak,
     switch_on,

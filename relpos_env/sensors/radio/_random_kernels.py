@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.jit import small_kernel
+from tracking.kernels.jit import small_kernel
 
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 _A = np.uint64(0xBF58476D1CE4E5B9)

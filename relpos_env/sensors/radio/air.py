@@ -28,10 +28,10 @@ from relpos_env.sensors.radio._air_state import LATENT, NODE, RECEPTION, make_ch
 from relpos_env.sensors.radio._channel_kernels import KNOT
 from relpos_env.sensors.radio.params import RadioSimParams
 from tracking.arrays import F64
-from tracking.ranging.airtime import airtime
 from tracking.ranging.events import Event, Output, Reception, Transmission
+from tracking.ranging.frames.airtime import airtime
+from tracking.ranging.frames.timestamps import MODULUS, unwrap
 from tracking.ranging.session import Session
-from tracking.ranging.timestamps import MODULUS, unwrap
 
 END, DETECT, DEADLINE, POWER = 0, 1, 2, 3
 NO_BOXES, NO_CAPSULES = np.zeros((0, 6)), np.zeros((0, 7))

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from relpos_env.sensors.radio.channel import CALIBRATED, ChannelParams
+from tracking.ranging.frames.wire import entries_per_frame
 from tracking.ranging.params import SessionParams
-from tracking.ranging.wire import entries_per_frame
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

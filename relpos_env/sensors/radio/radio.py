@@ -28,17 +28,17 @@ from relpos_env.sensors.radio._channel_kernels import KNOT
 from relpos_env.sensors.radio._radio_kernels import Air, Scene, power_nodes, run_window
 from relpos_env.sensors.radio.params import RadioSimParams
 from tracking.arrays import F64, I64, Bool
-from tracking.ranging._session_state import (
+from tracking.params.short_repr import short_repr
+from tracking.ranging.compiled.state import (
     MESSAGE,
     SessionNumbers,
     make_sessions,
     session_numbers,
 )
-from tracking.ranging.airtime import airtime, round_rate
+from tracking.ranging.frames.airtime import airtime, round_rate
+from tracking.ranging.frames.timestamps import TICK_HZ
+from tracking.ranging.frames.wire import ENTRY_BYTES, FIXED_BYTES, entries_per_frame
 from tracking.ranging.members import MAX_MEMBERS
-from tracking.ranging.timestamps import TICK_HZ
-from tracking.ranging.wire import ENTRY_BYTES, FIXED_BYTES, entries_per_frame
-from tracking.short_repr import short_repr
 
 
 @dataclass(frozen=True, slots=True)

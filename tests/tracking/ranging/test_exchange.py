@@ -6,12 +6,11 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from tracking.ranging._exchange_kernels import take_carrier
-from tracking.ranging.airtime import PAPER_PHY, message_time
+from tracking.ranging.compiled.exchange import take_carrier
 from tracking.ranging.events import Reception
 from tracking.ranging.exchange import ExchangeParams, Exchanges, Passage
-from tracking.ranging.listening import Listener
-from tracking.ranging.timestamps import (
+from tracking.ranging.frames.airtime import PAPER_PHY, message_time
+from tracking.ranging.frames.timestamps import (
     GRID,
     METRES_PER_TICK,
     MODULUS,
@@ -21,7 +20,8 @@ from tracking.ranging.timestamps import (
     on_grid,
     ticks,
 )
-from tracking.ranging.wire import Frame, Type, decode, encode
+from tracking.ranging.frames.wire import Frame, Type, decode, encode
+from tracking.ranging.listening import Listener
 
 quick = settings(max_examples=40, derandomize=True)
 SKEW = st.floats(-20e-6, 20e-6)

@@ -7,7 +7,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tracking.errors import ConfigError
-from tracking.ranging.airtime import FAST_PHY, PAPER_PHY, airtime
 from tracking.ranging.events import (
     DuplicateId,
     MembersChanged,
@@ -17,10 +16,11 @@ from tracking.ranging.events import (
     Transmission,
 )
 from tracking.ranging.exchange import RangeEvent
+from tracking.ranging.frames.airtime import FAST_PHY, PAPER_PHY, airtime
+from tracking.ranging.frames.timestamps import GRID, MODULUS, difference, ticks
+from tracking.ranging.frames.wire import MAX_ID, MAX_PARTS, Entry, Frame, Type, decode, encode
 from tracking.ranging.params import SessionParams
 from tracking.ranging.session import Session
-from tracking.ranging.timestamps import GRID, MODULUS, difference, ticks
-from tracking.ranging.wire import MAX_ID, MAX_PARTS, Entry, Frame, Type, decode, encode
 
 BYTE = st.integers(0, 255)
 STAMP = st.integers(0, MODULUS - 1)

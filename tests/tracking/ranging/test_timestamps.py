@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tracking.ranging.timestamps import (
+from tracking.ranging.frames.timestamps import (
     GRID,
     MODULUS,
     SPEED_OF_LIGHT,

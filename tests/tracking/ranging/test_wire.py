@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tracking.errors import WireError
-from tracking.ranging.timestamps import MODULUS
-from tracking.ranging.wire import (
+from tracking.ranging.frames.timestamps import MODULUS
+from tracking.ranging.frames.wire import (
     ENTRY_BYTES,
     FIXED_BYTES,
     MAX_ID,

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from tracking.filters.clear_estimate import clear_estimate, is_heard
+from tracking.filters.joint.ekf.preintegration import preintegrate
+from tracking.filters.joint.ekf.propagation import predict
 from tracking.filters.joint.hypotheses.alignment import LINEAR, MODES, NONE, STATIC
-from tracking.filters.joint.preintegration import preintegrate
-from tracking.filters.joint.propagation import predict
 from tracking.filters.joint.state import N_PRE, JointState
-from tracking.jit import kernel
+from tracking.kernels.addresses import by_reference
+from tracking.kernels.jit import kernel
 from tracking.maths.covariance import apply_downdate
-from tracking.reference import by_reference
 
 # Plain numbers of `Status`: kernels do not know enums.
 ABSENT, STARTING, AMBIGUOUS, OK, LOST, DOUBTFUL = 0, 1, 2, 3, 4, 5

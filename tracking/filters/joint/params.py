@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from tracking.errors import ConfigError
 from tracking.filters.joint.supervision.params import AlignmentParams, SupervisionParams
-from tracking.numbers import check_numbers
+from tracking.params.checks import check_numbers
 from tracking.vehicles import VEHICLES, VehicleParams
 
 

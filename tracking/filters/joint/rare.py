@@ -10,7 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from tracking.filters.joint import workspace
+from tracking.filters.joint.ekf import workspace
+from tracking.filters.joint.ekf.scalar_update import flush_all_updates
+from tracking.filters.joint.ekf.workspace import ENV, EVENT, FLAG, NODE
 from tracking.filters.joint.hypotheses.alignment_modes import challenge_alignment, monitor_modes
 from tracking.filters.joint.hypotheses.alignment_sensitivity import start_alignments
 from tracking.filters.joint.hypotheses.bank import (
@@ -21,14 +23,12 @@ from tracking.filters.joint.hypotheses.bank import (
 )
 from tracking.filters.joint.hypotheses.initialisation import join, start
 from tracking.filters.joint.hypotheses.static_initialisation import spawn_rotation_hypotheses
-from tracking.filters.joint.scalar_update import flush_all_updates
 from tracking.filters.joint.state import one_env
 from tracking.filters.joint.supervision.actions import reinitialise_node
 from tracking.filters.joint.supervision.staleness import drop_stale
-from tracking.filters.joint.surveyed_distance import apply_surveys
-from tracking.filters.joint.workspace import ENV, EVENT, FLAG, NODE
-from tracking.jit import Call, bind, kernel
-from tracking.reference import by_reference
+from tracking.filters.joint.updates.surveyed_distance import apply_surveys
+from tracking.kernels.addresses import by_reference
+from tracking.kernels.jit import Call, bind, kernel
 
 
 @kernel

@@ -31,7 +31,7 @@ from tracking.filters.joint.coefficients import (
 )
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.records import GROUP, NODE, PAIR
-from tracking.jit import kernel
+from tracking.kernels.jit import kernel
 from tracking.maths.starting_rotations import starting_rotations
 from tracking.records import Records
 

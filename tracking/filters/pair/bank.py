@@ -12,7 +12,7 @@ from tracking.filters.pair.initialisation import (
     hypothesis_positions,
 )
 from tracking.filters.pair.mds_feedback import add_pair, factor, move_pair, solve, weigh
-from tracking.jit import allocating_kernel, kernel, small_kernel
+from tracking.kernels.jit import allocating_kernel, kernel, small_kernel
 
 
 @small_kernel

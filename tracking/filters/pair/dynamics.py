@@ -8,7 +8,7 @@ the kernels, since handing on slices costs more than the algebra.
 
 from __future__ import annotations
 
-from tracking.jit import small_kernel
+from tracking.kernels.jit import small_kernel
 from tracking.models.range import range_model
 from tracking.models.range_rate import range_rate_model
 from tracking.models.relative_speed import relative_speed_model

@@ -33,7 +33,7 @@ from tracking.filters.pair.range_update import (
     surveyed_distance_update,
 )
 from tracking.filters.pair.state import FilterState
-from tracking.jit import allocating_kernel, kernel, small_kernel
+from tracking.kernels.jit import allocating_kernel, kernel, small_kernel
 from tracking.measurements import ACCEL_NOISE
 from tracking.models.nlos import power_evidence
 

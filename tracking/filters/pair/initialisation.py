@@ -18,7 +18,7 @@ from tracking.filters.first_ranges import (
     start_distance,
 )
 from tracking.filters.pair.nlos_model import E
-from tracking.jit import allocating_kernel, kernel
+from tracking.kernels.jit import allocating_kernel, kernel
 from tracking.maths.linear_multilateration import place
 
 

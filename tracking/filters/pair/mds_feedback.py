@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import math
 
-from tracking.jit import small_kernel
+from tracking.kernels.jit import small_kernel
 
 LEAST_VAR = 1e-6
 """[m2], [m2/s2] Added to every variance: surveyed pairs of fixed nodes are as good as exact."""

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 
-from tracking.jit import small_kernel
+from tracking.kernels.jit import small_kernel
 from tracking.models.nonholonomic import nonholonomic_model
 
 

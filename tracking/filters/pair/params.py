@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from tracking.errors import ConfigError
-from tracking.numbers import check_numbers
+from tracking.params.checks import check_numbers
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -17,7 +17,7 @@ from tracking.filters.pair.nlos_model import (
     reset_bias_on_transition,
     update_nlos_posterior,
 )
-from tracking.jit import kernel, small_kernel
+from tracking.kernels.jit import kernel, small_kernel
 from tracking.models.lever_arm import antenna_in_world
 
 TIE = 1e-6

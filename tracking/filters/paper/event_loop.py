@@ -14,7 +14,7 @@ from tracking.filters.paper.pair_filter import (
     relative_orientation,
 )
 from tracking.filters.paper.state import PaperState
-from tracking.jit import allocating_kernel, kernel
+from tracking.kernels.jit import allocating_kernel, kernel
 
 # Plain numbers of `Kind` and `Status`: kernels do not know enums.
 STATE, SURVEY, RANGE, LEAVE = 3, 4, 5, 6

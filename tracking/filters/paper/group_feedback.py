@@ -14,7 +14,7 @@ from tracking.filters.paper.pair_filter import (
     update_position,
 )
 from tracking.geometry import FLAT
-from tracking.jit import allocating_kernel, kernel
+from tracking.kernels.jit import allocating_kernel, kernel
 
 REPLACE, NONE = 0, 2
 """Values of `feedback`."""

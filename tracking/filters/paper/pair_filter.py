@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from tracking.jit import kernel, small_kernel
+from tracking.kernels.jit import kernel, small_kernel
 
 TINY = 1e-6
 """[m, m/s] Shorter vectors have no direction."""

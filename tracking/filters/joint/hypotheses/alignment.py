@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-from tracking.jit import small_kernel
+from tracking.kernels.jit import small_kernel
 
 
 class Alignment(IntEnum):

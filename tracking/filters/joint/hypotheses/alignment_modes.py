@@ -34,7 +34,7 @@ from tracking.filters.joint.hypotheses.alignment_sensitivity import (
 )
 from tracking.filters.joint.hypotheses.copying import copy_hypothesis, rotate_block
 from tracking.filters.joint.hypotheses.static_initialisation import TIE
-from tracking.jit import allocating_kernel
+from tracking.kernels.jit import allocating_kernel
 from tracking.maths.rotation_modes import (
     climb_to_mode,
     curvature,

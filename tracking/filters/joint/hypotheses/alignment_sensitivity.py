@@ -22,11 +22,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.filters.joint.gyro_bias import STEP, propagate_gyro_bias_sensitivity
+from tracking.filters.joint.ekf.gyro_bias import STEP, propagate_gyro_bias_sensitivity
+from tracking.filters.joint.ekf.propagation import moves, n_bias_states
 from tracking.filters.joint.hypotheses.alignment import FILTERED, LINEAR, has_modes
-from tracking.filters.joint.lever_arm import attach_to_world
-from tracking.filters.joint.propagation import moves, n_bias_states
-from tracking.jit import allocating_kernel, kernel, small_kernel
+from tracking.filters.joint.updates.lever_arm import attach_to_world
+from tracking.kernels.jit import allocating_kernel, kernel, small_kernel
 from tracking.maths.covariance import STATES
 
 LOOSE = 3.0

@@ -15,7 +15,8 @@ import numpy as np
 
 from tracking.filters.best_hypothesis import choose_best
 from tracking.filters.first_ranges import forget_first
-from tracking.filters.joint.gyro_bias import last_state
+from tracking.filters.joint.ekf.gyro_bias import last_state
+from tracking.filters.joint.ekf.scalar_update import reset_state
 from tracking.filters.joint.hypotheses.alignment import (
     CANDIDATES,
     FILTERED,
@@ -34,9 +35,8 @@ from tracking.filters.joint.hypotheses.initialisation import (
 )
 from tracking.filters.joint.hypotheses.merging import are_same, rotation_between
 from tracking.filters.joint.hypotheses.static_initialisation import TIE, spawn_rotations
-from tracking.filters.joint.scalar_update import reset_state
 from tracking.filters.joint.supervision.residuals import reset_residuals
-from tracking.jit import allocating_kernel, kernel, small_kernel
+from tracking.kernels.jit import allocating_kernel, kernel, small_kernel
 
 
 @small_kernel

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.jit import allocating_kernel
+from tracking.kernels.jit import allocating_kernel
 
 
 @allocating_kernel

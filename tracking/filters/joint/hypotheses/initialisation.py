@@ -20,7 +20,9 @@ from tracking.filters.first_ranges import (
     is_ready,
     start_distance,
 )
-from tracking.filters.joint.heading_gauge import add_rotation_uncertainty, heading_functional
+from tracking.filters.joint.ekf.heading_gauge import add_rotation_uncertainty, heading_functional
+from tracking.filters.joint.ekf.propagation import initial_tilt_variance
+from tracking.filters.joint.ekf.scalar_update import reset_state
 from tracking.filters.joint.hypotheses.alignment import FILTERED, STATIC
 from tracking.filters.joint.hypotheses.alignment_sensitivity import has_linear_alignment
 from tracking.filters.joint.hypotheses.copying import copy_hypothesis
@@ -29,10 +31,8 @@ from tracking.filters.joint.hypotheses.static_initialisation import (
     is_at_rest,
     is_settling,
 )
-from tracking.filters.joint.propagation import initial_tilt_variance
-from tracking.filters.joint.scalar_update import reset_state
 from tracking.filters.joint.supervision.residuals import reset_residuals
-from tracking.jit import allocating_kernel, kernel
+from tracking.kernels.jit import allocating_kernel, kernel
 from tracking.maths.exponentials import decay
 from tracking.maths.multilateration import best_positions
 from tracking.models.range_bias import slow_error_var

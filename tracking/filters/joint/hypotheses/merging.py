@@ -8,7 +8,7 @@ import numpy as np
 
 from tracking.filters.joint.hypotheses.alignment import CHALLENGED, STATIC, has_modes
 from tracking.filters.joint.hypotheses.alignment_sensitivity import has_linear_alignment
-from tracking.jit import allocating_kernel, kernel, small_kernel
+from tracking.kernels.jit import allocating_kernel, kernel, small_kernel
 
 
 @kernel

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.filters.joint.heading_gauge import add_rotation_uncertainty, heading_variance
+from tracking.filters.joint.ekf.heading_gauge import add_rotation_uncertainty, heading_variance
+from tracking.filters.joint.ekf.observability import shift_nullspace
+from tracking.filters.joint.ekf.scalar_update import reset_state
 from tracking.filters.joint.hypotheses.alignment import FILTERED
 from tracking.filters.joint.hypotheses.alignment_sensitivity import has_linear_alignment
 from tracking.filters.joint.hypotheses.copying import copy_hypothesis, rotate_hypothesis
-from tracking.filters.joint.observability import shift_nullspace
-from tracking.filters.joint.scalar_update import reset_state
-from tracking.jit import allocating_kernel, kernel, small_kernel
+from tracking.kernels.jit import allocating_kernel, kernel, small_kernel
 
 TIE = 1e-6
 """[s] Times that differ by less are equal, whatever the clock began with."""

@@ -27,7 +27,7 @@ from tracking.filters.joint.supervision.residuals import (
     mean_range_error,
     node_outlier_ratio,
 )
-from tracking.jit import allocating_kernel, kernel
+from tracking.kernels.jit import allocating_kernel, kernel
 from tracking.maths.multilateration import best_position, total_loss
 
 

@@ -23,7 +23,7 @@ from tracking.filters.joint.supervision.residuals import (
     node_outlier_ratio,
     others_fit,
 )
-from tracking.jit import kernel
+from tracking.kernels.jit import kernel
 from tracking.maths.exponentials import decay
 from tracking.maths.multilateration import misfit
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from tracking.filters.joint.hypotheses.static_initialisation import is_at_rest
-from tracking.jit import small_kernel
+from tracking.kernels.jit import small_kernel
 
 
 @small_kernel

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from tracking.jit import kernel, small_kernel
+from tracking.kernels.jit import kernel, small_kernel
 
 
 @small_kernel

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from tracking.filters.joint.hypotheses.bank import remove_node
-from tracking.jit import allocating_kernel, kernel, small_kernel
+from tracking.kernels.jit import allocating_kernel, kernel, small_kernel
 
 SAME = 1e-5
 """[s] Ranges of one message differ by their rounding only."""

@@ -2,24 +2,9 @@
 
 from __future__ import annotations
 
-from tracking.filters.joint.heading_gauge import update_heading_variance
-from tracking.filters.joint.hypotheses.alignment import is_linear
-from tracking.filters.joint.hypotheses.bank import (
-    any_timed_out,
-    needs_reflection,
-    prune_bank,
-)
-from tracking.filters.joint.scalar_update import flush_all_updates
-from tracking.filters.joint.supervision.actions import begin_node_fault, follow_node_faults
-from tracking.filters.joint.supervision.faults import (
-    ALIGNMENT,
-    DIVERGED,
-    NONE,
-    POSITION,
-    find_fault,
-    update_group_misfit,
-)
-from tracking.filters.joint.workspace import (
+from tracking.filters.joint.ekf.heading_gauge import update_heading_variance
+from tracking.filters.joint.ekf.scalar_update import flush_all_updates
+from tracking.filters.joint.ekf.workspace import (
     CHALLENGE,
     FLAG,
     MODES_STEP,
@@ -29,7 +14,22 @@ from tracking.filters.joint.workspace import (
     REINITIALISE,
     TIME_OUT_LATER,
 )
-from tracking.jit import kernel
+from tracking.filters.joint.hypotheses.alignment import is_linear
+from tracking.filters.joint.hypotheses.bank import (
+    any_timed_out,
+    needs_reflection,
+    prune_bank,
+)
+from tracking.filters.joint.supervision.actions import begin_node_fault, follow_node_faults
+from tracking.filters.joint.supervision.faults import (
+    ALIGNMENT,
+    DIVERGED,
+    NONE,
+    POSITION,
+    find_fault,
+    update_group_misfit,
+)
+from tracking.kernels.jit import kernel
 
 
 @kernel

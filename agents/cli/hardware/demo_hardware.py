@@ -1,0 +1,101 @@
+"""`relpos demo-hardware`."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+from typing import Any
+
+import click
+
+from agents.cli.console import emit_json, print_table, progress_bar
+from agents.cli.scenario_option import scenario_option
+from agents.errors import UsageError
+
+
+@click.command("demo-hardware")
+@scenario_option(".", default="cars-nlos")
+@click.option(
+    "--task",
+    default="ring",
+    show_default=True,
+    help="ring, hold, travel, gap, rendezvous or follow.",
+)
+@click.option("--seconds", default=40.0, show_default=True, help="Length of a drive, 15 to 3600.")
+@click.option("--seed", default=0, show_default=True, help="Of the first drive.")
+@click.option("--drives", default=1, show_default=True, help="So many, one after the other.")
+@click.option("--cars", type=int, help="2 to 20; by default as many as the scenario has.")
+@click.option("--policy", metavar="NAME_OR_PATH", help="A trained policy drives.")
+@click.option(
+    "--controller",
+    metavar="NAME",
+    help="Who drives: consensus, leader-follower or range-only.  [default: consensus]",
+)
+@click.option(
+    "--format",
+    default="relpos",
+    show_default=True,
+    help="What the nodes speak: relpos, linktrack, uwb-core, dw1000 or dwm1001.",
+)
+@click.option(
+    "--driver", default="relpos", show_default=True, help="Of the cars: relpos, vesc or pwm."
+)
+@click.option("--faults", type=Path, help="What goes wrong, a TOML file; see docs/emulator.md.")
+@click.option(
+    "--virtual", is_flag=True, help="In memory, under a virtual clock: as fast as it goes."
+)
+@click.option("--out", type=Path, default=Path("demo-hardware"), show_default=True)
+@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+def demo_hardware(
+    seed: int,
+    drives: int,
+    policy: str | None,
+    controller: str | None,
+    faults: Path | None,
+    virtual: bool,
+    out: Path,
+    as_json: bool,
+    **options: Any,
+) -> None:
+    """Emulated cars through the whole path, serial bytes and all; writes report.html.
+
+    With --virtual there are no ports and processes, only their bytes: some five times faster than
+    real time, and the same every time.
+    """
+    from agents.hardware.demo import hardware_demo
+    from agents.hardware.emulate import EmulateOptions
+    from agents.output import check_folder, write_results
+    from agents.reports.hardware_report import HEADER, demo_rows, hardware_report, ratio_record
+    from hardware_bridge.emulator.fault_plan import FaultPlan, read_faults
+
+    if policy is not None and controller is not None:
+        raise UsageError("--policy: expected either a policy or a --controller, got both")
+    if not 15.0 <= options["seconds"] <= 3600.0:
+        raise UsageError(f"--seconds: expected 15 to 3600, got {options['seconds']:g}")
+    if not 1 <= drives <= 1000:
+        raise UsageError(f"--drives: expected 1 to 1000, got {drives}")
+    check_folder(out, ["report.html"])
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # nothing is left behind
+    plan = FaultPlan() if faults is None else read_faults(faults)
+    results = []
+    for each in range(seed, seed + drives):
+        chosen = EmulateOptions(seed=each, faults=plan, **options)
+        with progress_bar(f"{chosen.task}, seed {each}") as report:
+            name = policy or controller or "consensus"
+            result = hardware_demo(options=chosen, name=name, virtual=virtual, progress=report)
+            results.append(result)
+        if as_json:
+            emit_json([results[-1].summary])
+    room = chosen.parts().scenario.room
+    write_results(out, {"report.html": hardware_report(results, room)})
+    if as_json:
+        if drives > 1:
+            emit_json([ratio_record(results)])
+        return
+    print_table(
+        "Formation error through the bridge and in the simulator", HEADER, demo_rows(results)
+    )
+    for result in results:
+        for stop in result.drive.stops:
+            click.echo(f"seed {result.seed}: {stop}")
+    click.echo(f"open {out / 'report.html'} to see the drive")

@@ -1,0 +1,147 @@
+"""`relpos emulate`."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+from typing import Any
+
+import click
+
+from agents.cli.console import emit_json, print_table
+from agents.cli.scenario_option import scenario_option
+from agents.errors import UsageError
+
+
+@click.command()
+@click.option(
+    "--folder", type=Path, required=True, help="Gets the ports, and swarm.toml when they are ready."
+)
+@scenario_option("; by default that of the task.")
+@click.option(
+    "--task",
+    default="ring",
+    show_default=True,
+    help="ring, hold, travel, gap, rendezvous or follow.",
+)
+@click.option(
+    "--cars", type=int, help="Number of cars, 2 to 20; by default as many as the scenario has."
+)
+@click.option("--seed", default=0, show_default=True, help="Same seed, same world.")
+@click.option(
+    "--seconds",
+    default=60.0,
+    show_default=True,
+    help="Length, 0.1 to 86400, from when the cars are let go; Ctrl-C or SIGTERM ends it before.",
+)
+@click.option(
+    "--format",
+    default="relpos",
+    show_default=True,
+    help="What the nodes speak: relpos, linktrack, uwb-core, dw1000 or dwm1001.",
+)
+@click.option(
+    "--imu-format",
+    metavar="NAME",
+    help="What their second ports speak; default: witmotion where the first has no IMU, else none.",
+)
+@click.option(
+    "--driver", default="relpos", show_default=True, help="Of the cars: relpos, vesc or pwm."
+)
+@click.option(
+    "--key",
+    metavar="HEX",
+    help="16 bytes that sign messages of relpos, or @FILE.",
+)
+@click.option(
+    "--proximity", default=0, show_default=True, help="Beams of distance sensors round each car."
+)
+@click.option(
+    "--deadman", type=float, help="Seconds after which cars stop by themselves; by default 0.2."
+)
+@click.option("--no-operator", is_flag=True, help="Nobody holds a remote control.")
+@click.option("--faults", type=Path, help="What goes wrong, a TOML file; see docs/emulator.md.")
+@click.option(
+    "--wait",
+    default=0.0,
+    show_default=True,
+    help="The world stands until a host has sent something to a car, at most so many seconds.",
+)
+@click.option("--log", type=Path, help="Writes a log folder with truth.")
+@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+def emulate(
+    folder: Path,
+    key: str | None,
+    no_operator: bool,
+    faults: Path | None,
+    wait: float,
+    log: Path | None,
+    as_json: bool,
+    **options: Any,
+) -> None:
+    """Nodes and cars in a simulated world, behind serial ports, in real time."""
+    from agents.hardware.emulate import EmulatedRig, EmulateOptions
+    from agents.hardware.emulate import emulate as run
+    from hardware_bridge.emulator.fault_plan import FaultPlan, read_faults
+
+    chosen = EmulateOptions(
+        key=_key(key),
+        operator=not no_operator,
+        faults=FaultPlan() if faults is None else read_faults(faults),
+        **options,
+    )
+
+    def ready(rig: EmulatedRig) -> None:
+        record = {"result": "ready", "folder": str(rig.folder), "ports": sorted(rig.ports)}
+        if as_json:
+            emit_json([record])
+            return
+        parts = rig.world.parts
+        click.echo(
+            f"{parts.scenario.name}, task {parts.config.task}, seed {chosen.seed}: "
+            f"{parts.n_cars} cars with {chosen.driver}, nodes speak "
+            f"{' and '.join(f.name for f in chosen.formats())}\n"
+            f"ports {', '.join(rig.ports)} and swarm.toml in {rig.folder}"
+        )
+
+    # Whoever started it in the background ends it so; the ports are to go then, too.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    result = run(
+        folder=folder,
+        options=chosen,
+        wait=wait,
+        log=log,
+        ready=ready,
+        report=(lambda record: emit_json([record])) if as_json else None,
+    )
+    if as_json:
+        emit_json([{"result": "line", **line} for line in result.lines])
+        emit_json([result.summary])
+        return
+    names = ("frames", "lost", "damaged", "bytes", "dropped", "unheard", "read")
+    print_table(
+        "Lines",
+        ["line", *names],
+        [[line["line"], *(str(line[name]) for name in names)] for line in result.lines],
+    )
+    click.echo(
+        "frames: said by the devices; lost, damaged: on the way, as --faults asks; dropped: "
+        "no room;\nunheard: bytes while nothing had the port open; read: bytes of commands"
+    )
+    late = result.lateness
+    error = result.summary["formation_error"]
+    click.echo(
+        f"{result.seconds:.1f} s, formation error "
+        f"{'unknown' if error is None else f'{error:.3f} m'}, {result.contacts} contacts, "
+        f"{len(result.happened)} faults\n"
+        f"{late.late} of {late.steps} steps late, the latest by {1e-6 * late.worst_ns:.1f} ms"
+    )
+
+
+def _key(text: str | None) -> bytes | None:
+    from hardware_bridge.wire.key import read_key
+
+    try:
+        return read_key(text)
+    except ValueError as error:
+        raise UsageError(f"--key: {error}") from error

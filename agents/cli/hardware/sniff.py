@@ -1,0 +1,80 @@
+"""`relpos sniff`."""
+
+from __future__ import annotations
+
+import click
+
+from agents.cli.console import emit_json
+from agents.errors import UsageError
+
+
+@click.command()
+@click.argument("port")
+@click.option("--format", "format", help="A format of links; by default all are tried.")
+@click.option("--baud", type=int, help="By default that of the format, else 115200.")
+@click.option("--seconds", type=float, help="How long to listen; by default until Ctrl-C.")
+@click.option("--key", help="Of formats whose messages carry a code: 32 hex digits, or @FILE.")
+@click.option("--raw", is_flag=True, help="The bytes in hex, whatever they mean.")
+@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+def sniff(
+    port: str,
+    format: str | None,
+    baud: int | None,
+    seconds: float | None,
+    key: str | None,
+    raw: bool,
+    as_json: bool,
+) -> None:
+    """Show what a device at PORT says; nothing is sent but the request of a --format rplidar.
+
+    PORT is a path, serial:NUMBER, tcp:host:port or file:path.
+    """
+    from agents.hardware.inspection.sniff import as_line, as_record
+    from agents.hardware.inspection.sniff import sniff as run
+    from hardware_bridge.links.link_state import LinkNotice
+    from hardware_bridge.links.ports import Chunk
+    from hardware_bridge.readings import Reading
+
+    def show(t: float, reading: Reading) -> None:
+        if as_json:
+            emit_json([as_record(t, reading)])
+        else:
+            click.echo(as_line(t, reading))
+
+    def show_chunk(t: float, chunk: Chunk) -> None:
+        if as_json:
+            emit_json([{"kind": "bytes", "t_s": round(t, 6), "hex": chunk.data.hex()}])
+        else:
+            click.echo(f"{t:9.3f}  {len(chunk.data):4d}  {chunk.data.hex(' ')}")
+
+    def show_notice(notice: LinkNotice) -> None:
+        click.echo(f"{port}: {'back' if notice.up else notice.reason}", err=True)
+
+    sniffed = run(
+        port,
+        format=format,
+        baud=baud,
+        seconds=seconds,
+        key=_key(key),
+        show=None if raw else show,
+        show_chunk=show_chunk if raw else None,
+        show_notice=show_notice,
+    )
+    if as_json:
+        emit_json([sniffed.record])
+        return
+    fits = f"speaks {sniffed.format}, " if sniffed.format is not None else "no format fits, "
+    click.echo(
+        f"{port}: {fits}{sniffed.n_bytes} bytes in {sniffed.seconds:.1f} s, "
+        f"{sniffed.readings} readings in {sniffed.frames} frames, {sniffed.damaged} damaged, "
+        f"{sniffed.skipped} skipped, {sniffed.strange} bytes between frames"
+    )
+
+
+def _key(text: str | None) -> bytes | None:
+    from hardware_bridge.wire.key import read_key
+
+    try:
+        return read_key(text)
+    except ValueError as error:
+        raise UsageError(f"--key: {error}") from error

@@ -1,0 +1,94 @@
+"""The command line `relpos`. Imports of a command happen when it runs, so that help is quick."""
+
+from __future__ import annotations
+
+import sys
+
+import click
+
+from agents.cli.hardware.demo_hardware import demo_hardware
+from agents.cli.hardware.doctor import doctor
+from agents.cli.hardware.drive import drive
+from agents.cli.hardware.emulate import emulate
+from agents.cli.hardware.live import live
+from agents.cli.hardware.replay import replay
+from agents.cli.hardware.sniff import sniff
+from agents.cli.measuring.bench import bench
+from agents.cli.measuring.warmup import warmup
+from agents.cli.simulation.compare import compare
+from agents.cli.simulation.demo import demo
+from agents.cli.simulation.export import export
+from agents.cli.simulation.policy import policy
+from agents.cli.simulation.rllib import rllib
+from agents.cli.simulation.simulate import simulate
+from agents.cli.simulation.train import train
+from agents.cli.tracking.calibrate import calibrate
+from agents.cli.tracking.convert import convert
+from agents.cli.tracking.evaluate import evaluate
+from agents.cli.tracking.protocol import protocol
+from agents.cli.tracking.track import track
+from agents.errors import UsageError
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="relpos-env", prog_name="relpos")
+def cli() -> None:
+    """Relative positions without anchors: track, simulate, drive in formation, measure."""
+
+
+for command in (
+    track,
+    calibrate,
+    simulate,
+    convert,
+    demo,
+    emulate,
+    drive,
+    demo_hardware,
+    evaluate,
+    compare,
+    train,
+    export,
+    policy,
+    rllib,
+    protocol,
+    doctor,
+    sniff,
+    live,
+    replay,
+    bench,
+    warmup,
+):
+    cli.add_command(command)
+
+
+def main() -> None:
+    """Run the command line; what a user can mend ends in one line and status 2."""
+    try:
+        cli(standalone_mode=False)
+    except click.exceptions.Abort:
+        sys.exit(130)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(2)
+    except BrokenPipeError:
+        sys.exit(1)
+    except Exception as error:
+        if not _is_expected(error):
+            raise
+        click.echo(f"Error: {error}", err=True)
+        sys.exit(2)
+
+
+def _is_expected(error: Exception) -> bool:
+    """True for errors that say what a user can mend."""
+    # The packages take longer to import than help takes to print.
+    from hardware_bridge.errors import BridgeError
+    from relpos_env.errors import EnvError
+    from tracking.errors import TrackingError
+
+    return isinstance(error, (TrackingError, EnvError, BridgeError, UsageError, OSError))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,45 @@
+"""`relpos warmup`."""
+
+from __future__ import annotations
+
+import click
+
+from agents.cli.console import emit_json, print_table
+
+
+@click.command()
+@click.option(
+    "--filter",
+    "filters",
+    multiple=True,
+    help="joint (default), ekf-mds, ekf, paper-ekf-mds or paper-ekf; may be given again.",
+)
+@click.option(
+    "--for",
+    "purpose",
+    default="track",
+    show_default=True,
+    help="track, env (also the simulated world), hardware (also the bridge) or all.",
+)
+@click.option("--jobs", type=click.IntRange(1, 64), help="Processes; default: one for each core.")
+@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+def warmup(purpose: str, filters: tuple[str, ...], jobs: int | None, as_json: bool) -> None:
+    """Compile ahead: for containers, CI and laptops before a demo.
+
+    What is compiled is kept on the disk until the package, numba or the processor change.
+    """
+    from agents.warm_up import parts_of, warm_up
+    from agents.warm_up.processes import shown_progress
+    from tracking.filters import DEFAULT_FILTER
+
+    with shown_progress() as tell:
+        found = warm_up(parts_of(purpose, filters or (DEFAULT_FILTER,)), jobs=jobs, progress=tell)
+    if as_json:
+        emit_json([found.summary])
+        return
+    rows = [
+        [part, "compiled now" if part in found.compiled else "on the disk"] for part in found.parts
+    ]
+    print_table("Warm-up", ["part", ""], rows)
+    memory = f", at most {found.largest_mb:.0f} MB a process" if found.largest_mb else ""
+    click.echo(f"{found.seconds:.1f} s{memory}")

@@ -1,0 +1,174 @@
+"""`relpos compare`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from agents.cli.console import emit_json, print_table, progress_bar
+from agents.cli.scenario_option import scenario_option
+from agents.errors import UsageError
+
+if TYPE_CHECKING:
+    from agents.comparison.result import CompareResult
+
+SIMULATED = {
+    "scenarios": "--scenario", "task": "--task", "cars": "--cars", "proximity": "--proximity",
+    "level": "--level", "operator": "--operator", "first_seed": "--first-seed",
+    "jobs": "--jobs", "engine": "--engine",
+    "address": "--address",
+}  # fmt: skip
+"""Options that real cars do not have, by parameter."""
+WHY = "which has its own cars and task; they drive one after the other"
+
+
+@click.command()
+@click.argument("names", metavar="NAME...", nargs=-1, required=True)
+@click.option(
+    "--observation",
+    "observations",
+    multiple=True,
+    default=("estimate",),
+    show_default=True,
+    help="What they see: estimate, estimate_cov, ranges, truth; may be given several times.",
+)
+@scenario_option(
+    "; may be given several times. By default that of the task.", "scenarios", multiple=True
+)
+@click.option(
+    "--task",
+    default="ring",
+    show_default=True,
+    help="ring, hold, travel, gap, rendezvous or follow.",
+)
+@click.option(
+    "--cars", type=int, help="Number of cars, 2 to 20; by default as many as the scenario has."
+)
+@click.option(
+    "--proximity",
+    type=int,
+    help="Beams that measure distances round each car, 0 to 32; default: as the policies.",
+)
+@click.option("--level", type=int, help="Randomisation of a level, 0 to 4, in every scenario.")
+@click.option(
+    "--operator", default=1.0, show_default=True, help="Share of episodes with an operator, 0 to 1."
+)
+@click.option("--episodes", type=int, help="Of each of them; default: 100, on real cars 10.")
+@click.option("--first-seed", default=1000, show_default=True, help="Of the first episode.")
+@click.option("--seconds", default=60.0, show_default=True, help="Length of an episode, to 3600.")
+@click.option("--settle", default=10.0, show_default=True, help="Errors are scored from then on.")
+@click.option(
+    "--jobs", default=1, show_default=True, help="Processes at a time; no figure depends on it."
+)
+@click.option("--engine", default="local", show_default=True, help="Where jobs run: local or ray.")
+@click.option("--address", help="Of a Ray cluster that runs, for --engine ray: auto or host:port.")
+@click.option("--swarm", type=Path, help="A swarm.toml: compare on real cars, in turns.")
+@click.option("--arm", is_flag=True, help="With --swarm: the cars may move.")
+@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+@click.option("--out", type=Path, help="New folder for report.html, its pictures, results.jsonl.")
+def compare(
+    names: tuple[str, ...],
+    observations: tuple[str, ...],
+    swarm: Path | None,
+    arm: bool,
+    as_json: bool,
+    out: Path | None,
+    **options: Any,
+) -> None:
+    """Compare drivers on the same episodes: formation error, contacts, energy, with intervals.
+
+    NAME is a controller (consensus, leader-follower, range-only) or a trained policy: its name,
+    its file or its folder.
+
+    With --swarm on real cars, in real time; errors are what the cars believe. On a terminal:
+    space stops all at once, c clears the stop, q quits.
+    """
+    from agents.output import check_folder, check_new, write_results
+    from agents.reports import compare_report as report
+
+    if out is not None:
+        check_new(out)
+        check_folder(out, ["report.html"])
+    chosen = {k: v for k, v in options.items() if v is not None}
+    if swarm is None:
+        if arm:
+            raise UsageError("--arm: expected together with --swarm")
+        result, films = _simulated(names, observations, chosen, filmed=out is not None)
+    else:
+        result, films = _on_cars(names, observations, swarm, arm, chosen), []
+    if out is not None:
+        write_results(out, report.compare_files(result, films))
+    if as_json:
+        emit_json(result.records)
+        return
+    for scenario in result.scenarios:
+        print_table(scenario, report.SHORT_HEADER, report.short_rows(result, scenario))
+    for line in report.notes(result):
+        click.echo(line)
+    if out is not None:
+        click.echo(f"written: {out / 'report.html'}")
+
+
+def _simulated(
+    names: tuple[str, ...], observations: tuple[str, ...], options: dict[str, Any], *, filmed: bool
+) -> tuple[CompareResult, list[dict[str, Any]]]:
+    """The comparison in the simulator, and its films."""
+    from agents.comparison.compare import compare as run
+    from agents.comparison.film import median_films
+    from agents.warm_up import warm_up_first
+    from tracking.filters import DEFAULT_FILTER
+
+    scenarios = options.pop("scenarios") or (None,)
+    warm_up_first([DEFAULT_FILTER], purpose="env", in_space=False)
+    with progress_bar("compare") as tell:
+        result = run(
+            drivers=names, observations=observations, scenarios=scenarios, progress=tell, **options
+        )
+    if not filmed:
+        return result, []
+    work = {k: options[k] for k in ("jobs", "engine", "address") if k in options}
+    with progress_bar("film") as tell:
+        return result, median_films(result, progress=tell, **work)
+
+
+def _on_cars(
+    names: tuple[str, ...],
+    observations: tuple[str, ...],
+    swarm: Path,
+    arm: bool,
+    options: dict[str, Any],
+) -> CompareResult:
+    """The comparison with real cars."""
+    from agents.comparison.hardware import compare_hardware
+    from agents.hardware.drive.keys import NO_KEYS, TerminalKeys, check_stop_source, key_by_key
+
+    context = click.get_current_context()
+    for name, option in SIMULATED.items():
+        if context.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT:
+            raise UsageError(f"{option}: expected without --swarm, {WHY}")
+
+    if arm:
+        check_stop_source("terminal")
+    keys = TerminalKeys()
+
+    def attend(order: Callable[[str], None]) -> None:
+        had_them = not keys.lost
+        for what in keys.read_orders():
+            order(what)
+        if keys.lost and had_them:
+            click.echo(NO_KEYS, err=True)
+
+    given = {k: options[k] for k in ("episodes", "seconds", "settle") if k in options}
+    with progress_bar("compare") as tell, key_by_key():
+        return compare_hardware(
+            swarm=swarm,
+            drivers=names,
+            observations=observations,
+            arm=arm,
+            attend=attend,
+            progress=tell,
+            **given,
+        )

@@ -1,0 +1,81 @@
+"""`relpos rllib`."""
+
+from __future__ import annotations
+
+import json
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import click
+
+from agents.cli.scenario_option import scenario_option
+from agents.errors import UsageError
+
+
+@click.command()
+@scenario_option(". By default that of the task.")
+@click.option(
+    "--task",
+    default="ring",
+    show_default=True,
+    help="ring, hold, travel, gap, rendezvous or follow.",
+)
+@click.option(
+    "--observation",
+    default="estimate",
+    show_default=True,
+    help="What cars see: estimate, estimate_cov, ranges, truth.",
+)
+@click.option("--cars", "n_cars", type=int, help="Slots for cars, 2 to 20.")
+@click.option("--level", type=int, help="Randomisation of a level, 0 to 4.")
+@click.option("--history", default=1, show_default=True, help="Observations in one.")
+@click.option("--max-cycles", default=600, show_default=True, help="Decisions of an episode.")
+@click.option("--iterations", default=100, show_default=True, help="Of sampling and learning.")
+@click.option(
+    "--steps", default=4000, show_default=True, help="Decisions of environments in an iteration."
+)
+@click.option(
+    "--workers", default=2, show_default=True, help="Env runners, a core each; 0: this process."
+)
+@click.option("--envs", default=4, show_default=True, help="Environments of each of them.")
+@click.option("--seed", default=0, show_default=True, help="Of weights and episodes.")
+@click.option("--address", help="Of a Ray cluster that runs: auto or host:port.")
+@click.option("--out", type=Path, required=True, help="New folder for policy, checkpoint, log.")
+def rllib(
+    iterations: int,
+    steps: int,
+    workers: int,
+    envs: int,
+    seed: int,
+    address: str | None,
+    out: Path,
+    **arguments: Any,
+) -> None:
+    """Train with RLlib's PPO, on this machine or a cluster; one JSON line an iteration.
+
+    Writes policy.onnx with its card, for `relpos compare` and `relpos demo --policy`.
+    """
+    missing = [name for name in ("ray", "tree", "torch", "onnx") if find_spec(name) is None]
+    if missing:
+        raise UsageError(
+            f"relpos rllib: needs {', '.join(missing)}: pip install 'relpos-env[rllib]', in an "
+            "environment of its own"
+        )
+    from agents.rllib.config import RllibConfig
+    from agents.rllib.train import rllib_train
+
+    config = RllibConfig(
+        arguments=arguments,
+        iterations=iterations,
+        steps=steps,
+        workers=workers,
+        envs=envs,
+        seed=seed,
+    )
+    rllib_train(
+        config,
+        out,
+        address=address,
+        progress=lambda record: click.echo(json.dumps(record, allow_nan=False)),
+    )

@@ -1,0 +1,1 @@
+"""Commands that track recordings and evaluate filters."""

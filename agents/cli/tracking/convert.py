@@ -1,0 +1,55 @@
+"""`relpos convert`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from agents.cli.console import emit_json, progress_bar
+
+FOLDER = Path(__file__).parents[2] / "convert" / "presets"
+PRESETS = ", ".join(sorted(path.stem for path in FOLDER.glob("*.toml")))
+
+
+@click.command()
+@click.argument("source", type=Path)
+@click.argument("out", type=Path)
+@click.option("--preset", help=f"A public data set: {PRESETS}.")
+@click.option(
+    "--mapping",
+    type=Path,
+    help="A file that names streams and fields, instead of a preset.",
+)
+@click.option(
+    "--restamp", is_flag=True, help="Replace the times of IMU samples by those of a steady rate."
+)
+@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+def convert(
+    source: Path,
+    out: Path,
+    preset: str | None,
+    mapping: Path | None,
+    restamp: bool,
+    as_json: bool,
+) -> None:
+    """Make a log folder of a bag of ROS, CSV tables, a file of arrays or a serial capture."""
+    from agents.convert import convert as run
+
+    with progress_bar(f"reading {source}") as report:
+        log = run(source, out, preset=preset, mapping=mapping, restamp=restamp, progress=report)
+    record = {
+        "log": log.name,
+        "out": str(out),
+        "nodes": log.constellation.n_nodes,
+        "duration_s": log.duration,
+        "ranges": log.n_ranges,
+        "truth_rows": len(log.truth.t),
+    }
+    if as_json:
+        emit_json([record])
+    else:
+        click.echo(
+            f"{out}: {record['nodes']} nodes, {log.duration:.0f} s, {log.n_ranges} ranges, "
+            f"{len(log.truth.t)} rows of truth"
+        )

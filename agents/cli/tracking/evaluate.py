@@ -1,0 +1,83 @@
+"""`relpos evaluate`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from agents.cli.console import emit_json, print_table, progress_bar
+
+
+@click.command()
+@click.option("--suite", default="paper", show_default=True, help="paper, robustness or scaling.")
+@click.option(
+    "--filters",
+    default="joint,ekf-mds,ekf,paper-ekf-mds,paper-ekf",
+    show_default=True,
+    help="Names, commas between.",
+)
+@click.option(
+    "--seeds", type=int, help="Runs of each case: 0 to N-1. Default 50, robustness 20, scaling 10."
+)
+@click.option(
+    "--seconds",
+    type=float,
+    help="Length of a run, 15 to 1800. Default 120, robustness and scaling 60.",
+)
+@click.option(
+    "--jobs",
+    default=1,
+    show_default=True,
+    help="Processes at a time; no figure but the time of a round depends on it.",
+)
+@click.option("--engine", default="local", show_default=True, help="Where jobs run: local or ray.")
+@click.option("--address", help="Of a Ray cluster that runs, for --engine ray: auto or host:port.")
+@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+@click.option("--out", type=Path, help="New folder for report.html, its pictures, results.jsonl.")
+def evaluate(
+    suite: str,
+    filters: str,
+    seeds: int | None,
+    seconds: float | None,
+    jobs: int,
+    engine: str,
+    address: str | None,
+    as_json: bool,
+    out: Path | None,
+) -> None:
+    """Evaluate filters over many simulated runs: errors, consistency, lost runs, time."""
+    from agents.evaluation.evaluate import evaluate as run
+    from agents.output import check_folder, check_new, write_results
+    from agents.reports import evaluate_report as report
+    from agents.warm_up import warm_up_first
+
+    if out is not None:
+        check_new(out)
+        check_folder(out, ["report.html"])
+    names = [name.strip() for name in filters.split(",")]
+    warm_up_first(names)
+    with progress_bar(f"evaluate {suite}") as tell:
+        result = run(
+            suite=suite,
+            filters=names,
+            seeds=seeds,
+            seconds=seconds,
+            jobs=jobs,
+            engine=engine,
+            address=address,
+            progress=tell,
+        )
+    if out is not None:
+        write_results(out, report.evaluate_files(result))
+    if as_json:
+        emit_json(result.records)
+        return
+    print_table(result.suite.title, report.header(result), report.rows(result))
+    targets = report.target_rows(result)
+    if targets:
+        print_table("Targets [m]", report.TARGETS, targets)
+    for line in report.notes(result):
+        click.echo(line)
+    if out is not None:
+        click.echo(f"written: {out / 'report.html'}")

@@ -1,0 +1,47 @@
+"""`relpos protocol`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from agents.cli.console import emit_json, print_table, progress_bar
+from agents.errors import UsageError
+
+
+@click.command()
+@click.option("--events", default=200, show_default=True, help="Of each kind, for each mode.")
+@click.option(
+    "--nodes", default="3,4,5,6,10,20,50", show_default=True, help="Sizes of groups, 2 to 62."
+)
+@click.option("--seed", default=0, show_default=True, help="Same seed, same figures.")
+@click.option("--out", type=Path, help="Folder for report.html and the pictures in it.")
+@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+def protocol(events: int, nodes: str, seed: int, out: Path | None, as_json: bool) -> None:
+    """Measure the ranging protocol: rate, recovery when nodes come and go, clock errors."""
+    from agents.output import check_folder, write_results
+    from agents.protocol.experiment import protocol as run
+    from agents.reports import protocol_report as report
+    from agents.reports.page import png
+
+    try:
+        sizes = tuple(int(n) for n in nodes.split(","))
+    except ValueError:
+        raise UsageError(f"--nodes: expected numbers such as 3,6,10, got {nodes!r}") from None
+    if out is not None:
+        check_folder(out, ["report.html", *report.PICTURES])
+    with progress_bar("protocol") as tell:
+        result = run(events=events, nodes=sizes, seed=seed, progress=tell)
+    if out is not None:
+        figures = report.figures(result)
+        pictures = {name: png(figure) for name, figure in figures.items()}
+        write_results(out, {"report.html": report.protocol_report(result, figures), **pictures})
+    if as_json:
+        emit_json(result.records)
+        return
+    print_table("Rate", report.RATE_HEADER, report.rate_rows(result))
+    print_table("Recovery", report.RECOVERY_HEADER, report.recovery_rows(result))
+    print_table("Range errors by clocks", report.CLOCK_HEADER, report.clock_rows(result))
+    if out is not None:
+        click.echo(f"written: {out / 'report.html'}")

@@ -1,0 +1,188 @@
+"""`relpos track`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import click
+
+from agents.cli.console import emit_json, print_table, progress_bar
+from agents.errors import UsageError
+
+if TYPE_CHECKING:
+    from tracking.findings import Finding
+    from tracking.log import Log
+
+
+@click.command()
+@click.argument("logs", metavar="LOG [LOG ...]", nargs=-1, required=True, type=Path)
+@click.option(
+    "--filter",
+    "filters",
+    multiple=True,
+    help="joint (default), ekf-mds, ekf, paper-ekf-mds or paper-ekf; may be given again.",
+)
+@click.option(
+    "--calibration",
+    "calibrations",
+    multiple=True,
+    type=Path,
+    help="A calibration.toml to correct measurements with; may be given again.",
+)
+@click.option(
+    "--smooth",
+    type=click.Choice(["lag", "all"]),
+    help="Estimates know what was measured in the 0.1 s after them, too (lag), or all that was "
+    "measured, before and after (all); joint only.",
+)
+@click.option(
+    "--bound",
+    is_flag=True,
+    help="Also show the expected errors of an efficient estimator; needs truth.",
+)
+@click.option(
+    "--accuracy",
+    type=float,
+    metavar="METRES",
+    help="A pair is ok while it expects to be off by no more, 0.01 to 10; by default 0.3 with a "
+    "car, 0.5 without; joint only.",
+)
+@click.option(
+    "--no-checks",
+    is_flag=True,
+    help="Track the log as it is, whatever its sensors, clocks and ranges look like.",
+)
+@click.option("--skip", default=10.0, show_default=True, help="Seconds that are not scored.")
+@click.option("--out", type=Path, help="Folder for estimates.csv and report.html.")
+@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+def track(
+    logs: tuple[Path, ...],
+    filters: tuple[str, ...],
+    calibrations: tuple[Path, ...],
+    smooth: Literal["lag", "all"] | None,
+    bound: bool,
+    accuracy: float | None,
+    no_checks: bool,
+    skip: float,
+    out: Path | None,
+    as_json: bool,
+) -> None:
+    """Track recorded runs and score them where they have truth."""
+    from agents.evaluation.calibrate import apply_calibrations
+    from agents.evaluation.track import TrackResult, estimates_csv, track_log
+    from agents.output import check_folder, write_results
+    from agents.reports.track_report import track_report
+    from agents.warm_up import warm_up_first
+    from tracking.filters import DEFAULT_FILTER, filter_builder
+    from tracking.filters.joint.params import JointParams
+    from tracking.filters.params import FilterParams
+    from tracking.findings import refuse_errors
+    from tracking.log import read_log
+    from tracking.metrics.bound import recorded_bound
+    from tracking.tracker import TrackerParams
+
+    if not 0.0 <= skip < float("inf"):
+        raise UsageError(f"--skip: expected 0 or more seconds, got {skip:g}")
+    if accuracy is not None and not 0.01 <= accuracy <= 10.0:
+        raise UsageError(f"--accuracy: expected 0.01 to 10 m, got {accuracy:g}")
+    params = TrackerParams(filter=FilterParams(joint=JointParams(accuracy=accuracy)))
+    names = tuple(dict.fromkeys(filters)) or (DEFAULT_FILTER,)
+    for name in names:
+        filter_builder(name)
+    if smooth and names != ("joint",):
+        raise UsageError(f"--smooth: expected filter joint alone, not {', '.join(names)}")
+    if out is not None:
+        check_folder(out, ["report.html"])
+    read = [apply_calibrations(read_log(path), calibrations) for path in logs]
+    needed = names if no_checks else (*names, DEFAULT_FILTER)
+    warm_up_first(needed, in_space=any(log.constellation.dimensions == 3 for log in read))
+    results: list[TrackResult] = []
+    checked = [(log, []) if no_checks else _examined(log) for log in read]
+    refuse_errors([finding for _, found in checked for finding in found])
+    for log, found in checked:
+        expected = recorded_bound(log, skip=skip) if bound else None
+        for name in names:
+            label = f"{log.name}, {name}"
+            with progress_bar(label, shown=log.duration > 20.0) as report:
+                results.append(
+                    track_log(
+                        log,
+                        filter=name,
+                        skip=skip,
+                        smooth=smooth,
+                        bound=expected,
+                        params=params,
+                        findings=found,
+                        progress=report,
+                    )
+                )
+    told = {f"{r.log.name}, {f.severity}: {f.text}": None for r in results for f in r.findings}
+    click.echo("\n".join(told), err=True, nl=bool(told))
+    if out is not None:
+        many = len(results) > 1
+        files = {"report.html": track_report(results)}
+        for k, r in enumerate(results):
+            folder = f"{k + 1:02d}-{_file_name(r.log.name)}-{r.filter}/" if many else ""
+            files[f"{folder}estimates.csv"] = estimates_csv(r.estimate)
+        write_results(out, files)
+    if as_json:
+        emit_json(r.summary for r in results)
+        return
+    print_tracks(results)
+    if out is not None:
+        click.echo(f"\nwritten: {out / 'report.html'} and estimates.csv")
+
+
+def print_tracks(results: Sequence[Any]) -> None:
+    """Errors over all pairs and for each of them."""
+    from agents.evaluation.track import ERRORS, pair_name
+    from agents.reports.page import metres, percent
+
+    rows = []
+    for r in results:
+        s = r.summary
+        head = [f"{s['log']}  {s['filter']}", "all"]
+        rows.append([*head, *(metres(s[k]) for k in ERRORS)])
+        if r.expected:
+            rows.append(["", "efficient", *(metres(r.expected.get(k)) for k in ERRORS)])
+        pairs = [p for p, e in enumerate(r.score.pair_rmse) if e == e]
+        for p in pairs:
+            figures = (r.score.pair_rmse, r.score.pair_rmse_yaw, r.score.pair_rmse_shape)
+            name = pair_name(r.log.constellation, p)
+            rows.append(["", name, *(metres(float(f[p])) for f in figures)])
+    header = ["log and filter", "pair", *ERRORS]
+    print_table("Errors of relative positions [m]", header, rows)
+    for r in results:
+        skipped = ", ".join(f"{n} in {name}" for name, n in r.log.skipped.items()) or "0"
+        click.echo(
+            f"{r.log.name}, {r.filter}: {r.log.n_ranges} ranges in {r.log.duration:.0f} s, "
+            f"{r.n_rejected} refused as outliers, bad rows skipped: {skipped}, "
+            f"status ok {percent(r.score.ok_share)} of the scored time, ok and wrong "
+            f"{percent(r.score.integrity_share, 2)} of the run{_longest(r.score)}, "
+            f"{r.realtime_factor:.0f} times faster than real time"
+        )
+        if r.score.rmse is None:
+            reason = (
+                "there is no truth"
+                if not len(r.log.truth.t)
+                else (f"no estimated pair has truth from {r.skip:g} s after the first range")
+            )
+            click.echo(f"{r.log.name}, {r.filter}: no errors, since {reason}")
+
+
+def _examined(log: Log) -> tuple[Log, list[Finding]]:
+    from tracking.findings import examine
+
+    with progress_bar(f"{log.name}, checks", shown=log.duration > 10.0) as report:
+        return examine(log, report)
+
+
+def _longest(score: Any) -> str:
+    worst = score.integrity_worst_s
+    return f" (at most {worst:.1f} s in one go)" if worst else ""
+
+
+def _file_name(name: str) -> str:
+    return "".join(ch if ch.isascii() and (ch.isalnum() or ch in "-_") else "_" for ch in name)[:60]

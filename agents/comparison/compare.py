@@ -1,0 +1,157 @@
+"""Drivers on observations in scenarios: what `relpos compare` does, as a function."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from agents.comparison.arguments import check_numbers, each_once, modes
+from agents.comparison.contender import Contender, find_entry, line_up
+from agents.comparison.episode import run_episodes
+from agents.comparison.meter import EpisodeResult
+from agents.comparison.result import CompareResult, Row
+from agents.comparison.setting import Setting
+from agents.errors import UsageError
+from agents.jobs import check_jobs, find_engine
+from agents.simulation.demo import SETTLE
+from relpos_env.interface.beams import MOST_BEAMS
+
+FIRST_SEED = 1000
+"""Of the first episode. Training draws its own at random from 2^30 numbers."""
+BATCH = 10
+"""[-] Episodes that a process runs side by side."""
+
+
+def compare(
+    *,
+    drivers: Sequence[str],
+    observations: Sequence[str] = ("estimate",),
+    scenarios: Sequence[str | Path | None] = (None,),
+    task: str = "ring",
+    task_options: Mapping[str, Any] | None = None,
+    cars: int | None = None,
+    level: int | None = None,
+    operator: float = 1.0,
+    proximity: int | None = None,
+    episodes: int = 100,
+    first_seed: int = FIRST_SEED,
+    seconds: float = 60.0,
+    settle: float = SETTLE,
+    jobs: int = 1,
+    engine: str = "local",
+    address: str | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> CompareResult:
+    """Let every driver drive on every mode of observations in every scenario, on the same seeds.
+
+    What a driver cannot see is left out and noted. With more than one job the calling script
+    must be importable: its work belongs below `if __name__ == "__main__"`.
+
+    Args:
+        drivers: Controllers of `agents.controllers.CONTROLLERS`, and policies as for
+            `agents.policies.load_policy`.
+        observations: Of `relpos_env.interface.observations.OBSERVATIONS`.
+        scenarios: Of `relpos_env.scenarios.SCENARIOS`, or TOML files; None is that of the task.
+        task: One of `relpos_env.tasks.TASKS`.
+        task_options: The task's own options, by name.
+        cars: Slots for cars; by default as many as the scenario can have.
+        level: Randomisation of a level of the curriculum, 0 to 4.
+        operator: Share of episodes with an operator; in the others cars follow the plan alone,
+            as real cars without a remote control do.
+        proximity: Beams that measure distances round each car; by default those that each policy
+            was trained with, and of controllers as many as any policy has, or none.
+        episodes: Of each driver, mode and scenario, seeds from `first_seed` on.
+        first_seed: Seed of the first episode.
+        seconds: Length of an episode [s], less where the task is done before.
+        settle: Errors are scored from here on [s].
+        jobs: Processes at a time. No figure depends on it.
+        engine: One of `agents.jobs.ENGINES`.
+        address: Of a cluster that runs, see `agents.jobs.find_engine`.
+        progress: Called with the share done, 0 to 1.
+
+    Raises:
+        UsageError: A name that is not known, a number out of range, nothing left to compare;
+            the option is named.
+        EnvError: A scenario, task or number of cars that does not exist or fit.
+    """
+    check_numbers(episodes, first_seed, seconds, settle)
+    if not 0.0 <= operator <= 1.0:
+        raise UsageError(f"--operator: expected 0 to 1, got {operator:g}")
+    check_jobs(jobs)
+    work = find_engine(engine, address)
+    settings = [
+        Setting(
+            scenario=scenario,
+            task=task,
+            task_options=dict(task_options or {}),
+            cars=cars,
+            level=level,
+            operator=operator,
+            seconds=seconds,
+            settle=settle,
+        )
+        for scenario in each_once("--scenario", scenarios)
+    ]
+    if proximity is not None and not 0 <= proximity <= MOST_BEAMS:
+        raise UsageError(f"--proximity: expected 0 to {MOST_BEAMS}, got {proximity}")
+    chosen = line_up(each_once("NAME", drivers), modes(observations), proximity)
+    empty, notes = _who_can(chosen, settings)
+    seeds = range(first_seed, first_seed + episodes)
+    tasks = [
+        (row.contender, row.setting, seeds[k : k + BATCH])
+        for k in range(0, episodes, BATCH)
+        for row in empty
+    ]
+    done: dict[int, list[EpisodeResult]] = {}
+    for n, found in work(run_episodes, tasks, jobs):
+        done[n] = found
+        if progress is not None:
+            progress(len(done) / len(tasks))
+    rows = [
+        Row(
+            contender=row.contender,
+            trained_on=row.trained_on,
+            setting=row.setting,
+            scenario=row.scenario,
+            cars=row.cars,
+            episodes=tuple(e for n in range(k, len(tasks), len(empty)) for e in done[n]),
+        )
+        for k, row in enumerate(empty)
+    ]
+    return CompareResult(
+        rows=tuple(rows), notes=tuple(notes), first_seed=first_seed, seeds=episodes
+    )
+
+
+def _who_can(
+    contenders: Sequence[Contender], settings: Sequence[Setting]
+) -> tuple[list[Row], list[str]]:
+    """Rows without episodes of all who can drive, and why the others cannot."""
+    rows: list[Row] = []
+    refused: dict[tuple[str, str], list[str]] = {}
+    for setting in settings:
+        for contender in contenders:
+            entry = find_entry(contender.name)
+            parts = setting.parts(contender.observation, entry.history, contender.proximity)
+            why = entry.refusal(contender.observation, parts.n_cars, contender.proximity)
+            if why is not None:
+                refused.setdefault((contender.label, why), []).append(parts.scenario.name)
+                continue
+            rows.append(
+                Row(
+                    contender=contender,
+                    trained_on=entry.trained_on,
+                    setting=setting,
+                    scenario=parts.scenario.name,
+                    cars=parts.n_cars,
+                    episodes=(),
+                )
+            )
+    notes = [f"{who} in {', '.join(names)}: {why}" for (who, why), names in refused.items()]
+    if not rows:
+        raise UsageError("NAME: nothing to compare: " + "; ".join(notes))
+    found = {setting.parts(rows[0].contender.observation, 1).scenario.name for setting in settings}
+    if len(found) < len(settings):
+        raise UsageError("--scenario: expected scenarios of different names")
+    return rows, notes

@@ -1,0 +1,90 @@
+"""An episode of real cars as a comparison reads it: by what the cars believe."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hardware_bridge.live.env import LiveFormationEnv
+from relpos_env.interface.actions import action_mode
+from relpos_env.interface.observations.base import F32
+from relpos_env.world.car import CarParams
+from tracking.arrays import F64, Bool
+
+
+class Driven:
+    """A group of real cars as a `agents.comparison.meter.Running` of one environment."""
+
+    def __init__(self, env: LiveFormationEnv, cycles: int) -> None:
+        """Begin an episode: the cars are armed and find each other first.
+
+        Args:
+            env: The cars.
+            cycles: Decisions of an episode.
+
+        Raises:
+            BridgeError: The cars could not be armed.
+        """
+        env.reset()
+        self._env, self._group = env, env.group
+        self._actions = action_mode("continuous")
+        self._unknown: F64 = np.full(self._group.active.shape, np.nan)
+        self.car, self.cycles = CarParams(), cycles
+
+    @property
+    def observations(self) -> F32:
+        """What the cars see, (1, car, size)."""
+        return self._group.observations
+
+    @property
+    def present(self) -> Bool:
+        """Who is heard, (1, car)."""
+        return self._group.believed.present
+
+    @property
+    def speed(self) -> F64:
+        """By the odometers, (1, car) [m/s]."""
+        speed: F64 = np.abs(self._group.swarm.view.speed)
+        return speed
+
+    @property
+    def error(self) -> F64:
+        """Formation error that the cars believe in, (1, car) [m]."""
+        return self._group.task.error
+
+    @property
+    def place_error(self) -> F64:
+        """Nobody knows."""
+        return self._unknown[:, 0]
+
+    @property
+    def tracking_error(self) -> F64:
+        """Nobody knows."""
+        return self._unknown
+
+    @property
+    def contacts(self) -> F64:
+        """Nobody knows."""
+        return self._unknown
+
+    @property
+    def clearance(self) -> F64:
+        """Nobody knows."""
+        return self._unknown
+
+    @property
+    def done(self) -> Bool:
+        """Whether the task is accomplished, as the cars believe, (1)."""
+        return self._group.task.done
+
+    @property
+    def over(self) -> Bool:
+        """Whether the episode has ended, (1)."""
+        return self._group.terminated | self._group.truncated
+
+    def step(self, actions: F32) -> None:
+        """One decision of all cars, in real time; see `Running`."""
+        self._group.step(*self._actions.decode(actions, "actions"))
+
+    def close(self) -> None:
+        """Let the cars stand."""
+        self._env.close()

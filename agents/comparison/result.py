@@ -1,0 +1,176 @@
+"""What a comparison found: figures of every driver, observation and scenario, and ratios."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+
+from agents.comparison.contender import Contender
+from agents.comparison.meter import EpisodeResult
+from agents.comparison.setting import Setting
+from agents.comparison.statistics import Interval, mean, ratio
+from tracking.arrays import F64
+from tracking.params.short_repr import short_repr
+
+FIGURES = (
+    "formation_error", "place_error", "tracking_error", "collisions_per_min", "contact_time",
+    "time_in_formation", "energy",
+)  # fmt: skip
+"""What is measured in every episode, see `agents.comparison.meter.EpisodeResult`."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """One driver on one mode of observations in one scenario, over all seeds."""
+
+    __repr__ = short_repr
+
+    contender: Contender
+    trained_on: str | None
+    """Observation mode that it was trained on, None if it was not trained."""
+    setting: Setting
+    scenario: str
+    """Name of the scenario."""
+    cars: int
+    """[-] Slots for cars."""
+    episodes: tuple[EpisodeResult, ...]
+    """By seed."""
+
+    def values(self, figure: str) -> F64:
+        """A figure of every episode, (episode); NaN where it has none.
+
+        Args:
+            figure: A field of `EpisodeResult`.
+        """
+        return np.array([getattr(e, figure) for e in self.episodes], dtype=np.float64)
+
+    @cached_property
+    def means(self) -> dict[str, Interval | None]:
+        """Every figure over the episodes, None where none has it."""
+        return {name: mean(self.values(name)) for name in FIGURES}
+
+    @property
+    def median_episode(self) -> EpisodeResult:
+        """That whose formation error is in the middle; the lower one of two."""
+        ranked = sorted(
+            self.episodes, key=lambda e: (np.isnan(e.formation_error), e.formation_error)
+        )
+        return ranked[(len(ranked) - 1) // 2]
+
+    def ratio(self, reference: Row) -> Interval | None:
+        """Formation error over that of another on the same seeds; below 1 this one is better."""
+        return ratio(self.values("formation_error"), reference.values("formation_error"))
+
+
+@dataclass(frozen=True, kw_only=True)
+class CompareResult:
+    """Drivers compared."""
+
+    __repr__ = short_repr
+
+    rows: tuple[Row, ...]
+    """By scenario, then driver, then observation."""
+    notes: tuple[str, ...]
+    """What was left out, and why."""
+    first_seed: int
+    """On real cars the number of the first round."""
+    seeds: int
+    errors_from: Literal["truth", "estimates"] = "truth"
+    """Whether errors are true, or what real cars believed."""
+    remarks: tuple[str, ...] = ()
+    """What happened to real cars on the way."""
+
+    @property
+    def scenarios(self) -> tuple[str, ...]:
+        """Names, in order."""
+        return tuple(dict.fromkeys(r.scenario for r in self.rows))
+
+    @property
+    def contenders(self) -> tuple[Contender, ...]:
+        """All, in order."""
+        return tuple(dict.fromkeys(r.contender for r in self.rows))
+
+    def of(self, scenario: str) -> list[Row]:
+        """The rows of a scenario."""
+        return [r for r in self.rows if r.scenario == scenario]
+
+    def reference(self, scenario: str) -> Row:
+        """Whom the others of a scenario are measured by.
+
+        The controller with the least formation error among those that are not told the truth;
+        where there is none, among those that are; without any controller, the best policy.
+        """
+
+        def rank(row: Row) -> tuple[bool, bool, float]:
+            error = row.means["formation_error"]
+            told = row.contender.observation == "truth"
+            return row.trained_on is not None, told, np.inf if error is None else error.value
+
+        return min(self.of(scenario), key=rank)
+
+    @cached_property
+    def records(self) -> list[dict[str, Any]]:
+        """One flat record a row, ready for JSON; what could not be measured is None."""
+        return [self._record(row) for row in self.rows]
+
+    @property
+    def episode_records(self) -> list[dict[str, Any]]:
+        """One flat record an episode, ready for JSON."""
+        return [
+            {
+                "policy": row.contender.called,
+                "observation": row.contender.observation,
+                "proximity": row.contender.proximity,
+                "scenario": row.scenario,
+                "errors_from": self.errors_from,
+                "seed": e.seed,
+                **{name: _number(getattr(e, name)) for name in FIGURES},
+                "seconds": e.seconds,
+                "done": e.done,
+            }
+            for row in self.rows
+            for e in row.episodes
+        ]
+
+    def _record(self, row: Row) -> dict[str, Any]:
+        error, *others = (row.means[name] for name in FIGURES)
+        reference = self.reference(row.scenario)
+        compared = row.ratio(reference)
+        return {
+            "policy": row.contender.called,
+            "trained_on": row.trained_on,
+            "observation": row.contender.observation,
+            "proximity": row.contender.proximity,
+            "scenario": row.scenario,
+            "task": row.setting.task,
+            "level": row.setting.level,
+            "operator": row.setting.operator,
+            "cars": row.cars,
+            "episodes": len(row.episodes),
+            "errors_from": self.errors_from,
+            "formation_error": _value(error),
+            "ci95": _ends(error),
+            **{name: _value(m) for name, m in zip(FIGURES[1:], others, strict=True)},
+            **{f"{name}_ci95": _ends(m) for name, m in zip(FIGURES[1:], others, strict=True)},
+            "seconds": float(row.values("seconds").mean()),
+            "done_share": float(row.values("done").mean()),
+            "reference": reference.contender.label,
+            "ratio": _value(compared),
+            "ratio_ci95": _ends(compared),
+        }
+
+
+def _value(found: Interval | None) -> float | None:
+    return None if found is None else found.value
+
+
+def _ends(found: Interval | None) -> list[float] | None:
+    return None if found is None else found.ends
+
+
+def _number(value: float) -> float | None:
+    """A finite number, or None."""
+    return float(value) if np.isfinite(value) else None

@@ -1,6 +1,0 @@
-"""Real cars driven by policies and controllers: what `relpos drive` does."""
-
-from agents.drive.result import DriveResult
-from agents.drive.run import drive, drive_on
-
-__all__ = ["DriveResult", "drive", "drive_on"]

@@ -1,0 +1,184 @@
+"""One run: a simulated log, tracked by one filter and scored."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from agents.evaluation.lost import converged_at, lost_at
+from agents.evaluation.over_time import OverTime, over_time
+from agents.evaluation.suites import Case
+from relpos_env.core.oracle_params import matched_params
+from tracking.geometry import quat_from_yaw, rotate
+from tracking.log import Log
+from tracking.measurements import Kind
+from tracking.metrics.bound import Bound, posterior_bound
+from tracking.metrics.gospa import labelled_gospa
+from tracking.metrics.score import score
+from tracking.params.short_repr import short_repr
+from tracking.tracker import Tracker
+
+SKIP = 10.0
+"""[s] After the first range, not scored."""
+WARM_UP = 200
+"""[-] So many events are tracked before the clock runs, so that compiling is not timed."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunResult:
+    """One case, seed and filter; figures are None where there was nothing to score."""
+
+    __repr__ = short_repr
+
+    case: str
+    scenario: str
+    filter: str
+    seed: int
+    nodes: int
+    rmse: float | None
+    """[m]"""
+    rmse_yaw: float | None
+    """[m]"""
+    rmse_shape: float | None
+    """[m]"""
+    bound: float | None
+    """[m] `rmse` that is expected of an efficient estimator (`tracking.metrics.bound`)."""
+    bound_yaw: float | None
+    """[m] The same of `rmse_yaw`."""
+    bound_shape: float | None
+    """[m] The same of `rmse_shape`."""
+    nees: float | None
+    """[-]"""
+    nis: float | None
+    """[-]"""
+    gospa: float | None
+    """[m] Labelled GOSPA after one constant yaw: errors, and pairs that are missed or not there."""
+    coverage: float | None
+    """[-] Share of the scored time with an estimate."""
+    ok_share: float | None
+    """[-] Share of the scored time with status ok."""
+    integrity_share: float | None
+    """[-] Share of the run in which pairs were ok and wrong, see `tracking.metrics.integrity`."""
+    integrity_worst_s: float | None
+    """[s] Longest time in one go that a pair was so."""
+    converged_s: float
+    """[s] From the first range until all pairs were ok, at most 10."""
+    lost_s: float | None
+    """[s] When the run was lost, None if never."""
+    rejected: int
+    """Ranges refused as outliers."""
+    rounds_hz: float
+    """[1/s] Ranges over pairs and time."""
+    us_per_round: float
+    """[us] Time of the tracker, orientation and reports too, over rounds; the only figure that is
+    not repeatable."""
+    over_time: OverTime
+
+    @property
+    def lost(self) -> bool:
+        """Whether a pair was wrong for too long."""
+        return self.lost_s is not None
+
+    @property
+    def ratio_bound(self) -> float | None:
+        """`rmse_yaw` over its bound [-]."""
+        return _ratio(self.rmse_yaw, self.bound_yaw)
+
+    @property
+    def ratio_shape(self) -> float | None:
+        """`rmse_shape` over its bound [-]."""
+        return _ratio(self.rmse_shape, self.bound_shape)
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """The figures, ready for JSON."""
+        names = [n for n in self.__slots__ if n != "over_time"]
+        return {n: getattr(self, n) for n in names} | {
+            "ratio_bound": self.ratio_bound,
+            "ratio_shape": self.ratio_shape,
+        }
+
+
+def run(case: Case, log: Log, filter: str, seed: int, bound: Bound | None) -> RunResult:
+    """Track the log of a case and score it.
+
+    Args:
+        case: What kind of run it is.
+        log: Its log, with truth.
+        filter: One of `tracking.filters.FILTERS`.
+        seed: That of the log.
+        bound: Expected errors of an efficient estimator; None where cars come and go, which it
+            does not know.
+    """
+    constellation, block = log.constellation, log.block
+    first, last = log.t_range
+    t = log.truth.times()
+    t = t[(t >= first) & (t <= last)]
+    n_warm = int(np.searchsorted(block.t[0], first)) + WARM_UP
+    warm = block.take(slice(0, n_warm))
+    Tracker(constellation, filter=filter).step(warm, float(warm.t[0, -1]))
+
+    tracker = Tracker(constellation, filter=filter)
+    began = time.perf_counter()
+    estimate = tracker.run(block, t).take(0)
+    elapsed = time.perf_counter() - began
+
+    truth, has_truth = log.truth.pairs(constellation, t)
+    s = score(estimate, truth, has_truth, first + SKIP)
+    turned = rotate(quat_from_yaw(-np.radians(s.yaw_deg or 0.0)), truth)
+    gospa = labelled_gospa(estimate, turned, has_truth).total[t >= first + SKIP]
+    end = float(log.truth.t.max())
+    n_rounds = block.count(Kind.RANGE) / constellation.n_pairs
+    return RunResult(
+        case=case.name,
+        scenario=case.scenario.name,
+        filter=filter,
+        seed=seed,
+        nodes=constellation.n_nodes,
+        rmse=_number(s.rmse),
+        rmse_yaw=_number(s.rmse_yaw),
+        rmse_shape=_number(s.rmse_shape),
+        bound=None if bound is None else _number(bound.rmse),
+        bound_yaw=None if bound is None else _number(bound.rmse_yaw),
+        bound_shape=None if bound is None else _number(bound.rmse_shape),
+        nees=_number(s.nees),
+        nis=_number(float(tracker.mean_nis()[0])),
+        gospa=_number(np.sqrt(np.mean(gospa**2))) if len(gospa) else None,
+        coverage=s.coverage,
+        ok_share=s.ok_share,
+        integrity_share=s.integrity_share,
+        integrity_worst_s=s.integrity_worst_s,
+        converged_s=converged_at(estimate, first) - first,
+        lost_s=lost_at(estimate, truth, has_truth, first),
+        rejected=int(tracker.n_rejected()[0]),
+        rounds_hz=n_rounds / (last - first),
+        us_per_round=1e6 * elapsed / n_rounds,
+        over_time=over_time(estimate, truth, has_truth, np.radians(s.yaw_deg or 0.0), end),
+    )
+
+
+def run_seed(case: Case, seed: int, filters: tuple[str, ...], seconds: float) -> list[RunResult]:
+    """All filters on the run of one seed.
+
+    Args:
+        case: What kind of run it is.
+        seed: Same seed, same figures but for the time.
+        filters: Names in `tracking.filters.FILTERS`.
+        seconds: Length of the run.
+    """
+    log = case.log(seed, seconds)
+    stays = log.truth.pairs(log.constellation, log.truth.times())[1].all()
+    bound = posterior_bound(log, matched_params(case.scenario), skip=SKIP) if stays else None
+    return [run(case, log, name, seed, bound) for name in filters]
+
+
+def _number(value: float | None) -> float | None:
+    """A finite number, or None."""
+    return None if value is None or not np.isfinite(value) else float(value)
+
+
+def _ratio(value: float | None, bound: float | None) -> float | None:
+    return None if value is None or not bound else value / bound

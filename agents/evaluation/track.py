@@ -1,0 +1,274 @@
+"""Tracking a recorded run: what `relpos track` does, as a function."""
+
+from __future__ import annotations
+
+import csv
+import io
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from tracking.arrays import F64, Bool
+from tracking.constellation import Constellation
+from tracking.errors import ConfigError
+from tracking.estimate import Status, TeamEstimate
+from tracking.filters import DEFAULT_FILTER
+from tracking.findings import Finding, examine, find_refused, find_unplaced, refuse_errors
+from tracking.late_data.horizon import HorizonParams
+from tracking.log import Log, read_log
+from tracking.measurements import MeasurementBlock
+from tracking.metrics.bound import Bound
+from tracking.metrics.integrity import protection_radius
+from tracking.metrics.score import Score, score
+from tracking.params.short_repr import short_repr
+from tracking.tracker import Tracker, TrackerParams
+from tracking.whole_smoother import smooth_whole
+
+CSV_HZ = 20.0
+"""[Hz] Rate of estimates.csv."""
+ERRORS = ("rmse", "rmse_yaw", "rmse_shape", "rmse_mirror")
+"""The errors of a run, in the order they are shown."""
+LAG = HorizonParams().delay
+"""[s] So much later is what smoothed estimates know."""
+Smoothing = Literal["lag", "all"]
+N_CHUNKS = 50
+"""A log is tracked in so many pieces, so that progress can be shown."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrackResult:
+    """One log tracked by one filter."""
+
+    __repr__ = short_repr
+
+    log: Log
+    filter: str
+    estimate: TeamEstimate
+    """Over (time, pair), at `CSV_HZ`."""
+    truth_ij_w: F64
+    """True relative positions at those times, (time, pair, 3) [m]."""
+    has_truth: Bool
+    """(time, pair)"""
+    score: Score
+    """At the truth's own times."""
+    nis: float
+    """Mean NIS of accepted ranges [-]."""
+    n_rejected: int
+    """Ranges that the gate refused."""
+    skip: float
+    """[s] Time after the first range that is not scored."""
+    realtime_factor: float
+    """[-] Duration of the log over the time that tracking took."""
+    bound: Bound | None = None
+    """The expected errors of an efficient estimator, where asked for."""
+    findings: tuple[Finding, ...] = ()
+    """What a reader should know of the recording and of what became of it."""
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The figures, ready for JSON; what could not be scored is None."""
+        constellation, s = self.log.constellation, self.score
+        pair_rmse = {
+            pair_name(constellation, p): _number(s.pair_rmse[p])
+            for p in range(constellation.n_pairs)
+            if np.isfinite(s.pair_rmse[p])
+        }
+        return {
+            "log": self.log.name,
+            "filter": self.filter,
+            "nodes": constellation.n_nodes,
+            "duration_s": self.log.duration,
+            "ranges": self.log.n_ranges,
+            "rmse": _number(s.rmse),
+            "rmse_yaw": _number(s.rmse_yaw),
+            "yaw_deg": _number(s.yaw_deg),
+            "rmse_shape": _number(s.rmse_shape),
+            "rmse_mirror": _number(s.rmse_mirror),
+            **{f"bound_{name}": value for name, value in self.expected.items()},
+            "pair_rmse": pair_rmse,
+            "nees": _number(s.nees),
+            "nis": _number(self.nis),
+            "realtime_factor": _number(self.realtime_factor),
+            "coverage": s.coverage,
+            "ok_share": s.ok_share,
+            "integrity_share": s.integrity_share,
+            "integrity_worst_s": s.integrity_worst_s,
+            "protection_share": s.protection_share,
+            "findings": [f.record for f in self.findings],
+            "rejected": self.n_rejected,
+            "skipped": sum(self.log.skipped.values()),
+        }
+
+    @property
+    def expected(self) -> dict[str, float]:
+        """The bound under the names of its errors [m]; empty where it was not asked for."""
+        if self.bound is None:
+            return {}
+        return {name: float(getattr(self.bound, name)) for name in ERRORS if name != "rmse_mirror"}
+
+
+def track_log(
+    log: Log | Path | str,
+    *,
+    filter: str = DEFAULT_FILTER,
+    skip: float = 10.0,
+    smooth: Smoothing | None = None,
+    bound: Bound | None = None,
+    params: TrackerParams | None = None,
+    findings: Sequence[Finding] | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> TrackResult:
+    """Track a recorded run and score it where there is truth.
+
+    Args:
+        log: A log, or its folder.
+        filter: One of `tracking.filters.FILTERS`.
+        skip: Times until so many seconds after the first range are not scored.
+        smooth: Estimates know what was measured in the `LAG` after them, too ("lag"), or all that
+            was measured ("all", `tracking.whole_smoother`).
+        bound: The expected errors of an efficient estimator, kept beside those there are
+            (`tracking.metrics.bound.recorded_bound`).
+        params: What the tracker believes.
+        findings: What `tracking.findings.examine` found of the log already, or nothing, for a log
+            that is to be taken as it is; None examines it, and corrects its clocks.
+        progress: Called with the share done, 0 to 1.
+
+    Raises:
+        LogError: The folder cannot be read, or estimates would be wrong (`refuse_errors`).
+        ConfigError: No such filter, or one that cannot smooth.
+    """
+    log = log if isinstance(log, Log) else read_log(log)
+    if findings is None:
+        log, findings = examine(log)
+        refuse_errors(findings)
+    constellation, block = log.constellation, log.block
+    tracker = Tracker(constellation, params, filter=filter)
+    first, last = log.t_range
+    # From whole multiples, so that large times stay on the grid.
+    grid = first + np.arange(int((last - first) * CSV_HZ) + 1) / CSV_HZ
+    t_truth = log.truth.times()
+    t_truth = t_truth[(t_truth >= first) & (t_truth <= last)]
+    t_out = np.union1d(grid, t_truth)
+
+    started = time.perf_counter()
+    if smooth == "all":
+        if filter != DEFAULT_FILTER:
+            raise ConfigError(f"smooth: expected filter '{DEFAULT_FILTER}', got '{filter}'")
+        estimate, nis, n_rejected = smooth_whole(constellation, block, t_out, params, progress)
+    else:
+        estimate = _in_parts(tracker, block, t_out, smooth is not None, progress)
+        nis, n_rejected = float(tracker.mean_nis()[0]), int(tracker.n_rejected()[0])
+    elapsed = time.perf_counter() - started
+
+    found = (*findings, *find_unplaced(log, estimate), *find_refused(log, n_rejected))
+    truth, has_truth = log.truth.pairs(constellation, t_out)
+    at_truth = np.isin(t_out, t_truth)
+    on_grid = np.isin(t_out, grid)
+    return TrackResult(
+        log=log,
+        filter=filter,
+        estimate=_at_times(estimate, on_grid),
+        truth_ij_w=truth[on_grid],
+        has_truth=has_truth[on_grid],
+        score=score(
+            _at_times(estimate, at_truth), truth[at_truth], has_truth[at_truth], first + skip
+        ),
+        nis=nis,
+        n_rejected=n_rejected,
+        skip=skip,
+        realtime_factor=log.duration / max(elapsed, 1e-9),
+        bound=bound,
+        findings=found,
+    )
+
+
+def _in_parts(
+    tracker: Tracker,
+    block: MeasurementBlock,
+    t_out: F64,
+    smooth: bool,
+    progress: Callable[[float], None] | None,
+) -> TeamEstimate:
+    """Estimates of a log, arrays over (time, ...); in pieces, so that progress can be shown."""
+    edges = np.linspace(block.t[0, 0], block.t[0, -1], N_CHUNKS + 1)[1:]
+    edges[-1] = max(block.t[0, -1], t_out[-1])
+    parts, event, out = [], 0, 0
+    for k, edge in enumerate(edges):
+        # An estimate holds every event up to its time, so both are cut at the same edge.
+        next_event = int(np.searchsorted(block.t[0], edge, side="right"))
+        next_out = int(np.searchsorted(t_out, edge, side="right"))
+        chunk, times = slice(event, next_event), t_out[out:next_out]
+        if smooth:
+            parts.append(_smoothed(tracker, block, chunk, times))
+        else:
+            parts.append(tracker.run(block.take(chunk), times))
+        event, out = next_event, next_out
+        if progress is not None:
+            progress((k + 1) / N_CHUNKS)
+    return _join(tracker.constellation, parts)
+
+
+def _smoothed(tracker: Tracker, block: MeasurementBlock, chunk: slice, t_out: F64) -> TeamEstimate:
+    """Estimates that know what was measured in the `LAG` after them; events of a chunk handled."""
+    event, found = chunk.start, []
+    for t in t_out:
+        now, later = np.searchsorted(block.t[0], [t, t + LAG], side="right")
+        tracker.step(block.take(slice(event, now)), t)
+        found.append(tracker.smooth(block.take(slice(now, later)), t))
+        event = now
+    rest = tracker.run(block.take(slice(event, chunk.stop)), np.empty(0))
+    if not found:
+        return rest
+    names = TeamEstimate.__slots__[1:]
+    stacked = (np.stack([getattr(e, n) for e in found], axis=1) for n in names)
+    return TeamEstimate(rest.constellation, *stacked)
+
+
+def pair_name(constellation: Constellation, pair: int) -> str:
+    """A pair by the ids of its nodes, "1-2"."""
+    i, j = constellation.pairs[pair]
+    return f"{constellation.ids[i]}-{constellation.ids[j]}"
+
+
+def estimates_csv(estimate: TeamEstimate) -> str:
+    """A run as text: one row per time and pair that has an estimate."""
+    constellation = estimate.constellation
+    ids = [(constellation.ids[i], constellation.ids[j]) for i, j in constellation.pairs]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(
+        ["t_s", "node_i", "node_j", "x", "y", "z", "vx", "vy", "vz", "sx", "sy", "sz",
+         "protection", "status"]
+    )  # fmt: skip
+    std, radius = estimate.pos_std, protection_radius(estimate)
+    for k, t in enumerate(estimate.t):
+        for p, (i, j) in enumerate(ids):
+            status = Status(int(estimate.status[k, p]))
+            if status in (Status.ABSENT, Status.STARTING):
+                continue
+            numbers = (*estimate.pos_ij_w[k, p], *estimate.vel_ij_w[k, p], *std[k, p])
+            within = f"{radius[k, p]:.5f}" if np.isfinite(radius[k, p]) else ""
+            row = [f"{t:.6f}", i, j, *(f"{v:.5f}" for v in numbers), within, status.name.lower()]
+            writer.writerow(row)
+    return text.getvalue()
+
+
+def _join(constellation: Constellation, parts: Sequence[TeamEstimate]) -> TeamEstimate:
+    """Runs one after another, the env axis removed."""
+    names = TeamEstimate.__slots__[1:]
+    joined = (np.concatenate([getattr(part, n)[0] for part in parts]) for n in names)
+    return TeamEstimate(constellation, *joined)
+
+
+def _at_times(estimate: TeamEstimate, chosen: Bool) -> TeamEstimate:
+    arrays = (getattr(estimate, n)[chosen] for n in TeamEstimate.__slots__[1:])
+    return TeamEstimate(estimate.constellation, *arrays)
+
+
+def _number(value: float | None) -> float | None:
+    """A finite number, or None."""
+    return None if value is None or not np.isfinite(value) else float(value)

@@ -1,0 +1,1 @@
+"""Programs for real and emulated nodes and cars."""

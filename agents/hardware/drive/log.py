@@ -1,0 +1,83 @@
+"""What is kept of a drive's decisions: the newest, in memory that does not grow."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from agents.hardware.drive.result import DriveResult
+from hardware_bridge.live.env import LiveFormationEnv
+from hardware_bridge.live.opened import OpenBridge
+
+MOST_KEPT = 6000
+"""[-] Decisions, ten minutes; of longer drives the last ones. A recording keeps all."""
+STOPPED = " stopped: "
+
+
+class DriveLog:
+    """A ring of decisions."""
+
+    def __init__(self, title: str, bridge: OpenBridge, env: LiveFormationEnv, cycles: int) -> None:
+        """Have room for a drive.
+
+        Args:
+            title: Of the driver.
+            bridge: Of the cars.
+            env: Is driven.
+            cycles: Decisions that there may be.
+        """
+        self._title, self._bridge, self._env = title, bridge, env
+        self._n, self._n_late, self._began_ns = 0, 0, 0
+        n, room = bridge.config.n_slots, min(cycles, MOST_KEPT)
+        self._t_ns = np.full(room, -1, dtype=np.int64)
+        self._target = np.full((room, n, n, 2), np.nan)
+        self._wanted = np.full((room, n, n), True)
+        self._error, self._lag = np.full((2, room), np.nan)
+        self._command, self._passed = np.full((2, room, n, 2), np.nan)
+
+    def first(self) -> None:
+        """The drive begins."""
+        self._n_late = self._bridge.feed.n_late
+
+    def add(self) -> None:
+        """A decision has passed."""
+        group, report = self._env.group, self._bridge.feed.report
+        present, task = group.believed.present[0], group.task
+        k = self._n % len(self._t_ns)
+        self._began_ns = self._began_ns if self._n else group.t_ns
+        self._n += 1
+        self._t_ns[k] = group.t_ns
+        self._target[k], self._wanted[k] = task.target[0], task.has_target[0]
+        self._error[k] = task.error[0, present].mean() if present.any() else np.nan
+        self._command[k] = group.asked
+        self._passed[k] = 0.0
+        self._lag[k] = np.nan
+        if report is not None:
+            self._passed[k, :, 0], self._passed[k, :, 1] = report.speed, report.steering
+            self._lag[k] = report.lag if report.lag > 0.0 else np.nan
+
+    def result(self, armed: bool) -> DriveResult:
+        """All of it.
+
+        Args:
+            armed: Whether the cars were.
+        """
+        report, room = self._bridge.feed.report, len(self._t_ns)
+        order = np.arange(max(self._n - room, 0), self._n) % max(room, 1)
+        notices = [text for _, text in self._bridge.feed.notices]
+        return DriveResult(
+            driver=self._title,
+            armed=armed,
+            t_ns=self._t_ns[order],
+            began_ns=self._began_ns,
+            target=self._target[order],
+            wanted=self._wanted[order],
+            error=self._error[order],
+            command=self._command[order],
+            passed=self._passed[order],
+            lag=self._lag[order],
+            decisions=self._n,
+            late_decisions=self._bridge.feed.n_late - self._n_late,
+            missed_ticks=report.missed if report is not None else 0,
+            recording_lost=self._bridge.recording_lost,
+            stops=tuple(text for text in notices if STOPPED in text),
+        )

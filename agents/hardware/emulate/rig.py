@@ -1,0 +1,211 @@
+"""An emulation that is stepped by hand: a world, its devices, and their ports in a folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from agents.hardware.emulate.options import EmulateOptions
+from agents.hardware.emulate.swarm_file import (
+    OPERATOR_PORT,
+    WRITTEN_BY,
+    car_port,
+    node_port,
+    swarm_toml,
+)
+from agents.hardware.emulate.world import EmulatedWorld
+from hardware_bridge.emulator.boots import boot_numbers
+from hardware_bridge.emulator.cars import make_firmware
+from hardware_bridge.emulator.cars.emulated_car import EmulatedCar
+from hardware_bridge.emulator.devices import OPERATOR, CarDevice, NodeDevice, OperatorDevice
+from hardware_bridge.emulator.emulator import Emulator
+from hardware_bridge.emulator.faults import FaultInjector, FaultParams
+from hardware_bridge.emulator.line import Line
+from hardware_bridge.emulator.node import EmulatedNode
+from hardware_bridge.emulator.ports import DevicePort, MemoryPort, PortBuilder
+from hardware_bridge.emulator.pty import PtyPort
+from hardware_bridge.errors import BridgeError
+from hardware_bridge.safe_file import write_safely
+from hardware_bridge.wire.encoder import RelposEncoder
+from relpos_env.timing import DT
+from tracking.log import Log
+from tracking.measurements import MeasurementBlock
+
+STEP_NS = round(1e9 * DT)
+"""[ns] From step to step."""
+SWARM_FILE = "swarm.toml"
+TRUTH_EVERY = 2
+"""[-] A log has the truth of every so-manieth step."""
+
+
+class EmulatedRig:
+    """World, devices and ports; a step takes no time but that of its computation.
+
+    Law: same options and same bytes to the cars at the same times, same everything, bit for bit.
+    """
+
+    def __init__(
+        self,
+        options: EmulateOptions,
+        folder: Path | None = None,
+        *,
+        ports: PortBuilder | None = None,
+        record: bool = False,
+    ) -> None:
+        """Make everything, and write ``swarm.toml`` once all ports can be opened.
+
+        Args:
+            options: What it is made of.
+            folder: For the ports and ``swarm.toml``; made if it is not there. None writes nothing.
+            ports: Gives ports by their names; by default pseudo terminals in the folder, or lines
+                in memory without one.
+            record: Keep measurements and truth, see `EmulatedWorld.recording`.
+
+        Raises:
+            EnvError: An unknown name or a number out of range.
+            BridgeError: Likewise of devices, or a port that cannot be made.
+        """
+        self.options = options
+        self._formats = options.formats()
+        self.world = EmulatedWorld(options.parts(), options.seed, record=record)
+        self.constellation = self.world.swarm.constellation
+        ids = self.constellation.ids
+        for node in ids:
+            make_firmware(options.driver, node, options.driver_options, self.options.car_key)
+        # Links must mean the same wherever somebody else stands.
+        self.folder = None if folder is None else folder.resolve()
+        if self.folder is not None:
+            try:
+                self.folder.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                why = error.strerror
+                raise BridgeError(f"--folder {folder}: cannot be made ({why})") from error
+            _check_ours(self.folder / SWARM_FILE)
+        self._make_port = ports or _ports_in(self.folder)
+        self.ports: dict[str, DevicePort] = {}
+        """By name."""
+        self._rng = np.random.default_rng([options.seed, _DEVICES])
+        try:
+            self.emulator = self._plug_in(ids)
+        except BaseException:
+            for port in self.ports.values():
+                port.unplug()
+            raise
+        self._t_ns = 0
+        if self.folder is not None:
+            self._write(self.folder)
+
+    def step(self, t_ns: int | None = None) -> MeasurementBlock:
+        """Go on by 10 ms of the world.
+
+        Args:
+            t_ns: Now, of the host; by default 10 ms after the last step.
+
+        Returns:
+            What was measured, faults or not; valid until the next step.
+        """
+        self._t_ns = self._t_ns + STEP_NS if t_ns is None else t_ns
+        return self.emulator.step(self._t_ns)
+
+    def log(self, name: str) -> Log:
+        """What was measured since the beginning, with the truth.
+
+        Args:
+            name: Of the log.
+
+        Raises:
+            BridgeError: Nothing was kept.
+        """
+        recording, scenario = self.world.recording, self.world.parts.scenario.name
+        if recording is None:
+            raise BridgeError("record: expected an emulation that keeps measurements")
+        return recording.to_log(name, scenario, self.constellation, truth_every=TRUTH_EVERY)
+
+    def close(self) -> None:
+        """Unplug everything."""
+        self.emulator.close()
+
+    def swarm_toml(self, folder: Path) -> str:
+        """The text of ``swarm.toml``.
+
+        Args:
+            folder: Where the ports are.
+        """
+        nodes = [(d.node, [line.name for line in d.lines]) for d in self.emulator.nodes]
+        return swarm_toml(self.options, self.world.parts, self.constellation, nodes, folder)
+
+    def _write(self, folder: Path) -> None:
+        """Write ``swarm.toml``, at once and whole."""
+        text = self.swarm_toml(folder)
+        write_safely(folder / SWARM_FILE, text, mode=0o644 if self.options.key is None else 0o600)
+        # These devices are new: what others of the same ids said before is nothing to them.
+        (folder / SWARM_FILE).with_suffix(".marks.json").unlink(missing_ok=True)
+
+    def _plug_in(self, ids: tuple[int, ...]) -> Emulator:
+        """All devices on their lines."""
+        options = self.options
+        nodes = [self._node(k, ids) for k in range(len(ids))]
+        cars = [self._car(node) for node in ids]
+        operator = None
+        if options.operator:
+            boot = next(boot_numbers(self._rng))
+            encoder = RelposEncoder(OPERATOR, boot, options.key)
+            operator = OperatorDevice(self._line(OPERATOR_PORT, FaultParams()), encoder, boot, ids)
+        return Emulator(self.world, nodes, cars, operator, options.faults)
+
+    def _node(self, k: int, ids: tuple[int, ...]) -> NodeDevice:
+        """A node with its ports."""
+        options = self.options
+        names = [node_port(ids[k], p) for p in range(len(self._formats))]
+        lines = [self._line(name, options.faults.frames) for name in names]
+        own, other = self._rng.spawn(2)
+
+        def make(rng: np.random.Generator) -> EmulatedNode:
+            return EmulatedNode(ids[k], self._formats, ids, rng, options.nodes)
+
+        return NodeDevice(make(own), lines, lambda: make(other))
+
+    def _car(self, node: int) -> CarDevice:
+        """A car's controller on its line."""
+        options, boots = self.options, boot_numbers(self._rng)
+
+        def make() -> EmulatedCar:
+            firmware = make_firmware(
+                options.driver, node, options.driver_options, self.options.car_key, next(boots)
+            )
+            return EmulatedCar(firmware, options.deadman)
+
+        line = self._line(car_port(node), FaultParams())
+        return CarDevice(node, line, make, CAR_VOLTAGE)
+
+    def _line(self, name: str, faults: FaultParams) -> Line:
+        """A port and what happens on the way to it."""
+        self.ports[name] = port = self._make_port(name)
+        return Line(name, port, FaultInjector(faults, self._rng.spawn(1)[0]))
+
+
+def _check_ours(path: Path) -> None:
+    """See that a file that is to be replaced was written by an emulation.
+
+    Raises:
+        BridgeError: It was not.
+    """
+    if not path.exists():
+        return
+    with path.open(encoding="utf-8", errors="replace") as stream:
+        if stream.readline().rstrip("\n") != WRITTEN_BY:
+            raise BridgeError(f"{path}: not written by an emulation, expected another --folder")
+
+
+_DEVICES = 0x0DE71CE5
+"""Sets the draws of devices apart from those of the world, which has the seed alone."""
+CAR_VOLTAGE = 7.6
+"""[V] Of a battery of two cells."""
+
+
+def _ports_in(folder: Path | None) -> PortBuilder:
+    """Pseudo terminals in a folder, or lines in memory without one."""
+    if folder is None:
+        return lambda name: MemoryPort()
+    return lambda name: PtyPort(folder / name)

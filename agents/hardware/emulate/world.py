@@ -1,0 +1,155 @@
+"""The world behind the devices: a swarm with its task and its operator, 10 ms at a time.
+
+Law: with the same scenario, task, seed and commands it goes as `relpos_env.core.env_core.Formation`
+goes, to the last bit.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from gymnasium.utils import seeding
+
+from relpos_env.config import Parts
+from relpos_env.scenarios.episode import Episode, draw_episode
+from relpos_env.sensors.operator import Operator
+from relpos_env.simulation.recorder import Recording
+from relpos_env.timing import DECISION, DT, SOON, STAND_STILL
+from relpos_env.world.world import Swarm
+from tracking.arrays import F64, Bool
+from tracking.measurements import MeasurementBlock
+
+STEPS = round(DECISION / DT)
+"""[-] Steps of a decision: so often task and operator look at the room."""
+AT_REST = round(STAND_STILL / DT)
+"""[-] Steps in which the cars stand at first."""
+
+
+class EmulatedWorld:
+    """A `hardware_bridge.emulator.emulator.World`."""
+
+    def __init__(self, parts: Parts, seed: int, *, record: bool = False) -> None:
+        """Begin an episode.
+
+        Args:
+            parts: What the world is made of.
+            seed: Of the episode, as of `FormationEnv.reset`.
+            record: Keep measurements and truth for `recording`.
+        """
+        self.parts = parts
+        self._swarm = Swarm(
+            parts.scenario, parts.n_cars, n_steps=1, proximity=parts.config.proximity
+        )
+        self._task = parts.make_task(1)
+        self._operator = Operator(parts.config.operator, parts.n_cars, 1)
+        self.recording = Recording() if record else None
+        self.contacts = 0
+        """[-] That cars began since they were let go."""
+        self._touched = np.zeros((1, parts.n_cars))
+        self._steps = 0
+        # A car that comes in stands until the next decision, as in the simulation.
+        self._driven = np.zeros(parts.n_cars, dtype=bool)
+        # The same draws in the same order as in `Formation.begin`.
+        rng = seeding.np_random(seed)[0].spawn(1)[0]
+        seconds = STAND_STILL + DECISION * parts.config.max_cycles
+        episode = draw_episode(parts.scenario, parts.n_cars, seconds, rng)
+        self._swarm.begin(0, at_decisions(episode), rng.spawn(1)[0])
+        self._operator_seed = rng.integers(1 << 62)
+
+    @property
+    def swarm(self) -> Swarm:
+        """The truth; a batch of one."""
+        return self._swarm
+
+    @property
+    def t(self) -> float:
+        """Time since it began, the time at rest included [s]."""
+        return float(self._swarm.t[0])
+
+    @property
+    def at_rest(self) -> bool:
+        """True while the cars are held at first."""
+        return self._steps < AT_REST
+
+    @property
+    def just_judged(self) -> bool:
+        """True when task and operator have just looked at the room."""
+        return self._steps >= AT_REST and (self._steps - AT_REST) % STEPS == 0
+
+    @property
+    def present(self) -> Bool:
+        """Who is in the room, (car)."""
+        present: Bool = self._swarm.state.present[0]
+        return present
+
+    @property
+    def powered(self) -> Bool:
+        """Which trackers have power, (car)."""
+        powered: Bool = self._swarm.powered[0]
+        return powered
+
+    @property
+    def command(self) -> F64:
+        """Velocity that the operator asks for on top of the plan, (car, 2) [m/s].
+
+        Zeros while the cars are held.
+        """
+        trim: F64 = self._operator.command[0] - self._task.plan[0]
+        return np.where(self.present[:, None], trim, 0.0)
+
+    @property
+    def error(self) -> float:
+        """Formation error as the task says, mean over the cars in the room [m]."""
+        return float(self._task.error[0, self.present].mean()) if self.present.any() else math.nan
+
+    @property
+    def done(self) -> bool:
+        """Whether the task is accomplished."""
+        return bool(self._task.done[0])
+
+    def step(self, speed: F64, steering: F64) -> MeasurementBlock:
+        """Go on by 10 ms; see `World`."""
+        if self._steps % STEPS == 0:
+            self._driven = self.present.copy()
+        block = self._swarm.step((speed * self._driven)[None], (steering * self._driven)[None])
+        self._steps += 1
+        if self.recording is not None:
+            self.recording.add_swarm(self._swarm)
+        self._touched += self._swarm.contacts
+        if self._steps == AT_REST:
+            self._task.reset(self._swarm.state, slice(0, 1))
+            self._operator.reset(np.array([self._operator_seed], dtype=np.uint64), slice(0, 1))
+        if self.just_judged:
+            self._judge()
+        return block
+
+    def motion(self) -> tuple[F64, F64]:
+        """Speeds by the odometers [m/s] and steering angles [rad], (car)."""
+        speed: F64 = self._swarm.odometer[0]
+        steering: F64 = self._swarm.state.steering[0]
+        return speed, steering
+
+    def near(self) -> F64:
+        """Distances by the cars' own sensors, (car, beam) [m]."""
+        near: F64 = self._swarm.proximity[0]
+        return near
+
+    def _judge(self) -> None:
+        """What task and operator say of now."""
+        swarm = self._swarm
+        self._task.update(swarm.state, swarm.t - STAND_STILL, self._touched, slice(0, 1))
+        self._operator.sample(swarm.state, self._task, slice(0, 1))
+        if self._steps > AT_REST:
+            self.contacts += int(self._touched.sum())
+        self._touched[:] = 0.0
+
+
+def at_decisions(episode: Episode) -> Episode:
+    """The episode in which cars come and go between decisions, when the simulation lets them."""
+    events = tuple(
+        replace(event, t=math.ceil((event.t - SOON) / DECISION) * DECISION)
+        for event in episode.events
+    )
+    return replace(episode, events=events)

@@ -1,0 +1,1 @@
+"""Inspect ports, links and cars before anything drives."""

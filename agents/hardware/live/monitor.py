@@ -1,0 +1,78 @@
+"""Watches a swarm over time, live or replayed: rates, counts, and what is to be kept."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from agents.hardware.live.history import History
+from agents.hardware.live.rates import Rates
+from agents.hardware.live.snapshot import Snapshot, take_snapshot
+from hardware_bridge.live.swarm import LiveSwarm
+from tracking.measurements import MeasurementBlock
+
+
+class Monitor:
+    """To be told after every step of the swarm."""
+
+    def __init__(
+        self, swarm: LiveSwarm, *, estimates: bool = True, measurements: bool = False
+    ) -> None:
+        """Begin with nothing.
+
+        Args:
+            swarm: Is watched; its tap is taken.
+            estimates: Whether all estimates are kept.
+            measurements: Whether all measurements are.
+        """
+        self.swarm = swarm
+        self.rates = Rates(swarm.group.n_nodes)
+        self.history = History(swarm.group)
+        self.t_ns = swarm.intake.start_ns
+        """Host time of the last step [ns]."""
+        self.decisions = 0
+        self._estimates, self._measurements = estimates, measurements
+        self._blocks: list[MeasurementBlock] = []
+        swarm.tap = self._take
+
+    def after_step(self, t_ns: int) -> None:
+        """The swarm has made a step."""
+        self.t_ns = t_ns
+        self.decisions += 1
+        self.rates.close(self.swarm.intake.seconds(t_ns))
+        if self._estimates:
+            self.history.add(t_ns, self.swarm.estimate)
+
+    def snapshot(self) -> Snapshot:
+        """What is known after the last step."""
+        return take_snapshot(self.swarm, self.rates.hz, self.t_ns)
+
+    @property
+    def block(self) -> MeasurementBlock:
+        """What was measured, as it came, if it was kept; times in seconds since the start."""
+        parts = self._blocks
+        return MeasurementBlock.concatenate(parts) if parts else MeasurementBlock.empty()
+
+    @property
+    def counts(self) -> dict[str, Any]:
+        """What came and what was refused, ready for JSON."""
+        intake = self.swarm.intake
+        return {
+            "measurements": dict(self.rates.totals),
+            "refused": dict(sorted((intake.refused + intake.plausibility.refused).items())),
+            "late_measurements": self.swarm.n_late,
+        }
+
+    @property
+    def streams(self) -> list[dict[str, Any]]:
+        """Of each stream what its decoder met, ready for JSON."""
+        rows = []
+        for name, stream in self.swarm.intake.streams.items():
+            c = stream.decoder.counts
+            counts = {"bytes": c.n_bytes, "frames": c.frames, "skipped": c.skipped}
+            rows.append({"stream": name, **counts, "damaged": c.damaged, "strange": c.strange})
+        return rows
+
+    def _take(self, block: MeasurementBlock) -> None:
+        self.rates.take(block)
+        if self._measurements:
+            self._blocks.append(block.env(0))

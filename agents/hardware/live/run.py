@@ -1,0 +1,92 @@
+"""Listening to a live swarm, from opened ports to closed ones."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable
+from pathlib import Path
+
+from agents.errors import UsageError
+from agents.hardware.live.monitor import Monitor
+from agents.hardware.live.result import LiveResult
+from hardware_bridge.config import SwarmConfig, read_config
+from hardware_bridge.live.bridge import Bridge
+from hardware_bridge.live.feed import LiveFeed
+
+Watch = Callable[[Monitor, list[tuple[float, str]]], bool | None]
+"""Takes what is known and the notices since the last call, time [s] and text; False ends it."""
+
+
+def live(
+    config: SwarmConfig | Path | str,
+    *,
+    seconds: float | None = None,
+    record: Path | str | None = None,
+    watch: Watch | None = None,
+    keep: bool = True,
+) -> LiveResult:
+    """Track a live swarm without driving it.
+
+    Args:
+        config: A swarm.toml, or what `read_config` made of one.
+        seconds: Length; None ends with Ctrl-C.
+        record: File for a recording.
+        watch: Called after every decision.
+        keep: Whether the result has the estimates of all decisions.
+
+    Raises:
+        BridgeError: Something of the swarm cannot be used.
+        UsageError: A length that makes no sense.
+    """
+    if seconds is not None and not 0.0 < seconds < float("inf"):
+        raise UsageError(f"seconds: expected a number above 0, got {seconds:g}")
+    swarm = config if isinstance(config, SwarmConfig) else read_config(config)
+    notices: list[tuple[float, str]] = []
+    with Bridge(swarm, record=record) as bridge:
+        monitor = Monitor(bridge.swarm, estimates=keep)
+        with contextlib.suppress(KeyboardInterrupt):
+            _listen(bridge, monitor, seconds, watch, notices)
+        notices += _drain(bridge.feed, monitor)
+        recorder, n_late = bridge.recorder, bridge.feed.n_late
+    intake = monitor.swarm.intake
+    return LiveResult(
+        name=swarm.name,
+        start_ns=intake.start_ns,
+        seconds=intake.seconds(monitor.t_ns),
+        decisions=monitor.decisions,
+        late_decisions=n_late,
+        t_ns=monitor.history.t_ns,
+        estimate=monitor.history.estimate,
+        counts=monitor.counts,
+        streams=tuple(monitor.streams),
+        notices=tuple(notices),
+        recording=None if record is None else str(record),
+        # Only known for sure once it is closed.
+        recording_lost=None if recorder is None else recorder.lost,
+    )
+
+
+def _listen(
+    bridge: Bridge,
+    monitor: Monitor,
+    seconds: float | None,
+    watch: Watch | None,
+    notices: list[tuple[float, str]],
+) -> None:
+    """Decide until the time is up or somebody says so."""
+    intake = bridge.swarm.intake
+    while seconds is None or intake.seconds(monitor.t_ns) < seconds:
+        t_ns = bridge.feed.advance()
+        bridge.swarm.step(t_ns)
+        monitor.after_step(t_ns)
+        new = _drain(bridge.feed, monitor)
+        notices += new
+        if watch is not None and watch(monitor, new) is False:
+            return
+
+
+def _drain(feed: LiveFeed, monitor: Monitor) -> list[tuple[float, str]]:
+    """The notices since the last call, times in seconds since the start."""
+    notices = [(monitor.swarm.intake.seconds(t_ns), text) for t_ns, text in feed.notices]
+    feed.notices.clear()
+    return notices

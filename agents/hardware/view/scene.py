@@ -1,0 +1,111 @@
+"""Nodes in the axes of the world round one of them, how sure each is, and the links between.
+
+Relative positions leave one place open: the first node that most others are known from is at the
+origin. The ellipse of a node is that of its position relative to it, three standard deviations.
+"""
+
+from __future__ import annotations
+
+import math
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from agents.hardware.live.snapshot import PairRow, Snapshot
+from tracking.arrays import F64
+
+SIGMAS = 3.0
+ARROW = 0.4
+"""[m] Length of a heading."""
+CORNERS = 48
+"""Of an ellipse."""
+SIGHT = (60, 180, 90)
+BLOCKED = (240, 150, 30)
+LOST = (220, 60, 60)
+VAGUE = (130, 130, 130)
+"""Not known enough to be used."""
+NODE = (70, 130, 230)
+SILENT = (130, 130, 130)
+SILENT_AFTER = 1.0
+"""[s]"""
+_USABLE = ("ok", "lost", "doubtful", "ambiguous")
+
+
+def log_scene(rr: ModuleType, stream: Any, snapshot: Snapshot) -> None:
+    """Log one moment, whose time is set."""
+    places, ellipses = place(snapshot)
+    heard = {n.node: n.heard_ago is not None and n.heard_ago < SILENT_AFTER for n in snapshot.nodes}
+    ids = [node for node in heard if node in places]
+    points = np.array([places[node] for node in ids]).reshape(-1, 3)
+    colours = [NODE if heard[node] else SILENT for node in ids]
+    labels = [str(node) for node in ids]
+    stream.log("plan/nodes", rr.Points3D(points, colors=colours, labels=labels, radii=0.08))
+    pointing = [n for n in snapshot.nodes if n.node in places and n.heading is not None]
+    arrows = [(ARROW * math.cos(n.heading or 0.0), ARROW * math.sin(n.heading or 0.0), 0.0)
+              for n in pointing]  # fmt: skip
+    stream.log(
+        "plan/headings",
+        rr.Arrows3D(
+            vectors=np.array(arrows).reshape(-1, 3),
+            origins=np.array([places[n.node] for n in pointing]).reshape(-1, 3),
+            colors=[NODE] * len(pointing),
+        ),
+    )
+    stream.log("plan/sigma", rr.LineStrips3D(list(ellipses.values()), colors=[VAGUE], radii=0.01))
+    links = [p for p in snapshot.pairs if p.node_i in places and p.node_j in places]
+    stream.log(
+        "plan/links",
+        rr.LineStrips3D(
+            [[places[p.node_i], places[p.node_j]] for p in links],
+            colors=[link_colour(p) for p in links],
+            radii=0.02,
+        ),
+    )
+
+
+def place(snapshot: Snapshot) -> tuple[dict[int, F64], dict[int, F64]]:
+    """Places and ellipses by node id, (3) and (corner, 3) [m]; of those that are known."""
+    known = [p for p in snapshot.pairs if p.pos_w is not None and p.status in _USABLE]
+    counts = {n.node: sum(n.node in (p.node_i, p.node_j) for p in known) for n in snapshot.nodes}
+    if not known:
+        return {}, {}
+    origin = max(counts, key=lambda node: counts[node])
+    places: dict[int, F64] = {origin: np.zeros(3)}
+    ellipses: dict[int, F64] = {}
+    for p in known:
+        if origin not in (p.node_i, p.node_j) or p.pos_w is None or p.cov_w is None:
+            continue
+        other, sign = (p.node_j, 1.0) if p.node_i == origin else (p.node_i, -1.0)
+        places[other] = sign * np.array(p.pos_w)
+        ellipses[other] = places[other] + ellipse(p.cov_w)
+    return places, ellipses
+
+
+def ellipse(cov_w: tuple[float, float, float]) -> F64:
+    """A closed line of `SIGMAS` standard deviations round 0, (corner, 3) [m].
+
+    Args:
+        cov_w: xx, yy, xy [m2].
+    """
+    xx, yy, xy = cov_w
+    values, axes = np.linalg.eigh(np.array([[xx, xy], [xy, yy]]))
+    phase = np.linspace(0.0, 2.0 * np.pi, CORNERS + 1)
+    circle = np.stack([np.cos(phase), np.sin(phase)])
+    line = np.zeros((CORNERS + 1, 3))
+    line[:, :2] = (axes @ (SIGMAS * np.sqrt(np.maximum(values, 0.0))[:, None] * circle)).T
+    return line
+
+
+def link_colour(pair: PairRow) -> tuple[int, int, int]:
+    """Red without ranges, grey before it can be used, else from green to orange.
+
+    Orange is where there is no line of sight, as far as that is known.
+    """
+    if pair.status in ("lost", "doubtful"):
+        return LOST
+    if pair.status != "ok":
+        return VAGUE
+    share = pair.nlos_prob or 0.0
+    r, g, b = (round(a + share * (c - a)) for a, c in zip(SIGHT, BLOCKED, strict=True))
+    return r, g, b

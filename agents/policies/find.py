@@ -1,0 +1,97 @@
+"""Where the two files of a policy are, and reading them without trusting what they are."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+
+from agents.policies.errors import PolicyError
+
+SHIPPED = Path(__file__).with_name("shipped")
+"""Policies that come with the package; what is in the folder is known by its name."""
+PICKLES = (".zip", ".pkl", ".pickle", ".pt", ".pth", ".ckpt", ".joblib", ".npy", ".npz")
+"""Files of trainers, in which there may be code that runs when they are loaded."""
+UNSAFE = "may execute code when it is loaded and is not opened; use `relpos export`"
+MOST_NETWORK = 50 << 20
+"""[byte] A network is no larger."""
+MOST_CARD = 1 << 20
+"""[byte] A card is no larger."""
+
+
+def shipped_names() -> list[str]:
+    """Names of the policies that come with the package."""
+    return sorted(path.stem for path in SHIPPED.glob("*.onnx"))
+
+
+def find_policy(wanted: str | Path) -> tuple[Path, Path]:
+    """Network and card of a policy.
+
+    Args:
+        wanted: One of the two, a folder with one policy, or the name of one that is shipped.
+
+    Raises:
+        PolicyError: There is none, or something that is not opened.
+    """
+    if str(wanted) in shipped_names():
+        return _pair(SHIPPED / f"{wanted}.onnx")
+    path = Path(wanted)
+    suffix = path.suffix.lower()
+    if suffix in PICKLES:
+        raise PolicyError(path, UNSAFE)
+    try:
+        mode = os.stat(path).st_mode
+    except FileNotFoundError as error:
+        names = ", ".join(shipped_names()) or "none"
+        reason = f"no such file or folder, and no policy of that name (there are: {names})"
+        raise PolicyError(path, reason) from error
+    except (OSError, ValueError) as error:
+        raise PolicyError(path, f"cannot be read ({_why(error)})") from error
+    if stat.S_ISDIR(mode):
+        return _pair(_only_one(path))
+    if suffix not in (".onnx", ".json"):
+        raise PolicyError(path, "expected a file .onnx or .json, a folder or a name")
+    return _pair(path)
+
+
+def read_bounded(path: Path, most: int) -> bytes:
+    """The bytes of an ordinary file.
+
+    Raises:
+        PolicyError: It is none, cannot be read, or has more than so many.
+    """
+    try:
+        # A pipe would wait for somebody to write into it.
+        number = os.open(
+            path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+        )
+        with open(number, "rb") as file:
+            if not stat.S_ISREG(os.fstat(number).st_mode):
+                raise PolicyError(path, "expected an ordinary file")
+            data = file.read(most + 1)
+    except FileNotFoundError as error:
+        raise PolicyError(path, "no such file; a policy is name.onnx and name.json") from error
+    except (OSError, ValueError) as error:
+        raise PolicyError(path, f"cannot be read ({_why(error)})") from error
+    if len(data) > most:
+        raise PolicyError(path, f"expected at most {most >> 20} MiB")
+    return data
+
+
+def _only_one(folder: Path) -> Path:
+    try:
+        names = sorted(p.name for p in folder.iterdir() if p.suffix == ".onnx")
+    except OSError as error:
+        raise PolicyError(folder, f"cannot be read ({_why(error)})") from error
+    if len(names) != 1:
+        found = ", ".join(names[:5]) + (", ..." if len(names) > 5 else "")
+        raise PolicyError(folder, f"expected one policy in the folder, got {found or 'none'}")
+    return folder / names[0]
+
+
+def _pair(path: Path) -> tuple[Path, Path]:
+    return path.with_suffix(".onnx"), path.with_suffix(".json")
+
+
+def _why(error: OSError | ValueError) -> str:
+    return getattr(error, "strerror", None) or str(error)

@@ -1,0 +1,284 @@
+"""Pictures of a comparison: figures with intervals, error over time, scatter, ratios."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from agents.comparison.meter import IN_FORMATION
+from agents.comparison.result import FIGURES, CompareResult, Row
+from agents.comparison.statistics import Interval
+from relpos_env.timing import DECISION
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COLOURS = (
+    "#2563eb", "#d97706", "#059669", "#dc2626", "#7c3aed", "#0891b2", "#be185d", "#65a30d",
+    "#475467", "#92400e",
+)  # fmt: skip
+"""Of the contenders, in order."""
+LABELS = {
+    "formation_error": "formation error [m]",
+    "place_error": "distance from the goals [m]",
+    "tracking_error": "tracking error [m]",
+    "collisions_per_min": "contacts [1/min]",
+    "contact_time": "time in contact [%]",
+    "time_in_formation": f"time below {IN_FORMATION:g} m [%]",
+    "energy": "energy [J/min]",
+}
+WIDE = 4.0
+"""[-] Ratios that span more than this factor are drawn on a logarithmic axis."""
+COLUMNS = 3
+"""[-] Panels side by side."""
+
+
+def figures(result: CompareResult) -> dict[str, tuple[str, Figure, str]]:
+    """Title, picture and caption by file name."""
+    settle = result.rows[0].setting.settle
+    drawn = {
+        "compare-figures.png": (
+            "Figures",
+            _bars(result),
+            "Means over the episodes with 95 % intervals. The axis of the energy does not begin at "
+            "0: differences are small beside what rolling takes.",
+        ),
+        "compare-time.png": (
+            "Formation error over time",
+            _over_time(result),
+            f"Median over the episodes, and the band of the middle half of them. Grey: before "
+            f"{settle:g} s, not scored.",
+        ),
+    }
+    if "tracking_error" in _measured(result):
+        drawn["compare-scatter.png"] = (
+            "What the tracker costs",
+            _scatter(result),
+            "Every episode: formation error over the error of the relative positions that the "
+            "cars knew. Rings: means.",
+        )
+    if len(result.contenders) > 1:
+        drawn["compare-ratios.png"] = (
+            "Ratio to the best controller",
+            _ratios(result),
+            "Formation error over that of the reference on the same seeds (real cars: in the same "
+            "rounds), with 95 % intervals; left of 1 is better. Dotted: a "
+            "fifth better.",
+        )
+    return drawn
+
+
+def _measured(result: CompareResult) -> list[str]:
+    """Figures that anybody has."""
+    return [name for name in FIGURES if any(row.means[name] for row in result.rows)]
+
+
+def _colours(result: CompareResult) -> dict[str, str]:
+    """A colour for every contender, the same in all pictures."""
+    return {c.label: COLOURS[n % len(COLOURS)] for n, c in enumerate(result.contenders)}
+
+
+def _bars(result: CompareResult) -> Figure:
+    from matplotlib.figure import Figure
+
+    colours, scenarios, measured = _colours(result), result.scenarios, _measured(result)
+    counts = [len(result.of(s)) for s in scenarios]
+    height = sum(0.34 * n + 0.9 for n in counts) + 0.2
+    figure = Figure(figsize=(3.0 + 2.0 * len(measured), height), layout="constrained")
+    axes = figure.subplots(
+        len(scenarios), len(measured), squeeze=False, sharey="row",
+        height_ratios=[n + 0.6 for n in counts],
+    )  # fmt: skip
+    for line, scenario in zip(axes, scenarios, strict=True):
+        rows = result.of(scenario)
+        for ax, name in zip(line, measured, strict=True):
+            scale = _scale(name)
+            for y, row in enumerate(rows):
+                bar = name != "energy"
+                _bar(ax, y, row.means[name], scale, colours[row.contender.label], bar=bar)
+            ax.set_xlim(_limits(name, [row.means[name] for row in rows]))
+            ax.grid(alpha=0.3, axis="x")
+            ax.set_ylim(len(rows) - 0.4, -0.6)
+            ax.tick_params(axis="y", length=0)
+            ax.locator_params(axis="x", nbins=3)
+        line[0].set_yticks(range(len(rows)), [r.contender.label for r in rows])
+        line[0].set_title(scenario, fontsize=10, loc="left", fontweight="bold")
+    for ax, name in zip(axes[-1], measured, strict=True):
+        ax.set_xlabel(LABELS[name])
+    return figure
+
+
+def _bar(ax: Axes, y: int, found: Interval | None, scale: float, colour: str, *, bar: bool) -> None:
+    """One bar, or a dot where the axis does not begin at 0, with its interval."""
+    if found is None:
+        return
+    if found.ends is not None:
+        ax.hlines(y, scale * found.ends[0], scale * found.ends[1], color="k", lw=1.6, zorder=3)
+    if bar:
+        ax.barh(y, scale * found.value, height=0.62, color=colour, alpha=0.75)
+    else:
+        ax.plot(scale * found.value, y, "o", color=colour, ms=7, zorder=2)
+
+
+def _limits(name: str, found: Sequence[Interval | None]) -> tuple[float, float]:
+    """Where the axis of a figure begins and ends."""
+    if name == "time_in_formation":
+        return 0.0, 100.0
+    ends = [e for m in found if m is not None for e in (m.ends or [m.value])] or [0.0]
+    low, high = min(ends), max(ends)
+    if name == "energy":
+        margin = 0.15 * (high - low) + 0.01 * high + 1e-3
+        return low - margin, high + margin
+    return 0.0, 1.08 * _scale(name) * high or 1.0
+
+
+def _scale(name: str) -> float:
+    """Shares are drawn in percent."""
+    return 100.0 if LABELS[name].endswith("[%]") else 1.0
+
+
+def _panels(result: CompareResult, width: float, height: float) -> tuple[Figure, list[Axes]]:
+    """A picture with a panel for each scenario."""
+    from matplotlib.figure import Figure
+
+    names = result.scenarios
+    columns = min(len(names), COLUMNS)
+    lines = -(-len(names) // columns)
+    width = max(width * columns, 7.0)
+    figure = Figure(figsize=(width, height * lines + 0.4), layout="constrained")
+    axes = figure.subplots(lines, columns, squeeze=False).ravel()
+    for ax in axes[len(names) :]:
+        ax.remove()
+    for ax, name in zip(axes, names, strict=False):
+        ax.set_title(name, fontsize=10)
+        ax.grid(alpha=0.3)
+    return figure, list(axes[: len(names)])
+
+
+def _over_time(result: CompareResult) -> Figure:
+    colours = _colours(result)
+    figure, axes = _panels(result, 4.0, 3.2)
+    for ax, scenario in zip(axes, result.scenarios, strict=True):
+        rows, top = result.of(scenario), 0.0
+        setting = rows[0].setting
+        ax.axvspan(0, setting.settle, color="0.94", lw=0)
+        for row in rows:
+            t, (low, middle, high) = _quartiles(row)
+            colour = colours[row.contender.label]
+            ax.fill_between(t, low, high, color=colour, alpha=0.18, lw=0)
+            ax.plot(t, middle, color=colour, lw=1.3, label=row.contender.label)
+            scored = high[t > setting.settle]
+            top = max(top, float(np.nanmax(scored if len(scored) else high)))
+        ax.set(xlim=(0, setting.seconds), ylim=(0, 1.3 * top or 1.0), xlabel="t [s]")
+    _finish(figure, "formation error [m]")
+    return figure
+
+
+def _quartiles(row: Row) -> tuple[np.ndarray, np.ndarray]:
+    """Times (cycle) and quartiles of the error over the episodes that still go on (3, cycle)."""
+    cycles = max(len(e.error) for e in row.episodes)
+    error = np.full((len(row.episodes), cycles), np.nan)
+    for line, episode in zip(error, row.episodes, strict=True):
+        line[: len(episode.error)] = episode.error
+    out = np.full((3, cycles), np.nan)
+    some = np.isfinite(error).any(axis=0)
+    out[:, some] = np.nanquantile(error[:, some], (0.25, 0.5, 0.75), axis=0)
+    return DECISION * np.arange(1, cycles + 1), out
+
+
+def _scatter(result: CompareResult) -> Figure:
+    colours = _colours(result)
+    figure, axes = _panels(result, 4.0, 3.4)
+    for ax, scenario in zip(axes, result.scenarios, strict=True):
+        for row in result.of(scenario):
+            x, y = row.values("tracking_error"), row.values("formation_error")
+            colour = colours[row.contender.label]
+            ax.plot(x, y, ".", color=colour, ms=7, alpha=0.45, mew=0, label=row.contender.label)
+        for row in result.of(scenario):
+            x_mean, y_mean = row.means["tracking_error"], row.means["formation_error"]
+            if x_mean is not None and y_mean is not None:
+                colour = colours[row.contender.label]
+                x_y = (x_mean.value, y_mean.value)
+                ax.plot(*x_y, "o", zorder=3, mfc="none", mec=colour, mew=2, ms=8)
+        ax.set_xlabel("tracking error [m]")
+        ax.locator_params(axis="x", nbins=6)
+        ax.set_xlim(left=-0.03 * ax.get_xlim()[1])
+        ax.set_ylim(bottom=0)
+    _finish(figure, "formation error [m]")
+    return figure
+
+
+def _ratios(result: CompareResult) -> Figure:
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import FormatStrFormatter, LogLocator, NullLocator
+
+    colours, scenarios = _colours(result), result.scenarios
+    counts = [len(result.of(s)) for s in scenarios]
+    figure = Figure(figsize=(9, sum(0.34 * n + 0.9 for n in counts) + 0.2), layout="constrained")
+    heights = [n + 0.6 for n in counts]
+    axes = figure.subplots(len(scenarios), 1, squeeze=False, height_ratios=heights)[:, 0]
+    for ax, scenario in zip(axes, scenarios, strict=True):
+        rows, reference = result.of(scenario), result.reference(scenario)
+        for y, row in enumerate(rows):
+            found = row.ratio(reference)
+            if found is None:
+                continue
+            colour = colours[row.contender.label]
+            if found.ends is not None:
+                ax.hlines(y, *found.ends, color=colour, lw=3, alpha=0.6)
+            ax.plot(found.value, y, "o", color=colour, ms=6)
+            ax.annotate(
+                f"{found.value:.2f}",
+                (found.value, y),
+                (0, 7),
+                textcoords="offset points",
+                ha="center",
+                fontsize=8,
+            )
+        ax.axvline(1.0, color="k", lw=1)
+        ax.axvline(0.8, color="k", lw=1, ls=":")
+        ax.set_yticks(range(len(rows)), [r.contender.label for r in rows])
+        ax.set_ylim(len(rows) - 0.4, -0.8)
+        ax.grid(alpha=0.3, axis="x")
+        title = f"{scenario}: over {reference.contender.label}"
+        ax.set_title(title, fontsize=10, loc="left", fontweight="bold")
+        ax.margins(x=0.08)
+        low, high = ax.dataLim.intervalx
+        if high > WIDE * low > 0.0:
+            ax.set_xscale("log")
+            ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=30))
+            ax.xaxis.set_major_formatter(FormatStrFormatter("%g"))
+            ax.xaxis.set_minor_locator(NullLocator())
+    axes[-1].set_xlabel("ratio of formation errors")
+    return figure
+
+
+def _finish(figure: Figure, label: str) -> None:
+    """Label the panels at the left, and one legend above all."""
+    for ax in figure.axes:
+        spec = ax.get_subplotspec()
+        if spec is not None and spec.is_first_col():
+            ax.set_ylabel(label)
+    handles, labels = _legend_of(figure.axes)
+    figure.legend(
+        handles,
+        labels,
+        loc="outside upper center",
+        ncols=3,
+        fontsize=9,
+        frameon=False,
+        markerscale=1.5,
+    )
+
+
+def _legend_of(axes: Sequence[Axes]) -> tuple[list[Artist], list[str]]:
+    """One entry for every label of the panels."""
+    entries: dict[str, Artist] = {}
+    for ax in axes:
+        for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
+            entries.setdefault(label, handle)
+    return list(entries.values()), list(entries)

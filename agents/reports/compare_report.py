@@ -1,0 +1,146 @@
+"""The report of a comparison: table, pictures, and the median episode of every contender."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import Any
+
+from agents.comparison.contender import sees
+from agents.comparison.meter import IN_FORMATION
+from agents.comparison.result import CompareResult, Row
+from agents.reports import compare_figures as figures
+from agents.reports.animation import player_markup
+from agents.reports.page import Page, metres, png
+
+_TO = "\N{NO-BREAK SPACE}to\N{NO-BREAK SPACE}"
+HEADER = (
+    "driver", "trained on", "sees", "error [m]", "95 %", "place", "tracking", "hits/min",
+    "touch %", "formed %", "J/min", "ratio", "95 %",
+)  # fmt: skip
+"""Names of the columns."""
+
+
+def rows(result: CompareResult, scenario: str) -> list[list[str]]:
+    """Cells of the table of one scenario, one line for each driver and mode of observations."""
+    return [_cells(r) for r in result.records if r["scenario"] == scenario]
+
+
+def _cells(record: dict[str, Any]) -> list[str]:
+    share, touch = record["time_in_formation"], record["contact_time"]
+    return [
+        record["policy"],
+        record["trained_on"] or "-",
+        sees(record["observation"], record["proximity"]),
+        metres(record["formation_error"]),
+        _ends(record["ci95"]),
+        metres(record["place_error"]),
+        metres(record["tracking_error"]),
+        _number(record["collisions_per_min"], 2),
+        _number(None if touch is None else 100.0 * touch, 2),
+        _number(None if share is None else 100.0 * share, 1),
+        _number(record["energy"], 1),
+        _number(record["ratio"], 3),
+        _ends(record["ratio_ci95"]),
+    ]
+
+
+SHORT_HEADER = ("driver", "error", "95 %", "place", "track", "hits", "formed", "ratio", "95 %")
+"""Names of the columns of `short_rows`."""
+_LONGEST = 36
+"""[-] Letters of a driver in a terminal, so that no figure is cut."""
+
+
+def short_rows(result: CompareResult, scenario: str) -> list[list[str]]:
+    """Cells of the table of one scenario, for a terminal: without energy and time in contact."""
+    lines = []
+    for row, cells in zip(result.of(scenario), rows(result, scenario), strict=True):
+        shown = f" on {row.contender.sees}"
+        name, room = row.contender.called, _LONGEST - len(shown)
+        if len(name) > room:
+            name = f"{name[: room - 3]}..."
+        kept = (*cells[3:8], cells[9], *cells[11:])
+        numbers = [cell.replace(_TO, "-") for cell in kept]
+        lines.append([name + shown, *numbers])
+    return lines
+
+
+def notes(result: CompareResult) -> list[str]:
+    """What a reader of the table must know, a line each."""
+    setting = result.rows[0].setting
+    by: dict[str, list[str]] = {}
+    for scenario in result.scenarios:
+        by.setdefault(result.reference(scenario).contender.label, []).append(scenario)
+    references = "; ".join(f"{label} in {', '.join(names)}" for label, names in by.items())
+    last = result.first_seed + result.seeds - 1
+    if result.errors_from == "truth":
+        alike, whole = "on the same seeds", "hits (contacts of all cars) and the energy of a car"
+        order = f"seeds {result.first_seed} to {last}, the same for all"
+    else:
+        alike, whole = "in the same rounds", "the energy of a car, by its odometer,"
+        order = "in rounds, one driver after the other, with real cars"
+    lines = [
+        f"Task {setting.task}, {result.seeds} episodes of {setting.seconds:g} s each, {order}; "
+        "means with 95 % intervals.",
+        f"Errors [m] and the time formed (every car's error below {IN_FORMATION:g} m) count from "
+        f"{setting.settle:g} s on; {whole} from the start.",
+        "place: how far the middle of the group is from where the task wants it [m].",
+        f"ratio: formation error over that of {references}, {alike}.",
+    ]
+    if result.errors_from == "estimates":
+        lines.append(
+            "Errors are what the cars believed themselves: nobody knows the truth, tracking error "
+            "and contacts among it."
+        )
+    lines += [f"Left out: {note}." for note in result.notes]
+    return lines + [f"{remark}." for remark in result.remarks]
+
+
+def compare_files(
+    result: CompareResult, films: Sequence[dict[str, Any]] = ()
+) -> dict[str, str | bytes]:
+    """Everything that goes into the folder, by name.
+
+    Args:
+        result: What was found.
+        films: Frames of the median episode of every row; real cars have none.
+    """
+    drawn = figures.figures(result)
+    names = ", ".join(dict.fromkeys(c.called for c in result.contenders))
+    page = Page(f"Comparison on task {result.rows[0].setting.task}", names)
+    for scenario in result.scenarios:
+        page.heading(scenario)
+        page.table(HEADER, rows(result, scenario))
+    for line in notes(result):
+        page.text(line)
+    for name, (title, figure, caption) in drawn.items():
+        page.heading(title)
+        page.figure(figure, f"{caption} ({name})")
+    filmed = list(zip(result.rows, films, strict=True)) if films else []
+    for n, scenario in enumerate(result.scenarios if films else ()):
+        page.heading(f"Median episodes in {scenario}")
+        drives = {_title(r): frames for r, frames in filmed if r.scenario == scenario}
+        page.raw(player_markup(drives, running=n == 0))
+    lines = [*result.records, *result.episode_records]
+    return {
+        "report.html": page.render(),
+        "results.jsonl": "".join(json.dumps(r, allow_nan=False) + "\n" for r in lines),
+        **{name: png(figure) for name, (_, figure, _) in drawn.items()},
+    }
+
+
+def _title(row: Row) -> str:
+    """What an episode is called in the player."""
+    episode = row.median_episode
+    error = metres(episode.formation_error)
+    return f"{row.contender.label}: seed {episode.seed}, formation error {error} m"
+
+
+def _number(value: float | None, digits: int) -> str:
+    """A number for a table, or a dash."""
+    return "-" if value is None else f"{value:.{digits}f}"
+
+
+def _ends(ends: Sequence[float] | None) -> str:
+    """An interval for a table, or a dash."""
+    return "-" if ends is None else f"{ends[0]:.3f}{_TO}{ends[1]:.3f}"

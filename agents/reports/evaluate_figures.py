@@ -1,0 +1,229 @@
+"""Pictures of an evaluation: error over time, consistency, error over seeds, and over nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from agents.evaluation.evaluate import CaseResult, EvaluateResult
+from agents.evaluation.over_time import NIS_EDGES
+from agents.evaluation.run import SKIP
+from tracking.metrics.consistency import chi_square_band
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
+    from matplotlib.figure import Figure
+
+COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple", "tab:brown")
+"""Of the filters, in order."""
+BAND = 0.95
+"""[-] Probability of the chi-square band."""
+
+
+def figures(result: EvaluateResult) -> dict[str, tuple[str, Figure, str]]:
+    """Title, picture and caption by file name."""
+    has_paper = any(c.paper is not None for c in result.cases)
+    paper = " Dotted: the paper's error of that filter." if has_paper else ""
+    drawn = {
+        "evaluate-time.png": (
+            "Error over time",
+            _over_time(result),
+            "Position error after one constant yaw, mean over the pairs: median over the seeds, "
+            f"and the band from 10 % to 90 % of them.{paper}",
+        ),
+        "evaluate-seeds.png": (
+            "Error over seeds",
+            _over_seeds(result),
+            "rmse_yaw of every run with the median as a bar; lost runs as crosses. Dashed: the "
+            "expected error of an efficient estimator, median over the seeds.",
+        ),
+        "evaluate-nees.png": (
+            "Consistency: position errors",
+            _nees(result),
+            "NEES over time, mean over pairs and seeds; 1 is right, above it the filter is too "
+            "sure. The first seconds may lie beyond the frame. Grey: 95 % of the chi-square "
+            "distribution that alike and independent errors of the nodes would have.",
+        ),
+        "evaluate-nis.png": (
+            "Consistency: ranges",
+            _nis(result),
+            "NIS of the ranges of all seeds and the share of those above 10; black: the chi-square "
+            "distribution of one degree of freedom that it should have.",
+        ),
+    }
+    if result.suite.name == "scaling":
+        drawn["evaluate-scaling.png"] = (
+            "Cost and error over the size of the group",
+            _scaling(result),
+            "Left: time of the tracker for a ranging round. Right: errors, medians over the "
+            "seeds; dashed: the rmse expected of an efficient estimator.",
+        )
+    return drawn
+
+
+def _panels(
+    result: EvaluateResult, width: float, height: float
+) -> tuple[Figure, Iterator[tuple[Axes, list[CaseResult]]]]:
+    """A picture with a panel for each case."""
+    from matplotlib.figure import Figure
+
+    cases = result.by_case
+    columns = min(len(cases), 3)
+    lines = -(-len(cases) // columns)
+    figure = Figure(figsize=(width * columns, height * lines + 0.4), layout="constrained")
+    axes = figure.subplots(lines, columns, squeeze=False, sharey=True).ravel()
+    for ax in axes[len(cases) :]:
+        ax.remove()
+    for ax, (case, _) in zip(axes, cases, strict=False):
+        ax.set_title(case.name, fontsize=10)
+        ax.grid(alpha=0.3)
+    return figure, iter([(ax, rows) for ax, (_, rows) in zip(axes, cases, strict=False)])
+
+
+def _over_time(result: EvaluateResult) -> Figure:
+    figure, panels = _panels(result, 3.7, 2.9)
+    for ax, rows in panels:
+        for colour, c in zip(COLOURS, rows, strict=False):
+            t = c.runs[0].over_time.t
+            error = np.array([r.over_time.error for r in c.runs])
+            low, middle, high = _quantiles(error, (0.1, 0.5, 0.9))
+            ax.fill_between(t, low, high, color=colour, alpha=0.18, lw=0)
+            ax.plot(t, middle, color=colour, lw=1.3, label=c.filter)
+            if c.paper is not None:
+                ax.axhline(c.paper, color=colour, ls=":", lw=1.2)
+        ax.set(yscale="log", xlim=(0, result.seconds), xlabel="t [s]")
+        _plain_ticks(ax.yaxis)
+    _finish(figure, "error [m]")
+    return figure
+
+
+def _quantiles(values: np.ndarray, at: tuple[float, ...]) -> np.ndarray:
+    """Quantiles over the runs, NaN where no run says anything, (quantile, bin)."""
+    out = np.full((len(at), values.shape[1]), np.nan)
+    some = np.isfinite(values).any(axis=0)
+    out[:, some] = np.nanquantile(values[:, some], at, axis=0)
+    return out
+
+
+def _over_seeds(result: EvaluateResult) -> Figure:
+    figure, panels = _panels(result, 3.4, 2.7)
+    rng = np.random.default_rng(0)
+    for ax, rows in panels:
+        for k, (colour, c) in enumerate(zip(COLOURS, rows, strict=False)):
+            runs = [r for r in c.runs if r.rmse_yaw is not None]
+            x = k + rng.uniform(-0.22, 0.22, len(runs))
+            errors = np.array([_or_nan(r.rmse_yaw) for r in runs])
+            for lost, marker in ((False, "."), (True, "x")):
+                chosen = [n for n, r in enumerate(runs) if r.lost == lost]
+                ax.plot(x[chosen], errors[chosen], marker, color=colour, ms=5, alpha=0.6, mew=1)
+            if runs:
+                ax.hlines(np.median(errors), k - 0.34, k + 0.34, color=colour, lw=2)
+        bound = rows[0].median("bound_yaw")
+        if bound is not None:
+            ax.axhline(bound, color="k", ls="--", lw=1)
+        ax.set(yscale="log", xlim=(-0.6, len(rows) - 0.4))
+        ax.set_xticks(range(len(rows)), [c.filter for c in rows], fontsize=9, rotation=20)
+        _plain_ticks(ax.yaxis)
+    _finish(figure, "rmse_yaw [m]", legend=False)
+    return figure
+
+
+def _nees(result: EvaluateResult) -> Figure:
+
+    figure, panels = _panels(result, 3.7, 2.9)
+    highest = 3.0
+    for ax, rows in panels:
+        # Errors of nodes that are alike and independent: the mean over all pairs is that of
+        # n - 1 independent positions.
+        dimensions = 3 if rows[0].case.scenario.name.startswith("human") else 2
+        free = dimensions * (rows[0].runs[0].nodes - 1) * result.seeds
+        low, high = chi_square_band(free, 1, BAND)
+        ax.axhspan(low, high, color="0.8")
+        top = 2.0
+        for colour, c in zip(COLOURS, rows, strict=False):
+            nees = np.array([r.over_time.nees for r in c.runs])
+            some = np.isfinite(nees).any(axis=0)
+            t = c.runs[0].over_time.t[some]
+            mean = np.nanmean(nees[:, some], axis=0)
+            ax.plot(t, mean, color=colour, lw=1.2, label=c.filter)
+            top = max(top, float(mean[t > SKIP].max(initial=0.0)))
+        # What is off before the scored time would squeeze all the rest.
+        highest = max(highest, 1.5 * top)
+        ax.set(yscale="log", xlim=(0, result.seconds), xlabel="t [s]", ylim=(0.2, highest))
+        _plain_ticks(ax.yaxis, (1.0, 3.0))
+    _finish(figure, "NEES")
+    return figure
+
+
+def _nis(result: EvaluateResult) -> Figure:
+    from scipy.stats import chi2
+
+    figure, panels = _panels(result, 3.7, 2.7)
+    right = np.diff(chi2.cdf(NIS_EDGES, 1)) / np.diff(NIS_EDGES)
+    for ax, rows in panels:
+        for colour, c in zip(COLOURS, rows, strict=False):
+            counts = np.sum([r.over_time.nis_counts for r in c.runs], axis=0)
+            total = max(int(counts.sum()), 1)
+            density = counts[:-1] / total / np.diff(NIS_EDGES)
+            label = f"{c.filter}, {100 * counts[-1] / total:.1f} % above"
+            ax.stairs(density, NIS_EDGES, color=colour, lw=1.3, label=label)
+        ax.stairs(right, NIS_EDGES, color="k", lw=1)
+        ax.set(yscale="log", xlim=(0, NIS_EDGES[-1]), ylim=(2e-4, 10), xlabel="NIS")
+        _plain_ticks(ax.yaxis, (1.0,))
+        ax.legend(fontsize=7)
+    _finish(figure, "density", legend=False)
+    return figure
+
+
+def _scaling(result: EvaluateResult) -> Figure:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10, 3.6), layout="constrained")
+    cost, errors = figure.subplots(1, 2)
+    nodes = [c.runs[0].nodes for c in result.cases if c.filter == result.filters[0]]
+    for colour, name in zip(COLOURS, result.filters, strict=False):
+        mine = [c for c in result.cases if c.filter == name]
+        cost.plot(nodes, [c.median("us_per_round") for c in mine], "o-", color=colour, label=name)
+        for figure_name, style in (("rmse_yaw", "o-"), ("rmse_shape", "s:")):
+            values = [_or_nan(c.median(figure_name)) for c in mine]
+            label = f"{name}, {figure_name}"
+            errors.plot(nodes, values, style, color=colour, ms=4, label=label)
+    bound = [_or_nan(c.median("bound")) for c in result.cases if c.filter == result.filters[0]]
+    errors.plot(nodes, bound, "k--", lw=1, label="bound")
+    cost.set(ylabel="us per round")
+    errors.set(ylabel="error [m]")
+    for ax in (cost, errors):
+        ax.set(xscale="log", yscale="log", xlabel="nodes")
+        _plain_ticks(ax.yaxis)
+        ax.set_xticks(nodes, [str(n) for n in nodes])
+        ax.minorticks_off()
+        ax.grid(alpha=0.3)
+    cost.legend(fontsize=8)
+    errors.legend(fontsize=7, ncols=2)
+    return figure
+
+
+def _finish(figure: Figure, label: str, *, legend: bool = True) -> None:
+    """Label the panels at the left, and a legend in the first."""
+    for ax in figure.axes:
+        spec = ax.get_subplotspec()
+        if spec is not None and spec.is_first_col():
+            ax.set_ylabel(label)
+    if legend:
+        figure.axes[0].legend(fontsize=8)
+
+
+def _plain_ticks(axis: Axis, subs: tuple[float, ...] = (1.0, 2.0, 5.0)) -> None:
+    """Numbers at the given steps of every decade: a logarithmic axis may span less than one."""
+    from matplotlib.ticker import FormatStrFormatter, LogLocator, NullLocator
+
+    axis.set_major_locator(LogLocator(subs=subs, numticks=30))
+    axis.set_major_formatter(FormatStrFormatter("%g"))
+    axis.set_minor_locator(NullLocator())
+
+
+def _or_nan(value: float | None) -> float:
+    return float("nan") if value is None else value

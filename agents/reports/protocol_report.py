@@ -1,0 +1,175 @@
+"""The report of the protocol's experiments: ranging frequency over time, recovery, rates."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from agents.protocol.experiment import ProtocolResult
+from agents.protocol.recovery import EVENTS, MODES
+from agents.protocol.timeline import SCRIPT
+from agents.reports.page import Page
+
+if TYPE_CHECKING:
+    from matplotlib.axis import Axis
+    from matplotlib.figure import Figure
+
+PAPER_MS = {"responder-join": 12.3, "responder-leave": 12.3, "initiator-loss": 733.4}
+"""Mean recovery times of Armani and Holz, ICRA 2024."""
+
+
+PICTURES = ("protocol-timeline.png", "protocol-recovery.png", "protocol-rates.png")
+
+
+def figures(result: ProtocolResult) -> dict[str, Figure]:
+    """The pictures by name."""
+    drawn = _timeline(result), _recovery(result), _rates(result)
+    return dict(zip(PICTURES, drawn, strict=True))
+
+
+def protocol_report(result: ProtocolResult, pictures: dict[str, Figure]) -> str:
+    """One page with the pictures of `figures`."""
+    page = Page(
+        "The ranging protocol",
+        "Nodes that run the real session in a simulated air: every message, clock and collision.",
+    )
+    page.heading("Ranging frequency while nodes come and go")
+    page.figure(
+        pictures["protocol-timeline.png"],
+        "Rounds per second in which every node that is on spoke, mean over ten groups.",
+    )
+    page.heading("Recovery")
+    page.table(RECOVERY_HEADER, recovery_rows(result))
+    page.figure(pictures["protocol-recovery.png"], "All recovery times.")
+    page.heading("Rate")
+    page.table(RATE_HEADER, rate_rows(result))
+    page.figure(pictures["protocol-rates.png"], "Rounds per second over the size of the group.")
+    page.heading("Clocks")
+    page.text(
+        "Errors of the ranges between node 0 and the node in each slot, 2 m/s, clocks off by so "
+        "much in opposite directions; uncorrected is what single-sided ranging would be wrong by."
+    )
+    page.table(CLOCK_HEADER, clock_rows(result))
+    return page.render()
+
+
+RATE_HEADER = ["radio", "nodes", "rounds per second", "paper", "ranges resolved by all"]
+RECOVERY_HEADER = ["event", "mode", "events", "mean [ms]", "p95 [ms]", "paper, mean [ms]"]
+CLOCK_HEADER = ["nodes", "slot", "ppm", "bias [cm]", "std, ratio to perfect", "uncorrected [m]"]
+
+
+def rate_rows(result: ProtocolResult) -> list[list[str]]:
+    """Cells of the table of rates."""
+    return [
+        [
+            r["phy"],
+            str(r["n"]),
+            f"{r['rounds_hz']:.2f}",
+            "-" if r["paper_hz"] is None else f"{r['paper_hz']:.2f}",
+            f"{100 * r['complete']:.1f} %",
+        ]
+        for r in result.rates
+    ]
+
+
+def recovery_rows(result: ProtocolResult) -> list[list[str]]:
+    """Cells of the table of recovery times."""
+    return [
+        [
+            r["event"],
+            r["mode"],
+            str(r["events"]),
+            f"{r['mean_ms']:.1f}",
+            f"{r['p95_ms']:.1f}",
+            f"{PAPER_MS[r['event']]:.1f}",
+        ]
+        for r in result.recovery
+    ]
+
+
+def clock_rows(result: ProtocolResult) -> list[list[str]]:
+    """Cells of the table of clock errors."""
+    return [
+        [
+            str(r["n"]),
+            str(r["slot"]),
+            f"{r['ppm']:.0f}",
+            f"{r['bias_cm']:.2f}",
+            f"{r['std_ratio']:.3f}",
+            f"{r['uncorrected_cm'] / 100:.1f}",
+        ]
+        for r in result.clock
+    ]
+
+
+def _timeline(result: ProtocolResult) -> Figure:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10, 4.6), layout="constrained")
+    for ax, line in zip(figure.subplots(2, 1, sharex=True), result.timelines, strict=True):
+        ax.step(line.t, line.hz, where="mid", color="tab:blue", lw=1.2)
+        for at, what, _, _ in SCRIPT:
+            ax.axvline(at, color="0.6", lw=0.8, ls="--")
+            if ax.get_subplotspec().is_first_row():
+                ax.annotate(what, (at, 1.02), xycoords=("data", "axes fraction"), fontsize=8)
+        ax.set(ylabel="rounds per second", ylim=(0, 65))
+        ax.text(0.005, 0.06, line.mode, transform=ax.transAxes, weight="bold")
+        ax.grid(alpha=0.3)
+    ax.set(xlabel="t [s]")
+    return figure
+
+
+def _recovery(result: ProtocolResult) -> Figure:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10, 3.0), layout="constrained")
+    for ax, event in zip(figure.subplots(1, 3), EVENTS, strict=True):
+        ms = [1e3 * np.sort(result.times[event, mode]) for mode in MODES]
+        for values, mode, colour in zip(ms, MODES, ("tab:orange", "tab:blue"), strict=True):
+            share = np.arange(1, len(values) + 1) / len(values)
+            ax.step(values, share, where="post", color=colour, label=mode)
+        ax.axvline(PAPER_MS[event], color="k", ls=":", lw=1, label="paper, mean")
+        ax.set(title=event, xlabel="ms", ylim=(0, 1.02))
+        if event == "initiator-loss":
+            ax.set_xscale("log")
+            _plain_ticks(ax.xaxis)
+        ax.grid(alpha=0.3)
+    figure.axes[0].set_ylabel("share of events")
+    figure.axes[0].legend(fontsize=8)
+    return figure
+
+
+def _plain_ticks(axis: Axis) -> None:
+    """Numbers at 1, 2 and 5 of every decade: a logarithmic axis may span less than one."""
+    from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
+
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=30))
+    axis.set_major_formatter(FormatStrFormatter("%g"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def _rates(result: ProtocolResult) -> Figure:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10, 3.6), layout="constrained")
+    ax, right = figure.subplots(1, 2)
+    for phy, colour in (("110k", "tab:blue"), ("6M8", "tab:orange")):
+        rows = [r for r in result.rates if r["phy"] == phy]
+        n = [r["n"] for r in rows]
+        ax.plot(n, [r["law_hz"] for r in rows], color=colour, lw=1, label=f"{phy}, airtime")
+        ax.plot(n, [r["rounds_hz"] for r in rows], "o", color=colour, label=f"{phy}, measured")
+        paper = [(r["n"], r["paper_hz"]) for r in rows if r["paper_hz"] is not None]
+        if paper:
+            ax.plot(*zip(*paper, strict=True), "k+", ms=12, label="paper")
+    ax.set(ylabel="rounds per second", title="rate")
+    right.plot([r["n"] for r in result.cost], [r["us_per_round"] for r in result.cost], "o-")
+    right.set(ylabel="us per round, one core", title="cost in simulation, batch")
+    for axis in (ax, right):
+        axis.set(xscale="log", yscale="log", xlabel="nodes")
+        _plain_ticks(axis.yaxis)
+        axis.set_xticks([r["n"] for r in result.cost], [str(r["n"]) for r in result.cost])
+        axis.minorticks_off()
+        axis.grid(alpha=0.3)
+    ax.legend(fontsize=8)
+    return figure

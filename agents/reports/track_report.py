@@ -1,0 +1,170 @@
+"""The report of tracked logs: trajectories, errors with their 3-sigma bands, ranges."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from agents.evaluation.track import ERRORS, TrackResult, pair_name
+from agents.reports.page import Page, metres, percent
+from tracking.estimate import Status
+from tracking.findings import KINDS
+from tracking.measurements import Kind
+from tracking.metrics.integrity import LIMIT, SIGMAS
+from tracking.metrics.score import errors_after
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MAX_PAIRS = 6
+"""So many pairs are drawn; the table has all."""
+
+
+def track_report(results: Sequence[TrackResult]) -> str:
+    """One page over all logs and filters."""
+    page = Page("Tracking report", "Relative positions from UWB ranges and inertial sensors")
+    page.heading("Errors")
+    page.text(
+        "Root-mean-square errors of the relative positions in metres: as they are (rmse), after "
+        "one constant yaw (rmse_yaw), after the best rotation at each instant (rmse_shape), and "
+        "after the best rotation and reflection (rmse_mirror). ok: share of the scored time; "
+        f"wrong: share of the run in which a pair was ok and off by more than {LIMIT:g} m and "
+        f"{SIGMAS:g} of its own standard deviations. NEES and NIS are 1 where the covariance is "
+        "right. efficient: expected errors of an efficient estimator, if the assumed noise is true."
+    )
+    header = [
+        "log", "filter", "rmse", "rmse_yaw", "yaw deg", "rmse_shape", "rmse_mirror", "ok",
+        "wrong", "nees", "nis",
+    ]  # fmt: skip
+    rows = []
+    for r in results:
+        s = r.summary
+        figures = [metres(s[k]) for k in ("rmse", "rmse_yaw")]
+        others = [metres(s[k]) for k in ("rmse_shape", "rmse_mirror")]
+        others += [percent(s["ok_share"]), percent(s["integrity_share"], 2)]
+        others += [metres(s[k]) for k in ("nees", "nis")]
+        yaw = "-" if s["yaw_deg"] is None else f"{s['yaw_deg']:.1f}"
+        rows.append([s["log"], s["filter"], *figures, yaw, *others])
+        if r.expected:
+            world, turned, shape, _ = (metres(r.expected.get(name)) for name in ERRORS)
+            rows.append(["", "efficient", world, turned, "", shape, *[""] * 5])
+    page.table(header, rows)
+    for r in results:
+        _add_result(page, r)
+    return page.render()
+
+
+def _add_result(page: Page, r: TrackResult) -> None:
+    log = r.log
+    page.heading(f"{log.name}, {r.filter}")
+    page.text(
+        f"{log.constellation.n_nodes} nodes, {log.duration:.0f} s, {log.n_ranges} ranges, of "
+        f"which {r.n_rejected} were refused as outliers; {sum(log.skipped.values())} bad rows "
+        f"skipped. Scored from {r.skip:g} s after the first range; of what has truth then, there "
+        f"was an estimate for {percent(r.score.coverage)}, with status ok for "
+        f"{percent(r.score.ok_share)}."
+    )
+    for found in r.findings:
+        page.text(f"{found.severity.capitalize()}: {found.text}; {KINDS[found.name].remedy}.")
+    constellation = log.constellation
+    rows = []
+    for p in range(constellation.n_pairs):
+        if np.isfinite(r.score.pair_rmse[p]):
+            figures = (r.score.pair_rmse, r.score.pair_rmse_yaw, r.score.pair_rmse_shape)
+            rows.append([pair_name(constellation, p), *(metres(f[p]) for f in figures)])
+    if rows:
+        page.table(["pair", "rmse", "rmse_yaw", "rmse_shape"], rows)
+    pairs = _pairs_to_draw(r)
+    if not pairs:
+        page.text("No pair has a moving node, so there is nothing to draw.")
+        return
+    page.figure(_trajectories(r, pairs), "Relative trajectories from above, seen from node i.")
+    page.figure(
+        _errors(r, pairs),
+        "Position error of each axis after one constant yaw, with the filter's own 3-sigma band.",
+    )
+    page.figure(_ranges(r, pairs), "Measured ranges, estimated and true distance.")
+
+
+def _pairs_to_draw(r: TrackResult) -> list[int]:
+    constellation = r.log.constellation
+    moving = ~constellation.is_static[constellation.pairs].all(axis=1)
+    return [int(p) for p in np.nonzero(moving)[0][:MAX_PAIRS]]
+
+
+def _known(r: TrackResult, p: int) -> np.ndarray:
+    """Times at which a pair has an estimate."""
+    known: np.ndarray = ~np.isin(r.estimate.status[:, p], (Status.ABSENT, Status.STARTING))
+    return known
+
+
+def _axes(n: int, height: float) -> tuple[Figure, np.ndarray]:
+    from matplotlib.figure import Figure
+
+    columns = min(n, 3)
+    lines = -(-n // columns)
+    figure = Figure(figsize=(11, height * lines), layout="constrained")
+    return figure, np.atleast_1d(figure.subplots(lines, columns, squeeze=False)).ravel()
+
+
+def _trajectories(r: TrackResult, pairs: list[int]) -> Figure:
+    figure, axes = _axes(len(pairs), 3.6)
+    yaw = np.radians(r.score.yaw_deg or 0.0)
+    c, s = np.cos(yaw), np.sin(yaw)
+    for ax, p in zip(axes, pairs, strict=False):
+        ok = _known(r, p)
+        x, y = r.estimate.pos_ij_w[ok, p, 0], r.estimate.pos_ij_w[ok, p, 1]
+        seen = r.has_truth[:, p]
+        ax.plot(*r.truth_ij_w[seen, p, :2].T, color="0.6", lw=2.2, label="truth")
+        ax.plot(c * x - s * y, s * x + c * y, color="tab:blue", lw=0.9, label="estimate, one yaw")
+        ax.plot(0, 0, "k+", ms=9)
+        ax.set(title=pair_name(r.log.constellation, p), xlabel="x [m]", ylabel="y [m]")
+        ax.set_aspect("equal", "datalim")
+    axes[0].legend(loc="best", fontsize=8)
+    for ax in axes[len(pairs) :]:
+        ax.remove()
+    return figure
+
+
+def _errors(r: TrackResult, pairs: list[int]) -> Figure:
+    figure, axes = _axes(len(pairs), 2.6)
+    error = errors_after(r.estimate, r.truth_ij_w, np.radians(r.score.yaw_deg or 0.0))
+    for ax, p in zip(axes, pairs, strict=False):
+        ok = _known(r, p) & r.has_truth[:, p]
+        t = r.estimate.t
+        for axis, colour in zip(range(r.log.constellation.dimensions), "rgb", strict=False):
+            e = np.where(ok, error[:, p, axis], np.nan)
+            ax.plot(t, e, color=f"tab:{dict(r='red', g='green', b='blue')[colour]}", lw=0.8)
+        band = np.where(ok, 3.0 * r.estimate.pos_std[:, p].max(axis=1), np.nan)
+        ax.fill_between(t, -band, band, color="0.85", zorder=0)
+        ax.set(title=pair_name(r.log.constellation, p), xlabel="t [s]", ylabel="error [m]")
+        limit = np.nanpercentile(np.abs(error[ok, p]), 99) * 1.3 if ok.any() else 1.0
+        ax.set_ylim(-max(limit, 0.2), max(limit, 0.2))
+    for ax in axes[len(pairs) :]:
+        ax.remove()
+    return figure
+
+
+def _ranges(r: TrackResult, pairs: list[int]) -> Figure:
+    figure, axes = _axes(len(pairs), 2.6)
+    block = r.log.block
+    for ax, p in zip(axes, pairs, strict=False):
+        i, j = r.log.constellation.pairs[p]
+        mine = (block.kind[0] == Kind.RANGE) & (
+            ((block.i[0] == i) & (block.j[0] == j)) | ((block.i[0] == j) & (block.j[0] == i))
+        )
+        ax.plot(block.t[0, mine], block.values[0, mine, 0], ".", color="0.75", ms=2)
+        ok, seen = _known(r, p), r.has_truth[:, p]
+        t, length = r.estimate.t, np.linalg.norm(r.estimate.pos_ij_w[:, p], axis=1)
+        ax.plot(t, np.where(ok, length, np.nan), color="tab:blue", lw=0.9)
+        true = np.linalg.norm(r.truth_ij_w[:, p], axis=1)
+        ax.plot(t, np.where(seen, true, np.nan), "--", color="k", lw=0.8)
+        ax.set(title=pair_name(r.log.constellation, p), xlabel="t [s]", ylabel="distance [m]")
+        if mine.any():
+            top = np.percentile(block.values[0, mine, 0], 99.5) * 1.15
+            ax.set_ylim(0, max(float(top), 0.5))
+    for ax in axes[len(pairs) :]:
+        ax.remove()
+    return figure

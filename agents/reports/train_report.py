@@ -1,0 +1,134 @@
+"""The report of a training run: learning curves and the configuration."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from agents.reports.page import Page, metres
+from agents.settings import to_json
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from agents.training.choice import Choice
+    from agents.training.config import TrainConfig
+
+Rows = Sequence[dict[str, Any]]
+
+
+def train_report(config: TrainConfig, rows: Rows, choice: Choice) -> str:
+    """The page.
+
+    Args:
+        config: Of the runs.
+        rows: What was measured after every leg of each, with its seed.
+        choice: Of the policy that is kept.
+    """
+    env, last = config.env, rows[-1]
+    seeds = list(dict.fromkeys(r["seed"] for r in rows))
+    kept = choice.measured
+    page = Page(
+        f"Training: {env.task} on {env.observation}",
+        f"{last['frames']:,} frames in {last['seconds'] / 60.0:.1f} minutes, "
+        f"{_seeds(seeds)}; kept: seed {kept['seed']} after leg {kept['leg']}",
+    )
+    page.heading("Learning curves")
+    page.figure(
+        curves(
+            [
+                (f"seed {s}" if len(seeds) > 1 else "", [r for r in rows if r["seed"] == s])
+                for s in seeds
+            ]
+        ),
+        f"{config.eval_episodes} episodes in {', '.join(env.scenarios)} after every leg, the same "
+        "every time, driven by the most likely action; errors from 10 s on.",
+    )
+    page.heading("The choice")
+    page.table(
+        ["seed", "leg", "return", "formation [m]", "tracking [m]", "collisions/min"],
+        [[str(r["seed"]), str(r["leg"]), *_measured(r)] for r in choice.rows],
+    )
+    page.text(
+        f"The policy with the highest return in {config.choice_episodes} other episodes is kept, "
+        "among the best by the curves and the last of every run."
+    )
+    page.heading("Legs")
+    page.table(
+        [
+            "seed",
+            "leg",
+            "frames",
+            "level",
+            "return",
+            "formation [m]",
+            "tracking [m]",
+            "collisions/min",
+        ],
+        [
+            [
+                str(r["seed"]),
+                str(r["leg"]),
+                f"{r['frames']:,}",
+                "-" if r["level"] is None else str(r["level"]),
+                *_measured(r),
+            ]
+            for r in rows
+        ],
+    )
+    page.heading("Configuration")
+    flat: dict[str, Any] = {}
+    for name, value in to_json(config).items():
+        flat.update(value if isinstance(value, dict) else {name: value})
+    page.table(["setting", "value"], [[k, str(v)] for k, v in flat.items()])
+    return page.render()
+
+
+def _measured(row: dict[str, Any]) -> list[str]:
+    """What both tables tell of a policy."""
+    return [
+        f"{row['return']:.3f}",
+        metres(row["formation_error"]),
+        metres(row["tracking_error"]),
+        f"{row['collisions_per_min']:.2f}",
+    ]
+
+
+def _seeds(seeds: Sequence[int]) -> str:
+    return f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {seeds[0]} to {seeds[-1]}"
+
+
+def curves(runs: Sequence[tuple[str, Rows]]) -> Figure:
+    """Return, formation error and collisions over the frames of some runs.
+
+    Args:
+        runs: Label and rows of each; runs of equal labels are drawn alike.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10.0, 3.4), layout="constrained")
+    axes = figure.subplots(1, 3)
+    names = ("return", "formation_error", "collisions_per_min")
+    titles = ("mean return of a decision", "formation error [m]", "collisions per minute")
+    labels = list(dict.fromkeys(label for label, _ in runs))
+    for axis, name, title in zip(axes, names, titles, strict=True):
+        shown = set()
+        for label, rows in runs:
+            colour = f"C{labels.index(label)}"
+            axis.plot(
+                [r["frames"] / 1e6 for r in rows],
+                [r[name] for r in rows],
+                color=colour,
+                label=label if label and label not in shown else None,
+                marker="." if len(rows) < 30 else None,
+                alpha=0.8,
+            )
+            shown.add(label)
+        axis.set_title(title, fontsize=10)
+        axis.set_xlabel("million frames")
+        axis.grid(alpha=0.3)
+        if name == "formation_error":
+            axis.set_yscale("log")
+        if any(labels):
+            axis.legend(fontsize=8)
+    return figure

@@ -1,0 +1,1 @@
+"""Simulated drives: recorded, demonstrated and shown."""

@@ -1,0 +1,159 @@
+"""How good a policy is that is being trained: the same episodes after every leg."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from gymnasium.utils import seeding
+
+from agents.policies.layout import Layout
+from agents.policies.padding import Padding
+from agents.simulation.demo import SETTLE
+from agents.training.environments import shares
+from agents.training.ppo.network import Actor, SwarmPolicy
+from relpos_env.config import Parts
+from relpos_env.core.env_core import Formation
+from relpos_env.interface.observations.base import F32
+from relpos_env.timing import DECISION
+from tracking.arrays import F64, Bool
+
+FIRST_SEED = 500
+"""Episodes of an evaluation have seeds from here on, 500 at most: comparisons begin at 1000."""
+
+
+class Evaluation:
+    """Episodes of all scenarios, driven by what a policy holds for best."""
+
+    def __init__(
+        self,
+        every: Sequence[Parts],
+        layout: Layout,
+        episodes: int,
+        threads: int,
+        *,
+        first_seed: int = FIRST_SEED,
+    ) -> None:
+        """Make room for them.
+
+        Args:
+            every: What the environments of each scenario are made of.
+            layout: What the policy sees.
+            episodes: How many, shared out among the scenarios.
+            threads: Of the simulation.
+            first_seed: Of the first episode.
+        """
+        self._first_seed = first_seed
+        self._rooms = [
+            _Room(Formation(parts, n, min(threads, n)), Padding(layout, Layout.of(parts)))
+            for parts, n in zip(every, shares(episodes, len(every)), strict=True)
+        ]
+
+    def run(self, policy: SwarmPolicy) -> dict[str, Any]:
+        """Mean reward of a decision, errors from `SETTLE` on [m], and contacts.
+
+        Means are over cars and times, so scenarios with more cars count for more. An episode that
+        ends early earns nothing for the rest of its time, and costs nothing: where time is paid
+        for, to be through is better than to hover. The tracking error is None where nobody could
+        use any estimate.
+        """
+        actor = Actor(policy).eval()
+        first, drives = self._first_seed, []
+        for room in self._rooms:
+            drives.append(room.drive(actor, first))
+            first += room.formation.n_envs
+        rewards, decisions, contacts, minutes = (
+            sum(getattr(d, name) for d in drives)
+            for name in ("rewards", "decisions", "contacts", "minutes")
+        )
+        tracking = np.concatenate([d.tracking for d in drives])
+        return {
+            "return": rewards / max(decisions, 1.0),
+            "formation_error": float(np.concatenate([d.error for d in drives]).mean()),
+            "tracking_error": float(tracking.mean()) if tracking.size else None,
+            "collisions_per_min": contacts / minutes,
+        }
+
+    def close(self) -> None:
+        """Release the threads."""
+        for room in self._rooms:
+            room.formation.close()
+
+
+@dataclass(frozen=True, slots=True)
+class _Drive:
+    """What came of the episodes of one scenario."""
+
+    rewards: float
+    """Of all cars and decisions together."""
+    decisions: float
+    """Of all cars, those after an early end counted."""
+    contacts: float
+    minutes: float
+    error: F64
+    """Formation errors from `SETTLE` on, of all cars and times [m]."""
+    tracking: F64
+    """Tracking errors likewise, where there are any [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Room:
+    """The episodes of one scenario, side by side."""
+
+    formation: Formation
+    pad: Padding
+
+    def drive(self, actor: Actor, first_seed: int) -> _Drive:
+        """From beginning to end."""
+        f = self.formation
+        for env in range(f.n_envs):
+            f.seed(env, seeding.np_random(first_seed + env)[0])
+            f.begin([env])
+        error, tracking, present, going = [], [], [], []
+        contacts, rewards, decisions = 0.0, 0.0, 0.0
+        on = np.ones(f.n_envs, dtype=bool)
+        for _ in range(f.parts.config.max_cycles - 1):
+            going.append(on)
+            f.step(*f.parts.actions.decode(drive(actor, self.pad(f.observations)), "actions"))
+            error.append(f.task.error.copy())
+            tracking.append(f.tracking_error())
+            present.append(f.state.present & on[:, None])
+            decisions += float(f.state.present.sum())
+            contacts += float(f.loop.swarm.contacts[on].sum())
+            rewards += float(f.rewards[on].sum())
+            on = on & ~f.task.done
+        alive, here = np.array(going), np.array(present)
+        scored = here & _scored(alive)[..., None]
+        known = np.array(tracking)[scored]
+        return _Drive(
+            rewards=rewards,
+            decisions=decisions,
+            contacts=contacts,
+            minutes=float(alive.sum()) * DECISION / 60.0,
+            error=np.array(error)[scored],
+            tracking=known[np.isfinite(known)],
+        )
+
+
+def _scored(alive: Bool) -> Bool:
+    """Which decisions count: from `SETTLE` on, or the last where the task was done before.
+
+    Args:
+        alive: Which were driven, (decision, env).
+    """
+    scored = alive.copy()
+    scored[: round(SETTLE / DECISION)] = False
+    early = np.flatnonzero(~scored.any(axis=0))
+    scored[alive[:, early].sum(axis=0) - 1, early] = True
+    return scored
+
+
+def drive(actor: Actor, observations: F32) -> F32:
+    """Actions for observations of any leading axes, (..., 2)."""
+    with torch.no_grad():
+        flat = torch.from_numpy(observations.reshape(-1, observations.shape[-1]))
+        actions: F32 = actor(flat).numpy()
+    return actions.reshape(*observations.shape[:-1], -1)

@@ -1,0 +1,152 @@
+"""Training of one policy for all cars: what `relpos train` does, as a function.
+
+A run is made of legs. Each begins with new episodes and reseeded generators, both from the run's
+seed and the leg's number, and ends with an evaluation and a checkpoint. So a run that is taken up
+at a checkpoint goes on exactly as if it had never stopped, and no state of simulations,
+generators or threads has to be stored.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from stable_baselines3 import PPO
+from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
+from torch import Tensor
+
+from agents.errors import UsageError
+from agents.training.begin import begin_with
+from agents.training.config import TrainConfig
+from agents.training.environments import check_environments, layout_of, make_rooms
+from agents.training.evaluation import Evaluation
+from agents.training.ppo.learner import level_of, make_model, make_policy, run_leg
+from agents.training.progress import Progress
+from agents.training.run_folder import RunFolder, restore, tensors_of
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrainResult:
+    """A finished run."""
+
+    folder: Path
+    config: TrainConfig
+    progress: Progress
+
+    @property
+    def records(self) -> list[dict[str, Any]]:
+        """What was measured after every leg."""
+        return self.progress.log
+
+
+def train(
+    config: TrainConfig | None,
+    folder: Path,
+    *,
+    progress: Callable[[float, dict[str, Any] | None], None] | None = None,
+) -> TrainResult:
+    """Train a policy, or go on with a run.
+
+    Args:
+        config: Of a new run; None to go on with the run in the folder.
+        folder: New or empty, or that of the run.
+        progress: Called with the share done, and after every leg with what was measured, else None.
+
+    Raises:
+        UsageError: The folder does not fit, or cannot be written to.
+        EnvError: An environment that cannot be.
+    """
+    run = RunFolder(folder)
+    resumed = config is None
+    config = run.config() if config is None else config
+    every = check_environments(config)
+    if not resumed:
+        if config.begin:
+            begin_with(make_policy(config), config)
+        run.create(config)
+    tensors, state = run.load() or (None, Progress())
+    torch.set_num_threads(config.threads)
+    evaluation = Evaluation(every, layout_of(config), config.eval_episodes, config.threads)
+    with run.writing():
+        logger = Logger(None, [TensorBoardOutputFormat(str(folder / "tensorboard"))])
+    learner: _Learner | None = None
+
+    def tell(frames: int) -> None:
+        if progress is not None:
+            progress(min(frames / config.frames, 1.0), None)
+
+    while state.frames < config.frames:
+        began = time.perf_counter()
+        level = level_of(config, state.frames)
+        if learner is None or learner.level != level:
+            learner = _Learner.begin(config, level, logger, tensors, state.frames, learner)
+        with run.writing():
+            try:
+                run_leg(learner.model, config, state.legs, tell)
+            except ValueError as error:
+                # torch refuses distributions of what is no number.
+                if all(bool(p.isfinite().all()) for p in learner.model.policy.parameters()):
+                    raise
+                raise UsageError(
+                    f"{folder}: diverged in leg {state.legs + 1}, its weights are no numbers any "
+                    "more: expected a smaller --learning-rate or --entropy"
+                ) from error
+        measured = evaluation.run(learner.model.policy)
+        state = state.after_leg(
+            int(learner.model.num_timesteps), time.perf_counter() - began, level, measured
+        )
+        tensors = tensors_of(learner.model.policy, learner.model.policy.optimizer)
+        run.save(tensors, state, best=state.best_leg == state.legs - 1)
+        with run.writing():
+            _note(logger, state)
+        if progress is not None:
+            progress(min(state.frames / config.frames, 1.0), state.log[-1])
+    evaluation.close()
+    logger.close()
+    if learner is not None:
+        learner.model.env.close()
+    return TrainResult(folder=folder, config=config, progress=state)
+
+
+@dataclass(frozen=True, slots=True)
+class _Learner:
+    """The learner and the level of its environments."""
+
+    model: PPO
+    level: int | None
+
+    @classmethod
+    def begin(
+        cls,
+        config: TrainConfig,
+        level: int | None,
+        logger: Logger,
+        tensors: Mapping[str, Tensor] | None,
+        frames: int,
+        before: _Learner | None,
+    ) -> _Learner:
+        """Go on in the environments of a level with weights that were learned before."""
+        if before is not None:
+            before.model.env.close()
+        model = make_model(config, make_rooms(config, level))
+        model.set_logger(logger)
+        model.num_timesteps = frames
+        if tensors is not None:
+            restore(model.policy, model.policy.optimizer, tensors)
+        elif config.begin:
+            begin_with(model.policy, config)
+        return cls(model, level)
+
+
+def _note(logger: Logger, state: Progress) -> None:
+    """Write what was measured to TensorBoard."""
+    row = state.log[-1]
+    for name in ("return", "formation_error", "tracking_error", "collisions_per_min"):
+        if row[name] is not None:
+            logger.record(f"evaluation/{name}", row[name])
+    logger.record("time/frames_per_second", state.frames / max(state.seconds, 1e-9))
+    logger.dump(state.frames)

@@ -1,5 +1,0 @@
-"""A swarm drawn by Rerun: what `--view` shows."""
-
-from agents.view.viewer import Viewer, open_viewer
-
-__all__ = ["Viewer", "open_viewer"]

@@ -1,0 +1,1 @@
+"""Positions from an external tracker in place of our own."""

@@ -1,0 +1,86 @@
+"""What another tracker told and was not taken over yet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hardware_bridge.readings import PairReading, PoseReading, Vector
+from tracking.arrays import F64
+from tracking.estimate import Status
+from tracking.params.short_repr import short_repr
+
+
+@dataclass(frozen=True, slots=True)
+class ToldPlace:
+    """Where a pair or a node was said to be; world frame."""
+
+    __repr__ = short_repr
+
+    t: float
+    """[s]"""
+    pos: Vector
+    """[m]"""
+    vel: Vector | None
+    """[m/s]"""
+    cov: F64 | None
+    """(3, 3) of the position [m2], or (6, 6) of both."""
+    status: Status
+    nlos: float
+
+
+@dataclass(frozen=True, slots=True)
+class ToldHeading:
+    """Where a node was said to point."""
+
+    t: float
+    """[s]"""
+    q_wb: tuple[float, float, float, float]
+
+
+class Told:
+    """Lists in the order in which it was told."""
+
+    def __init__(self) -> None:
+        self.pairs: list[tuple[int, int, ToldPlace]] = []
+        """Indices of the nodes, i < j."""
+        self.nodes: list[tuple[int, ToldPlace]] = []
+        self.headings: list[tuple[int, ToldHeading]] = []
+
+    def add_pair(self, t: float, nodes: tuple[int, ...], reading: PairReading) -> None:
+        """Note where a pair is; nodes by their indices, in the order of the reading."""
+        i, j = nodes
+        pos, vel = reading.pos, reading.vel
+        if i > j:
+            i, j, pos = j, i, _opposite(pos)
+            vel = None if vel is None else _opposite(vel)
+        cov = _square(reading.cov)
+        self.pairs.append((i, j, ToldPlace(t, pos, vel, cov, reading.status, reading.nlos)))
+
+    def add_pose(self, t: float, node: int, reading: PoseReading) -> None:
+        """Note where a node is and where it points."""
+        if reading.pos is not None:
+            cov = _square(reading.cov)
+            place = ToldPlace(t, reading.pos, reading.vel, cov, Status.OK, 0.0)
+            self.nodes.append((node, place))
+        if reading.q_wb is not None:
+            self.headings.append((node, ToldHeading(t, reading.q_wb)))
+
+    def clear(self) -> None:
+        """Forget all."""
+        self.pairs.clear()
+        self.nodes.clear()
+        self.headings.clear()
+
+
+def _opposite(vector: Vector) -> Vector:
+    x, y, z = vector
+    return -x, -y, -z
+
+
+def _square(cov: tuple[float, ...] | None) -> F64 | None:
+    if cov is None:
+        return None
+    size = 3 if len(cov) == 9 else 6
+    return np.array(cov).reshape(size, size)

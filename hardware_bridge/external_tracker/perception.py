@@ -1,0 +1,179 @@
+"""What cars see by a tracker that is not ours, in the place of `Perception`.
+
+    lines -> Tracks, Headings -> TeamEstimate -> View
+
+The last that was told of every pair and every node is carried to now and put into a
+`TeamEstimate`, from which the very code writes the view that does so for our own tracker.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hardware_bridge.external_tracker.headings import Headings
+from hardware_bridge.external_tracker.params import ReadyParams
+from hardware_bridge.external_tracker.pending import Told
+from hardware_bridge.external_tracker.tracks import Tracks
+from relpos_env.interface._view_kernels import forget_all, note_ranges
+from relpos_env.interface.views import View, bind_view, make_view
+from tracking.arrays import F64, I64, Bool
+from tracking.constellation import Constellation
+from tracking.estimate import Status, TeamEstimate
+from tracking.kernels.jit import bind
+from tracking.measurements import Kind, MeasurementBlock
+
+
+class ReadyPerception:
+    """One group; used like `relpos_env.interface.perception.Perception`.
+
+    Of a pair that was told itself and by the places of both its nodes, the newer is taken. Status
+    is as told, usually OK, while it is younger than `ReadyParams.stale`, then LOST; ABSENT before
+    the first time and once a node has left. Static nodes may be told once. The estimate is for
+    now.
+    """
+
+    def __init__(
+        self,
+        constellation: Constellation,
+        params: ReadyParams,
+        told: Told,
+        block: MeasurementBlock,
+        powered: Bool,
+        n_beams: int = 0,
+    ) -> None:
+        """Begin with nothing told.
+
+        Args:
+            constellation: The nodes; the first of them ride on the cars, in the cars' order.
+            params: What is believed of the other tracker.
+            told: Filled by the caller before every step, emptied by it.
+            block: Likewise; of it count who leaves, and ranges, which cars may see.
+            powered: Which cars are there, (1, car), likewise.
+            n_beams: Of each car's distance sensors.
+        """
+        group, n_cars = constellation, powered.shape[1]
+        self.constellation, self._params, self._told = group, params, told
+        self._i, self._j = group.pairs.T
+        moves = ~group.is_static
+        ends = moves[self._i].astype(np.float64) + moves[self._j]
+        self._nodes = self._tracks(moves.astype(np.float64))
+        self._pairs = self._tracks(ends)
+        self._headings = Headings(group.n_nodes)
+        self.view: View = make_view(1, n_cars, n_beams)
+        self.estimate = TeamEstimate.empty(group, np.zeros(1))
+        """What is believed now, overwritten by every step."""
+        self._turns: F64 = np.zeros((1, group.n_nodes))
+        self.rebind(block, powered)
+
+    def share(self, target: F64, wanted: Bool, command: F64) -> None:
+        """Let the view have what the task wants; see `Perception.share`."""
+        self.view = self.view._replace(target=target, wanted=wanted, command=command)
+        self.rebind(self._block, self._powered)
+
+    def reset(self, env: int = 0) -> None:
+        """Forget everything."""
+        everyone = np.arange(self.constellation.n_nodes)
+        self._nodes.forget(everyone)
+        self._pairs.forget(np.arange(self.constellation.n_pairs))
+        for node in everyone.tolist():
+            self._headings.forget(node)
+        self._told.clear()
+        forget_all(self.view, env)
+
+    @property
+    def n_late(self) -> I64:
+        """Nothing waits for what is late, (1)."""
+        return np.zeros(1, dtype=np.int64)
+
+    @property
+    def n_waiting(self) -> I64:
+        """Nothing waits, (1)."""
+        return np.zeros(1, dtype=np.int64)
+
+    def make_room(self, room: int) -> None:
+        """Nothing waits."""
+
+    def rebind(self, block: MeasurementBlock, powered: Bool) -> None:
+        """Put together what the kernels take; see `Perception.rebind`."""
+        self._block, self._powered = block, powered
+        self._see = bind_view(self.view, self.estimate, powered, self._turns)
+        self._note = bind(
+            note_ranges, block.t, block.kind, block.i, block.j, block.values, block.has_power,
+            block.valid, self.view,
+        )  # fmt: skip
+
+    def step(self) -> None:
+        """Take over what was told, and see."""
+        now = float(self.view.now[0])
+        self._let_go()
+        index = self.constellation.pair_index
+        self._pairs.take([(int(index[i, j]), place) for i, j, place in self._told.pairs])
+        self._nodes.take(self._told.nodes)
+        self._headings.take(self._told.headings)
+        self._told.clear()
+        self._believe(now)
+        self._see()
+        self._note()
+        self._note_distances()
+
+    def _tracks(self, ends: F64) -> Tracks:
+        """Of which so many ends move each, (track): 0 stands still."""
+        p, root = self._params, np.sqrt(ends)
+        return Tracks(len(ends), root * p.accel_psd, root * p.top_speed, p.std, p.vel_std)
+
+    def _let_go(self) -> None:
+        """Nodes that have left are forgotten, but those that stand where they stood."""
+        block = self._block
+        leaves = block.valid[0] & (block.kind[0] == Kind.LEAVE)
+        for node in block.i[0, leaves].tolist():
+            if not self.constellation.is_static[node]:
+                self._nodes.forget(node)
+                self._pairs.forget(np.flatnonzero((self._i == node) | (self._j == node)))
+                self._headings.forget(node)
+
+    def _believe(self, now: float) -> None:
+        """Write the estimate."""
+        e, i, j, pairs = self.estimate, self._i, self._j, self._pairs
+        still = self.constellation.is_static
+        x, P = pairs.at(now)  # noqa: N806
+        place, place_cov = self._nodes.at(now)
+        # Where both ends were told; the age of what stands still is no age.
+        since = np.where(still & np.isfinite(self._nodes.t), now, self._nodes.t)
+        by_nodes = np.minimum(since[i], since[j])
+        other = by_nodes > pairs.t
+        x = np.where(other[:, None], place[j] - place[i], x)
+        P = np.where(other[:, None, None], place_cov[i] + place_cov[j], P)  # noqa: N806
+        told = np.where(other, by_nodes, pairs.t)
+        known = np.isfinite(told)
+        if self.constellation.dimensions == 2:
+            x[:, [2, 5]] = 0.0
+            P[:, [2, 5], :] = P[:, :, [2, 5]] = 0.0
+        e.t[0] = now
+        e.pos_ij_w[0] = np.where(known[:, None], x[:, :3], 0.0)
+        e.vel_ij_w[0] = np.where(known[:, None], x[:, 3:], 0.0)
+        e.cov[0] = np.where(known[:, None, None], P, 0.0)
+        e.age[0] = np.where(known, np.maximum(now - told, 0.0), 0.0)
+        e.nlos_prob[0] = np.where(other, 0.0, pairs.nlos)
+        e.status[0] = self._status(np.where(other, Status.OK, pairs.status), known)
+        e.q_wb[0] = self._headings.q_wb
+        e.has_orientation[0] = self._headings.known(now, self._params.stale)
+        self._turns[0] = self._headings.turns(now)
+
+    def _status(self, told: I64, known: Bool) -> I64:
+        """As told, until it is stale; (pair)."""
+        old = (self.estimate.age[0] > self._params.stale) & (told >= Status.OK)
+        status = np.where(old, Status.LOST, told)
+        return np.where(known, status, Status.ABSENT)
+
+    def _note_distances(self) -> None:
+        """A position is a distance too, for whoever looks at ranges."""
+        e, view, n = self.estimate, self.view, self.view.heard.shape[1]
+        cars = (self._i < n) & (self._j < n) & (e.status[0] != Status.ABSENT)
+        i, j = self._i[cars], self._j[cars]
+        told = e.t[0] - e.age[0, cars]
+        length = np.linalg.norm(e.pos_ij_w[0, cars], axis=1)
+        newer = (told > view.heard[0, i, j]) & (e.age[0, cars] <= self._params.stale)
+        for a, b in ((i, j), (j, i)):
+            view.heard[0, a[newer], b[newer]] = told[newer]
+            view.distance[0, a[newer], b[newer]] = length[newer]
+            view.gap[0, a[newer], b[newer]] = 0.0

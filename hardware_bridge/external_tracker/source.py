@@ -1,0 +1,91 @@
+"""What another tracker tells: about whom, when it was so, and whether it is believed."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from hardware_bridge.clocks import DeviceTime
+from hardware_bridge.external_tracker.frozen_positions import StuckPlaces
+from hardware_bridge.external_tracker.pending import Told
+from hardware_bridge.ingest.naming import Naming
+from hardware_bridge.ingest.stream import Stream
+from hardware_bridge.plausibility import Plausibility
+from hardware_bridge.readings import MICROSECONDS_64, PairReading, PoseReading
+from tracking.estimate import Status
+
+NS = 1e-9
+OF_STREAM = -1
+"""In place of a node: one clock stamps all."""
+
+
+class OtherTracker:
+    """Lines about pairs and nodes, from whichever links."""
+
+    def __init__(
+        self,
+        start_ns: int,
+        ids: tuple[int, ...],
+        naming: Naming,
+        plausibility: Plausibility,
+        refused: Counter[str],
+        notices: list[tuple[int, str]],
+    ) -> None:
+        """Begin with nothing told.
+
+        Args:
+            start_ns: Host time that is 0 s of what is told [ns].
+            ids: Of the nodes, by index.
+            naming: Finds them.
+            plausibility: What can be.
+            refused: What was not used is counted here.
+            notices: What the user should read is added here.
+        """
+        self._start_ns, self._ids = start_ns, ids
+        self._naming, self._plausibility = naming, plausibility
+        self._refused, self._notices = refused, notices
+        self._stuck = StuckPlaces()
+        self.told = Told()
+        """What was believed and not taken over yet."""
+        self.driving: frozenset[int] = frozenset()
+        """Who drives, by what cars say or were let do, by index; written by the caller."""
+
+    def take(
+        self, stream: Stream, reading: PairReading | PoseReading, arrival_ns: int
+    ) -> tuple[int, ...]:
+        """Take a line; indices of the nodes whose places are known by it."""
+        names = (reading.i, reading.j) if isinstance(reading, PairReading) else (reading.node,)
+        found = [
+            self._naming.index(stream, name, arrival_ns, named=True, mixed=True) for name in names
+        ]
+        nodes = tuple(node for node in found if node is not None)
+        clock = stream.times.setdefault(OF_STREAM, DeviceTime(MICROSECONDS_64))
+        t_ns = clock.map(reading.source.ticks, arrival_ns)
+        if len(set(nodes)) < len(names):
+            return ()
+        if reading.pos is not None and not self._believes(reading, nodes, t_ns, arrival_ns):
+            return ()
+        t = (t_ns - self._start_ns) * NS
+        if isinstance(reading, PoseReading):
+            self.told.add_pose(t, nodes[0], reading)
+            return nodes
+        self.told.add_pair(t, nodes, reading)
+        return () if reading.status in (Status.LOST, Status.ABSENT) else nodes
+
+    def _believes(
+        self, reading: PairReading | PoseReading, nodes: tuple[int, ...], t_ns: int, arrival_ns: int
+    ) -> bool:
+        """Whether a place can be, and its tracker does not hang."""
+        assert reading.pos is not None
+        if not self._plausibility.allows_place(nodes, reading.pos, t_ns):
+            return False
+        attitude = reading.q_wb if isinstance(reading, PoseReading) else None
+        known, drives = nodes in self._stuck.stuck, not self.driving.isdisjoint(nodes)
+        values = (*reading.pos, *(attitude or ()))
+        if not self._stuck.refuses(nodes, values, drives, arrival_ns):
+            return True
+        self._refused["stuck"] += 1
+        if not known:
+            who = " and ".join(str(self._ids[node]) for node in nodes)
+            text = f"the place of {who} stays the same while it drives: its tracker hangs"
+            self._notices.append((arrival_ns, text))
+        return False

@@ -1,0 +1,145 @@
+"""Positions at constant velocity, many at a time: a Kalman filter for each.
+
+The velocity changes by white noise of density q = accel_psd**2 along every axis [1],
+
+    p' = v,  v' = w,  E[w(t) w(s)] = q delta(t - s),
+
+so over a time dt
+
+    F = [1 dt; 0 1],  Q = q [dt**3/3 dt**2/2; dt**2/2 dt].
+
+A filter, and not differences through a fixed low-pass: it weighs each position by its own
+covariance, takes lines at any intervals, and says how well it knows the velocity, which the
+safety gate asks for.
+
+References:
+    [1] Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking and Navigation,
+        Wiley 2001, section 6.2.2.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hardware_bridge.external_tracker.pending import ToldPlace
+from tracking.arrays import F64, I64
+from tracking.estimate import Status
+
+EYE = np.eye(3)
+
+
+class Tracks:
+    """The filters, arrays over (track, ...).
+
+    Laws: a position with a velocity is taken as it is, since it comes out of a filter already;
+    positions alone are measurements. What is older than the last of its track changes nothing.
+    """
+
+    def __init__(self, n: int, psd: F64, first_vel_std: F64, std: float, vel_std: float) -> None:
+        """Make tracks of which nothing was told.
+
+        Args:
+            n: How many.
+            psd: Acceleration noise of each, (track) [m/s2/sqrt(Hz)].
+            first_vel_std: Standard deviation of the velocity before the second position,
+                (track) [m/s].
+            std: Of positions without a covariance [m].
+            vel_std: Of velocities without one [m/s].
+        """
+        self._q, self._first_var = psd**2, first_vel_std**2
+        self._var, self._vel_var = std * std * EYE, vel_std * vel_std * EYE
+        self.x: F64 = np.zeros((n, 6))
+        """Position [m] and velocity [m/s] at `t`."""
+        self.P: F64 = np.zeros((n, 6, 6))
+        """Its covariance."""
+        self.t: F64 = np.full(n, -np.inf)
+        """When each was told last [s]; -inf before the first time."""
+        self.status: I64 = np.full(n, Status.ABSENT, dtype=np.int64)
+        """As told last."""
+        self.nlos: F64 = np.zeros(n)
+        """Likewise [-]."""
+
+    def forget(self, tracks: int | I64) -> None:
+        """As if nothing had been told of these."""
+        self.t[tracks] = -np.inf
+        self.status[tracks] = Status.ABSENT
+        self.nlos[tracks] = 0.0
+
+    def take(self, told: list[tuple[int, ToldPlace]]) -> None:
+        """Take over what was told; tracks by their numbers, in the order of telling."""
+        waiting = told
+        while waiting:
+            # One of each track at a time, and all tracks at once.
+            now: dict[int, ToldPlace] = {}
+            later = []
+            for k, place in waiting:
+                if k in now:
+                    later.append((k, place))
+                else:
+                    now[k] = place
+            self._take_round({k: p for k, p in now.items() if p.t >= self.t[k]})
+            waiting = later
+
+    def at(self, now: float) -> tuple[F64, F64]:
+        """All of them carried to a time, those of which nothing was told without meaning.
+
+        Returns:
+            Position and velocity, (track, 6), and covariance, (track, 6, 6).
+        """
+        dt = np.where(np.isfinite(self.t), now - self.t, 0.0)
+        return self._carried(np.arange(len(self.t)), np.maximum(dt, 0.0))
+
+    def _take_round(self, told: dict[int, ToldPlace]) -> None:
+        if not told:
+            return
+        k = np.fromiter(told, dtype=np.int64)
+        t = np.array([p.t for p in told.values()])
+        z = np.array([p.pos for p in told.values()])
+        R = np.array([self._var if p.cov is None else p.cov[:3, :3] for p in told.values()])  # noqa: N806
+        new = ~np.isfinite(self.t[k])
+        whole = np.array([p.vel is not None for p in told.values()])
+        self._begin(k[new & ~whole], z[new & ~whole], R[new & ~whole])
+        follows = ~new & ~whole
+        self._update(k[follows], t[follows] - self.t[k[follows]], z[follows], R[follows])
+        for track, place in told.items():
+            if place.vel is not None:
+                self.x[track] = (*place.pos, *place.vel)
+                self.P[track] = self._whole_cov(place)
+            self.status[track], self.nlos[track] = place.status, place.nlos
+        self.t[k] = t
+
+    def _whole_cov(self, place: ToldPlace) -> F64:
+        if place.cov is not None and len(place.cov) == 6:
+            return place.cov
+        P = np.zeros((6, 6))  # noqa: N806
+        P[:3, :3] = self._var if place.cov is None else place.cov
+        P[3:, 3:] = self._vel_var
+        return P
+
+    def _begin(self, k: I64, z: F64, R: F64) -> None:  # noqa: N803
+        self.x[k, :3], self.x[k, 3:] = z, 0.0
+        self.P[k] = 0.0
+        self.P[k, :3, :3] = R
+        self.P[k, 3:, 3:] = self._first_var[k, None, None] * EYE
+
+    def _update(self, k: I64, dt: F64, z: F64, R: F64) -> None:  # noqa: N803
+        x, P = self._carried(k, dt)  # noqa: N806
+        K = P[:, :, :3] @ np.linalg.inv(P[:, :3, :3] + R)  # noqa: N806
+        self.x[k] = x + (K @ (z - x[:, :3])[..., None])[..., 0]
+        left = np.broadcast_to(np.eye(6), P.shape).copy()
+        left[:, :, :3] -= K
+        # In Joseph's form, which stays positive definite.
+        self.P[k] = left @ P @ left.swapaxes(1, 2) + K @ R @ K.swapaxes(1, 2)
+
+    def _carried(self, k: I64, dt: F64) -> tuple[F64, F64]:
+        x = self.x[k].copy()
+        x[:, :3] += dt[:, None] * x[:, 3:]
+        F = np.broadcast_to(np.eye(6), (len(k), 6, 6)).copy()  # noqa: N806
+        F[:, :3, 3:] = dt[:, None, None] * EYE
+        P = F @ self.P[k] @ F.swapaxes(1, 2)  # noqa: N806
+        q = self._q[k]
+        P[:, :3, :3] += (q * dt**3 / 3.0)[:, None, None] * EYE
+        P[:, :3, 3:] += (q * dt**2 / 2.0)[:, None, None] * EYE
+        P[:, 3:, :3] += (q * dt**2 / 2.0)[:, None, None] * EYE
+        P[:, 3:, 3:] += (q * dt)[:, None, None] * EYE
+        return x, 0.5 * (P + P.swapaxes(1, 2))

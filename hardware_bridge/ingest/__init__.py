@@ -1,0 +1,1 @@
+"""From bytes of ports to measurements of nodes."""

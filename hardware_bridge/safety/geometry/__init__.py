@@ -1,0 +1,1 @@
+"""Distances and turning circles for the rules of the gate."""

@@ -1,0 +1,215 @@
+"""Stable-Baselines3: a seat for every car of every environment, all with one shared policy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium.spaces import Box
+
+from relpos_env.api.sb3_attributes import SharedSeats
+from relpos_env.api.state_space import N_TRUTH, truth_of_each
+from relpos_env.config import configure
+from relpos_env.core.env_core import Formation
+from relpos_env.core.reset_options import reset_options
+from relpos_env.errors import EnvError
+from relpos_env.interface.infos import car_infos
+from relpos_env.interface.observations import space_of
+from relpos_env.interface.observations.base import F32
+from relpos_env.interface.seeding import episode_rng, seeds_of_batch
+from relpos_env.render.film import Film, check_render_mode
+from relpos_env.tasks import reward_weights
+from relpos_env.tasks.options import flag
+from tracking.arrays import F64, Bool
+
+
+class FormationVecEnv(SharedSeats):
+    """``n_envs`` environments; seat ``e * n_cars + k`` is car k of environment e.
+
+    Seeds count on from environment to environment. A seat is done when the episode of its
+    environment is over, or when its car leaves for good; its info then has the figures of
+    `relpos_env.interface.infos`, the last observation that the car had as
+    ``terminal_observation``, and ``TimeLimit.truncated``. A seat without a car sees zeros, gets no
+    reward, and its info has ``active`` False at every step: plain algorithms of Stable-Baselines3
+    learn from these rows too, unless they use
+    `agents.training.ppo.buffer.SwarmRolloutBuffer`, which leaves them out.
+    """
+
+    def __init__(
+        self,
+        n_envs: int = 1,
+        *,
+        threads: int = 1,
+        render_mode: str | None = None,
+        with_truth: bool = False,
+        **arguments: Any,
+    ) -> None:
+        """Build the environments.
+
+        Args:
+            n_envs: How many.
+            threads: The batch is stepped in so many parts at a time.
+            render_mode: None, ``human`` or ``rgb_array``: pictures of the first environment.
+            with_truth: Every observation is followed by that of
+                `relpos_env.api.state_space.truth_of_each`, for critics.
+            arguments: Fields of `relpos_env.config.FormationConfig`.
+
+        Raises:
+            EnvError: An unknown name or a number out of range; the argument is named.
+        """
+        check_render_mode(render_mode)
+        self.render_mode = render_mode
+        self._parts = configure(arguments)
+        self.formation = Formation(self._parts, n_envs, threads)
+        self.n_cars = self._parts.n_cars
+        self._film = Film(render_mode, 10)
+        self._commands: tuple[F64, F64] | None = None
+        self._next_seeds: list[int | None] = [None] * n_envs
+        self._begun = False
+        self.with_truth = flag("with_truth", with_truth)
+        space = space_of(self._parts.mode.fields, self._parts.config.history)
+        if with_truth:
+            more = np.full(N_TRUTH * self.n_cars, np.inf, np.float32)
+            space = Box(np.append(space.low, -more), np.append(space.high, more))
+        super().__init__(n_envs * self.n_cars, space, self._parts.actions.space())
+
+    @property
+    def max_episode_steps(self) -> int:
+        """Steps until truncation."""
+        return self._parts.config.max_cycles
+
+    @property
+    def active(self) -> Bool:
+        """Which seats have a car that takes part, (seat)."""
+        return self.formation.active.ravel()
+
+    def seed(self, seed: int | None = None) -> Sequence[int | None]:
+        """Seed all environments, from the next reset on; None leaves their generators alone."""
+        if seed is not None:
+            self._next_seeds = seeds_of_batch(seed, self.formation.n_envs)
+        return [s for s in self._next_seeds for _ in range(self.n_cars)]
+
+    def stagger(self, rng: np.random.Generator) -> None:
+        """Let episodes that begin now end at random times, no two together but by chance.
+
+        Args:
+            rng: Draws how much of `max_cycles` has passed already.
+        """
+        cycles = self.formation.cycles
+        cycles[:] = rng.integers(0, self._parts.config.max_cycles, len(cycles))
+
+    def reweigh(self, weights: Mapping[str, float]) -> None:
+        """Let reward terms count by other weights from the next step on.
+
+        Args:
+            weights: By term; those that are not named count as the task has it.
+
+        Raises:
+            EnvError: No term of that name, or a weight that is not finite.
+        """
+        task = self._parts.config.task
+        self.formation.weights[:] = reward_weights(task, self.formation.task, weights)
+
+    def reset(self) -> F32:
+        """Begin an episode in every environment; observations, (seat, size).
+
+        The options of `set_options` are those of the first seat of each room; see
+        `relpos_env.core.reset_options`.
+
+        Raises:
+            EnvError: An unknown option, or one that cannot be fulfilled.
+        """
+        rooms = range(self.formation.n_envs)
+        for env, seed in enumerate(self._next_seeds):
+            if seed is not None or not self._begun:
+                self.formation.seed(env, episode_rng(seed))
+        self._begun = False  # until all wishes are fulfilled
+        wishes = [reset_options(self._options[k * self.n_cars], self._parts) for k in rooms]
+        if not any(self._options):
+            self.formation.begin(rooms)
+        else:
+            for env, wish in zip(rooms, wishes, strict=True):
+                self.formation.begin([env], options=wish)
+        self._reset_options()
+        self._next_seeds = [None] * self.formation.n_envs
+        self._begun = True
+        self.reset_infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        self._film.forget()
+        self._show()
+        return self._observations()
+
+    def step_async(self, actions: Any) -> None:
+        """Take the actions of all seats, (seat, ...).
+
+        Raises:
+            EnvError: The actions have a wrong shape, are not finite or not in the space; or
+                there was no reset.
+        """
+        if not self._begun:
+            raise EnvError("the environment must be reset first")
+        shape = (self.num_envs, *self._parts.actions.shape)
+        if np.shape(actions) != shape:
+            raise EnvError(f"actions: expected shape {shape}, got {np.shape(actions)}")
+        rows = np.reshape(actions, (-1, self.n_cars, *self._parts.actions.shape))
+        self._commands = self._parts.actions.decode(rows, "actions")
+
+    def step_wait(self) -> tuple[F32, F32, Bool, list[dict[str, Any]]]:
+        """Drive for 0.1 s: observations, rewards, dones and infos of all seats."""
+        assert self._commands is not None
+        f = self.formation
+        f.step(*self._commands)
+        rewards = f.rewards.ravel().astype(np.float32)
+        over = f.terminated | f.truncated
+        dones = (over[:, None] | f.left).ravel()
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        if not f.active.all():
+            for seat in np.nonzero(~f.active.ravel())[0]:
+                infos[seat] = {"active": False}
+        if dones.any():
+            last, columns = self._rows(f.observations), f.infos()
+            for done in np.nonzero(dones)[0].tolist():
+                of, car = divmod(done, self.n_cars)
+                infos[done] = car_infos(columns, of, [car])[0] | {
+                    "terminal_observation": last[done],
+                    "TimeLimit.truncated": not f.terminated[of],
+                }
+            if over.any():
+                f.begin(np.flatnonzero(over).tolist())
+                if over[0]:
+                    self._film.forget()
+        self._show()
+        return self._observations(), rewards, dones, infos
+
+    def close(self) -> None:
+        """Release threads and window."""
+        self.formation.close()
+        self._film.close()
+
+    def get_images(self) -> list[Any]:
+        """A picture of the first environment."""
+        return [self._film.picture(self.formation)]
+
+    def render(self, mode: str | None = None) -> Any:
+        """A picture of the first environment; None without a render mode or with a window."""
+        return self._film.picture(self.formation)
+
+    def _observations(self) -> F32:
+        """What the seats see now; zeros where a car has left."""
+        return self._rows(self.formation.team_observations())
+
+    def _rows(self, observations: F32) -> F32:
+        """Observations of all seats, with the truth if it is wanted; a copy."""
+        observations = observations.reshape(self.num_envs, -1)
+        if self.with_truth:
+            truth = (
+                truth_of_each(self.formation.state).reshape(self.num_envs, -1).astype(np.float32)
+            )
+            return np.concatenate([observations, truth], axis=1)
+        return observations.copy()
+
+    def _show(self) -> None:
+        if self.render_mode is not None:
+            self._film.add(self.formation)
+
+    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 10}  # noqa: RUF012

@@ -1,0 +1,126 @@
+"""What `reset(options=...)` can ask of an episode."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from relpos_env.config import Parts
+from relpos_env.errors import EnvError
+from relpos_env.scenarios import Scenario
+from relpos_env.scenarios import scenario as find_scenario
+from relpos_env.scenarios.episode import Episode
+from relpos_env.scenarios.rooms.floor import spacing
+from relpos_env.scenarios.rooms.obstacle import boxes_of
+from relpos_env.scenarios.rooms.overlap import beyond_walls, car_boxes, overlap
+from tracking.arrays import F64
+from tracking.params.short_repr import short_repr
+
+KNOWN = ("poses", "goals", "scenario")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ResetOptions:
+    """Wishes for one episode."""
+
+    __repr__ = short_repr
+
+    poses: F64 | None = None
+    """x, y, heading of the first cars at the start, (car, 3) [m, m, rad]; drawn if None."""
+    goals: F64 | None = None
+    """Where the cars shall stand, (car, 2) [m], if the task is `hold`; where they shall meet, (2),
+    if it is `rendezvous`; chosen by the task if None."""
+    scenario: Scenario | None = None
+    """In place of that of the environment; of the same room, protocol, antennas, magnetic waves
+    and furnishing, with no more boxes."""
+
+    def placed(self, episode: Episode, size: tuple[float, float]) -> Episode:
+        """The episode with its first cars where they are wanted.
+
+        Raises:
+            EnvError: A car in a wall, an obstacle or another car, or more cars than slots.
+        """
+        if self.poses is None:
+            return episode
+        n = len(self.poses)
+        if not 2 <= n <= len(episode.start):
+            raise EnvError(f"poses: expected 2 to {len(episode.start)} cars, got {n}")
+        taken = car_boxes(self.poses, episode.car, 0.0)
+        apart = np.linalg.norm(self.poses[:, None, :2] - self.poses[None, :, :2], axis=-1)
+        near = np.argwhere(
+            np.triu(apart < spacing(episode.car), 1) & np.triu(overlap(taken, taken), 1)
+        )
+        if len(near):
+            raise EnvError(f"poses: cars {near[0][0]} and {near[0][1]} overlap")
+        hit = overlap(taken, boxes_of(episode.obstacles)).any(axis=1) | beyond_walls(taken, size)
+        if hit.any():
+            raise EnvError(f"poses: car {int(hit.argmax())} is in a wall or an obstacle")
+        start = np.zeros_like(episode.start)
+        start[:n] = self.poses
+        return replace(episode, start=start, present=np.arange(len(start)) < n)
+
+
+def reset_options(options: Mapping[str, Any] | None, parts: Parts) -> ResetOptions:
+    """Read the options of a reset.
+
+    Args:
+        options: By name; None for none.
+        parts: Of the environment.
+
+    Raises:
+        EnvError: An unknown option, or one of a wrong shape.
+    """
+    options = options or {}
+    for name in options:
+        if name not in KNOWN:
+            raise EnvError(f"options: expected names among {', '.join(KNOWN)}, got {name!r}")
+    poses, goals = options.get("poses"), options.get("goals")
+    wanted = options.get("scenario")
+    return ResetOptions(
+        poses=None if poses is None else _rows("poses", poses, 3),
+        goals=None if goals is None else _rows("goals", goals, 2),
+        scenario=None if wanted is None else _fitting(find_scenario(wanted), parts),
+    )
+
+
+def _rows(name: str, value: Any, columns: int) -> F64:
+    """Finite numbers, (row, columns), or (columns) as one row.
+
+    Raises:
+        EnvError: They are not.
+    """
+    try:
+        array = np.atleast_2d(np.asarray(value, dtype=np.float64))
+    except (TypeError, ValueError):
+        array = np.zeros(0)
+    if array.ndim != 2 or array.shape[1] != columns or not np.isfinite(array).all():
+        raise EnvError(f"{name}: expected finite numbers, (car, {columns}), got {value!r}")
+    return array
+
+
+def _fitting(wanted: Scenario, parts: Parts) -> Scenario:
+    """The scenario, if an environment that was made for another can have it.
+
+    Raises:
+        EnvError: It cannot.
+    """
+    made = parts.scenario
+    if wanted.room != made.room:
+        raise EnvError(f"scenario: expected a room of {made.room} m, got {wanted.room}")
+    if wanted.max_boxes > max(made.max_boxes, 1):
+        raise EnvError(
+            f"scenario: expected at most {made.max_boxes} obstacles, got {wanted.max_boxes}"
+        )
+    if wanted.radio.session != made.radio.session:
+        raise EnvError("scenario: expected the radio protocol of the environment, got another")
+    for name, ours, theirs in (
+        ("height of the antennas", made.radio.antenna_height, wanted.radio.antenna_height),
+        ("number of magnetic waves", made.mag.n_waves, wanted.mag.n_waves),
+        ("furnish", made.furnish, wanted.furnish),
+    ):
+        if ours != theirs:
+            raise EnvError(f"scenario: expected the {name} of the environment, got another")
+    return wanted.with_cars(min(parts.n_cars, wanted.n_cars_range[1]))

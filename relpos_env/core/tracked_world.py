@@ -1,0 +1,159 @@
+"""The tracker in the loop: rooms, their measurements, and what the cars believe.
+
+    command -> Swarm -> measurements -> Perception -> view of every car
+
+The tracker gets nothing but measurements.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from relpos_env.interface.perception import FOR_POLICIES, Perception
+from relpos_env.interface.views import View
+from relpos_env.scenarios import Scenario
+from relpos_env.scenarios.episode import Episode
+from relpos_env.timing import DT, STAND_STILL
+from relpos_env.world.world import Physics, Swarm
+from tracking.arrays import F64, Bool
+from tracking.estimate import TeamEstimate
+from tracking.filters import FilterBuilder
+from tracking.late_data.horizon import HorizonParams
+from tracking.ranging.frames.airtime import round_rate
+from tracking.tracker import TrackerParams
+
+
+def default_params(scenario: Scenario, n_cars: int) -> TrackerParams:
+    """What the trackers believe by default: they wait for ranges as long as a round takes."""
+    radio = scenario.radio.for_nodes(n_cars)
+    rounds = 1.5 / round_rate(radio.session.phy, n_cars)
+    horizon = HorizonParams(delay=max(HorizonParams().delay, rounds))
+    return TrackerParams(filter=FOR_POLICIES, horizon=horizon)
+
+
+def waiting_at_most(scenario: Scenario, n_cars: int, params: TrackerParams, n_steps: int) -> int:
+    """Measurements that the horizon holds at a time, and some."""
+    pairs = n_cars * (n_cars - 1) // 2
+    phy = scenario.radio.for_nodes(n_cars).session.phy
+    rate = 2 * n_cars / DT + pairs * round_rate(phy, n_cars)
+    return int(1.2 * rate * (params.horizon.delay + 2 * n_steps * DT)) + 4 * pairs
+
+
+class TrackedSwarm:
+    """Groups of cars that know each other through their trackers."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        n_cars: int,
+        n_envs: int = 1,
+        *,
+        filter: str | FilterBuilder,
+        params: TrackerParams,
+        n_steps: int = 10,
+        proximity: int = 0,
+        physics: Physics,
+    ) -> None:
+        self.swarm = swarm = Swarm(scenario, n_cars, n_envs, n_steps, proximity, physics)
+        self.perception = Perception(
+            swarm.constellation,
+            params,
+            swarm.block,
+            swarm.powered,
+            filter=filter,
+            room=waiting_at_most(scenario, n_cars, params, n_steps),
+            n_beams=proximity,
+        )
+        self._singles: dict[int, TrackedSwarm] = {}
+
+    @property
+    def view(self) -> View:
+        """What every car sees now."""
+        return self.perception.view
+
+    @property
+    def estimate(self) -> TeamEstimate:
+        """The tracker's last estimate, as old as the horizon, overwritten by the next."""
+        return self.perception.estimate
+
+    def part(self, envs: slice) -> TrackedSwarm:
+        """Some of the groups; shares their memory."""
+        part = TrackedSwarm.__new__(TrackedSwarm)  # to copy binds the kernels of the whole, 2 ms
+        part.swarm = self.swarm.part(envs)
+        part.perception = self.perception.part(envs, part.swarm.block, part.swarm.powered)
+        part._singles = {}
+        return part
+
+    def share(self, target: F64, wanted: Bool, command: F64) -> None:
+        """Let the view have what the task and the operator want, in their own memory.
+
+        Args:
+            target: As in `View`.
+            wanted: As in `View`.
+            command: As in `View`.
+        """
+        self.perception.share(target, wanted, command)
+        self._singles = {}
+
+    def begin(
+        self,
+        envs: Sequence[int],
+        episodes: Sequence[Episode],
+        rngs: Sequence[np.random.Generator],
+        watch: Callable[[Swarm], None] | None = None,
+    ) -> None:
+        """Reset some groups and let them stand while their trackers are switched on.
+
+        Args:
+            envs: Which, ascending.
+            episodes: What each is made of.
+            rngs: One for each.
+            watch: Called with each group after each of its steps.
+        """
+        for env, episode, rng in zip(envs, episodes, rngs, strict=True):
+            self.swarm.begin(env, episode, rng)
+            self.perception.reset(env)
+        steps = round(STAND_STILL / (DT * self.swarm.n_steps))
+        for part in self._parts(envs):
+            still = np.zeros((part.swarm.n_envs, self.view.speed.shape[1]))
+            for _ in range(steps):
+                part.step(still, still)
+                if watch is not None:
+                    watch(part.swarm)
+
+    def _parts(self, envs: Sequence[int]) -> Iterator[TrackedSwarm]:
+        """Groups to step: the whole batch at once, or each by itself."""
+        if len(envs) == self.swarm.n_envs:
+            yield self
+            return
+        for env in envs:
+            if env not in self._singles:
+                self._singles[env] = self.part(slice(env, env + 1))
+            yield self._singles[env]
+
+    def step(self, speed: F64, steering: F64) -> None:
+        """Drive for one decision and let the tracker catch up.
+
+        Args:
+            speed: Wanted, (env, car) [m/s].
+            steering: Wanted, (env, car) [rad].
+        """
+        swarm, view = self.swarm, self.view
+        swarm.step(speed, steering)
+        state = swarm.state
+        view.now[:] = swarm.t
+        view.present[:] = state.present
+        view.speed[:] = swarm.odometer
+        view.steering[:] = state.steering
+        view.near[:] = swarm.proximity
+        self.perception.step()
+
+    def __getstate__(self) -> dict[str, object]:
+        """Parts stay behind."""
+        return {**self.__dict__, "_singles": {}}
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        self.__dict__.update(state)
+        self.perception.rebind(self.swarm.block, self.swarm.powered)

@@ -1,0 +1,1 @@
+"""Distances, contacts to come and lines of sight between boxes."""

@@ -1,0 +1,1 @@
+"""Walls, obstacles and the free floor of a room."""

@@ -1,0 +1,1 @@
+"""One room that is driven by a script and recorded."""

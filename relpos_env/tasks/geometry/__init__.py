@@ -1,0 +1,1 @@
+"""Shapes, curves, paths, and the assignment of places."""

@@ -1,0 +1,78 @@
+"""A meeting without given places, compiled."""
+
+from __future__ import annotations
+
+import math
+
+from relpos_env.tasks.kernels.score import changed, common_terms, time_term
+from tracking.kernels.jit import kernel
+
+CLOSING_SPEED = 1.0
+"""[m/s] Speed towards the middle of the group at which the progress term is 1."""
+
+
+@kernel
+def update_meeting(
+    start, stop, pos, vel, accel, clear, present, t, collided, seated, place, since, limits, goal,
+    error, rewards, done,
+):  # fmt: skip
+    """Goals, error, rewards and ending of the environments from start to stop.
+
+    The plan and the targets stay 0.
+
+    Args:
+        start: First environment.
+        stop: One behind the last.
+        pos: (env, car, 2) [m].
+        vel: (env, car, 2) [m/s].
+        accel: (env, car, 2) [m/s2].
+        clear: Way to what is nearest, (env, car) [m].
+        present: (env, car).
+        t: (env) [s].
+        collided: (env, car).
+        seated: Who counted before, (env, car).
+        place: Where to meet, (env, 2) [m].
+        since: When all had come together, infinite while they have not, (env) [s], updated.
+        limits: Radius [m], how long to stay [s], scale of the error [m].
+        goal: (env, car, 2) [m], written.
+        error: Distance from the middle of the group beyond the radius, (env, car) [m], written.
+        rewards: (env, car, term), written.
+        done: (env), written.
+
+    Returns:
+        How many environments have other cars than before; those are left alone.
+    """
+    radius, stay, error_scale = limits
+    n = present.shape[1]
+    n_changed = 0
+    for env in range(start, stop):
+        if changed(env, present, seated):
+            n_changed += 1
+            continue
+        x, y, v_x, v_y, n_present = 0.0, 0.0, 0.0, 0.0, 0
+        for k in range(n):
+            if present[env, k]:
+                x, y = x + pos[env, k, 0], y + pos[env, k, 1]
+                v_x, v_y = v_x + vel[env, k, 0], v_y + vel[env, k, 1]
+                n_present += 1
+        share = 1.0 / max(n_present, 1)
+        together = n_present > 0
+        for k in range(n):
+            goal[env, k, 0] = goal[env, k, 1] = error[env, k] = 0.0
+            if not present[env, k]:
+                continue
+            goal[env, k, 0], goal[env, k, 1] = place[env, 0], place[env, 1]
+            d_x, d_y = share * x - pos[env, k, 0], share * y - pos[env, k, 1]
+            distance = math.sqrt(d_x * d_x + d_y * d_y)
+            rewards[env, k, 1] = 0.0
+            if distance > radius:
+                together = False
+                error[env, k] = distance - radius
+                closing = d_x * (vel[env, k, 0] - share * v_x)
+                closing += d_y * (vel[env, k, 1] - share * v_y)
+                rewards[env, k, 1] = min(max(closing / (distance * CLOSING_SPEED), -1.0), 1.0)
+        since[env] = min(since[env], t[env]) if together else math.inf
+        done[env] = together and t[env] - since[env] >= stay - 1e-9
+        common_terms(env, accel, clear, present, collided, error, error_scale, rewards)
+        time_term(env, present, done[env], rewards)
+    return n_changed

@@ -1,0 +1,151 @@
+"""What all tasks have in common, compiled: targets from goals, formation error, reward terms."""
+
+from __future__ import annotations
+
+import math
+
+from tracking.kernels.jit import small_kernel
+
+HARD_ACCEL = 5.0
+"""[m/s2] Acceleration whose effort is 1; harder counts no more."""
+TIME = 5
+"""Number of the term that tasks with an end have."""
+NEAR = 0.15
+"""[m] Way to what is nearest below which nearness counts."""
+FAR = 4.0
+"""[-] Half of the formation term falls off over so many times the scale: there is something to be
+had by coming nearer even where a car is metres from its place."""
+VELOCITY_SCALE = 0.5
+"""[m/s] Difference from the planned velocity at which the velocity term is exp(-1)."""
+
+
+@small_kernel
+def changed(env, present, seated):
+    """True if other cars are in the room than the places were given to."""
+    n_other = 0
+    for k in range(present.shape[1]):
+        n_other += present[env, k] != seated[env, k]
+    return n_other > 0
+
+
+@small_kernel
+def targets_from_goals(env, present, goal, target):
+    """Wanted relative positions of one environment, antisymmetric to the last bit.
+
+    Args:
+        env: Environment.
+        present: (env, car).
+        goal: Place of each car in the room, (env, car, 2) [m].
+        target: (env, car, other, 2) [m], written; 0 where either is absent.
+    """
+    n = present.shape[1]
+    for i in range(n):
+        for j in range(n):
+            if present[env, i] and present[env, j]:
+                target[env, i, j, 0] = goal[env, j, 0] - goal[env, i, 0]
+                target[env, i, j, 1] = goal[env, j, 1] - goal[env, i, 1]
+            else:
+                target[env, i, j, 0] = 0.0
+                target[env, i, j, 1] = 0.0
+
+
+@small_kernel
+def formation_error(env, pos, present, target, error):
+    """Distance of the present others from where they should be, mean, into error (env, car) [m]."""
+    n = present.shape[1]
+    others = -1
+    for i in range(n):
+        error[env, i] = 0.0
+        if present[env, i]:
+            others += 1
+    if others < 1:
+        return
+    for i in range(n):
+        if not present[env, i]:
+            continue
+        for j in range(i + 1, n):
+            if present[env, j]:
+                x = pos[env, j, 0] - pos[env, i, 0] - target[env, i, j, 0]
+                y = pos[env, j, 1] - pos[env, i, 1] - target[env, i, j, 1]
+                distance = math.sqrt(x * x + y * y) / others
+                error[env, i] += distance
+                error[env, j] += distance
+
+
+@small_kernel
+def all_within(env, pos, present, goal, tolerance):
+    """True if somebody is present, and all who are stand within a distance [m] of their goals."""
+    anybody = False
+    for k in range(present.shape[1]):
+        if present[env, k]:
+            anybody = True
+            x, y = pos[env, k, 0] - goal[env, k, 0], pos[env, k, 1] - goal[env, k, 1]
+            if x * x + y * y > tolerance * tolerance:
+                return False
+    return anybody
+
+
+@small_kernel
+def velocity_term(env, k, vel, wanted_x, wanted_y, rewards):
+    """The second reward term of cars that follow a plan, of one car and its velocity there."""
+    off = math.hypot(vel[env, k, 0] - wanted_x, vel[env, k, 1] - wanted_y)
+    rewards[env, k, 1] = math.exp(-off / VELOCITY_SCALE)
+
+
+@small_kernel
+def place_term(env, pos, present, goal, scale, rewards):
+    """The second reward term of a group that is to stand somewhere, the same for all its cars."""
+    x, y, n = 0.0, 0.0, 0
+    for k in range(present.shape[1]):
+        if present[env, k]:
+            x += pos[env, k, 0] - goal[env, k, 0]
+            y += pos[env, k, 1] - goal[env, k, 1]
+            n += 1
+    for k in range(present.shape[1]):
+        if present[env, k]:
+            rewards[env, k, 1] = math.exp(-math.hypot(x, y) / (n * scale))
+
+
+@small_kernel
+def common_terms(env, accel, clear, present, collided, error, error_scale, rewards):
+    """The reward terms that all tasks have; the second, the task's own, must be there before.
+
+    Args:
+        env: Environment.
+        accel: (env, car, 2) [m/s2].
+        clear: Way to what is nearest, (env, car) [m].
+        present: (env, car).
+        collided: Contacts begun, (env, car).
+        error: (env, car) [m].
+        error_scale: Error over which half of the formation term falls off to exp(-1) [m].
+        rewards: (env, car, term), written: formation, (own), collision, effort, nearness; all
+            terms of an absent car are 0.
+    """
+    n_terms = rewards.shape[2]
+    for k in range(present.shape[1]):
+        if not present[env, k]:
+            for term in range(n_terms):
+                rewards[env, k, term] = 0.0
+            continue
+        square = accel[env, k, 0] ** 2 + accel[env, k, 1] ** 2
+        off = error[env, k] / error_scale
+        rewards[env, k, 0] = 0.5 * math.exp(-off) + 0.5 * math.exp(-off / FAR)
+        rewards[env, k, 2] = -collided[env, k]
+        rewards[env, k, 3] = -min(1.0, square / (HARD_ACCEL * HARD_ACCEL))
+        short = max(1.0 - clear[env, k] / NEAR, 0.0)
+        rewards[env, k, 4] = -short * short
+
+
+@small_kernel
+def time_term(env, present, done, rewards):
+    """The last reward term of tasks with an end: what a step costs until all is done.
+
+    Args:
+        env: Environment.
+        present: (env, car).
+        done: Whether this environment is through.
+        rewards: (env, car, term), written.
+    """
+    for k in range(present.shape[1]):
+        if present[env, k]:
+            rewards[env, k, TIME] = 0.0 if done else -1.0

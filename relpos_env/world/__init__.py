@@ -1,0 +1,1 @@
+"""The simulated truth: rooms, cars, contacts and their steps."""

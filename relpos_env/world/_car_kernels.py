@@ -1,0 +1,235 @@
+"""The dynamic bicycle, compiled: servo, motor, tyres, roll and pitch of one car and of many.
+
+Derived in docs/vehicle.md. In the frame of the car (x forward, y left), with the wheels'
+rolling velocities u and side slips s at the rear and the front axle,
+
+    m (v_x' - r v_y) = F_xr + F_xf cos d - F_yf sin d
+    m (v_y' + r v_x) = F_yr + F_xf sin d + F_yf cos d
+    I r'             = l_f (F_xf sin d + F_yf cos d) - l_r F_yr
+    F_y = -sign(s) Y (1 - (1 - z)^3),   z = min(1, C |s| / (3 Y |u|)),   Y^2 + F_x^2 = (mu N)^2
+
+which is the brush tyre of [1] inside the friction ellipse. Every force against a slip is
+at most what stops this slip within the step, for the inverse masses that an axle feels from all
+axles; so the tyres can only take energy, whatever the step, and hold at standstill.
+
+References:
+    [1] Pacejka, Tire and Vehicle Dynamics, 3rd ed., Butterworth-Heinemann 2012, section 3.2.
+"""
+
+from __future__ import annotations
+
+import math
+
+from tracking.kernels.jit import kernel, small_kernel
+
+X, Y, HEADING, VX, VY, RATE = range(6)
+"""Columns of a body: [m], [m], [rad], world velocity [m/s], [m/s], yaw rate [rad/s]."""
+STEERING, ACCEL, ROLL, ROLL_RATE, ROLL_ACCEL, PITCH, PITCH_RATE, PITCH_ACCEL = range(8)
+"""Columns of a drive: front wheels [rad], motor [m/s2], then angles [rad] and their derivatives."""
+TURN, PAST = 8, 9
+"""Columns of a drive: place of the next steering command, and the first of the last commands."""
+N_PAST = 16
+"""[-] Steering commands remembered; a delay is shorter than as many steps."""
+N_DRIVE = PAST + N_PAST
+"""[-] Columns of a drive; all zero is a car at rest."""
+SETTLED = 1e-12
+"""[m/s2], [rad/s] A motor or a body as slow as this stands: no numbers too small to be fast."""
+
+
+@small_kernel
+def drive_car(p, body, drive, e, n, speed, steering, dt, wrench):
+    """Advance the drive of one car and write the force and torque on it for the next step.
+
+    Args:
+        p: The car, a record of `relpos_env.world.car.CAR`.
+        body: (env, car, 6), read.
+        drive: (env, car, `N_DRIVE`), advanced.
+        e: Environment.
+        n: Car.
+        speed: Command, backwards if negative [m/s].
+        steering: Command, left is positive [rad].
+        dt: Step, that which the record was made for [s].
+        wrench: Force x, y [N] in the world frame, torque [N m], (env, car, 3), written.
+    """
+    c, s = math.cos(body[e, n, HEADING]), math.sin(body[e, n, HEADING])
+    v_x = c * body[e, n, VX] + s * body[e, n, VY]
+    v_y = c * body[e, n, VY] - s * body[e, n, VX]
+    rate = body[e, n, RATE]
+
+    angle = _steer(p, drive, e, n, steering, dt)
+    wanted = _clip(speed, p.max_speed)
+    motor = _motor(p, drive[e, n, ACCEL], wanted, v_x)
+    drive[e, n, STEERING] = angle
+    drive[e, n, ACCEL] = motor
+
+    pushes = motor * wanted > 0.0
+    if pushes or abs(v_x) + abs(v_y) + abs(rate) > SETTLED:
+        f_x, f_y, torque = _tyres(p, v_x, v_y, rate, angle, motor, pushes, dt)
+        wrench[e, n, 0] = c * f_x - s * f_y
+        wrench[e, n, 1] = s * f_x + c * f_y
+        wrench[e, n, 2] = torque
+    else:
+        f_x, f_y = 0.0, 0.0
+        wrench[e, n, 0] = -body[e, n, VX] * p.mass / dt
+        wrench[e, n, 1] = -body[e, n, VY] * p.mass / dt
+        wrench[e, n, 2] = -rate * p.inertia / dt
+
+    # The body leans out of a turn (to the right in a left one) and dives when braking.
+    lean, dive = p.roll_per_force * f_y, -p.pitch_per_force * f_x
+    _sway(drive, e, n, ROLL, lean, p.roll_stiffness, p.roll_damping, p.roll_slack, dt)
+    _sway(drive, e, n, PITCH, dive, p.pitch_stiffness, p.pitch_damping, p.pitch_slack, dt)
+
+
+@small_kernel
+def integrate_car(p, body, wrench, e, n, dt):
+    """What Chipmunk does with a body that touches nothing: first the pose, then the velocity."""
+    body[e, n, X] += body[e, n, VX] * dt
+    body[e, n, Y] += body[e, n, VY] * dt
+    body[e, n, HEADING] += body[e, n, RATE] * dt
+    body[e, n, VX] += wrench[e, n, 0] * p.mass_inv * dt
+    body[e, n, VY] += wrench[e, n, 1] * p.mass_inv * dt
+    body[e, n, RATE] += wrench[e, n, 2] * p.inertia_inv * dt
+
+
+@kernel
+def drive_cars(cars, body, drive, present, command_speed, command_steering, dt, wrench):
+    """`drive_car` for all cars; nothing acts on the absent.
+
+    Args:
+        cars: Records of `relpos_env.world.car.CAR`, (env).
+        body: (env, car, 6).
+        drive: (env, car, `N_DRIVE`), advanced.
+        present: (env, car) bool.
+        command_speed: (env, car) [m/s].
+        command_steering: (env, car) [rad].
+        dt: Step [s].
+        wrench: (env, car, 3), written.
+    """
+    for e in range(body.shape[0]):
+        p = cars[e]
+        for n in range(body.shape[1]):
+            if present[e, n]:
+                speed, steering = command_speed[e, n], command_steering[e, n]
+                drive_car(p, body, drive, e, n, speed, steering, dt, wrench)
+            else:
+                wrench[e, n, 0] = wrench[e, n, 1] = wrench[e, n, 2] = 0.0
+
+
+@kernel
+def integrate_cars(cars, body, present, wrench, dt):
+    """`integrate_car` for all cars that are present; arguments as of `drive_cars`."""
+    for e in range(body.shape[0]):
+        p = cars[e]
+        for n in range(body.shape[1]):
+            if present[e, n]:
+                integrate_car(p, body, wrench, e, n, dt)
+
+
+@small_kernel
+def _clip(value, limit):
+    return min(max(value, -limit), limit)
+
+
+@small_kernel
+def _steer(p, drive, e, n, command, dt):
+    """Angle of the front wheels after a step: the servo follows the command of a while ago."""
+    turn = int(drive[e, n, TURN])
+    drive[e, n, PAST + turn] = command
+    then = (turn - int(p.delay_steps)) & (N_PAST - 1)
+    drive[e, n, TURN] = (turn + 1) & (N_PAST - 1)
+    angle = drive[e, n, STEERING]
+    wanted = _clip(drive[e, n, PAST + then], p.max_steering)
+    return angle + _clip(wanted - angle, p.steering_rate * dt)
+
+
+@small_kernel
+def _motor(p, motor, wanted, v_x):
+    """Acceleration that the motor gives after a step: a speed controller behind a lag [m/s2]."""
+    asked = p.speed_gain * (wanted - v_x)
+    if wanted != 0.0:
+        asked += math.copysign(p.rolling, wanted)
+    asked = _clip(asked, p.max_brake if asked * v_x < 0.0 else p.max_accel)
+    motor = asked + p.motor_keep * (motor - asked)
+    return motor if abs(motor) > SETTLED else 0.0
+
+
+@small_kernel
+def _tyres(p, v_x, v_y, rate, angle, motor, pushes, dt):
+    """Force forward and to the left [N], and torque [N m], of both axles' tyres on the car."""
+    sd = math.sin(angle)
+    cd = math.sqrt(1.0 - sd * sd)
+    hub = v_y + p.front * rate
+    u_front, s_front = cd * v_x + sd * hub, cd * hub - sd * v_x
+    s_rear = v_y - p.rear * rate
+
+    # How fast a force changes the slip it acts against: row sums of J M^-1 J' along the wheels
+    # and across them, times dt. Within slip / row sum, the forces of both axles take energy.
+    cross = abs(cd * (p.mass_inv - p.front * p.rear * p.inertia_inv))
+    lever = p.front * cd
+    across_rear = dt * (p.mass_inv + p.rear * p.rear * p.inertia_inv + cross)
+    across_front = dt * (p.mass_inv + lever * lever * p.inertia_inv + cross)
+    lever = p.front * sd
+    along_rear = dt * (1.0 + cd) * p.mass_inv
+    along_front = along_rear + dt * lever * lever * p.inertia_inv
+
+    force, share, drag = motor * p.mass, p.front_drive, p.rolling_share
+    grip_rear, grip_front = p.friction * p.rear_load, p.friction * p.front_load
+    fx_rear = _along(v_x, force * (1.0 - share), pushes, drag * p.rear_load, grip_rear, along_rear)
+    fx_front = _along(u_front, force * share, pushes, drag * p.front_load, grip_front, along_front)
+    fy_rear = _across(s_rear, v_x, fx_rear, grip_rear, p.rear_stiffness, across_rear)
+    fy_front = _across(s_front, u_front, fx_front, grip_front, p.front_stiffness, across_front)
+
+    side = sd * fx_front + cd * fy_front
+    f_x = fx_rear + cd * fx_front - sd * fy_front
+    return f_x, fy_rear + side, p.front * side - p.rear * fy_rear
+
+
+@small_kernel
+def _along(u, motor, pushes, drag, grip, yields):
+    """Force along an axle's wheels that roll at u: motor or brake, rolling resistance, grip [N].
+
+    Where the motor does not push towards the speed that is wanted it is a brake: it never turns
+    wheels, and holds them once they stand. The force u / yields would stop the wheels.
+    """
+    if not pushes:
+        if motor * u > 0.0:
+            motor = 0.0
+        elif abs(motor) * yields > abs(u):
+            motor = -u / yields
+    free = u + motor * yields
+    if abs(free) > drag * yields:
+        return _clip(motor - math.copysign(drag, free), grip)
+    return _clip(-u / yields, grip)
+
+
+@small_kernel
+def _across(s, u, along, grip, stiffness, yields):
+    """Force across an axle's wheels that slip at s while they roll at u [N]."""
+    room = math.sqrt(max(grip * grip - along * along, 0.0))
+    slip, full = stiffness * abs(s), 3.0 * room * abs(u)
+    force = room
+    if slip < full:
+        z = slip / full
+        force = room * z * (3.0 - z * (3.0 - z))
+    if force * yields > abs(s):
+        force = abs(s) / yields
+    return -math.copysign(force, s)
+
+
+@small_kernel
+def _sway(drive, e, n, column, rest, stiffness, damping, slack, dt):
+    """Step a spring-damper towards its rest angle by the implicit midpoint rule.
+
+    Stiffness is omega^2 [1/s2], damping 2 zeta omega [1/s], and slack what the rule divides by,
+    1 / (1 + damping dt / 2 + stiffness dt^2 / 4).
+    """
+    angle, rate = drive[e, n, column], drive[e, n, column + 1]
+    h = 0.5 * dt
+    accel = slack * (stiffness * (rest - angle - h * rate) - damping * rate)
+    angle += dt * (rate + h * accel)
+    rate += dt * accel
+    if abs(angle) + abs(rate) + abs(accel) < SETTLED:
+        angle, rate, accel = 0.0, 0.0, 0.0
+    drive[e, n, column] = angle
+    drive[e, n, column + 1] = rate
+    drive[e, n, column + 2] = accel

@@ -1,0 +1,1 @@
+"""The extended Kalman filter of the joint filter: prediction, correction, retraction."""

@@ -1,0 +1,245 @@
+"""Dead reckoning: what inertial samples add up to is applied when a measurement comes.
+
+With T the time since the last one, the sums ``dv = int a``, ``dp = int int a`` and, for a bias b
+that turns with the body by ``B``, ``Bv = int B``, ``Bp = int int B`` (`preintegration`) give
+
+    p += T v + R dp - R Bp b,    v += R dv - R Bv b,    R = rotation by the heading error
+
+exactly, for every hypothesis at once; the samples themselves cost next to nothing. What is turned
+about in space is in `attitude_coupling`. Bias, heading error and range errors decay towards zero
+(first-order Markov): the first two with time, the last with the way of both ends, so that they
+stay while no node moves.
+"""
+
+from __future__ import annotations
+
+import math
+
+from tracking.filters.joint.ekf.attitude_coupling import (
+    PER_GRAVITY,
+    corrected_increments,
+    write_accel_bias_jacobian,
+    write_attitude_coupling,
+)
+from tracking.filters.joint.ekf.gyro_bias import (
+    decay_gyro_bias_transition,
+    propagate_gyro_bias_columns,
+    propagate_gyro_bias_rows,
+)
+from tracking.filters.joint.ekf.tilt_correction import apply_tilt_correction, tilt_bias_tau
+from tracking.kernels.jit import kernel, small_kernel
+from tracking.maths.angles import cosine_sine
+from tracking.maths.covariance import STATES, add_to_columns, add_to_rows, apply_downdate, mirror
+from tracking.maths.exponentials import decay
+
+
+@kernel
+def predict(c, s, h, step, work):
+    """Carry hypothesis h over the summed time of every node; no update is pending from then on.
+
+    What decays does so first, in the sweep over P that applies pending updates. What is added after
+    it goes by what is left.
+
+    Args:
+        c: Coefficients.
+        s: JointState of one environment.
+        h: Hypothesis.
+        step: How long that is [s].
+        work: Room: `scale`, how much of a state's error stays; `step`, time and derivatives
+            of each node; `speed`.
+    """
+    nodes, pairs, x, P = s.nodes, s.pairs, s.x, s.P
+    scale, w, F, speed = work.scale, work.step, work.derivatives, work.speed
+    d = c.d
+    for r in range(P.shape[2]):
+        scale[r] = 1.0
+    for i in range(nodes.shape[0]):
+        speed[i] = 0.0
+        if moves(nodes[i]):
+            propagate_state(c, nodes[i], s.preintegrated, x, h, i, scale, w, speed)
+    for p in range(pairs.shape[0]):
+        at = pairs[p].i_range_error
+        if at < 0 or not (nodes[pairs[p].i].present and nodes[pairs[p].j].present):
+            continue
+        way = (speed[pairs[p].i] + speed[pairs[p].j]) * step
+        scale[at] = decay(way / c.fast_length)
+        hidden = s.nlos[h, p]
+        scale[at + 1] = decay(way * ((1.0 - hidden) / c.slow_length + hidden / c.nlos_bias_length))
+        scale[at + 1] *= s.bias_retention[h, p]  # as a way does that leaves so much
+        x[h, at] *= scale[at]
+        x[h, at + 1] *= scale[at + 1]
+        x[h, at + 1] += (1.0 - scale[at + 1]) * hidden * c.nlos_bias
+    apply_downdate(P, h, s.pending_updates, h, s.n_pending[h], scale)
+    s.n_pending[h] = 0
+    for i in range(nodes.shape[0]):
+        if moves(nodes[i]):
+            write_derivatives(d, nodes[i], w, i, F, scale)
+            add_to_rows(P, h, nodes[i].i_pos, nodes[i].i_tilt_bias, n_bias_states(nodes[i]), F, i)
+    for i in range(nodes.shape[0]):
+        if moves(nodes[i]):
+            add_to_columns(
+                P, h, nodes[i].i_pos, nodes[i].i_tilt_bias, n_bias_states(nodes[i]), F, i
+            )
+    for i in range(nodes.shape[0]):
+        if moves(nodes[i]) and nodes[i].has_ahrs_feedback:
+            decay_gyro_bias_transition(nodes[i], i, w, scale)
+            propagate_gyro_bias_rows(nodes[i], P, h, i, w, scale)
+            propagate_gyro_bias_columns(nodes[i], P, h, i, w, scale)
+    mirror(P, h, c.n_motion)
+    for i in range(nodes.shape[0]):
+        if nodes[i].present:
+            add_noise(c, nodes[i], s.preintegrated, P, h, i, scale, step)
+    for p in range(pairs.shape[0]):
+        at = pairs[p].i_range_error
+        if at >= 0:
+            slow_var = c.slow_var + s.nlos[h, p] * c.nlos_bias_var
+            P[h, at, at] += (1.0 - scale[at] * scale[at]) * c.fast_var
+            P[h, at + 1, at + 1] += (1.0 - scale[at + 1] * scale[at + 1]) * slow_var
+
+
+@small_kernel
+def propagate_state(c, node, pre, x, h, i, scale, w, speed):
+    """The states of node i, and the derivatives of the step, written to row i of w."""
+    d, T = c.d, pre[i, 0]
+    p, v, b, y = node.i_pos, node.i_vel, node.i_tilt_bias, node.i_heading
+    psi = x[h, y]
+    cos_psi, sin_psi = cosine_sine(psi)
+    cos_r, sin_r = cos_psi, sin_psi
+    if node.i_acc_bias >= 0:
+        write_accel_bias_jacobian(node, pre, x, h, i, cos_r, sin_r, scale, w)
+    dv0, dv1, dv2, dp0, dp1, dp2 = corrected_increments(node, pre, x, h, i)
+    dv0, dv1 = cos_r * dv0 - sin_r * dv1, sin_r * dv0 + cos_r * dv1
+    dp0, dp1 = cos_r * dp0 - sin_r * dp1, sin_r * dp0 + cos_r * dp1
+    if not node.levelled:
+        cos_r, sin_r = 1.0, 0.0
+    vc, vs = cos_r * pre[i, 7] - sin_r * pre[i, 8], sin_r * pre[i, 7] + cos_r * pre[i, 8]
+    pc, ps = cos_r * pre[i, 9] - sin_r * pre[i, 10], sin_r * pre[i, 9] + cos_r * pre[i, 10]
+    if node.i_acc_bias >= 0:
+        vc, pc = vc + PER_GRAVITY * dv2, pc + PER_GRAVITY * dp2
+    b0, b1 = x[h, b], x[h, b + 1]
+    bv0, bv1 = vc * b0 - vs * b1, vs * b0 + vc * b1
+    bp0, bp1 = pc * b0 - ps * b1, ps * b0 + pc * b1
+    w[i, 0], w[i, 1], w[i, 2], w[i, 3], w[i, 4] = T, pc, ps, vc, vs
+    share = 1.0 if node.levelled else 0.0
+    w[i, 5], w[i, 6] = -(dp1 - share * bp1), dp0 - share * bp0
+    w[i, 7], w[i, 8] = -(dv1 - share * bv1), dv0 - share * bv0
+    w[i, 27], w[i, 28] = dv2, dp2
+    w[i, 29], w[i, 30] = -dv1 * b0 + dv0 * b1, -dp1 * b0 + dp0 * b1
+    x[h, p] += T * x[h, v] + dp0 - bp0
+    x[h, p + 1] += T * x[h, v + 1] + dp1 - bp1
+    x[h, v] += dv0 - bv0
+    x[h, v + 1] += dv1 - bv1
+    squared = x[h, v] ** 2 + x[h, v + 1] ** 2
+    if d == 3:
+        x[h, p + 2] += T * x[h, v + 2] + dp2 - 0.5 * T * T * x[h, b + 2]
+        x[h, v + 2] += dv2 - T * x[h, b + 2]
+        if node.i_acc_bias >= 0:
+            x[h, p + 2] += PER_GRAVITY * (dp0 * b0 + dp1 * b1)
+            x[h, v + 2] += PER_GRAVITY * (dv0 * b0 + dv1 * b1)
+        squared += x[h, v + 2] ** 2
+    speed[i] = math.sqrt(squared)
+    if node.has_ahrs_feedback:
+        apply_tilt_correction(node, pre, x, h, i, cos_psi, sin_psi, w)
+    keep = decay(T / tilt_bias_tau(node))
+    scale[b], scale[b + 1] = keep, keep
+    if d == 3:
+        scale[b + 2] = decay(T / node.vertical_bias_tau)
+    for k in range(b, y):
+        x[h, k] *= scale[k]
+    scale[y] = decay(T / node.heading_tau)
+    x[h, y] *= scale[y]
+
+
+@small_kernel
+def time_since_epoch(s, i):
+    """How much older than the sums of node i the states are [s]; 0 for a static node."""
+    return 0.0 if s.nodes[i].static else s.preintegrated[i, 0]
+
+
+@small_kernel
+def displacement_since_epoch(c, s, h, i):
+    """What `propagate_state` would add to the position of node i, three numbers [m]."""
+    node, pre, x, T = s.nodes[i], s.preintegrated, s.x, s.preintegrated[i, 0]
+    psi = x[h, node.i_heading]
+    cos_r, sin_r = cosine_sine(psi)
+    b0, b1 = x[h, node.i_tilt_bias], x[h, node.i_tilt_bias + 1]
+    _, _, _, dp0, dp1, dp2 = corrected_increments(node, pre, x, h, i)
+    bp0, bp1 = pre[i, 9], pre[i, 10]
+    way0, way1, way2 = cos_r * dp0 - sin_r * dp1, sin_r * dp0 + cos_r * dp1, 0.0
+    if node.levelled:
+        bp0, bp1 = cos_r * bp0 - sin_r * bp1, sin_r * bp0 + cos_r * bp1
+    if node.i_acc_bias >= 0:
+        way2 = PER_GRAVITY * (way0 * b0 + way1 * b1)
+        bp0 += PER_GRAVITY * dp2
+    way0 += T * x[h, node.i_vel] - (bp0 * b0 - bp1 * b1)
+    way1 += T * x[h, node.i_vel + 1] - (bp1 * b0 + bp0 * b1)
+    if c.d == 3:
+        way2 += T * x[h, node.i_vel + 2] + dp2 - 0.5 * T * T * x[h, node.i_tilt_bias + 2]
+    return way0, way1, way2
+
+
+@small_kernel
+def moves(node):
+    """True for a node of the group that is not fixed."""
+    return node.present and not node.static
+
+
+@small_kernel
+def n_bias_states(node):
+    """How many states stand behind position and velocity of a node: bias, offset, heading."""
+    return node.i_heading + 1 - node.i_tilt_bias
+
+
+@small_kernel
+def write_derivatives(d, node, w, i, F, scale):
+    """What position and velocity of node i gain by what is left of the states behind, to F."""
+    T, pc, ps, vc, vs = w[i, 0], w[i, 1], w[i, 2], w[i, 3], w[i, 4]
+    y = node.i_heading - node.i_tilt_bias
+    F[i, :, :] = 0.0
+    F[i, STATES, :d] = T
+    F[i, 0, 0], F[i, 0, 1], F[i, 0, d], F[i, 0, d + 1] = -pc, -ps, -vc, -vs
+    F[i, 1, 0], F[i, 1, 1], F[i, 1, d], F[i, 1, d + 1] = ps, -pc, vs, -vc
+    F[i, y, 0], F[i, y, 1], F[i, y, d], F[i, y, d + 1] = w[i, 5], w[i, 6], w[i, 7], w[i, 8]
+    if d == 3:
+        F[i, 2, 2], F[i, 2, 5] = -0.5 * T * T, -T
+    if node.i_acc_bias >= 0:
+        write_attitude_coupling(w, i, F)
+    for q in range(y + 1):
+        undo = 1.0 / scale[node.i_tilt_bias + q]
+        for r in range(2 * d):
+            F[i, q, r] *= undo
+
+
+@small_kernel
+def initial_tilt_variance(node, age):
+    """Variance of the bias that comes from an orientation of that age [s], which is new."""
+    return node.initial_tilt_speed2 / (max(age, 1.0) * max(age, 1.0))
+
+
+@small_kernel
+def add_noise(c, node, pre, P, h, i, scale, step):
+    """Process noise of one node: white acceleration, and what keeps the Markov parts alive."""
+    p = node.i_pos
+    if node.static:
+        for k in range(c.d):
+            P[h, p + k, p + k] += c.static_drift2 * step
+        return
+    v, b, y = node.i_vel, node.i_tilt_bias, node.i_heading
+    T = pre[i, 0]
+    q = node.psd2 * T + pre[i, 11]
+    for k in range(c.d):
+        P[h, p + k, p + k] += q * T * T / 3.0
+        P[h, p + k, v + k] += 0.5 * q * T
+        P[h, v + k, p + k] += 0.5 * q * T
+        P[h, v + k, v + k] += q
+        bias_var = node.bias_var if k < 2 else node.vertical_bias_var
+        P[h, b + k, b + k] += (1.0 - scale[b + k] * scale[b + k]) * bias_var
+    if node.initial_tilt_speed2 > 0.0:
+        age = max(node.t_pre - node.t_oriented, 1.0)
+        for k in range(2):
+            P[h, b + k, b + k] += 2.0 * T / age * initial_tilt_variance(node, age)
+    for k in range(node.i_acc_bias, node.i_acc_bias + (3 if node.i_acc_bias >= 0 else 0)):
+        P[h, k, k] += (1.0 - scale[k] * scale[k]) * node.offset_var
+    P[h, y, y] += (1.0 - scale[y] * scale[y]) * node.heading_var
+    for k in range(node.i_gyro_bias, node.i_gyro_bias + (3 if node.has_ahrs_feedback else 0)):
+        P[h, k, k] += node.gyro_drift2 * T

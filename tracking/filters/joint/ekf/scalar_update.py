@@ -1,0 +1,123 @@
+"""The linear algebra of the joint filter: scalar measurements with few non-zero derivatives.
+
+A measurement is a list of states and derivatives, so that its cost is that of one sweep over
+the covariance. With the optimal gain ``K = PH / S`` the Joseph form reduces to
+``P - (PH)(PH)^T / S``; written with ``w = PH / sqrt(S)`` it is symmetric to the last bit.
+
+A covariance of many states does not fit the nearest cache, and a sweep over it costs more than
+the sums. So in larger groups corrections wait: the covariance is ``P - W^T W`` with one row of W
+each, and one sweep takes them all off before P is used for anything else (`flush_updates`).
+"""
+
+from __future__ import annotations
+
+import math
+
+from tracking.kernels.jit import small_kernel
+from tracking.maths.covariance import apply_downdate, sum_rows
+
+
+@small_kernel
+def compute_pht(s, h, m, work):
+    """Write ``w = P H`` of hypothesis h to the scratch; returns ``H P H^T``.
+
+    Args:
+        s: JointState of one environment.
+        h: Hypothesis.
+        m: Number of non-zero derivatives.
+        work: Room; `idx` and `val` hold their states and them.
+    """
+    idx, val, w, share, W = work.idx, work.val, work.w, work.share, s.pending_updates
+    # Eight at a time, since each sum takes as long as all eight; rows beyond count for nothing.
+    for q in range(0, s.n_pending[h], 8):
+        v0, v1, v2, v3, v4, v5, v6, v7 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for k in range(m):
+            v, at = val[k], idx[k]
+            v0, v1 = v0 + v * W[h, q, at], v1 + v * W[h, q + 1, at]
+            v2, v3 = v2 + v * W[h, q + 2, at], v3 + v * W[h, q + 3, at]
+            v4, v5 = v4 + v * W[h, q + 4, at], v5 + v * W[h, q + 5, at]
+            v6, v7 = v6 + v * W[h, q + 6, at], v7 + v * W[h, q + 7, at]
+        share[q], share[q + 1], share[q + 2], share[q + 3] = v0, v1, v2, v3
+        share[q + 4], share[q + 5], share[q + 6], share[q + 7] = v4, v5, v6, v7
+    sum_rows(s.P, h, idx, val, m, W, share, s.n_pending[h], w)
+    variance = 0.0
+    for k in range(m):
+        variance += val[k] * w[idx[k]]
+    return max(variance, 0.0)
+
+
+@small_kernel
+def covariance(s, h, a, b):
+    """One element of the covariance of hypothesis h, pending updates included."""
+    total = s.P[h, a, b]
+    for q in range(s.n_pending[h]):
+        total -= s.pending_updates[h, q, a] * s.pending_updates[h, q, b]
+    return total
+
+
+@small_kernel
+def kalman_update(s, h, w, nu, S):
+    """Correct hypothesis h with an innovation nu of variance S; w is ``P H``, overwritten.
+
+    What the states are moved by is added to `accumulated_correction`.
+    """
+    x, P, W, moved = s.x, s.P, s.pending_updates, s.accumulated_correction
+    n, room = P.shape[2], W.shape[1]
+    gain, scale = nu / S, 1.0 / math.sqrt(S)
+    if room > 0:
+        if s.n_pending[h] == room:
+            flush_updates(s, h)
+        q = s.n_pending[h]
+        for r in range(n):
+            w_r = w[r]
+            x[h, r] += w_r * gain
+            moved[h, r] += w_r * gain
+            W[h, q, r] = w_r * scale
+        s.n_pending[h] = q + 1
+        return
+    for r in range(n):
+        x[h, r] += w[r] * gain
+        moved[h, r] += w[r] * gain
+        w[r] *= scale
+    for r in range(n):
+        w_r = w[r]
+        for c in range(n):
+            P[h, r, c] -= w_r * w[c]
+
+
+@small_kernel
+def flush_updates(s, h):
+    """Apply pending updates: from here on P is the covariance of hypothesis h."""
+    if s.n_pending[h] > 0:
+        apply_downdate(s.P, h, s.pending_updates, h, s.n_pending[h], None)
+        s.n_pending[h] = 0
+
+
+@small_kernel
+def flush_all_updates(s):
+    """Apply the pending updates of every hypothesis."""
+    for h in range(s.alive.shape[0]):
+        if s.alive[h]:
+            flush_updates(s, h)
+
+
+@small_kernel
+def reset_state(s, h, n, at, variance):
+    """Forget what is known about one state: value 0, the given variance, no correlation."""
+    for r in range(n):
+        s.P[h, at, r] = 0.0
+        s.P[h, r, at] = 0.0
+    s.P[h, at, at] = variance
+    s.x[h, at] = 0.0
+    for k in range(s.sensitivity.shape[1]):
+        s.sensitivity[h, k, at] = 0.0
+
+
+@small_kernel
+def symmetrise(P, h, n):
+    """Take out what rounding has made unequal across the diagonal."""
+    for r in range(n):
+        for c in range(r + 1, n):
+            mean = 0.5 * (P[h, r, c] + P[h, c, r])
+            P[h, r, c] = mean
+            P[h, c, r] = mean

@@ -1,0 +1,1 @@
+"""Measurement updates of the joint filter."""

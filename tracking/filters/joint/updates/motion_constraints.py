@@ -1,0 +1,216 @@
+"""Motion constraints: zero velocity, non-holonomic vehicles, mean velocity; and the gauge.
+
+Ranges and accelerations do not observe where the group as a whole is. Its centre is moved back to
+the origin from time to time, with a fixed uncertainty that is independent of all else; differences
+between nodes are not affected.
+"""
+
+from __future__ import annotations
+
+import math
+
+from tracking.filters.joint.ekf.scalar_update import (
+    compute_pht,
+    covariance,
+    flush_updates,
+    kalman_update,
+    symmetrise,
+)
+from tracking.filters.joint.hypotheses.alignment import is_linear
+from tracking.filters.joint.hypotheses.alignment_sensitivity import (
+    accumulate_alignment_information,
+    innovation_sensitivity,
+)
+from tracking.filters.joint.hypotheses.static_initialisation import is_at_rest
+from tracking.kernels.jit import kernel, small_kernel
+from tracking.models.mean_velocity import mean_velocity_model
+from tracking.models.nonholonomic import nonholonomic_model
+from tracking.models.zero_velocity import zero_velocity_model
+
+
+@kernel
+def apply_motion_constraints(c, s, h, t, dt, work):
+    """Use what is known about the carriers, in hypothesis h.
+
+    Args:
+        c: Coefficients.
+        s: JointState of one environment, at time t.
+        h: Hypothesis.
+        t: Time [s].
+        dt: Time since the last use [s].
+        work: Room.
+    """
+    constrain_nodes(c, s, h, t, work)
+    mean_velocity_prior(c, s, h, dt, work)
+
+
+@small_kernel
+def constrain_nodes(c, s, h, t, work):
+    """Nodes that rest do not move, and the axles of cars do not slide."""
+    for r in range(c.n):
+        work.x[0, r] = s.x[h, r]
+    for i in range(s.nodes.shape[0]):
+        node = s.nodes[i]
+        if not node.present or node.static or t - node.t_state > c.imu_timeout:
+            continue
+        if is_at_rest(c, node, t):
+            if is_known_to_move(c, s, h, i):
+                if h == s.group[0].best:
+                    node.t_moved = t
+                continue
+            for k in range(c.d):
+                predicted, work.val[0] = zero_velocity_model(s.x[h, node.i_vel + k])
+                work.idx[0] = node.i_vel + k
+                if is_linear(s.group[0]):
+                    work.direct[:] = 0.0
+                apply_constraint(c, s, h, -predicted, 1, c.rest_var, work)
+        elif node.sideways_var > 0.0:
+            nonholonomic_constraint(c, s, h, i, work)
+
+
+@small_kernel
+def is_known_to_move(c, s, h, i):
+    """True if node i, whose IMU reads the same for a while, is known to move all the same.
+
+    At a constant velocity, or slowly round a curve, an IMU reads what it reads at rest.
+    """
+    for k in range(c.d):
+        at = s.nodes[i].i_vel + k
+        v = s.x[h, at]
+        floor = c.glide_nis * c.rest_var
+        if v * v > floor and v * v > floor + c.glide_nis * covariance(s, h, at, at):
+            return True
+    return False
+
+
+@small_kernel
+def apply_constraint(c, s, h, nu, m, variance, work):
+    """Correct with a constraint, and let it speak for or against the hypothesis."""
+    S, open_var = compute_pht(s, h, m, work) + variance, 0.0
+    if is_linear(s.group[0]):
+        open_var = innovation_sensitivity(s, h, m, work)
+        accumulate_alignment_information(s, h, work, nu, max(S, nu * nu / c.jolt_nis))
+    if s.group[0].n_alive > 1:
+        s.loglik[h] -= 0.5 * min(nu * nu / (S + open_var), c.nis_cap)
+    if nu * nu > c.jolt_nis * S:
+        S = nu * nu / c.jolt_nis  # a jolt or a skid: it counts for less
+    kalman_update(s, h, work.w, nu, S)
+
+
+@small_kernel
+def nonholonomic_constraint(c, s, h, i, work):
+    """The rear axle moves sideways by the slip of its tyres only; wheeled nodes do not rise."""
+    node, x = s.nodes[i], work.x[0]
+    error = x[node.i_heading]
+    cos_e, sin_e = math.cos(error), math.sin(error)
+    cos_y, sin_y = (
+        node.cos_yaw * cos_e - node.sin_yaw * sin_e,
+        node.sin_yaw * cos_e + node.cos_yaw * sin_e,
+    )
+    ahead, slip, m = node.ahead, node.slip, 3
+    idx, val = work.idx, work.val
+    idx[0], idx[1], idx[2] = node.i_vel, node.i_vel + 1, node.i_heading
+    if node.i_mount >= 0:
+        ahead, slip, m = x[node.i_mount], x[node.i_mount + 1], 5
+        idx[3], idx[4] = node.i_mount, node.i_mount + 1
+    predicted, val[0], val[1], val[2], val[3], val[4] = nonholonomic_model(
+        x[idx[0]], x[idx[1]], error, ahead, slip, cos_y, sin_y, node.yaw_rate, node.aside
+    )
+    nu, variance = -predicted, node.sideways_var
+    if m == 3:  # what is not known of it is noise
+        variance += val[3] * val[3] * node.ahead_var + val[4] * val[4] * node.slip_var
+    for k in range(m):
+        nu -= val[k] * (s.x[h, idx[k]] - x[idx[k]])
+    if is_linear(s.group[0]):
+        velocity_sensitivity(s, h, node.i_vel, val[0], val[1], 0.0, work)
+    apply_constraint(c, s, h, nu, m, variance, work)
+    if c.d == 3:
+        idx[0], val[0] = node.i_vel + 2, 1.0
+        if is_linear(s.group[0]):
+            velocity_sensitivity(s, h, node.i_vel, 0.0, 0.0, 1.0, work)
+        apply_constraint(c, s, h, -s.x[h, node.i_vel + 2], 1, node.sideways_var, work)
+
+
+@small_kernel
+def velocity_sensitivity(s, h, at, g0, g1, g2, work):
+    """Derivatives by the turn M of ``g . M^T v``, a velocity of the world, with v held."""
+    for r in range(3):
+        v = s.x[h, at + r]
+        work.direct[3 * r], work.direct[3 * r + 1] = g0 * v, g1 * v
+        work.direct[3 * r + 2] = g2 * v
+
+
+@small_kernel
+def mean_velocity_prior(c, s, h, dt, work):
+    """The mean velocity of the moving nodes is that of things that are carried.
+
+    Once a second by weight: `dt` spreads it evenly.
+    """
+    m, variance = 0, 0.0
+    for i in range(s.nodes.shape[0]):
+        if s.nodes[i].present and not s.nodes[i].static:
+            m += 1
+            variance += s.nodes[i].speed_var
+    if m == 0:
+        return
+    variance /= m * max(dt, 1e-3)
+    for k in range(c.d):
+        a, mean = 0, 0.0
+        for i in range(s.nodes.shape[0]):
+            if s.nodes[i].present and not s.nodes[i].static:
+                at = s.nodes[i].i_vel + k
+                part, work.val[a] = mean_velocity_model(s.x[h, at], m)
+                work.idx[a] = at
+                mean += part
+                a += 1
+        S = compute_pht(s, h, m, work) + variance
+        if is_linear(s.group[0]):
+            work.direct[:] = 0.0
+            innovation_sensitivity(s, h, m, work)
+            accumulate_alignment_information(s, h, work, -mean, S)
+        kalman_update(s, h, work.w, -mean, S)
+
+
+@kernel
+def centre(c, s, h, w):
+    """Move the centre of the group to the origin: ``p <- p - mean p``, and P with it.
+
+    The covariance becomes ``T P T^T`` with the projection T, plus a common variance, so that
+    it stays positive definite and bounded.
+    """
+    n_nodes = s.nodes.shape[0]
+    present = 0
+    for i in range(n_nodes):
+        present += s.nodes[i].present
+    if present == 0:
+        return
+    flush_updates(s, h)
+    for k in range(c.d):
+        mean = 0.0
+        for r in range(c.n):
+            w[r] = 0.0
+        for i in range(n_nodes):
+            if s.nodes[i].present:
+                at = s.nodes[i].i_pos + k
+                mean += s.x[h, at] / present
+                for r in range(c.n):
+                    w[r] += s.P[h, at, r] / present
+        for i in range(n_nodes):
+            if s.nodes[i].present:
+                at = s.nodes[i].i_pos + k
+                s.x[h, at] -= mean
+                for r in range(c.n):
+                    s.P[h, at, r] -= w[r]
+        for r in range(c.n):
+            total = 0.0
+            for i in range(n_nodes):
+                if s.nodes[i].present:
+                    total += s.P[h, r, s.nodes[i].i_pos + k]
+            for i in range(n_nodes):
+                if s.nodes[i].present:
+                    s.P[h, r, s.nodes[i].i_pos + k] -= total / present
+        for i in range(n_nodes):
+            for j in range(n_nodes):
+                if s.nodes[i].present and s.nodes[j].present:
+                    s.P[h, s.nodes[i].i_pos + k, s.nodes[j].i_pos + k] += c.centre_std**2
+    symmetrise(s.P, h, c.n)

@@ -1,0 +1,240 @@
+"""A range: its model and the correction.
+
+    z = |p_j + l_j - p_i - l_i| + fast + slow + noise
+
+with the antenna offsets l turned by the nodes' orientations and heading errors, and p where the
+nodes are by now: the states may be a little older (`event_loop.predict_to`). Behind an
+obstacle an excess is added (`nlos_model`). The correction is that of both cases by their
+probabilities: information adds up, so a range that is surely hidden hardly counts. A few ranges
+mean nothing; one that fits neither case counts for nothing.
+"""
+
+from __future__ import annotations
+
+import math
+
+from tracking.filters.joint.ekf.observability import enforce_observability
+from tracking.filters.joint.ekf.propagation import displacement_since_epoch, time_since_epoch
+from tracking.filters.joint.ekf.scalar_update import compute_pht, kalman_update
+from tracking.filters.joint.hypotheses.alignment import is_linear
+from tracking.filters.joint.hypotheses.alignment_sensitivity import (
+    accumulate_alignment_information,
+    innovation_sensitivity,
+)
+from tracking.filters.joint.updates.lever_arm import lever_arm_sensitivity
+from tracking.filters.joint.updates.nlos_model import (
+    reset_bias_on_transition,
+    update_nlos_posterior,
+)
+from tracking.filters.joint.updates.range_noise import learn_white_noise, learns_noise
+from tracking.kernels.jit import kernel, small_kernel
+from tracking.models.lever_arm import lever_arm_slope, rotate_lever_arm
+from tracking.models.range import range_model
+from tracking.models.range_bias import range_bias_model
+
+NEGLIGIBLE = 1e-3
+"""[-] Share of the noise that is not worth working out."""
+
+
+@small_kernel
+def predict_range(c, s, h, p, lever_i, lever_j, idx, val):
+    """Predicted range of pair p [m] and its derivatives.
+
+    Args:
+        c: Coefficients.
+        s: JointState of one environment.
+        h: Hypothesis.
+        p: Pair.
+        lever_i: Antenna of i relative to its node, as measured, 3 numbers [m].
+        lever_j: The same of j.
+        idx: States, written.
+        val: Derivatives, written.
+
+    Returns:
+        The range, and how many derivatives there are.
+    """
+    pair = s.pairs[p]
+    node_i, node_j = s.nodes[pair.i], s.nodes[pair.j]
+    i0, i1 = lever_i[0], lever_i[1]
+    j0, j1 = lever_j[0], lever_j[1]
+    if not node_i.static and (i0 != 0.0 or i1 != 0.0):
+        i0, i1 = rotate_lever_arm(s.x[h, node_i.i_heading], i0, i1)
+    if not node_j.static and (j0 != 0.0 or j1 != 0.0):
+        j0, j1 = rotate_lever_arm(s.x[h, node_j.i_heading], j0, j1)
+    at_i, at_j = node_i.i_pos, node_j.i_pos
+    r0 = s.x[h, at_j] - s.x[h, at_i] + j0 - i0
+    r1 = s.x[h, at_j + 1] - s.x[h, at_i + 1] + j1 - i1
+    r2 = lever_j[2] - lever_i[2]
+    if c.d == 3:
+        r2 += s.x[h, at_j + 2] - s.x[h, at_i + 2]
+    T_i, T_j = time_since_epoch(s, pair.i), time_since_epoch(s, pair.j)
+    if T_i > 0.0:
+        way0, way1, way2 = displacement_since_epoch(c, s, h, pair.i)
+        r0, r1, r2 = r0 - way0, r1 - way1, r2 - way2
+    if T_j > 0.0:
+        way0, way1, way2 = displacement_since_epoch(c, s, h, pair.j)
+        r0, r1, r2 = r0 + way0, r1 + way1, r2 + way2
+    distance, u0, u1, u2 = range_model(r0, r1, r2)
+    idx[0], idx[1], idx[2], idx[3] = at_i, at_i + 1, at_j, at_j + 1
+    val[0], val[1], val[2], val[3] = -u0, -u1, u0, u1
+    m = 4
+    if c.d == 3:
+        idx[4], idx[5] = at_i + 2, at_j + 2
+        val[4], val[5] = -u2, u2
+        m = 6
+    # By biases and heading errors the way changes too, by less than a millimetre: left out.
+    for node, T, sign in ((node_i, T_i, -1.0), (node_j, T_j, 1.0)):
+        if T > 0.0:
+            idx[m], idx[m + 1] = node.i_vel, node.i_vel + 1
+            val[m], val[m + 1] = sign * T * u0, sign * T * u1
+            m += 2
+            if c.d == 3:
+                idx[m], val[m] = node.i_vel + 2, sign * T * u2
+                m += 1
+    if not node_i.static and (i0 != 0.0 or i1 != 0.0):
+        idx[m], val[m] = node_i.i_heading, -lever_arm_slope(i0, i1, u0, u1)
+        m += 1
+    if not node_j.static and (j0 != 0.0 or j1 != 0.0):
+        idx[m], val[m] = node_j.i_heading, lever_arm_slope(j0, j1, u0, u1)
+        m += 1
+    if pair.i_range_error >= 0:
+        idx[m], idx[m + 1] = pair.i_range_error, pair.i_range_error + 1
+        bias, val[m], val[m + 1] = range_bias_model(
+            s.x[h, pair.i_range_error], s.x[h, pair.i_range_error + 1]
+        )
+        m += 2
+        distance += bias
+    return distance, m
+
+
+@small_kernel
+def second_order_variance(c, s, h, p, val):
+    """What the straight line misses, as noise of the range [m2].
+
+    A range is longer than predicted by ``tr(P_across) / (2 d)`` on average, to second order, with
+    P_across the covariance of the relative position across the line of sight.
+    """
+    i, j, W = s.nodes[s.pairs[p].i].i_pos, s.nodes[s.pairs[p].j].i_pos, s.pending_updates
+    r0, r1, r2 = s.x[h, j] - s.x[h, i], s.x[h, j + 1] - s.x[h, i + 1], 0.0
+    trace = relative_covariance(s.P, h, i, j, 0, 0) + relative_covariance(s.P, h, i, j, 1, 1)
+    if c.d == 3:
+        r2 = s.x[h, j + 2] - s.x[h, i + 2]
+        trace += relative_covariance(s.P, h, i, j, 2, 2)
+    gain = 0.5 * c.nonlinearity_gain / math.sqrt(r0 * r0 + r1 * r1 + r2 * r2 + 0.01)
+    if (gain * trace) ** 2 < NEGLIGIBLE * s.group[0].white_var:
+        return 0.0  # and less by pending updates
+    u0, u1, u2 = val[2], val[3], val[5] if c.d == 3 else 0.0
+    along = u0 * u0 * relative_covariance(s.P, h, i, j, 0, 0) + u1 * u1 * relative_covariance(
+        s.P, h, i, j, 1, 1
+    )
+    along += 2.0 * u0 * u1 * relative_covariance(s.P, h, i, j, 0, 1)
+    if c.d == 3:
+        across = u0 * relative_covariance(s.P, h, i, j, 0, 2) + u1 * relative_covariance(
+            s.P, h, i, j, 1, 2
+        )
+        along += u2 * (2.0 * across + u2 * relative_covariance(s.P, h, i, j, 2, 2))
+    # A sum for each axis: additions do not depend on each other.
+    t0, t1, t2 = 0.0, 0.0, 0.0
+    for q in range(s.n_pending[h]):
+        off0, off1, off2 = W[h, q, j] - W[h, q, i], W[h, q, j + 1] - W[h, q, i + 1], 0.0
+        if c.d == 3:
+            off2 = W[h, q, j + 2] - W[h, q, i + 2]
+        t0, t1, t2 = t0 + off0 * off0, t1 + off1 * off1, t2 + off2 * off2
+        part = u0 * off0 + u1 * off1 + u2 * off2
+        along -= part * part
+    trace -= t0 + t1 + t2
+    return min(gain * max(trace - along, 0.0), c.largest_bend) ** 2
+
+
+@small_kernel
+def relative_covariance(P, h, i, j, a, b):
+    """Covariance of components a and b of the position at j relative to that at i."""
+    return P[h, i + a, i + b] + P[h, j + a, j + b] - P[h, i + a, j + b] - P[h, j + a, i + b]
+
+
+@small_kernel
+def lasting_error(s, h, p):
+    """What is taken for the lasting error of the ranges of a pair [m]."""
+    at = s.pairs[p].i_range_error
+    return s.x[h, at] + s.x[h, at + 1] if at >= 0 else 0.0
+
+
+@small_kernel
+def distance_covariance(s, p, variance, w):
+    """Covariance of a predicted range and the distance in it, its lasting errors left out [m2].
+
+    Args:
+        s: JointState of one environment.
+        p: Pair.
+        variance: Of the range [m2].
+        w: ``P H``.
+    """
+    at = s.pairs[p].i_range_error
+    return variance - w[at] - w[at + 1] if at >= 0 else variance
+
+
+@kernel
+def range_update(c, s, h, p, dt, distance, levers, sight, work):
+    """Correct hypothesis h with a range of pair p.
+
+    Args:
+        c: Coefficients.
+        s: JointState of one environment, at the time of the range.
+        h: Hypothesis.
+        p: Pair.
+        dt: Time since the pair's last range [s].
+        distance: The range [m].
+        levers: Antennas of i and j relative to their nodes, six numbers [m].
+        sight: What its powers say of it: log-likelihood ratio of none, 0 where they are not
+            reported; how often it is lost, and regained [1/s].
+        work: Room.
+
+    Returns:
+        Innovation [m] and its square over the variance it was expected to have, its square over
+        the variance that the correction used, and the probability that the range meant anything.
+    """
+    if s.group[0].heading_gauge_var > c.gauge_std * c.gauge_std:
+        enforce_observability(c, s, h, work)
+    predicted, m = predict_range(c, s, h, p, levers[:3], levers[3:], work.idx, work.val)
+    nu = distance - predicted
+    longer = nu + lasting_error(s, h, p)
+    variance = compute_pht(s, h, m, work)
+    open_var = 0.0
+    if is_linear(s.group[0]):
+        lever_arm_sensitivity(levers, work)
+        open_var = innovation_sensitivity(s, h, m, work)
+    bent = second_order_variance(c, s, h, p, work.val)
+    expected = variance + open_var + bent
+    S = expected + s.group[0].white_var
+    switched, sane, likelihood, is_far = update_nlos_posterior(
+        c, s, h, p, dt, nu, expected, sight, work.w
+    )
+    if s.group[0].n_alive > 1:
+        # Rotations and mirror images of one group are equally uncertain but for how far each was
+        # bent, and wrong ones, bent most, look surest: only how well they fit counts.
+        s.loglik[h] += max(math.log(likelihood) + 0.5 * math.log(S), -0.5 * c.nis_cap)
+    before, misfit = nu, nu * nu / S
+    if switched < c.reset_at_once or s.pairs[p].i_range_error < 0:
+        s.bias_retention[h, p] *= 1.0 - switched
+    else:
+        reset_bias_on_transition(c, s, h, p, switched, is_far)
+        predicted, m = predict_range(c, s, h, p, levers[:3], levers[3:], work.idx, work.val)
+        nu = distance - predicted
+        variance = compute_pht(s, h, m, work)
+        if is_linear(s.group[0]):
+            open_var = innovation_sensitivity(s, h, m, work)
+    R = s.group[0].white_var + bent + s.nlos[h, p] * c.nlos_white_var
+    nis = nu * nu / (variance + open_var + R)
+    # Ranges of a pair that have long contradicted all others count less and less.
+    doubt = s.pairs[p].mean_nis / (c.contradiction_share * c.pair_nis_limit)
+    trust = sane
+    if doubt > 1.0:
+        trust /= doubt * doubt * doubt * doubt
+    if learns_noise(c, s):
+        gain = distance_covariance(s, p, variance, work.w) / (variance + R / max(trust, 1e-9))
+        learn_white_noise(c, s.group[0], s.pairs[p], longer, longer - gain * nu, dt)
+    if trust > 1e-3:
+        if is_linear(s.group[0]):
+            accumulate_alignment_information(s, h, work, nu, variance + R / trust)
+        kalman_update(s, h, work.w, nu, variance + R / trust)
+    return before, misfit, nis, sane

@@ -1,0 +1,1 @@
+"""Late and out-of-order measurements become an ordered stream."""

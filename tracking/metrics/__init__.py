@@ -1,0 +1,1 @@
+"""Errors, consistency, integrity and bounds of estimates."""

@@ -1,0 +1,1 @@
+"""Parameters: read from tables, checked, and chosen by name."""

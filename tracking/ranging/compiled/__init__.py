@@ -1,0 +1,1 @@
+"""The ranging session in compiled form, for batches of environments."""

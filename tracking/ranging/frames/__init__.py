@@ -1,0 +1,1 @@
+"""Bytes, time stamps and durations of ranging messages."""

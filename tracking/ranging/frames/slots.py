@@ -1,0 +1,38 @@
+"""The durations of the protocol in ticks, for one radio setting."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+from tracking.ranging.frames.airtime import Phy, airtime, message_time
+from tracking.ranging.frames.timestamps import ticks
+from tracking.ranging.frames.wire import FIXED_BYTES
+
+
+class Slots:
+    """When the next message can be expected after one that was heard.
+
+    Times of messages are those of their stamps, `header` after the start of the frame.
+    """
+
+    def __init__(self, phy: Phy) -> None:
+        self._phy = phy
+        self.header = ticks(phy.header_time)
+        self.sense = ticks(phy.sense)
+        self.turnaround = ticks(phy.turnaround)
+        self.gap = ticks(phy.gap)
+        self.silent = ticks(phy.sense + phy.turnaround)
+        """What a slot costs in which nobody speaks."""
+        self.join = ticks(airtime(phy, FIXED_BYTES) + phy.gap)
+        """A message without a table, with its gap."""
+        self.longest = ticks(airtime(phy, phy.max_frame) + phy.gap)
+        self.frame = lru_cache(maxsize=None)(self._frame)
+        self.message = lru_cache(maxsize=None)(self._message)
+
+    def _frame(self, frame_bytes: int) -> int:
+        """A frame of so many bytes."""
+        return ticks(airtime(self._phy, frame_bytes))
+
+    def _message(self, n_nodes: int) -> int:
+        """A message of a group of so many, with its gap: the length of a slot."""
+        return ticks(message_time(self._phy, n_nodes))
