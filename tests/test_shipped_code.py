@@ -16,7 +16,7 @@ from tracking.kernels.processors import LEVELS, fitting_levels, has_wide_registe
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
 ROOT = Path(__file__).resolve().parent.parent
 MODULE = """
-from tracking import compile_units
+from tracking.kernels import compile_units
 from tracking.kernels.jit import kernel
 
 @kernel
@@ -134,7 +134,7 @@ def test_a_wheel_in_an_empty_environment_compiles_nothing(tmp_path):
     zipfile.ZipFile(wheel).extractall(site)
     (site / "others.pth").write_text(f"import sys; sys.path.append({packages!r})\n")
     code = (
-        "import tracking; from tracking import compile_units;"
+        "import tracking; from tracking.kernels import compile_units;"
         "from agents.warm_up import parts_of, warm_up;"
         "found = warm_up(parts_of('track', ('paper-ekf',)));"
         "print(tracking.__file__, found.compiled, compile_units._UnitCompiler.n_compiled)"

@@ -12,7 +12,8 @@ from agents.policies.find import find_policy
 from agents.settings import from_json, to_json
 from agents.training.config import TrainConfig
 
-EPISODES = range(2000, 2004)
+EPISODES = range(2000, 2012)
+"""Enough that a single car that gets stuck in one of them does not decide."""
 
 
 def mean_error(name, **setting):

@@ -24,8 +24,15 @@ LONGEST = 30.0
 BEFORE = 5.0
 """[s] Inertial samples before its first range, which find the orientation."""
 PARAMS = TrackerParams(
-    filter=FilterParams(joint=JointParams(noise_learning=NoiseLearningParams(learns=False)))
+    filter=FilterParams(
+        joint=replace(
+            JointParams(noise_learning=NoiseLearningParams(learns=False)),
+            nlos=replace(JointParams().nlos, nlos_bias_length=2.0),
+            nlos_in_space=replace(JointParams().nlos_in_space, nlos_bias_length=2.0),
+        )
+    )
 )
+"""Neither learned noise nor a lasting excess may explain what is wrong with a recording."""
 
 
 def parts_of(log: Log) -> list[MeasurementBlock]:
