@@ -1,1 +1,30 @@
-"""Controllers, reports and the command line: what people run."""
+"""Controllers, training, evaluation, reports and the command line.
+
+The functions that most users need, imported when they are first used:
+
+>>> from agents import compare, demo, evaluate, simulate, track, train
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+_FUNCTIONS = {
+    "compare": "agents.comparison.compare",
+    "demo": "agents.simulation.demo",
+    "evaluate": "agents.evaluation.evaluate",
+    "simulate": "agents.simulation.simulate",
+    "track": "agents.evaluation.track:track_log",
+    "train": "agents.training.run:train_policy",
+}
+"""Name to module, and the function's own name where it differs."""
+
+__all__ = ["compare", "demo", "evaluate", "simulate", "track", "train"]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _FUNCTIONS:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module, _, function = _FUNCTIONS[name].partition(":")
+    return getattr(import_module(module), function or name)

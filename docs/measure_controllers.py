@@ -13,7 +13,7 @@ from gymnasium.utils import seeding
 from agents.controllers import CONTROLLERS
 from agents.simulation.demo import SETTLE
 from relpos_env.config import configure
-from relpos_env.core.env_core import Formation
+from relpos_env.core.env_core import EnvCore
 from relpos_env.timing import DECISION
 
 SEEDS = range(16)
@@ -45,7 +45,7 @@ def measure(
             "max_cycles": steps + 1,
         }
     )
-    formation = Formation(parts, len(seeds))
+    formation = EnvCore(parts, len(seeds))
     for e, seed in enumerate(seeds):
         formation.seed(e, seeding.np_random(seed)[0])
         formation.begin([e])

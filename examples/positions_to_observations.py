@@ -10,7 +10,7 @@ import numpy as np
 from agents.controllers import Consensus
 from hardware_bridge.config import read_config
 from hardware_bridge.links.ports import Chunk
-from hardware_bridge.live.env import LiveFormationEnv
+from hardware_bridge.live.env import HardwareFormationEnv
 from hardware_bridge.live.swarm import LiveSwarm
 
 SWARM = """
@@ -72,7 +72,7 @@ with TemporaryDirectory() as folder:
     write_lines(Path(folder) / "positions.jsonl", seconds=3.0)
     swarm = LiveSwarm(read_config(file), start_ns=0)
     feed = LinesInTheirTime(swarm, Path(folder) / "positions.jsonl")
-    env = LiveFormationEnv(swarm, feed)
+    env = HardwareFormationEnv(swarm, feed)
     controller = Consensus(env.fields)
     observations, _ = env.reset()
     for _ in range(25):

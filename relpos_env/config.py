@@ -39,7 +39,7 @@ KINDS: dict[str, tuple[type, ...]] = {
 
 
 RewardTerm = Callable[[Any], F64]
-"""Takes the `relpos_env.core.env_core.Formation` after a step."""
+"""Takes the `relpos_env.core.env_core.EnvCore` after a step."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -29,37 +29,37 @@ from agents.cli.tracking.protocol import protocol
 from agents.cli.tracking.track import track
 from agents.errors import UsageError
 
+SECTIONS = {
+    "Track and evaluate": (track, calibrate, convert, evaluate, protocol),
+    "Simulate and train": (simulate, demo, compare, train, export, policy, rllib),
+    "Hardware": (doctor, sniff, live, drive, replay, emulate, demo_hardware),
+    "Measure": (bench, warmup),
+}
+"""Commands as help shows them."""
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+
+class _Sections(click.Group):
+    """A group whose help lists commands by section."""
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        width = max(len(name) for name in self.commands)
+        for title, commands in SECTIONS.items():
+            rows = [
+                (str(c.name).ljust(width), c.get_short_help_str(limit=78 - width)) for c in commands
+            ]
+            with formatter.section(title):
+                formatter.write_dl(rows)
+
+
+@click.group(cls=_Sections, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="relpos-env", prog_name="relpos")
 def cli() -> None:
-    """Relative positions without anchors: track, simulate, drive in formation, measure."""
+    """Relative positions without anchors: track, simulate, train, drive."""
 
 
-for command in (
-    track,
-    calibrate,
-    simulate,
-    convert,
-    demo,
-    emulate,
-    drive,
-    demo_hardware,
-    evaluate,
-    compare,
-    train,
-    export,
-    policy,
-    rllib,
-    protocol,
-    doctor,
-    sniff,
-    live,
-    replay,
-    bench,
-    warmup,
-):
-    cli.add_command(command)
+for commands in SECTIONS.values():
+    for command in commands:
+        cli.add_command(command)
 
 
 def main() -> None:

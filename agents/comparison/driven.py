@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hardware_bridge.live.env import LiveFormationEnv
+from hardware_bridge.live.env import HardwareFormationEnv
 from relpos_env.interface.actions import action_mode
 from relpos_env.interface.observations.base import F32
 from relpos_env.world.car import CarParams
@@ -14,7 +14,7 @@ from tracking.arrays import F64, Bool
 class Driven:
     """A group of real cars as a `agents.comparison.meter.Running` of one environment."""
 
-    def __init__(self, env: LiveFormationEnv, cycles: int) -> None:
+    def __init__(self, env: HardwareFormationEnv, cycles: int) -> None:
         """Begin an episode: the cars are armed and find each other first.
 
         Args:

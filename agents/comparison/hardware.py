@@ -22,7 +22,7 @@ from agents.simulation.demo import SETTLE
 from hardware_bridge.config import SwarmConfig, read_config
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.live.bridge import Bridge
-from hardware_bridge.live.env import LiveFormationEnv
+from hardware_bridge.live.env import HardwareFormationEnv
 from hardware_bridge.live.opened import OpenBridge
 
 EPISODES = 10
@@ -129,7 +129,7 @@ class _Seat:
     driver: Driver
     rounds: list[EpisodeResult] = field(default_factory=list)
 
-    def env(self, bridge: OpenBridge, cycles: int = 1) -> LiveFormationEnv:
+    def env(self, bridge: OpenBridge, cycles: int = 1) -> HardwareFormationEnv:
         """The cars as it sees them; the last one that is made of a bridge is the one to use."""
         return bridge.env(
             observation=self.contender.observation, history=self.history, max_cycles=cycles

@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium.utils import seeding
 
 from relpos_env.config import Parts
-from relpos_env.core.env_core import Formation
+from relpos_env.core.env_core import EnvCore
 from relpos_env.interface.observations.base import F32
 from relpos_env.world.car import CarParams
 from tracking.arrays import F64, Bool
@@ -24,7 +24,7 @@ class Simulated:
             parts: What the environments are made of.
             seeds: Of the episodes.
         """
-        self.formation = Formation(parts, len(seeds))
+        self.formation = EnvCore(parts, len(seeds))
         for env, seed in enumerate(seeds):
             self.formation.seed(env, seeding.np_random(seed)[0])
             self.formation.begin([env])

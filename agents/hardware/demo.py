@@ -47,7 +47,7 @@ class HardwareDemoResult:
     simulated: F64
     """That of the same driver in the same room of the simulator, (decision) [m]."""
     boxes: F64
-    """What stood in the room at the start, (box, 6), as `relpos_env.world.world.Swarm.boxes`."""
+    """What stood in the room at the start, (box, 6), as `relpos_env.world.world.World.boxes`."""
     contacts: int
     """[-] That cars began, start included."""
     simulated_contacts: int

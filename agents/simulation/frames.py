@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from relpos_env.core.env_core import Formation
+from relpos_env.core.env_core import EnvCore
 from relpos_env.timing import DECISION
 from tracking.arrays import F64
 
@@ -20,7 +20,7 @@ NAMES = (
 class FrameRecorder:
     """Collects frames of one environment, as its first car in the room sees it."""
 
-    def __init__(self, formation: Formation) -> None:
+    def __init__(self, formation: EnvCore) -> None:
         self._formation = formation
         scenario = formation.parts.scenario
         self.frames: dict[str, Any] = {
@@ -70,7 +70,7 @@ class FrameRecorder:
         self._boxes = frame["boxes"]
 
 
-def errors(formation: Formation) -> tuple[float, float]:
+def errors(formation: EnvCore) -> tuple[float, float]:
     """Tracking and formation error now, means over the cars that know any, and that are there [m].
 
     NaN and 0 where there are none.

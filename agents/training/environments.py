@@ -10,7 +10,7 @@ import numpy as np
 from agents.errors import UsageError
 from agents.policies.layout import Layout
 from agents.training.config import MOST_SEED, TrainConfig
-from agents.training.rooms import Rooms
+from agents.training.rooms import MultiScenarioVecEnv
 from relpos_env.api.sb3_vec_env import FormationVecEnv
 from relpos_env.config import FormationConfig, Parts
 from relpos_env.sensors.operator import OperatorSimParams
@@ -147,7 +147,7 @@ def shares(n: int, scenarios: int) -> list[int]:
     return counts
 
 
-def make_rooms(config: TrainConfig, level: int | None) -> Rooms:
+def make_rooms(config: TrainConfig, level: int | None) -> MultiScenarioVecEnv:
     """The environments to learn in at a level of the curriculum."""
     scenarios = config.env.scenarios
     # Handing work to a thread costs as much as stepping a few environments: rather whole rooms.
@@ -161,7 +161,7 @@ def make_rooms(config: TrainConfig, level: int | None) -> Rooms:
         )
         for scenario, n in zip(scenarios, shares(config.ppo.envs, len(scenarios)), strict=True)
     ]
-    return Rooms(
+    return MultiScenarioVecEnv(
         parts,
         layout_of(config),
         reward_scale=config.ppo.reward_scale,

@@ -16,7 +16,7 @@ from agents.simulation.demo import SETTLE
 from agents.training.environments import shares
 from agents.training.ppo.network import Actor, SwarmPolicy
 from relpos_env.config import Parts
-from relpos_env.core.env_core import Formation
+from relpos_env.core.env_core import EnvCore
 from relpos_env.interface.observations.base import F32
 from relpos_env.timing import DECISION
 from tracking.arrays import F64, Bool
@@ -48,7 +48,7 @@ class Evaluation:
         """
         self._first_seed = first_seed
         self._rooms = [
-            _Room(Formation(parts, n, min(threads, n)), Padding(layout, Layout.of(parts)))
+            _Room(EnvCore(parts, n, min(threads, n)), Padding(layout, Layout.of(parts)))
             for parts, n in zip(every, shares(episodes, len(every)), strict=True)
         ]
 
@@ -103,7 +103,7 @@ class _Drive:
 class _Room:
     """The episodes of one scenario, side by side."""
 
-    formation: Formation
+    formation: EnvCore
     pad: Padding
 
     def drive(self, actor: Actor, first_seed: int) -> _Drive:

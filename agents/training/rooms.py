@@ -13,7 +13,7 @@ from gymnasium.spaces import Box
 
 from agents.policies.layout import Layout
 from agents.policies.padding import Padding
-from relpos_env.api.sb3_attributes import SharedSeats
+from relpos_env.api.sb3_attributes import SharedAttributeVecEnv
 from relpos_env.api.sb3_vec_env import FormationVecEnv
 from relpos_env.api.state_space import N_TRUTH
 from relpos_env.interface.observations import space_of
@@ -21,7 +21,7 @@ from relpos_env.interface.observations.base import F32
 from tracking.arrays import Bool
 
 
-class Rooms(SharedSeats):
+class MultiScenarioVecEnv(SharedAttributeVecEnv):
     """The seats of several `FormationVecEnv`, one after the other, as of one.
 
     Environments may have fewer cars than the policy has slots for: what their cars see is padded

@@ -1,6 +1,6 @@
 """What cars see by a tracker that is not ours, in the place of `Perception`.
 
-    lines -> Tracks, Headings -> TeamEstimate -> View
+    lines -> Tracks, Headings -> TeamEstimate -> AgentView
 
 The last that was told of every pair and every node is carried to now and put into a
 `TeamEstimate`, from which the very code writes the view that does so for our own tracker.
@@ -15,7 +15,7 @@ from hardware_bridge.external_tracker.params import ReadyParams
 from hardware_bridge.external_tracker.pending import Told
 from hardware_bridge.external_tracker.tracks import Tracks
 from relpos_env.interface._view_kernels import forget_all, note_ranges
-from relpos_env.interface.views import View, bind_view, make_view
+from relpos_env.interface.views import AgentView, bind_view, make_view
 from tracking.arrays import F64, I64, Bool
 from tracking.constellation import Constellation
 from tracking.estimate import Status, TeamEstimate
@@ -59,7 +59,7 @@ class ReadyPerception:
         self._nodes = self._tracks(moves.astype(np.float64))
         self._pairs = self._tracks(ends)
         self._headings = Headings(group.n_nodes)
-        self.view: View = make_view(1, n_cars, n_beams)
+        self.view: AgentView = make_view(1, n_cars, n_beams)
         self.estimate = TeamEstimate.empty(group, np.zeros(1))
         """What is believed now, overwritten by every step."""
         self._turns: F64 = np.zeros((1, group.n_nodes))

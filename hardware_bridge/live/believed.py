@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from relpos_env.interface.views import View
+from relpos_env.interface.views import AgentView
 from tracking.arrays import F64, Bool
 
 
@@ -32,7 +32,7 @@ class Believed:
         """Whose place is known relative to the others'."""
         self._placed: Bool = np.zeros(n_cars, dtype=bool)
 
-    def update(self, view: View, seconds: float) -> None:
+    def update(self, view: AgentView, seconds: float) -> None:
         """Take over what the cars see now.
 
         Args:
@@ -60,7 +60,7 @@ class Believed:
                 self._placed[:, None], pos - pos[self._placed].mean(axis=0), 0.0
             )
 
-    def _move(self, view: View, seconds: float) -> None:
+    def _move(self, view: AgentView, seconds: float) -> None:
         """Everyone's place goes on by its odometer and heading."""
         ahead = np.stack([np.cos(view.heading[0]), np.sin(view.heading[0])], axis=-1)
         moves = view.present[0] & view.oriented[0]

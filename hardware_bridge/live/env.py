@@ -9,11 +9,11 @@ from hardware_bridge.live.group import Feed, LiveGroup
 from hardware_bridge.live.swarm import LiveSwarm
 from relpos_env.errors import EnvError
 from relpos_env.interface.actions import action_mode
-from relpos_env.interface.base_parallel_env import CarsEnv
+from relpos_env.interface.base_parallel_env import BaseFormationParallelEnv
 from relpos_env.interface.observations import observation_mode
 
 
-class LiveFormationEnv(CarsEnv):
+class HardwareFormationEnv(BaseFormationParallelEnv):
     """Cars that are moved by motors, in real time: a step takes a tenth of a second.
 
     What the gate allows is what happens. Infos have the keys of the simulation but `collisions`,
@@ -23,7 +23,7 @@ class LiveFormationEnv(CarsEnv):
     the car is not armed, so that the transition is not the policy's.
     """
 
-    metadata = {**CarsEnv.metadata, "render_modes": []}  # noqa: RUF012
+    metadata = {**BaseFormationParallelEnv.metadata, "render_modes": []}  # noqa: RUF012
 
     def __init__(
         self,

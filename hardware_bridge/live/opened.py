@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from hardware_bridge.config.swarm import SwarmConfig
-from hardware_bridge.live.env import LiveFormationEnv
+from hardware_bridge.live.env import HardwareFormationEnv
 from hardware_bridge.live.group import Feed
 from hardware_bridge.live.start import Gated, Start
 from hardware_bridge.live.swarm import LiveSwarm
@@ -43,9 +43,9 @@ class OpenBridge(ABC):
         history: int = 1,
         actions: str = "continuous",
         max_cycles: int = 600,
-    ) -> LiveFormationEnv:
-        """The environment on these cars, see `LiveFormationEnv`; the last one is the one to use."""
-        return LiveFormationEnv(
+    ) -> HardwareFormationEnv:
+        """Return the environment on these cars; the last one that was made is the one to use."""
+        return HardwareFormationEnv(
             self.swarm,
             self.feed,
             observation=observation,

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from hardware_bridge.safety.picture import Picture
-from relpos_env.interface.views import View
+from relpos_env.interface.views import AgentView
 from tracking.arrays import F64, Bool
 from tracking.estimate import Status
 
@@ -29,7 +29,7 @@ class SilentCars:
         self._sigma: F64 = np.full((n_slots, n_slots), np.inf)
         self._t = -np.inf
 
-    def note(self, view: View, sigma: F64, heard: Bool) -> None:
+    def note(self, view: AgentView, sigma: F64, heard: Bool) -> None:
         """Note where those are that are heard and known to be there.
 
         Args:
@@ -53,7 +53,7 @@ class SilentCars:
         """A person says that those who are silent are gone."""
         self.here[:] = False
 
-    def move(self, view: View, t: float) -> None:
+    def move(self, view: AgentView, t: float) -> None:
         """Move on to the time of a view [s], by what cars say of their own driving."""
         elapsed = t - self._t if np.isfinite(self._t) else 0.0
         self._t = t
@@ -61,7 +61,7 @@ class SilentCars:
         self._pos += elapsed * (own - own[:, None])
         self._sigma += elapsed * GROWTH
 
-    def write(self, q: Picture, view: View) -> None:
+    def write(self, q: Picture, view: AgentView) -> None:
         """Let the gate see them: they stand where they were last."""
         own = _velocities(view)
         for slot in np.flatnonzero(self.here).tolist():
@@ -74,7 +74,7 @@ class SilentCars:
                 q.vel[0, a, b] = -sign * own[others]
 
 
-def _velocities(view: View) -> F64:
+def _velocities(view: AgentView) -> F64:
     """Of the cars in the world, by their own headings and odometers, (slot, 2) [m/s]."""
     ahead = np.stack([np.cos(view.heading[0]), np.sin(view.heading[0])], axis=-1)
     velocities: F64 = ahead * np.where(view.present[0], view.speed[0], 0.0)[:, None]

@@ -18,7 +18,7 @@ from hardware_bridge.links.ports import Chunk
 from hardware_bridge.live.silent_cars import SilentCars
 from hardware_bridge.safety.picture import largest_std
 from relpos_env.interface.perception import FOR_POLICIES, Perception
-from relpos_env.interface.views import View
+from relpos_env.interface.views import AgentView
 from tracking.arrays import F64, I64, Bool
 from tracking.calibration.calibration import Calibration, merge
 from tracking.calibration.file import read_calibration
@@ -72,7 +72,7 @@ class LiveSwarm:
         """Velocity that an operator asks for on top of the plan, (1, slot, 2) [m/s]."""
 
     @property
-    def view(self) -> View:
+    def view(self) -> AgentView:
         """What every car sees now; of one environment."""
         return self._perception.view
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from hardware_bridge.safety.gate import NOT_ARMED, Gate, reason_text
 from hardware_bridge.safety.params import SafetyParams
 from hardware_bridge.safety.picture import blank_picture, largest_std
-from relpos_env.interface.views import View
+from relpos_env.interface.views import AgentView
 from tracking.arrays import F64, Bool
 
 
@@ -42,7 +42,7 @@ class SimulatedGate:
         self._asked[env] = self._speed[env] = self._steering[env] = 0.0
         self._stopped[env], self._reason[env] = True, NOT_ARMED
 
-    def allow(self, view: View, speed: F64, steering: F64) -> tuple[F64, F64]:
+    def allow(self, view: AgentView, speed: F64, steering: F64) -> tuple[F64, F64]:
         """What the cars may do.
 
         Args:

@@ -16,7 +16,7 @@ from gymnasium.envs.registration import EnvSpec
 
 from relpos_env.api.state_space import state_space, truth_inside
 from relpos_env.config import Parts, configure
-from relpos_env.core.env_core import Formation
+from relpos_env.core.env_core import EnvCore
 from relpos_env.core.reset_options import reset_options
 from relpos_env.errors import EnvError
 from relpos_env.interface.actions import ActionMode
@@ -25,7 +25,7 @@ from relpos_env.interface.observations import space_of
 from relpos_env.interface.observations.base import F32
 from relpos_env.interface.seeding import episode_rng
 from relpos_env.render.film import Film, check_render_mode
-from relpos_env.world.pymunk_space import World
+from relpos_env.world.pymunk_space import PhysicsSpace
 from tracking.arrays import F64
 
 
@@ -78,14 +78,14 @@ class FormationGymEnv(gymnasium.Env[F32, Any]):
         self.render_mode = render_mode
         self._spec: EnvSpec | None = None
         self._parts = configure(arguments)
-        self._formation = Formation(self._parts, physics="pymunk")
+        self._formation = EnvCore(self._parts, physics="pymunk")
         self.observation_space: Any = team_observation_space(self._parts)
         self.action_space = team_action_space(self._parts)
         self._film = Film(render_mode, 10)
         self._begun = self._seeded = self._over = False
 
     @property
-    def formation(self) -> Formation:
+    def formation(self) -> EnvCore:
         """The running environment, a batch of one.
 
         Raises:
@@ -96,7 +96,7 @@ class FormationGymEnv(gymnasium.Env[F32, Any]):
         return self._formation
 
     @property
-    def world(self) -> World:
+    def world(self) -> PhysicsSpace:
         """The pymunk space of the episode, to read and to change; see `world.pymunk_space`.
 
         Raises:

@@ -12,24 +12,24 @@ from typing import Any
 
 from relpos_env.api.state_space import state_space, truth_inside
 from relpos_env.config import configure
-from relpos_env.core.env_core import Formation
+from relpos_env.core.env_core import EnvCore
 from relpos_env.core.reset_options import reset_options
-from relpos_env.core.tracked_world import TrackedSwarm
+from relpos_env.core.tracked_world import TrackedWorld
 from relpos_env.errors import EnvError
-from relpos_env.interface.base_parallel_env import CarsEnv
+from relpos_env.interface.base_parallel_env import BaseFormationParallelEnv
 from relpos_env.interface.observations.base import F32
 from relpos_env.render.film import Film, check_render_mode
 from relpos_env.scenarios import Scenario
 from relpos_env.simulation.recorder import Recording
 from relpos_env.tasks.options import flag
-from relpos_env.world.pymunk_space import World
+from relpos_env.world.pymunk_space import PhysicsSpace
 from tracking.log import Log
 
 
-class FormationEnv(CarsEnv):
+class FormationEnv(BaseFormationParallelEnv):
     """Cars in a room keep a formation on the estimates of the tracker that serves the group.
 
-    Agents come and go as `CarsEnv` says. `reset` takes the options of
+    Agents come and go as `BaseFormationParallelEnv` says. `reset` takes the options of
     `relpos_env.core.reset_options.ResetOptions`: ``poses``, ``goals`` and ``scenario``.
 
     Law: same arguments, seed and actions, same everything, bit for bit.
@@ -59,7 +59,7 @@ class FormationEnv(CarsEnv):
         self.render_mode = render_mode
         self._parts = parts = configure(arguments)
         self._record = flag("record", record)
-        self._formation = Formation(parts, physics="pymunk")
+        self._formation = EnvCore(parts, physics="pymunk")
         history = parts.config.history
         super().__init__(
             self._formation,
@@ -79,7 +79,7 @@ class FormationEnv(CarsEnv):
         return self._parts.scenario
 
     @property
-    def formation(self) -> Formation:
+    def formation(self) -> EnvCore:
         """The running environment: truth, task, views of the cars; a batch of one.
 
         Raises:
@@ -90,12 +90,12 @@ class FormationEnv(CarsEnv):
         return self._formation
 
     @property
-    def loop(self) -> TrackedSwarm:
+    def loop(self) -> TrackedWorld:
         """The running simulation with its trackers; a batch of one."""
         return self.formation.loop
 
     @property
-    def world(self) -> World:
+    def world(self) -> PhysicsSpace:
         """The pymunk space of the episode, to read and to change; see `world.pymunk_space`.
 
         Raises:
@@ -104,7 +104,7 @@ class FormationEnv(CarsEnv):
         return self.formation.loop.swarm.world(0)
 
     def step(self, actions: dict[str, Any]) -> tuple[dict[str, Any], ...]:
-        """Drive for 0.1 s; see `CarsEnv`."""
+        """Drive for 0.1 s; see `BaseFormationParallelEnv`."""
         recorded = self._recording if self.agents else None
         results = super().step(actions)
         if recorded is not None:

@@ -7,7 +7,7 @@ from typing import Any
 from stable_baselines3.common.vec_env import VecEnv
 
 
-class SharedSeats(VecEnv):  # type: ignore[misc]
+class SharedAttributeVecEnv(VecEnv):  # type: ignore[misc]
     """Attributes and methods are those of the whole; nothing is wrapped."""
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from gymnasium.spaces import Box
 
-from relpos_env.api.sb3_attributes import SharedSeats
+from relpos_env.api.sb3_attributes import SharedAttributeVecEnv
 from relpos_env.api.state_space import N_TRUTH, truth_of_each
 from relpos_env.config import configure
-from relpos_env.core.env_core import Formation
+from relpos_env.core.env_core import EnvCore
 from relpos_env.core.reset_options import reset_options
 from relpos_env.errors import EnvError
 from relpos_env.interface.infos import car_infos
@@ -24,7 +24,7 @@ from relpos_env.tasks.options import flag
 from tracking.arrays import F64, Bool
 
 
-class FormationVecEnv(SharedSeats):
+class FormationVecEnv(SharedAttributeVecEnv):
     """``n_envs`` environments; seat ``e * n_cars + k`` is car k of environment e.
 
     Seeds count on from environment to environment. A seat is done when the episode of its
@@ -61,7 +61,7 @@ class FormationVecEnv(SharedSeats):
         check_render_mode(render_mode)
         self.render_mode = render_mode
         self._parts = configure(arguments)
-        self.formation = Formation(self._parts, n_envs, threads)
+        self.formation = EnvCore(self._parts, n_envs, threads)
         self.n_cars = self._parts.n_cars
         self._film = Film(render_mode, 10)
         self._commands: tuple[F64, F64] | None = None

@@ -16,7 +16,7 @@ from relpos_env.api.gym_env import (
 )
 from relpos_env.api.state_space import state_space, truth_inside
 from relpos_env.config import configure, whole_number
-from relpos_env.core.env_core import MOST_ENVS, NO_OPTIONS, Formation
+from relpos_env.core.env_core import MOST_ENVS, NO_OPTIONS, EnvCore
 from relpos_env.core.reset_options import ResetOptions, reset_options
 from relpos_env.errors import EnvError
 from relpos_env.interface.infos import team_columns, vector_infos
@@ -84,7 +84,7 @@ class FormationVectorEnv(VectorEnv[F32, Any, Any]):
             steps = whole_number("max_episode_steps", max_episode_steps, 1, 800_000)
             arguments["max_cycles"] = min(steps, arguments.get("max_cycles", steps))
         self._parts = configure(arguments)
-        self.formation = Formation(self._parts, num_envs, threads)
+        self.formation = EnvCore(self._parts, num_envs, threads)
         self.single_observation_space = team_observation_space(self._parts)
         self.single_action_space = team_action_space(self._parts)
         self.observation_space = batch_space(self.single_observation_space, num_envs)

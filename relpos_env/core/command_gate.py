@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from relpos_env.interface.infos import Columns
-from relpos_env.interface.views import View
+from relpos_env.interface.views import AgentView
 from relpos_env.registry import look_up
 from tracking.arrays import F64
 
@@ -20,7 +20,7 @@ class CommandGate(Protocol):
     def reset(self, env: int) -> None:
         """Reset one room."""
 
-    def allow(self, view: View, speed: F64, steering: F64) -> tuple[F64, F64]:
+    def allow(self, view: AgentView, speed: F64, steering: F64) -> tuple[F64, F64]:
         """Speed [m/s] and steering [rad] that the cars may do, each (env, car)."""
 
     def infos(self) -> Columns:

@@ -15,7 +15,7 @@ from relpos_env.config import Parts, RewardTerm, whole_number
 from relpos_env.core._outcome_kernels import TeamResults, judge, tracking_errors
 from relpos_env.core.command_gate import make_gate
 from relpos_env.core.reset_options import ResetOptions
-from relpos_env.core.tracked_world import TrackedSwarm
+from relpos_env.core.tracked_world import TrackedWorld
 from relpos_env.errors import EnvError
 from relpos_env.interface._info_kernels import write_figures
 from relpos_env.interface.infos import Columns, car_columns, make_figures
@@ -26,7 +26,7 @@ from relpos_env.scenarios.episode import draw_episode
 from relpos_env.sensors.operator import Operator
 from relpos_env.tasks import reward_weights
 from relpos_env.timing import DECISION, DT, STAND_STILL
-from relpos_env.world.world import Physics, Swarm
+from relpos_env.world.world import Physics, World
 from relpos_env.world.world_state import WorldState
 from tracking.arrays import F64, I64, Bool
 from tracking.kernels.jit import bind
@@ -35,7 +35,7 @@ MOST_ENVS = 1 << 20
 NO_OPTIONS = ResetOptions()
 
 
-class Formation:
+class EnvCore:
     """Environments of one configuration, their results in arrays.
 
     Laws: same configuration, seeds and actions, same everything, bit for bit; environment k of
@@ -63,7 +63,7 @@ class Formation:
                 f"physics: expected 'pymunk' in scenario {parts.scenario.name!r}, which puts more "
                 f"into the space, got {physics!r}"
             )
-        self.loop = TrackedSwarm(
+        self.loop = TrackedWorld(
             parts.scenario,
             n,
             n_envs,
@@ -112,7 +112,7 @@ class Formation:
     def begin(
         self,
         envs: Sequence[int],
-        watch: Callable[[Swarm], None] | None = None,
+        watch: Callable[[World], None] | None = None,
         options: ResetOptions = NO_OPTIONS,
     ) -> None:
         """Begin a new episode in some environments and observe it.

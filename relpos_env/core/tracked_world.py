@@ -1,6 +1,6 @@
 """The tracker in the loop: rooms, their measurements, and what the cars believe.
 
-    command -> Swarm -> measurements -> Perception -> view of every car
+    command -> World -> measurements -> Perception -> view of every car
 
 The tracker gets nothing but measurements.
 """
@@ -12,11 +12,11 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from relpos_env.interface.perception import FOR_POLICIES, Perception
-from relpos_env.interface.views import View
+from relpos_env.interface.views import AgentView
 from relpos_env.scenarios import Scenario
 from relpos_env.scenarios.episode import Episode
 from relpos_env.timing import DT, STAND_STILL
-from relpos_env.world.world import Physics, Swarm
+from relpos_env.world.world import Physics, World
 from tracking.arrays import F64, Bool
 from tracking.estimate import TeamEstimate
 from tracking.filters import FilterBuilder
@@ -41,7 +41,7 @@ def waiting_at_most(scenario: Scenario, n_cars: int, params: TrackerParams, n_st
     return int(1.2 * rate * (params.horizon.delay + 2 * n_steps * DT)) + 4 * pairs
 
 
-class TrackedSwarm:
+class TrackedWorld:
     """Groups of cars that know each other through their trackers."""
 
     def __init__(
@@ -56,7 +56,7 @@ class TrackedSwarm:
         proximity: int = 0,
         physics: Physics,
     ) -> None:
-        self.swarm = swarm = Swarm(scenario, n_cars, n_envs, n_steps, proximity, physics)
+        self.swarm = swarm = World(scenario, n_cars, n_envs, n_steps, proximity, physics)
         self.perception = Perception(
             swarm.constellation,
             params,
@@ -66,10 +66,10 @@ class TrackedSwarm:
             room=waiting_at_most(scenario, n_cars, params, n_steps),
             n_beams=proximity,
         )
-        self._singles: dict[int, TrackedSwarm] = {}
+        self._singles: dict[int, TrackedWorld] = {}
 
     @property
-    def view(self) -> View:
+    def view(self) -> AgentView:
         """What every car sees now."""
         return self.perception.view
 
@@ -78,9 +78,9 @@ class TrackedSwarm:
         """The tracker's last estimate, as old as the horizon, overwritten by the next."""
         return self.perception.estimate
 
-    def part(self, envs: slice) -> TrackedSwarm:
+    def part(self, envs: slice) -> TrackedWorld:
         """Some of the groups; shares their memory."""
-        part = TrackedSwarm.__new__(TrackedSwarm)  # to copy binds the kernels of the whole, 2 ms
+        part = TrackedWorld.__new__(TrackedWorld)  # to copy binds the kernels of the whole, 2 ms
         part.swarm = self.swarm.part(envs)
         part.perception = self.perception.part(envs, part.swarm.block, part.swarm.powered)
         part._singles = {}
@@ -90,9 +90,9 @@ class TrackedSwarm:
         """Let the view have what the task and the operator want, in their own memory.
 
         Args:
-            target: As in `View`.
-            wanted: As in `View`.
-            command: As in `View`.
+            target: As in `AgentView`.
+            wanted: As in `AgentView`.
+            command: As in `AgentView`.
         """
         self.perception.share(target, wanted, command)
         self._singles = {}
@@ -102,7 +102,7 @@ class TrackedSwarm:
         envs: Sequence[int],
         episodes: Sequence[Episode],
         rngs: Sequence[np.random.Generator],
-        watch: Callable[[Swarm], None] | None = None,
+        watch: Callable[[World], None] | None = None,
     ) -> None:
         """Reset some groups and let them stand while their trackers are switched on.
 
@@ -123,7 +123,7 @@ class TrackedSwarm:
                 if watch is not None:
                     watch(part.swarm)
 
-    def _parts(self, envs: Sequence[int]) -> Iterator[TrackedSwarm]:
+    def _parts(self, envs: Sequence[int]) -> Iterator[TrackedWorld]:
         """Groups to step: the whole batch at once, or each by itself."""
         if len(envs) == self.swarm.n_envs:
             yield self

@@ -64,7 +64,7 @@ class Group(Protocol):
         """Drive for one decision; speed [m/s] and steering [rad], each (env, car)."""
 
 
-class CarsEnv(ParallelEnv, ABC):  # type: ignore[misc]
+class BaseFormationParallelEnv(ParallelEnv, ABC):  # type: ignore[misc]
     """An agent is a car.
 
     One that joins in mid-episode becomes an agent in that step; one that leaves for good is

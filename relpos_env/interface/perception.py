@@ -1,6 +1,6 @@
 """From measurements to what every car sees, wherever they come from: simulation or hardware.
 
-    block -> Horizon -> Tracker -> TeamEstimate -> View
+    block -> Horizon -> Tracker -> TeamEstimate -> AgentView
 
 The tracker's estimate is as old as the horizon's delay and is carried to the present: positions
 at constant velocity, headings by the gyroscopes.
@@ -13,7 +13,7 @@ import copy
 import numpy as np
 
 from relpos_env.interface._view_kernels import forget_all, note_ranges
-from relpos_env.interface.views import View, bind_view, make_view
+from relpos_env.interface.views import AgentView, bind_view, make_view
 from tracking.arrays import F64, I64, Bool
 from tracking.constellation import Constellation
 from tracking.estimate import TeamEstimate
@@ -65,7 +65,7 @@ class Perception:
         self.tracker = Tracker(constellation, params, filter=filter, n_envs=n_envs)
         self.horizon = Horizon(params.horizon, n_envs)
         self.horizon.reserve(room)
-        self.view: View = make_view(n_envs, n_cars, n_beams)
+        self.view: AgentView = make_view(n_envs, n_cars, n_beams)
         self.estimate = TeamEstimate.empty(constellation, np.zeros(n_envs))
         """The tracker's last estimate, as old as the horizon, overwritten by the next."""
         self._room = room
@@ -102,9 +102,9 @@ class Perception:
         """Let the view have what the task and the operator want, in their own memory.
 
         Args:
-            target: As in `View`.
-            wanted: As in `View`.
-            command: As in `View`.
+            target: As in `AgentView`.
+            wanted: As in `AgentView`.
+            command: As in `AgentView`.
         """
         self.view = self.view._replace(target=target, wanted=wanted, command=command)
         self.rebind(self._block, self._powered)

@@ -14,7 +14,7 @@ from tracking.estimate import TeamEstimate
 from tracking.kernels.jit import bind
 
 
-class View(NamedTuple):
+class AgentView(NamedTuple):
     """Arrays over (env, car, ...) and, of the others, over (env, car, other, ...).
 
     Relative quantities are in the plane of the world frame; the observation modes turn them into
@@ -63,15 +63,15 @@ class View(NamedTuple):
     now: F64
     """(env) [s]"""
 
-    def part(self, envs: slice) -> View:
+    def part(self, envs: slice) -> AgentView:
         """Some of the environments; shares their memory."""
-        return View._make(array[envs] for array in self)
+        return AgentView._make(array[envs] for array in self)
 
 
-def make_view(n_envs: int, n_cars: int, n_beams: int = 0) -> View:
+def make_view(n_envs: int, n_cars: int, n_beams: int = 0) -> AgentView:
     """A view in which nobody knows anything, and no beam meets anything."""
     own, other = (n_envs, n_cars), (n_envs, n_cars, n_cars)
-    return View(
+    return AgentView(
         pos=np.zeros((*other, 2)),
         vel=np.zeros((*other, 2)),
         cov=np.zeros((*other, 3)),
@@ -95,7 +95,9 @@ def make_view(n_envs: int, n_cars: int, n_beams: int = 0) -> View:
     )
 
 
-def bind_view(view: View, estimate: TeamEstimate, powered: Bool, turns: F64) -> Callable[[], None]:
+def bind_view(
+    view: AgentView, estimate: TeamEstimate, powered: Bool, turns: F64
+) -> Callable[[], None]:
     """What writes into a view what trackers tell, carried to `view.now` at constant velocity.
 
     Args:
@@ -111,7 +113,7 @@ def bind_view(view: View, estimate: TeamEstimate, powered: Bool, turns: F64) -> 
     return bind(see_estimate, motion, rest, i, j, powered, turns, view)
 
 
-def reveal(view: View, pos_w: F64, vel_w: F64, heading: F64) -> None:
+def reveal(view: AgentView, pos_w: F64, vel_w: F64, heading: F64) -> None:
     """Write the truth in place of what trackers tell, for modes that need it.
 
     Args:

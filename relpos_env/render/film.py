@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from relpos_env.core.env_core import Formation
+from relpos_env.core.env_core import EnvCore
 from relpos_env.errors import EnvError
 from relpos_env.render.backend import load_pygame
 from relpos_env.render.renderer import RENDER_MODES, Renderer
@@ -44,7 +44,7 @@ class Film:
         """Begin a new episode."""
         self._errors.clear()
 
-    def add(self, formation: Formation) -> None:
+    def add(self, formation: EnvCore) -> None:
         """Note the errors of now and, if there is a window, show it."""
         env = self._env
         present = formation.state.present[env]
@@ -56,7 +56,7 @@ class Film:
         if self._mode == "human":
             self._draw(formation)
 
-    def picture(self, formation: Formation) -> Any:
+    def picture(self, formation: EnvCore) -> Any:
         """A picture of now, uint8 (height, width, 3); None for a window or no mode."""
         return self._draw(formation) if self._mode == "rgb_array" else None
 
@@ -69,12 +69,12 @@ class Film:
         """Everything but the drawing surfaces, which are made anew."""
         return {**self.__dict__, "_renderer": None}
 
-    def _draw(self, formation: Formation) -> Any:
+    def _draw(self, formation: EnvCore) -> Any:
         if self._renderer is None:
             self._renderer = Renderer(mode=self._mode or "rgb_array", fps=self._fps)
         return self._renderer.draw(self.snapshot(formation))
 
-    def snapshot(self, formation: Formation) -> Snapshot:
+    def snapshot(self, formation: EnvCore) -> Snapshot:
         """Everything that a picture of now shows."""
         env, swarm, view = self._env, formation.loop.swarm, formation.loop.view
         state, task = swarm.state.take(env), formation.task
@@ -110,7 +110,7 @@ class Film:
             title=f"{formation.parts.config.task}, {scenario.name}",
         )
 
-    def _links(self, formation: Formation) -> np.ndarray:
+    def _links(self, formation: EnvCore) -> np.ndarray:
         """Pairs of cars and whether they see and hear each other, (pair, 3)."""
         env, swarm, view = self._env, formation.loop.swarm, formation.loop.view
         i, j = swarm.constellation.pairs.T

@@ -25,7 +25,7 @@ from relpos_env.world.car import CarParams
 from tracking.arrays import F64
 
 Furnish = Callable[[Any, np.random.Generator], None]
-"""``(relpos_env.world.pymunk_space.World, generator)``"""
+"""``(relpos_env.world.pymunk_space.PhysicsSpace, generator)``"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,7 +6,7 @@ import numpy as np
 
 from relpos_env.sensors.radio.radio import Ranges
 from relpos_env.timing import DT
-from relpos_env.world.world import Swarm
+from relpos_env.world.world import World
 from tracking.arrays import F64, Bool
 from tracking.constellation import Constellation
 from tracking.geometry import quat_from_yaw, quat_multiply
@@ -44,7 +44,7 @@ class Recording:
         self._blocks.append(block)
         self._nlos.append(nlos)
 
-    def add_swarm(self, swarm: Swarm) -> None:
+    def add_swarm(self, swarm: World) -> None:
         """Keep what the last step of a swarm's first group brought."""
         n, events = int(swarm.events.used[0]), swarm.events
         steps = swarm.events.pose[0]

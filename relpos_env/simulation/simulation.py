@@ -9,7 +9,7 @@ from relpos_env.scenarios import Scenario
 from relpos_env.scenarios.episode import draw_episode
 from relpos_env.simulation.recorder import Recording
 from relpos_env.timing import DECISION, DT
-from relpos_env.world.world import Swarm
+from relpos_env.world.world import World
 from relpos_env.world.world_state import WorldState
 from tracking.arrays import F64
 from tracking.constellation import Constellation
@@ -32,7 +32,7 @@ class Simulation:
         """
         n = scenario.most_cars
         self.scenario = scenario
-        self.swarm = Swarm(scenario, n, n_steps=round(DECISION / DT))
+        self.swarm = World(scenario, n, n_steps=round(DECISION / DT))
         episode, group, self.driver_rng = rng.spawn(3)
         self.swarm.begin(0, draw_episode(scenario, n, seconds, episode), group)
         self._recording = Recording()

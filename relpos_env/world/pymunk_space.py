@@ -1,10 +1,9 @@
 """The pymunk space of one environment: cars, walls, boxes, and whatever else is put into it.
 
-`World.space` is an ordinary `pymunk.Space`. What is added to it (bodies, joints, shapes, collision
-handlers) moves and collides with the cars. Radios, distance sensors and pictures see each shape
-that is no sensor as a box: a polygon as the smallest rectangle around it, a circle as the square
-of its area. Shapes on the body of a car are part of it, and not seen.
-"""
+`PhysicsSpace.space` is an ordinary `pymunk.Space`. What is added to it (bodies, joints, shapes,
+collision handlers) moves and collides with the cars. Radios, distance sensors and pictures see
+each shape that is no sensor as a box: a polygon as the smallest rectangle around it, a circle as
+the square of its area. Shapes on the body of a car are part of it, and not seen."""
 
 from __future__ import annotations
 
@@ -42,7 +41,7 @@ Rectangle = tuple[float, float, float, float, float]
 """Centre x, y, width, height [m] and angle [rad], in the frame of a body."""
 
 
-class World:
+class PhysicsSpace:
     """The cars that are present and all that they can touch.
 
     The arrays of `Bodies` have the state of cars and boxes too. As long as nobody else has the

@@ -16,7 +16,7 @@ from relpos_env.timing import SOON
 from relpos_env.world._step_kernels import MOVED
 from relpos_env.world.arrays import Bodies
 from relpos_env.world.car import CarParams
-from relpos_env.world.pymunk_space import World
+from relpos_env.world.pymunk_space import PhysicsSpace
 from relpos_env.world.solver import UNKNOWN, Solver, connect, disconnect
 from tracking.arrays import F64, Bool
 from tracking.params.short_repr import short_repr
@@ -26,7 +26,7 @@ WAIT = 0.5
 
 
 @dataclass(slots=True)
-class Group:
+class RoomState:
     """One environment; the whole of a batch and its parts have the same object."""
 
     __repr__ = short_repr
@@ -39,7 +39,7 @@ class Group:
     car: CarParams = field(default_factory=CarParams)
     size: tuple[float, float] = (0.0, 0.0)
     """[m] Width and depth of the room."""
-    world: World | None = None
+    world: PhysicsSpace | None = None
     """Kept for a whole episode; with `physics="fast"` for as long as something touches."""
 
     @property
@@ -88,7 +88,7 @@ class Group:
         if self.world is not None and self.world.is_open:
             self.world.take(b, env)
 
-    def open(self, b: Bodies, solver: Solver, env: int) -> World:
+    def open(self, b: Bodies, solver: Solver, env: int) -> PhysicsSpace:
         """The world for others to look into and to change.
 
         Raises:
@@ -103,8 +103,8 @@ class Group:
             self.world.is_open = True
         return self.world
 
-    def _build(self, b: Bodies, env: int) -> World:
-        world = World(self.size, self.obstacles, self.car, np.nonzero(b.present[env])[0])
+    def _build(self, b: Bodies, env: int) -> PhysicsSpace:
+        world = PhysicsSpace(self.size, self.obstacles, self.car, np.nonzero(b.present[env])[0])
         world.put(b, env)
         return world
 

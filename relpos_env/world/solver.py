@@ -7,7 +7,7 @@ and fill stand in arrays, and a kernel (`_contact_kernels`) makes the step.
 
 Addresses hold for one process, and for one place in memory: copies begin without any. All that is
 private to pymunk is in this file. If a version of pymunk lays it out otherwise, `UNKNOWN` says how,
-and `World.step` makes the steps.
+and `PhysicsSpace.step` makes the steps.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import pymunk
 import pymunk.batch
 from numpy.typing import NDArray
 
-from relpos_env.world.pymunk_space import N_WALLS, World
+from relpos_env.world.pymunk_space import N_WALLS, PhysicsSpace
 from tracking.arrays import F64, I64
 
 N_STATE, N_INPUT, N_TOUCH = 6, 9, 3
@@ -88,7 +88,7 @@ def make_solver(n_envs: int, n_cars: int, n_boxes: int) -> Solver:
     return solver
 
 
-def connect(solver: Solver, env: int, world: World, tick: int) -> None:
+def connect(solver: Solver, env: int, world: PhysicsSpace, tick: int) -> None:
     """Let compiled code step the space of a world.
 
     Args:

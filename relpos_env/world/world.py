@@ -26,8 +26,8 @@ from relpos_env.world._car_kernels import STEERING
 from relpos_env.world._step_kernels import begin_decision, run_steps
 from relpos_env.world.arrays import Bodies, make_bodies, place_bodies
 from relpos_env.world.car_nodes import car_constellation
-from relpos_env.world.pymunk_space import World
-from relpos_env.world.room_state import Group
+from relpos_env.world.pymunk_space import PhysicsSpace
+from relpos_env.world.room_state import RoomState
 from relpos_env.world.solver import Solver, make_solver
 from relpos_env.world.world_state import WorldState
 from tracking.arrays import F64, Bool
@@ -40,7 +40,7 @@ SPARE_BOXES = 8
 """[-] Shapes that can be added to a space and that sensors see."""
 
 
-class Swarm:
+class World:
     """Groups of cars.
 
     Laws: same episode, seed and commands, same everything, bit for bit; environment k of a
@@ -85,7 +85,7 @@ class Swarm:
         )
         self._members: F64 = np.zeros((e, n, 2))
         self.events = make_events(e, n, n_steps, self._radio.room)
-        self._groups = [Group() for _ in range(e)]
+        self._groups = [RoomState() for _ in range(e)]
         self._solver = make_solver(e, n, self._bodies.boxes.shape[1])
         self._next_life = np.full(e, np.inf)
         self.to_come: Bool = np.zeros((e, n), dtype=bool)
@@ -134,7 +134,7 @@ class Swarm:
         share: F64 = (self.events.nlos & ranges).sum(axis=1) / np.maximum(ranges.sum(axis=1), 1)
         return share
 
-    def part(self, envs: slice) -> Swarm:
+    def part(self, envs: slice) -> World:
         """Some of the groups; shares their memory."""
         part = copy.copy(self)
         part._bodies = Bodies._make(a[envs] for a in self._bodies)
@@ -209,7 +209,7 @@ class Swarm:
             self._read_proximity()
         return self.block
 
-    def world(self, env: int) -> World:
+    def world(self, env: int) -> PhysicsSpace:
         """The space of a group, to look into and to change; from now on stepped by pymunk alone.
 
         Raises:

@@ -31,7 +31,7 @@ from agents.reports.compare_report import (
     short_rows,
 )
 from relpos_env.api.sb3_vec_env import FormationVecEnv
-from relpos_env.core.env_core import Formation
+from relpos_env.core.env_core import EnvCore
 from relpos_env.interface.observations import OBSERVATIONS
 from relpos_env.scenarios import SCENARIOS
 from relpos_env.tasks import TASKS
@@ -97,7 +97,7 @@ def test_figures_are_those_of_the_environment():
 def test_time_in_formation_is_that_of_the_worst_car():
     (episode,) = run_episodes(ON_ESTIMATE, SHORT, [1004])
     parts = SHORT.parts("estimate", 1)
-    formation, controller = Formation(parts), Consensus(parts.mode.fields)
+    formation, controller = EnvCore(parts), Consensus(parts.mode.fields)
     formation.seed(0, seeding.np_random(1004)[0])
     formation.begin([0])
     formed = []

@@ -24,7 +24,7 @@ from agents.controllers.surroundings import (
     surroundings,
 )
 from relpos_env.config import configure
-from relpos_env.core.env_core import Formation
+from relpos_env.core.env_core import EnvCore
 from relpos_env.interface.beams import FARTHEST, beam_directions, beam_starts
 from relpos_env.interface.observations import observation_mode, total_size
 
@@ -164,7 +164,7 @@ def test_hardly_anybody_touches_anything():
     touched = []
     for beams in (0, 16):
         parts = configure({"task": "hold", "scenario": "ring-nlos", "proximity": beams})
-        formation = Formation(parts, 6)
+        formation = EnvCore(parts, 6)
         for e in range(6):
             formation.seed(e, seeding.np_random(e)[0])
             formation.begin([e])

@@ -28,7 +28,7 @@ from hardware_bridge.readings import (
     OperatorReading,
     RangeReading,
 )
-from relpos_env.core.env_core import Formation
+from relpos_env.core.env_core import EnvCore
 from relpos_env.errors import EnvError
 from relpos_env.timing import STAND_STILL
 from tracking.log import read_log
@@ -38,7 +38,7 @@ KEY = bytes(range(16))
 
 
 def formation_of(options):
-    formation = Formation(options.parts(), physics="pymunk")
+    formation = EnvCore(options.parts(), physics="pymunk")
     formation.seed(0, seeding.np_random(options.seed)[0])
     formation.begin([0])
     return formation

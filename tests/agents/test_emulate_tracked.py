@@ -11,7 +11,7 @@ from hardware_bridge.drivers import make_driver
 from hardware_bridge.emulator.ports import MemoryPort
 from hardware_bridge.links.ports import Chunk
 from hardware_bridge.live.swarm import LiveSwarm
-from relpos_env.core.env_core import Formation
+from relpos_env.core.env_core import EnvCore
 
 SETTLED = 40
 """[-] Decisions after which errors are compared."""
@@ -66,7 +66,7 @@ def follow(formation):
 @pytest.mark.parametrize("form", ["relpos", "linktrack", "uwb-core", "dw1000"])
 def test_a_live_tracker_knows_what_that_of_the_simulation_knows(form, tmp_path):
     options = EmulateOptions(seed=3, seconds=12.0, format=form)
-    live, formation = Live(options, tmp_path), Formation(options.parts())
+    live, formation = Live(options, tmp_path), EnvCore(options.parts())
     formation.seed(0, np.random.default_rng(options.seed))
     formation.begin([0])
     n = live.rig.world.parts.n_cars

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from agents.policies.layout import Layout
 from agents.policies.padding import PaddedDriver, Padding
 from relpos_env.config import configure
-from relpos_env.core.env_core import Formation
+from relpos_env.core.env_core import EnvCore
 from relpos_env.core.tracked_world import default_params
 from relpos_env.errors import EnvError
 from relpos_env.interface.observations import OBSERVATIONS, observation_mode, total_size
@@ -33,7 +33,7 @@ def environments(mode, slots, history=1, steps=25):
     made = []
     for n in slots:
         arguments = {"scenario": s, "n_cars": n, "observation": mode, "history": history}
-        formation = Formation(configure({**arguments, "params": params}))
+        formation = EnvCore(configure({**arguments, "params": params}))
         formation.seed(0, np.random.default_rng(5))
         formation.begin([0])
         made.append(formation)
@@ -184,7 +184,7 @@ def test_a_layout_of_an_environment():
     parts = configure({"scenario": "cars-nlos", "observation": "ranges", "history": 2})
     layout = Layout.of(parts)
     assert layout == Layout("ranges", 3, 2)
-    assert layout.size == Formation(parts).observations.shape[-1]
+    assert layout.size == EnvCore(parts).observations.shape[-1]
 
 
 def test_differences_are_named_row_by_row():

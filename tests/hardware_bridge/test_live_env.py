@@ -12,7 +12,7 @@ from agents.hardware.emulate import EmulateOptions
 from agents.hardware.emulate.virtual import LAG, START_NS, VirtualBridge
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.ports import Chunk
-from hardware_bridge.live.env import LiveFormationEnv
+from hardware_bridge.live.env import HardwareFormationEnv
 from hardware_bridge.live.replay import APPLIED, ReplayFeed
 from hardware_bridge.live.start import StartParams, is_home, wriggle
 from hardware_bridge.recording import Header, Recorder, read_recording
@@ -20,7 +20,7 @@ from hardware_bridge.recording import Kind as Record
 from relpos_env import formation_v0
 from relpos_env.errors import EnvError
 from relpos_env.interface.actions import ACTIONS
-from relpos_env.interface.base_parallel_env import CarsEnv
+from relpos_env.interface.base_parallel_env import BaseFormationParallelEnv
 from relpos_env.interface.observations import OBSERVATIONS
 
 OPTIONS = EmulateOptions(scenario="cars-nlos", seed=3, seconds=600.0)
@@ -63,8 +63,8 @@ def drive(env, act, seed=7):
 def test_spaces_are_those_of_the_simulator(bridge, mode, history):
     ours = bridge.env(observation=mode, history=history)
     theirs = formation_v0.parallel_env(**SIMULATOR, observation=mode, history=history)
-    assert isinstance(ours, CarsEnv)
-    assert isinstance(theirs, CarsEnv)
+    assert isinstance(ours, BaseFormationParallelEnv)
+    assert isinstance(theirs, BaseFormationParallelEnv)
     assert ours.possible_agents == theirs.possible_agents
     assert ours.observation_spaces == theirs.observation_spaces
     assert ours.action_spaces == theirs.action_spaces
@@ -222,7 +222,7 @@ def test_whoever_stops_the_cars_while_they_wait_arms_them_too(pressed, moves):
 def test_a_virtual_drive_is_the_same_every_time():
     def once():
         bridge = VirtualBridge(OPTIONS)
-        env = LiveFormationEnv(bridge.swarm, bridge.feed, max_cycles=40)
+        env = HardwareFormationEnv(bridge.swarm, bridge.feed, max_cycles=40)
         seen, rewards = [], []
         observations, _ = env.reset()
         while env.agents:
@@ -269,7 +269,7 @@ def test_commands_pass_the_gate(armed):
 
 def test_unplugged_cars_are_known_to_be():
     bridge = VirtualBridge(OPTIONS)
-    env = LiveFormationEnv(bridge.swarm, bridge.feed)
+    env = HardwareFormationEnv(bridge.swarm, bridge.feed)
     env.reset()
     assert bridge.feed.report.linked.tolist() == [1.0, 1.0, 1.0]
     bridge.rig.emulator.cars[0].line.unplug(1.0)
@@ -337,16 +337,16 @@ def test_a_replay_is_the_same_environment(tmp_path, monkeypatch):
         take(chunk)
 
     monkeypatch.setattr(swarm, "take", keep)
-    live = LiveFormationEnv(swarm, Recorded(bridge.feed, recorder, names), max_cycles=40)
+    live = HardwareFormationEnv(swarm, Recorded(bridge.feed, recorder, names), max_cycles=40)
     seen, rewards, _ = drive(live, consensus)
     recorder.close()
     bridge.close()
     feed = ReplayFeed(read_recording(tmp_path / "run.relpos"))
-    again, same, _ = drive(LiveFormationEnv(feed.swarm, feed, max_cycles=40), consensus)
+    again, same, _ = drive(HardwareFormationEnv(feed.swarm, feed, max_cycles=40), consensus)
     assert rewards == same
     assert swarm.view.speed.any()
     for one, other in zip(seen, again, strict=True):
         np.testing.assert_array_equal(list(one.values()), list(other.values()))
     # A recording that has no more to give truncates the episode, and passes the checker.
     feed = ReplayFeed(read_recording(tmp_path / "run.relpos"))
-    parallel_api_test(LiveFormationEnv(feed.swarm, feed, max_cycles=10), num_cycles=20)
+    parallel_api_test(HardwareFormationEnv(feed.swarm, feed, max_cycles=10), num_cycles=20)

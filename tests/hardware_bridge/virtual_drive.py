@@ -8,7 +8,7 @@ from agents.comparison.contender import find_entry
 from agents.hardware.emulate.virtual import VirtualBridge
 from hardware_bridge.emulator.fault_plan import Fault
 from hardware_bridge.emulator.ports import MemoryPort
-from hardware_bridge.live.env import LiveFormationEnv
+from hardware_bridge.live.env import HardwareFormationEnv
 
 
 class WatchedLine(MemoryPort):
@@ -48,7 +48,7 @@ class VirtualDrive:
         self.feed.attend = self._attend
         entry = find_entry(name)
         self._driver = entry.driver("estimate", self.bridge.config.n_slots, 0)
-        self.env = LiveFormationEnv(
+        self.env = HardwareFormationEnv(
             self.swarm,
             self,
             history=entry.history,

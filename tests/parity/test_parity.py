@@ -11,7 +11,7 @@ from relpos_env.scenarios import draw_episode, scenario
 from relpos_env.simulation.recorder import Recording
 from relpos_env.simulation.scripted_driver import LoopDrivers
 from relpos_env.timing import DT
-from relpos_env.world.world import Swarm
+from relpos_env.world.world import World
 from tracking import TeamEstimate, Tracker, TrackerParams
 from tracking.filters import FILTERS
 from tracking.late_data.horizon import Horizon
@@ -35,7 +35,7 @@ def copy(estimate: TeamEstimate) -> TeamEstimate:
 def test_simulator_is_replayed_log(tmp_path, name, steps):
     """However many steps of the physics make a block."""
     place, rng = scenario("cars-nlos"), np.random.default_rng(5)
-    swarm = Swarm(place, place.n_cars, n_steps=steps)
+    swarm = World(place, place.n_cars, n_steps=steps)
     swarm.begin(0, draw_episode(place, place.n_cars, 12.0, rng), rng.spawn(1)[0])
     drivers, recording, params = LoopDrivers(place, rng), Recording(), TrackerParams()
     horizon = Horizon(params.horizon)

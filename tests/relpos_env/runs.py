@@ -7,7 +7,7 @@ import numpy as np
 from relpos_env.formation_v0 import parallel_env
 from relpos_env.scenarios import SCENARIOS, draw_episode
 from relpos_env.scenarios.randomisation import Randomisation
-from relpos_env.world.world import Swarm
+from relpos_env.world.world import World
 
 
 def busy(n_cars=5, rate=60.0):
@@ -97,7 +97,7 @@ def placed(start, *, room=(8.0, 8.0), obstacles=(), base="cars-los"):
         place, room=room, ring=(0.3, 0.3), layout="scattered",
         randomisation=Randomisation(obstacles=(0, len(obstacles))),
     )  # fmt: skip
-    swarm = Swarm(wide, n)
+    swarm = World(wide, n)
     episode = replace(
         drawn, start=start, present=np.ones(n, dtype=bool), obstacles=tuple(obstacles)
     )

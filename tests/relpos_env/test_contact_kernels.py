@@ -14,8 +14,8 @@ from relpos_env.world import solver as solver_module
 from relpos_env.world._contact_kernels import solve
 from relpos_env.world.arrays import make_bodies, place_bodies
 from relpos_env.world.car import CarParams
-from relpos_env.world.pymunk_space import REST, World
-from relpos_env.world.room_state import Group
+from relpos_env.world.pymunk_space import REST, PhysicsSpace
+from relpos_env.world.room_state import RoomState
 from relpos_env.world.solver import connect, disconnect, make_solver
 
 STATE = BodyFields.POSITION | BodyFields.ANGLE | BodyFields.VELOCITY | BodyFields.ANGULAR_VELOCITY
@@ -35,7 +35,7 @@ class Plain:
     """A room stepped through the interface of pymunk."""
 
     def __init__(self):
-        self.room = World(SIZE, BOXES, CAR, CARS)
+        self.room = PhysicsSpace(SIZE, BOXES, CAR, CARS)
         self.inbox, self.outbox = Buffer(), Buffer()
         self.room.space.on_collision(begin=self.count)
         self.contacts = np.zeros(N_CARS)
@@ -79,7 +79,7 @@ def crowded(n_envs=3, env=1):
 def test_moves_and_contacts_are_those_of_pymunk_bit_for_bit(seed):
     rng = np.random.default_rng(seed)
     bodies, solver = crowded()
-    plain, room = Plain(), World(SIZE, BOXES, CAR, CARS)
+    plain, room = Plain(), PhysicsSpace(SIZE, BOXES, CAR, CARS)
     connect(solver, 1, room, 0)
     body, box_body = bodies.body[1].copy(), bodies.box_body[1].copy()
     for k in range(600):
@@ -104,7 +104,7 @@ def test_moves_and_contacts_are_those_of_pymunk_bit_for_bit(seed):
 
 def test_a_box_is_drawn_where_it_stands():
     bodies, solver = crowded()
-    room = World(SIZE, BOXES, CAR, CARS)
+    room = PhysicsSpace(SIZE, BOXES, CAR, CARS)
     connect(solver, 1, room, 0)
     bodies.box_body[1, 0, 3:] = 0.5, 0.2, 1.0
     for _ in range(10):
@@ -118,7 +118,7 @@ def test_a_box_is_drawn_where_it_stands():
 def test_the_solvers_arrays_keep_their_room():
     # Where it finds too little room the C code takes other memory.
     bodies, solver = crowded()
-    room = World(SIZE, BOXES, CAR, CARS)
+    room = PhysicsSpace(SIZE, BOXES, CAR, CARS)
     connect(solver, 1, room, 0)
     calls = solver.calls[1]
     places = [int(calls[f"{way}_arr"]) for way in ("put", "got", "met")]
@@ -135,7 +135,7 @@ def test_the_solvers_arrays_keep_their_room():
 
 def test_a_kept_world_follows_cars_that_come_and_go():
     bodies, solver = crowded()
-    group = Group(obstacles=BOXES, car=CAR, size=SIZE)
+    group = RoomState(obstacles=BOXES, car=CAR, size=SIZE)
     group.begin(bodies, solver, 1)
     bodies.tick[1] = 7
     group.move(bodies, solver, 1, DT)

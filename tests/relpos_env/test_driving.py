@@ -5,7 +5,7 @@ import pytest
 from runs import busy, commands
 
 from relpos_env.config import configure
-from relpos_env.core.env_core import Formation
+from relpos_env.core.env_core import EnvCore
 from relpos_env.formation_v0 import parallel_env
 from relpos_env.interface.actions import MAX_SPEED, MAX_STEERING
 from relpos_env.interface.observations import OBSERVATIONS, index_table
@@ -83,7 +83,7 @@ def test_the_formation_is_kept_on_estimates():
 @pytest.mark.parametrize("n_cars", [4, 6])
 def test_a_group_that_stands_at_first_is_found_right(n_cars):
     """All rotations are open until somebody drives: nobody is ok and a metre wrong."""
-    formation = Formation(configure({"scenario": "ring-nlos", "n_cars": n_cars}), 8)
+    formation = EnvCore(configure({"scenario": "ring-nlos", "n_cars": n_cars}), 8)
     for env in range(8):
         formation.seed(env, np.random.default_rng(env))
         formation.begin([env])

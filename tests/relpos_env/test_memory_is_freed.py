@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from relpos_env.config import configure
-from relpos_env.core.env_core import Formation
+from relpos_env.core.env_core import EnvCore
 
 
 @pytest.mark.parametrize("name", ["joint", "ekf-mds"])
 def test_an_environment_that_is_gone_leaves_nothing_behind(name):
     parts = configure({"scenario": "ring-los", "task": "ring", "n_cars": 3, "filter": name})
-    formation = Formation(parts, n_envs=2, threads=2)
+    formation = EnvCore(parts, n_envs=2, threads=2)
     for env in range(2):
         formation.seed(env, np.random.default_rng(env))
         formation.begin([env])

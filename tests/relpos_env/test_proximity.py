@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from relpos_env.config import configure
-from relpos_env.core.env_core import Formation
+from relpos_env.core.env_core import EnvCore
 from relpos_env.errors import EnvError
 from relpos_env.interface.beams import FARTHEST, beam_directions, beam_starts
 from relpos_env.scenarios import scenario
@@ -217,7 +217,7 @@ def test_an_environment_of_a_batch_is_that_environment_alone():
 def drive(n_envs=1, steps=12, **arguments):
     """Observations of a drive, (step, env, car, size), and the formation."""
     parts = configure({"scenario": "ring-nlos", "max_cycles": 50, **arguments})
-    formation = Formation(parts, n_envs)
+    formation = EnvCore(parts, n_envs)
     for e in range(n_envs):
         formation.seed(e, np.random.default_rng(e))
         formation.begin([e])
@@ -266,7 +266,7 @@ def test_a_batch_is_its_environments():
         parts = configure(
             {"scenario": "swarm-nlos", "level": 2, "max_cycles": 50, "proximity": 5}
         )  # fmt: skip
-        alone = Formation(parts)
+        alone = EnvCore(parts)
         alone.seed(0, np.random.default_rng(e))
         alone.begin([0])
         for k in range(len(batch)):

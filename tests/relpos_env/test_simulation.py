@@ -12,7 +12,7 @@ from relpos_env.sensors import RadioSimParams
 from relpos_env.sensors.radio.channel import EXACT
 from relpos_env.simulation.scripted_driver import LoopDrivers
 from relpos_env.simulation.simulation import Simulation
-from relpos_env.world.world import Swarm
+from relpos_env.world.world import World
 from tracking.measurements import Kind
 
 
@@ -81,7 +81,7 @@ def test_as_many_cars_as_a_scenario_asks_for_can_be_recorded(name):
 def streams(seed=3, **change):
     """What each kind of sensor gave with parameters of the episode changed."""
     place = scenario("cars-nlos")
-    swarm = Swarm(place, 3)
+    swarm = World(place, 3)
     rng = np.random.default_rng(seed)
     episode = draw_episode(place, 3, 10.0, rng)
     changed = {k: replace(getattr(episode, k), **v) for k, v in change.items()}

@@ -12,7 +12,7 @@ from runs import busy
 from relpos_env.interface.actions import DriveCommand
 from relpos_env.scenarios import SCENARIOS, draw_episode
 from relpos_env.simulation.scripted_driver import LoopDrivers
-from relpos_env.world.world import SPARE_BOXES, Swarm
+from relpos_env.world.world import SPARE_BOXES, World
 
 FIELDS = ("body", "drive", "accel", "contacts", "present")
 
@@ -35,7 +35,7 @@ class Wild:
 def run(scenario, seed, seconds, drivers, physics):
     """The truth after every step of physics, where nothing was near, contacts, solver's steps."""
     n = scenario.n_cars
-    swarm = Swarm(scenario, n, n_steps=1, physics=physics)
+    swarm = World(scenario, n, n_steps=1, physics=physics)
     rng = np.random.default_rng(seed)
     swarm.begin(0, draw_episode(scenario, n, seconds, rng), rng)
     driver = drivers(scenario, np.random.default_rng(seed))

@@ -10,15 +10,21 @@ from relpos_env.scenarios.episode import draw_episode
 from relpos_env.scenarios.life import LifeEvent
 from relpos_env.sensors import ImuSimParams
 from relpos_env.world.car import CarParams
-from relpos_env.world.pymunk_space import BOX_DENSITY, BOX_FRICTION, ELASTICITY, FRICTION, World
-from relpos_env.world.world import Swarm
+from relpos_env.world.pymunk_space import (
+    BOX_DENSITY,
+    BOX_FRICTION,
+    ELASTICITY,
+    FRICTION,
+    PhysicsSpace,
+)
+from relpos_env.world.world import World
 from tracking.geometry import GRAVITY
 from tracking.measurements import Kind
 
 
 def swarm(scenario, start, events=()):
     """Cars that begin at given poses; nobody else comes or goes but as said."""
-    group = Swarm(scenario, len(start), 1)
+    group = World(scenario, len(start), 1)
     episode = draw_episode(scenario, len(start), 60.0, np.random.default_rng(0))
     episode = replace(episode, start=np.array(start), events=tuple(events))
     group.begin(0, episode, np.random.default_rng(1))
@@ -27,7 +33,7 @@ def swarm(scenario, start, events=()):
 
 def bare_car(position, velocity, *, spins=True):
     """A car without tyres that flies against the wall at x = 2.5 m; its velocity after it."""
-    space = World((5.0, 5.0), (), CarParams(), np.array([0])).space
+    space = PhysicsSpace((5.0, 5.0), (), CarParams(), np.array([0])).space
     (body,) = space.bodies
     if not spins:
         body.moment = float("inf")

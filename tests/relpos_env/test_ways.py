@@ -7,7 +7,7 @@ import pytest
 from scipy.sparse.csgraph import shortest_path
 
 from relpos_env.config import FormationConfig
-from relpos_env.core.env_core import Formation
+from relpos_env.core.env_core import EnvCore
 from relpos_env.tasks import make_task
 from relpos_env.tasks.geometry.shortest_paths import Ways
 from relpos_env.tasks.kernels.path import BERTH, CORNER
@@ -224,7 +224,7 @@ def test_rooms_do_not_know_of_each_other():
 def test_cars_that_gather_are_paid_for_it():
     """The term of `hold` is what the cars came nearer, also where cars come and go."""
     parts = FormationConfig(scenario="swarm-nlos", task="hold", max_cycles=300).resolve()
-    formation = Formation(parts, 2)
+    formation = EnvCore(parts, 2)
     for env in range(2):
         formation.seed(env, np.random.default_rng(env))
         formation.begin([env])

@@ -9,11 +9,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from relpos_env.core.env_core import Formation
+from relpos_env.core.env_core import EnvCore
 from relpos_env.interface.actions import MAX_SPEED, MAX_STEERING
 from tracking.arrays import F64
 
-Drive = Callable[[Formation], F64]
+Drive = Callable[[EnvCore], F64]
 
 PULL = 0.8
 """[1/s] Speed towards the own place per metre that it is away."""
@@ -25,7 +25,7 @@ KEEP = 0.95
 """[-] From step to step of the noise that speed and steering are made of: 2 s."""
 
 
-def followed(formation: Formation) -> F64:
+def followed(formation: EnvCore) -> F64:
     """Pure pursuit of what the operator tells and of the own place, by the truth.
 
     With the heading error e of the wanted velocity and the lookahead d, the arc has curvature
@@ -49,7 +49,7 @@ class Chance:
         self._rng = np.random.default_rng(seed)
         self._noise: F64 | None = None
 
-    def __call__(self, formation: Formation) -> F64:
+    def __call__(self, formation: EnvCore) -> F64:
         """Actions of now."""
         fresh = self._rng.normal(size=(*formation.active.shape, 2))
         if self._noise is None:

@@ -10,19 +10,19 @@ from typing import Any
 from unittest.mock import patch
 
 from agents.bench.env.batch import Batch
-from relpos_env.core.env_core import Formation
+from relpos_env.core.env_core import EnvCore
 from relpos_env.sensors.operator import Operator
 from relpos_env.tasks.base import Task
 from relpos_env.timing import DECISION, DT
-from relpos_env.world.world import Swarm
+from relpos_env.world.world import World
 
 RESETS = "resets"
 METHODS: tuple[tuple[str, type, str], ...] = (
-    ("cars, sensors, radio", Swarm, "step"),
+    ("cars, sensors, radio", World, "step"),
     ("task, operator", Task, "update"),
     ("task, operator", Operator, "sample"),
-    ("observations", Formation, "_observe"),
-    (RESETS, Formation, "begin"),
+    ("observations", EnvCore, "_observe"),
+    (RESETS, EnvCore, "begin"),
 )
 """Part, and the class with the method that is timed for it."""
 BOUND: tuple[tuple[str, str], ...] = (
@@ -53,7 +53,7 @@ class Parts:
 class _Stopwatch:
     """Time by name. What is called inside of something timed counts for the outer one."""
 
-    swarm: Swarm
+    swarm: World
     spent: dict[str, float] = field(default_factory=dict)
     moves_of_resets: int = 0
     """Of the solver, while episodes began."""

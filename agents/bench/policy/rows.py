@@ -16,7 +16,7 @@ from agents.policies import load_policy, shipped_names
 from agents.policies.layout import Layout
 from agents.policies.padding import PaddedDriver
 from relpos_env.config import configure
-from relpos_env.core.env_core import Formation
+from relpos_env.core.env_core import EnvCore
 from relpos_env.interface.observations.base import F32
 
 Row = dict[str, Any]
@@ -78,9 +78,9 @@ def bench_policy(
     return rows
 
 
-def _room(proximity: int = 0) -> Formation:
+def _room(proximity: int = 0) -> EnvCore:
     """An environment in which the trackers know something."""
-    formation = Formation(configure({"scenario": SCENARIO, "proximity": proximity}))
+    formation = EnvCore(configure({"scenario": SCENARIO, "proximity": proximity}))
     formation.seed(0, np.random.default_rng(0))
     formation.begin([0])
     speed, steering = np.full((1, 3), 0.5), np.full((1, 3), 0.2)
@@ -89,7 +89,7 @@ def _room(proximity: int = 0) -> Formation:
     return formation
 
 
-def _decision(formation: Formation, driver: Driver) -> Callable[[], F32]:
+def _decision(formation: EnvCore, driver: Driver) -> Callable[[], F32]:
     """Write the observations of a room, and let one car decide."""
     out = np.zeros_like(formation.observations)
     observe = formation.parts.mode.bind(formation.loop.view, out)

@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from relpos_env.api.sb3_attributes import SharedSeats
+from relpos_env.api.sb3_attributes import SharedAttributeVecEnv
 from relpos_env.interface.observations.base import F32
 from tracking.arrays import Bool
 
 
-class Nothing(SharedSeats):
+class Nothing(SharedAttributeVecEnv):
     """Shows the same observations at every step; nothing ends."""
 
-    def __init__(self, like: SharedSeats, observations: F32) -> None:
+    def __init__(self, like: SharedAttributeVecEnv, observations: F32) -> None:
         """Take the spaces and seats of an environment.
 
         Args:

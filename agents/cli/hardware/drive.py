@@ -15,7 +15,7 @@ from agents.cli.console import emit_json, print_table
 from agents.errors import UsageError
 
 if TYPE_CHECKING:
-    from hardware_bridge.live.env import LiveFormationEnv
+    from hardware_bridge.live.env import HardwareFormationEnv
     from hardware_bridge.live.opened import OpenBridge
 
 EVERY = 10
@@ -145,7 +145,7 @@ class _Screen:
         if self._source.lost and had_them and self._live is None:
             click.echo(NO_KEYS, err=True)
 
-    def show(self, bridge: OpenBridge, env: LiveFormationEnv) -> None:
+    def show(self, bridge: OpenBridge, env: HardwareFormationEnv) -> None:
         """After every decision."""
         from agents.hardware.drive.status import HEADER, car_rows, status_record
 

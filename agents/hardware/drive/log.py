@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from agents.hardware.drive.result import DriveResult
-from hardware_bridge.live.env import LiveFormationEnv
+from hardware_bridge.live.env import HardwareFormationEnv
 from hardware_bridge.live.opened import OpenBridge
 
 MOST_KEPT = 6000
@@ -16,7 +16,9 @@ STOPPED = " stopped: "
 class DriveLog:
     """A ring of decisions."""
 
-    def __init__(self, title: str, bridge: OpenBridge, env: LiveFormationEnv, cycles: int) -> None:
+    def __init__(
+        self, title: str, bridge: OpenBridge, env: HardwareFormationEnv, cycles: int
+    ) -> None:
         """Have room for a drive.
 
         Args:

@@ -17,12 +17,12 @@ from agents.hardware.drive.result import DriveResult
 from hardware_bridge.config import SwarmConfig, read_config
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.live.bridge import Bridge
-from hardware_bridge.live.env import LiveFormationEnv
+from hardware_bridge.live.env import HardwareFormationEnv
 from hardware_bridge.live.opened import OpenBridge
 from relpos_env.timing import DECISION
 
 CONTROLLER = "consensus"
-Watch: TypeAlias = Callable[[OpenBridge, LiveFormationEnv], None]
+Watch: TypeAlias = Callable[[OpenBridge, HardwareFormationEnv], None]
 MOST_CYCLES = 800_000
 
 
@@ -151,7 +151,7 @@ class _Orders:
         self._bridge.start.heed(what)
         self._bridge.feed.order(what)
 
-    def show(self, env: LiveFormationEnv, watch: Watch | None) -> bool:
+    def show(self, env: HardwareFormationEnv, watch: Watch | None) -> bool:
         """After a decision; whether it is to end."""
         if watch is not None:
             watch(self._bridge, env)
@@ -159,7 +159,7 @@ class _Orders:
 
 
 def _drive(
-    env: LiveFormationEnv, driver: Driver, log: DriveLog, is_over: Callable[[], bool]
+    env: HardwareFormationEnv, driver: Driver, log: DriveLog, is_over: Callable[[], bool]
 ) -> None:
     """Decide until the time is up, the task is done, or somebody says so."""
     for space in env.observation_spaces.values():

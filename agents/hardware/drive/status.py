@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from hardware_bridge.live.env import LiveFormationEnv
+from hardware_bridge.live.env import HardwareFormationEnv
 from hardware_bridge.live.opened import OpenBridge
 from hardware_bridge.safety.gate import reason_text
 from tracking.estimate import Status
@@ -16,7 +16,7 @@ LINES = 4
 """[-] Of notices below the table."""
 
 
-def car_rows(bridge: OpenBridge, env: LiveFormationEnv) -> list[list[str]]:
+def car_rows(bridge: OpenBridge, env: HardwareFormationEnv) -> list[list[str]]:
     """One row a slot, as `HEADER`."""
     report, group = bridge.feed.report, env.group
     view, config = bridge.swarm.view, bridge.config
@@ -46,7 +46,7 @@ def car_rows(bridge: OpenBridge, env: LiveFormationEnv) -> list[list[str]]:
     return rows
 
 
-def status_record(bridge: OpenBridge, env: LiveFormationEnv) -> dict[str, Any]:
+def status_record(bridge: OpenBridge, env: HardwareFormationEnv) -> dict[str, Any]:
     """The state of a drive as a record."""
     report, group = bridge.feed.report, env.group
     present = group.believed.present[0]

@@ -1,6 +1,6 @@
 """The world behind the devices: a swarm with its task and its operator, 10 ms at a time.
 
-Law: with the same scenario, task, seed and commands it goes as `relpos_env.core.env_core.Formation`
+Law: with the same scenario, task, seed and commands it goes as `relpos_env.core.env_core.EnvCore`
 goes, to the last bit.
 """
 
@@ -17,7 +17,7 @@ from relpos_env.scenarios.episode import Episode, draw_episode
 from relpos_env.sensors.operator import Operator
 from relpos_env.simulation.recorder import Recording
 from relpos_env.timing import DECISION, DT, SOON, STAND_STILL
-from relpos_env.world.world import Swarm
+from relpos_env.world.world import World
 from tracking.arrays import F64, Bool
 from tracking.measurements import MeasurementBlock
 
@@ -39,7 +39,7 @@ class EmulatedWorld:
             record: Keep measurements and truth for `recording`.
         """
         self.parts = parts
-        self._swarm = Swarm(
+        self._swarm = World(
             parts.scenario, parts.n_cars, n_steps=1, proximity=parts.config.proximity
         )
         self._task = parts.make_task(1)
@@ -59,7 +59,7 @@ class EmulatedWorld:
         self._operator_seed = rng.integers(1 << 62)
 
     @property
-    def swarm(self) -> Swarm:
+    def swarm(self) -> World:
         """The truth; a batch of one."""
         return self._swarm
 

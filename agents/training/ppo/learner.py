@@ -18,7 +18,7 @@ from agents.training.environments import layout_of, weights_of
 from agents.training.ppo.buffer import SwarmRolloutBuffer
 from agents.training.ppo.hyperbolic import Tanh
 from agents.training.ppo.network import Actor, SwarmPolicy
-from agents.training.rooms import Rooms, observation_space
+from agents.training.rooms import MultiScenarioVecEnv, observation_space
 from relpos_env.api.state_space import N_TRUTH
 from relpos_env.interface.actions import ContinuousActions
 
@@ -40,7 +40,7 @@ def share_done(config: TrainConfig, frames: int) -> float:
     return min(frames / config.frames, 1.0)
 
 
-def make_model(config: TrainConfig, rooms: Rooms) -> PPO:
+def make_model(config: TrainConfig, rooms: MultiScenarioVecEnv) -> PPO:
     """The learner with fresh weights that follow from the seed."""
     ppo = config.ppo
     models: list[PPO] = []

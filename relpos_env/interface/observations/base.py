@@ -10,7 +10,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from relpos_env.interface.views import View
+from relpos_env.interface.views import AgentView
 
 F32 = NDArray[np.float32]
 
@@ -42,7 +42,7 @@ class ObservationMode(Protocol):
     fields: tuple[Field, ...]
     """The stretches of the vector, in order."""
 
-    def bind(self, view: View, out: F32) -> Callable[[], None]:
+    def bind(self, view: AgentView, out: F32) -> Callable[[], None]:
         """What writes observations from a view that is filled anew before every call.
 
         Args:

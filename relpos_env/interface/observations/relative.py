@@ -7,7 +7,7 @@ from collections.abc import Callable
 from relpos_env.interface._observation_kernels import FAR, FAST, N_STATUS, OLD, observe_relative
 from relpos_env.interface.observations.base import F32, Field
 from relpos_env.interface.observations.standard_fields import own_fields, wish_fields
-from relpos_env.interface.views import View
+from relpos_env.interface.views import AgentView
 from tracking.kernels.jit import bind
 
 
@@ -67,6 +67,6 @@ class RelativePositions:
             *own_fields(n_beams),
         )
 
-    def bind(self, view: View, out: F32) -> Callable[[], None]:
+    def bind(self, view: AgentView, out: F32) -> Callable[[], None]:
         """What writes observations of every car, (env, car, size)."""
         return bind(observe_relative, view, self._with_cov, out)
