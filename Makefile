@@ -11,7 +11,7 @@ INSTALL := $(PIP) install --no-compile -c constraints.txt
 LEVELS ?= $(if $(filter x86_64 amd64,$(shell uname -m)),x86-64-v2 x86-64-v3 x86-64-v4,generic)
 WARM   ?= --for all
 
-.PHONY: demo demo-hardware test check lowest format wheel clean
+.PHONY: demo demo-hardware test check docs dist lowest format wheel clean
 
 demo: $(VENV)/.core
 	$(BIN)/relpos demo --out demo
@@ -30,6 +30,18 @@ check: $(VENV)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# The documentation as a site, build/docs/index.html; DOCS_ONLINE=1 links to other projects.
+docs: $(VENV)/.dev
+	$(BIN)/python -m sphinx --fail-on-warning --keep-going -q -b html docs build/docs
+
+# Source distribution and wheel; the wheel is installed into an empty environment and tried.
+dist: $(VENV)/.dev
+	rm -rf dist build/dist-env
+	$(BIN)/python -m build --no-isolation --outdir dist .
+	$(PYTHON) -m venv build/dist-env
+	build/dist-env/bin/python -m pip --disable-pip-version-check install --quiet -c constraints.txt dist/*.whl
+	cd build && dist-env/bin/relpos --version && dist-env/bin/python -c 'import tracking, relpos_env, agents, hardware_bridge'
 
 # Whether everything imports with the lowest versions that pyproject.toml admits.
 lowest: .venv-lowest/.installed

@@ -1,7 +1,7 @@
 """Simulated ranges beside real ones: same distances, same share behind an obstacle.
 
 The real ones are those that the channel `OUTDOOR` was fitted to; they are not part of the
-project. With a path as argument, the picture of `docs/simulator.md` is saved there.
+project. With a path as argument, the picture of `docs/explanation/simulator.md` is saved there.
 """
 
 import os

@@ -23,6 +23,6 @@
     The other end: nodes and cars behind ports, and what goes wrong with them.
 
 Host time is nanoseconds of a monotonic clock and always an argument; only what owns a port or a
-process reads one. Errors that a user can mend are `errors.BridgeError`. docs/architecture.md has
-the picture.
+process reads one. Errors that a user can mend are `errors.BridgeError`.
+docs/explanation/architecture.md has the picture.
 """

@@ -1,4 +1,4 @@
-"""On which systems what works; docs/safety.md has the table."""
+"""On which systems what works; docs/explanation/safety.md has the table."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def expect_linux(what: str) -> None:
         BridgeError: This is none.
     """
     if sys.platform != "linux":
-        raise BridgeError(f"{what} needs Linux, not {sys.platform}; see docs/safety.md, Systems")
+        raise BridgeError(f"{what} needs Linux, not {sys.platform}; see docs/explanation/safety.md")
 
 
 def expect_posix(what: str) -> None:
@@ -30,4 +30,4 @@ def expect_posix(what: str) -> None:
         BridgeError: This is Windows.
     """
     if sys.platform == "win32":
-        raise BridgeError(f"{what} needs Linux or macOS; see docs/safety.md, Systems")
+        raise BridgeError(f"{what} needs Linux or macOS; see docs/explanation/safety.md")

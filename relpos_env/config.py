@@ -52,7 +52,7 @@ class FormationConfig:
     `relpos_env.tasks.needs.DEFAULT_SCENARIO`."""
     task: str | TaskBuilder = "ring"
     """What is asked of the cars: one of `relpos_env.tasks.TASKS`, or of
-    [your own](adding.md#your-own-without-a-change-here)."""
+    [your own](../how-to/adding.md#your-own-without-a-change-here)."""
     task_options: Mapping[str, Any] = field(default_factory=dict)
     """The task's own options, by name."""
     n_cars: int | None = None

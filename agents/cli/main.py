@@ -44,9 +44,8 @@ class _Sections(click.Group):
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         width = max(len(name) for name in self.commands)
         for title, commands in SECTIONS.items():
-            rows = [
-                (str(c.name).ljust(width), c.get_short_help_str(limit=78 - width)) for c in commands
-            ]
+            limit = formatter.width - 6 - width
+            rows = [(str(c.name).ljust(width), c.get_short_help_str(limit)) for c in commands]
             with formatter.section(title):
                 formatter.write_dl(rows)
 

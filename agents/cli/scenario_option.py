@@ -38,5 +38,5 @@ def scenario_option(
         default=default,
         show_default=default is not None,
         multiple=multiple,
-        help=f"{', '.join(shipped_names())}, or a file *.toml{more}",
+        help=f"{', '.join(shipped_names())}, or a TOML file{more}",
     )

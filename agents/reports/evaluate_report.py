@@ -67,7 +67,7 @@ def notes(result: EvaluateResult) -> list[str]:
         lines += [
             "paper: Armani and Holz, ICRA 2024 [m], measured on hardware; everything else is "
             "simulation. The paper does not say which of the three errors it reports.",
-            "paper-ekf, paper-ekf-mds: the paper's algorithm as its text has it (docs/paper.md).",
+            "paper-ekf, paper-ekf-mds: the paper's algorithm as its text has it.",
         ]
     return lines
 

@@ -1,5 +1,5 @@
 /*
- * A car that obeys the driver `relpos`, see docs/drivers.md, and stops by itself.
+ * A car that obeys the driver `relpos`, see docs/reference/drivers.md, and stops by itself.
  *
  * It is plain C99 over board.h. Call car_start() once and car_loop() as often as possible. It has
  * a port of its own, and numbers of its own: a board that is node and car has two of both. Switch

@@ -1,8 +1,8 @@
 /*
- * A node: what it measures goes out in the wire format `relpos`, see docs/wire-format.md.
+ * A node: what it measures goes out in the wire format `relpos`, see docs/reference/wire-format.md.
  *
  * It is plain C99 over board.h. Call node_start() once and node_loop() as often as possible, a
- * thousand times a second or more. The board's own work is to range the others; docs/protocol.md
+ * thousand times a second or more. The board's own work is to range the others; docs/reference/protocol.md
  * has a protocol for that.
  */
 #include "board.h"

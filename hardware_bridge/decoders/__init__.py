@@ -1,6 +1,6 @@
 """Decoders: bytes of devices to readings.
 
-To add one: its file, and a line in `DECODERS`; docs/decoders.md says what it must give.
+To add one: its file, and a line in `DECODERS`; docs/reference/decoders.md says what it must give.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Positions of any other tracker, a JSON object a line; docs/positions.md has the format.
+"""Positions of any other tracker, a JSON object a line; docs/how-to/positions.md has the format.
 
     {"time": 81250000, "i": 1, "j": 2, "pos": [1.2, -0.4, 0.0], "vel": [0.1, 0.0, 0.0], "cov": 0.02}
     {"time": 81250000, "node": 1, "pos": [3.1, 0.2, 0.1], "q": [1, 0, 0, 0], "speed": 0.8}

@@ -1,4 +1,4 @@
-"""Our own nodes and cars: see docs/wire-format.md."""
+"""Our own nodes and cars: see docs/reference/wire-format.md."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 Every record starts with the file's own random marker and ends with a check sum over all before
 it, marker included. So a reader finds the next whole record behind a damaged place, and takes
-nothing for a record that stood in a payload or in another recording (`docs/recording.md`).
+nothing for a record that stood in a payload or in another recording (`docs/how-to/recording.md`).
 """
 
 from __future__ import annotations

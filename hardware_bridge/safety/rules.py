@@ -1,8 +1,8 @@
 """The rules of the gate, a table: each caps speeds, and may stop a car for good.
 
-A rule looks at one moment, arrays over (env, car), and remembers nothing. Comparisons are such that
-what is not a number, or comes from the future, counts as unwell. `docs/safety.md` has the table in
-words, and the reasoning behind the distances.
+A rule looks at one moment, arrays over (env, car), and remembers nothing. Comparisons are such
+that what is not a number, or comes from the future, counts as unwell.
+`docs/explanation/safety.md` has the table in words, and the reasoning behind the distances.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Rule(NamedTuple):
     meaning: str
     """What a user is told."""
     effect: str
-    """What it does, for `docs/safety.md`."""
+    """What it does, for `docs/explanation/safety.md`."""
 
 
 def silence(m: Moment, p: SafetyParams) -> Verdict:

@@ -1,7 +1,8 @@
 """The messages of our own nodes and cars, as data.
 
-Everything else follows from it: the tables of the codec (`hardware_bridge.wire.layout`), the table
-of docs/wire-format.md, and the C header of the firmware (`hardware_bridge.wire.c_header`).
+Everything else follows from it: the tables of the codec (`hardware_bridge.wire.layout`), the
+table of docs/reference/wire-format.md, and the C header of the firmware
+(`hardware_bridge.wire.c_header`).
 
 A number on the wire is a little-endian integer, `steps` to the unit. The
 quantisation of every measured value is far below the noise of the best sensor that is meant.

@@ -1,5 +1,5 @@
 /*
- * Wire format of relpos nodes and cars, version 1: see docs/wire-format.md.
+ * Wire format of relpos nodes and cars, version 1: see docs/reference/wire-format.md.
  *
  * Made from the definition by `python -m hardware_bridge.wire.c_header`; do not edit.
  * C99, one file, no memory but the caller's, nothing of the C library but types.

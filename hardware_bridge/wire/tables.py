@@ -1,4 +1,4 @@
-"""The tables of docs/wire-format.md, from the definition; `docs/make_tables.py` writes them."""
+"""Tables of docs/reference/wire-format.md, from the definition of the format."""
 
 from __future__ import annotations
 

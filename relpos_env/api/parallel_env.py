@@ -1,8 +1,8 @@
 """The PettingZoo environment: cars keep a formation on what their trackers tell them.
 
 Every step a car sees where its tracker believes the others to be (or, in the mode ``truth``,
-where they are), and answers with a speed and a steering angle. `docs/environment.md` has the
-tables of observations, actions and rewards.
+where they are), and answers with a speed and a steering angle. `docs/reference/environment.md`
+has the tables of observations, actions and rewards.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ Filters and worlds have parameters of different types on purpose. This is the on
 translates. Noise of sensors follows from their parameters; what the orientation stage makes of
 them (heading and slow acceleration errors), how tyres slip beyond what the filter knows and how
 often sight is lost were measured on simulated runs, as written beside the numbers
-(`docs/measure_world.py`).
+(`benchmarks/measure_world.py`).
 """
 
 from __future__ import annotations

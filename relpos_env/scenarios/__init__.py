@@ -1,6 +1,6 @@
 """Scenarios: rooms, obstacles, who moves, the sensors, and what changes from episode to episode.
 
-Those with cars are the files in `files/`; adding one: a file there. `docs/scenarios.md`.
+Those with cars are the files in `files/`; adding one: a file there. `docs/reference/scenarios.md`.
 """
 
 from __future__ import annotations

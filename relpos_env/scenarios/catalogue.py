@@ -53,7 +53,7 @@ def is_path(name_or_path: str | Path) -> bool:
 
 
 def load_scenario(path: str | Path) -> Scenario:
-    """Read a scenario from a TOML file, see `docs/scenarios.md`.
+    """Read a scenario from a TOML file, see `docs/reference/scenarios.md`.
 
     Raises:
         EnvError: No such file, no TOML, or something in it that is unknown or cannot be; names

@@ -1,6 +1,6 @@
 """The dynamic bicycle, compiled: servo, motor, tyres, roll and pitch of one car and of many.
 
-Derived in docs/vehicle.md. In the frame of the car (x forward, y left), with the wheels'
+Derived in docs/reference/vehicle.md. In the frame of the car (x forward, y left), with the wheels'
 rolling velocities u and side slips s at the rear and the front axle,
 
     m (v_x' - r v_y) = F_xr + F_xf cos d - F_yf sin d

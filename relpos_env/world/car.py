@@ -1,7 +1,7 @@
 """The car: a dynamic bicycle with a servo, a motor, tyres that can slide and a body that sways.
 
-Equations and closed forms in docs/vehicle.md. The centre of mass is the origin of the car and the
-middle of the box that collides; the axles stand where the weight on them says.
+Equations and closed forms in docs/reference/vehicle.md. The centre of mass is the origin of the
+car and the middle of the box that collides; the axles stand where the weight on them says.
 
 References:
     [1] F1TENTH Gym, parameters of a 1:10 car: friction 1.0489, cornering stiffness 4.718 and

@@ -3,7 +3,8 @@
 `PhysicsSpace.space` is an ordinary `pymunk.Space`. What is added to it (bodies, joints, shapes,
 collision handlers) moves and collides with the cars. Radios, distance sensors and pictures see
 each shape that is no sensor as a box: a polygon as the smallest rectangle around it, a circle as
-the square of its area. Shapes on the body of a car are part of it, and not seen."""
+the square of its area. Shapes on the body of a car are part of it, and not seen.
+"""
 
 from __future__ import annotations
 

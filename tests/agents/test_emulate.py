@@ -476,7 +476,7 @@ def test_signals_that_mean_something_else_are_left_alone():
 
 
 def test_the_page_holds():
-    page = (Path(__file__).resolve().parents[2] / "docs" / "emulator.md").read_text()
+    page = (Path(__file__).resolve().parents[2] / "docs" / "how-to" / "emulator.md").read_text()
     example = page.split("```toml\n")[1].split("```")[0]
     plan = parse_faults(tomllib.loads(example))
     assert plan.frames.reordering_by == 0.03

@@ -2,9 +2,10 @@
 
 python tests/hardware_bridge/fuzz_decoders.py [--chunks 1000000] [--trials 200000] [FORMAT ...]
 
-Prints two tables in Markdown, those of docs/decoders.md. Of the second each cell has three numbers:
-readings that differ from what was sent, without the bounds of `hardware_bridge.decoders.plausible`;
-the same with them; and of these the ones with a wrong distance to a device that is known.
+Prints two tables in Markdown, those of docs/reference/decoders.md. Of the second each cell has
+three numbers: readings that differ from what was sent, without the bounds of
+`hardware_bridge.decoders.plausible`; the same with them; and of these the ones with a wrong
+distance to a device that is known.
 """
 
 import argparse

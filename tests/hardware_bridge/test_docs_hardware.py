@@ -35,7 +35,7 @@ from tracking.measurements import Kind, MeasurementBlock
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "examples" / "firmware"
 EXAMPLE = ROOT / "examples" / "three_cars.toml"
-PAGE = (ROOT / "docs" / "hardware.md").read_text()
+PAGE = (ROOT / "docs" / "how-to" / "hardware.md").read_text()
 STRICT = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wconversion"]
 CAREFUL = ["-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
 KEY = bytes(range(16))
@@ -252,7 +252,7 @@ class TestExample:
 
 
 class TestPage:
-    """docs/hardware.md."""
+    """docs/how-to/hardware.md."""
 
     def test_the_start_keeps_to_its_place(self):
         """Half a metre, as long as the wheels hold what is asked."""

@@ -236,7 +236,7 @@ def test_other_versions_and_no_file_are_refused(place, tmp_path):
 
 
 def test_the_bytes_are_those_of_the_documentation(place):
-    """docs/recording.md, followed by hand."""
+    """docs/how-to/recording.md, followed by hand."""
 
     def record(kind, link, sequence, t_ns, payload):
         body = b"mark" + bytes([kind]) + link.to_bytes(2, "little")

@@ -1,7 +1,7 @@
 """Groups driven by policies that mean ill, with faults: the truth must keep what the gate holds.
 
-The first two tests are 1000 runs of 5 s with 2 to 4 cars, seeds 0 and 1; `docs/safety.md` has the
-figures.
+The first two tests are 1000 runs of 5 s with 2 to 4 cars, seeds 0 and 1;
+`docs/explanation/safety.md` has the figures.
 """
 
 import pytest

@@ -268,7 +268,7 @@ void imu_came(const float gyr[3], const float acc[3]);
 
 
 def test_the_firmware_of_the_page_compiles(tmp_path):
-    page = (HEADER.parents[2] / "docs" / "wire-format.md").read_text()
+    page = (HEADER.parents[2] / "docs" / "reference" / "wire-format.md").read_text()
     (code,) = re.findall(r"^```c\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
     include, _, rest = code.partition("\n")
     compile_c(tmp_path, f"{include}{FIRMWARE}{rest}", [*STRICT, "-c"])

@@ -1,4 +1,4 @@
-"""The vectors of docs/wire-format.md: bytes that do not change as long as the version does not."""
+"""The vectors of docs/reference/wire-format.md: bytes of this version never change."""
 
 import re
 from pathlib import Path
@@ -25,7 +25,7 @@ from hardware_bridge.readings import (
 from hardware_bridge.wire import definition as wire
 from hardware_bridge.wire.encoder import RelposEncoder
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "wire-format.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "reference" / "wire-format.md"
 GYR, ACC, MAG = (0.01, -0.02, 0.03), (0.0, 0.0, 9.81), (20.0, -1.5, -43.25)
 TURN = (0.6, 0.0, 0.0, -0.8)
 
@@ -56,7 +56,7 @@ VECTORS = [
 """Readings of node 3 and boot 7, their message and the numbers of its rows."""
 
 CODED = [bytes.fromhex(line) for line in
-         re.search(r"```hex\n(.*?)```", PAGE.read_text(), re.DOTALL)[1].replace(
+         re.search(r"```text\n(.*?)```", PAGE.read_text(), re.DOTALL)[1].replace(
              "\n  ", " ").splitlines()]  # fmt: skip
 PLAIN, SEALED = CODED[: len(VECTORS)], CODED[len(VECTORS) :]
 

@@ -18,23 +18,32 @@ from relpos_env.tasks import TASKS
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-MAKE = runpy.run_path(str(DOCS / "make_tables.py"))
+MAKE = runpy.run_path(str(ROOT / "benchmarks" / "make_tables.py"))
 CODE = re.compile(r"^```(?:python|toml)\n(.*?)^```", re.DOTALL | re.MULTILINE)
-TOP = ("tracking/", "relpos_env/", "agents/", "hardware_bridge/", "tests/", "docs/", "examples/")
+TOP = (
+    "tracking/",
+    "relpos_env/",
+    "agents/",
+    "hardware_bridge/",
+    "tests/",
+    "docs/",
+    "examples/",
+    "benchmarks/",
+)
 
 
 def snippets(page):
     return CODE.findall((DOCS / page).read_text())
 
 
-@pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda p: p.name)
+@pytest.mark.parametrize("page", sorted(DOCS.rglob("*.md")), ids=lambda p: p.name)
 def test_tables_are_those_of_the_code(page):
     text = page.read_text()
-    assert MAKE["rewrite"](text) == text, "run python docs/make_tables.py"
+    assert MAKE["rewrite"](text) == text, "run python benchmarks/make_tables.py"
 
 
 def test_every_table_is_somewhere():
-    pages = "".join(page.read_text() for page in DOCS.glob("*.md"))
+    pages = "".join(page.read_text() for page in DOCS.rglob("*.md"))
     assert all(f"<!-- table: {name} -->" in pages for name in MAKE["TABLES"])
 
 
@@ -57,7 +66,7 @@ def test_sizes_in_cars(at_two, at_three, size):
 
 
 def test_infos_are_told():
-    text = (DOCS / "environment.md").read_text()
+    text = (DOCS / "reference" / "environment.md").read_text()
     infos = text[text.index("## Infos") : text.index("## Options of a reset")]
     told = set(re.findall(r"^\| `(\w+)`", infos, re.MULTILINE)) | {"active"}
     options = {"observation": "truth", "max_cycles": 4}
@@ -71,12 +80,14 @@ def test_infos_are_told():
 
 @pytest.mark.parametrize("form", [FormationEnv, FormationGymEnv, FormationVectorEnv])
 def test_arguments_of_the_forms_are_told(form):
-    text = (DOCS / "environment.md").read_text()
+    text = (DOCS / "reference" / "environment.md").read_text()
     for name in list(inspect.signature(form).parameters)[:-1]:
         assert f"| `{name}` |" in text
 
 
-@pytest.mark.parametrize("code", snippets("environment.md"), ids=lambda c: c.splitlines()[0])
+@pytest.mark.parametrize(
+    "code", snippets("reference/environment.md"), ids=lambda c: c.splitlines()[0]
+)
 def test_snippets_run(code, tmp_path, monkeypatch):
     if "sb3" in code:
         pytest.importorskip("stable_baselines3")
@@ -86,7 +97,7 @@ def test_snippets_run(code, tmp_path, monkeypatch):
     exec(compile(code, "environment.md", "exec"), {})
 
 
-@pytest.mark.parametrize("code", snippets("adding.md"), ids=lambda c: c.splitlines()[0])
+@pytest.mark.parametrize("code", snippets("how-to/adding.md"), ids=lambda c: c.splitlines()[0])
 def test_quoted_code_is_that_of_the_file(code):
     """The first line names the file; where something is left out stands a line of three dots."""
     name, _, quoted = code.partition("\n")
@@ -95,7 +106,7 @@ def test_quoted_code_is_that_of_the_file(code):
         assert part.strip("\n") in text, part
 
 
-@pytest.mark.parametrize("page", [ROOT / "README.md", *sorted(DOCS.glob("*.md"))],
+@pytest.mark.parametrize("page", [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))],
                          ids=lambda p: p.name)  # fmt: skip
 def test_named_paths_exist(page):
     for name in re.findall(r"`([\w./*-]+/[\w./*-]*)`", page.read_text()):

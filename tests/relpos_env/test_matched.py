@@ -19,7 +19,7 @@ from relpos_env.core.oracle_params import (
 from relpos_env.scenarios import recordable
 from relpos_env.sensors.radio.channel import EXACT
 
-MEASURES = runpy.run_path(str(Path(__file__).parents[2] / "docs" / "measure_world.py"))
+MEASURES = runpy.run_path(str(Path(__file__).parents[2] / "benchmarks" / "measure_world.py"))
 
 
 @pytest.fixture(scope="module")

@@ -235,7 +235,7 @@ def test_any_change_of_a_files_text_loads_or_is_named(tmp_path_factory, at, text
 
 
 def test_the_manual_has_every_key():
-    text = (Path(__file__).parents[2] / "docs" / "scenarios.md").read_text()
+    text = (Path(__file__).parents[2] / "docs" / "reference" / "scenarios.md").read_text()
     kinds = (Scenario, Randomisation, Gap, Obstacle)
     missing = {name for kind in kinds for name in readable(kind) if f"`{name}`" not in text}
     assert not missing
@@ -243,7 +243,7 @@ def test_the_manual_has_every_key():
 
 
 def test_the_example_of_the_manual_loads(tmp_path):
-    text = (Path(__file__).parents[2] / "docs" / "scenarios.md").read_text()
+    text = (Path(__file__).parents[2] / "docs" / "reference" / "scenarios.md").read_text()
     example = text.split("```toml\n", 1)[1].split("```", 1)[0]
     s = load_scenario(save(tmp_path, example))
     assert draw_episode(s, 8, 60.0, np.random.default_rng(0)).present.sum() >= 2

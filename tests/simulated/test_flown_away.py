@@ -11,7 +11,7 @@ from tracking import Tracker
 from tracking.estimate import Status
 from tracking.measurements import Kind
 
-DOCS = Path(__file__).parents[2] / "docs"
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 AWAY = 30.0
 """[m] How far off, with 5 m/s of speed, and as certain as before."""
 
@@ -39,8 +39,8 @@ def errors_after(group, block, truth, gone, at, t):
 
 @pytest.fixture(scope="module")
 def space():
-    """What `docs/space_runs.py` defines."""
-    return runpy.run_path(str(DOCS / "space_runs.py"))
+    """What `benchmarks/space_runs.py` defines."""
+    return runpy.run_path(str(BENCHMARKS / "space_runs.py"))
 
 
 @pytest.fixture(scope="module")

@@ -13,15 +13,15 @@ from tracking.ahrs.params import OrientationParams
 from tracking.geometry import rotate
 from tracking.measurements import Kind, MeasurementBlock
 
-DOCS = Path(__file__).parents[2] / "docs"
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
 
 @pytest.fixture(scope="module")
 def measured():
     """The script that measures them, and the runs it is made of."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "path", [str(DOCS), *sys.path])
-        return runpy.run_path(str(DOCS / "measure_space.py"))
+        patch.setattr(sys, "path", [str(BENCHMARKS), *sys.path])
+        return runpy.run_path(str(BENCHMARKS / "measure_space.py"))
 
 
 @pytest.mark.parametrize("seed", [9, 11, 12, 13])
@@ -43,7 +43,7 @@ def test_a_swarm_of_drones_keeps_together(measured, seed):
 
 def test_the_tilt_of_a_drone_that_was_in_flight_at_the_start_does_not_swing():
     """The bias of its gyroscope is told by the tilt no faster than that is corrected."""
-    space = runpy.run_path(str(DOCS / "space_runs.py"))
+    space = runpy.run_path(str(BENCHMARKS / "space_runs.py"))
     rng, t = np.random.default_rng(4), np.arange(0.0, 60.0, 0.01)
     nodes = (NodeConfig(id=1, vehicle="drone", initial_heading=0.0), NodeConfig(id=2))
     constellation = Constellation(nodes=nodes, heading="initial")

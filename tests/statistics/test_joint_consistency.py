@@ -33,7 +33,7 @@ def runs():
 
 
 def test_errors_are_as_large_as_the_covariance_says(runs):
-    """Means of six short runs: wider than the band of 200 long ones in docs/tracker.md."""
+    """Means of six short runs: wider than the band of 200 long ones in the documents."""
     nees = np.array([r[0].nees for r in runs], dtype=float)
     assert 0.5 < np.mean(nees) < 1.7
 

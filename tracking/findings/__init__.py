@@ -1,4 +1,4 @@
-"""Findings: what is wrong with a recording, told before estimates are (`docs/findings.md`)."""
+"""Findings: what is wrong with a recording (`docs/reference/findings.md`)."""
 
 from __future__ import annotations
 

@@ -88,7 +88,7 @@ KINDS: dict[str, Kind] = {
     ),
     "never-placed": Kind("note", "a node was never placed", "range it with more of the others"),
 }
-"""By name. `docs/findings.md` shows it."""
+"""By name. `docs/reference/findings.md` shows it."""
 
 
 @dataclass(frozen=True, slots=True)

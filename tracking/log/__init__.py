@@ -1,4 +1,4 @@
-"""The log folder: a recorded run as plain files, format 1 (`docs/log-format.md`)."""
+"""The log folder: a recorded run as plain files, format 1 (`docs/reference/log-format.md`)."""
 
 from tracking.log.folder import Log
 from tracking.log.read import read_log

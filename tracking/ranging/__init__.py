@@ -1,4 +1,4 @@
-"""The ranging protocol, without a clock and without a radio; see `docs/protocol.md`."""
+"""The ranging protocol, without a clock and without a radio; see `docs/reference/protocol.md`."""
 
 from tracking.ranging.events import (
     DuplicateId,

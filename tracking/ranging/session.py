@@ -3,7 +3,7 @@
 The shell that owns the radio calls it when a preamble is detected, when a frame has arrived or
 broken off, and when the `deadline` has come; the session answers with frames to send at exact
 times and with events. All times are 40-bit stamps of the node's own radio clock.
-`docs/protocol.md` has the rules, the bytes and the tables of states.
+`docs/reference/protocol.md` has the rules, the bytes and the tables of states.
 """
 
 from __future__ import annotations

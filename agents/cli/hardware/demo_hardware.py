@@ -40,7 +40,7 @@ from agents.errors import UsageError
 @click.option(
     "--driver", default="relpos", show_default=True, help="Of the cars: relpos, vesc or pwm."
 )
-@click.option("--faults", type=Path, help="What goes wrong, a TOML file; see docs/emulator.md.")
+@click.option("--faults", type=Path, help="TOML file of faults; see docs/how-to/emulator.md.")
 @click.option(
     "--virtual", is_flag=True, help="In memory, under a virtual clock: as fast as it goes."
 )

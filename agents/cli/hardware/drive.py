@@ -23,7 +23,7 @@ EVERY = 10
 
 
 @click.command()
-@click.option("--config", type=Path, required=True, help="A swarm.toml, see docs/hardware.md.")
+@click.option("--config", type=Path, required=True, help="swarm.toml; see docs/how-to/hardware.md.")
 @click.option("--policy", metavar="NAME_OR_PATH", help="A trained policy drives.")
 @click.option(
     "--controller",

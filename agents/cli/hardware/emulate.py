@@ -60,7 +60,7 @@ from agents.errors import UsageError
     "--deadman", type=float, help="Seconds after which cars stop by themselves; by default 0.2."
 )
 @click.option("--no-operator", is_flag=True, help="Nobody holds a remote control.")
-@click.option("--faults", type=Path, help="What goes wrong, a TOML file; see docs/emulator.md.")
+@click.option("--faults", type=Path, help="TOML file of faults; see docs/how-to/emulator.md.")
 @click.option(
     "--wait",
     default=0.0,

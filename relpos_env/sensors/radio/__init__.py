@@ -1,1 +1,1 @@
-"""The air between the nodes: clocks, paths, collisions; `docs/simulator.md` tells what it does."""
+"""The air between the nodes: clocks, paths, collisions; see `docs/explanation/simulator.md`."""

@@ -11,7 +11,8 @@ as real multipath does:
     power gap   = gap + gap_near exp(-d / gap_length) [+ gap_nlos] + place LN(z5) + noise
 
 LN is a log-normal of mean 0 and unit variance; z5 shares parts with z3 and z4. White noise is
-added to the receive stamps and to the readings. `docs/simulator.md` shows what it is worth.
+added to the receive stamps and to the readings. `docs/explanation/simulator.md` shows what it is
+worth.
 """
 
 from __future__ import annotations

@@ -50,7 +50,7 @@ VECTORS = [
         "4188000000ffff01001305ff020200000002000000d0bd",
     ),
 ]  # fmt: skip
-"""Frames and their bytes, as in `docs/protocol.md`."""
+"""Frames and their bytes, as in `docs/reference/protocol.md`."""
 
 BYTE = st.integers(0, 255)
 STAMP = st.integers(0, MODULUS - 1) | st.sampled_from([0, 1, 2**32, MODULUS - 1])
@@ -257,6 +257,6 @@ def test_powers_are_quantised(rx_power, fp_power):
 
 
 def test_the_documentation_has_these_vectors():
-    text = (Path(__file__).parents[3] / "docs" / "protocol.md").read_text()
+    text = (Path(__file__).parents[3] / "docs" / "reference" / "protocol.md").read_text()
     hexes = text.replace(" ", "").replace("\n", "")
     assert all(data in hexes for _, data in VECTORS)

@@ -8,7 +8,7 @@ covariance is that of the group:
     correct     ranges, in sight or not (`range_update`); what is known about the carriers
     choose      among rotations and mirror images, by the likelihood of all that (`bank`)
 
-`docs/tracker.md` derives it and says what each part is worth.
+`docs/explanation/tracker.md` derives it and says what each part is worth.
 """
 
 from __future__ import annotations

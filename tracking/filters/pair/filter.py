@@ -1,9 +1,9 @@
 """One extended Kalman filter per pair, with or without MDS: the pipeline of the paper.
 
-The state of a pair is its relative position and velocity in the world frame,
-``x = (p_j - p_i, v_j - v_i)``. The relative orientation of the paper's state,
-``q_ij = q_i^-1 q_j``, is a function of the inputs alone and is reported from them; its
-covariance is the constant sum of both orientation noises ([1] eq. 8-9, `docs/tracker.md`).
+The state of a pair is its relative position and velocity in the world frame, ``x = (p_j - p_i,
+v_j - v_i)``. The relative orientation of the paper's state, ``q_ij = q_i^-1 q_j``, is a function
+of the inputs alone and is reported from them; its covariance is the constant sum of both
+orientation noises ([1] eq. 8-9, `docs/explanation/tracker.md`).
 
     predict     pos += dt vel + dt^2/2 (a_j - a_i),  vel += dt (a_j - a_i)
     correct     z = (range, its low-passed derivative),  h = (|pos|, u . vel)

@@ -2,7 +2,7 @@
 
 `reference.py` is the specification, equation by equation; this is the same, compiled. The filter
 takes nodes for their antennas, every range for line of sight, and never doubts its rotation: a pair
-is OK as soon as it runs. `docs/paper.md` has what it gives and what each option costs.
+is OK as soon as it runs. `docs/explanation/paper.md` has what it gives and what each option costs.
 
 References:
     [1] Armani, Holz, Accurately tracking relative positions of moving trackers based on UWB

@@ -22,7 +22,7 @@ class PaperParams:
     """Noise, gate and options of `paper-ekf` and `paper-ekf-mds`.
 
     Covariances are constant and diagonal, "determined empirically" in the paper. The defaults are
-    chosen on simulated runs of cars and people, seeds 1000 to 1009 (docs/paper.md).
+    chosen on simulated runs of cars and people, seeds 1000 to 1009 (docs/explanation/paper.md).
     """
 
     accel_std: float = 0.2

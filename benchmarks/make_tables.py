@@ -1,0 +1,426 @@
+"""Tables of the documents that follow from the code.
+
+python benchmarks/make_tables.py            writes them anew
+python benchmarks/make_tables.py --check    fails if one differs
+
+A table stands between ``<!-- table: NAME -->`` and ``<!-- end of table -->``.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import json
+import re
+import sys
+from collections.abc import Callable, Iterable
+from dataclasses import MISSING, Field, fields, is_dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from agents.settings import leaves
+from agents.training.config import TrainConfig
+from hardware_bridge.decoders import DECODERS
+from hardware_bridge.drivers import DRIVERS
+from hardware_bridge.safety.params import SafetyParams
+from hardware_bridge.safety.rules import RULES
+from hardware_bridge.wire.tables import header_table, message_table
+from relpos_env import config
+from relpos_env.interface.actions import ACTIONS, MAX_SPEED, MAX_STEERING, DiscreteActions
+from relpos_env.interface.observations import (
+    OBSERVATIONS,
+    index_table,
+    observation_mode,
+    total_size,
+)
+from relpos_env.scenarios import LEVELS, SCENARIOS, Scenario
+from relpos_env.sensors.radio.channel import CHANNELS
+from relpos_env.tasks import DEFAULT_WEIGHTS, TASKS
+from relpos_env.tasks.needs import DEFAULT_SCENARIO
+from tracking.ahrs.params import OrientationParams
+from tracking.filters.joint.hypotheses.alignment import TRANSITIONS, Alignment
+from tracking.filters.joint.params import JointParams
+from tracking.filters.joint.supervision.faults import ACTIONS as REMEDIES
+from tracking.filters.joint.supervision.faults import Fault
+from tracking.findings import KINDS
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCS, MEASURED = ROOT / "docs", ROOT / "benchmarks" / "results"
+CARS = 3
+"""So many cars have the observations whose indices are shown."""
+RESULTS = MEASURED / "tracker-results.jsonl"
+"""Figures of the filters, of `measure_results.py`."""
+BLOCK = re.compile(r"(<!-- table: ([\w-]+) -->\n).*?(<!-- end of table -->)", re.DOTALL)
+
+
+def markdown(head: Iterable[str], rows: Iterable[Iterable[str]], right: str = "") -> str:
+    """A table; `right` names the columns that are set to the right."""
+    head = list(head)
+    rule = ["--:" if name in right.split(", ") else "---" for name in head]
+    lines = ["| " + " | ".join(cells) + " |" for cells in (head, *rows)]
+    lines.insert(1, "|" + "|".join(rule) + "|")
+    return "\n".join(lines) + "\n"
+
+
+def in_others(at_two: int, at_three: int) -> str:
+    """A size that is linear in the number of cars n, from those for two and three."""
+    slope = at_three - at_two
+    rest = at_two - slope
+    if slope == 0:
+        return str(rest)
+    share = "n - 1" if slope == 1 else f"{slope} (n - 1)"
+    return f"{share} + {rest}" if rest else share
+
+
+def sizes() -> str:
+    """How long the observations of every mode are."""
+    rows = []
+    for name in OBSERVATIONS:
+        two, three = observation_mode(name, 2), observation_mode(name, CARS)
+        n = total_size(three.fields)
+        size = in_others(total_size(two.fields), n)
+        rows.append([f"`{name}`", size, str(n), "the truth" if two.needs_truth else "the tracker"])
+    rows[[r[0] for r in rows].index("`ranges`")][3] = "the radio; the heading is the tracker's"
+    return markdown(("mode", "size", "three cars", "from"), rows, right="three cars")
+
+
+def observations(mode: str) -> str:
+    """The vector of one mode: for three cars, and how it grows."""
+    small = observation_mode(mode, 2).fields
+    large = observation_mode(mode, CARS).fields
+    rows = []
+    for few, many, row in zip(small, large, index_table(large), strict=True):
+        last = f" to {row['last']}" if row["last"] > row["first"] else ""
+        size = in_others(few.size, many.size)
+        limits = f"{row['low']:g} to {row['high']:g}"
+        name = f"`{row['name']}`"
+        rows.append([f"{row['first']}{last}", name, size, row["unit"], limits, row["meaning"]])
+    return markdown(("index", "field", "size", "unit", "limits", "meaning"), rows)
+
+
+def continuous() -> str:
+    """What the two numbers of a continuous action mean."""
+    return markdown(
+        ("index", "values", "meaning"),
+        [
+            ["0", "-1 to 1", f"forward speed wanted, share of {MAX_SPEED:g} m/s"],
+            ["1", "-1 to 1", f"steering angle wanted, share of {MAX_STEERING:g} rad; left is +"],
+        ],
+    )
+
+
+def discrete() -> str:
+    """What every number of a discrete action means."""
+    mode = DiscreteActions()
+    assert isinstance(ACTIONS["discrete"](), DiscreteActions)
+    head = ["speed \\ steering [rad]", *(f"{angle:+.2f}" for angle in mode.angles)]
+    rows, number = [], 0
+    for speed in mode.speeds:
+        cells = []
+        for angle in mode.angles:
+            assert mode.decode(number, "") == (speed, angle)
+            cells.append(str(number))
+            number += 1
+        rows.append([f"{speed:g} m/s", *cells])
+    return markdown(head, rows, right=", ".join(head[1:]))
+
+
+def weights() -> str:
+    """Reward terms of every task and how much they count."""
+    terms: list[str] = []
+    for task in TASKS:
+        terms += [t for t in DEFAULT_WEIGHTS[task] if t not in terms]
+    rows = []
+    for task in TASKS:
+        default = config.configure({"task": task})
+        has = default.make_task(1).terms
+        cells = []
+        for term in terms:
+            weight = DEFAULT_WEIGHTS[task].get(term)
+            unused = "" if term in has else "*"
+            cells.append("" if weight is None else f"{weight:g}{unused}")
+        rows.append([f"`{task}`", f"`{DEFAULT_SCENARIO[task]}`", *cells])
+    return markdown(("task", "scenario", *terms), rows, right=", ".join(terms))
+
+
+def arguments() -> str:
+    """The fields of a configuration."""
+    told = docstrings(config.FormationConfig)
+    rows = []
+    for f in fields(config.FormationConfig):
+        rows.append([f"`{f.name}`", f"`{default_of(f)}`", told[f.name]])
+    return markdown(("argument", "default", "meaning"), rows)
+
+
+def default_of(f: Field[Any]) -> str:
+    """A default as one would write it."""
+    if f.default is not MISSING:
+        return repr(f.default)
+    assert f.default_factory is not MISSING
+    value = f.default_factory()
+    return repr(value) if isinstance(value, dict) else f"{type(value).__name__}()"
+
+
+def docstrings(cls: type) -> dict[str, str]:
+    """The strings under the fields of a dataclass or enum, each in one line."""
+    (body,) = ast.parse(inspect.getsource(cls)).body
+    assert isinstance(body, ast.ClassDef)
+    told = {}
+    for line, below in zip(body.body, body.body[1:], strict=False):
+        if not isinstance(line, ast.Assign | ast.AnnAssign) or not isinstance(below, ast.Expr):
+            continue
+        target = line.target if isinstance(line, ast.AnnAssign) else line.targets[0]
+        if isinstance(target, ast.Name) and isinstance(below.value, ast.Constant):
+            told[target.id] = " ".join(str(below.value.value).split())
+    return told
+
+
+def scenarios() -> str:
+    """The scenarios that come with the package."""
+    rows = []
+    for name in SCENARIOS:
+        s = SCENARIOS[name]
+        room = f"{s.room[0]:g} m x {s.room[1]:g} m"
+        boxes = str(len(s.obstacles)) if s.gap is None else f"a wall with a gap of {s.gap.width} m"
+        channel = next((k for k, c in CHANNELS.items() if c == s.radio.channel), "its own")
+        rows.append([f"`{name}`", room, str(s.n_cars), s.layout, boxes, channel, drawn(s)])
+    head = ("scenario", "room", "cars", "start", "obstacles", "radio", "drawn anew")
+    return markdown(head, rows, right="cars")
+
+
+def drawn(s: Scenario) -> str:
+    """What a scenario draws for every episode besides the poses."""
+    for k, level in enumerate(LEVELS):
+        if s.randomisation == level:
+            return f"level {k}" if k else ""
+    own = [f.name for f in fields(s.randomisation)]
+    least = [
+        (sum(getattr(s.randomisation, n) != getattr(level, n) for n in own), k)
+        for k, level in enumerate(LEVELS)
+    ]
+    _, nearest = min(least)
+    differ = [n for n in own if getattr(s.randomisation, n) != getattr(LEVELS[nearest], n)]
+    told = ", ".join(f"{n} {getattr(s.randomisation, n)}" for n in differ)
+    return f"level {nearest}, {told}"
+
+
+def training() -> str:
+    """Everything a training run depends on."""
+    rows = []
+    for leaf in leaves(TrainConfig):
+        default = ",".join(map(str, leaf.default)) if leaf.many else leaf.default
+        shown = f"`{default}`" if default != "" else "none"
+        rows.append([f"`--{leaf.name.replace('_', '-')}`", shown, leaf.help])
+    return markdown(("option", "default", "meaning"), rows)
+
+
+def driver(name: str) -> str:
+    """The options of a car driver."""
+    options = DRIVERS[name].options
+    told = docstrings(options)
+    rows = [[f"`{f.name}`", f"`{default_of(f)}`", told[f.name]] for f in fields(options)]
+    return markdown(("option", "default", "meaning"), rows)
+
+
+def decoders() -> str:
+    """The formats of devices that can be read."""
+    rows = []
+    for name, entry in DECODERS.items():
+        tells = ", ".join(kind.__name__.removesuffix("Reading").lower() for kind in entry.tells)
+        who = "itself" if entry.names_itself else "`node` of the link"
+        when = "its clock" if entry.has_time else "on arrival"
+        check = "with a key" if entry.keyed else "yes" if entry.checked else "no"
+        rows.append([f"`{name}`", entry.device, tells, who, when, str(entry.baud), check])
+    head = ("format", "device", "tells", "who speaks", "time", "baud", "check sum")
+    return markdown(head, rows, right="baud")
+
+
+def safety_rules() -> str:
+    """The rules of the safety gate, in the order in which reasons are told."""
+    rows = []
+    for rule in RULES:
+        does = inspect.getdoc(rule.check) or ""
+        rows.append([f"`{rule.name}`", does.partition("\n")[0], rule.effect, rule.meaning])
+    return markdown(("rule", "when", "then", "told as"), rows)
+
+
+def safety_limits() -> str:
+    """The limits of the safety gate."""
+    told = docstrings(SafetyParams)
+    rows = [[f"`{f.name}`", f"`{default_of(f)}`", told[f.name]] for f in fields(SafetyParams)]
+    return markdown(("limit", "default", "meaning"), rows)
+
+
+def alignment() -> str:
+    """The states of a group's alignment, and what follows each of them and why."""
+    rows = []
+    for state, following in TRANSITIONS.items():
+        then = "; ".join(f"{why}: `{after.name}`" for after, why in following.items())
+        rows.append([f"`{state.name}`", docstrings(Alignment)[state.name], then])
+    return markdown(("state", "what it is", "then"), rows)
+
+
+def faults() -> str:
+    """The catalogue of faults, and what is done about each."""
+    told = docstrings(Fault)
+    rows = [[f"`{f.name}`", " ".join(told[f.name].split()), do] for f, do in REMEDIES.items()]
+    return markdown(("fault", "what it is", "action"), rows)
+
+
+def findings() -> str:
+    """What may be amiss with a recording."""
+    order = ("error", "warning", "note")
+    kinds = sorted(KINDS.items(), key=lambda item: order.index(item[1].severity))
+    rows = [[f"`{name}`", kind.severity, kind.meaning, kind.remedy] for name, kind in kinds]
+    return markdown(("name", "severity", "meaning", "remedy"), rows)
+
+
+def second_world() -> str:
+    """Errors in the second world."""
+    head = ("", "worlds", "rmse_yaw / shape", "over the bound", "NEES", "`ok`", "`ok` and wrong",
+            "`ok` and within its accuracy")  # fmt: skip
+    rows = []
+    for line in (MEASURED / "second-world.jsonl").read_text().splitlines():
+        r = json.loads(line)
+        rows.append([
+            r["kind"], f"{r['worlds']}", f"{r['yaw']:.3f} / {r['shape']:.3f}",
+            f"{r['yaw_ratio']:.2f} / {r['shape_ratio']:.2f}", f"{r['nees']:.2f}",
+            f"{100.0 * r['ok']:.0f} %", f"{100.0 * r['wrong']:.2f} %",
+            f"{100.0 * r['within']:.1f} %",
+        ])  # fmt: skip
+    return markdown(head, rows, right=", ".join(head[1:]))
+
+
+def results(is_recording: bool) -> list[dict[str, Any]]:
+    """Lines of the recordings, or those of the simulated rooms."""
+    lines = [json.loads(line) for line in RESULTS.read_text().splitlines()]
+    return [line for line in lines if ("from" in line) == is_recording]
+
+
+def room_results() -> str:
+    """Errors of all filters in the rooms of the paper."""
+    head = ("room", "filter", "the paper's number (hardware)", "rmse", "rmse_yaw", "rmse_shape",
+            "bound yaw / shape", "ratio yaw / shape", "lost", "`ok`", "`ok` and wrong",
+            "NEES")  # fmt: skip
+    rows, before = [], ""
+    for r in results(is_recording=False):
+        bold = "**" if r["filter"] == "joint" else ""
+        bounds = r["bound_yaw"], r["bound_shape"]
+        ratios = (r[f"rmse_{name}"] / r[f"bound_{name}"] for name in ("yaw", "shape"))
+        rows.append([
+            r["case"] if r["case"] != before else "",
+            f"{bold}{r['filter']}{bold}",
+            "-" if r["paper"] is None else f"{r['paper']:.3f}",
+            f"{r['rmse']:.3f}", f"{r['rmse_yaw']:.3f}", f"{bold}{r['rmse_shape']:.3f}{bold}",
+            " / ".join(f"{x:.3f}" for x in bounds), " / ".join(f"{x:.2f}" for x in ratios),
+            f"{r['lost_runs']}/{r['seeds']}", f"{100.0 * r['ok_share']:.0f} %",
+            f"{100.0 * r['integrity_share']:.2f} %", f"{r['nees']:.1f}",
+        ])  # fmt: skip
+        before = r["case"]
+    return markdown(head, rows, right=", ".join(head[2:]))
+
+
+def recording_results() -> str:
+    """Errors on recordings, and those expected of an efficient estimator."""
+    found: dict[tuple[str, float], dict[str, str]] = {}
+    for r in results(is_recording=True):
+        errors = f"{r['rmse']:.2f} / {r['rmse_yaw']:.3f} / {r['rmse_shape']:.3f}"
+        found.setdefault((r["case"], r["from"]), {})[r["filter"]] = errors
+    names = ("joint", "efficient", "ekf-mds", "ekf")
+    rows = [
+        [f"{case}, from {first:g} s on", *(of[name] for name in names)]
+        for (case, first), of in found.items()
+    ]
+    return markdown(("recording", *names), rows)
+
+
+def mds_results() -> str:
+    """Errors of `joint` and of multidimensional scaling of each instant."""
+    rows = []
+    for line in map(json.loads, (MEASURED / "mds-results.jsonl").read_text().splitlines()):
+        errors = ["-" if line[k] is None else f"{line[k]:.2f}" for k in ("joint", "mds")]
+        rows.append([line["case"], str(line["nodes"]), *errors, str(line["instants"])])
+    head = ("recording", "nodes", "joint [m]", "MDS [m]", "instants with all pairs")
+    return markdown(head, rows, right=", ".join(head[1:]))
+
+
+def parameters(params: Any, names: tuple[str, ...]) -> str:
+    """Parameters of a stage, those of its parts among them."""
+    rows = []
+    for name in ("", *names):
+        part = getattr(params, name) if name else params
+        told = docstrings(type(part))
+        for f in fields(part):
+            value = getattr(part, f.name)
+            if not is_dataclass(value) and not isinstance(value, dict):
+                unit, _, meaning = told[f.name].replace("\n", " ").partition("]")
+                named = [
+                    f"`{name}{'.' * bool(name)}{f.name}`",
+                    f"`{value}`" if value in (None, True, False) else f"`{value:g}`",
+                    unit.lstrip("["),
+                ]
+                rows.append([*named, " ".join(meaning.split())])
+    return markdown(("parameter", "default", "unit", "meaning"), rows)
+
+
+TABLES: dict[str, Callable[[], str]] = {
+    "alignment": alignment,
+    "faults": faults,
+    "findings": findings,
+    "second-world": second_world,
+    "room-results": room_results,
+    "recording-results": recording_results,
+    "mds-results": mds_results,
+    "filter-parameters": partial(
+        parameters,
+        JointParams(),
+        ("range_error", "nlos", "noise_learning", "update", "start", "alignment", "supervision"),
+    ),
+    "orientation-parameters": partial(
+        parameters, OrientationParams(), ("bias", "rest", "magnetic", "sanity")
+    ),
+    "sizes": sizes,
+    **{f"observation-{mode}": partial(observations, mode) for mode in OBSERVATIONS},
+    "actions-continuous": continuous,
+    "actions-discrete": discrete,
+    "weights": weights,
+    "arguments": arguments,
+    "scenarios": scenarios,
+    "training": training,
+    **{f"driver-{name}": partial(driver, name) for name in DRIVERS},
+    "wire-header": lambda: markdown(*header_table(), right="offset"),
+    "wire-messages": lambda: markdown(*message_table()),
+    "decoders": decoders,
+    "safety-rules": safety_rules,
+    "safety-limits": safety_limits,
+}
+"""Name to what makes it."""
+
+
+def rewrite(text: str) -> str:
+    """A page with its tables made anew.
+
+    Raises:
+        KeyError: It has a table of which nothing is known.
+    """
+    return BLOCK.sub(lambda match: f"{match[1]}{TABLES[match[2]]()}{match[3]}", text)
+
+
+def main(check: bool) -> list[str]:
+    """Rewrite all pages, or only say which differ; returns their names."""
+    differ = []
+    for page in (*sorted(DOCS.rglob("*.md")), ROOT / "README.md"):
+        old = page.read_text()
+        new = rewrite(old)
+        if new != old:
+            differ.append(page.name)
+            if not check:
+                page.write_text(new)
+    return differ
+
+
+if __name__ == "__main__":
+    changed = main("--check" in sys.argv[1:])
+    print(", ".join(changed) if changed else "nothing to change")
+    sys.exit(1 if changed and "--check" in sys.argv[1:] else 0)

@@ -1,0 +1,62 @@
+"""How often pairs that are OK are off by more than their protection radius.
+
+Runs begin at any time of a minute's drive, walk or flight: the first 15 s after a start count, and
+a whole minute. Prints a line for each kind.
+
+Run `python benchmarks/measure_protection.py [STARTS] [FIRST]`.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+
+import numpy as np
+from measure_ablation import Case, case
+
+from tracking import Tracker
+from tracking.metrics.integrity import beyond_protection
+
+KINDS = ("cars-los", "cars-nlos", "human", "hand", "drones")
+PER_RUN = 10
+"""[-] Starts in each run."""
+LENGTH = 15.0
+"""[s]"""
+
+
+def started(of: Case, at: float) -> tuple[int, int]:
+    """OK samples of a tracker that begins at a time [s], and those beyond their radius."""
+    block = of.block.take((of.block.t[0] >= at) & (of.block.t[0] < at + LENGTH))
+    times = (of.t >= at) & (of.t < at + LENGTH)
+    estimate = Tracker(of.constellation).run(block, of.t[times]).take(0)
+    judged = of.known[times] & ~of.constellation.is_static[of.constellation.pairs].all(axis=1)
+    n = int((judged & estimate.ok).sum())
+    share = beyond_protection(estimate, of.truth[times], judged)
+    return n, round((share or 0.0) * n)
+
+
+def main() -> None:
+    """Measure every kind."""
+    given = [int(x) for x in sys.argv[1:]]
+    n_starts, first = [*given, *(2000, 20000)[len(given) :]][:2]
+    for kind in KINDS:
+        counts = []
+        for seed in range(first, first + n_starts // PER_RUN):
+            of = case(kind, seed)
+            starts = np.linspace(of.t[0], of.t[-1] - LENGTH, PER_RUN)
+            counts += [started(of, float(at)) for at in starts]
+            case.cache_clear()
+        ok, beyond = np.array(counts).T
+        line = {
+            "kind": kind,
+            "starts": len(counts),
+            "first": first,
+            "ok_samples": int(ok.sum()),
+            "beyond": float(beyond.sum() / max(ok.sum(), 1)),
+            "starts_beyond": float((beyond > 0).mean()),
+        }
+        print(json.dumps(line), flush=True)
+
+
+if __name__ == "__main__":
+    main()

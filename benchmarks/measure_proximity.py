@@ -1,0 +1,31 @@
+"""What distance sensors do for consensus, for the table of `docs/reference/controllers.md`.
+
+Run `python benchmarks/measure_proximity.py`; some minutes.
+"""
+
+from __future__ import annotations
+
+import runpy
+from itertools import product
+from pathlib import Path
+
+MEASURE = runpy.run_path(str(Path(__file__).parent / "measure_controllers.py"))["measure"]
+RUNS = (
+    ("hold", "ring-nlos"), ("hold", "cars-nlos"), ("travel", "hall"), ("follow", "hall"),
+)  # fmt: skip
+BEAMS = (0, 8, 16)
+SEEDS = (range(16), range(100, 132))
+
+
+def main() -> None:
+    """Print the rows of the table."""
+    for seeds, beams in product(SEEDS, BEAMS):
+        cells = []
+        for task, scenario in RUNS:
+            error, cars, others = MEASURE("consensus", task, scenario, "estimate", beams, seeds)
+            cells.append(f"{error:.3f} ({cars:.1f}, {others:.1f})")
+        print(f"| {seeds[0]} to {seeds[-1]} | {beams} | {' | '.join(cells)} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,39 @@
+"""Sphinx configuration of the documentation: `make docs`."""
+
+import os
+from importlib.metadata import version as installed
+
+project = "relpos-env"
+author = "The relpos-env developers"
+copyright = "2026, the relpos-env developers"
+version = release = installed("relpos-env")
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.intersphinx",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.viewcode",
+    "sphinx_click",
+    "sphinx_copybutton",
+]
+html_theme = "furo"
+html_title = f"relpos-env {release}"
+templates_path: list[str] = []
+exclude_patterns = ["images"]
+myst_enable_extensions = ["colon_fence", "dollarmath"]
+myst_heading_anchors = 4
+autodoc_member_order = "bysource"
+autodoc_typehints = "description"
+default_role = "code"
+copybutton_prompt_text = r"\$ |>>> "
+copybutton_prompt_is_regexp = True
+# Only where the network may be used: a page that cannot be fetched would be a warning.
+intersphinx_mapping = (
+    {
+        "gymnasium": ("https://gymnasium.farama.org", None),
+        "pettingzoo": ("https://pettingzoo.farama.org", None),
+    }
+    if os.environ.get("DOCS_ONLINE")
+    else {}
+)
