@@ -8,14 +8,14 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 
 IMAGES = Path(__file__).resolve().parents[1] / "docs" / "images"
-WIDE, HIGH, GAP = 1.25, 0.9, 0.55
+WIDE, HIGH, GAP = 1.75, 1.05, 0.5
 
 
 def main() -> None:
     """Read boxes and arrows and draw them."""
     mpl.rcParams["svg.hashsalt"] = "architecture"
     boxes: dict[str, tuple[float, float, float]] = {}
-    fig, ax = plt.subplots(figsize=(11.5, 5.4))
+    fig, ax = plt.subplots(figsize=(13.5, 4.6))
     for line in (IMAGES / "architecture.txt").read_text().splitlines():
         if line.startswith("#") or not line.strip():
             continue
@@ -27,7 +27,7 @@ def main() -> None:
             boxes[names[0]] = (x, y, w)
             ax.add_patch(plt.Rectangle((x, y), w, HIGH, fc="#eef3f8", ec="#33536f", lw=1.2))
             text = "\n".join(parts[1:])
-            ax.text(x + w / 2, y + HIGH / 2, text, ha="center", va="center", fontsize=8.5)
+            ax.text(x + w / 2, y + HIGH / 2, text, ha="center", va="center", fontsize=8)
         else:
             _arrow(ax, boxes[names[0]], boxes[names[1]], parts[0])
     ax.set_aspect("equal")

@@ -64,9 +64,9 @@ def draw_room(
         if target is not None:
             at = places[viewer][0] + target[0], places[viewer][1] + target[1]
             put(*at, "+", COLOURS[n % len(COLOURS)])
-    for n, belief in enumerate(frames["estimate"][k]):
-        if belief is not None:
-            at = places[viewer][0] + belief[0], places[viewer][1] + belief[1]
+    for n, estimate in enumerate(frames["estimate"][k]):
+        if estimate is not None:
+            at = places[viewer][0] + estimate[0], places[viewer][1] + estimate[1]
             put(*at, "o", COLOURS[n % len(COLOURS)])
     arrows = PLAIN_ARROWS if plain else ARROWS
     for n, (place, heading) in enumerate(zip(places, frames["heading"][k], strict=True)):

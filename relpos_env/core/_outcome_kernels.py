@@ -1,4 +1,4 @@
-"""What came of a step: rewards, who takes part, what is over, and how far beliefs are off."""
+"""What came of a step: rewards, who takes part, what is over, and how far estimates are off."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def tracking_errors(body, believed, ok, out):
     Args:
         body: The truth: x and y first, (env, car, 6) [m].
         believed: (env, car, other, 2) [m]
-        ok: Where a belief can be used, (env, car, other).
+        ok: Where an estimate can be used, (env, car, other).
         out: (env, car) [m], written; NaN where none can.
     """
     for e in range(out.shape[0]):

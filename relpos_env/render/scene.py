@@ -120,6 +120,6 @@ class Scene:
         write(self._picture, f"t = {snapshot.t:.1f} s", (left, y), 13 * u, palette.INK)
         colour = palette.mix(palette.car_colour(snapshot.viewer), palette.INK, 0.2)
         write(
-            self._picture, f"belief of car {snapshot.viewer}", (head.right - 14 * u, y), 13 * u,
+            self._picture, f"estimates of car {snapshot.viewer}", (head.right - 14 * u, y), 13 * u,
             colour, bold=True, anchor=(1.0, 0.5),
         )  # fmt: skip

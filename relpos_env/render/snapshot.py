@@ -19,11 +19,11 @@ _SHAPES: dict[str, tuple[int | str, ...]] = {
     "steering": ("car",),
     "present": ("car",),
     "powered": ("car",),
-    "belief": ("car", 2),
-    "belief_cov": ("car", 2, 2),
-    "belief_ok": ("car",),
-    "belief_status": ("car",),
-    "belief_heading": ("car",),
+    "estimate": ("car", 2),
+    "estimate_cov": ("car", 2, 2),
+    "estimate_ok": ("car",),
+    "estimate_status": ("car",),
+    "estimate_heading": ("car",),
     "links": ("pair", 3),
     "target": ("car", 2),
     "has_target": ("car",),
@@ -66,19 +66,19 @@ class Snapshot:
     car_size: tuple[float, float]
     """[m] Length, width."""
     viewer: int
-    """The car whose belief is drawn."""
-    belief: F64
+    """The car whose estimate is drawn."""
+    estimate: F64
     """Where the viewer believes the others to be, relative to itself, on the axes that it takes
     for the world's, (car, 2) [m]. The viewer's own row is not used."""
-    belief_cov: F64
+    estimate_cov: F64
     """Covariance of that, (car, 2, 2) [m2]."""
-    belief_ok: Bool
+    estimate_ok: Bool
     """The viewer may use it, (car)."""
-    belief_status: I64
+    estimate_status: I64
     """A `tracking.estimate.Status`, (car). Nothing is drawn of ABSENT and STARTING."""
-    belief_heading: F64 | None = None
+    estimate_heading: F64 | None = None
     """Headings as the viewer believes, (car) [rad]. With them, ghosts are turned like cars, and
-    the belief is turned by the error of the viewer's own heading."""
+    the estimate is turned by the error of the viewer's own heading."""
     links: I64
     """Cars i and j and the kind of their link, (pair, 3): 0 line of sight, 1 none, 2 no range
     lately."""
@@ -95,7 +95,7 @@ class Snapshot:
     formation_error: F64
     """Distance from the wanted formation, (time) [m]; gaps where it is not finite."""
     tracking_error: F64
-    """Distance of the belief from the truth, (time) [m]; gaps where it is not finite."""
+    """Distance of the estimate from the truth, (time) [m]; gaps where it is not finite."""
     title: str = ""
 
     def __post_init__(self) -> None:

@@ -16,7 +16,7 @@ from relpos_env.render.parts import car_shape
 from relpos_env.render.parts.boxes import hatching
 from relpos_env.render.parts.dashes import dashed
 from relpos_env.render.parts.error_plot import error_axis, stretches
-from relpos_env.render.parts.estimates import ellipse, placed_belief
+from relpos_env.render.parts.estimates import ellipse, placed_estimate
 from tracking.estimate import Status
 
 SIZE = (480, 360)
@@ -40,11 +40,11 @@ def make_snapshot(n=4, **changes):
         "powered": np.arange(n) != 1,
         "car_size": (0.42, 0.2),
         "viewer": 0,
-        "belief": pos - pos[0] + 0.2,
-        "belief_cov": np.tile(np.diag([0.03, 0.01]), (n, 1, 1)),
-        "belief_ok": status == Status.OK,
-        "belief_status": status,
-        "belief_heading": angle + 0.5 * np.pi,
+        "estimate": pos - pos[0] + 0.2,
+        "estimate_cov": np.tile(np.diag([0.03, 0.01]), (n, 1, 1)),
+        "estimate_ok": status == Status.OK,
+        "estimate_status": status,
+        "estimate_heading": angle + 0.5 * np.pi,
         "links": np.array(pairs).reshape(-1, 3),
         "target": pos - pos[0],
         "has_target": np.ones(n, dtype=bool),
@@ -70,7 +70,8 @@ def empty_room(**changes):
     changes = {
         "boxes": np.zeros((0, 6)), "movable": np.zeros(0, dtype=bool), "goal": None, "path": None,
         "links": np.zeros((0, 3), dtype=np.int64), "has_target": np.zeros(4, dtype=bool),
-        "belief_status": np.zeros(4, dtype=np.int64), "powered": np.ones(4, dtype=bool), **changes,
+        "estimate_status": np.zeros(4, dtype=np.int64), "powered": np.ones(4, dtype=bool),
+        **changes,
     }  # fmt: skip
     return make_snapshot(**changes)
 
@@ -118,11 +119,11 @@ CHANGES = {
     "present": lambda s: np.arange(4) != 2,
     "powered": lambda s: ~s.powered,
     "viewer": lambda s: 2,
-    "belief": lambda s: s.belief + 0.2,
-    "belief_cov": lambda s: 2.0 * s.belief_cov,
-    "belief_ok": lambda s: ~s.belief_ok,
-    "belief_status": lambda s: np.roll(s.belief_status, 1),
-    "belief_heading": lambda s: s.belief_heading + 0.3,
+    "estimate": lambda s: s.estimate + 0.2,
+    "estimate_cov": lambda s: 2.0 * s.estimate_cov,
+    "estimate_ok": lambda s: ~s.estimate_ok,
+    "estimate_status": lambda s: np.roll(s.estimate_status, 1),
+    "estimate_heading": lambda s: s.estimate_heading + 0.3,
     "links": lambda s: s.links[::-1] % 3 * [1, 1, 0] + [0, 0, 1],
     "target": lambda s: 1.2 * s.target,
     "has_target": lambda s: ~s.has_target,
@@ -160,7 +161,9 @@ def test_absent_cars_leave_an_empty_room():
 
 def test_a_viewer_that_is_absent_believes_nothing():
     gone = {"present": np.arange(4) != 0}
-    ideas = draw(empty_room(**gone, belief_status=np.full(4, 3), has_target=np.ones(4, dtype=bool)))
+    ideas = draw(
+        empty_room(**gone, estimate_status=np.full(4, 3), has_target=np.ones(4, dtype=bool))
+    )
     np.testing.assert_array_equal(ideas, draw(empty_room(**gone)))
 
 
@@ -185,14 +188,14 @@ def test_cars_are_where_they_are_and_point_ahead(heading):
 
 def test_ghosts_stand_at_the_viewer_plus_the_belief():
     pose = np.array([[1.0, 1.0, 0.0], [-2, 2, 0], [-2, 0, 0], [2, 2, 0]])
-    belief = np.array([[0.0, 0.0], [-1.5, -2.5], [0, 0], [0, 0]])
+    estimate = np.array([[0.0, 0.0], [-1.5, -2.5], [0, 0], [0, 0]])
     status = np.array([0, int(Status.OK), 0, 0])
     snapshot = empty_room(
-        pose=pose, belief=belief, belief_status=status, belief_ok=status == 3,
-        belief_heading=None, belief_cov=np.zeros((4, 2, 2)),
+        pose=pose, estimate=estimate, estimate_status=status, estimate_ok=status == 3,
+        estimate_heading=None, estimate_cov=np.zeros((4, 2, 2)),
     )  # fmt: skip
     with_ghost = draw(snapshot, (960, 720))
-    without = draw(replace(snapshot, belief_status=np.zeros(4, dtype=np.int64)), (960, 720))
+    without = draw(replace(snapshot, estimate_status=np.zeros(4, dtype=np.int64)), (960, 720))
     inside = np.array([-0.5, -1.55])
     np.testing.assert_array_equal(pixel(without, snapshot, inside), palette.FLOOR)
     np.testing.assert_array_less(
@@ -204,10 +207,10 @@ def test_belief_turns_with_the_error_of_the_viewers_heading():
     pose = np.zeros((2, 3))
     pose[0] = [1.0, 0.0, 0.7]
     snapshot = make_snapshot(
-        n=2, pose=pose, belief=np.array([[0.0, 0.0], [2.0, 0.0]]),
-        belief_heading=np.array([0.7 - 0.5 * np.pi, 0.2]),
+        n=2, pose=pose, estimate=np.array([[0.0, 0.0], [2.0, 0.0]]),
+        estimate_heading=np.array([0.7 - 0.5 * np.pi, 0.2]),
     )  # fmt: skip
-    pos, cov, turn = placed_belief(snapshot)
+    pos, cov, turn = placed_estimate(snapshot)
     np.testing.assert_allclose(pos[1], [1.0, 2.0], atol=1e-12)
     np.testing.assert_allclose(cov[1], np.diag([0.01, 0.03]), atol=1e-12)
     assert turn == pytest.approx(0.5 * np.pi)
@@ -215,10 +218,12 @@ def test_belief_turns_with_the_error_of_the_viewers_heading():
 
 def test_what_is_not_finite_or_far_off_is_not_drawn():
     blank = empty_room()
-    for belief in (np.nan, np.inf, 1e9):
-        wild = empty_room(belief=np.full((4, 2), belief), belief_status=np.full(4, 3))
+    for estimate in (np.nan, np.inf, 1e9):
+        wild = empty_room(estimate=np.full((4, 2), estimate), estimate_status=np.full(4, 3))
         np.testing.assert_array_equal(draw(wild), draw(blank))
-    vast = empty_room(belief_cov=np.tile(1e12 * np.eye(2), (4, 1, 1)), belief_status=np.full(4, 3))
+    vast = empty_room(
+        estimate_cov=np.tile(1e12 * np.eye(2), (4, 1, 1)), estimate_status=np.full(4, 3)
+    )
     assert draw(vast).shape == (SIZE[1], SIZE[0], 3)
 
 
@@ -302,7 +307,7 @@ def test_stretches_are_the_runs_of_a_mask():
     [
         ({"pose": np.zeros((4, 2))}, "pose"),
         ({"steering": np.zeros(5)}, "steering"),
-        ({"belief_cov": np.zeros((4, 2))}, "belief_cov"),
+        ({"estimate_cov": np.zeros((4, 2))}, "estimate_cov"),
         ({"movable": np.zeros(3, dtype=bool)}, "movable"),
         ({"tracking_error": np.zeros(3)}, "tracking_error"),
         ({"goal": np.zeros((7, 2))}, "goal"),

@@ -53,7 +53,7 @@ def draw_viewer(canvas: Canvas, layout: Layout, snapshot: Snapshot) -> None:
 
 
 def draw_halo(canvas: Canvas, centre: F64, radius: float, colour: Colour) -> None:
-    """The ring of light round the car whose belief is drawn [pixels]."""
+    """The ring of light round the car whose estimate is drawn [pixels]."""
     canvas.circle(centre, radius, palette.mix(colour, palette.FLOOR, 0.86))
     canvas.circle(centre, radius, palette.mix(colour, palette.FLOOR, 0.15), 1.4)
 

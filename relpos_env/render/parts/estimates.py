@@ -46,45 +46,45 @@ def ellipse(cov: F64, sigmas: float = SIGMAS, most: float = np.inf) -> F64:
     return outline
 
 
-def placed_belief(snapshot: Snapshot) -> tuple[F64, F64, float]:
-    """The belief in the room: positions (car, 2) [m], covariances, turn of its axes [rad].
+def placed_estimate(snapshot: Snapshot) -> tuple[F64, F64, float]:
+    """The estimate in the room: positions (car, 2) [m], covariances, turn of its axes [rad].
 
     The viewer takes its own heading for the axes: where it errs, all it believes is turned
-    round it. Without ``belief_heading`` the axes count as true.
+    round it. Without ``estimate_heading`` the axes count as true.
     """
     turn = 0.0
-    if snapshot.belief_heading is not None:
-        turn = float(snapshot.pose[snapshot.viewer, 2] - snapshot.belief_heading[snapshot.viewer])
+    if snapshot.estimate_heading is not None:
+        turn = float(snapshot.pose[snapshot.viewer, 2] - snapshot.estimate_heading[snapshot.viewer])
     c, s = np.cos(turn), np.sin(turn)
     rotation = np.array([[c, -s], [s, c]])
     with np.errstate(invalid="ignore"):  # of what is not finite nothing is drawn
-        pos = snapshot.pose[snapshot.viewer, :2] + snapshot.belief @ rotation.T
-        return pos, rotation @ snapshot.belief_cov @ rotation.T, turn
+        pos = snapshot.pose[snapshot.viewer, :2] + snapshot.estimate @ rotation.T
+        return pos, rotation @ snapshot.estimate_cov @ rotation.T, turn
 
 
 def draw_ghosts(canvas: Canvas, layout: Layout, snapshot: Snapshot) -> None:
     """The ghost of every car the viewer has an idea of, with an ellipse of two sigmas."""
     if not snapshot.present[snapshot.viewer]:
         return
-    pos, cov, turn = placed_belief(snapshot)
+    pos, cov, turn = placed_estimate(snapshot)
     far = 2.0 * float(np.hypot(*snapshot.room))
     for car in np.flatnonzero(snapshot.present).tolist():
-        status = int(snapshot.belief_status[car])
+        status = int(snapshot.estimate_status[car])
         known = np.all(np.isfinite(pos[car])) and np.all(np.isfinite(cov[car]))
         if car == snapshot.viewer or status not in PATTERNS or not known:
             continue
         if np.max(np.abs(pos[car])) > far:
             continue
         colour, pattern = palette.car_colour(car), PATTERNS[status]
-        ok = bool(snapshot.belief_ok[car])
+        ok = bool(snapshot.estimate_ok[car])
         x, y = pos[car].tolist()
         around = layout.pixels(ellipse(cov[car], most=far) + pos[car])
         draw_ellipse(canvas, around, colour, pattern, ok=ok)
-        if snapshot.belief_heading is None:
+        if snapshot.estimate_heading is None:
             outline = 0.4 * snapshot.car_size[0] * _CIRCLE.T
             body = layout.pixels(outline + pos[car])
         else:
-            heading = float(snapshot.belief_heading[car]) + turn
+            heading = float(snapshot.estimate_heading[car]) + turn
             body = layout.shape(car_shape.BODY * snapshot.car_size, x, y, heading)
         truth = layout.pixels(snapshot.pose[car, :2])
         faint = palette.mix(colour, palette.FLOOR, 0.35)

@@ -36,7 +36,7 @@ _LENGTH = 27.0
 def entries(snapshot: Snapshot) -> tuple[str, ...]:
     """What the legend of a snapshot explains, in order."""
     size = np.asarray(snapshot.boxes)[:, 2:4].min(axis=1) > 0.0
-    names = ["car", "viewer", "belief", "ambiguous", "doubtful", "lost"]
+    names = ["car", "viewer", "estimate", "ambiguous", "doubtful", "lost"]
     names += ["sight", "no sight", "no range", "place"]
     names += ["goal"] if snapshot.goal is not None else []
     names += ["path"] if snapshot.path is not None else []
@@ -139,7 +139,7 @@ def _no_power(canvas: Canvas, layout: Layout, at: F64) -> None:
 _SIGNS: dict[str, Callable[[Canvas, Layout, F64], None]] = {
     "car": _car,
     "viewer": _viewer,
-    "belief": _ghost(Status.OK),
+    "estimate": _ghost(Status.OK),
     "ambiguous": _ghost(Status.AMBIGUOUS),
     "doubtful": _ghost(Status.DOUBTFUL),
     "lost": _ghost(Status.LOST),
@@ -154,17 +154,17 @@ _SIGNS: dict[str, Callable[[Canvas, Layout, F64], None]] = {
     "no power": _no_power,
 }
 _WORDS = {
-    "car": "car, where it is",
-    "viewer": "car whose belief is shown",
-    "belief": "belief, ellipse of 2σ",
-    "ambiguous": "belief, ambiguous",
-    "doubtful": "belief, doubtful",
-    "lost": "belief, lost",
+    "car": "car, true position",
+    "viewer": "car whose estimates are shown",
+    "estimate": "estimate, 2σ ellipse",
+    "ambiguous": "estimate, ambiguous",
+    "doubtful": "estimate, doubtful",
+    "lost": "estimate, lost",
     "sight": "line of sight",
     "no sight": "no line of sight",
     "no range": "no range lately",
-    "place": "wanted place",
-    "goal": "place in the plan",
+    "place": "target",
+    "goal": "target in the plan",
     "path": "path of the plan",
     "fixed": "obstacle",
     "movable": "obstacle that moves",

@@ -23,7 +23,7 @@ STYLES: dict[int, Style] = {
 def draw_links(canvas: Canvas, layout: Layout, snapshot: Snapshot) -> None:
     """A line for every pair of which both cars are present."""
     pixels = layout.pixels(snapshot.pose[:, :2])
-    # Among many links those of the viewer stand out, since it is the viewer's belief they make.
+    # Among many links those of the viewer stand out, since it is the viewer's estimate they make.
     fade = min(max(0.01 * (len(snapshot.links) - 10), 0.0), 0.7)
     for i, j, kind in snapshot.links.tolist():
         if snapshot.present[i] and snapshot.present[j] and kind in STYLES:
