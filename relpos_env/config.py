@@ -62,15 +62,16 @@ class FormationConfig:
     observation: str | ModeBuilder = "estimate"
     """One of `relpos_env.interface.observations.OBSERVATIONS`, or of your own."""
     history: int = 1
-    """So many observations in one, the newest first."""
+    """Number of stacked observations, the newest first."""
     proximity: int = 0
-    """Beams that measure distances round each car, 0 to 32; they end observations."""
+    """Number of distance sensors of each car, 0 to 32; their readings are appended to the
+    observation."""
     actions: str | Callable[[], ActionMode] = "continuous"
     """One of `relpos_env.interface.actions.ACTIONS`, or of your own."""
     filter: str | FilterBuilder = DEFAULT_FILTER
     """Position filter of the trackers, one of `tracking.filters.FILTERS`, or of your own."""
     params: TrackerParams | None = None
-    """What the trackers believe; by default `relpos_env.core.tracked_world.default_params`."""
+    """Parameters of the tracker; by default `relpos_env.core.tracked_world.default_params`."""
     operator: OperatorSimParams = field(default_factory=OperatorSimParams)
     """The operator who tells the group where to go."""
     weights: Mapping[str, float] | None = None

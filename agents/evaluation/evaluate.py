@@ -205,12 +205,12 @@ def check_filters(names: Iterable[str]) -> tuple[str, ...]:
     """
     chosen = tuple(dict.fromkeys(names))
     if not chosen:
-        raise UsageError(f"--filters: expected names of {', '.join(FILTERS)}, got none")
+        raise UsageError(f"--filter: expected names of {', '.join(FILTERS)}, got none")
     try:
         for name in chosen:
             filter_builder(name)
     except ConfigError as error:
-        raise UsageError(f"--filters: {error}") from error
+        raise UsageError(f"--filter: {error}") from error
     return chosen
 
 

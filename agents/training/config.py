@@ -42,8 +42,8 @@ class EnvSetup:
     """Weights of reward terms that differ from the task's own, TERM=WEIGHT."""
     final_weights: tuple[str, ...] = ()
     """Weights that differ from those in the end, TERM=WEIGHT: they go there while a quarter to half
-    of the run is done. Policies are judged by these. What helps to find out how to drive need not
-    be what driving is for, and care may cost more once there is something to lose."""
+    of the run is done. Policies are judged by these. Anneals shaping rewards, and raises the
+    price of collisions late in training."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,17 +53,16 @@ class Networks:
     width: int = number(64, 4, 1024)
     """Units of each layer."""
     depth: int = number(2, 1, 6)
-    """Layers for each of the others, before the mean."""
+    """Layers applied to each other car, before the mean."""
     layers: int = number(2, 1, 6)
-    """Layers behind it."""
+    """Layers after the mean."""
     critic: Literal["own", "central"] = "own"
-    """What the critic sees: what the car sees, or the truth of all cars as well."""
+    """Input of the critic: the car's observation, or the truth of all cars too."""
     log_std: float = number(-1.0, -5, 1)
     """[-] Logarithm of the standard deviation of actions at first."""
     final_log_std: float = number(-2.3, -5, 1)
-    """[-] The most that it may be in the end: a bound falls to this from `log_std` while half to
-    seven tenths of the run are done. What drives later has no such noise, and should not need
-    it."""
+    """[-] Upper limit at the end. The limit falls linearly from `log_std` between 50 % and 70 %
+    of the run, since deployed policies act without this noise."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,14 +78,14 @@ class Ppo:
     epochs: int = number(5, 1, 100)
     """Times that every transition is learned from."""
     reward_scale: float = number(0.05, 1e-06, 1000)
-    """[-] Rewards are multiplied by it for the learner alone. Returns so are of the order of one:
-    the critic's gradient would else be most of what is clipped, and leave the actor little."""
+    """[-] Rewards are multiplied by it for the learner alone. Scales returns to about 1;
+    otherwise the value loss dominates the clipped gradient."""
     learning_rate: float = number(1e-3, 1e-07, 1)
     """[-] At first; falls to a hundredth along half a cosine."""
     gamma: float = number(0.95, 0, 1)
     """[-] Discount of a decision of 0.1 s: 2 s are foreseen."""
     gae_lambda: float = number(0.9, 0, 1)
-    """[-] Of the generalised advantage estimate."""
+    """[-] Decay of the generalised advantage estimate."""
     clip: float = number(0.2, 0.01, 1)
     """[-] Largest relative change of a probability by an update."""
     entropy: float = number(0.0, 0, 1)

@@ -119,7 +119,7 @@ def test_a_recorded_run_is_that_of_relpos_simulate():
 
 
 def test_command_line_writes_a_report_and_rows(tmp_path):
-    args = ("--seconds", 15, "--seeds", 1, "--suite", "scaling", "--filters", "ekf")
+    args = ("--seconds", 15, "--seeds", 1, "--suite", "scaling", "--filter", "ekf")
     done = relpos("evaluate", *args, "--json", "--out", tmp_path / "out")
     assert done.returncode == 0, done.stderr
     rows = [json.loads(line) for line in done.stdout.splitlines()]
@@ -142,8 +142,11 @@ def test_command_line_writes_a_report_and_rows(tmp_path):
     ("args", "message"),
     [
         (["--suite", "moon"], "--suite: expected one of paper, robustness, scaling, got 'moon'"),
-        (["--filters", "joint,magic"], "--filters: filter: expected one of joint, ekf-mds, ekf"),
-        (["--filters", ""], "--filters: filter: expected one of"),
+        (
+            ["--filter", "joint", "--filter", "magic"],
+            "--filter: filter: expected one of joint, ekf-mds, ekf",
+        ),
+        (["--filter", ""], "--filter: filter: expected one of"),
         (["--seeds", "0"], "--seeds: expected 1 to 100000, got 0"),
         (["--jobs", "0"], "--jobs: expected 1 to 1024, got 0"),
         (["--seconds", "12"], "--seconds: expected 15 to 1800, got 12"),
@@ -161,7 +164,7 @@ def test_faults_end_in_one_line_and_write_nothing(args, message, tmp_path):
 
 
 def test_the_function_refuses_like_the_command():
-    with pytest.raises(UsageError, match="--filters: expected names of"):
+    with pytest.raises(UsageError, match="--filter: expected names of"):
         evaluate(filters=())
 
 

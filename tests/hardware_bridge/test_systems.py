@@ -11,7 +11,9 @@ def test_systems_are_named(monkeypatch):
     expect_linux("this")
     monkeypatch.setattr("sys.platform", "darwin")
     expect_posix("this")
-    with pytest.raises(BridgeError, match="^driving cars needs Linux, not darwin; see docs/safety"):
+    with pytest.raises(
+        BridgeError, match="^driving cars needs Linux, not darwin; see docs/explanation/safety"
+    ):
         expect_linux("driving cars")
     monkeypatch.setattr("sys.platform", "win32")
     with pytest.raises(BridgeError, match="^listening to ports needs Linux or macOS"):

@@ -19,33 +19,43 @@ from agents.errors import UsageError
     "--task",
     default="ring",
     show_default=True,
-    help="ring, hold, travel, gap, rendezvous or follow.",
+    help="Task: ring, hold, travel, gap, rendezvous or follow.",
 )
-@click.option("--seconds", default=40.0, show_default=True, help="Length of a drive, 15 to 3600.")
-@click.option("--seed", default=0, show_default=True, help="Of the first drive.")
-@click.option("--drives", default=1, show_default=True, help="So many, one after the other.")
-@click.option("--cars", type=int, help="2 to 20; by default as many as the scenario has.")
-@click.option("--policy", metavar="NAME_OR_PATH", help="A trained policy drives.")
+@click.option(
+    "--seconds", default=40.0, show_default=True, help="Length of a drive, 15 to 3600 [s]."
+)
+@click.option("--seed", default=0, show_default=True, help="Seed of the first drive.")
+@click.option(
+    "--drives", default=1, show_default=True, help="Number of drives, one after the other."
+)
+@click.option(
+    "--cars", type=int, help="Number of cars, 2 to 20.  [default: as many as the scenario has]"
+)
+@click.option(
+    "--policy",
+    metavar="NAME_OR_PATH",
+    help="Trained policy that drives: a name, a file or a folder.",
+)
 @click.option(
     "--controller",
     metavar="NAME",
-    help="Who drives: consensus, leader-follower or range-only.  [default: consensus]",
+    help="Controller that drives: consensus, leader-follower or range-only.  [default: consensus]",
 )
 @click.option(
     "--format",
     default="relpos",
     show_default=True,
-    help="What the nodes speak: relpos, linktrack, uwb-core, dw1000 or dwm1001.",
+    help="Serial format of the nodes: relpos, linktrack, uwb-core, dw1000 or dwm1001.",
 )
 @click.option(
-    "--driver", default="relpos", show_default=True, help="Of the cars: relpos, vesc or pwm."
+    "--driver", default="relpos", show_default=True, help="Driver of the cars: relpos, vesc or pwm."
 )
 @click.option("--faults", type=Path, help="TOML file of faults; see docs/how-to/emulator.md.")
 @click.option(
-    "--virtual", is_flag=True, help="In memory, under a virtual clock: as fast as it goes."
+    "--virtual", is_flag=True, help="Run in memory under a virtual clock, as fast as possible."
 )
 @click.option("--out", type=Path, default=Path("demo-hardware"), show_default=True)
-@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
 def demo_hardware(
     seed: int,
     drives: int,

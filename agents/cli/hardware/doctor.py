@@ -18,16 +18,18 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.option("--config", type=Path, help="swarm.toml: listen to its links and cars too.")
-@click.option("--seconds", default=3.0, show_default=True, help="How long to listen, 0.1 to 3600.")
+@click.option("--seconds", default=3.0, show_default=True, help="Time to listen, 0.1 to 3600 [s].")
 @click.option(
     "--watchdog",
     is_flag=True,
     help="Measure how long each car goes on without commands. Its WHEELS TURN: lift them off the "
     "ground.",
 )
-@click.option("--wheels-up", is_flag=True, help="Of --watchdog: all wheels are off the ground.")
-@click.option("--write", is_flag=True, help="Of --watchdog: write the results into the swarm.toml.")
-@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+@click.option(
+    "--wheels-up", is_flag=True, help="Confirm for --watchdog that all wheels are off the ground."
+)
+@click.option("--write", is_flag=True, help="Write the results of --watchdog into swarm.toml.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
 def doctor(
     config: Path | None,
     seconds: float,

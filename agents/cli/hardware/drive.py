@@ -24,14 +24,18 @@ EVERY = 10
 
 @click.command()
 @click.option("--config", type=Path, required=True, help="swarm.toml; see docs/how-to/hardware.md.")
-@click.option("--policy", metavar="NAME_OR_PATH", help="A trained policy drives.")
+@click.option(
+    "--policy",
+    metavar="NAME_OR_PATH",
+    help="Trained policy that drives: a name, a file or a folder.",
+)
 @click.option(
     "--controller",
     metavar="NAME",
-    help="Who drives: consensus, leader-follower or range-only.  [default: consensus]",
+    help="Controller that drives: consensus, leader-follower or range-only.  [default: consensus]",
 )
-@click.option("--observation", help="What they see; default: as the policy, or estimate.")
-@click.option("--arm", is_flag=True, help="Cars may move; without it nothing is sent to them.")
+@click.option("--observation", help="Observation mode.  [default: that of the policy, or estimate]")
+@click.option("--arm", is_flag=True, help="Allow the cars to move; without it no command is sent.")
 @click.option(
     "--stop-source",
     type=click.Choice(["terminal", "stdin"]),
@@ -40,12 +44,14 @@ EVERY = 10
     help="Where --arm takes keys from: a terminal, or a program that writes them to standard input "
     "and a dot at least once a second; its silence stops the cars.",
 )
-@click.option("--seconds", type=float, help="Length, 1 to 86400; by default until Ctrl-C.")
+@click.option("--seconds", type=float, help="Length, 1 to 86400 [s].  [default: until Ctrl-C]")
 @click.option(
-    "--wait", default=60.0, show_default=True, help="Seconds in which all must be well once."
+    "--wait", default=60.0, show_default=True, help="Longest wait until all checks pass [s]."
 )
-@click.option("--record", type=Path, help="New file for a recording of all that came and went.")
-@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+@click.option(
+    "--record", type=Path, help="New file for a recording of all bytes received and sent."
+)
+@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
 def drive(
     config: Path,
     policy: str | None,

@@ -15,60 +15,68 @@ from agents.errors import UsageError
 
 @click.command()
 @click.option(
-    "--folder", type=Path, required=True, help="Gets the ports, and swarm.toml when they are ready."
+    "--folder",
+    type=Path,
+    required=True,
+    help="Folder for the ports and, once they are ready, swarm.toml.",
 )
 @scenario_option("; by default that of the task.")
 @click.option(
     "--task",
     default="ring",
     show_default=True,
-    help="ring, hold, travel, gap, rendezvous or follow.",
+    help="Task: ring, hold, travel, gap, rendezvous or follow.",
 )
 @click.option(
-    "--cars", type=int, help="Number of cars, 2 to 20; by default as many as the scenario has."
+    "--cars", type=int, help="Number of cars, 2 to 20.  [default: as many as the scenario has]"
 )
-@click.option("--seed", default=0, show_default=True, help="Same seed, same world.")
+@click.option(
+    "--seed", default=0, show_default=True, help="Seed; the same seed gives the same world."
+)
 @click.option(
     "--seconds",
     default=60.0,
     show_default=True,
-    help="Length, 0.1 to 86400, from when the cars are let go; Ctrl-C or SIGTERM ends it before.",
+    help="Length from the release of the cars, 0.1 to 86400 [s]; Ctrl-C or SIGTERM ends "
+    "it earlier.",
 )
 @click.option(
     "--format",
     default="relpos",
     show_default=True,
-    help="What the nodes speak: relpos, linktrack, uwb-core, dw1000 or dwm1001.",
+    help="Serial format of the nodes: relpos, linktrack, uwb-core, dw1000 or dwm1001.",
 )
 @click.option(
     "--imu-format",
     metavar="NAME",
-    help="What their second ports speak; default: witmotion where the first has no IMU, else none.",
+    help="Serial format of second ports.  [default: witmotion where the first has no IMU]",
 )
 @click.option(
-    "--driver", default="relpos", show_default=True, help="Of the cars: relpos, vesc or pwm."
+    "--driver", default="relpos", show_default=True, help="Driver of the cars: relpos, vesc or pwm."
 )
 @click.option(
     "--key",
     metavar="HEX",
-    help="16 bytes that sign messages of relpos, or @FILE.",
+    help="Key of 16 bytes, in hex or as @FILE, that signs messages in the format relpos.",
 )
 @click.option(
-    "--proximity", default=0, show_default=True, help="Beams of distance sensors round each car."
+    "--proximity", default=0, show_default=True, help="Number of distance sensors on each car."
 )
 @click.option(
-    "--deadman", type=float, help="Seconds after which cars stop by themselves; by default 0.2."
+    "--deadman",
+    type=float,
+    help="Time without a command after which a car stops itself [s].  [default: 0.2]",
 )
-@click.option("--no-operator", is_flag=True, help="Nobody holds a remote control.")
+@click.option("--no-operator", is_flag=True, help="Leave out the simulated operator.")
 @click.option("--faults", type=Path, help="TOML file of faults; see docs/how-to/emulator.md.")
 @click.option(
     "--wait",
     default=0.0,
     show_default=True,
-    help="The world stands until a host has sent something to a car, at most so many seconds.",
+    help="Longest wait for the first command of a host before the world moves [s].",
 )
-@click.option("--log", type=Path, help="Writes a log folder with truth.")
-@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+@click.option("--log", type=Path, help="New log folder with the truth.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
 def emulate(
     folder: Path,
     key: str | None,

@@ -21,17 +21,17 @@ BROWSER = "browser"
 
 
 @click.command()
-@click.option("--config", type=Path, required=True, help="The swarm.toml.")
-@click.option("--seconds", type=float, help="Length; by default until Ctrl-C.")
-@click.option("--record", type=Path, help="Records everything to this new file.")
+@click.option("--config", type=Path, required=True, help="swarm.toml; see docs/how-to/hardware.md.")
+@click.option("--seconds", type=float, help="Length [s].  [default: until Ctrl-C]")
+@click.option("--record", type=Path, help="New file for a recording of all bytes.")
 @click.option(
     "--view",
     is_flag=False,
     flag_value=BROWSER,
     metavar="[FILE.rrd]",
-    help="Shows the swarm in the browser, or writes the view to a new file.",
+    help="Show the swarm in the browser, or write the view to a new file.",
 )
-@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
 def live(
     config: Path, seconds: float | None, record: Path | None, view: str | None, as_json: bool
 ) -> None:

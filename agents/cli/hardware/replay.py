@@ -18,11 +18,12 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("recording", type=Path)
-@click.option("--speed", type=float, help="Times as fast as it happened; 1 is real time.")
-@click.option("--fast", is_flag=True, help="As fast as possible, which is the default.")
+@click.option("--speed", type=float, help="Speed of the replay; 1 is real time.")
+@click.option("--fast", is_flag=True, help="Replay as fast as possible.  [default]")
 @click.option(
     "--filter",
-    help="joint, ekf-mds, ekf, paper-ekf-mds or paper-ekf; by default the one of the recording.",
+    help="Filter: joint, ekf-mds, ekf, paper-ekf-mds or paper-ekf.  [default: that of the "
+    "recording]",
 )
 @click.option(
     "--keys",
@@ -35,19 +36,24 @@ if TYPE_CHECKING:
     "--export",
     "exports",
     multiple=True,
-    help="log, mcap or tum, into the folder of --out; may be given again.",
+    help="Export format into --out: log, mcap or tum; repeatable.",
 )
 @click.option("--out", type=Path, help="New folder for exports.")
-@click.option("--truth", type=Path, help="A log folder with the truth, to score against.")
+@click.option("--truth", type=Path, help="Log folder with the truth to score against.")
 @click.option(
     "--truth-offset",
     default="auto",
     show_default=True,
-    help="Seconds to add to times of the truth; auto finds them by the ranges.",
+    help="Offset added to the times of the truth [s]; auto finds it by the ranges.",
 )
-@click.option("--skip", default=10.0, show_default=True, help="Seconds that are not scored.")
-@click.option("--view", type=Path, metavar="FILE.rrd", help="Writes a view of it to a new file.")
-@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+@click.option(
+    "--skip",
+    default=10.0,
+    show_default=True,
+    help="Time from the first range that is not scored [s].",
+)
+@click.option("--view", type=Path, metavar="FILE.rrd", help="New file for the view.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
 def replay(
     recording: Path,
     speed: float | None,

@@ -10,12 +10,12 @@ from agents.errors import UsageError
 
 @click.command()
 @click.argument("port")
-@click.option("--format", "format", help="A format of links; by default all are tried.")
-@click.option("--baud", type=int, help="By default that of the format, else 115200.")
-@click.option("--seconds", type=float, help="How long to listen; by default until Ctrl-C.")
-@click.option("--key", help="Of formats whose messages carry a code: 32 hex digits, or @FILE.")
-@click.option("--raw", is_flag=True, help="The bytes in hex, whatever they mean.")
-@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+@click.option("--format", "format", help="Serial format.  [default: detected]")
+@click.option("--baud", type=int, help="Baud rate.  [default: that of the format, else 115200]")
+@click.option("--seconds", type=float, help="Time to listen [s].  [default: until Ctrl-C]")
+@click.option("--key", help="Key of signed formats: 32 hex digits, or @FILE.")
+@click.option("--raw", is_flag=True, help="Print the bytes in hex.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
 def sniff(
     port: str,
     format: str | None,

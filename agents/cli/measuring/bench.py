@@ -19,9 +19,9 @@ def bench() -> None:
 @bench.command("tracker")
 @click.option("--rounds", default=2000, show_default=True, help="Ranging rounds per figure.")
 @click.option("--out", type=Path, help="Folder for a picture of the time over the group's size.")
-@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
 def bench_tracker(rounds: int, out: Path | None, as_json: bool) -> None:
-    """Time of ranging rounds, messages and an hour, beside filterpy and GTSAM."""
+    """Measure the time of ranging rounds, messages and an hour next to filterpy and GTSAM."""
     from agents.bench.tracker import bench_tracker as run
     from agents.output import check_folder
     from agents.reports.bench.tracker_figures import PICTURE
@@ -51,9 +51,9 @@ def _draw_growth(out: Path) -> None:
 
 
 @bench.command("radio")
-@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
 def bench_radio(as_json: bool) -> None:
-    """Microseconds per message-level round in a batch, beside the reference session."""
+    """Measure the time of a message-level ranging round next to the reference session."""
     from agents.bench.radio import bench_radio as run
 
     with progress_bar("radio") as report:
@@ -62,10 +62,10 @@ def bench_radio(as_json: bool) -> None:
 
 
 @bench.command("policy")
-@click.option("--steps", default=2000, show_default=True, help="Calls per turn.")
-@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+@click.option("--steps", default=2000, show_default=True, help="Number of calls per repetition.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
 def bench_policy(steps: int, as_json: bool) -> None:
-    """Time of one step of a policy, alone and with the observation, beside plain numpy."""
+    """Measure the time of a policy's step next to plain numpy."""
     from agents.bench.policy import bench_policy as run
 
     if not 1 <= steps <= 1_000_000:
@@ -76,10 +76,10 @@ def bench_policy(steps: int, as_json: bool) -> None:
 
 
 @bench.command("codec")
-@click.option("--frames", default=5000, show_default=True, help="Frames per turn.")
-@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+@click.option("--frames", default=5000, show_default=True, help="Number of frames per repetition.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
 def bench_codec(frames: int, as_json: bool) -> None:
-    """Frames per second of the nodes' wire format, beside pymavlink; ratio: times as many."""
+    """Measure frames per second of the wire format next to pymavlink."""
     from agents.bench.codec import bench_codec as run
 
     if not 1 <= frames <= 100_000:
@@ -90,12 +90,16 @@ def bench_codec(frames: int, as_json: bool) -> None:
 
 
 @bench.command("train")
-@click.option("--updates", default=6, show_default=True, help="Updates per turn.")
-@click.option("--threads", default=2, show_default=True, help="Of simulation and learning.")
-@click.option("--after", default=2, show_default=True, help="Updates before it is measured.")
-@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+@click.option("--updates", default=6, show_default=True, help="Number of updates per repetition.")
+@click.option(
+    "--threads", default=2, show_default=True, help="Number of threads of simulation and learning."
+)
+@click.option(
+    "--after", default=2, show_default=True, help="Number of updates before the measurement."
+)
+@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
 def bench_train(updates: int, threads: int, after: int, as_json: bool) -> None:
-    """Frames per second of training, beside an environment that costs nothing."""
+    """Measure frames per second of training next to an environment that costs nothing."""
     if not 1 <= updates <= 10_000:
         raise UsageError(f"--updates: expected 1 to 10000, got {updates}")
     if not 1 <= threads <= 64:
@@ -113,9 +117,9 @@ def bench_train(updates: int, threads: int, after: int, as_json: bool) -> None:
 
 @bench.command("cold")
 @click.option("--install", is_flag=True, help="Also install into a new environment, with pip.")
-@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
 def bench_cold(install: bool, as_json: bool) -> None:
-    """Seconds that everything takes the first and the second time; some minutes."""
+    """Measure installing, importing, compiling and the first run; takes minutes."""
     from agents.bench.cold import bench_cold as run
 
     with progress_bar("first time") as report:
@@ -124,11 +128,11 @@ def bench_cold(install: bool, as_json: bool) -> None:
 
 
 @bench.command("env")
-@click.option("--quick", is_flag=True, help="Fewer and shorter figures.")
+@click.option("--quick", is_flag=True, help="Measure fewer and shorter figures.")
 @click.option("--out", type=Path, help="Folder for a picture of the curves and the parts.")
-@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
 def bench_env(quick: bool, out: Path | None, as_json: bool) -> None:
-    """Environment steps per second, beside mpe2 and bare pymunk, and where the time goes."""
+    """Measure environment steps per second next to mpe2 and bare pymunk."""
     from agents.bench.env import bench_env as run
     from agents.bench.env.effort import FULL, QUICK
     from agents.output import check_folder, write_results

@@ -12,17 +12,19 @@ from agents.cli.console import emit_json, print_table
     "--filter",
     "filters",
     multiple=True,
-    help="joint (default), ekf-mds, ekf, paper-ekf-mds or paper-ekf; may be given again.",
+    help="Filter: joint (default), ekf-mds, ekf, paper-ekf-mds or paper-ekf; repeatable.",
 )
 @click.option(
     "--for",
     "purpose",
     default="track",
     show_default=True,
-    help="track, env (also the simulated world), hardware (also the bridge) or all.",
+    help="What is compiled: track, env (also the simulator), hardware (also the bridge) or all.",
 )
-@click.option("--jobs", type=click.IntRange(1, 64), help="Processes; default: one for each core.")
-@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+@click.option(
+    "--jobs", type=click.IntRange(1, 64), help="Number of processes.  [default: one per core]"
+)
+@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
 def warmup(purpose: str, filters: tuple[str, ...], jobs: int | None, as_json: bool) -> None:
     """Compile ahead: for containers, CI and laptops before a demo.
 

@@ -33,7 +33,7 @@ WHY = "which has its own cars and task; they drive one after the other"
     multiple=True,
     default=("estimate",),
     show_default=True,
-    help="What they see: estimate, estimate_cov, ranges, truth; may be given several times.",
+    help="Observation mode: estimate, estimate_cov, ranges or truth; repeatable.",
 )
 @scenario_option(
     "; may be given several times. By default that of the task.", "scenarios", multiple=True
@@ -42,32 +42,49 @@ WHY = "which has its own cars and task; they drive one after the other"
     "--task",
     default="ring",
     show_default=True,
-    help="ring, hold, travel, gap, rendezvous or follow.",
+    help="Task: ring, hold, travel, gap, rendezvous or follow.",
 )
 @click.option(
-    "--cars", type=int, help="Number of cars, 2 to 20; by default as many as the scenario has."
+    "--cars", type=int, help="Number of cars, 2 to 20.  [default: as many as the scenario has]"
 )
 @click.option(
     "--proximity",
     type=int,
-    help="Beams that measure distances round each car, 0 to 32; default: as the policies.",
+    help="Number of distance sensors on each car, 0 to 32.  [default: those of the policies]",
 )
-@click.option("--level", type=int, help="Randomisation of a level, 0 to 4, in every scenario.")
+@click.option(
+    "--level", type=int, help="Curriculum level of the randomisation, 0 to 4, in every scenario."
+)
 @click.option(
     "--operator", default=1.0, show_default=True, help="Share of episodes with an operator, 0 to 1."
 )
-@click.option("--episodes", type=int, help="Of each of them; default: 100, on real cars 10.")
-@click.option("--first-seed", default=1000, show_default=True, help="Of the first episode.")
-@click.option("--seconds", default=60.0, show_default=True, help="Length of an episode, to 3600.")
-@click.option("--settle", default=10.0, show_default=True, help="Errors are scored from then on.")
 @click.option(
-    "--jobs", default=1, show_default=True, help="Processes at a time; no figure depends on it."
+    "--episodes",
+    type=int,
+    help="Episodes of each driver, observation and scenario.  [default: 100; on real cars 10]",
 )
-@click.option("--engine", default="local", show_default=True, help="Where jobs run: local or ray.")
-@click.option("--address", help="Of a Ray cluster that runs, for --engine ray: auto or host:port.")
+@click.option("--first-seed", default=1000, show_default=True, help="Seed of the first episode.")
+@click.option(
+    "--seconds", default=60.0, show_default=True, help="Length of an episode, up to 3600 [s]."
+)
+@click.option(
+    "--settle",
+    default=10.0,
+    show_default=True,
+    help="Time of an episode from which errors are scored [s].",
+)
+@click.option(
+    "--jobs", default=1, show_default=True, help="Number of processes. No figure depends on it."
+)
+@click.option(
+    "--engine", default="local", show_default=True, help="Engine that runs the jobs: local or ray."
+)
+@click.option(
+    "--address", help="Address of a running Ray cluster: auto or host:port; needs --engine ray."
+)
 @click.option("--swarm", type=Path, help="A swarm.toml: compare on real cars, in turns.")
-@click.option("--arm", is_flag=True, help="With --swarm: the cars may move.")
-@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+@click.option("--arm", is_flag=True, help="Allow the cars of --swarm to move.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
 @click.option("--out", type=Path, help="New folder for report.html, its pictures, results.jsonl.")
 def compare(
     names: tuple[str, ...],

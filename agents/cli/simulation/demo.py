@@ -18,38 +18,41 @@ from agents.errors import UsageError
 @scenario_option("; by default that of the policy or of the task.")
 @click.option(
     "--task",
-    help="ring, hold, travel, gap, rendezvous or follow; by default that of the policy, or ring.",
+    help="Task: ring, hold, travel, gap, rendezvous or follow.  [default: that of the "
+    "policy, or ring]",
 )
-@click.option("--seconds", default=60.0, show_default=True, help="Length, 15 to 3600.")
-@click.option("--seed", default=0, show_default=True, help="Same seed, same run.")
+@click.option("--seconds", default=60.0, show_default=True, help="Length, 15 to 3600 [s].")
 @click.option(
-    "--cars", type=int, help="Number of cars, 2 to 20; by default as many as the scenario has."
+    "--seed", default=0, show_default=True, help="Seed; the same seed gives the same run."
+)
+@click.option(
+    "--cars", type=int, help="Number of cars, 2 to 20.  [default: as many as the scenario has]"
 )
 @click.option(
     "--proximity",
     type=int,
-    help="Beams that measure distances round each car, 0 to 32; default: as the policy.",
+    help="Number of distance sensors on each car, 0 to 32.  [default: those of the policy]",
 )
 @click.option(
     "--controller",
     metavar="NAME",
-    help="Who drives: consensus, leader-follower or range-only.  [default: consensus]",
+    help="Controller that drives: consensus, leader-follower or range-only.  [default: consensus]",
 )
 @click.option(
     "--policy",
     metavar="NAME_OR_PATH",
-    help="A trained policy drives: its name, its file or its folder; see `relpos policy list`.",
+    help="Trained policy that drives: a name, a file or a folder; see `relpos policy list`.",
 )
 @click.option(
     "--filter",
     default="joint",
     show_default=True,
-    help="The cars' tracker: joint, ekf-mds, ekf, paper-ekf-mds or paper-ekf.",
+    help="Filter of the tracker: joint, ekf-mds, ekf, paper-ekf-mds or paper-ekf.",
 )
 @click.option("--window", is_flag=True, help="Show the drive in a window; needs pygame.")
-@click.option("--gif", is_flag=True, help="Also write drive.gif; needs pygame.")
+@click.option("--gif", is_flag=True, help="Write drive.gif too; needs pygame.")
 @click.option("--out", type=Path, default=Path("demo"), show_default=True)
-@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
 def demo(
     seconds: float,
     seed: int,

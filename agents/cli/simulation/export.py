@@ -14,14 +14,16 @@ from agents.errors import UsageError
 @click.command()
 @click.argument("run", type=Path)
 @click.option("--out", type=Path, required=True, help="Folder for NAME.onnx and NAME.json.")
-@click.option("--name", help="Of the policy; by default that of the run's folder.")
+@click.option("--name", help="Name of the policy.  [default: that of the run's folder]")
 @click.option(
     "--results", type=Path, help="results.jsonl of `relpos compare`, for the policy's card."
 )
 @click.option(
-    "--last", is_flag=True, help="The policy of the last leg of one run instead of what was chosen."
+    "--last", is_flag=True, help="Export the last policy of a run in place of the chosen one."
 )
-@click.option("--json", "as_json", is_flag=True, help="The card as JSON on stdout, nothing else.")
+@click.option(
+    "--json", "as_json", is_flag=True, help="Print the card as JSON on stdout, nothing else."
+)
 def export(
     run: Path, out: Path, name: str | None, results: Path | None, last: bool, as_json: bool
 ) -> None:

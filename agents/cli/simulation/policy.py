@@ -19,7 +19,7 @@ def policy() -> None:
 
 
 @policy.command("list")
-@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
 def list_policies(as_json: bool) -> None:
     """Policies that come with the package."""
     from agents.policies import load_policy, shipped_names
@@ -37,7 +37,9 @@ def list_policies(as_json: bool) -> None:
 
 @policy.command("show")
 @click.argument("wanted", metavar="NAME_OR_PATH")
-@click.option("--json", "as_json", is_flag=True, help="The card as one JSON object, nothing else.")
+@click.option(
+    "--json", "as_json", is_flag=True, help="Print the card as one JSON object, nothing else."
+)
 def show(wanted: str, as_json: bool) -> None:
     """Check a policy and print its card."""
     from agents.policies import load_policy

@@ -19,28 +19,34 @@ from agents.errors import UsageError
     "--task",
     default="ring",
     show_default=True,
-    help="ring, hold, travel, gap, rendezvous or follow.",
+    help="Task: ring, hold, travel, gap, rendezvous or follow.",
 )
 @click.option(
     "--observation",
     default="estimate",
     show_default=True,
-    help="What cars see: estimate, estimate_cov, ranges, truth.",
+    help="Observation mode: estimate, estimate_cov, ranges or truth.",
 )
-@click.option("--cars", "n_cars", type=int, help="Slots for cars, 2 to 20.")
-@click.option("--level", type=int, help="Randomisation of a level, 0 to 4.")
-@click.option("--history", default=1, show_default=True, help="Observations in one.")
-@click.option("--max-cycles", default=600, show_default=True, help="Decisions of an episode.")
-@click.option("--iterations", default=100, show_default=True, help="Of sampling and learning.")
+@click.option("--cars", "n_cars", type=int, help="Number of agent slots, 2 to 20.")
+@click.option("--level", type=int, help="Curriculum level of the randomisation, 0 to 4.")
+@click.option("--history", default=1, show_default=True, help="Number of stacked observations.")
+@click.option("--max-cycles", default=600, show_default=True, help="Steps of an episode.")
 @click.option(
-    "--steps", default=4000, show_default=True, help="Decisions of environments in an iteration."
+    "--iterations",
+    default=100,
+    show_default=True,
+    help="Number of iterations of sampling and learning.",
 )
+@click.option("--steps", default=4000, show_default=True, help="Environment steps of an iteration.")
 @click.option(
-    "--workers", default=2, show_default=True, help="Env runners, a core each; 0: this process."
+    "--workers",
+    default=2,
+    show_default=True,
+    help="Number of env runners, one core each; 0 runs in this process.",
 )
-@click.option("--envs", default=4, show_default=True, help="Environments of each of them.")
-@click.option("--seed", default=0, show_default=True, help="Of weights and episodes.")
-@click.option("--address", help="Of a Ray cluster that runs: auto or host:port.")
+@click.option("--envs", default=4, show_default=True, help="Environments of each worker.")
+@click.option("--seed", default=0, show_default=True, help="Seed of weights and episodes.")
+@click.option("--address", help="Address of a running Ray cluster: auto or host:port.")
 @click.option("--out", type=Path, required=True, help="New folder for policy, checkpoint, log.")
 def rllib(
     iterations: int,

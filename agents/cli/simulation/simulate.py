@@ -15,20 +15,22 @@ from agents.cli.scenario_option import scenario_option
 @click.argument("out", type=Path)
 @scenario_option("; human or human-mocap.", default="cars-nlos")
 @click.option(
-    "--seconds", default=120.0, show_default=True, help="Length, 3 to 86400; people to 1800."
+    "--seconds", default=120.0, show_default=True, help="Length, 3 to 86400 [s]; people up to 1800."
 )
-@click.option("--seed", default=0, show_default=True, help="Same seed, same run.")
+@click.option(
+    "--seed", default=0, show_default=True, help="Seed; the same seed gives the same run."
+)
 @click.option(
     "--cars",
     type=int,
-    help="Number of cars, 2 to 20; by default as many as the scenario has. Not for people.",
+    help="Number of cars, 2 to 20; not for people.  [default: as many as the scenario has]",
 )
 @click.option(
     "--channel",
     help="Radio: calibrated (default of cars), indoor, hall, outdoor, body (of people) or exact.",
 )
-@click.option("--antenna-delay", type=float, help="Uncalibrated antennas: std in metres.")
-@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+@click.option("--antenna-delay", type=float, help="Standard deviation of antenna delays [m].")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
 def simulate(out: Path, as_json: bool, **options: Any) -> None:
     """Record simulated cars or a person as a log folder with truth."""
     from agents.simulation.simulate import simulate as run

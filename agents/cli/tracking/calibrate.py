@@ -20,7 +20,9 @@ FILES = ("calibration.toml", "report.html")
 def _shared(function: Callable[..., Any]) -> Callable[..., Any]:
     """The arguments of every kind of calibration."""
     for decorate in (
-        click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else."),
+        click.option(
+            "--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else."
+        ),
         click.option(
             "--out", type=Path, required=True, help="Folder for calibration.toml and report.html."
         ),
@@ -37,8 +39,15 @@ def calibrate() -> None:
 
 @calibrate.command("imu")
 @_shared
-@click.option("--level", is_flag=True, help="The nodes lie level whenever they are at rest.")
-@click.option("--gravity", default=9.81, show_default=True, help="Where they lie [m/s2].")
+@click.option(
+    "--level", is_flag=True, help="Assume that nodes are level whenever they are at rest."
+)
+@click.option(
+    "--gravity",
+    default=9.81,
+    show_default=True,
+    help="Gravity at the place of the recording [m/s2].",
+)
 def imu(log: Path, out: Path, as_json: bool, level: bool, gravity: float) -> None:
     """Gyroscope and accelerometer offsets, from rest."""
     from agents.evaluation.calibrate import calibrate_imus
@@ -55,7 +64,9 @@ def imu(log: Path, out: Path, as_json: bool, level: bool, gravity: float) -> Non
 
 @calibrate.command("mag")
 @_shared
-@click.option("--seed", default=0, show_default=True, help="Same seed, same result.")
+@click.option(
+    "--seed", default=0, show_default=True, help="Seed; the same seed gives the same result."
+)
 def mag(log: Path, out: Path, as_json: bool, seed: int) -> None:
     """Hard and soft iron of the magnetometers, from turns on the spot."""
     from agents.evaluation.calibrate import calibrate_magnetometers
@@ -71,9 +82,11 @@ def mag(log: Path, out: Path, as_json: bool, seed: int) -> None:
 
 @calibrate.command("uwb")
 @_shared
-@click.option("--seed", default=0, show_default=True, help="Same seed, same result.")
 @click.option(
-    "--max-distance", default=8.0, show_default=True, help="Farther ranges are not used [m]."
+    "--seed", default=0, show_default=True, help="Seed; the same seed gives the same result."
+)
+@click.option(
+    "--max-distance", default=8.0, show_default=True, help="Longest range that is used [m]."
 )
 def uwb(log: Path, out: Path, as_json: bool, seed: int, max_distance: float) -> None:
     """Slope and antenna delays of the ranges, against truth."""

@@ -24,7 +24,7 @@ PRESETS = ", ".join(sorted(path.stem for path in FOLDER.glob("*.toml")))
 @click.option(
     "--restamp", is_flag=True, help="Replace the times of IMU samples by those of a steady rate."
 )
-@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
 def convert(
     source: Path,
     out: Path,

@@ -10,34 +10,47 @@ from agents.cli.console import emit_json, print_table, progress_bar
 
 
 @click.command()
-@click.option("--suite", default="paper", show_default=True, help="paper, robustness or scaling.")
 @click.option(
-    "--filters",
-    default="joint,ekf-mds,ekf,paper-ekf-mds,paper-ekf",
+    "--suite",
+    default="paper",
     show_default=True,
-    help="Names, commas between.",
+    help="Suite of cases: paper, robustness or scaling.",
 )
 @click.option(
-    "--seeds", type=int, help="Runs of each case: 0 to N-1. Default 50, robustness 20, scaling 10."
+    "--filter",
+    "filters",
+    multiple=True,
+    default=("joint", "ekf-mds", "ekf", "paper-ekf-mds", "paper-ekf"),
+    help="Filter to evaluate; repeatable.  [default: joint, ekf-mds, ekf, paper-ekf-mds "
+    "and paper-ekf]",
+)
+@click.option(
+    "--seeds",
+    type=int,
+    help="Runs of each case, with seeds from 0.  [default: 50; robustness 20, scaling 10]",
 )
 @click.option(
     "--seconds",
     type=float,
-    help="Length of a run, 15 to 1800. Default 120, robustness and scaling 60.",
+    help="Length of a run, 15 to 1800 [s].  [default: 120; robustness and scaling 60]",
 )
 @click.option(
     "--jobs",
     default=1,
     show_default=True,
-    help="Processes at a time; no figure but the time of a round depends on it.",
+    help="Number of processes. Only the time of a round depends on it.",
 )
-@click.option("--engine", default="local", show_default=True, help="Where jobs run: local or ray.")
-@click.option("--address", help="Of a Ray cluster that runs, for --engine ray: auto or host:port.")
-@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+@click.option(
+    "--engine", default="local", show_default=True, help="Engine that runs the jobs: local or ray."
+)
+@click.option(
+    "--address", help="Address of a running Ray cluster: auto or host:port; needs --engine ray."
+)
+@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
 @click.option("--out", type=Path, help="New folder for report.html, its pictures, results.jsonl.")
 def evaluate(
     suite: str,
-    filters: str,
+    filters: tuple[str, ...],
     seeds: int | None,
     seconds: float | None,
     jobs: int,
@@ -55,12 +68,11 @@ def evaluate(
     if out is not None:
         check_new(out)
         check_folder(out, ["report.html"])
-    names = [name.strip() for name in filters.split(",")]
-    warm_up_first(names)
+    warm_up_first(filters)
     with progress_bar(f"evaluate {suite}") as tell:
         result = run(
             suite=suite,
-            filters=names,
+            filters=filters,
             seeds=seeds,
             seconds=seconds,
             jobs=jobs,

@@ -11,13 +11,20 @@ from agents.errors import UsageError
 
 
 @click.command()
-@click.option("--events", default=200, show_default=True, help="Of each kind, for each mode.")
 @click.option(
-    "--nodes", default="3,4,5,6,10,20,50", show_default=True, help="Sizes of groups, 2 to 62."
+    "--events", default=200, show_default=True, help="Number of events of each kind and mode."
 )
-@click.option("--seed", default=0, show_default=True, help="Same seed, same figures.")
+@click.option(
+    "--nodes",
+    default="3,4,5,6,10,20,50",
+    show_default=True,
+    help="Numbers of nodes, 2 to 62, separated by commas.",
+)
+@click.option(
+    "--seed", default=0, show_default=True, help="Seed; the same seed gives the same figures."
+)
 @click.option("--out", type=Path, help="Folder for report.html and the pictures in it.")
-@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
 def protocol(events: int, nodes: str, seed: int, out: Path | None, as_json: bool) -> None:
     """Measure the ranging protocol: rate, recovery when nodes come and go, clock errors."""
     from agents.output import check_folder, write_results

@@ -22,14 +22,14 @@ if TYPE_CHECKING:
     "--filter",
     "filters",
     multiple=True,
-    help="joint (default), ekf-mds, ekf, paper-ekf-mds or paper-ekf; may be given again.",
+    help="Filter: joint (default), ekf-mds, ekf, paper-ekf-mds or paper-ekf; repeatable.",
 )
 @click.option(
     "--calibration",
     "calibrations",
     multiple=True,
     type=Path,
-    help="A calibration.toml to correct measurements with; may be given again.",
+    help="calibration.toml that corrects the measurements; repeatable.",
 )
 @click.option(
     "--smooth",
@@ -52,11 +52,16 @@ if TYPE_CHECKING:
 @click.option(
     "--no-checks",
     is_flag=True,
-    help="Track the log as it is, whatever its sensors, clocks and ranges look like.",
+    help="Skip the checks of sensors, clocks and ranges.",
 )
-@click.option("--skip", default=10.0, show_default=True, help="Seconds that are not scored.")
+@click.option(
+    "--skip",
+    default=10.0,
+    show_default=True,
+    help="Time from the first range that is not scored [s].",
+)
 @click.option("--out", type=Path, help="Folder for estimates.csv and report.html.")
-@click.option("--json", "as_json", is_flag=True, help="JSON lines on stdout, nothing else.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
 def track(
     logs: tuple[Path, ...],
     filters: tuple[str, ...],

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from agents.hardware.inspection.hearing import Formats, Hearing, Voice, why_nothing_fits
+from agents.hardware.inspection.inspected import CarLike, LinkLike
 from hardware_bridge.ingest.naming import node_of
 from hardware_bridge.ingest.sample_rates import PAUSE, WINDOW, is_off
 from tracking.constellation import NodeConfig
 from tracking.findings import KINDS
 from tracking.findings.at_rest import find_in_samples
-
-if TYPE_CHECKING:
-    from agents.hardware.inspection.doctor import CarLike, LinkLike
 
 TELLS_OF_OTHERS = "positions"
 """The format whose lines name nodes by their ids beside names of `ids`."""

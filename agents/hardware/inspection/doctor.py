@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 from agents.errors import UsageError
 from agents.hardware.inspection.diagnosis import (
@@ -16,6 +16,7 @@ from agents.hardware.inspection.diagnosis import (
     share_a_device,
 )
 from agents.hardware.inspection.hearing import Formats, Hearing, known_formats
+from agents.hardware.inspection.inspected import ConfigLike
 from hardware_bridge.links.links import Links
 from hardware_bridge.links.port_list import (
     Listing,
@@ -24,63 +25,9 @@ from hardware_bridge.links.port_list import (
     permission_remedy,
 )
 from hardware_bridge.links.port_users import port_users
-from hardware_bridge.links.ports import PortSpec
-from tracking.constellation import Constellation
 
 TURN = 0.05
 """[s] Between two looks at the clock."""
-
-
-class LinkLike(Protocol):
-    """What is taken of a link of the configuration."""
-
-    @property
-    def port(self) -> PortSpec:
-        """Where."""
-
-    @property
-    def format(self) -> str:
-        """Which decoder."""
-
-    @property
-    def node(self) -> int | None:
-        """Who speaks, where the format does not say."""
-
-    @property
-    def ids(self) -> Mapping[str, int]:
-        """Device id to node."""
-
-    @property
-    def key(self) -> bytes | None:
-        """Of the code of its messages."""
-
-
-class CarLike(Protocol):
-    """What is taken of a car of the configuration."""
-
-    @property
-    def port(self) -> PortSpec:
-        """Where."""
-
-    @property
-    def driver(self) -> str:
-        """Which driver."""
-
-
-class ConfigLike(Protocol):
-    """What is taken of a configuration."""
-
-    @property
-    def constellation(self) -> Constellation:
-        """Who is in the group."""
-
-    @property
-    def links(self) -> Sequence[LinkLike]:
-        """Streams that measure."""
-
-    @property
-    def cars(self) -> Sequence[CarLike]:
-        """Cars that can be driven."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,0 +1,39 @@
+"""Folders and imports are such that a reader finds the way."""
+
+from pathlib import Path
+
+import grimp
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGES = ("tracking", "relpos_env", "agents", "hardware_bridge")
+MOST_FILES = 15
+
+
+def folders():
+    for package in PACKAGES:
+        for folder in [ROOT / package, *(ROOT / package).rglob("*")]:
+            if folder.is_dir() and any(folder.glob("*.py")):
+                yield folder
+
+
+@pytest.mark.parametrize("folder", list(folders()), ids=lambda f: f.relative_to(ROOT).as_posix())
+def test_a_folder_has_few_files_and_says_what_it_is(folder):
+    modules = [path for path in folder.glob("*.py") if path.name != "__init__.py"]
+    assert len(modules) <= MOST_FILES
+    text = (folder / "__init__.py").read_text()
+    assert text.startswith('"""')
+
+
+def test_no_modules_import_each_other():
+    graph = grimp.build_graph(*PACKAGES, exclude_type_checking_imports=True)
+    waiting = {m: set(graph.find_modules_directly_imported_by(m)) for m in graph.modules}
+    while waiting:
+        free = {m for m, needs in waiting.items() if not needs & waiting.keys()}
+        assert free, f"cycle among {sorted(waiting)}"
+        waiting = {m: needs for m, needs in waiting.items() if m not in free}
+
+
+def test_packages_tell_type_checkers_that_they_are_typed():
+    for package in PACKAGES:
+        assert (ROOT / package / "py.typed").exists()
