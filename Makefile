@@ -30,6 +30,7 @@ check: $(VENV)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/python tests/words.py
 
 # The documentation as a site, build/docs/index.html; DOCS_ONLINE=1 links to other projects.
 docs: $(VENV)/.dev

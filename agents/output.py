@@ -13,7 +13,7 @@ from agents.errors import UsageError
 def write_results(folder: Path, files: Mapping[str, str | bytes]) -> Path:
     """Write named texts and pictures into a folder, all of them or none.
 
-    All are written beside their places first and only then moved, so that a full disk leaves
+    All are written next to their places first and only then moved, so that a full disk leaves
     nothing and a kill no half file. Files of the same names are replaced.
 
     Raises:

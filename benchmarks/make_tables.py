@@ -1,6 +1,6 @@
 """Tables of the documents that follow from the code.
 
-python benchmarks/make_tables.py            writes them anew
+python benchmarks/make_tables.py            writes them again
 python benchmarks/make_tables.py --check    fails if one differs
 
 A table stands between ``<!-- table: NAME -->`` and ``<!-- end of table -->``.
@@ -185,7 +185,7 @@ def scenarios() -> str:
         boxes = str(len(s.obstacles)) if s.gap is None else f"a wall with a gap of {s.gap.width} m"
         channel = next((k for k, c in CHANNELS.items() if c == s.radio.channel), "its own")
         rows.append([f"`{name}`", room, str(s.n_cars), s.layout, boxes, channel, drawn(s)])
-    head = ("scenario", "room", "cars", "start", "obstacles", "radio", "drawn anew")
+    head = ("scenario", "room", "cars", "start", "obstacles", "radio", "drawn again")
     return markdown(head, rows, right="cars")
 
 
@@ -399,7 +399,7 @@ TABLES: dict[str, Callable[[], str]] = {
 
 
 def rewrite(text: str) -> str:
-    """A page with its tables made anew.
+    """A page with its tables made again.
 
     Raises:
         KeyError: It has a table of which nothing is known.

@@ -2,7 +2,7 @@
 
 Cars stand for two seconds and then drive. A start is judged three seconds later, over all pairs:
 the error in the world frame, and that after the best rotation, which magnetic north has no share
-in. Beside both stands the posterior Cramer-Rao bound of the same drive at the same moment
+in. Next to both stands the posterior Cramer-Rao bound of the same drive at the same moment
 (`tracking.metrics.bound`), with the errors that headings have here at first
 (`relpos_env.core.oracle_params`).
 

@@ -1,4 +1,4 @@
-"""How wrong the joint filter believes itself to be, beside how wrong it is.
+"""How wrong the joint filter believes itself to be, next to how wrong it is.
 
 NEES and NIS of `joint` with the parameters of the simulated world
 (`relpos_env.core.oracle_params`), means over drives: 1 where errors are as large as the

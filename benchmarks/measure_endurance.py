@@ -5,7 +5,7 @@ python benchmarks/measure_endurance.py --seconds 3600 --cars 6
 Prints the memory of every process once a minute and, at the end, how far it grew since the first
 minute, and how many ticks of the supervisor were more than 20 ms late. On every core a process that
 only sleeps, with a higher priority than all else and its memory locked, tells how often the machine
-itself stood; beside each missed tick is how long it did in the two seconds before that was told.
+itself stood; next to each missed tick is how long it did in the two seconds before that was told.
 
 python benchmarks/measure_endurance.py --seconds 3600 --cars 6 --virtual
 

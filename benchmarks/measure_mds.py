@@ -1,4 +1,4 @@
-"""Multidimensional scaling of each instant beside `joint`, on recordings.
+"""Multidimensional scaling of each instant next to `joint`, on recordings.
 
 The layout of an instant follows from the newest range of each pair alone, by classical MDS. Both
 are scored after the best rotation and reflection of each instant, which is all that ranges can

@@ -3,7 +3,7 @@
 `results/provenance.json` has an entry for every file of results and every picture of the documents:
 the command that made it, version, commit, date and machine, and a hash of the code that it depends
 on. Run `python benchmarks/provenance.py` to list what is stale, with `--stamp FILE ...` after files
-have been made anew.
+have been made again.
 """
 
 from __future__ import annotations

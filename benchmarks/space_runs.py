@@ -1,4 +1,4 @@
-"""Simulated runs in space with raw sensors: a hand beside fixed nodes, and a swarm of drones.
+"""Simulated runs in space with raw sensors: a hand next to fixed nodes, and a swarm of drones.
 
 For `measure_space.py`: half of the runs begin at rest, the others in mid-walk or mid-flight; rooms
 are of 5 m, sensors cheap or good, ranges err by 3 to 10 cm that last, and a tenth of them has no

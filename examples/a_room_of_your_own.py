@@ -1,4 +1,4 @@
-"""A scenario from a file beside this one: desks, a box to push, trackers that lose power."""
+"""A scenario from a file next to this one: desks, a box to push, trackers that lose power."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Simulated ranges beside real ones: same distances, same share behind an obstacle.
+"""Simulated ranges next to real ones: same distances, same share behind an obstacle.
 
 The real ones are those that the channel `OUTDOOR` was fitted to; they are not part of the
 project. With a path as argument, the picture of `docs/explanation/simulator.md` is saved there.
@@ -49,7 +49,7 @@ def simulate(channel, distance, nlos, seconds=0.5, seed=0):
         radio.switch_on(k, 1, boot=2, after=0.002)
     pos = np.zeros((n, 2, 3))
     pos[:, 1, 0] = distance
-    boxes = np.zeros((n, 1, 6))  # halfway between the nodes, or 50 m beside
+    boxes = np.zeros((n, 1, 6))  # halfway between the nodes, or 50 m next to
     boxes[:, 0] = [0.0, 0.0, 0.2, 0.2, 1.0, 0.0]
     boxes[:, 0, 0], boxes[:, 0, 1] = 0.5 * np.asarray(distance), np.where(nlos, 0.0, 50.0)
     found = []

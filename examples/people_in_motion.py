@@ -1,4 +1,4 @@
-"""The simulated person beside motion capture: accelerations, distances, hidden pairs.
+"""The simulated person next to motion capture: accelerations, distances, hidden pairs.
 
 Prints a table. With a path as argument it also draws the exercises as stick figures:
 

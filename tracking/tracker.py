@@ -106,7 +106,7 @@ class Tracker:
         """`step` for arrays that stay where they are, without its overhead.
 
         Args:
-            block: Filled anew before every step, which leaves states in place of samples.
+            block: Filled again before every step, which leaves states in place of samples.
             estimate: Arrays over (env, ...), written by every step for its times `t`.
 
         Returns:

@@ -1,1 +1,1 @@
-"""Benchmarks: each figure beside a peer measured in the same run."""
+"""Benchmarks: each figure next to a peer measured in the same run."""

@@ -62,7 +62,7 @@ class Driven:
         return self._unknown
 
     @property
-    def contacts(self) -> F64:
+    def collisions(self) -> F64:
         """Nobody knows."""
         return self._unknown
 

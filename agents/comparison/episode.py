@@ -1,7 +1,7 @@
 """Episodes of one contender in one setting, a batch at a time.
 
 Law: the figures of a simulated episode follow from contender, setting and seed alone, bit for
-bit; neither the episodes beside it in the batch nor the number of jobs change them.
+bit; neither the episodes next to it in the batch nor the number of jobs change them.
 """
 
 from __future__ import annotations

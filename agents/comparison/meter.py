@@ -42,7 +42,7 @@ class EpisodeResult:
     collisions_per_min: float
     """[1/min] Contacts begun, summed over the cars, over the whole episode."""
     contact_time: float
-    """[-] Share of the cars' time in which they touch something, over the whole episode: contacts
+    """[-] Share of the cars' time in which they touch something, over the whole episode: collisions
     begun do not tell who presses on."""
     time_in_formation: float
     """[-] Share of the scored time in which every present car's error is below `IN_FORMATION`."""
@@ -89,7 +89,7 @@ class Running(Protocol):
         """Of the relative positions that cars could use, (env, car) [m]."""
 
     @property
-    def contacts(self) -> F64:
+    def collisions(self) -> F64:
         """That cars began in the last decision, (env, car) [-]."""
 
     @property
@@ -129,13 +129,13 @@ class Meter:
         self._error, self._place, self._tracking, self._worst = np.full(
             (4, e, running.cycles), np.nan
         )
-        self._contacts, self._touching, self._here = np.zeros((3, e))
+        self._collisions, self._touching, self._here = np.zeros((3, e))
         self._work, self._car_time = np.zeros((2, e))
 
     def read(self) -> None:
         """Take down what the last decision led to."""
         r = self._running
-        present, speed, error, contacts = r.present, r.speed, r.error, r.contacts
+        present, speed, error, collisions = r.present, r.speed, r.error, r.collisions
         touching = np.where(np.isnan(r.clearance), np.nan, r.clearance == 0.0)
         work = _work(self._speed, speed, *self._car)
         # A car that came in or was taken out in between was not driven there.
@@ -150,7 +150,7 @@ class Meter:
             known = np.isfinite(tracking[e])
             if known.any():
                 self._tracking[e, k] = tracking[e, known].mean()
-            self._contacts[e] += contacts[e].sum()
+            self._collisions[e] += collisions[e].sum()
             self._touching[e] += touching[e, here].sum()
             self._here[e] += here.sum()
             self._work[e] += work[e, driven[e]].sum()
@@ -180,7 +180,7 @@ class Meter:
             formation_error=_mean(self._error[env, scored]),
             place_error=_mean(self._place[env, scored]),
             tracking_error=_mean(self._tracking[env, scored]),
-            collisions_per_min=60.0 * self._contacts[env] / seconds,
+            collisions_per_min=60.0 * self._collisions[env] / seconds,
             contact_time=self._touching[env] / max(self._here[env], 1.0),
             time_in_formation=_mean((worst < IN_FORMATION)[np.isfinite(worst)]),
             energy=60.0 * self._work[env] / max(self._car_time[env], DECISION),

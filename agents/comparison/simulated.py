@@ -78,7 +78,7 @@ class Simulated:
         return self.formation.tracking_error()
 
     @property
-    def contacts(self) -> F64:
+    def collisions(self) -> F64:
         """That cars began in the last decision, (env, car) [-]."""
         return self.formation.loop.swarm.contacts
 

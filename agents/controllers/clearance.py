@@ -36,7 +36,7 @@ from relpos_env.interface.observations.base import F32
 from tracking.arrays import F64
 
 REAR = 0.156
-"""[m] From the middle of the car to its rear axle, round a point beside which it turns."""
+"""[m] From the middle of the car to its rear axle, round a point next to which it turns."""
 ROLLING = 0.05
 """[m/s] A car faster than this is in gear."""
 WAYS = np.array([0.03, 0.06, 0.1, 0.15, 0.21, 0.28, 0.36, 0.46, 0.58, 0.72, 0.9])

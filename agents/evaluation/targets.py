@@ -18,7 +18,7 @@ BOUNDS = {"rmse_yaw": "bound_yaw", "rmse_shape": "bound_shape"}
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """A figure beside what is asked of it, all in metres."""
+    """A figure next to what is asked of it, all in metres."""
 
     figure: str
     asked: float

@@ -130,7 +130,7 @@ def track_log(
         skip: Times until so many seconds after the first range are not scored.
         smooth: Estimates know what was measured in the `LAG` after them, too ("lag"), or all that
             was measured ("all", `tracking.whole_smoother`).
-        bound: The expected errors of an efficient estimator, kept beside those there are
+        bound: The expected errors of an efficient estimator, kept next to those there are
             (`tracking.metrics.bound.recorded_bound`).
         params: What the tracker believes.
         findings: What `tracking.findings.examine` found of the log already, or nothing, for a log

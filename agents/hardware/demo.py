@@ -1,4 +1,4 @@
-"""Emulated cars driven through the whole path, serial bytes and all, beside the simulator.
+"""Emulated cars driven through the whole path, serial bytes and all, next to the simulator.
 
 The emulator is a process of its own, or steps together with the drive under a virtual clock; its
 truth scores the drive, which knows nothing of it.
@@ -48,7 +48,7 @@ class HardwareDemoResult:
     """That of the same driver in the same room of the simulator, (decision) [m]."""
     boxes: F64
     """What stood in the room at the start, (box, 6), as `relpos_env.world.world.World.boxes`."""
-    contacts: int
+    collisions: int
     """[-] That cars began, start included."""
     simulated_contacts: int
     """[-] In the simulator."""
@@ -69,7 +69,7 @@ class HardwareDemoResult:
             "formation_error": error,
             "simulated_error": twin,
             "ratio": None if error is None or twin is None else error / twin,
-            "contacts": self.contacts,
+            "collisions": self.collisions,
             "simulated_contacts": self.simulated_contacts,
             "late_steps": self.late_steps,
             "virtual": self.virtual,
@@ -147,7 +147,7 @@ def hardware_demo(
         error=true_error(result, log, t),
         simulated=twin.error,
         boxes=EmulatedWorld(options.parts(), options.seed).swarm.boxes[0].copy(),
-        contacts=drove.contacts,
+        collisions=drove.collisions,
         simulated_contacts=round(twin.collisions_per_min * twin.seconds / 60.0),
         late_steps=drove.late_steps,
         virtual=virtual,
@@ -182,7 +182,7 @@ class _Drove:
     result: DriveResult
     log: Log
     start_ns: int
-    contacts: int
+    collisions: int
     late_steps: int = 0
 
 
@@ -203,7 +203,7 @@ def _drive_ports(
         result=result,
         log=read_log(place / "truth"),
         start_ns=emulation.start_ns,
-        contacts=emulation.contacts,
+        collisions=emulation.collisions,
         late_steps=emulation.late_steps,
     )
 
@@ -222,8 +222,8 @@ def _drive_virtually(
         watch=_teller(options, progress),
     )
     log = bridge.rig.log(f"emulation-{options.seed}")
-    contacts = bridge.rig.world.contacts
-    return _Drove(result=result, log=log, start_ns=START_NS, contacts=contacts)
+    collisions = bridge.rig.world.collisions
+    return _Drove(result=result, log=log, start_ns=START_NS, collisions=collisions)
 
 
 def _teller(

@@ -26,7 +26,7 @@ LABELS = {
     "formation_error": "formation error [m]",
     "place_error": "distance from the goals [m]",
     "tracking_error": "tracking error [m]",
-    "collisions_per_min": "contacts [1/min]",
+    "collisions_per_min": "collisions [1/min]",
     "contact_time": "time in contact [%]",
     "time_in_formation": f"time below {IN_FORMATION:g} m [%]",
     "energy": "energy [J/min]",
@@ -45,7 +45,7 @@ def figures(result: CompareResult) -> dict[str, tuple[str, Figure, str]]:
             "Figures",
             _bars(result),
             "Means over the episodes with 95 % intervals. The axis of the energy does not begin at "
-            "0: differences are small beside what rolling takes.",
+            "0: differences are small next to what rolling takes.",
         ),
         "compare-time.png": (
             "Formation error over time",

@@ -15,7 +15,7 @@ from agents.reports.page import Page, metres, png
 
 _TO = "\N{NO-BREAK SPACE}to\N{NO-BREAK SPACE}"
 HEADER = (
-    "driver", "trained on", "sees", "error [m]", "95 %", "place", "tracking", "hits/min",
+    "driver", "trained on", "sees", "error [m]", "95 %", "place", "tracking", "collisions/min",
     "touch %", "formed %", "J/min", "ratio", "95 %",
 )  # fmt: skip
 """Names of the columns."""
@@ -45,7 +45,9 @@ def _cells(record: dict[str, Any]) -> list[str]:
     ]
 
 
-SHORT_HEADER = ("driver", "error", "95 %", "place", "track", "hits", "formed", "ratio", "95 %")
+SHORT_HEADER = (
+    "driver", "error", "95 %", "place", "track", "collisions", "formed", "ratio", "95 %",
+)  # fmt: skip
 """Names of the columns of `short_rows`."""
 _LONGEST = 36
 """[-] Letters of a driver in a terminal, so that no figure is cut."""
@@ -74,7 +76,7 @@ def notes(result: CompareResult) -> list[str]:
     references = "; ".join(f"{label} in {', '.join(names)}" for label, names in by.items())
     last = result.first_seed + result.seeds - 1
     if result.errors_from == "truth":
-        alike, whole = "on the same seeds", "hits (contacts of all cars) and the energy of a car"
+        alike, whole = "on the same seeds", "collisions (of all cars) and the energy of a car"
         order = f"seeds {result.first_seed} to {last}, the same for all"
     else:
         alike, whole = "in the same rounds", "the energy of a car, by its odometer,"
@@ -90,7 +92,7 @@ def notes(result: CompareResult) -> list[str]:
     if result.errors_from == "estimates":
         lines.append(
             "Errors are what the cars believed themselves: nobody knows the truth, tracking error "
-            "and contacts among it."
+            "and collisions among it."
         )
     lines += [f"Left out: {note}." for note in result.notes]
     return lines + [f"{remark}." for remark in result.remarks]

@@ -1,4 +1,4 @@
-"""The report of an evaluation: figures beside the paper's, and pictures of all runs."""
+"""The report of an evaluation: figures next to the paper's, and pictures of all runs."""
 
 from __future__ import annotations
 

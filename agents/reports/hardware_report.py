@@ -1,4 +1,4 @@
-"""The report of emulated drives: where the cars went, and their errors beside the simulator's."""
+"""The report of emulated drives: where the cars went, and their errors next to the simulator's."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-HEADER = ("seed", "through the bridge [m]", "simulator [m]", "ratio", "contacts", "late p99 [ms]")
+HEADER = ("seed", "through the bridge [m]", "simulator [m]", "ratio", "collisions", "late p99 [ms]")
 COLOURS = ("tab:blue", "tab:red", "tab:green", "tab:orange", "tab:purple", "tab:cyan")
 
 
@@ -31,7 +31,7 @@ def demo_rows(results: Sequence[HardwareDemoResult]) -> list[list[str]]:
                 metres(s["formation_error"]),
                 metres(s["simulated_error"]),
                 "-" if s["ratio"] is None else f"{s['ratio']:.2f}",
-                f"{s['contacts']} / {s['simulated_contacts']}",
+                f"{s['collisions']} / {s['simulated_contacts']}",
                 "-" if s["lag_p99_ms"] is None else f"{s['lag_p99_ms']:.1f}",
             ]
         )

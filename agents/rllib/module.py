@@ -1,7 +1,7 @@
 """The network that all cars share, as RLlib trains it: actor and critic, two layers each.
 
 Observations are scaled by fixed lengths and times inside the network, so what is exported needs no
-statistics beside it.
+statistics next to it.
 """
 
 from __future__ import annotations

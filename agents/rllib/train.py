@@ -45,7 +45,7 @@ class RllibResult:
     """A training."""
 
     policy: Path
-    """The file with the network; the card is beside it."""
+    """The file with the network; the card is next to it."""
     checkpoint: Path
     """RLlib's own, a folder."""
     records: list[dict[str, Any]]

@@ -53,7 +53,7 @@ class Evaluation:
         ]
 
     def run(self, policy: SwarmPolicy) -> dict[str, Any]:
-        """Mean reward of a decision, errors from `SETTLE` on [m], and contacts.
+        """Mean reward of a decision, errors from `SETTLE` on [m], and collisions.
 
         Means are over cars and times, so scenarios with more cars count for more. An episode that
         ends early earns nothing for the rest of its time, and costs nothing: where time is paid
@@ -65,16 +65,16 @@ class Evaluation:
         for room in self._rooms:
             drives.append(room.drive(actor, first))
             first += room.formation.n_envs
-        rewards, decisions, contacts, minutes = (
+        rewards, decisions, collisions, minutes = (
             sum(getattr(d, name) for d in drives)
-            for name in ("rewards", "decisions", "contacts", "minutes")
+            for name in ("rewards", "decisions", "collisions", "minutes")
         )
         tracking = np.concatenate([d.tracking for d in drives])
         return {
             "return": rewards / max(decisions, 1.0),
             "formation_error": float(np.concatenate([d.error for d in drives]).mean()),
             "tracking_error": float(tracking.mean()) if tracking.size else None,
-            "collisions_per_min": contacts / minutes,
+            "collisions_per_min": collisions / minutes,
         }
 
     def close(self) -> None:
@@ -91,7 +91,7 @@ class _Drive:
     """Of all cars and decisions together."""
     decisions: float
     """Of all cars, those after an early end counted."""
-    contacts: float
+    collisions: float
     minutes: float
     error: F64
     """Formation errors from `SETTLE` on, of all cars and times [m]."""
@@ -113,7 +113,7 @@ class _Room:
             f.seed(env, seeding.np_random(first_seed + env)[0])
             f.begin([env])
         error, tracking, present, going = [], [], [], []
-        contacts, rewards, decisions = 0.0, 0.0, 0.0
+        collisions, rewards, decisions = 0.0, 0.0, 0.0
         on = np.ones(f.n_envs, dtype=bool)
         for _ in range(f.parts.config.max_cycles - 1):
             going.append(on)
@@ -122,7 +122,7 @@ class _Room:
             tracking.append(f.tracking_error())
             present.append(f.state.present & on[:, None])
             decisions += float(f.state.present.sum())
-            contacts += float(f.loop.swarm.contacts[on].sum())
+            collisions += float(f.loop.swarm.contacts[on].sum())
             rewards += float(f.rewards[on].sum())
             on = on & ~f.task.done
         alive, here = np.array(going), np.array(present)
@@ -131,7 +131,7 @@ class _Room:
         return _Drive(
             rewards=rewards,
             decisions=decisions,
-            contacts=contacts,
+            collisions=collisions,
             minutes=float(alive.sum()) * DECISION / 60.0,
             error=np.array(error)[scored],
             tracking=known[np.isfinite(known)],

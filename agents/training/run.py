@@ -26,7 +26,7 @@ class PolicyResult:
     """A trained policy."""
 
     policy: Path
-    """The file with its network; the card is beside it."""
+    """The file with its network; the card is next to it."""
     best: dict[str, Any]
     """What was measured of it when it was chosen: seed and leg too."""
     records: list[dict[str, Any]]

@@ -1,7 +1,7 @@
 """The folder of a training run: configuration, checkpoints, best weights, what was measured.
 
 Weights are stored as safetensors, numbers and their names and nothing that could be executed.
-Every file is written beside its place, flushed, and only then moved there: a full disk or a kill
+Every file is written next to its place, flushed, and only then moved there: a full disk or a kill
 leaves the last good one.
 """
 
@@ -74,12 +74,12 @@ class RunFolder:
         version = found.get("format") if isinstance(found, dict) else None
         if version != FORMAT:
             raise UsageError(
-                f"{path}: a run of format {version!r}, expected {FORMAT}; train it anew"
+                f"{path}: a run of format {version!r}, expected {FORMAT}; train it again"
             )
         config = from_json(TrainConfig, found.get("config"), f"{path}: config")
         if found.get("layout") != layout_of(config).digest:
             raise UsageError(
-                f"{path}: a run on another observation layout than this version has; train it anew"
+                f"{path}: a run on another observation layout than this version has; train it again"
             )
         return config
 

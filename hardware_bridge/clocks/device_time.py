@@ -34,7 +34,7 @@ class DeviceTime:
     """
 
     steps: int
-    """How often the device's clock was set or began anew, as far as its stamps tell."""
+    """How often the device's clock was set or began again, as far as its stamps tell."""
     strays: int
     """Stamps that agreed with nothing before and nothing after; mapped to their arrival."""
 
@@ -82,7 +82,7 @@ class DeviceTime:
         return self._line.slope / (1 << SHIFT)
 
     def restart(self) -> None:
-        """The device started anew: its counter too. What is known of its rate stays."""
+        """The device started again: its counter too. What is known of its rate stays."""
         self._begun = False
 
     def map(self, ticks: int | None, arrival_ns: int) -> int:
@@ -137,7 +137,7 @@ class DeviceTime:
         return self._learn(ticks, ticks * self._num // self._den, arrival)
 
     def _learn(self, unwrapped: int, x: int, arrival: int) -> int:
-        """Fit anew from this stamp on."""
+        """Fit again from this stamp on."""
         self._acquit()
         self._late_since = None
         self._line.start(x, arrival)

@@ -57,5 +57,5 @@ class EvenTime:
         return self._last
 
     def restart(self) -> None:
-        """The device started anew."""
+        """The device started again."""
         self._last, self._n = None, 0

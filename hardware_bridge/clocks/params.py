@@ -33,7 +33,7 @@ class ClockParams:
     number in a text, or a port that was congested all the time before."""
     step: float = 0.5
     """[s] Ahead by more, or older than the newest by more: the device's clock was set or began
-    anew, once a second stamp agrees."""
+    again, once a second stamp agrees."""
     patience: float = 5.0
     """[s] Later than `step` for this long: the device's clock stood still."""
 

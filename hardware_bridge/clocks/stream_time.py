@@ -21,7 +21,7 @@ class StreamTime(Protocol):
         """
 
     def restart(self) -> None:
-        """The device started anew: its counter too."""
+        """The device started again: its counter too."""
 
 
 class HostTime:

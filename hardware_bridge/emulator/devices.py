@@ -61,7 +61,7 @@ class NodeDevice:
             t: Now, of the world [s].
             t_ns: Now, of the host.
             rows: Since the last step.
-            powered: Whether the node has power; it starts anew when that comes back.
+            powered: Whether the node has power; it starts again when that comes back.
         """
         if powered and not self._powered:
             self.node.reboot(t, 0.0)

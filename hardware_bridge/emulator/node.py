@@ -98,7 +98,7 @@ class EmulatedNode:
         return sent
 
     def reboot(self, t: float, seconds: float) -> None:
-        """Start anew: silent for so long, then with the next boot number and a clock from 0."""
+        """Start again: silent for so long, then with the next boot number and a clock from 0."""
         self._silent_until = t + seconds
         self.clock.restart(t + seconds)
         self._start()

@@ -17,7 +17,7 @@ from tracking.log.read import MAX_ACC, MAX_DISTANCE, MAX_GYR, MAX_MAG
 from tracking.measurements import Kind, MeasurementBlock
 
 N_COLUMNS = 7
-"""Columns of values that a log has a place for; the eighth is made anew by the tracker."""
+"""Columns of values that a log has a place for; the eighth is made again by the tracker."""
 _LIMITS = {
     Kind.MAG: np.array([MAX_MAG] * 3),
     Kind.IMU: np.array([MAX_GYR] * 3 + [MAX_ACC] * 3),

@@ -13,7 +13,7 @@ from hardware_bridge.errors import BridgeError
 
 @contextmanager
 def whole_file(path: Path | str) -> Iterator[Path]:
-    """A name beside the target to write a file to, which is moved there if all went well.
+    """A name next to the target to write a file to, which is moved there if all went well.
 
     Raises:
         BridgeError: The target exists, or it cannot be written.
@@ -32,7 +32,7 @@ def whole_file(path: Path | str) -> Iterator[Path]:
 
 @contextmanager
 def whole_folder(path: Path | str) -> Iterator[Path]:
-    """An empty folder beside the target, which is moved there if all went well.
+    """An empty folder next to the target, which is moved there if all went well.
 
     Raises:
         BridgeError: The target exists and is not an empty folder, or it cannot be written.

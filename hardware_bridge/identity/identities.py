@@ -93,9 +93,9 @@ class Identities:
             state.quarantined = True
             self._note(t_ns, node, "twin", f"{judge.twins}: refused until it is released")
         elif verdict is Verdict.REBOOT:
-            self._note(t_ns, node, "reboot", f"started anew, on link {link}")
+            self._note(t_ns, node, "reboot", f"started again, on link {link}")
         elif state.refused == MANY_OLD:
-            text = f"sends only old messages, on link {link}: refused until this is started anew"
+            text = f"sends only old messages, on link {link}: refused until this is started again"
             self._note(t_ns, node, "old", text)
         return verdict
 
@@ -128,7 +128,7 @@ class Identities:
             self._rising[node] = RisingBoots()
         verdict = self._rising[node].check(source.boot, source.sequence)
         if verdict is Verdict.REBOOT:
-            self._note(t_ns, node, "reboot", f"started anew, on link {link}")
+            self._note(t_ns, node, "reboot", f"started again, on link {link}")
         elif verdict is Verdict.REPLAY:
             self._note(
                 t_ns,

@@ -20,7 +20,7 @@ class Verdict(Enum):
     LATE = "late"
     """Out of order, and new."""
     REBOOT = "reboot"
-    """The first of a new start of its device, whose counters began anew."""
+    """The first of a new start of its device, whose counters began again."""
     UNNUMBERED = "unnumbered"
     """Its format has no numbers."""
     DUPLICATE = "duplicate"
@@ -60,7 +60,7 @@ class IdentityParams:
     """[s] A device that is plugged into another port is silent for longer."""
     refused: int = 8
     """[-] Without boots: so many refused numbers in a row, rising, are a device that began
-    anew, once nothing was accepted for `quiet`."""
+    again, once nothing was accepted for `quiet`."""
     quiet: float = 2.0
     """[s]"""
     again: float = 10.0

@@ -1,4 +1,4 @@
-"""How often inertial samples come, beside how often the configuration says.
+"""How often inertial samples come, next to how often the configuration says.
 
 Turns are integrated sample by sample, each for one period of the configured rate: with a wrong
 rate every turn is taken for another by that factor, and nothing else tells.
@@ -13,7 +13,7 @@ WINDOW = 1.0
 BACKLOG = 0.5
 """[s] What comes at first is not counted: a port hands on at once what it has kept."""
 PAUSE = 0.5
-"""[s] After a longer one they are counted anew."""
+"""[s] After a longer one they are counted again."""
 OFF = 0.3
 """[-] A rate that differs by more is another one. What comes in bunches, or is lost, is within it;
 rates that somebody has mistaken differ by a factor of two."""

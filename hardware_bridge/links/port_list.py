@@ -71,7 +71,7 @@ def _names_by_device() -> dict[str, str]:
 
 
 def device_path(spec: PortSpec, listing: Listing = list_serial_ports) -> str:
-    """The device that `spec` means; a serial number is looked up anew each time.
+    """The device that `spec` means; a serial number is looked up again each time.
 
     Raises:
         BridgeError: None or several adapters have the number: never guessed.
@@ -110,7 +110,7 @@ def permission_remedy(path: str) -> str:
         return "it is another user's pseudo terminal: run both programs as the same user"
     if group == "root" or not mode.st_mode & stat.S_IRGRP or not mode.st_mode & stat.S_IWGRP:
         rule = f'KERNEL=="{kernel}*", GROUP="dialout", MODE="0660"'
-        return f"add the udev rule {rule} in /etc/udev/rules.d/50-serial.rules and plug it in anew"
+        return f"add the udev rule {rule} in /etc/udev/rules.d/50-serial.rules and plug it in again"
     user = getpass.getuser()
     if user in grp.getgrgid(mode.st_gid).gr_mem:
         return f"you were added to the group {group}: log out and in again"

@@ -26,7 +26,7 @@ class Believed:
         self.accel_w: F64 = np.zeros((*shape, 2))
         """[m/s2] From one decision to the next."""
         self.clearance: F64 = np.full(shape, np.inf)
-        """[m] Infinite: nobody knows what stands beside them."""
+        """[m] Infinite: nobody knows what stands next to them."""
         self.present: Bool = np.zeros(shape, dtype=bool)
         self.known: Bool = np.zeros(shape, dtype=bool)
         """Whose place is known relative to the others'."""
@@ -52,7 +52,7 @@ class Believed:
             known[seer] = True
             self.known[0] = known
             seen, both = view.pos[0, seer], known & self._placed
-            # What went on is put beside those that are seen and had a place before.
+            # What went on is put next to those that are seen and had a place before.
             shift = (seen - self.pos_w[0])[both].mean(axis=0) if both.any() else 0.0
             pos = np.where(known[:, None], seen, self.pos_w[0] + shift)
             self._placed = known | (self._placed & both.any())

@@ -151,7 +151,7 @@ class LiveFeed:
                     self.note(self._now_ns(), text)
         if self._supervisor.gone:
             # Their controllers stop them by themselves; nobody is left to tell them anything.
-            raise BridgeError("supervisor: it is gone, so the cars stand; start the drive anew")
+            raise BridgeError("supervisor: it is gone, so the cars stand; start the drive again")
 
     def _note_links(self) -> None:
         for notice in self._links.drain_notices():

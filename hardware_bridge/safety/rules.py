@@ -26,7 +26,7 @@ AHEAD = 0.05
 """[s] A time so far ahead of the clock is no time."""
 DIRECTION = 1.0
 """[-] Standard deviations that the direction of another that is too near is believed to be off;
-with more, cars beside each other could not part."""
+with more, cars next to each other could not part."""
 
 
 RECOVERED = 0.1

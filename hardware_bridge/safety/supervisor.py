@@ -93,7 +93,7 @@ class Supervisor:
                     self._picture = picture
                     self._word[0] = max(float(picture.t[0]), self._word[0])
             case Order("arm"):
-                # Who has asked to end it does not begin anew.
+                # Who has asked to end it does not begin again.
                 return [] if self.quit else self._arm()
             case Order("disarm"):
                 self._gate.disarm()

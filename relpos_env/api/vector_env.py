@@ -109,7 +109,7 @@ class FormationVectorEnv(VectorEnv[F32, Any, Any]):
 
         Args:
             seed: Of the first environment, the others count on; or one for each.
-            options: ``reset_mask``, (env): only these begin anew; and what a single environment
+            options: ``reset_mask``, (env): only these begin again; and what a single environment
                 takes, the same for all.
 
         Raises:

@@ -3,7 +3,7 @@
 Filters and worlds have parameters of different types on purpose. This is the one place that
 translates. Noise of sensors follows from their parameters; what the orientation stage makes of
 them (heading and slow acceleration errors), how tyres slip beyond what the filter knows and how
-often sight is lost were measured on simulated runs, as written beside the numbers
+often sight is lost were measured on simulated runs, as written next to the numbers
 (`benchmarks/measure_world.py`).
 """
 

@@ -54,7 +54,7 @@ class Perception:
         Args:
             constellation: The nodes; the first of them ride on the cars, in the cars' order.
             params: What the trackers believe.
-            block: Filled anew by the caller before every step, in its own memory.
+            block: Filled again by the caller before every step, in its own memory.
             powered: Which cars' trackers run, (env, car), likewise.
             filter: One of `tracking.filters.FILTERS`.
             room: Measurements that wait at a time, at most.

@@ -78,7 +78,7 @@ class Clip:
 
 
 def find_recordings() -> Path | None:
-    """Folder of motion capture: in RELPOS_DATA, or in ../shared/data beside the project."""
+    """Folder of motion capture: in RELPOS_DATA, or in ../shared/data next to the project."""
     named = os.environ.get("RELPOS_DATA")
     data = Path(named) if named else Path(__file__).resolve().parents[3] / "shared" / "data"
     folder = data / "human_motion"

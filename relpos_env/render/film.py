@@ -66,7 +66,7 @@ class Film:
             self._renderer.close()
 
     def __getstate__(self) -> dict[str, Any]:
-        """Everything but the drawing surfaces, which are made anew."""
+        """Everything but the drawing surfaces, which are made again."""
         return {**self.__dict__, "_renderer": None}
 
     def _draw(self, formation: EnvCore) -> Any:

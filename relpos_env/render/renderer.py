@@ -85,7 +85,7 @@ class Renderer:
         return flat.reshape(height, width, 3).copy()
 
     def close(self) -> None:
-        """Close the window and forget the size; the next picture begins anew."""
+        """Close the window and forget the size; the next picture begins again."""
         if self._window is not None:
             self._pg.display.quit()
         self._window, self._scene, self._clock = None, None, None

@@ -46,7 +46,7 @@ class Scenario:
     ring: tuple[float, float]
     """[m] Half axes of the loop on which the cars start and drive round the centre."""
     layout: Layout = "ring"
-    """Where the cars start: `ring`, evenly on the loop; `line`, on a straight line beside the
+    """Where the cars start: `ring`, evenly on the loop; `line`, on a straight line next to the
     centre, at x = ring[0]; `scattered`, anywhere, facing anywhere."""
     start_area: Area | None = None
     """[m] x from, y from, x to, y to: where scattered and joining cars start; None is
@@ -64,7 +64,7 @@ class Scenario:
     """Puts further bodies, shapes, joints and collision handlers into the space of an episode,
     drawing from the generator; needs ``physics="pymunk"``. In a file ``package.module:name``."""
     randomisation: Randomisation = field(default_factory=Randomisation)
-    """What is drawn anew for every episode; nothing by default."""
+    """What is drawn again for every episode; nothing by default."""
 
     def __post_init__(self) -> None:
         if self.in_line:

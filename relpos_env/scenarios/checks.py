@@ -127,7 +127,7 @@ def _check_gap(gap: Gap, s: Scenario) -> None:
     gap.wall(s.room)
     boxes = boxes_of(s.obstacles)
     for k in (1.0, -1.0):
-        # A finger's breadth of wall just beside the opening.
+        # A finger's breadth of wall just next to the opening.
         beside = _slice(gap, k * (0.5 * gap.width + 0.005), 0.002)
         if not overlap(beside, boxes).any():
             raise EnvError("gap: expected walls at both its sides, see Scenario.with_gap")

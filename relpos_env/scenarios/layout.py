@@ -41,7 +41,7 @@ def ring_poses(n: int, ring: tuple[float, float], car: CarParams, rng: np.random
 
 
 def line_poses(n: int, ring: tuple[float, float], rng: np.random.Generator) -> F64:
-    """Evenly on a straight line beside the centre, (car, 3) [m, m, rad].
+    """Evenly on a straight line next to the centre, (car, 3) [m, m, rad].
 
     The line is `x = ring[0]` and as long as the loop; only the headings are in disorder.
     """

@@ -1,4 +1,4 @@
-"""A curriculum: the same scenario with more and more drawn anew for every episode.
+"""A curriculum: the same scenario with more and more drawn again for every episode.
 
 The noise of a level spans that of real devices of one type at level 1 and of cheap, badly
 calibrated ones at level 4. Later levels have all of the earlier ones.

@@ -1,4 +1,4 @@
-"""What is drawn anew for every episode. Nothing is, unless said.
+"""What is drawn again for every episode. Nothing is, unless said.
 
 An interval `(low, high)` is drawn from uniformly; a factor log-uniformly, so that half and
 double are as likely, and multiplies what the scenario says.

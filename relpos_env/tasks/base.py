@@ -156,7 +156,7 @@ class Task(ABC):
 
     @abstractmethod
     def change(self, env: int, pos: F64, cars: I64, before: Bool, t: float) -> None:
-        """Give out places anew, since cars came or went.
+        """Give out places again, since cars came or went.
 
         Args:
             env: Environment.

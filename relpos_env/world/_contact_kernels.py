@@ -110,7 +110,7 @@ def count_contacts(bodies, solver, e, n_met):
     """Add the contacts that are new to those that the cars began.
 
     To a fresh space all are: of these, what touched just before does not count again. A car that
-    touches two things that are no cars, one of them anew, in that very step goes for one that
+    touches two things that are no cars, one of them again, in that very step goes for one that
     touches on.
     """
     n_cars, tick, fresh = bodies.contacts.shape[1], bodies.tick[e], solver.calls[e].fresh

@@ -174,7 +174,7 @@ class RoomState:
         if (away < spacing(self.car)).any():
             return True
         boxes = b.boxes[env]
-        # Places to come in were drawn with more room than this beside the boxes.
+        # Places to come in were drawn with more room than this next to the boxes.
         reach = 0.5 * np.hypot(self.car.length, self.car.width)
         pushed = boxes[self.movable(len(boxes))]
         return any(distance(place, box) < reach for box in pushed)

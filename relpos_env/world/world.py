@@ -151,7 +151,7 @@ class World:
         return part
 
     def begin(self, env: int, episode: Episode, rng: np.random.Generator) -> None:
-        """Begin a group anew.
+        """Begin a group again.
 
         Args:
             env: Which.

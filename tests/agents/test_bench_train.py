@@ -1,4 +1,4 @@
-"""Training beside an environment that costs nothing."""
+"""Training next to an environment that costs nothing."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""Trained policies beside controllers: what they are shown, and how they are named."""
+"""Trained policies next to controllers: what they are shown, and how they are named."""
 
 from dataclasses import replace
 

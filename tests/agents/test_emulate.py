@@ -83,7 +83,7 @@ def test_the_world_goes_as_the_environment_goes(task, scenario, seconds):
             world.step(speed, steering)
         contacts += int(formation.loop.swarm.contacts.sum())
         same(world, formation)
-    assert world.contacts == contacts
+    assert world.collisions == contacts
 
 
 class Host:

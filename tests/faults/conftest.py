@@ -65,7 +65,7 @@ class Edit:
 
 
 class Run:
-    """Estimates of all recordings beside the truth; pairs with the bad node, and the others."""
+    """Estimates of all recordings next to the truth; pairs with the bad node, and the others."""
 
     def __init__(self, logs, fault):
         self.t = np.arange(SETTLED, 60.0, 0.05)

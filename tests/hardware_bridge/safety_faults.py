@@ -9,7 +9,7 @@ LONGEST = 1.5
 
 
 class Faults:
-    """Drawn anew for every environment when the last one is over; arrays over (env)."""
+    """Drawn again for every environment when the last one is over; arrays over (env)."""
 
     def __init__(self, n_envs, n_cars, rng, kinds=KINDS):
         self._rng, self._n = rng, n_cars

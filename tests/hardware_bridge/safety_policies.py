@@ -9,7 +9,7 @@ NAMES = (
 
 
 class Policies:
-    """One for every car, drawn anew every few seconds; speed and steering, (env, car)."""
+    """One for every car, drawn again every few seconds; speed and steering, (env, car)."""
 
     def __init__(self, shape, rng):
         self._rng, self._shape = rng, shape
@@ -21,10 +21,10 @@ class Policies:
     def decide(self, pos, heading, present):
         rng, shape = self._rng, self._shape
         self._count += 1
-        anew = rng.random(shape) < 0.03
-        self._kind = np.where(anew, rng.integers(0, len(NAMES), shape), self._kind)
-        self._prey = np.where(anew, rng.integers(0, shape[1], shape), self._prey)
-        self._side = np.where(anew, rng.choice([-1.0, 1.0], shape), self._side)
+        again = rng.random(shape) < 0.03
+        self._kind = np.where(again, rng.integers(0, len(NAMES), shape), self._kind)
+        self._prey = np.where(again, rng.integers(0, shape[1], shape), self._prey)
+        self._side = np.where(again, rng.choice([-1.0, 1.0], shape), self._side)
         env = np.arange(shape[0])[:, None]
         chase = pos[env, self._prey] - pos
         bearing = np.arctan2(chase[..., 1], chase[..., 0]) - heading

@@ -170,10 +170,10 @@ def settled(clock=MICROSECONDS_32, ticks=3_000_000_000, seconds=5.0):
 
 def test_a_counter_that_began_anew_is_a_step_and_counted():
     _, stream = settled()
-    anew = Device(ticks=0)
+    again = Device(ticks=0)
     for k in range(200):
         t = 6.0 + 0.01 * k
-        mapped = stream.map(anew.ticks(t - 5.9), round((t + 1e-3) * S))
+        mapped = stream.map(again.ticks(t - 5.9), round((t + 1e-3) * S))
         assert abs(mapped / S - t - 1e-3) < 1e-4
     assert (stream.steps, stream.strays) == (1, 0)
 

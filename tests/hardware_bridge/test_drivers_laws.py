@@ -15,7 +15,7 @@ patient = settings(suppress_health_check=[HealthCheck.too_slow])
 
 KEY = bytes(range(16))
 REVERSING = {"pwm": {"reverse": [[0.5, 1440], [2.0, 1300]]}}
-"""Options beside the defaults."""
+"""Options next to the defaults."""
 EVERY = pytest.mark.parametrize("name", sorted(DRIVERS))
 anything = st.floats(allow_nan=True, allow_infinity=True)
 within = st.floats(0.5, 1.5), st.floats(-0.25, 0.25)

@@ -163,7 +163,7 @@ def test_a_restart_is_seen_with_its_first_message():
         assert identities.check("left", numbered(11, k), k * 10 * MS, 3) is Verdict.FRESH
     assert identities.check("left", numbered(12, 0), 2 * S, 3) is Verdict.REBOOT
     assert identities.check("left", numbered(12, 1), 2 * S, 3) is Verdict.FRESH
-    assert identities.notices == [(2 * S, "node 3 started anew, on link left")]
+    assert identities.notices == [(2 * S, "node 3 started again, on link left")]
 
 
 def test_a_device_that_comes_back_after_its_twin_is_found_by_one_message():

@@ -1,4 +1,4 @@
-"""What was signed and said once is not believed again, whoever starts anew, and however."""
+"""What was signed and said once is not believed again, whoever starts again, and however."""
 
 import json
 from dataclasses import replace

@@ -108,7 +108,7 @@ def test_reboot(drive, usual, key):
     each = drive(key=key)
     each.drive(2.0).befall("reboot", "nodes.1", 1.0)
     each.drive(3.0)
-    assert each.notices == [f"cars.1 {SILENT}", "node 1 started anew, on link links.n1"]
+    assert each.notices == [f"cars.1 {SILENT}", "node 1 started again, on link links.n1"]
     assert each.armed == [False, True, True]
     assert each.report.well_for[0] > 0.5
     n = len(each.errors)
@@ -169,7 +169,7 @@ def test_two_nodes_with_one_id(drive):
     each.drive(2.0).befall("twin", "nodes.1", 1.5)
     each.drive(1.0)
     assert each.notices[:2] == [
-        "node 1 started anew, on link links.n1",
+        "node 1 started again, on link links.n1",
         "node 1 is two devices, both on link links.n1: refused until it is released",
     ]
     assert not each.armed[0]

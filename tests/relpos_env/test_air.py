@@ -185,7 +185,7 @@ def test_a_node_that_is_switched_on_again(who, pause):
     group.right(group.run(1.0))
     group.air.switch_off(who)
     group.right(group.run(pause))
-    group.air._nodes[who]["base"] = 2**38 + 12345  # its clock begins anew too
+    group.air._nodes[who]["base"] = 2**38 + 12345  # its clock begins again too
     group.on(who, boot=200)
     group.right(group.run(1.0))
     assert group.together()

@@ -54,7 +54,7 @@ def clearances(poses, room=(5.0, 3.0), box=None, present=None):
 
 def test_the_nearest_of_walls_boxes_and_cars_counts():
     np.testing.assert_allclose(clearances([(0.0, 0.0, 0.3)]), FARTHEST)
-    # A wall ahead, and one beside a car that is turned by a right angle.
+    # A wall ahead, and one next to a car that is turned by a right angle.
     wall = 0.2 - CAR_RADIUS - WALL_RADIUS
     np.testing.assert_allclose(clearances([(2.5 - 0.15 - 0.2, 0.0, 0.0)]), wall)
     np.testing.assert_allclose(clearances([(2.5 - 0.10 - 0.2, 0.0, np.pi / 2)]), wall)

@@ -229,7 +229,7 @@ def test_two_cars_stay_whoever_waits_outside(monkeypatch):
 
 
 def test_a_box_that_was_not_pushed_is_in_nobodys_way():
-    """Doors are drawn beside boxes that can be pushed, however long these are."""
+    """Doors are drawn next to boxes that can be pushed, however long these are."""
     kept = []
     env = make(scenario="rooms-9x7", n_cars=6)
     for seed in range(150):

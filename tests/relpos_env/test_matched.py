@@ -1,4 +1,4 @@
-"""What a filter is told of the simulated world, beside that world."""
+"""What a filter is told of the simulated world, next to that world."""
 
 import runpy
 from dataclasses import replace

@@ -42,7 +42,7 @@ def check_copy(env, make_copy, steps=60):
     env.reset(seed=3)
     rng = np.random.default_rng(1)
     go_on(env, rng, 15)
-    # What is touching when it is copied is solved anew, and not to the last bit.
+    # What is touching when it is copied is solved again, and not to the last bit.
     while env.formation.loop.swarm._bodies.calm.any():
         go_on(env, rng, 1)
     twin = make_copy(env)

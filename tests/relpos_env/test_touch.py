@@ -82,7 +82,7 @@ def test_a_contact_that_lasts_counts_once(others):
     group = swarm(scenario, start, events if others == "come and go" else ())
     n = np.zeros(4)
     for k in range(110):
-        # Until the group is left alone it pushes at the wall; then it comes back and hits anew.
+        # Until the group is left alone it pushes at the wall; then it comes back and hits again.
         speed = np.zeros((1, 4))
         speed[0, 0] = 1.0 if k < 75 or k >= 82 else -1.0
         group.step(speed, np.zeros((1, 4)))

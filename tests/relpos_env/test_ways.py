@@ -160,7 +160,7 @@ def test_new_goals_absent_cars_and_places_out_of_reach_bring_nothing():
     ways.follow(pos + [0.0, 0.3], one, goal, 0, 1)
     assert ways.progress[0, 0] > 0.0
     assert ways.progress[0, 1] == 0.0
-    ways.follow(pos - [0.0, 0.2], both, goal, 0, 1)  # the second is back: it begins anew
+    ways.follow(pos - [0.0, 0.2], both, goal, 0, 1)  # the second is back: it begins again
     assert ways.progress[0, 0] < 0.0
     assert ways.progress[0, 1] == 0.0
     for other in ([0.1, 0.0], [0.0, 0.1]):

@@ -1,4 +1,4 @@
-"""Hands beside fixed nodes, and drones, in space, from nothing but raw sensors."""
+"""Hands next to fixed nodes, and drones, in space, from nothing but raw sensors."""
 
 import runpy
 import sys

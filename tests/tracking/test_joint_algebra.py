@@ -68,7 +68,7 @@ def test_a_turned_hypothesis_is_turned_as_a_whole(dimensions, kinds, mirrored):
         rows = [slice(a, a + d) for a in at[there]]
         mean = np.mean([x[row] for row in rows], axis=0)
         if not there.all():
-            mean = np.zeros(d)  # velocities beside static nodes
+            mean = np.zeros(d)  # velocities next to static nodes
         for row in rows:
             x[row] = mean + M @ (x[row] - mean)
             T[row, row] = M
@@ -89,7 +89,7 @@ def test_hypotheses_are_the_same_where_they_agree_about_the_centre(dimensions, k
     assert are_same(c, s, 0, 1, none)
     limit = c["merge_distance"]
     at = s.nodes["i_vel"][0]
-    # One of n moves: it is off by (n - 1) / n of that from the mean, or by all beside static ones.
+    # One of n moves: it is off by (n - 1) / n of that from the mean, or by all next to static ones.
     share = 2.0 / 3.0 if moving.all() else 1.0
     s.x[1, at] += 0.95 * limit / share
     assert are_same(c, s, 0, 1, none)

@@ -62,15 +62,15 @@ def test_a_tilt_that_is_being_found_leaves_the_bias_uncertain(at_rest):
         assert s.P[0, at, at] == pytest.approx(carrier.bias_std**2 + unsettled**2)
 
 
-@pytest.mark.parametrize(("gap", "anew"), [(0.01, False), (0.4, False), (0.6, True)])
-def test_an_orientation_goes_on_over_gaps_that_are_filled(gap, anew):
-    """What VQF goes on from is as old as it was, though the group has to see who moves anew."""
+@pytest.mark.parametrize(("gap", "again"), [(0.01, False), (0.4, False), (0.6, True)])
+def test_an_orientation_goes_on_over_gaps_that_are_filled(gap, again):
+    """What VQF goes on from is as old as it was, though the group has to see who moves again."""
     c, s = one_env("hand")
     values = np.zeros((1, 2, N_VALUES))
     values[..., 0] = 1.0
     for k, t in enumerate((7.0, 7.0 + gap)):
         process_attitude(c, s.nodes, s.last_attitude_accel, s.preintegrated, 0, t, values, 0, k)
-    assert s.nodes["t_oriented"][0] == (7.0 + gap if anew else 7.0)
+    assert s.nodes["t_oriented"][0] == (7.0 + gap if again else 7.0)
 
 
 @given(st.floats(-30.0, 30.0))

@@ -87,7 +87,7 @@ class Orientation:
             array[:] = old
 
     def bind(self, block: MeasurementBlock) -> Callable[[], None]:
-        """`step` in place, for a block that stays where it is and is filled anew every time."""
+        """`step` in place, for a block that stays where it is and is filled again every time."""
         block.in_place  # noqa: B018 -- refuses what is not contiguous
         kernel, arguments = self.call(block)
         return bind(kernel, *arguments)

@@ -33,7 +33,7 @@ STEADY = 1.5
 STARTED, T, GRAVITY, COS_YAW, SIN_YAW = 0, 1, 2, 3, 4
 LAST_GYR, LAST_ACC, FIELD, HAS_FIELD, SEEN_FIELD, TURNED = 5, 8, 11, 14, 15, 16
 N_NODE = 18
-"""Columns of what a node remembers beside its VQF: 1 after the first sample; its time [s]; length
+"""Columns of what a node remembers next to its VQF: 1 after the first sample; its time [s]; length
 of gravity [m/s2]; cosine and sine of half the turn that gives the initial heading; the last
 sample, gyroscope [rad/s] and specific force [m/s2]; a field that no sample followed yet, and 1
 if there is one; 1 after a field was used; by how much it was turned upright, about x and y of the
@@ -129,7 +129,7 @@ def tell_upright(s, e, n, cos, sin, values, k):
 
 @small_kernel
 def find_gap(c, s, e, n, t):
-    """Samples lost before one at time t [s]; after a long silence VQF starts anew instead."""
+    """Samples lost before one at time t [s]; after a long silence VQF starts again instead."""
     m = s.node
     gap = t - m[e, n, T]
     if m[e, n, STARTED] == 0.0 or gap * c.rate[n] <= STEADY:

@@ -35,7 +35,7 @@ class RangeTable:
 
 
 def range_table(block: MeasurementBlock, constellation: Constellation, truth: Truth) -> RangeTable:
-    """Put beside every range of environment 0 what it should have been.
+    """Put next to every range of environment 0 what it should have been.
 
     A distance is known where both positions are and, for an antenna that is not at the
     origin of its body, the orientation too.

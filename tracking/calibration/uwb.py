@@ -85,7 +85,7 @@ def calibrate_uwb(
     """Find slope and offsets.
 
     Args:
-        table: Ranges beside their true distances.
+        table: Ranges next to their true distances.
         ids: Node ids in array order.
         random_state: Seed of RANSAC.
         params: What is asked of the data.

@@ -1,4 +1,4 @@
-"""Position filters. Adding one: a folder beside `joint` and a line in `FILTERS`."""
+"""Position filters. Adding one: a folder next to `joint` and a line in `FILTERS`."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ class Filter(Protocol):
         """`run` for arrays that stay where they are, without its overhead.
 
         Args:
-            block: Filled anew before every call, contiguous.
+            block: Filled again before every call, contiguous.
             estimate: Written by every call for its times `t`, (env, time), filled before.
         """
 

@@ -148,7 +148,7 @@ class Horizon:
         """`step` for arrays that stay where they are, without its overhead.
 
         Args:
-            block: Filled anew before every call.
+            block: Filled again before every call.
             now: Likewise, (env) [s].
             out: Written by every call.
 

@@ -3,7 +3,7 @@
 Events lie in slots that never move; `order` lists the slots: those that wait, in order, then the
 free ones, the last freed first, since they are still in the cache. An event that comes is put at
 the end and moved forward past those that come after it, which is one comparison for one that
-arrives in order. Only what devices send is kept: what the tracker's own orientations tell beside
+arrives in order. Only what devices send is kept: what the tracker's own orientations tell next to
 comes behind the horizon.
 """
 

@@ -23,7 +23,7 @@ from tracking.mount import KEYS, Mount
 def write_log(folder: Path | str, log: Log) -> Path:
     """Write a run so that `read_log` gives the same measurements, to the last bit.
 
-    The files are written beside the target and moved in place at the end.
+    The files are written next to the target and moved in place at the end.
 
     Raises:
         LogError: The target exists and is not an empty folder, or holds an event that a log

@@ -25,7 +25,7 @@ class Joining:
         self._attempts = self._pause = 0
 
     def begin(self) -> None:
-        """The node begins anew."""
+        """The node begins again."""
         self.succeeded()
         self._tried = None
 

@@ -24,7 +24,7 @@ class Listener:
         self._spoken: int | None = None
 
     def forget(self) -> None:
-        """Begin anew: the own clock has jumped or the node was reset."""
+        """Begin again: the own clock has jumped or the node was reset."""
         self.peers.forget()
         self._exchanges.forget()
         self._spoken = None

@@ -26,7 +26,7 @@ class SessionParams:
     listen: tuple[float, float] = (0.04, 0.06)
     """[s] A node that is switched on listens for a time between these before it speaks."""
     idle: tuple[float, float] = (0.005, 0.02)
-    """[s] Pause of an initiator that is alone, drawn anew every time."""
+    """[s] Pause of an initiator that is alone, drawn again every time."""
     drop_after: int = 5
     """[rounds] A member that nobody has heard for so long is dropped."""
     first_check: tuple[float, float] = (0.2, 1.2)

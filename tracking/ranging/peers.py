@@ -66,7 +66,7 @@ class Peers:
         """Note a message that was heard.
 
         Returns:
-            True if its stamp goes on from the last one; False if the clock begins anew, since
+            True if its stamp goes on from the last one; False if the clock begins again, since
             the peer is new, was switched on again or has jumped; None if the message is a
             repeated or late one and must be ignored.
         """

@@ -42,7 +42,7 @@ class Session:
         Args:
             node_id: 0 to 254, unique in the group.
             params: How it takes part.
-            boot: A random number, drawn anew whenever the node is switched on.
+            boot: A random number, drawn again whenever the node is switched on.
 
         Raises:
             ConfigError: An ID out of range.
@@ -263,7 +263,7 @@ class Session:
             self._await_slot()
 
     def _begin(self) -> None:
-        """Begin anew: listen before speaking."""
+        """Begin again: listen before speaking."""
         self._forget()
         self.role, self.root = Role.LISTENING, self.id
         self._members.ask_first(self._time.now)
@@ -282,7 +282,7 @@ class Session:
         return 0 <= self._time.now - arrived <= self._slots.longest + self._slots.header
 
     def _advance(self, now: int) -> bool:
-        """Take the time; False if the clock has jumped back, and the node begins anew."""
+        """Take the time; False if the clock has jumped back, and the node begins again."""
         goes_on = self._time.take(now)
         if not goes_on:
             self._begin()

@@ -27,7 +27,7 @@ class Waiting(Enum):
     SLOT = "the slot is silent if no preamble comes"
     PART = "the next part of a message should come"
     TAKEOVER = "the request is missing: take over"
-    WATCHDOG = "begin anew"
+    WATCHDOG = "begin again"
 
 
 class Turns:

@@ -1,4 +1,4 @@
-"""How fast the environments step, beside mpe2 and bare pymunk in the same run.
+"""How fast the environments step, next to mpe2 and bare pymunk in the same run.
 
 Three cars with sensors at 100 Hz, a radio of messages and the joint tracker; an env-step is one
 decision of 0.1 s, ten steps of the physics, of every car of one environment. Episodes have 600

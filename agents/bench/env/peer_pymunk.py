@@ -8,7 +8,7 @@ boxes. For a step of 0.1 s it does, and nothing else:
 - the positions of the three cars and one `segment_query_first` for each pair of them, as line of
   sight.
 
-After 600 steps a room is built anew. There are no tyres, sensors, radio, tracker, operator,
+After 600 steps a room is built again. There are no tyres, sensors, radio, tracker, operator,
 rewards or observations. The cars touch nothing, so the solver has no contacts to solve.
 """
 
@@ -54,7 +54,7 @@ class Rooms:
 
         Args:
             n_envs: How many.
-            resets: Rooms that are built anew in a turn, which has as many steps as that takes.
+            resets: Rooms that are built again in a turn, which has as many steps as that takes.
             name: Of the scenario.
         """
         self.n_envs, self._scenario = n_envs, scenario(name)

@@ -31,7 +31,7 @@ def bench_env(
     progress: Callable[[float], None] | None = None,
     tell: Callable[[str], None] | None = None,
 ) -> list[Row]:
-    """Time of env-steps beside mpe2 and pymunk, on two cores, over sizes, and of the parts.
+    """Time of env-steps next to mpe2 and pymunk, on two cores, over sizes, and of the parts.
 
     Args:
         effort: How much of everything.
@@ -81,7 +81,7 @@ def _single(effort: Effort, tell: Callable[[str], None] | None) -> Row:
 
 
 def _batch(effort: Effort, name: str, drive: str) -> list[Row]:
-    """A batch on one core beside pymunk, then its parts."""
+    """A batch on one core next to pymunk, then its parts."""
     ours = Batch(effort.envs, DRIVES[drive](), resets=effort.resets, scenario=name)
     ours.warm_up(effort.warm_up)
     theirs = Rooms(effort.envs, resets=effort.resets, name=name)
@@ -97,7 +97,7 @@ def _batch(effort: Effort, name: str, drive: str) -> list[Row]:
 
 
 def _kept(effort: Effort) -> Row:
-    """A batch whose every step is made in its spaces, beside pymunk."""
+    """A batch whose every step is made in its spaces, next to pymunk."""
     ours = Batch(effort.envs, followed, resets=effort.resets, physics="pymunk")
     ours.warm_up(effort.warm_up)
     theirs = Rooms(effort.envs, resets=effort.resets, name=SCENARIO)
@@ -108,7 +108,7 @@ def _kept(effort: Effort) -> Row:
 
 
 def _threads(effort: Effort) -> list[Row]:
-    """Two threads beside one, and beside pymunk, which has one."""
+    """Two threads next to one, and next to pymunk, which has one."""
     rows = []
     for n_envs in effort.two_cores:
         one, two = (Batch(n_envs, followed, resets=effort.resets, threads=k) for k in (1, 2))
@@ -126,7 +126,7 @@ def _threads(effort: Effort) -> list[Row]:
 
 
 def _processes(effort: Effort, rows: list[Row]) -> Row:
-    """Two processes beside the thread that was measured alone before."""
+    """Two processes next to the thread that was measured alone before."""
     n_envs = effort.two_cores[0]
     cost = processes_cost(
         n_envs, 2, resets=effort.resets, warm_up=effort.warm_up, turns=effort.turns

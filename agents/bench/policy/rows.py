@@ -32,7 +32,7 @@ SAME = 1e-5
 def bench_policy(
     *, steps: int = 2000, progress: Callable[[float], None] | None = None
 ) -> list[Row]:
-    """Times of a policy, alone and with what makes the observation, beside numpy.
+    """Times of a policy, alone and with what makes the observation, next to numpy.
 
     Args:
         steps: Calls in a turn; a batch has fewer.

@@ -1,4 +1,4 @@
-"""How long the tracker takes, beside filterpy and GTSAM on the same measurements.
+"""How long the tracker takes, next to filterpy and GTSAM on the same measurements.
 
 A step is what one moment brings: a new orientation and acceleration of every node, and some
 ranges of that time. In a `round` every pair ranges; in a `message` one node with half the group,

@@ -1,4 +1,4 @@
-"""The figures of `relpos bench tracker`, each beside a peer."""
+"""The figures of `relpos bench tracker`, each next to a peer."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def bench_tracker(
     progress: Callable[[float], None] | None = None,
     tell: Callable[[str], None] | None = None,
 ) -> list[Row]:
-    """Times of the tracker beside filterpy, and GTSAM where it is installed.
+    """Times of the tracker next to filterpy, and GTSAM where it is installed.
 
     Args:
         rounds: Steps timed for each figure of small groups; fewer for large ones and peers.
@@ -54,7 +54,7 @@ def bench_tracker(
 
 
 def _rounds(workload: Workload, rounds: int, filterpy: str, gtsam: str | None) -> list[Row]:
-    """One prediction and a range of every pair, every filter beside its peers."""
+    """One prediction and a range of every pair, every filter next to its peers."""
     few = max(rounds // 20, 20)
     pairs, group = pairs_cost(workload, few), group_cost(workload, few)
     where = f"{workload.n} nodes {workload.dimensions}D"

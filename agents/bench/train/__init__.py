@@ -1,4 +1,4 @@
-"""`relpos bench train`: frames per second of training, beside an environment that costs nothing."""
+"""`relpos bench train`: training speed next to an environment that costs nothing."""
 
 from __future__ import annotations
 

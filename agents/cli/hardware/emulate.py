@@ -140,7 +140,7 @@ def emulate(
     error = result.summary["formation_error"]
     click.echo(
         f"{result.seconds:.1f} s, formation error "
-        f"{'unknown' if error is None else f'{error:.3f} m'}, {result.contacts} contacts, "
+        f"{'unknown' if error is None else f'{error:.3f} m'}, {result.collisions} collisions, "
         f"{len(result.happened)} faults\n"
         f"{late.late} of {late.steps} steps late, the latest by {1e-6 * late.worst_ns:.1f} ms"
     )

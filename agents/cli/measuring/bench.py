@@ -13,7 +13,7 @@ from agents.errors import UsageError
 
 @click.group()
 def bench() -> None:
-    """Measure speed, each figure beside a peer in the same run."""
+    """Measure speed, each figure next to a peer in the same run."""
 
 
 @bench.command("tracker")

@@ -95,7 +95,7 @@ def compare(
     out: Path | None,
     **options: Any,
 ) -> None:
-    """Compare drivers on the same episodes: formation error, contacts, energy, with intervals.
+    """Compare drivers on the same episodes: formation error, collisions, energy, with intervals.
 
     NAME is a controller (consensus, leader-follower, range-only) or a trained policy: its name,
     its file or its folder.

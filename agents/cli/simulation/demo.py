@@ -153,5 +153,5 @@ def demo(
     done = f", done after {result.seconds:.1f} s" if result.done else ""
     click.echo(
         f"{100 * result.nlos_share:.0f} % of the ranges behind an obstacle, "
-        f"{result.collisions} contacts{done}\nopen {out / 'report.html'} to see the drive"
+        f"{result.collisions} collisions{done}\nopen {out / 'report.html'} to see the drive"
     )

@@ -23,7 +23,7 @@ class EmulationProcess:
 
     start_ns = 0
     """[ns] Host time of the world's beginning."""
-    contacts = 0
+    collisions = 0
     """[-] That cars began."""
     late_steps = 0
     """[-] By more than 10 ms."""
@@ -56,7 +56,7 @@ class EmulationProcess:
         self._process.join(timeout=LONGEST_START)
         self._process.close()
         if isinstance(said, tuple):
-            self.start_ns, self.contacts, self.late_steps = said
+            self.start_ns, self.collisions, self.late_steps = said
         elif error[0] is None:
             # What went wrong with the drive itself is the more telling.
             why = said if isinstance(said, Exception) else "its process was ended from outside"
@@ -78,4 +78,4 @@ def _emulate(options: EmulateOptions, place: Path, pipe: Connection) -> None:
     except Exception as error:
         pipe.send(error)
         return
-    pipe.send((result.start_ns, result.contacts, result.lateness.late))
+    pipe.send((result.start_ns, result.collisions, result.lateness.late))

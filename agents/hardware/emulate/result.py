@@ -34,7 +34,7 @@ class EmulateResult:
     """When task and operator looked at the room, since the cars were let go, (decision) [s]."""
     error: F64
     """Formation error by the truth, mean over the cars in the room, (decision) [m]."""
-    contacts: int
+    collisions: int
     """[-] That cars began."""
     lateness: Lateness
     """How well the steps kept to their times."""
@@ -72,7 +72,7 @@ class EmulateResult:
             "seed": self.seed,
             "seconds": self.seconds,
             "formation_error": None if math.isnan(error) else error,
-            "contacts": self.contacts,
+            "collisions": self.collisions,
             "start_ns": self.start_ns,
             "late_steps": self.lateness.late,
             "worst_late_ms": 1e-6 * self.lateness.worst_ns,

@@ -45,7 +45,7 @@ class EmulatedWorld:
         self._task = parts.make_task(1)
         self._operator = Operator(parts.config.operator, parts.n_cars, 1)
         self.recording = Recording() if record else None
-        self.contacts = 0
+        self.collisions = 0
         """[-] That cars began since they were let go."""
         self._touched = np.zeros((1, parts.n_cars))
         self._steps = 0
@@ -142,7 +142,7 @@ class EmulatedWorld:
         self._task.update(swarm.state, swarm.t - STAND_STILL, self._touched, slice(0, 1))
         self._operator.sample(swarm.state, self._task, slice(0, 1))
         if self._steps > AT_REST:
-            self.contacts += int(self._touched.sum())
+            self.collisions += int(self._touched.sum())
         self._touched[:] = 0.0
 
 

@@ -17,7 +17,7 @@ from tracking.findings import KINDS
 from tracking.findings.at_rest import find_in_samples
 
 TELLS_OF_OTHERS = "positions"
-"""The format whose lines name nodes by their ids beside names of `ids`."""
+"""The format whose lines name nodes by their ids next to names of `ids`."""
 MOST_DAMAGED = 0.05
 """[-] A larger share of damaged frames is a problem."""
 MOST_MISSING = 0.05

@@ -1,4 +1,4 @@
-"""A log with truth beside a recording: whose times are how far apart, and how large errors are.
+"""A log with truth next to a recording: whose times are how far apart, and how large errors are.
 
 True distances between nodes, taken at the times of the recorded ranges, agree with them best where
 the clocks agree. The offset is found by that alone, so any log will do in which the nodes move:

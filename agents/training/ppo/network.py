@@ -3,7 +3,7 @@
 Every other car goes through the same small network, the mean over those that count is joined
 with what the car knows of itself (deep sets [1]), so the order of the others does not matter and
 absent ones leave no trace. Observations are scaled by fixed lengths and times, in the network:
-what is exported needs no statistics beside it.
+what is exported needs no statistics next to it.
 
 References:
     [1] Zaheer et al., Deep sets, NeurIPS 30 (2017).

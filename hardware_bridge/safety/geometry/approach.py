@@ -16,7 +16,7 @@ from hardware_bridge.safety.picture import Picture
 from tracking.arrays import F64, Bool
 
 ABEAM = 0.7
-"""[-] Sine of the angle from which on something stands beside a car, not before or behind it."""
+"""[-] Sine of the angle from which on something stands next to a car, not before or behind it."""
 CREEP = 0.02
 """[m] What is left of the way when a speed controller that follows a falling speed seems to be at
 rest."""

@@ -1,4 +1,4 @@
-"""Observation modes. Adding one: a file beside `relative.py` and a line in `OBSERVATIONS`."""
+"""Observation modes. Adding one: a file next to `relative.py` and a line in `OBSERVATIONS`."""
 
 from __future__ import annotations
 

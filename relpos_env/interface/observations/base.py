@@ -43,7 +43,7 @@ class ObservationMode(Protocol):
     """The stretches of the vector, in order."""
 
     def bind(self, view: AgentView, out: F32) -> Callable[[], None]:
-        """What writes observations from a view that is filled anew before every call.
+        """What writes observations from a view that is filled again before every call.
 
         Args:
             view: Of all cars.

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import pygame
 
 _ROOM_FOR_NUMBER = 12.0
-"""[units] Cars narrower than this have their number beside them."""
+"""[units] Cars narrower than this have their number next to them."""
 
 
 def draw_cars(canvas: Canvas, layout: Layout, snapshot: Snapshot) -> None:

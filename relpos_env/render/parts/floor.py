@@ -46,7 +46,7 @@ def draw_floor(canvas: Canvas, layout: Layout) -> None:
 
 
 def write_scale(picture: pygame.Surface, layout: Layout, letters: Lettering) -> None:
-    """The length of the scale bar beside it, and the size of the room."""
+    """The length of the scale bar next to it, and the size of the room."""
     bar, unit = _bar(layout), layout.unit
     at = (float(bar[1, 0]) + 9.0 * unit, float(bar[1, 1]))
     letters.write(picture, f"{_length(layout):g} m", at, 12 * unit, palette.INK)

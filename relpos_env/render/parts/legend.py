@@ -54,7 +54,7 @@ def draw_legend(canvas: Canvas, layout: Layout, names: tuple[str, ...]) -> None:
 def write_legend(
     picture: pygame.Surface, layout: Layout, names: tuple[str, ...], letters: Lettering
 ) -> None:
-    """The words beside the signs."""
+    """The words next to the signs."""
     u = layout.unit
     for name, at in zip(names, _places(layout, len(names)), strict=True):
         where = (float(at[0]) + 0.5 * _SIGN * u, float(at[1]))

@@ -19,7 +19,7 @@ CELL = 0.1
 """[m] Side of a cell, larger in rooms of more than `MOST_CELLS`."""
 MOST_CELLS = 10_000
 MARGIN = 0.1
-"""[m] Room to leave between a car and what stands beside it, on every side."""
+"""[m] Room to leave between a car and what stands next to it, on every side."""
 FLOOR_PER_CAR = 1.9
 """[spacing^2] Free floor that each car needs to find a random place: discs thrown at random jam
 when they cover 0.547 of the floor (Feder, J. Theor. Biol. 87, 1980); these cover 0.41."""

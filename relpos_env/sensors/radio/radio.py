@@ -138,7 +138,7 @@ class Radio:
         )
 
     def reset(self, env: int, seed: int, params: RadioSimParams | None = None) -> None:
-        """Begin anew in one environment, with every node switched off.
+        """Begin again in one environment, with every node switched off.
 
         Args:
             env: Which.

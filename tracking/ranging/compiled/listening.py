@@ -48,7 +48,7 @@ def forget_peers(s, peers, me):
 
 @small_kernel
 def take_stamp(peer, boot, stamp, arrived):
-    """`Peers.take`: 1 if the clock goes on, 0 if it begins anew, -1 if it does not fit."""
+    """`Peers.take`: 1 if the clock goes on, 0 if it begins again, -1 if it does not fit."""
     peer.known = True
     peer.doubt = DOUBT if peer.silences else max(peer.doubt - 1, 0)
     peer.silences = 0

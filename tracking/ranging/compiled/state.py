@@ -91,7 +91,7 @@ MESSAGE = np.dtype(
         ("ticks", "i8"),  # time on the air
     ]
 )
-"""A message that is sent, in place of its bytes; the stamps of its rows are kept beside it."""
+"""A message that is sent, in place of its bytes; the stamps of its rows are kept next to it."""
 
 
 class SessionNumbers(NamedTuple):
