@@ -8,12 +8,14 @@ have been made again.
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import json
 import platform
 import subprocess
 import sys
 from datetime import date
+from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -31,14 +33,28 @@ def load() -> dict[str, Entry]:
 
 
 def code_hash(sources: list[str], root: Path = ROOT) -> str:
-    """Return a hash of the Python files of some files and folders."""
+    """Return a hash of the code of some files and folders, without comments."""
     digest = hashlib.sha256()
     for source in sources:
         path = root / source
         for file in sorted(path.rglob("*.py")) if path.is_dir() else [path]:
             digest.update(file.relative_to(root).as_posix().encode())
-            digest.update(file.read_bytes())
+            digest.update(_code(file.read_text(encoding="utf-8")).encode())
     return digest.hexdigest()[:16]
+
+
+@lru_cache(maxsize=None)
+def _code(text: str) -> str:
+    """Return a Python text without comments and docstrings, which change no figure."""
+    tree = ast.parse(text)
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        if isinstance(body, list):
+            node.body = [  # type: ignore[attr-defined]
+                s for s in body
+                if not (isinstance(s, ast.Expr) and isinstance(s.value, ast.Constant))
+            ]  # fmt: skip
+    return ast.dump(tree)
 
 
 def stale(entries: dict[str, Entry], root: Path = ROOT) -> list[str]:

@@ -12,7 +12,7 @@ from tracking.log.folder import Log
 from tracking.measurements import Kind
 
 MOST_REFUSED = 0.2
-"""[-] Share of ranges; recordings that are tracked have up to 0.02, one that is lost has 0.65."""
+"""[-] Share of ranges; recordings that are tracked have up to 0.02, one that is lost has 0.5."""
 
 
 def find_unused(log: Log) -> list[Finding]:
