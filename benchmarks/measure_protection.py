@@ -10,11 +10,13 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import replace
 
 import numpy as np
 from measure_ablation import Case, case
 
 from tracking import Tracker
+from tracking.measurements import Kind
 from tracking.metrics.integrity import beyond_protection
 
 KINDS = ("cars-los", "cars-nlos", "human", "hand", "drones")
@@ -26,7 +28,11 @@ LENGTH = 15.0
 
 def started(of: Case, at: float) -> tuple[int, int]:
     """OK samples of a tracker that begins at a time [s], and those beyond their radius."""
-    block = of.block.take((of.block.t[0] >= at) & (of.block.t[0] < at + LENGTH))
+    t, kind = of.block.t[0], of.block.kind[0]
+    block = of.block.take(((t >= at) | (kind == Kind.SURVEY)) & (t < at + LENGTH))
+    # Surveyed distances hold from the start on.
+    block = replace(block, t=np.where(block.kind == Kind.SURVEY, at, block.t))
+    block = block.take(block.order()[0])
     times = (of.t >= at) & (of.t < at + LENGTH)
     estimate = Tracker(of.constellation).run(block, of.t[times]).take(0)
     judged = of.known[times] & ~of.constellation.is_static[of.constellation.pairs].all(axis=1)

@@ -15,7 +15,7 @@ import platform
 import subprocess
 import sys
 from datetime import date
-from functools import lru_cache
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -43,7 +43,7 @@ def code_hash(sources: list[str], root: Path = ROOT) -> str:
     return digest.hexdigest()[:16]
 
 
-@lru_cache(maxsize=None)
+@cache
 def _code(text: str) -> str:
     """Return a Python text without comments and docstrings, which change no figure."""
     tree = ast.parse(text)

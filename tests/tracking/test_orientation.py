@@ -212,3 +212,27 @@ def test_a_noisy_gyroscope_is_seen_to_rest():
         accel = np.abs(out[-200:, 4:8].mean(axis=0))
         assert (accel < most).all()
         assert np.isfinite(most) or accel.max() > 0.05  # VQF's own limit does not see it
+
+
+@pytest.mark.parametrize(("swing", "first"), [(15.0, 1.5), (0.0, 0.0)])
+def test_an_orientation_that_starts_in_motion_is_used_once_it_has_settled(swing, first):
+    """Before, its tilt follows single accelerations, and its heading that tilt."""
+    rng, n = np.random.default_rng(0), 600
+    t = np.arange(n) / 100.0
+    samples = 0.01 * rng.standard_normal((n, 6))
+    # A limb that swings along its x axis, level and pointing east.
+    samples[:, 3] += swing * np.cos(2.0 * np.pi * 1.7 * t)
+    samples[:, 5] += GRAVITY
+    field = np.tile([0.0, 20.0, -40.0], (n, 1)) + 0.1 * rng.standard_normal((n, 3))
+    node = np.zeros(n, dtype=np.int64)
+    rows = [
+        MeasurementBlock.of_kind(Kind.MAG, t, node, field),
+        MeasurementBlock.of_kind(Kind.IMU, t, node, samples),
+    ]
+    block = MeasurementBlock.concatenate(rows)
+    states = Orientation(constellation(vehicle="human"), OrientationParams()).step(
+        block.take(block.order()[0])
+    )
+    states = states.take(states.valid[0] & (states.kind[0] == Kind.STATE))
+    assert states.t[0, 0] == pytest.approx(first, abs=0.02)
+    assert np.degrees(np.abs(yaw_of(states.values[0, 100:, :4]))).max() < 5.0

@@ -65,6 +65,10 @@ class OrientationCoefficients(NamedTuple):
     """Share by which a sample at rest moves the length of gravity, (node)."""
     max_gap: F64
     """`OrientationParams.max_gap`, (node) [s]."""
+    settling_samples: F64
+    """Samples of `OrientationParams.settling`, (node); 0 for vehicles that stay level."""
+    settling_accel: F64
+    """`OrientationParams.settling_accel`, (node) [m/s2]."""
     heading: F64
     """Yaw of the body at the first sample, without magnetometer, (node) [rad]."""
     doubtful_psd: F64
@@ -153,6 +157,8 @@ def make_coefficients(
         vertical_var=motion_var / b.vertical_share,
         gravity_gain=dt / params.gravity_tau,
         max_gap=np.full(len(nodes), params.max_gap),
+        settling_samples=np.where([v.levelled for v in vehicles], 0.0, params.settling / dt),
+        settling_accel=np.full(len(nodes), params.settling_accel),
         heading=np.array([node.initial_heading or 0.0 for node in nodes]),
         doubtful_psd=np.full(len(nodes), params.doubtful_psd),
         levelled=np.array([v.levelled for v in vehicles]),

@@ -111,6 +111,12 @@ class OrientationParams:
     gravity_tau: float = 0.5
     """[s] Time constant with which a node at rest learns the length of gravity that its own
     accelerometer reads, which removes the vertical part of its offset."""
+    settling: float = 1.5
+    """[s] An orientation that starts in motion is not used for so long, and its heading is averaged
+    from then on: the first tilts follow single accelerations, and headings are measured with them.
+    Limbs that jump start up to 180 deg off and are within 3 deg after 1.5 s."""
+    settling_accel: float = 1.0
+    """[m/s2] A specific force whose length differs by more from gravity is one of motion."""
     sanity: SanityParams = field(default_factory=SanityParams)
     """Which samples are doubtful."""
     doubtful_psd: float = 1.5

@@ -9,9 +9,10 @@ from __future__ import annotations
 import math
 
 from tracking.ahrs.gyro_bias import BIAS, mean_variance, worst_variance
-from tracking.ahrs.magnetometer import COS, SIN
+from tracking.ahrs.magnetometer import COS, GAIN, SIN
 from tracking.ahrs.rest import RESTING
 from tracking.ahrs.vqf import (
+    N_ACC_READ,
     Q_6D,
     TURN,
     about_vertical,
@@ -32,12 +33,13 @@ STEADY = 1.5
 
 STARTED, T, GRAVITY, COS_YAW, SIN_YAW = 0, 1, 2, 3, 4
 LAST_GYR, LAST_ACC, FIELD, HAS_FIELD, SEEN_FIELD, TURNED = 5, 8, 11, 14, 15, 16
-N_NODE = 18
+MOVED = 18
+N_NODE = 19
 """Columns of what a node remembers next to its VQF: 1 after the first sample; its time [s]; length
 of gravity [m/s2]; cosine and sine of half the turn that gives the initial heading; the last
 sample, gyroscope [rad/s] and specific force [m/s2]; a field that no sample followed yet, and 1
 if there is one; 1 after a field was used; by how much it was turned upright, about x and y of the
-world [rad]."""
+world [rad]; 1 where it moved while its orientation settled."""
 
 
 @kernel
@@ -82,7 +84,10 @@ def take_sample(c, s, e, n, t, kind, values, valid, k):
     cut_x, cut_y, cut_z, upright = find_limits(c.sanity[0], s.limits, e, n, ax, ay, az)
     n_lost = find_gap(c, s, e, n, t)
     integrate_over(c, s, e, n, n_lost, upright)
+    is_settling = settles(c, s, e, n, ax, ay, az)
     if has_field:
+        if is_settling:
+            s.magnetic[e, n, GAIN] = 1.0
         update_heading(s, c, e, n, m[e, n, FIELD], m[e, n, FIELD + 1], m[e, n, FIELD + 2])
         m[e, n, SEEN_FIELD] = 1.0
     if m[e, n, STARTED] == 0.0:
@@ -105,7 +110,18 @@ def take_sample(c, s, e, n, t, kind, values, valid, k):
     doubted = cut_x or cut_y or (cut_z and not c.levelled[n]) or s.health[e, n, N_ODD] > 0.0
     values[e, k, ACCEL_NOISE] = c.doubtful_psd[n] if doubted else 0.0
     tell_upright(s, e, n, cos, sin, values, k)
-    valid[e, k] = m[e, n, SEEN_FIELD] != 0.0 or not c.magnetic[n]
+    valid[e, k] = (m[e, n, SEEN_FIELD] != 0.0 or not c.magnetic[n]) and not is_settling
+
+
+@small_kernel
+def settles(c, s, e, n, ax, ay, az):
+    """Whether node n moves while its orientation is new (`OrientationParams.settling`)."""
+    if s.tilt[e, n, N_ACC_READ] > c.settling_samples[n]:
+        return False
+    length = math.sqrt(ax * ax + ay * ay + az * az)
+    if abs(length - s.node[e, n, GRAVITY]) > c.settling_accel[n]:
+        s.node[e, n, MOVED] = 1.0
+    return s.node[e, n, MOVED] != 0.0
 
 
 @small_kernel
@@ -139,7 +155,7 @@ def find_gap(c, s, e, n, t):
     if c.magnetic[n]:
         # Where it points now, nobody knows; what its gyroscope reads at rest is still true.
         start_vqf(s, c, e, n, worst_variance(s.bias, c, e, n))
-        m[e, n, SEEN_FIELD] = 0.0
+        m[e, n, SEEN_FIELD] = m[e, n, MOVED] = 0.0
     return 0
 
 
