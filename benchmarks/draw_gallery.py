@@ -22,7 +22,7 @@ ROOM = 0.692
 WIDTH = 280
 """[pixels]"""
 EVERY = 4
-"""[-] One of so many frames is kept."""
+"""[-] Every fourth frame is kept."""
 
 
 def shrink(source: Path, target: Path) -> None:
