@@ -1,4 +1,4 @@
-"""Formation errors and contacts of all controllers.
+"""Formation errors and collisions of all controllers.
 
 Run `python benchmarks/measure_controllers.py`; a minute or two. Seeds 0 to 15, 60 s each.
 """

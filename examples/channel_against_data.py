@@ -49,7 +49,7 @@ def simulate(channel, distance, nlos, seconds=0.5, seed=0):
         radio.switch_on(k, 1, boot=2, after=0.002)
     pos = np.zeros((n, 2, 3))
     pos[:, 1, 0] = distance
-    boxes = np.zeros((n, 1, 6))  # halfway between the nodes, or 50 m next to
+    boxes = np.zeros((n, 1, 6))  # halfway between the nodes, or 50 m to the side
     boxes[:, 0] = [0.0, 0.0, 0.2, 0.2, 1.0, 0.0]
     boxes[:, 0, 0], boxes[:, 0, 1] = 0.5 * np.asarray(distance), np.where(nlos, 0.0, 50.0)
     found = []

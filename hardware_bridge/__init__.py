@@ -11,8 +11,10 @@
     Bytes of devices to what they said, in SI units; the format of our own nodes, and its C header.
 `identity`, `clocks`, `plausibility`
     Who said it, when, and whether it can be.
+`ingest`, `external_tracker`
+    Readings to measurements of nodes; positions from another tracker.
 `live`
-    Intake and trackers of a swarm, the environment on real cars, the start of a drive.
+    Trackers of a swarm, the environment on real cars, the start of a drive.
 `drivers`
     Speed and steering to bytes of motor controllers.
 `safety`

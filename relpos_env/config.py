@@ -77,8 +77,9 @@ class FormationConfig:
     weights: Mapping[str, float] | None = None
     """Weights of reward terms that differ from `relpos_env.tasks.DEFAULT_WEIGHTS`."""
     physics: Physics | None = None
-    """``pymunk``: a space that is kept for the episode, see `world.pymunk_space`; ``fast``: the
-    same motion while nothing touches, for batches. By default ``pymunk`` in the PettingZoo and
+    """``pymunk``: a space that is kept for the episode, see
+    `relpos_env.world.pymunk_space`; ``fast``: the same motion while nothing touches, for batches.
+    By default ``pymunk`` in the PettingZoo and
     Gymnasium environments, ``fast`` in the vector forms."""
     reward: str | RewardTerm | None = None
     """A reward term of your own, ``(formation) -> (env, car)``, which is added to the others; infos

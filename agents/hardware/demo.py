@@ -50,7 +50,7 @@ class HardwareDemoResult:
     """What stood in the room at the start, (box, 6), as `relpos_env.world.world.World.boxes`."""
     collisions: int
     """[-] That cars began, start included."""
-    simulated_contacts: int
+    simulated_collisions: int
     """[-] In the simulator."""
     late_steps: int
     """[-] Of the emulator, by more than 10 ms: what it then did was no fault of the drive."""
@@ -70,7 +70,7 @@ class HardwareDemoResult:
             "simulated_error": twin,
             "ratio": None if error is None or twin is None else error / twin,
             "collisions": self.collisions,
-            "simulated_contacts": self.simulated_contacts,
+            "simulated_collisions": self.simulated_collisions,
             "late_steps": self.late_steps,
             "virtual": self.virtual,
         }
@@ -148,7 +148,7 @@ def hardware_demo(
         simulated=twin.error,
         boxes=EmulatedWorld(options.parts(), options.seed).swarm.boxes[0].copy(),
         collisions=drove.collisions,
-        simulated_contacts=round(twin.collisions_per_min * twin.seconds / 60.0),
+        simulated_collisions=round(twin.collisions_per_min * twin.seconds / 60.0),
         late_steps=drove.late_steps,
         virtual=virtual,
     )

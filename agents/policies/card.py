@@ -39,7 +39,7 @@ INDEX_KEYS: dict[str, type] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Card:
-    """What is known of a policy next to its network."""
+    """What is known of a policy in addition to its network."""
 
     name: str
     """Letters, digits, dots, hyphens and underscores, 64 at most."""

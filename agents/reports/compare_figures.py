@@ -45,7 +45,7 @@ def figures(result: CompareResult) -> dict[str, tuple[str, Figure, str]]:
             "Figures",
             _bars(result),
             "Means over the episodes with 95 % intervals. The axis of the energy does not begin at "
-            "0: differences are small next to what rolling takes.",
+            "0: differences are small compared with what rolling takes.",
         ),
         "compare-time.png": (
             "Formation error over time",

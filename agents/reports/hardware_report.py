@@ -31,7 +31,7 @@ def demo_rows(results: Sequence[HardwareDemoResult]) -> list[list[str]]:
                 metres(s["formation_error"]),
                 metres(s["simulated_error"]),
                 "-" if s["ratio"] is None else f"{s['ratio']:.2f}",
-                f"{s['collisions']} / {s['simulated_contacts']}",
+                f"{s['collisions']} / {s['simulated_collisions']}",
                 "-" if s["lag_p99_ms"] is None else f"{s['lag_p99_ms']:.1f}",
             ]
         )
@@ -70,9 +70,9 @@ def hardware_report(results: Sequence[HardwareDemoResult], room: tuple[float, fl
     )
     page.heading("Formation error")
     page.text(
-        f"By the truth, from {SETTLE:.0f} s after the cars had found each other. Contacts: through "
-        "the bridge / in the simulator. Late: from the last byte that a decision rests on to the "
-        "bytes of its command."
+        f"By the truth, from {SETTLE:.0f} s after the cars had found each other. Collisions: "
+        "through the bridge / in the simulator. Late: from the last byte that a decision rests on "
+        "to the bytes of its command."
     )
     page.table(HEADER, demo_rows(results))
     for result in results:

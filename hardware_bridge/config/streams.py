@@ -46,7 +46,7 @@ class _Car:
 def read_links(
     raw: Mapping[str, Any], group: Constellation, where: Where, beside: Path
 ) -> Iterator[LinkConfig]:
-    """The streams that measure; files are looked for next to."""
+    """Read the streams that measure; relative paths start from a folder."""
     from hardware_bridge.decoders import DECODERS
 
     for key, table in tables_of(raw, "links", where):
@@ -119,7 +119,7 @@ def _check_scanner(
 def read_cars(
     raw: Mapping[str, Any], group: Constellation, where: Where, beside: Path
 ) -> list[CarConfig]:
-    """The cars, in the order of their nodes; files are looked for next to."""
+    """Read the cars, in the order of their nodes; relative paths start from a folder."""
     from hardware_bridge.drivers import driver_entry, driver_options
 
     cars = []

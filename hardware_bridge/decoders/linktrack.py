@@ -7,9 +7,9 @@ Node_Frame2 holds the sensor's own readings and an orientation that the node fil
 the readings are given on: the tracker filters the orientation of all nodes in the same way, from
 readings whose errors it knows, and both together would count the same motion twice.
 
-Ids count for each role again. A node of mode DR is its bare number; in the modes with anchors the
-letter of the role goes before it, as the maker's own program writes it: anchor 0 is A0, tag 1 is
-T1.
+Ids are counted separately for each role. A node of mode DR is its bare number; in the modes with
+anchors the letter of the role goes before it, as the maker's own program writes it: anchor 0 is
+A0, tag 1 is T1.
 
 References:
     [1] Nooploop, nlink_unpack, github.com/nooploop-dev/nlink_unpack.

@@ -1,4 +1,4 @@
-"""Forcing a growing file onto the disk from time to time, next to the thread that writes.
+"""Forcing a growing file onto the disk from time to time, while another thread writes.
 
 A sync can take as long as the disk likes. The writing thread goes on meanwhile, so that what is
 recorded is soon in the hands of the system, where the end of the process cannot reach it.

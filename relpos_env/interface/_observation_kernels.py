@@ -65,7 +65,7 @@ def observe_relative(view, with_cov, out):
     """Relative positions and velocities; with_cov: and how sure they are.
 
     Args:
-        view: View.
+        view: AgentView.
         with_cov: Whether covariance, age, NLOS probability and status follow.
         out: Observations, (env, car, size), written; zeros for absent cars.
     """
@@ -126,7 +126,7 @@ def observe_ranges(view, out):
     """The last range of every pair as it came, its age and its power gap.
 
     Args:
-        view: View.
+        view: AgentView.
         out: Observations, (env, car, size), written; zeros for absent cars.
     """
     n = view.ok.shape[1]

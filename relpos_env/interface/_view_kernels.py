@@ -25,7 +25,7 @@ def see_estimate(motion, rest, pair_i, pair_j, powered, turns, view):
         pair_j: (pair), larger; nodes behind the cars ride on none and are left out.
         powered: (env, car)
         turns: How far every car has turned since, (env, car) [rad].
-        view: View, written.
+        view: AgentView, written.
     """
     pos, vel, cov, q = motion
     has_q, age, nlos, status, t = rest

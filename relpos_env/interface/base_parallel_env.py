@@ -203,7 +203,7 @@ class BaseFormationParallelEnv(ParallelEnv, ABC):  # type: ignore[misc]
         """Begin an episode of the group."""
 
     def _infos(self, agents: list[str]) -> dict[str, Any]:
-        """What agents are told next to their observations."""
+        """Infos of agents, in addition to their observations."""
         cars = [self._numbers[agent] for agent in agents]
         return dict(zip(agents, car_infos(self._group.infos(), 0, cars), strict=True))
 

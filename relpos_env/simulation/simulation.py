@@ -1,4 +1,4 @@
-"""One room that is driven and recorded: a swarm of one group with its recording."""
+"""One room that is driven and recorded: a world of one room with its recording."""
 
 from __future__ import annotations
 

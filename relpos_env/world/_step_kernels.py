@@ -84,7 +84,7 @@ def run_steps(
         speed: Commands, (env, car) [m/s].
         steering: Commands, (env, car) [rad].
         t: Time since each environment began, (env) [s], written.
-        waiting: Numbers of the environments that wait for `Group.move`, written.
+        waiting: Numbers of the environments that wait for `RoomState.move`, written.
 
     Returns:
         How many wait.

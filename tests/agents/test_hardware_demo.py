@@ -24,7 +24,7 @@ def test_the_mean_is_that_of_drives_with_both_errors():
     def drive(seed, ours, theirs):
         summary = {
             "seed": seed, "formation_error": ours, "simulated_error": theirs, "collisions": 0,
-            "simulated_contacts": 0, "lag_p99_ms": None,
+            "simulated_collisions": 0, "lag_p99_ms": None,
             "ratio": None if ours is None else ours / theirs,
         }  # fmt: skip
         return SimpleNamespace(summary=summary)

@@ -85,7 +85,7 @@ class OrientationState(NamedTuple):
     """Everything that evolves; the columns are named in the kernels' modules."""
 
     node: F64
-    """What a node remembers next to its VQF, (env, node, N_NODE)."""
+    """What a node remembers in addition to its VQF, (env, node, N_NODE)."""
     health: F64
     """Memory of `imu`, (env, node, N_HEALTH)."""
     limits: F64

@@ -115,8 +115,9 @@ class OrientationParams:
     """[s] An orientation that starts in motion is not used for so long, and its heading is averaged
     from then on: the first tilts follow single accelerations, and headings are measured with them.
     Limbs that jump start up to 180 deg off and are within 3 deg after 1.5 s."""
-    settling_accel: float = 1.0
-    """[m/s2] A specific force whose length differs by more from gravity is one of motion."""
+    settling_accel: float = 3.0
+    """[m/s2] It starts in motion if the length of a specific force differs by more from gravity:
+    taken for gravity, such a force tilts by up to 17 deg and more."""
     sanity: SanityParams = field(default_factory=SanityParams)
     """Which samples are doubtful."""
     doubtful_psd: float = 1.5

@@ -35,11 +35,11 @@ STARTED, T, GRAVITY, COS_YAW, SIN_YAW = 0, 1, 2, 3, 4
 LAST_GYR, LAST_ACC, FIELD, HAS_FIELD, SEEN_FIELD, TURNED = 5, 8, 11, 14, 15, 16
 MOVED = 18
 N_NODE = 19
-"""Columns of what a node remembers next to its VQF: 1 after the first sample; its time [s]; length
-of gravity [m/s2]; cosine and sine of half the turn that gives the initial heading; the last
-sample, gyroscope [rad/s] and specific force [m/s2]; a field that no sample followed yet, and 1
-if there is one; 1 after a field was used; by how much it was turned upright, about x and y of the
-world [rad]; 1 where it moved while its orientation settled."""
+"""Columns of what a node remembers in addition to its VQF: 1 after the first sample; its time
+[s]; length of gravity [m/s2]; cosine and sine of half the turn that gives the initial heading;
+the last sample, gyroscope [rad/s] and specific force [m/s2]; a field that no sample followed yet,
+and 1 if there is one; 1 after a field was used; by how much it was turned upright, about x and y
+of the world [rad]; 1 where it moved while its orientation settled."""
 
 
 @kernel

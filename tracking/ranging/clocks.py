@@ -1,4 +1,4 @@
-"""How fast another node's clock runs next to one's own: the clock skew, per ordered pair.
+"""How fast another node's clock runs relative to one's own: the clock skew, per ordered pair.
 
 A crystal is off by up to 20 ppm, which single-sided ranging turns into metres: the error is
 c / 2 times the reply time times the skew. Two sources tell it: the carrier offset that the

@@ -1,4 +1,4 @@
-"""What goes into a session and what comes out of it, next to bytes."""
+"""What goes into a session and what comes out of it, apart from bytes."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from agents.cli.console import emit_json, print_table, progress_bar
-from agents.cli.scenario_option import scenario_option
+from agents.cli.options import cars_option, json_option, policy_option, scenario_option
 from agents.errors import UsageError
 
 
@@ -28,14 +28,8 @@ from agents.errors import UsageError
 @click.option(
     "--drives", default=1, show_default=True, help="Number of drives, one after the other."
 )
-@click.option(
-    "--cars", type=int, help="Number of cars, 2 to 20.  [default: as many as the scenario has]"
-)
-@click.option(
-    "--policy",
-    metavar="NAME_OR_PATH",
-    help="Trained policy that drives: a name, a file or a folder.",
-)
+@cars_option
+@policy_option
 @click.option(
     "--controller",
     metavar="NAME",
@@ -55,7 +49,7 @@ from agents.errors import UsageError
     "--virtual", is_flag=True, help="Run in memory under a virtual clock, as fast as possible."
 )
 @click.option("--out", type=Path, default=Path("demo-hardware"), show_default=True)
-@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
+@json_option
 def demo_hardware(
     seed: int,
     drives: int,

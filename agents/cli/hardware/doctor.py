@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from agents.cli.console import emit_json
+from agents.cli.options import json_option
 
 if TYPE_CHECKING:
     from agents.hardware.inspection.diagnosis import LinkReport
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     "--wheels-up", is_flag=True, help="Confirm for --watchdog that all wheels are off the ground."
 )
 @click.option("--write", is_flag=True, help="Write the results of --watchdog into swarm.toml.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
+@json_option
 def doctor(
     config: Path | None,
     seconds: float,

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from agents.cli.console import emit_json, print_table
+from agents.cli.options import json_option, policy_option
 from agents.errors import UsageError
 
 if TYPE_CHECKING:
@@ -24,11 +25,7 @@ EVERY = 10
 
 @click.command()
 @click.option("--config", type=Path, required=True, help="swarm.toml; see docs/how-to/hardware.md.")
-@click.option(
-    "--policy",
-    metavar="NAME_OR_PATH",
-    help="Trained policy that drives: a name, a file or a folder.",
-)
+@policy_option
 @click.option(
     "--controller",
     metavar="NAME",
@@ -51,7 +48,7 @@ EVERY = 10
 @click.option(
     "--record", type=Path, help="New file for a recording of all bytes received and sent."
 )
-@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
+@json_option
 def drive(
     config: Path,
     policy: str | None,

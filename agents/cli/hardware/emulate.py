@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from agents.cli.console import emit_json, print_table
-from agents.cli.scenario_option import scenario_option
+from agents.cli.options import cars_option, json_option, scenario_option
 from agents.errors import UsageError
 
 
@@ -27,9 +27,7 @@ from agents.errors import UsageError
     show_default=True,
     help="Task: ring, hold, travel, gap, rendezvous or follow.",
 )
-@click.option(
-    "--cars", type=int, help="Number of cars, 2 to 20.  [default: as many as the scenario has]"
-)
+@cars_option
 @click.option(
     "--seed", default=0, show_default=True, help="Seed; the same seed gives the same world."
 )
@@ -76,7 +74,7 @@ from agents.errors import UsageError
     help="Longest wait for the first command of a host before the world moves [s].",
 )
 @click.option("--log", type=Path, help="New log folder with the truth.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
+@json_option
 def emulate(
     folder: Path,
     key: str | None,

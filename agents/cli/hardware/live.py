@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from agents.cli.console import emit_json, print_table
+from agents.cli.options import json_option
 
 if TYPE_CHECKING:
     from agents.hardware.live.monitor import Monitor
@@ -31,7 +32,7 @@ BROWSER = "browser"
     metavar="[FILE.rrd]",
     help="Show the swarm in the browser, or write the view to a new file.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
+@json_option
 def live(
     config: Path, seconds: float | None, record: Path | None, view: str | None, as_json: bool
 ) -> None:

@@ -9,6 +9,7 @@ import click
 
 from agents.cli.console import emit_json, print_table
 from agents.cli.hardware.live import print_streams
+from agents.cli.options import json_option
 from agents.errors import UsageError
 
 if TYPE_CHECKING:
@@ -50,10 +51,10 @@ if TYPE_CHECKING:
     "--skip",
     default=10.0,
     show_default=True,
-    help="Time from the first range that is not scored [s].",
+    help="Time after the first range that is not scored [s].",
 )
 @click.option("--view", type=Path, metavar="FILE.rrd", help="New file for the view.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
+@json_option
 def replay(
     recording: Path,
     speed: float | None,

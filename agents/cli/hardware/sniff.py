@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from agents.cli.console import emit_json
+from agents.cli.options import json_option
 from agents.errors import UsageError
 
 
@@ -15,7 +16,7 @@ from agents.errors import UsageError
 @click.option("--seconds", type=float, help="Time to listen [s].  [default: until Ctrl-C]")
 @click.option("--key", help="Key of signed formats: 32 hex digits, or @FILE.")
 @click.option("--raw", is_flag=True, help="Print the bytes in hex.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
+@json_option
 def sniff(
     port: str,
     format: str | None,

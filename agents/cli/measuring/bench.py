@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from agents.cli.console import emit_json, print_table, progress_bar
+from agents.cli.options import json_option
 from agents.errors import UsageError
 
 
@@ -19,7 +20,7 @@ def bench() -> None:
 @bench.command("tracker")
 @click.option("--rounds", default=2000, show_default=True, help="Ranging rounds per figure.")
 @click.option("--out", type=Path, help="Folder for a picture of the time over the group's size.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
+@json_option
 def bench_tracker(rounds: int, out: Path | None, as_json: bool) -> None:
     """Measure the time of ranging rounds, messages and an hour next to filterpy and GTSAM."""
     from agents.bench.tracker import bench_tracker as run
@@ -51,7 +52,7 @@ def _draw_growth(out: Path) -> None:
 
 
 @bench.command("radio")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
+@json_option
 def bench_radio(as_json: bool) -> None:
     """Measure the time of a message-level ranging round next to the reference session."""
     from agents.bench.radio import bench_radio as run
@@ -63,7 +64,7 @@ def bench_radio(as_json: bool) -> None:
 
 @bench.command("policy")
 @click.option("--steps", default=2000, show_default=True, help="Number of calls per repetition.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
+@json_option
 def bench_policy(steps: int, as_json: bool) -> None:
     """Measure the time of a policy's step next to plain numpy."""
     from agents.bench.policy import bench_policy as run
@@ -77,7 +78,7 @@ def bench_policy(steps: int, as_json: bool) -> None:
 
 @bench.command("codec")
 @click.option("--frames", default=5000, show_default=True, help="Number of frames per repetition.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
+@json_option
 def bench_codec(frames: int, as_json: bool) -> None:
     """Measure frames per second of the wire format next to pymavlink."""
     from agents.bench.codec import bench_codec as run
@@ -97,7 +98,7 @@ def bench_codec(frames: int, as_json: bool) -> None:
 @click.option(
     "--after", default=2, show_default=True, help="Number of updates before the measurement."
 )
-@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
+@json_option
 def bench_train(updates: int, threads: int, after: int, as_json: bool) -> None:
     """Measure frames per second of training next to an environment that costs nothing."""
     if not 1 <= updates <= 10_000:
@@ -117,7 +118,7 @@ def bench_train(updates: int, threads: int, after: int, as_json: bool) -> None:
 
 @bench.command("cold")
 @click.option("--install", is_flag=True, help="Also install into a new environment, with pip.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
+@json_option
 def bench_cold(install: bool, as_json: bool) -> None:
     """Measure installing, importing, compiling and the first run; takes minutes."""
     from agents.bench.cold import bench_cold as run
@@ -130,7 +131,7 @@ def bench_cold(install: bool, as_json: bool) -> None:
 @bench.command("env")
 @click.option("--quick", is_flag=True, help="Measure fewer and shorter figures.")
 @click.option("--out", type=Path, help="Folder for a picture of the curves and the parts.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
+@json_option
 def bench_env(quick: bool, out: Path | None, as_json: bool) -> None:
     """Measure environment steps per second next to mpe2 and bare pymunk."""
     from agents.bench.env import bench_env as run

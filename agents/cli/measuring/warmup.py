@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from agents.cli.console import emit_json, print_table
+from agents.cli.options import json_option
 
 
 @click.command()
@@ -24,7 +25,7 @@ from agents.cli.console import emit_json, print_table
 @click.option(
     "--jobs", type=click.IntRange(1, 64), help="Number of processes.  [default: one per core]"
 )
-@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
+@json_option
 def warmup(purpose: str, filters: tuple[str, ...], jobs: int | None, as_json: bool) -> None:
     """Compile ahead: for containers, CI and laptops before a demo.
 

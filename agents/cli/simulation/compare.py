@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from agents.cli.console import emit_json, print_table, progress_bar
-from agents.cli.scenario_option import scenario_option
+from agents.cli.options import cars_option, jobs_options, json_option, scenario_option
 from agents.errors import UsageError
 
 if TYPE_CHECKING:
@@ -35,18 +35,14 @@ WHY = "which has its own cars and task; they drive one after the other"
     show_default=True,
     help="Observation mode: estimate, estimate_cov, ranges or truth; repeatable.",
 )
-@scenario_option(
-    "; may be given several times. By default that of the task.", "scenarios", multiple=True
-)
+@scenario_option("; repeatable.  [default: that of the task]", "scenarios", multiple=True)
 @click.option(
     "--task",
     default="ring",
     show_default=True,
     help="Task: ring, hold, travel, gap, rendezvous or follow.",
 )
-@click.option(
-    "--cars", type=int, help="Number of cars, 2 to 20.  [default: as many as the scenario has]"
-)
+@cars_option
 @click.option(
     "--proximity",
     type=int,
@@ -73,18 +69,10 @@ WHY = "which has its own cars and task; they drive one after the other"
     show_default=True,
     help="Time of an episode from which errors are scored [s].",
 )
-@click.option(
-    "--jobs", default=1, show_default=True, help="Number of processes. No figure depends on it."
-)
-@click.option(
-    "--engine", default="local", show_default=True, help="Engine that runs the jobs: local or ray."
-)
-@click.option(
-    "--address", help="Address of a running Ray cluster: auto or host:port; needs --engine ray."
-)
+@jobs_options("No figure depends on it.")
 @click.option("--swarm", type=Path, help="A swarm.toml: compare on real cars, in turns.")
 @click.option("--arm", is_flag=True, help="Allow the cars of --swarm to move.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
+@json_option
 @click.option("--out", type=Path, help="New folder for report.html, its pictures, results.jsonl.")
 def compare(
     names: tuple[str, ...],

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from agents.cli.console import emit_json, print_table, progress_bar
-from agents.cli.scenario_option import scenario_option
+from agents.cli.options import cars_option, json_option, policy_option, scenario_option
 from agents.cli.tracking.track import print_tracks
 from agents.errors import UsageError
 
@@ -25,9 +25,7 @@ from agents.errors import UsageError
 @click.option(
     "--seed", default=0, show_default=True, help="Seed; the same seed gives the same run."
 )
-@click.option(
-    "--cars", type=int, help="Number of cars, 2 to 20.  [default: as many as the scenario has]"
-)
+@cars_option
 @click.option(
     "--proximity",
     type=int,
@@ -38,11 +36,7 @@ from agents.errors import UsageError
     metavar="NAME",
     help="Controller that drives: consensus, leader-follower or range-only.  [default: consensus]",
 )
-@click.option(
-    "--policy",
-    metavar="NAME_OR_PATH",
-    help="Trained policy that drives: a name, a file or a folder; see `relpos policy list`.",
-)
+@policy_option
 @click.option(
     "--filter",
     default="joint",
@@ -52,7 +46,7 @@ from agents.errors import UsageError
 @click.option("--window", is_flag=True, help="Show the drive in a window; needs pygame.")
 @click.option("--gif", is_flag=True, help="Write drive.gif too; needs pygame.")
 @click.option("--out", type=Path, default=Path("demo"), show_default=True)
-@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
+@json_option
 def demo(
     seconds: float,
     seed: int,

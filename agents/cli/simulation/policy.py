@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from agents.cli.console import emit_json, print_table
+from agents.cli.options import json_option
 
 if TYPE_CHECKING:
     from agents.policies import Card
@@ -19,7 +20,7 @@ def policy() -> None:
 
 
 @policy.command("list")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
+@json_option
 def list_policies(as_json: bool) -> None:
     """Policies that come with the package."""
     from agents.policies import load_policy, shipped_names

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from agents.cli.scenario_option import scenario_option
+from agents.cli.options import scenario_option
 from agents.errors import UsageError
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from agents.cli.console import emit_json, progress_bar
-from agents.cli.scenario_option import scenario_option
+from agents.cli.options import json_option, scenario_option
 
 
 @click.command()
@@ -30,7 +30,7 @@ from agents.cli.scenario_option import scenario_option
     help="Radio: calibrated (default of cars), indoor, hall, outdoor, body (of people) or exact.",
 )
 @click.option("--antenna-delay", type=float, help="Standard deviation of antenna delays [m].")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
+@json_option
 def simulate(out: Path, as_json: bool, **options: Any) -> None:
     """Record simulated cars or a person as a log folder with truth."""
     from agents.simulation.simulate import simulate as run

@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from agents.cli.console import emit_json, print_table, progress_bar
+from agents.cli.options import json_option
 from agents.errors import UsageError
 from agents.settings import from_options, options
 from agents.training.config import TrainConfig
@@ -16,7 +17,7 @@ from agents.training.config import TrainConfig
 @click.command()
 @click.option("--out", type=Path, help="New folder for the run; its name is that of the policy.")
 @click.option("--resume", type=Path, metavar="RUN", help="Go on with the run in this folder.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
+@json_option
 @options(TrainConfig)
 def train(out: Path | None, resume: Path | None, as_json: bool, **given: str | None) -> None:
     """Train one policy for all cars; ends with a file that runs without torch, and a report.

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from agents.cli.console import emit_json, progress_bar
+from agents.cli.options import json_option
 
 FOLDER = Path(__file__).parents[2] / "convert" / "presets"
 PRESETS = ", ".join(sorted(path.stem for path in FOLDER.glob("*.toml")))
@@ -24,7 +25,7 @@ PRESETS = ", ".join(sorted(path.stem for path in FOLDER.glob("*.toml")))
 @click.option(
     "--restamp", is_flag=True, help="Replace the times of IMU samples by those of a steady rate."
 )
-@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
+@json_option
 def convert(
     source: Path,
     out: Path,

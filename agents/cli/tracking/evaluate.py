@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from agents.cli.console import emit_json, print_table, progress_bar
+from agents.cli.options import jobs_options, json_option
 
 
 @click.command()
@@ -34,19 +35,8 @@ from agents.cli.console import emit_json, print_table, progress_bar
     type=float,
     help="Length of a run, 15 to 1800 [s].  [default: 120; robustness and scaling 60]",
 )
-@click.option(
-    "--jobs",
-    default=1,
-    show_default=True,
-    help="Number of processes. Only the time of a round depends on it.",
-)
-@click.option(
-    "--engine", default="local", show_default=True, help="Engine that runs the jobs: local or ray."
-)
-@click.option(
-    "--address", help="Address of a running Ray cluster: auto or host:port; needs --engine ray."
-)
-@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
+@jobs_options("Only the time of a round depends on it.")
+@json_option
 @click.option("--out", type=Path, help="New folder for report.html, its pictures, results.jsonl.")
 def evaluate(
     suite: str,

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from agents.cli.console import emit_json, print_table, progress_bar
+from agents.cli.options import json_option
 from agents.errors import UsageError
 
 
@@ -24,7 +25,7 @@ from agents.errors import UsageError
     "--seed", default=0, show_default=True, help="Seed; the same seed gives the same figures."
 )
 @click.option("--out", type=Path, help="Folder for report.html and the pictures in it.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
+@json_option
 def protocol(events: int, nodes: str, seed: int, out: Path | None, as_json: bool) -> None:
     """Measure the ranging protocol: rate, recovery when nodes come and go, clock errors."""
     from agents.output import check_folder, write_results

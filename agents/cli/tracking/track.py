@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from agents.cli.console import emit_json, print_table, progress_bar
+from agents.cli.options import json_option
 from agents.errors import UsageError
 
 if TYPE_CHECKING:
@@ -58,10 +59,10 @@ if TYPE_CHECKING:
     "--skip",
     default=10.0,
     show_default=True,
-    help="Time from the first range that is not scored [s].",
+    help="Time after the first range that is not scored [s].",
 )
 @click.option("--out", type=Path, help="Folder for estimates.csv and report.html.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else.")
+@json_option
 def track(
     logs: tuple[Path, ...],
     filters: tuple[str, ...],

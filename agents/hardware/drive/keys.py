@@ -145,9 +145,9 @@ class TerminalKeys:
 def orders_of(pressed: str) -> list[str]:
     """What keys that were hit together mean.
 
-    Whatever else is hit in a hurry stops as well. Nothing next to a stop counts, before it or
-    after: a hand on the keyboard means none of it, and the arrow keys are letters behind an escape.
-    Nothing counts after a quit.
+    Whatever else is hit in a hurry stops as well. No other key pressed with a stop counts, before
+    it or after: a hand on the keyboard means none of it, and the arrow keys are letters behind an
+    escape. Nothing counts after a quit.
     """
     orders = [KEYS.get(key.lower(), "stop") for key in pressed]
     if "stop" in orders:

@@ -51,7 +51,7 @@ class EmulatedWorld:
         self._steps = 0
         # A car that comes in stands until the next decision, as in the simulation.
         self._driven = np.zeros(parts.n_cars, dtype=bool)
-        # The same draws in the same order as in `Formation.begin`.
+        # The same draws in the same order as in `EnvCore.begin`.
         rng = seeding.np_random(seed)[0].spawn(1)[0]
         seconds = STAND_STILL + DECISION * parts.config.max_cycles
         episode = draw_episode(parts.scenario, parts.n_cars, seconds, rng)
@@ -110,7 +110,7 @@ class EmulatedWorld:
         return bool(self._task.done[0])
 
     def step(self, speed: F64, steering: F64) -> MeasurementBlock:
-        """Go on by 10 ms; see `World`."""
+        """Go on by 10 ms; see `hardware_bridge.emulator.emulator.World`."""
         if self._steps % STEPS == 0:
             self._driven = self.present.copy()
         block = self._swarm.step((speed * self._driven)[None], (steering * self._driven)[None])

@@ -1,8 +1,8 @@
 """The hyperbolic tangent of layers, by whichever way is fast on this machine.
 
 torch calls MKL for it. That takes as long as the logistic function on processors of Intel with
-AVX-512, and four to seven times as long elsewhere (2.13, one thread, 10240 x 64 numbers: 0.2 next
-to 0.25 ms; with MKL held to AVX2, as without AVX-512, 1.1 ms; on another machine 1.5 next to
+AVX-512, and four to seven times as long elsewhere (2.13, one thread, 10240 x 64 numbers: 0.2
+against 0.25 ms; with MKL held to AVX2, as without AVX-512, 1.1 ms; on another machine 1.5 against
 0.15). There the logistic function is the way round, without which it was a third of all learning.
 """
 

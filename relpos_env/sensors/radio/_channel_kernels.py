@@ -58,7 +58,7 @@ def _step(rho, last, noise, correlated):
 
 @small_kernel
 def path_error(c, latent, weight, distance, nlos):
-    """What a range is wrong by, next to the noise of its stamps [m]."""
+    """What a range is wrong by, without the noise of its stamps [m]."""
     error = c.bias
     if distance > 2.0 and c.rise != 0.0:
         error += c.rise * (1.0 - math.exp(-(distance - 2.0) / c.rise_length))

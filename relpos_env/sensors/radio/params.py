@@ -1,4 +1,4 @@
-"""What the simulated radios do, next to what the place does to their messages."""
+"""What the simulated radios do, apart from what the place does to their messages."""
 
 from __future__ import annotations
 

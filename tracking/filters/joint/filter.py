@@ -5,7 +5,7 @@ state vector (`state`), so that every range informs every node it has to do with
 covariance is that of the group:
 
     predict     dead reckoning with the nodes' accelerations, biases and heading errors
-    correct     ranges, in sight or not (`range_update`); what is known about the carriers
+    correct     ranges, in sight or not (`range_update`); what is known about the vehicles
     choose      among rotations and mirror images, by the likelihood of all that (`bank`)
 
 `docs/explanation/tracker.md` derives it and says what each part is worth.

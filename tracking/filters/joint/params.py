@@ -200,7 +200,8 @@ class NoiseLearningParams:
     """How the white noise of ranges is learned (`range_noise`); all are the authors' choice."""
 
     learns: bool = True
-    """Whether it is; it stays that of `RangeErrorParams` otherwise."""
+    """[-] Whether the white noise of ranges is learned; otherwise it stays that of
+    `RangeErrorParams`."""
     white_step: float = 0.01
     """[-] Share by which a range moves the standard deviation."""
     white_gap: float = 0.3
@@ -252,7 +253,7 @@ class JointParams:
     rest_std: float = 0.02
     """[m/s] Speed of a node at rest."""
     constraint_period: float = 0.05
-    """[s] Time between two uses of what is known about the carriers."""
+    """[s] Time between two uses of what is known about the vehicles."""
     range_timeout: float = 0.5
     """[s] A node without a range for so long joins again, if its distances to all others are less
     certain than 0.7 `stale_std` by now. More than the time between two ranges of a node."""

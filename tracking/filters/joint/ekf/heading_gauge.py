@@ -80,7 +80,7 @@ def add_rotation_uncertainty(c, s, h, variance):
                 moving += 1
                 mean_v[: c.d] += s.x[h, node.i_vel : node.i_vel + c.d]
     mean /= max(present, 1)
-    # Next to static nodes velocities are not free to shift.
+    # With static nodes velocities are not free to shift.
     mean_v *= 1.0 / max(moving, 1) if moving == present else 0.0
     D = np.zeros(c.n)
     for axis in range(3 if c.d == 3 else 1):

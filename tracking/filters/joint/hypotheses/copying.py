@@ -51,7 +51,7 @@ def rotate_hypothesis(c, s, h, M):
                 moving += 1
                 mean_v += s.x[h, node.i_vel : node.i_vel + d]
     mean /= max(present, 1)
-    # Next to static nodes velocities are not free to shift.
+    # With static nodes velocities are not free to shift.
     mean_v *= 1.0 / max(moving, 1) if moving == present else 0.0
     for i in range(s.nodes.shape[0]):
         node = s.nodes[i]

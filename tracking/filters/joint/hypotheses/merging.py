@@ -81,7 +81,7 @@ def rotation_between(c, s, a, b, turn):
 def centre_of(c, s, h, of_velocities):
     """Where hypothesis h puts the centre of the group, or how it moves, three numbers.
 
-    Next to static nodes, velocities have no common part that is free: 0.
+    With static nodes, velocities have no common part that is free: 0.
     """
     total0, total1, total2, present, moving = 0.0, 0.0, 0.0, 0, 0
     for i in range(s.nodes.shape[0]):

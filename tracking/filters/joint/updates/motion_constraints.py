@@ -30,7 +30,7 @@ from tracking.models.zero_velocity import zero_velocity_model
 
 @kernel
 def apply_motion_constraints(c, s, h, t, dt, work):
-    """Use what is known about the carriers, in hypothesis h.
+    """Use what is known about the vehicles, in hypothesis h.
 
     Args:
         c: Coefficients.

@@ -1,0 +1,84 @@
+"""Options that several commands share, with one name, meaning and text."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import click
+
+Command = Callable[..., Any]
+
+
+def shipped_names() -> list[str]:
+    """Names of the scenarios of the package; nothing of it is imported, so that help is quick."""
+    spec = find_spec("relpos_env")
+    assert spec is not None
+    assert spec.origin is not None
+    files = Path(spec.origin).parent / "scenarios" / "files"
+    return sorted(path.stem for path in files.glob("*.toml"))
+
+
+json_option = click.option(
+    "--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else."
+)
+cars_option = click.option(
+    "--cars", type=int, help="Number of cars, 2 to 20.  [default: as many as the scenario has]"
+)
+policy_option = click.option(
+    "--policy",
+    metavar="NAME_OR_PATH",
+    help="Trained policy that drives: a name, a file or a folder; see `relpos policy list`.",
+)
+
+
+def jobs_options(text: str) -> Callable[[Command], Command]:
+    """Return the options `--jobs`, `--engine` and `--address`.
+
+    Args:
+        text: Which figures depend on the number of processes, a sentence.
+    """
+
+    def add(command: Command) -> Command:
+        for option in (
+            click.option(
+                "--address",
+                help="Address of a running Ray cluster: auto or host:port; needs --engine ray.",
+            ),
+            click.option(
+                "--engine",
+                default="local",
+                show_default=True,
+                help="Engine that runs the jobs: local or ray.",
+            ),
+            click.option(
+                "--jobs", default=1, show_default=True, help=f"Number of processes. {text}"
+            ),
+        ):
+            command = option(command)
+        return command
+
+    return add
+
+
+def scenario_option(
+    more: str, *names: str, default: str | None = None, multiple: bool = False
+) -> Callable[[Command], Command]:
+    """The option of a command.
+
+    Args:
+        more: What else its help says.
+        names: Of the option, by default that alone.
+        default: A scenario; None where it follows from something else.
+        multiple: May be given several times.
+    """
+    return click.option(
+        "--scenario",
+        *names,
+        default=default,
+        show_default=default is not None,
+        multiple=multiple,
+        help=f"{', '.join(shipped_names())}, or a TOML file{more}",
+    )
