@@ -55,6 +55,7 @@ def build_log(plan: Plan, tables: dict[str, F64], restamp: bool) -> Log:
         name=plan.meta.name,
         source=plan.meta.source,
         licence=plan.meta.licence,
+        range_noise=plan.meta.range_noise,
         constellation=group,
         block=block.take(block.order()[0]),
         truth=_truth(group, places, tables.get("truth", np.zeros((0, 9)))),

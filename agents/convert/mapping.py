@@ -13,7 +13,8 @@ from tracking.params.tables import TableReader, Where
 
 FOLDER = Path(__file__).parent / "presets"
 PRESETS = tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
-OF_META = ("format", "name", "source", "licence", "dimensions", "heading", "nodes", "antennas")
+OF_META = ("format", "name", "source", "licence", "dimensions", "heading", "nodes", "antennas",
+           "range_noise_m")  # fmt: skip
 """Keys of meta.toml, which a mapping has as well."""
 Fields = tuple[str, ...]
 """Names of fields whose numbers are joined; a minus before a name changes the sign."""

@@ -6,7 +6,7 @@ import csv
 import io
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -146,6 +146,8 @@ def track_log(
         log, findings = examine(log)
         refuse_errors(findings)
     constellation, block = log.constellation, log.block
+    if log.range_noise is not None:
+        params = with_range_noise(params or TrackerParams(), log.range_noise)
     tracker = Tracker(constellation, params, filter=filter)
     first, last = log.t_range
     # From whole multiples, so that large times stay on the grid.
@@ -184,6 +186,17 @@ def track_log(
         bound=bound,
         findings=found,
     )
+
+
+def with_range_noise(params: TrackerParams, noise: float) -> TrackerParams:
+    """Return parameters whose `joint` assumes a white noise of ranges [m] and does not learn it."""
+    joint = params.filter.joint
+    joint = replace(
+        joint,
+        range_error=replace(joint.range_error, white_std=noise),
+        noise_learning=replace(joint.noise_learning, learns=False),
+    )
+    return replace(params, filter=replace(params.filter, joint=joint))
 
 
 def _in_parts(

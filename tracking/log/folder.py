@@ -36,6 +36,9 @@ class Log:
     source: str = ""
     """Where it comes from."""
     licence: str = ""
+    range_noise: float | None = None
+    """[m] Standard deviation of the white noise of its ranges, where it is known; `joint` then
+    does not learn it."""
     skipped: dict[str, int] = field(default_factory=dict)
     """Bad measurements left out while reading, per file."""
 

@@ -16,6 +16,8 @@ MOST = 1e12
 """Numbers beyond this mean nothing in any unit."""
 MOST_DIGITS = 18
 """Of an id."""
+LEAST_NOISE, MOST_NOISE = 1e-3, 10.0
+"""[m] White noise of ranges beyond is a mistake of units."""
 MAX_OFFSET = 100.0
 """[m] An antenna farther from its body's origin is a mistake of units."""
 
@@ -28,6 +30,8 @@ class Meta:
     source: str
     licence: str
     constellation: Constellation
+    range_noise: float | None = None
+    """[m] As of `Log.range_noise`."""
 
 
 def read_meta(path: Path) -> Meta:
@@ -68,7 +72,20 @@ def read_meta(path: Path) -> Meta:
         source=_text("source", raw.get("source", "")),
         licence=_text("licence", raw.get("licence", "")),
         constellation=constellation,
+        range_noise=_noise(raw.get("range_noise_m")),
     )
+
+
+def _noise(value: Any) -> float | None:
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise LogError(f"meta.toml, range_noise_m: expected a number, found {value!r}")
+    if not LEAST_NOISE <= value <= MOST_NOISE:
+        raise LogError(
+            f"meta.toml, range_noise_m: expected {LEAST_NOISE:g} to {MOST_NOISE:g}, found {value!r}"
+        )
+    return float(value)
 
 
 def _text(where: str, value: Any) -> str:

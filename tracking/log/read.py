@@ -68,6 +68,7 @@ def read_log(folder: Path | str) -> Log:
         block=block.take(order),
         truth=_read_truth(folder, constellation, skipped),
         nlos=nlos,
+        range_noise=meta.range_noise,
         skipped={name: n for name, n in skipped.items() if n},
     )
 

@@ -85,6 +85,8 @@ def _meta(log: Log) -> str:
         f"dimensions = {c.dimensions}",
         f"heading = {_quoted(c.heading)}",
     ]
+    if log.range_noise is not None:
+        lines.append(f"range_noise_m = {float(log.range_noise)!r}")
     for node in c.nodes:
         lines += ["", f"[nodes.{node.id}]", f'kind = "{node.kind}"', f'vehicle = "{node.vehicle}"']
         if node.initial_heading is not None:
