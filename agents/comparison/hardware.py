@@ -53,7 +53,7 @@ def compare_hardware(
     Args:
         swarm: A swarm.toml, or what `read_config` made of one; the task is its own.
         drivers: As for `agents.comparison.compare.compare`.
-        observations: Likewise; without the truth.
+        observations: As for `agents.comparison.compare.compare`, without the truth.
         arm: Whether the cars may move, without which there is nothing to compare.
         episodes: Of each driver and mode.
         seconds: Length of an episode [s], less where the task is done before.

@@ -52,7 +52,7 @@ class Card:
     max_speed: float = MAX_SPEED
     """[m/s] What an action of 1 asks for."""
     max_steering: float = MAX_STEERING
-    """[rad] Likewise; left is +."""
+    """[rad] What an action of 1 asks for; left is +."""
     decision: float = DECISION
     """[s] From one action to the next."""
     training: dict[str, Any]

@@ -79,7 +79,7 @@ class Emulator:
         Args:
             world: Where they are.
             nodes: One a car, in the order of the world.
-            cars: Likewise.
+            cars: One a car, in the order of the world.
             operator: None where nobody holds a remote control.
             plan: The script of what goes wrong; its chances are in the lines already.
 

@@ -47,7 +47,7 @@ class ReadyPerception:
             constellation: The nodes; the first of them ride on the cars, in the cars' order.
             params: What is believed of the other tracker.
             told: Filled by the caller before every step, emptied by it.
-            block: Likewise; of it count who leaves, and ranges, which cars may see.
+            block: Measurements, of which departures and ranges are used.
             powered: Which cars are there, (1, car), likewise.
             n_beams: Of each car's distance sensors.
         """

@@ -53,11 +53,11 @@ class Tracks:
         self.P: F64 = np.zeros((n, 6, 6))
         """Its covariance."""
         self.t: F64 = np.full(n, -np.inf)
-        """When each was told last [s]; -inf before the first time."""
+        """Time of the last report of each [s]; -inf before the first."""
         self.status: I64 = np.full(n, Status.ABSENT, dtype=np.int64)
-        """As told last."""
+        """Status of the last report."""
         self.nlos: F64 = np.zeros(n)
-        """Likewise [-]."""
+        """NLOS probability of the last report [-]."""
 
     def forget(self, tracks: int | I64) -> None:
         """As if nothing had been told of these."""

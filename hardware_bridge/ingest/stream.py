@@ -39,11 +39,11 @@ class Stream:
     times: dict[int, StreamTime] = field(default_factory=dict)
     """By node index."""
     clocks: dict[int, DeviceClock] = field(default_factory=dict)
-    """The counter that `times` are told by, likewise; none where they are those of arrival."""
+    """The counter of `times`, by node index; none where they are times of arrival."""
     other: dict[int, DeviceClock | None] = field(default_factory=dict)
-    """Another counter that the last stamp was of, likewise."""
+    """Another counter that the last stamp was of, by node index."""
     even: dict[int, EvenTime] = field(default_factory=dict)
-    """Likewise, of samples that tell no time."""
+    """Times of samples without stamps, by node index."""
     source: Source | None = None
     """Of the last reading: those of one message share it, and are taken or refused together."""
     verdict: Verdict = Verdict.UNNUMBERED

@@ -37,7 +37,7 @@ class StartParams:
     speed: float = 0.3
     """[m/s] Of the wriggling."""
     steering: float = 0.4
-    """[rad] Likewise."""
+    """[rad] Of the wriggling."""
     period: float = 1.6
     """[s] Forwards and back of the first car; the others take longer by fifths of it."""
 

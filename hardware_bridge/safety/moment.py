@@ -37,15 +37,15 @@ class Moment(NamedTuple):
 
 
 class Verdict(NamedTuple):
-    """What a rule says of every car."""
+    """Limits that a rule sets for each car."""
 
     forward: F64
-    """Speed at most, (env, car) [m/s]."""
+    """Highest speed forwards, (env, car) [m/s]."""
     backward: F64
-    """Likewise, backwards."""
+    """Highest speed backwards, (env, car) [m/s]."""
     hold: Bool
     """Stop for good: only arming again lets it move, (env, car)."""
     left: F64 | float = FREE
-    """Steering angle at most to the left, (env, car) [rad]."""
+    """Largest steering angle to the left, (env, car) [rad]."""
     right: F64 | float = FREE
-    """Likewise to the right."""
+    """Largest steering angle to the right, (env, car) [rad]."""

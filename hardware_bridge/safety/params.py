@@ -80,11 +80,11 @@ class SafetyParams:
     stale_slow: float = 0.15
     """[s] Since a car's node was last heard."""
     stale_stop: float = 0.3
-    """[s] Likewise; stopped for good."""
+    """[s] Since a car's node was last heard; stopped for good."""
     sigma_slow: float = 0.5
     """[m] Largest standard deviation of where another is."""
     sigma_stop: float = 1.0
-    """[m] Likewise; stopped for good."""
+    """[m] Largest standard deviation of where another is; stopped for good."""
     hysteresis: float = 0.8
     """[-] What went over a limit counts as below it again at this share of it."""
     health: float = 0.5

@@ -20,24 +20,24 @@ class Recent(NamedTuple):
     """All arrays over (env, car); but for the first two, none negative."""
 
     speed: F64
-    """What was sent last, forward positive [m/s]."""
+    """Speed that was sent last, forward positive [m/s]."""
     steering: F64
-    """Likewise, left positive [rad]."""
+    """Steering angle that was sent last, left positive [rad]."""
     forward: F64
     """Fastest that the car may still be, for what was sent [m/s]."""
     backward: F64
-    """Likewise backwards [m/s]."""
+    """Fastest that the car may still be backwards [m/s]."""
     left: F64
     """Furthest that its wheels may still be turned to the left [rad]."""
     right: F64
-    """Likewise to the right [rad]."""
+    """Furthest that its wheels may still be turned to the right [rad]."""
 
     def after(self, speed: F64, steering: F64, elapsed: F64, braking: float) -> Recent:
         """What may be after a command.
 
         Args:
-            speed: Sent now, (env, car) [m/s].
-            steering: Likewise [rad].
+            speed: Speed that is sent, (env, car) [m/s].
+            steering: Steering angle that is sent, (env, car) [rad].
             elapsed: Since the last command, (env, 1) [s].
             braking: What cars surely brake with [m/s2].
         """

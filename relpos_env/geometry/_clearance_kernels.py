@@ -72,15 +72,15 @@ def gap(dx, dy, c_a, s_a, half_l_a, half_w_a, c_b, s_b, half_l_b, half_w_b):
 
     Args:
         dx: From the middle of the first to that of the second [m].
-        dy: Likewise.
+        dy: From the middle of the first to that of the second [m], along y.
         c_a: Cosine of the angle of the first.
         s_a: Sine of it.
         half_l_a: Its half sides [m].
-        half_w_a: Likewise.
-        c_b: Of the second.
-        s_b: Likewise.
-        half_l_b: Likewise.
-        half_w_b: Likewise.
+        half_w_a: Its half sides [m].
+        c_b: Cosine of the angle of the second.
+        s_b: Sine of it.
+        half_l_b: Its half sides [m].
+        half_w_b: Its half sides [m].
     """
     c, s = c_a * c_b + s_a * s_b, c_a * s_b - s_a * c_b
     ahead, left = c_a * dx + s_a * dy, c_a * dy - s_a * dx
@@ -97,13 +97,13 @@ def corner_to_box(x, y, c, s, half_l, half_w, box_l, box_w):
 
     Args:
         x: Middle of the rectangle [m].
-        y: Likewise.
+        y: Middle of the rectangle [m], along y.
         c: Cosine of its angle.
         s: Sine of it.
         half_l: Its half sides [m].
-        half_w: Likewise.
+        half_w: Its half sides [m].
         box_l: Those of the box [m].
-        box_w: Likewise.
+        box_w: Those of the box [m].
     """
     least = math.inf
     for k in range(4):

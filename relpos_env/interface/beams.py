@@ -31,7 +31,7 @@ def beam_starts(directions: F64, half_length: float, half_width: float) -> F64:
     Args:
         directions: (beam, 2)
         half_length: Of the car [m].
-        half_width: Likewise [m].
+        half_width: Of the car [m].
     """
     along, across = np.abs(directions).T
     starts: F64 = np.minimum(

@@ -77,7 +77,7 @@ class Perception:
         Args:
             envs: Which.
             block: As in the constructor, of these.
-            powered: Likewise.
+            powered: As in the constructor, of these.
         """
         part = copy.copy(self)
         part.tracker, part.horizon = self.tracker.part(envs), self.horizon.part(envs)
@@ -135,7 +135,7 @@ class Perception:
 
         Args:
             block: As in the constructor.
-            powered: Likewise.
+            powered: As in the constructor.
         """
         self._block, self._powered = block, powered
         view = self.view

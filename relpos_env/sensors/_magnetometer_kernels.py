@@ -71,9 +71,9 @@ def read_magnetometer(p, seed, count, waves, hard_iron, e, n, at, heading, roll,
         e: Environment.
         n: Node.
         at: x, y of the node [m].
-        heading: Its cosine and sine.
-        roll: Likewise.
-        pitch: Likewise.
+        heading: Cosine and sine of the heading.
+        roll: Cosine and sine of the roll.
+        pitch: Cosine and sine of the pitch.
         out: Values of events, (env, event, ...); columns 0 to 2 of the row are written.
         row: Which.
     """

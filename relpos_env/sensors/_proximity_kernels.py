@@ -59,9 +59,9 @@ def nearest(x, y, ux, uy, cone_cos, cone_sin, most, body, present, size, room, b
 
     Args:
         x: Tip of the cone [m].
-        y: Likewise.
+        y: Tip of the cone [m], along y.
         ux: Its axis, of length 1.
-        uy: Likewise.
+        uy: Its axis, of length 1, along y.
         cone_cos: Cosine of half its angle.
         cone_sin: Sine of it.
         most: [m]
@@ -104,7 +104,7 @@ def to_wall(away, straight, cone_cos, cone_sin, best):
         away: Of the tip from the wall, less than 0 behind it [m].
         straight: Cosine of the angle between axis and normal of the wall.
         cone_cos: Of half the angle of the cone.
-        cone_sin: Likewise.
+        cone_sin: Sine of it.
         best: [m]
     """
     if away <= 0.0:
@@ -127,15 +127,15 @@ def to_box(x, y, ux, uy, c, s, half_l, half_w, cone_cos, cone_sin, best):
 
     Args:
         x: Tip, from the centre of the box [m].
-        y: Likewise.
+        y: Tip, from the centre of the box [m], along y.
         ux: Axis, of length 1.
-        uy: Likewise.
+        uy: Axis, of length 1, along y.
         c: Cosine of the angle of the box.
         s: Sine of it.
         half_l: Half sides [m].
-        half_w: Likewise.
+        half_w: Half sides [m].
         cone_cos: Of half the angle of the cone.
-        cone_sin: Likewise.
+        cone_sin: Sine of it.
         best: [m]
     """
     x, y, ux, uy = c * x + s * y, c * y - s * x, c * ux + s * uy, c * uy - s * ux

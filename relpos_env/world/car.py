@@ -70,7 +70,7 @@ class CarParams:
     front_cornering: float = 4.95
     """[1/rad] Cornering stiffness of the front axle per load on it [1]. Less understeers."""
     rear_cornering: float = 5.72
-    """[1/rad] Likewise at the rear [1]."""
+    """[1/rad] Cornering stiffness of the rear axle per load on it [1]."""
     front_drive: float = 0.5
     """[-] Share of the motor and its brake at the front axle; 0.5 is four-wheel drive."""
     rolling_resistance: float = 0.02
@@ -98,7 +98,7 @@ class CarParams:
     roll_frequency: float = 5.0
     """[Hz] Undamped. A car's 1.5 Hz [2] times sqrt(10) for the scale."""
     pitch_frequency: float = 5.0
-    """[Hz] Likewise."""
+    """[Hz] Undamped. A car's 1.5 Hz [2] times sqrt(10) for the scale."""
     sway_damping: float = 0.4
     """[-] Damping ratio of roll and pitch; 0.2 to 0.4 in cars [2]."""
 

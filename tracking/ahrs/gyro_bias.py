@@ -77,11 +77,11 @@ def estimate_bias(bias, rest, c, e, n, count, qw, qx, qy, qz, tilt_x, tilt_y):
         n: Node.
         count: Number of this sample, the first is 1.
         qw: Orientation after the correction, 6D.
-        qx: Likewise.
-        qy: Likewise.
-        qz: Likewise.
+        qx: Orientation after the correction, 6D.
+        qy: Orientation after the correction, 6D.
+        qz: Orientation after the correction, 6D.
         tilt_x: Horizontal part of the upward direction before the correction [-].
-        tilt_y: Likewise.
+        tilt_y: Horizontal part of the upward direction before the correction [-], along y.
     """
     b0, b1, b2 = bias[e, n, BIAS], bias[e, n, BIAS + 1], bias[e, n, BIAS + 2]
     r00, r01, r02 = 1 - 2 * (qy * qy + qz * qz), 2 * (qx * qy - qw * qz), 2 * (qw * qy + qx * qz)

@@ -106,8 +106,8 @@ def correct_heading(magnetic, c, e, n, mx, my, mz, rate):
         e: Environment.
         n: Node.
         mx: Field, not all zero, in any unit.
-        my: Likewise.
-        mz: Likewise, up.
+        my: Field, not all zero, in any unit, along y.
+        mz: Field, not all zero, in any unit, along z, up.
         rate: Low-passed turn rate [rad/s].
     """
     norm = math.sqrt(mx * mx + my * my + mz * mz)

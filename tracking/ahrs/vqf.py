@@ -154,11 +154,11 @@ def update_vqf(s, c, e, n, gx, gy, gz, ax, ay, az):
         e: Environment.
         n: Node.
         gx: Gyroscope, body frame [rad/s].
-        gy: Likewise.
-        gz: Likewise.
+        gy: Gyroscope, body frame [rad/s], along y.
+        gz: Gyroscope, body frame [rad/s], along z.
         ax: Specific force, body frame [m/s2].
-        ay: Likewise.
-        az: Likewise.
+        ay: Specific force, body frame [m/s2], along y.
+        az: Specific force, body frame [m/s2], along z.
     """
     integrate(s, c, e, n, gx, gy, gz)
     if ax != 0.0 or ay != 0.0 or az != 0.0:

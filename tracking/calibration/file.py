@@ -52,7 +52,7 @@ FIELDS = {
 MOST_OFFSET = {"gyr_offset_rad_s": 1.0, "acc_offset_m_s2": 5.0}
 """Larger ones are other units, or a defect."""
 MOST_RANGE_OFFSET = 10.0
-"""[m] Likewise."""
+"""[m] Larger ones are other units, or a defect."""
 
 
 def calibration_toml(calibration: Calibration) -> str:

@@ -22,7 +22,7 @@ class RestParams:
     gyr_std: float = 0.02
     """[rad/s] Largest standard deviation of an axis in a window."""
     acc_std: float = 0.1
-    """[m/s2] Likewise."""
+    """[m/s2] Largest standard deviation of an axis in a window."""
     gyr_mean: float = 0.1
     """[rad/s] A faster steady turn is no offset."""
     gyr_agree: float = 0.01

@@ -149,7 +149,7 @@ class Horizon:
 
         Args:
             block: Filled again before every call.
-            now: Likewise, (env) [s].
+            now: Filled again before every call, (env) [s].
             out: Written by every call.
 
         Returns:

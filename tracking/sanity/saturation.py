@@ -92,8 +92,8 @@ def find_limits(q, memory, e, n, x, y, z):
         e: Environment.
         n: Node.
         x: Specific force [m/s2].
-        y: Likewise.
-        z: Likewise.
+        y: Specific force [m/s2], along y.
+        z: Specific force [m/s2], along z.
 
     Returns:
         True for each axis that is cut off; True if the sample tells the tilt.

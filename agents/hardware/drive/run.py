@@ -103,7 +103,7 @@ def drive_on(
 
     Raises:
         BridgeError: As `drive`.
-        UsageError: Likewise.
+        UsageError: As `drive`.
     """
     entry = find_entry(name)
     if entry.proximity is not None and entry.proximity != n_beams:

@@ -64,7 +64,7 @@ class EmulatedRig:
 
         Raises:
             EnvError: An unknown name or a number out of range.
-            BridgeError: Likewise of devices, or a port that cannot be made.
+            BridgeError: An unknown device or option, or a port that cannot be made.
         """
         self.options = options
         self._formats = options.formats()

@@ -62,7 +62,7 @@ def emulate(
 
     Raises:
         EnvError: An unknown name or a number out of range.
-        BridgeError: Likewise of devices, or a port that cannot be made.
+        BridgeError: An unknown device or option, or a port that cannot be made.
         LogError: `log` exists already.
     """
     chosen = replace(options or EmulateOptions(), **changes)

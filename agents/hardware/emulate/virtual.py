@@ -187,7 +187,7 @@ class VirtualBridge(OpenBridge):
 
         Raises:
             EnvError: An unknown name or a number out of range.
-            BridgeError: Likewise of devices.
+            BridgeError: An unknown device or option.
         """
         self.rig = EmulatedRig(options, ports=ports, record=record)
         text = self.rig.swarm_toml(NOWHERE)

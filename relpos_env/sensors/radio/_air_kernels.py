@@ -25,7 +25,7 @@ def make_nodes(nodes, seed, clock_offset, antenna_std):
         nodes: NODE, (node), written.
         seed: Of the environment, uint64.
         clock_offset: `RadioSimParams`.
-        antenna_std: Likewise.
+        antenna_std: `RadioSimParams`.
     """
     for k in range(nodes.shape[0]):
         key = draw_key(seed, np.uint64(STARTS + k))

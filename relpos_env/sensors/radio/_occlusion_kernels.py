@@ -13,9 +13,9 @@ def crosses_box(ax, ay, bx, by, box, berth):
 
     Args:
         ax: Its one end [m].
-        ay: Likewise.
+        ay: Its one end [m], along y.
         bx: Its other end [m].
-        by: Likewise.
+        by: Its other end [m], along y.
         box: Centre x y [m], half width, half depth [m], cosine and sine of its angle.
         berth: How much larger the box is taken on all sides [m].
     """
@@ -47,11 +47,11 @@ def crosses_capsule(ax, ay, az, bx, by, bz, capsule, skin):
 
     Args:
         ax: Its one end [m].
-        ay: Likewise.
-        az: Likewise.
+        ay: Its one end [m], along y.
+        az: Its one end [m], along z.
         bx: Its other end [m].
-        by: Likewise.
-        bz: Likewise.
+        by: Its other end [m], along y.
+        bz: Its other end [m], along z.
         capsule: Ends of the axis, 3 and 3 [m], and the radius [m].
         skin: Share of the radius that counts as inside, below 1: an antenna is worn on the
             surface and is not hidden by that.
