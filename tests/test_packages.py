@@ -57,3 +57,24 @@ def test_links_between_documents_resolve():
     for page in [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]:
         for target in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text()):
             assert (page.parent / target).exists(), (page.name, target)
+
+
+def test_another_package_called_agents_is_named(tmp_path):
+    (tmp_path / "agents").mkdir()
+    (tmp_path / "agents" / "__init__.py").write_text("")
+    code = "import sys; sys.path.insert(0, '.'); from hardware_bridge.command import main; main()"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path, check=False
+    )
+    assert done.returncode == 2
+    assert str(tmp_path / "agents") in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_the_entry_point_runs_the_command_line():
+    code = (
+        "import sys; from hardware_bridge.command import main; sys.argv = ['relpos', '-h']; main()"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0
+    assert "Track and evaluate" in done.stdout
