@@ -292,6 +292,26 @@ def second_world() -> str:
     return markdown(head, rows, right=", ".join(head[1:]))
 
 
+def policy_results() -> str:
+    """Errors of the shipped policy with distance sensors, next to those of controllers."""
+    head = ("room", "cars", "driver", "error", "95 %", "place", "tracking", "collisions/min",
+            "in contact", "in formation", "ratio to the best controller")  # fmt: skip
+    rows, before = [], ""
+    for line in (MEASURED / "policy-results.jsonl").read_text().splitlines():
+        r = json.loads(line)
+        low, high = r["ci95"]
+        ratio = "{:.2f} to {:.2f}".format(*r["ratio_ci95"])
+        is_new, before = r["scenario"] != before, r["scenario"]
+        rows.append([
+            f"`{r['scenario']}`" if is_new else "", "3 to 6" if r["cars"] is None else str(r["cars"]),
+            r["policy"], f"{r['formation_error']:.3f}", f"{low:.3f} to {high:.3f}",
+            f"{r['place_error']:.2f}", f"{r['tracking_error']:.3f}",
+            f"{r['collisions_per_min']:.2f}", f"{100.0 * r['contact_time']:.2f} %",
+            f"{100.0 * r['time_in_formation']:.1f} %", f"{r['ratio']:.2f} ({ratio})",
+        ])  # fmt: skip
+    return markdown(head, rows, right=", ".join(head[3:]))
+
+
 def results(is_recording: bool) -> list[dict[str, Any]]:
     """Lines of the recordings, or those of the simulated rooms."""
     lines = [json.loads(line) for line in RESULTS.read_text().splitlines()]
@@ -369,6 +389,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "faults": faults,
     "findings": findings,
     "second-world": second_world,
+    "policy-results": policy_results,
     "room-results": room_results,
     "recording-results": recording_results,
     "mds-results": mds_results,
