@@ -302,8 +302,10 @@ def policy_results() -> str:
         low, high = r["ci95"]
         ratio = "{:.2f} to {:.2f}".format(*r["ratio_ci95"])
         is_new, before = r["scenario"] != before, r["scenario"]
+        drawn = SCENARIOS[r["scenario"]].randomisation.n_cars
         rows.append([
-            f"`{r['scenario']}`" if is_new else "", "3 to 6" if r["cars"] is None else str(r["cars"]),
+            f"`{r['scenario']}`" if is_new else "",
+            "{} to {}".format(*drawn) if drawn else str(r["cars"]),
             r["policy"], f"{r['formation_error']:.3f}", f"{low:.3f} to {high:.3f}",
             f"{r['place_error']:.2f}", f"{r['tracking_error']:.3f}",
             f"{r['collisions_per_min']:.2f}", f"{100.0 * r['contact_time']:.2f} %",
