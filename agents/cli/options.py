@@ -27,6 +27,12 @@ json_option = click.option(
 cars_option = click.option(
     "--cars", type=int, help="Number of cars, 2 to 20.  [default: as many as the scenario has]"
 )
+task_option = click.option(
+    "--task",
+    default="ring",
+    show_default=True,
+    help="Task: ring, hold, travel, gap, rendezvous or follow.",
+)
 policy_option = click.option(
     "--policy",
     metavar="NAME_OR_PATH",

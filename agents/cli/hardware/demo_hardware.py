@@ -9,18 +9,19 @@ from typing import Any
 import click
 
 from agents.cli.console import emit_json, print_table, progress_bar
-from agents.cli.options import cars_option, json_option, policy_option, scenario_option
+from agents.cli.options import (
+    cars_option,
+    json_option,
+    policy_option,
+    scenario_option,
+    task_option,
+)
 from agents.errors import UsageError
 
 
 @click.command("demo-hardware")
 @scenario_option(".", default="cars-nlos")
-@click.option(
-    "--task",
-    default="ring",
-    show_default=True,
-    help="Task: ring, hold, travel, gap, rendezvous or follow.",
-)
+@task_option
 @click.option(
     "--seconds", default=40.0, show_default=True, help="Length of a drive, 15 to 3600 [s]."
 )

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from agents.cli.console import emit_json, print_table
-from agents.cli.options import cars_option, json_option, scenario_option
+from agents.cli.options import cars_option, json_option, scenario_option, task_option
 from agents.errors import UsageError
 
 
@@ -21,12 +21,7 @@ from agents.errors import UsageError
     help="Folder for the ports and, once they are ready, swarm.toml.",
 )
 @scenario_option("; by default that of the task.")
-@click.option(
-    "--task",
-    default="ring",
-    show_default=True,
-    help="Task: ring, hold, travel, gap, rendezvous or follow.",
-)
+@task_option
 @cars_option
 @click.option(
     "--seed", default=0, show_default=True, help="Seed; the same seed gives the same world."

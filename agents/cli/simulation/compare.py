@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from agents.cli.console import emit_json, print_table, progress_bar
-from agents.cli.options import cars_option, jobs_options, json_option, scenario_option
+from agents.cli.options import cars_option, jobs_options, json_option, scenario_option, task_option
 from agents.errors import UsageError
 
 if TYPE_CHECKING:
@@ -36,12 +36,7 @@ WHY = "which has its own cars and task; they drive one after the other"
     help="Observation mode: estimate, estimate_cov, ranges or truth; repeatable.",
 )
 @scenario_option("; repeatable.  [default: that of the task]", "scenarios", multiple=True)
-@click.option(
-    "--task",
-    default="ring",
-    show_default=True,
-    help="Task: ring, hold, travel, gap, rendezvous or follow.",
-)
+@task_option
 @cars_option
 @click.option(
     "--proximity",

@@ -9,18 +9,13 @@ from typing import Any
 
 import click
 
-from agents.cli.options import scenario_option
+from agents.cli.options import scenario_option, task_option
 from agents.errors import UsageError
 
 
 @click.command()
 @scenario_option(". By default that of the task.")
-@click.option(
-    "--task",
-    default="ring",
-    show_default=True,
-    help="Task: ring, hold, travel, gap, rendezvous or follow.",
-)
+@task_option
 @click.option(
     "--observation",
     default="estimate",
