@@ -234,5 +234,13 @@ def test_an_orientation_that_starts_in_motion_is_used_once_it_has_settled(swing,
         block.take(block.order()[0])
     )
     states = states.take(states.valid[0] & (states.kind[0] == Kind.STATE))
-    assert states.t[0, 0] == pytest.approx(first, abs=0.02)
+    assert states.t[0, 0] == pytest.approx(first, abs=1e-9)
     assert np.degrees(np.abs(yaw_of(states.values[0, 100:, :4]))).max() < 5.0
+
+
+def test_a_vehicle_that_stays_level_is_used_from_its_first_sample_on_in_motion_too():
+    samples = np.tile([0.0, 0.0, 0.0, 15.0, 0.0, GRAVITY], (20, 1))
+    t, node = np.arange(20) / 100.0, np.zeros(20, dtype=np.int64)
+    stage = Orientation(constellation("initial", vehicle="car"), OrientationParams())
+    out = stage.step(MeasurementBlock.of_kind(Kind.IMU, t, node, samples))
+    assert out.valid[0, out.kind[0] == Kind.STATE].all()
