@@ -100,7 +100,7 @@ def note_ranges(t, kind, i, j, values, has_power, valid, view):
 
 @kernel
 def forget_all(view, e):
-    """Begin an environment again: nobody has heard anything."""
+    """Begin an environment again: no node has received anything."""
     for a in range(view.heard.shape[1]):
         for b in range(view.heard.shape[1]):
             view.heard[e, a, b] = -np.inf

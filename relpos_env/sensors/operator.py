@@ -1,4 +1,4 @@
-"""The operator: somebody with a remote control who sees the room with an error, and late.
+"""The operator: a person with a remote control who sees the room with an error, and late.
 
 He tells every car the velocity of the plan, and the same trim on top that brings the group
 back to where the plan wants it:
