@@ -22,9 +22,9 @@ def double(x):
 """
 
 
-def run(folder, call):
+def run(folder, call, module="_double_kernels"):
     done = subprocess.run(
-        [sys.executable, "-c", f"from _double_kernels import double; print({call})"],
+        [sys.executable, "-c", f"from {module} import *; print({call})"],
         cwd=folder,
         capture_output=True,
         text=True,
@@ -113,6 +113,40 @@ def test_a_cache_that_cannot_be_read_is_replaced(folder, damage):
             path.write_bytes(path.read_bytes()[:-20])
     assert results(folder) == "2 0"
     assert results(folder) == "2 1"
+
+
+RECORDS = """
+import numpy as np
+
+from tracking.kernels.jit import small_kernel
+
+
+@small_kernel
+def last_field(record):
+    return record.b
+
+
+@small_kernel
+def last_field_later(record):
+    return last_field(record)
+
+
+first = np.array([(1.0, 2.0)], [("a", "f8"), ("b", "f8")])[0]
+second = np.array([(1.0, 2.0, 3.0)], [("a", "f8"), ("c", "f8"), ("b", "f8")])[0]
+"""
+
+
+@pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
+def test_functions_of_different_records_have_different_names_in_all_processes(tmp_path):
+    """One process compiles for one record, a second for the other, a third calls both."""
+    (tmp_path / "_record_kernels.py").write_text(RECORDS)
+
+    def call(expression):
+        return run(tmp_path, expression, "_record_kernels")
+
+    assert call("last_field_later(first)") == "2.0"
+    assert call("last_field_later(second)") == "3.0"
+    assert call("last_field_later(first), last_field_later(second)") == "2.0 3.0"
 
 
 class Pair(NamedTuple):
