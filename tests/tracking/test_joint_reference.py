@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from tests.exact_motion import ExactGroup
+from tests.tracking.joint_reference import JointReference
 from tracking.filters.joint import JointEkf
 from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.hypotheses.alignment import Alignment
 from tracking.filters.joint.params import JointParams, NoiseLearningParams
-from tracking.filters.joint.reference import JointReference
 from tracking.measurements import Kind
 from tracking.models.nlos import power_evidence
 

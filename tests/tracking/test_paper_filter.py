@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from tests.exact_motion import ExactGroup
+from tests.tracking.paper_reference import PaperReference
+from tests.tracking.paper_reference_ekf import PairFilter
 from tracking import Status, Tracker, TrackerParams
 from tracking.errors import ConfigError
 from tracking.filters import FilterParams
 from tracking.filters.paper import PaperEkf, PaperParams
 from tracking.filters.paper.params import CHOICES
-from tracking.filters.paper.reference import PaperReference
-from tracking.filters.paper.reference_ekf import PairFilter
 from tracking.measurements import Kind, MeasurementBlock
 
 OPTIONS = [{}, *({name: value} for name, values in CHOICES.items() for value in values[1:])]

@@ -19,10 +19,10 @@ from itertools import combinations
 
 import numpy as np
 
+from tests.tracking.paper_reference_ekf import PairFilter
 from tracking.arrays import F64
 from tracking.constellation import Constellation
 from tracking.filters.paper.params import PaperParams
-from tracking.filters.paper.reference_ekf import PairFilter
 from tracking.geometry import (
     best_rotation,
     quat_conjugate,

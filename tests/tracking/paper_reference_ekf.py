@@ -1,4 +1,4 @@
-"""The EKF of one pair in plain numpy, eq. (5) to (11) of the paper: see `reference`."""
+"""The EKF of one pair in plain numpy, eq. (5) to (11) of the paper: see `paper_reference`."""
 
 from __future__ import annotations
 
