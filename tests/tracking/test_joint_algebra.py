@@ -12,7 +12,6 @@ from tracking.arrays import aligned
 from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.hypotheses.alignment import Alignment
 from tracking.filters.joint.hypotheses.copying import rotate_hypothesis
-from tracking.filters.joint.hypotheses.geometric_degeneracy import least_axis
 from tracking.filters.joint.hypotheses.merging import are_same, rotation_between
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.state import JointState, make_state
@@ -253,29 +252,6 @@ def test_registers_of_any_width_give_the_same(monkeypatch, lanes):
         fresh(*arguments)
         loops.sum_rows(*arguments[:-1], summed)
         np.testing.assert_allclose(arguments[-1], summed, atol=1e-12)
-
-
-@given(st.integers(0, 2**31), st.sampled_from([2, 3]), st.sampled_from([1, 2, 3, 6]))
-def test_the_least_axis_is_the_librarys(seed, d, n):
-    rng = np.random.default_rng(seed)
-    points = rng.standard_normal((n, d)) * rng.choice([1e-3, 1.0, 30.0], size=d)
-    scatter = np.zeros((3, 3))
-    scatter[:d, :d] = points.T @ points
-    least, axis = least_axis(tuple(scatter[np.triu_indices(3)]), d)
-    eigenvalues = np.linalg.eigvalsh(scatter[:d, :d])
-    top = eigenvalues[-1]
-    assert least == pytest.approx(max(eigenvalues[0], 0.0), abs=1e-7 * top)
-    assert np.linalg.norm(axis) == pytest.approx(1.0)
-    # Across it the points reach as far as across the best: where two are alike, either will do.
-    assert axis @ scatter @ axis == pytest.approx(eigenvalues[0], abs=1e-6 * top)
-
-
-@pytest.mark.parametrize("scatter", [np.zeros((3, 3)), np.eye(3), np.diag([0.0, 0.0, 2.0])])
-def test_the_least_axis_of_what_has_none(scatter):
-    least, axis = least_axis(tuple(scatter[np.triu_indices(3)]), 3)
-    assert least == pytest.approx(scatter[0, 0], abs=1e-12)
-    assert np.array(axis) @ scatter @ axis == pytest.approx(least, abs=1e-12)
-    assert np.linalg.norm(axis) == pytest.approx(1.0)
 
 
 def test_arrays_begin_with_a_cache_line():

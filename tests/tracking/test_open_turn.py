@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from test_joint_kernels import running
 
+from tests.exact_motion import ExactGroup
 from tracking import Status, Tracker
 from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.ekf import propagation
@@ -14,7 +15,7 @@ from tracking.filters.joint.ekf.preintegration import preintegrate
 from tracking.filters.joint.ekf.tilt_correction import GAIN
 from tracking.filters.joint.hypotheses import alignment_modes, alignment_sensitivity
 from tracking.filters.joint.hypotheses.alignment import Alignment
-from tracking.filters.joint.hypotheses.geometric_degeneracy import degeneracy_ratio
+from tracking.filters.joint.hypotheses.geometric_degeneracy import degeneracy_ratio, least_axis
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.state import JointState, make_state
 from tracking.filters.joint.updates import motion_constraints, surveyed_distance
@@ -324,6 +325,40 @@ def test_an_unknown_turn_makes_no_layout_flat(make_group):
         s.P[0] += 0.3**2 * np.outer(turn, turn)
     assert degeneracy_ratio(c, s, 0, True) < 0.2 * well_known
     assert degeneracy_ratio(c, s, 0, False) > well_known
+
+
+@settings(max_examples=20)
+@given(st.integers(0, 2**31), st.sampled_from([2, 3]), st.integers(3, 7), st.booleans())
+def test_degeneracy_is_the_extent_across_a_layout_over_what_a_regression_leaves_of_its_error(
+    seed, dimensions, n, turns
+):
+    group = ExactGroup("human", range(n), hz=50.0, dimensions=dimensions, seconds=1.0)
+    c = as_records(make_coefficients(group.constellation, JointParams()))[0]
+    batch = make_state(group.constellation, JointParams(), 1, 1)
+    s = JointState._make(as_records(a[0]) if a.dtype.names else a[0] for a in batch)
+    rng = np.random.default_rng(seed)
+    s.nodes["present"] = True
+    s.nodes["present"][0] = n < 5  # one that is not there
+    there = np.flatnonzero(s.nodes["present"])
+    at = s.nodes["i_pos"][there][:, None] + np.arange(dimensions)
+    pos = rng.standard_normal((len(there), dimensions)) * rng.uniform(0.1, 5.0, dimensions)
+    s.x[0, at] = pos
+    A = rng.standard_normal(s.P[0].shape)
+    s.P[0] = 1e-3 * A @ A.T
+    found = degeneracy_ratio(c, s, 0, turns)
+    if len(there) <= dimensions:
+        assert found == np.inf
+        return
+    pos -= pos.mean(axis=0)
+    _, extent, axes = np.linalg.svd(pos)
+    columns = [np.ones(len(there))]
+    if dimensions == 3 and not turns:
+        columns += [pos @ axes[0], pos @ axes[1]]
+    rest = np.eye(len(there)) - np.stack(columns, 1) @ np.linalg.pinv(np.stack(columns, 1))
+    across = np.zeros((len(there), s.x.shape[1]))
+    across[np.arange(len(there))[:, None], at] = axes[-1]
+    assert found == pytest.approx(extent[-1] / np.sqrt(np.trace(rest @ across @ s.P[0] @ across.T)))
+    np.testing.assert_allclose(np.abs(least_axis(c, s, 0) @ axes[-1]), 1.0)
 
 
 def turned(group, R):  # noqa: N803

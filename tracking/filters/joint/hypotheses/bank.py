@@ -28,7 +28,6 @@ from tracking.filters.joint.hypotheses.copying import copy_hypothesis, rotate_hy
 from tracking.filters.joint.hypotheses.geometric_degeneracy import (
     degeneracy_ratio,
     least_axis,
-    scatter_of,
 )
 from tracking.filters.joint.hypotheses.initialisation import (
     initialise_pair,
@@ -54,17 +53,12 @@ def add_mirror_image(c, s):
 
     It is mirrored across the line or plane that the layout is nearest to, velocities as well.
     """
-    h, d = s.group[0].best, c.d
+    h = s.group[0].best
     target = copy_hypothesis(s, h)
     if target < 0:
         return
-    M = np.eye(d)
-    scatter, _ = scatter_of(c, s, h)
-    _, across = least_axis(scatter, d)
-    for r in range(d):
-        for k in range(d):
-            M[r, k] -= 2.0 * across[r] * across[k]
-    rotate_hypothesis(c, s, target, M)
+    across = least_axis(c, s, h)
+    rotate_hypothesis(c, s, target, np.eye(c.d) - 2.0 * np.outer(across, across))
 
 
 @kernel
