@@ -182,9 +182,8 @@ class JointReference:
         A[self.i_pos] = np.stack([-out[:, 1], out[:, 0]], axis=1)
         return A / (A @ A + 1e-9)
 
-    def update(self, H: F64, nu: float, R: float, most: float = np.inf) -> None:  # noqa: N803
-        """Kalman update in Joseph form; an innovation of a NIS beyond `most` counts for less."""
-        R += max(nu * nu / most - H @ self.P @ H - R, 0.0)
+    def update(self, H: F64, nu: float, R: float) -> None:  # noqa: N803
+        """Kalman update in Joseph form."""
         K = self.P @ H / (H @ self.P @ H + R)
         A = np.eye(len(self.x)) - np.outer(K, H)
         self.x, self.P = self.x + K * nu, A @ self.P @ A.T + R * np.outer(K, K)
@@ -271,12 +270,12 @@ class JointReference:
                     node["t_moved"] = t
                     continue
                 for k in range(2):
-                    self.update(np.eye(n)[v + k], -self.x[v + k], c["rest_var"], c["jolt_nis"])
+                    self.update(np.eye(n)[v + k], -self.x[v + k], c["rest_var"])
             elif node["sideways_var"] > 0.0:
                 model = partial(self.slides, node, v, y)
                 H = jacobian(model, before)
                 nu = -model(before) - H @ (self.x - before)
-                self.update(H, nu, node["sideways_var"], c["jolt_nis"])
+                self.update(H, nu, node["sideways_var"])
         for k in range(2):
             H = np.isin(np.arange(n), self.nodes["i_vel"] + k) / len(self.nodes)
             self.update(H, -(H @ self.x), self.nodes["speed_var"].mean() / max(dt, 1e-3))

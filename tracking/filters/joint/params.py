@@ -171,8 +171,6 @@ class UpdateParams:
     contradiction_share: float = 0.7
     """[-] A pair whose mean NIS is above this share of `JointParams.pair_nis_limit` counts
     less, by the fourth power."""
-    jolt_nis: float = 25.0
-    """[-] A motion constraint with a larger NIS counts less: a jolt, a skid."""
     glide_nis: float = 9.0
     """[-] A node that looks at rest, but whose velocity is known with this NIS, glides."""
     centre_std: float = 1.0

@@ -89,11 +89,9 @@ def apply_constraint(c, s, h, nu, m, variance, work):
     S, open_var = compute_pht(s, h, m, work) + variance, 0.0
     if is_linear(s.group[0]):
         open_var = innovation_sensitivity(s, h, m, work)
-        accumulate_alignment_information(s, h, work, nu, max(S, nu * nu / c.jolt_nis))
+        accumulate_alignment_information(s, h, work, nu, S)
     if s.group[0].n_alive > 1:
         s.loglik[h] -= 0.5 * min(nu * nu / (S + open_var), c.nis_cap)
-    if nu * nu > c.jolt_nis * S:
-        S = nu * nu / c.jolt_nis  # a jolt or a skid: it counts for less
     kalman_update(s, h, work.w, nu, S)
 
 
