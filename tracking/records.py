@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from typing import Any
 
@@ -19,9 +20,25 @@ def as_records(array: Records) -> Records:
 
 def record_of(params: Any) -> Records:
     """The numbers of a params class for kernels, (1)."""
-    names = [f.name for f in fields(params)]
-    values = tuple(getattr(params, name) for name in names)
-    return as_records(np.array([values], dtype=[(name, "f8") for name in names]))
+    return as_records(coefficients([params], {}))
+
+
+def coefficients(parts: Sequence[Any], derived: Mapping[str, float], **integers: int) -> Records:
+    """The constants of kernels, (1): numbers of params classes and what is derived from them.
+
+    Args:
+        parts: Params classes. Of fields with one name, the first counts.
+        derived: By name; in place of fields of that name.
+        integers: The same, as integers.
+    """
+    numbers = {
+        field.name: getattr(part, field.name)
+        for part in reversed(parts)
+        for field in fields(part)
+        if field.type in ("float", "int", "bool") and field.name not in integers
+    } | dict(derived)
+    kinds = [*((name, "f8") for name in numbers), *((name, "i8") for name in integers)]
+    return np.array([(*numbers.values(), *integers.values())], dtype=kinds)
 
 
 def with_records(state: Any) -> Any:

@@ -88,7 +88,7 @@ def test_noiseless_data_keep_zero_error(name, make_group):
     Without the speed measurement: a low-passed derivative lags, with or without noise.
     """
     group = make_group(n=4, seconds=30.0, hz=250.0)
-    pair, paper = PairEkfParams(speed_model="none"), PaperParams(speed="rate", speed_std=1e3)
+    pair, paper = PairEkfParams(), PaperParams(speed="rate", speed_std=1e3)
     params = TrackerParams(filter=FilterParams(pair=pair, paper=paper))
     estimate = half_on_truth(name, group, group.block, params=params)
     error = np.linalg.norm(estimate.pos_ij_w[0] - group.pairs(group.t[-1]), axis=-1)
@@ -283,9 +283,10 @@ def test_turning_the_world_turns_the_estimate(name, group):
     Put on the truth at half time: a wrong hypothesis that falls in with its ranges after all
     does so from an unstable balance, which makes any rounding larger by a factor of a million.
     In `joint` one rotation stands for all in the first half second; what its covariance has of
-    that is not forgotten to the last digit.
+    that is not forgotten to the last digit. In `ekf` nothing but accelerations hold a pair across
+    its line of sight, so rounding errors grow there.
     """
-    atol = 1e-4 if name == "joint" else 1e-6
+    atol = {"joint": 1e-4, "ekf": 1e-5}.get(name, 1e-6)
     b = group.block
     values = b.values.copy()
     state = b.kind[0] == Kind.STATE

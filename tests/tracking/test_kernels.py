@@ -21,8 +21,6 @@ def random_pair(rng, d=3, size=6):
 
 MODELS = {
     "range": lambda x, work: dynamics.predict_range(x, 0, 0, 0.1, -0.2, 0.05, work),
-    "range-rate": lambda x, work: dynamics.predict_range_rate(x, 0, 0, 0.1, -0.2, 0.05, work),
-    "speed-norm": lambda x, work: dynamics.predict_speed(x, 0, 0, work),
 }
 
 

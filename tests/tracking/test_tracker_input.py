@@ -205,7 +205,7 @@ def test_to_join_again_changes_nothing(filter):
         (lambda v: OrientationParams(tau_acc=v), "tau_acc"),
         (lambda v: group_of(imu_hz=v), "imu_hz"),
         (lambda v: group_of(mag_hz=v), "mag_hz"),
-        (lambda v: PairEkfParams(speed_tau=v), "speed_tau"),
+        (lambda v: PairEkfParams(lost_after=v), "lost_after"),
         (lambda v: VehicleParams(slip=v), "slip"),
     ],
 )

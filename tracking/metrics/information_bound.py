@@ -68,7 +68,7 @@ def run_bound(coefficients, layout, s, work, block, hidden, truth, turn_var, t_o
     """Carry the covariance through the events of one environment.
 
     Args:
-        coefficients: COEFFICIENTS, (1).
+        coefficients: Constants (`make_coefficients`), (1).
         layout: Tables.
         s: JointState of one environment and one hypothesis, updated.
         work: Room, as that of the filter's events.

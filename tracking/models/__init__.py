@@ -19,8 +19,6 @@ from tracking.models.mean_velocity import mean_velocity_model
 from tracking.models.nonholonomic import nonholonomic_model
 from tracking.models.range import range_model
 from tracking.models.range_bias import range_bias_model
-from tracking.models.range_rate import range_rate_model
-from tracking.models.relative_speed import relative_speed_model
 from tracking.models.zero_velocity import zero_velocity_model
 
 
@@ -39,8 +37,6 @@ MODELS: dict[str, Model] = {
     "range": Model(range_model, 3, 0, "RangeErrorParams.white_std"),
     "lever arm": Model(lever_arm_model, 1, 4, "RangeErrorParams.white_std"),
     "range bias": Model(range_bias_model, 2, 0, "RangeErrorParams.white_std"),
-    "range rate": Model(range_rate_model, 6, 0, "PairEkfParams.speed_std"),
-    "relative speed": Model(relative_speed_model, 3, 0, "PairEkfParams.speed_std"),
     "zero velocity": Model(zero_velocity_model, 1, 0, "JointParams.rest_std"),
     "non-holonomic": Model(nonholonomic_model, 5, 4, "VehicleParams.sideways_std"),
     "mean velocity": Model(mean_velocity_model, 1, 1, "VehicleParams.speed_std"),

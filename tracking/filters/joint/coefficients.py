@@ -2,99 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
-
 import numpy as np
 
 from tracking.arrays import Bool, whole_lines
 from tracking.constellation import Constellation
-from tracking.filters.joint.params import JointParams, NoiseLearningParams, UpdateParams
-from tracking.filters.joint.supervision.params import AlignmentParams, SupervisionParams
-from tracking.records import Records
-
-_NUMBERS = (
-    "nonlinearity_gain",
-    "white_var",
-    "fast_var",
-    "fast_length",
-    "slow_var",
-    "slow_length",
-    "los_to_nlos_rate",
-    "nlos_to_los_rate",
-    "los_to_nlos_rate_with_power",
-    "nlos_to_los_rate_with_power",
-    "nlos_bias",
-    "nlos_bias_var",
-    "nlos_bias_length",
-    "nlos_large_share",
-    "nlos_bias_large",
-    "nlos_bias_large_var",
-    "nlos_white_var",
-    "power_diff_los",
-    "power_diff_los_std",
-    "power_diff_nlos",
-    "power_diff_nlos_std",
-    "power_diff_weight",
-    "power_diff_most",
-    "least_prob",
-    "outlier_prob",
-    "outlier_span",
-    "start_k",
-    "start_max_age",
-    "min_ranges",
-    "rotation_var",
-    "position_var",
-    "start_speed_var",
-    "short_error",
-    "long_error",
-    "largest_loss",
-    "far_weight",
-    "join_spread",
-    "second_side_loss",
-    "prune",
-    "merge_distance",
-    "nis_cap",
-    "check_period",
-    "respawn_nis",
-    "challenger_penalty",
-    "height_var",
-    "unaided_psd2",
-    "imu_timeout",
-    "attitude_reset_gap",
-    "static_drift2",
-    "survey_var",
-    "rest_accel",
-    "rest_rate",
-    "rest_after",
-    "rest_var",
-    "propagation_period",
-    "constraint_period",
-    "range_timeout",
-    "lost_after",
-    "node_timeout",
-    "stale_var",
-    "pair_nis_limit",
-    "node_bias_limit",
-)
-_DECISIONS = tuple(
-    f.name
-    for kind in (SupervisionParams, AlignmentParams, UpdateParams, NoiseLearningParams)
-    for f in fields(kind)
-)
-COEFFICIENTS = np.dtype(
-    [
-        ("d", "i8"),
-        ("n", "i8"),
-        ("n_own", "i8"),
-        ("n_motion", "i8"),
-        *((name, "f8") for name in (*_NUMBERS, *_DECISIONS)),
-    ]
-)
-"""Constants derived once from `JointParams`, under the same names; ``_var`` and ``2``: squared."""
+from tracking.filters.joint.params import JointParams
+from tracking.records import Records, coefficients
 
 
 def make_coefficients(constellation: Constellation, params: JointParams) -> Records:
-    """Derive the constants of the kernels, (1)."""
+    """Derive the constants of the kernels, (1); ``_var`` and ``2``: squared."""
     e, s = params.range_error, params.start
     v = params.nlos_in_space if constellation.dimensions == 3 else params.nlos
     has_states = has_range_errors(constellation, params)
@@ -123,24 +40,16 @@ def make_coefficients(constellation: Constellation, params: JointParams) -> Reco
         "stale_var": params.stale_std**2,
         "propagation_period": min(params.vehicles[n.vehicle].propagation_period for n in moving),
     }
-    c = np.zeros(1, dtype=COEFFICIENTS)
-    c["d"] = constellation.dimensions
-    c["n"] = c["n_own"] = count_rows(constellation, params)
-    c["n_motion"] = count_motion(constellation)
-    for name in (*_NUMBERS, *_DECISIONS):
-        every = (
-            e,
-            v,
-            s,
-            params,
-            params.supervision,
-            params.alignment,
-            params.update,
-            params.noise_learning,
-        )
-        sources = [p for p in every if hasattr(p, name)]
-        c[name] = values[name] if name in values else getattr(sources[0], name)
-    return c
+    parts = e, v, s, params, params.supervision, params.alignment, params.update
+    n = count_rows(constellation, params)
+    return coefficients(
+        (*parts, params.noise_learning),
+        values,
+        d=constellation.dimensions,
+        n=n,
+        n_own=n,
+        n_motion=count_motion(constellation),
+    )
 
 
 def count_states(constellation: Constellation, params: JointParams) -> int:

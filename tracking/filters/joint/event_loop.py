@@ -57,7 +57,7 @@ def run_events(coefficients, layout, state, work, block, t_out, out):
     """Handle the events of every environment in order.
 
     Args:
-        coefficients: COEFFICIENTS, (1).
+        coefficients: Constants (`make_coefficients`), (1).
         layout: Tables.
         state: JointState, updated.
         work: Room.

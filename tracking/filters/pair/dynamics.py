@@ -10,8 +10,6 @@ from __future__ import annotations
 
 from tracking.kernels.jit import small_kernel
 from tracking.models.range import range_model
-from tracking.models.range_rate import range_rate_model
-from tracking.models.relative_speed import relative_speed_model
 
 
 @small_kernel
@@ -105,26 +103,3 @@ def predict_range(x, p, h, l0, l1, l2, work):
         work[0, e] = 1.0
         distance += x[p, h, e]
     return distance
-
-
-@small_kernel
-def predict_range_rate(x, p, h, l0, l1, l2, work):
-    """Rate of the distance, and its Jacobian to row 0 of work."""
-    r0, r1, r2 = x[p, h, 0] + l0, x[p, h, 1] + l1, x[p, h, 2] + l2
-    v0, v1, v2 = x[p, h, 3], x[p, h, 4], x[p, h, 5]
-    rate, d0, d1, d2, u0, u1, u2 = range_rate_model(r0, r1, r2, v0, v1, v2)
-    work[0, 0], work[0, 1], work[0, 2] = d0, d1, d2
-    work[0, 3], work[0, 4], work[0, 5] = u0, u1, u2
-    for e in range(6, x.shape[2]):
-        work[0, e] = 0.0
-    return rate
-
-
-@small_kernel
-def predict_speed(x, p, h, work):
-    """Relative speed, and its Jacobian to row 0 of work."""
-    speed, d0, d1, d2 = relative_speed_model(x[p, h, 3], x[p, h, 4], x[p, h, 5])
-    for k in range(x.shape[2]):
-        work[0, k] = 0.0
-    work[0, 3], work[0, 4], work[0, 5] = d0, d1, d2
-    return speed

@@ -66,7 +66,7 @@ def run_events(coefficients, layout, state, block, t_out, out):
     """Handle the events of every environment in order.
 
     Args:
-        coefficients: COEFFICIENTS, (1).
+        coefficients: Constants (`make_coefficients`), (1).
         layout: Tables.
         state: FilterState, updated.
         block: Events: t, kind, i, j, antenna_i, antenna_j, values, has_power, valid;

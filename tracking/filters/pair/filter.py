@@ -6,7 +6,7 @@ of the inputs alone and is reported from them; its covariance is the constant su
 orientation noises ([1] eq. 8-9, `docs/explanation/tracker.md`).
 
     predict     pos += dt vel + dt^2/2 (a_j - a_i),  vel += dt (a_j - a_i)
-    correct     z = (range, its low-passed derivative),  h = (|pos|, u . vel)
+    correct     z = range,  h = |pos| + its slow error
     refine      pos <- MDS of all |pos|, aligned to pos         (`ekf-mds` only)
 
 References:

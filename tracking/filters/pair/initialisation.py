@@ -42,7 +42,6 @@ def initialise_pair(c, s, h, p, pos, t):
     pair.t_range, pair.t_used = t, t
     pair.n_ranges = 0
     pair.in_a_row = 0
-    pair.rate = 0.0
 
 
 @kernel

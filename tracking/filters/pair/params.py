@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
 
-from tracking.errors import ConfigError
 from tracking.params.checks import check_numbers
 
 
@@ -58,9 +56,6 @@ class RangeErrorParams:
     does not remember, and its range error would wander off."""
     least_speed: float = 1.0
     """[m/s] Relative speed counted at least. Zero keeps the error of a pair at rest for ever."""
-    nonlinearity_gain: float = 0.1
-    """[-] Trust lost where a filter is uncertain across a short line of sight, in units of the
-    second-order error there."""
 
     def __post_init__(self) -> None:
         check_numbers(self)
@@ -177,22 +172,12 @@ class PairEkfParams:
     """[s] A node whose IMU was silent for so long is unaided."""
     survey_std: float = 0.02
     """[m] Standard deviation of a surveyed distance."""
-    speed_model: Literal["range-rate", "speed-norm", "none"] = "range-rate"
-    """What the derivative of the range is compared with: its true model, the rate of the
-    distance, or the norm of the velocity as the paper writes."""
-    speed_std: float = 4.0
-    """[m/s] Standard deviation of the low-passed derivative. It is made of the same ranges,
-    so that a small value counts them twice."""
-    speed_tau: float = 0.15
-    """[s] Time constant of that low pass."""
     lost_after: float = 1.0
     """[s] A pair without an accepted range for so long is lost."""
     missed_intervals: float = 3.0
     """[-] Or without one for this many of its usual intervals, where those are long."""
     node_timeout: float = 5.0
     """[s] A node not heard for so long has left; its filters are destroyed."""
-    largest_bend: float = 0.1
-    """[m] The error of linearisation counts for at most this."""
     gate: GateParams = field(default_factory=GateParams)
     mds: MdsParams = field(default_factory=MdsParams)
     range_error: RangeErrorParams = field(default_factory=RangeErrorParams)
@@ -202,8 +187,3 @@ class PairEkfParams:
 
     def __post_init__(self) -> None:
         check_numbers(self)
-        if self.speed_model not in ("range-rate", "speed-norm", "none"):
-            raise ConfigError(
-                f"speed_model: expected 'range-rate', 'speed-norm' or 'none', "
-                f"got {self.speed_model!r}"
-            )

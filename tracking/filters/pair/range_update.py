@@ -8,8 +8,6 @@ from tracking.filters.pair.dynamics import (
     correct,
     predict,
     predict_range,
-    predict_range_rate,
-    predict_speed,
 )
 from tracking.filters.pair.nlos_model import (
     E,
@@ -59,7 +57,7 @@ def node_variance(c, node, aided):
     if node.static:
         return 0.0
     if not aided:
-        return c.unaided_psd * c.unaided_psd
+        return c.unaided_accel_psd * c.unaided_accel_psd
     return node.psd * node.psd + node.accel_noise * node.accel_noise
 
 
@@ -116,38 +114,8 @@ def surveyed_distance_update(c, s, p, distance, work):
 
 
 @small_kernel
-def update_rate(c, pair, t, distance):
-    """Low-pass the derivative of the range; True once the filter has settled."""
-    age = t - pair.t_range
-    if pair.n_ranges > 0 and 0.0 < age < 3.0 * c.speed_tau:
-        raw = (distance - pair.last_distance) / age
-        pair.rate += age / (c.speed_tau + age) * (raw - pair.rate)
-        return pair.n_ranges * age > 2.0 * c.speed_tau + TIE
-    if age > 0.0:
-        pair.rate = 0.0
-        pair.n_ranges = 0
-    return False
-
-
-@small_kernel
-def second_order_bias(s, p, h, work):
-    """What the straight line misses: how much longer a range is on average than predicted [m].
-
-    To second order ``tr(P_across) / (2 d)``, with P_across the covariance of the relative
-    position across the line of sight.
-    """
-    trace, along, squared = 0.0, 0.0, 0.0
-    for a in range(3):
-        squared += s.x[p, h, a] * s.x[p, h, a]
-        trace += s.P[p, h, a, a]
-        for b in range(3):
-            along += work[0, a] * s.P[p, h, a, b] * work[0, b]
-    return 0.5 * max(trace - along, 0.0) / math.sqrt(squared + 0.01)
-
-
-@small_kernel
 def range_update(c, s, layout, p, t, distance, evidence, antenna_i, antenna_j, work):
-    """Gate a range, then correct pair p of every hypothesis with it and with its rate."""
+    """Gate a range, then correct pair p of every hypothesis with it."""
     if not passes_gate(c, s, p, t, distance):
         return
     pair = s.pairs[p]
@@ -155,7 +123,6 @@ def range_update(c, s, layout, p, t, distance, evidence, antenna_i, antenna_j, w
     j0, j1, j2 = antenna_offset(s, layout, pair.j, antenna_j)
     l0, l1, l2 = j0 - i0, j1 - i1, j2 - i2
     dt = max(t - pair.t_range, 0.0)
-    has_rate = update_rate(c, pair, t, distance)
     group = s.group[0]
     many = group.n_alive > 1
     first, end = (0, s.alive.shape[0]) if many else (group.best, group.best + 1)
@@ -171,8 +138,7 @@ def range_update(c, s, layout, p, t, distance, evidence, antenna_i, antenna_j, w
         nu += s.x[p, h, E]
         reset_bias_on_transition(c, s, p, h, switched)
         nu -= s.x[p, h, E]
-        bent = min(c.nonlinearity_gain * second_order_bias(s, p, h, work), c.largest_bend)
-        R = c.range_var + bent * bent + s.nlos[p, h] * c.nlos_white_var
+        R = c.range_var + s.nlos[p, h] * c.nlos_white_var
         variance, _ = predicted_variance(s.P, p, h, work)
         nis = nu * nu / (variance + R)
         if sane > 1e-3:
@@ -185,13 +151,6 @@ def range_update(c, s, layout, p, t, distance, evidence, antenna_i, antenna_j, w
             group.misfit += 0.01 * (sane * min(misfit, 25.0) - group.misfit)
             if sane > 0.5:
                 pair.t_used = t
-        if has_rate and c.speed_model == 1:
-            nu = pair.rate - predict_range_rate(s.x, p, h, l0, l1, l2, work)
-            correct(s.x, s.P, p, h, work, nu, c.speed_var)
-        elif has_rate and c.speed_model == 2:
-            nu = abs(pair.rate) - predict_speed(s.x, p, h, work)
-            correct(s.x, s.P, p, h, work, nu, c.speed_var)
-    pair.last_distance = distance
     if dt > TIE:
         pair.interval += 0.1 * (min(dt, c.node_timeout) - pair.interval)
     pair.t_range = t

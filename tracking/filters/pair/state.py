@@ -16,10 +16,8 @@ from tracking.arrays import F64, I64, Bool
 from tracking.constellation import Constellation
 from tracking.filters.pair.params import PairEkfParams
 from tracking.maths.starting_rotations import starting_rotations
-from tracking.records import Records
+from tracking.records import Records, coefficients
 from tracking.vehicles import VEHICLES
-
-SPEED_MODELS = {"none": 0, "range-rate": 1, "speed-norm": 2}
 
 NODE = np.dtype(
     [
@@ -49,8 +47,6 @@ PAIR = np.dtype(
         ("t_range", "f8"),  # time of the last accepted range [s]
         ("nis", "f8"),  # NIS of that range in the best hypothesis [-]
         ("mean_distance", "f8"),  # running average of accepted ranges [m]
-        ("last_distance", "f8"),  # the last accepted range [m]
-        ("rate", "f8"),  # low-passed derivative of the range [m/s]
         ("start_r", "f8", (8,)),  # newest ranges of a pair not started, a ring [m]
         ("start_t", "f8", (8,)),  # their times [s]
         ("start_n", "i8"),  # how many came
@@ -82,64 +78,6 @@ GROUP = np.dtype(
         ("nis_n", "i8"),
     ]
 )
-_NUMBERS = (
-    "unaided_psd",
-    "imu_timeout",
-    "range_var",
-    "survey_var",
-    "slow_var",
-    "slow_length",
-    "least_speed",
-    "nonlinearity_gain",
-    "likelihood_tempering",
-    "los_to_nlos_rate",
-    "nlos_to_los_rate",
-    "nlos_bias",
-    "nlos_bias_var",
-    "nlos_bias_length",
-    "nlos_white_var",
-    "power_diff_los",
-    "power_diff_los_std",
-    "power_diff_nlos",
-    "power_diff_nlos_std",
-    "power_diff_weight",
-    "power_diff_most",
-    "least_prob",
-    "outlier_prob",
-    "outlier_span",
-    "wheel_period",
-    "speed_var",
-    "speed_tau",
-    "lost_after",
-    "missed_intervals",
-    "largest_bend",
-    "group_speed_var",
-    "jolt_nis",
-    "yaw_rate_tau",
-    "report_lead",
-    "degenerate",
-    "regular",
-    "reflection_nis",
-    "node_timeout",
-    "gate_tau",
-    "gate_floor",
-    "gate_speed_gain",
-    "gate_min_speed",
-    "gate_max_rejected",
-    "mds_period",
-    "mds_min_spread",
-    "start_k",
-    "start_max_age",
-    "min_ranges",
-    "prune",
-    "merge_distance",
-    "nis_cap",
-    "check_period",
-)
-COEFFICIENTS = np.dtype(
-    [("d", "i8"), ("use_mds", "?"), ("speed_model", "i8"), *((name, "f8") for name in _NUMBERS)]
-)
-"""Constants derived once from `PairEkfParams`, under the same names and units."""
 
 
 class FilterState(NamedTuple):
@@ -184,45 +122,26 @@ def make_coefficients(
     constellation: Constellation, params: PairEkfParams, *, use_mds: bool
 ) -> Records:
     """Derive the constants of the kernels, (1)."""
-    c = np.zeros(1, dtype=COEFFICIENTS)
     rows = 2 * constellation.dimensions * (constellation.n_nodes - 1)
-    e, v, w = params.range_error, params.nlos, params.wheels
-    values = {
-        "d": constellation.dimensions,
-        "use_mds": use_mds,
-        "speed_model": SPEED_MODELS[params.speed_model],
-        "unaided_psd": params.unaided_accel_psd,
-        "imu_timeout": params.imu_timeout,
+    e, v, w, start = params.range_error, params.nlos, params.wheels, params.start
+    derived = {
         "range_var": e.white_std**2,
         "slow_var": e.slow_std**2,
-        "slow_length": e.slow_length,
-        "least_speed": e.least_speed,
-        "nonlinearity_gain": e.nonlinearity_gain,
-        **{k: getattr(v, k) for k in v.__slots__ if k in _NUMBERS},
         "nlos_bias_var": v.nlos_bias_std**2,
         "nlos_white_var": v.white_std**2,
         "survey_var": params.survey_std**2,
-        "speed_var": params.speed_std**2,
-        "speed_tau": params.speed_tau,
-        "lost_after": params.lost_after,
-        "missed_intervals": params.missed_intervals,
-        "largest_bend": params.largest_bend,
         "group_speed_var": w.group_speed_std**2,
-        "jolt_nis": w.jolt_nis,
-        "yaw_rate_tau": w.yaw_rate_tau,
-        **{k: getattr(params.start, k) for k in params.start.__slots__ if k in _NUMBERS},
-        "node_timeout": params.node_timeout,
+        "wheel_period": w.period,
         **{f"gate_{k}": getattr(params.gate, k) for k in params.gate.__slots__},
         # The cost of a refinement grows with the cube of the group: it keeps its share.
         "mds_period": params.mds.period * max(1.0, (rows / 30.0) ** 2),
         "mds_min_spread": params.mds.min_spread,
-        "wheel_period": w.period,
-        "start_k": params.start.k,
-        "start_max_age": params.start.max_age,
+        "start_k": start.k,
+        "start_max_age": start.max_age,
     }
-    for name, value in values.items():
-        c[name] = value
-    return c
+    return coefficients(
+        (e, v, w, start, params), derived, d=constellation.dimensions, use_mds=int(use_mds)
+    )
 
 
 def make_layout(constellation: Constellation, params: PairEkfParams) -> Layout:

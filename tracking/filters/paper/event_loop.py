@@ -26,7 +26,7 @@ def run_events(constants, layout, state, block, t_out, out):
     """Handle the events of every environment in order.
 
     Args:
-        constants: CONSTANTS, (1).
+        constants: Constants (`make_constants`), (1).
         layout: Tables.
         state: PaperState, updated.
         block: Events: t, kind, i, j, antenna_i, antenna_j, values, has_power, valid;

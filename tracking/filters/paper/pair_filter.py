@@ -1,7 +1,7 @@
 """The EKF of one pair: prediction and correction, eq. (7) to (11) of the paper, in place.
 
-`reference.PairFilter` has the same equations as matrices. Position and velocity are never
-correlated with the orientation, so the blocks of P are updated one by one.
+`tests/tracking/paper_reference_ekf.py` has the same equations as matrices. Position and velocity
+are never correlated with the orientation, so the blocks of P are updated one by one.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from tracking.kernels.jit import kernel, small_kernel
 
 TINY = 1e-6
 """[m, m/s] Shorter vectors have no direction."""
+
 VELOCITY, ORIENTATION = 3, 6
 """First elements of v_ij and q_ij in the state of a pair."""
 

@@ -9,7 +9,7 @@ import numpy as np
 from tracking.arrays import F64, I64
 from tracking.constellation import Constellation
 from tracking.filters.paper.params import CHOICES, PaperParams
-from tracking.records import Records
+from tracking.records import Records, coefficients
 
 NODE = np.dtype(
     [
@@ -41,24 +41,6 @@ GROUP = np.dtype(
         ("n_since_mds", "i8"),  # ranges accepted since the last MDS
         ("nis_sum", "f8"),  # over accepted ranges
         ("nis_n", "i8"),
-    ]
-)
-_NUMBERS = tuple(
-    name
-    for name in PaperParams.__slots__
-    if name not in (*CHOICES, "k", "gate_reset", "first_layout")
-)
-CONSTANTS = np.dtype(
-    [
-        ("d", "i8"),
-        ("k", "i8"),
-        ("gate_reset", "i8"),
-        ("speed_is_norm", "?"),
-        ("feedback", "i8"),
-        ("aligned", "?"),
-        ("power", "f8"),  # exponent of the eigenvalues
-        ("has_layout", "?"),
-        *((name, "f8") for name in _NUMBERS),
     ]
 )
 REPLACE, UPDATE, NONE = range(3)
@@ -95,16 +77,17 @@ class Layout(NamedTuple):
 
 def make_constants(constellation: Constellation, params: PaperParams) -> Records:
     """Derive the constants of the kernels, (1)."""
-    c = np.zeros(1, dtype=CONSTANTS)
-    for name in _NUMBERS:
-        c[name] = getattr(params, name)
-    c["d"], c["k"], c["gate_reset"] = constellation.dimensions, params.k, params.gate_reset
-    c["speed_is_norm"] = params.speed == "norm"
-    c["feedback"] = CHOICES["feedback"].index(params.feedback)
-    c["aligned"] = params.alignment == "procrustes"
-    c["power"] = 0.5 if params.scaling == "root" else 0.25
-    c["has_layout"] = params.first_layout is not None
-    return c
+    return coefficients(
+        [params],
+        {"power": 0.5 if params.scaling == "root" else 0.25},
+        d=constellation.dimensions,
+        k=params.k,
+        gate_reset=params.gate_reset,
+        speed_is_norm=params.speed == "norm",
+        feedback=CHOICES["feedback"].index(params.feedback),
+        aligned=params.alignment == "procrustes",
+        has_layout=params.first_layout is not None,
+    )
 
 
 def make_layout(constellation: Constellation, params: PaperParams) -> Layout:

@@ -27,7 +27,7 @@ def with_clones(state: JointState, coefficients: Records) -> tuple[JointState, R
 
     Args:
         state: Of the filter; not changed.
-        coefficients: COEFFICIENTS, (1).
+        coefficients: Constants (`make_coefficients`), (1).
 
     Returns:
         State with one hypothesis and the clones behind the other states, in the same order; its
