@@ -4,178 +4,118 @@ For `docs/explanation/tracker.md`. A mechanism is left out by parameters alone. 
 with those of the whole filter on the same seeds: the median ratio and its 95 % interval by the
 bootstrap.
 
-Faults are those of one node from 25 s on. Recordings are read from `RELPOS_DATA`, else
-`../shared/data`. Run `python benchmarks/measure_ablation.py [RUNS] [MECHANISM ...] > rows.jsonl`,
-then `python benchmarks/measure_ablation.py --table rows.jsonl`.
+The runs are those of `cases`. Run `python benchmarks/measure_ablation.py [RUNS] [MECHANISM ...] >
+rows.jsonl`, then `python benchmarks/measure_ablation.py --table rows.jsonl`.
 """
 
 from __future__ import annotations
 
 import json
-import os
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import cache
+from multiprocessing import Pool
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import space_runs
+from cases import FIRST, RECORDINGS, WORLDS, Case, case, data
 
-from agents.simulation.simulate import simulate
 from tracking import Tracker, TrackerParams
 from tracking.arrays import F64
 from tracking.filters.joint.params import JointParams
-from tracking.filters.params import FilterParams
 from tracking.geometry import quat_from_yaw, rotate
-from tracking.log import read_log
-from tracking.measurements import Kind
 from tracking.metrics.score import score
 
 NEVER, ALWAYS = 1e9, 1e-9
-FIRST = 7000
-"""Seed of the first run; no parameter was chosen on it or those after it."""
 SKIP, WRONG = 10.0, 0.5
 """[s, m] Not scored; a pair that is off by more is wrong."""
-RECORDINGS = ("isas_walk1", "inrol_env1")
-FAULT_AT = 25.0
-"""[s]"""
 
 
-def part(name: str, **values: Any) -> Callable[[JointParams], JointParams]:
-    """Parameters with some of a part changed."""
-    return lambda p: replace(p, **{name: replace(getattr(p, name), **values)})
+def joint(change: Callable[[JointParams], JointParams]) -> Callable[[TrackerParams], TrackerParams]:
+    """Parameters with some of the joint filter's changed."""
+    return lambda p: replace(p, filter=replace(p.filter, joint=change(p.filter.joint)))
 
 
-def vehicles(**values: Any) -> Callable[[JointParams], JointParams]:
+def part(name: str, **values: Any) -> Callable[[TrackerParams], TrackerParams]:
+    """Parameters with some of a part of the joint filter's changed."""
+    return joint(lambda p: replace(p, **{name: replace(getattr(p, name), **values)}))
+
+
+def vehicles(**values: Any) -> Callable[[TrackerParams], TrackerParams]:
     """Parameters with those of every vehicle changed."""
-    return lambda p: replace(
-        p, vehicles={name: replace(v, **values) for name, v in p.vehicles.items()}
+    return joint(
+        lambda p: replace(p, vehicles={k: replace(v, **values) for k, v in p.vehicles.items()})
     )
 
 
-MECHANISMS: dict[str, Callable[[JointParams], JointParams]] = {
+def nlos(**values: Any) -> Callable[[TrackerParams], TrackerParams]:
+    """Parameters of ranges without line of sight changed, in the plane and in space."""
+    return joint(
+        lambda p: replace(
+            p, nlos=replace(p.nlos, **values), nlos_in_space=replace(p.nlos_in_space, **values)
+        )
+    )
+
+
+MECHANISMS: dict[str, Callable[[TrackerParams], TrackerParams]] = {
     "states of range errors": part("range_error", max_pairs=ALWAYS),
-    "NLOS": lambda p: replace(
-        p,
-        nlos=replace(p.nlos, los_to_nlos_rate=ALWAYS, los_to_nlos_rate_with_power=ALWAYS),
-        nlos_in_space=replace(
-            p.nlos_in_space, los_to_nlos_rate=ALWAYS, los_to_nlos_rate_with_power=ALWAYS
-        ),
-    ),
-    "non-holonomic constraint": vehicles(sideways_std=None),
-    "level vehicles": vehicles(levelled=False),
-    "bias of accelerations": vehicles(bias_std=ALWAYS, vertical_bias_std=ALWAYS),
-    "heading error": vehicles(heading_std=ALWAYS, first_heading_std=None),
-    "offset of accelerometers": vehicles(offset_std=None),
-    "node faults: outliers": part("supervision", outlier_ratio=2.0),
-    "node faults: offsets": lambda p: replace(p, node_bias_limit=NEVER),
-    "wrong positions": part("supervision", position_misfit=NEVER),
-    "frozen ranges": part("supervision", frozen_ranges=NEVER),
-    "stale nodes": lambda p: replace(p, range_timeout=NEVER),
-    "challenge of the alignment": part("start", respawn_nis=NEVER),
-    "degenerate layouts": part("alignment", degenerate=ALWAYS),
-    "merging": part("start", merge_distance=ALWAYS),
-    "observability at every range": part("alignment", gauge_std=NEVER),
-    "second order": part("range_error", nonlinearity_gain=0.0),
-    "impacts": vehicles(impact_threshold=None),
-    "initial tilt": vehicles(initial_tilt_speed=0.0),
-    "rest": vehicles(rests=False),
-    "heading error at first": vehicles(first_heading_std=None),
-    "large NLOS": lambda p: replace(
-        p, nlos_in_space=replace(p.nlos_in_space, nlos_large_share=0.0)
-    ),
-    "power of ranges": lambda p: replace(
-        p,
-        nlos=replace(p.nlos, power_diff_weight=ALWAYS),
-        nlos_in_space=replace(p.nlos_in_space, power_diff_weight=ALWAYS),
-    ),
     "fast range error": part("range_error", fast_std=0.0),
-    "states of mounts": vehicles(ahead_std=0.0, slip_std=0.0),
+    "second order": part("range_error", nonlinearity_gain=0.0),
+    "NLOS": nlos(los_to_nlos_rate=ALWAYS, los_to_nlos_rate_with_power=ALWAYS),
+    "large NLOS": nlos(nlos_large_share=0.0),
+    "power of ranges": nlos(power_diff_weight=ALWAYS),
     "learned noise": part("noise_learning", learns=False),
+    "contradicting pairs count less": part("update", contradiction_share=NEVER),
+    "non-holonomic constraint": vehicles(sideways_std=None),
+    "states of mounts": vehicles(ahead_std=0.0, slip_std=0.0),
+    "level vehicles": vehicles(levelled=False),
+    "impacts": vehicles(impact_threshold=None),
+    "zero velocity": vehicles(rests=False),
+    "gliding nodes": part("update", glide_nis=NEVER),
+    "bias of accelerations": vehicles(bias_std=ALWAYS, vertical_bias_std=ALWAYS),
+    "offset of accelerometers": vehicles(offset_std=None),
+    "residual bias of gyroscopes": vehicles(gyro_std=ALWAYS, gyro_drift=ALWAYS),
+    "initial tilt": vehicles(initial_tilt_speed=0.0),
+    "settling orientations": lambda p: replace(
+        p, orientation=replace(p.orientation, settling=ALWAYS)
+    ),
+    "heading error": vehicles(heading_std=ALWAYS, first_heading_std=None),
+    "heading error at first": vehicles(first_heading_std=None),
+    "null space of rotations": part("update", follow_share=NEVER, follow_false=NEVER),
+    "null space at every range": part("alignment", gauge_std=NEVER),
+    "modes apart": part("alignment", mode_std=0.15),
+    "static start": part("alignment", settling=ALWAYS, orienting=ALWAYS),
     "patience with wheels": part("alignment", wheels_after=ALWAYS),
+    "two sides of a newcomer": part("start", join_spread=ALWAYS),
+    "reflections of degenerate layouts": part("alignment", degenerate=ALWAYS),
+    "merging": part("start", merge_distance=ALWAYS),
+    "fault: bias": joint(lambda p: replace(p, node_bias_limit=NEVER)),
+    "fault: position": part("supervision", position_misfit=NEVER),
+    "fault: alignment": part("start", respawn_nis=NEVER),
+    "frozen ranges": part("supervision", frozen_ranges=NEVER),
+    "stale nodes": joint(lambda p: replace(p, range_timeout=NEVER)),
 }
 """Name to parameters without it."""
 
 
-class Case:
-    """Measurements with the truth."""
-
-    def __init__(self, constellation: Any, block: Any, t: F64, truth: F64, known: Any) -> None:
-        self.constellation, self.block, self.t = constellation, block, t
-        self.truth, self.known = truth, known
-
-
-def spoiled(block: Any, fault: str, seed: int) -> Any:
-    """Measurements with one node at fault from `FAULT_AT` on.
-
-    ``offset``: its ranges are 0.6 m too long, as by a wrong calibration. ``outliers``: half of them
-    mean nothing. ``silent``: nothing of it for 3 s. ``frozen``: a pair of it repeats a range, 10 s.
-    """
-    rng, node = np.random.default_rng(seed), 0
-    block = replace(block, values=block.values.copy())  # the run without the fault is kept
-    t, ranges = block.t[0], block.kind[0] == Kind.RANGE
-    of_node = (block.i[0] == node) | (ranges & (block.j[0] == node))
-    late = t > FAULT_AT
-    hit = np.flatnonzero(of_node & ranges & late)
-    if fault == "offset":
-        block.values[0, hit, 0] += 0.6
-    elif fault == "outliers":
-        hit = hit[rng.random(len(hit)) < 0.5]
-        block.values[0, hit, 0] = rng.uniform(0.2, 20.0, len(hit))
-    elif fault == "silent":
-        return block.take(~(of_node & late & (t < FAULT_AT + 3.0)))
-    elif fault == "frozen":
-        other = block.j[0] + block.i[0] - node
-        hit = hit[(other[hit] == other[hit[0]]) & (t[hit] < FAULT_AT + 10.0)]
-        block.values[0, hit, 0] = block.values[0, hit[0], 0]
-    return block
-
-
-@cache
-def case(kind: str, seed: int) -> Case:
-    """One run, made once; ``KIND, FAULT`` is one with a fault."""
-    kind, _, fault = kind.partition(", ")
-    if fault:
-        good = case(kind, seed)
-        block = spoiled(good.block, fault, seed)
-        return Case(good.constellation, block, good.t, good.truth, good.known)
-    if kind in ("hand", "drones"):
-        run = getattr(space_runs, kind)(seed)
-        t = np.arange(0.5, space_runs.SECONDS - 0.1, 0.1)
-        pairs, where = run.constellation.pairs, run.positions(t)
-        truth = where[:, pairs[:, 1]] - where[:, pairs[:, 0]]
-        return Case(run.constellation, run.block, t, truth, np.ones(truth.shape[:2], dtype=bool))
-    log = (
-        recording(kind) if kind in RECORDINGS else simulate(scenario=kind, seconds=60.0, seed=seed)
-    )
-    first, last = log.block.t[log.block.valid].min(), log.block.t[log.block.valid].max()
-    t = np.arange(first + 0.5, last, 0.1)
-    truth, known = log.truth.pairs(log.constellation, t)
-    return Case(log.constellation, log.block, t, truth, known)
-
-
-def recording(name: str) -> Any:
-    """A recorded log."""
-    return read_log(data() / "logs" / name)
-
-
-def data() -> Path:
-    """Where recordings are."""
-    default = Path(__file__).resolve().parents[2] / "shared" / "data"
-    return Path(os.environ.get("RELPOS_DATA", default))
-
-
-def figures(of: Case, params: JointParams) -> tuple[float, float, float]:
-    """rmse_yaw [m], rmse_shape [m], share of pairs and time that are ok and wrong."""
-    tracker = Tracker(of.constellation, TrackerParams(filter=FilterParams(joint=params)))
-    estimate = tracker.run(of.block, of.t).take(0)
+def figures(of: Case, params: TrackerParams) -> tuple[float, float, float, float]:
+    """rmse_yaw [m], rmse_shape [m], shares of pairs and time that are ok and wrong, and ok."""
+    estimate = Tracker(of.constellation, params).run(of.block, of.t).take(0)
     found = score(estimate, of.truth, of.known, of.t[0] + SKIP)
     turned = rotate(quat_from_yaw(-np.radians(found.yaw_deg or 0.0)), of.truth)
     away = np.linalg.norm(estimate.pos_ij_w - turned, axis=-1)
-    wrong = (estimate.ok & of.known & (away > WRONG)).sum() / max(of.known.sum(), 1)
-    return found.rmse_yaw or np.inf, found.rmse_shape or np.inf, float(wrong)
+    ok, n = estimate.ok & of.known, max(of.known.sum(), 1)
+    wrong = float((ok & (away > WRONG)).sum() / n)
+    return found.rmse_yaw or np.inf, found.rmse_shape or np.inf, wrong, float(ok.sum() / n)
+
+
+def run(job: tuple[str, int, list[str]]) -> tuple[str, list[tuple[float, float, float, float]]]:
+    """Figures of one run: of the whole filter, then without each mechanism."""
+    kind, seed, names = job
+    of, whole = case(kind, seed), TrackerParams()
+    case.cache_clear()
+    return kind, [figures(of, whole), *(figures(of, MECHANISMS[name](whole)) for name in names)]
 
 
 def interval(ratio: F64, rng: np.random.Generator) -> list[float]:
@@ -186,57 +126,72 @@ def interval(ratio: F64, rng: np.random.Generator) -> list[float]:
 
 def rows(n_runs: int, names: list[str]) -> Iterator[dict[str, Any]]:
     """A row for each mechanism and kind of run."""
-    kinds = {k: n_runs for k in ("cars-los", "cars-nlos", "human", "drones", "hand")}
+    kinds = ["cars-los", "cars-nlos", "human", "drones", "hand"]
+    kinds += [f"late {kind}" for kind in ("cars-nlos", "robots", "human", "drones", "hand")]
+    kinds += [f"world {kind}" for kind in WORLDS]
     faults = ("offset", "outliers", "silent", "frozen")
-    kinds |= {f"{k}, {f}": n_runs for k in ("cars-nlos", "drones") for f in faults}
-    kinds |= {k: 1 for k in RECORDINGS if (data() / "logs" / k).is_dir()}
-    default, rng = JointParams(), np.random.default_rng(0)
-    for kind, n in kinds.items():
-        cases = [case(kind, FIRST + k) for k in range(n)]
-        whole = np.array([figures(c, default) for c in cases])
+    kinds += [f"{kind}, {fault}" for kind in ("cars-nlos", "drones") for fault in faults]
+    jobs = [(kind, FIRST + k, names) for kind in kinds for k in range(n_runs)]
+    jobs += [(kind, 0, names) for kind in RECORDINGS if (data() / "logs" / kind).is_dir()]
+    found: dict[str, list[Any]] = {}
+    with Pool() as pool:
+        for done, (kind, figures_of_run) in enumerate(pool.imap(run, jobs), start=1):
+            found.setdefault(kind, []).append(figures_of_run)
+            print(f"{done} of {len(jobs)} runs", file=sys.stderr, end="\r")
+    rng = np.random.default_rng(0)
+    for kind, runs in found.items():
+        whole, *left_out = np.array(runs).swapaxes(0, 1)
         yield {
-            "kind": kind, "without": "", "runs": n, "yaw": float(np.median(whole[:, 0])),
+            "kind": kind, "without": "", "runs": len(whole), "yaw": float(np.median(whole[:, 0])),
             "shape": float(np.median(whole[:, 1])), "wrong": float(whole[:, 2].mean()),
+            "ok": float(whole[:, 3].mean()),
         }  # fmt: skip
-        for name in names:
-            left = np.array([figures(c, MECHANISMS[name](default)) for c in cases])
+        for name, left in zip(names, left_out, strict=True):
             yield {
                 "kind": kind,
                 "without": name,
-                "runs": n,
+                "runs": len(whole),
                 "changed": int((left != whole).any(axis=1).sum()),
                 "yaw": interval(left[:, 0] / whole[:, 0], rng),
                 "shape": interval(left[:, 1] / whole[:, 1], rng),
                 "wrong": float(left[:, 2].mean()),
+                "ok": float(left[:, 3].mean()),
             }
 
 
 def tables(lines: list[str]) -> str:
-    """Rows as two tables in Markdown: without a fault, and with one."""
+    """Rows as tables in Markdown: in motion from rest, begun late, of the second world, faults."""
     rows = [json.loads(line) for line in lines]
     kinds = list(dict.fromkeys(row["kind"] for row in rows))
     names = list(dict.fromkeys(row["without"] for row in rows))
     found = {(row["without"], row["kind"]): row for row in rows}
+    groups: dict[str, list[str]] = {}
+    for kind in kinds:
+        of = kind.partition(",")[0] if "," in kind else kind.partition(" ")[0]
+        groups.setdefault(of if of in ("late", "world") or "," in kind else "", []).append(kind)
     parts = []
-    for some in ([k for k in kinds if "," not in k], [k for k in kinds if "," in k]):
+    for some in groups.values():
         head = ["without", *some]
         text = [head, ["---"] * len(head)]
-        text += [[name or "all of them", *(cell(found[name, k]) for k in some)] for name in names]
+        for name in names:
+            cells = [cell(found[name, k]) for k in some]
+            if set(cells) != {"="}:
+                text.append([name or "all of them", *cells])
         parts.append("\n".join("| " + " | ".join(row) + " |" for row in text))
     return "\n\n".join(parts)
 
 
 def cell(row: dict[str, Any]) -> str:
-    """One figure: errors [m] of the whole filter, else their ratio to it; and what is wrong."""
-    wrong = f"{100.0 * row['wrong']:.2g} %"
+    """One figure: errors [m] of the whole filter, else their ratio to it; what is wrong and ok."""
+    shares = f"{100.0 * row['wrong']:.2g} of {100.0 * row['ok']:.0f} %"
     if not row["without"]:
-        return f"{row['yaw']:.3f} / {row['shape']:.3f} m; {wrong}"
+        return f"{row['yaw']:.3f} / {row['shape']:.3f} m; {shares}"
     if not row["changed"]:
         return "="
-    (yaw, low, high), (shape, *ends) = row["yaw"], row["shape"]
+    (yaw, low, high), (shape, *_) = row["yaw"], row["shape"]
     if row["runs"] == 1:
-        return f"{yaw:.2f} / {shape:.2f}; {wrong}"
-    return f"{yaw:.2f} ({low:.2f}-{high:.2f}) / {shape:.2f} ({ends[0]:.2f}-{ends[1]:.2f}); {wrong}"
+        return f"{yaw:.2f} / {shape:.2f}; {shares}"
+    return f"{yaw:.2f} ({low:.2f}-{high:.2f}) / {shape:.2f}; {shares}"
 
 
 def main() -> None:
@@ -244,7 +199,7 @@ def main() -> None:
     if sys.argv[1:2] == ["--table"]:
         print(tables(Path(sys.argv[2]).read_text().splitlines()))
         return
-    n_runs = int(sys.argv[1]) if len(sys.argv) > 1 else 40
+    n_runs = int(sys.argv[1]) if len(sys.argv) > 1 else 30
     for row in rows(n_runs, sys.argv[2:] or list(MECHANISMS)):
         print(json.dumps(row), flush=True)
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from measure_ablation import data, recording
+from cases import data, recording
 
 from agents.convert import convert
 from agents.evaluation.track import track_log

@@ -13,7 +13,7 @@ import sys
 from dataclasses import replace
 
 import numpy as np
-from measure_ablation import Case, case
+from cases import Case, case
 
 from tracking import Tracker
 from tracking.measurements import Kind

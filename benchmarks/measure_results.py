@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from measure_ablation import RECORDINGS, recording
+from cases import RECORDINGS, recording
 
 from agents.evaluation.track import track_log
 from tracking.findings import examine

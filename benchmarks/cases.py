@@ -1,0 +1,132 @@
+"""Simulated and recorded runs that several figures are measured on.
+
+Faults are those of one node from 25 s on. "Late" runs are those in which the tracker begins while
+everything moves; "robots" are late cars whose wheels are not known. Recordings are read from
+`RELPOS_DATA`, else `../shared/data`.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import space_runs
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from agents.simulation.simulate import simulate
+from tests.second_world.record import record
+from tests.second_world.world import draw
+from tracking.arrays import F64
+from tracking.constellation import Constellation
+from tracking.log import read_log
+from tracking.measurements import Kind
+
+FIRST = 7000
+"""Seed of the first run, of the second world 0 for it; no parameter was chosen on these runs."""
+RECORDINGS = ("isas_walk1", "inrol_env1")
+FAULT_AT = 25.0
+"""[s]"""
+LATE = 12.0
+"""[s] When the tracker begins, and up to six seconds later."""
+WORLDS = {"car": "car", "hand": "hand", "drone": "drone", "body": "human"}
+"""Kind of the second world to its name there."""
+
+
+class Case:
+    """Measurements with the truth."""
+
+    def __init__(self, constellation: Any, block: Any, t: F64, truth: F64, known: Any) -> None:
+        self.constellation, self.block, self.t = constellation, block, t
+        self.truth, self.known = truth, known
+
+
+def spoiled(block: Any, fault: str, seed: int) -> Any:
+    """Measurements with one node at fault from `FAULT_AT` on.
+
+    ``offset``: its ranges are 0.6 m too long, as by a wrong calibration. ``outliers``: half of them
+    mean nothing. ``silent``: nothing of it for 3 s. ``frozen``: a pair of it repeats a range, 10 s.
+    """
+    rng, node = np.random.default_rng(seed), 0
+    block = replace(block, values=block.values.copy())  # the run without the fault is kept
+    t, ranges = block.t[0], block.kind[0] == Kind.RANGE
+    of_node = (block.i[0] == node) | (ranges & (block.j[0] == node))
+    late = t > FAULT_AT
+    hit = np.flatnonzero(of_node & ranges & late)
+    if fault == "offset":
+        block.values[0, hit, 0] += 0.6
+    elif fault == "outliers":
+        hit = hit[rng.random(len(hit)) < 0.5]
+        block.values[0, hit, 0] = rng.uniform(0.2, 20.0, len(hit))
+    elif fault == "silent":
+        return block.take(~(of_node & late & (t < FAULT_AT + 3.0)))
+    elif fault == "frozen":
+        other = block.j[0] + block.i[0] - node
+        hit = hit[(other[hit] == other[hit[0]]) & (t[hit] < FAULT_AT + 10.0)]
+        block.values[0, hit, 0] = block.values[0, hit[0], 0]
+    return block
+
+
+@cache
+def case(kind: str, seed: int) -> Case:
+    """One run, made once.
+
+    Args:
+        kind: Of run: a scenario, ``hand``, ``drones``, the name of a recording, ``world KIND``;
+            ``KIND, FAULT`` is one with a fault, ``late KIND`` begins in motion.
+        seed: Of its random numbers.
+    """
+    first, _, rest = kind.partition(" ")
+    kind, _, fault = kind.partition(", ")
+    if fault:
+        good = case(kind, seed)
+        block = spoiled(good.block, fault, seed)
+        return Case(good.constellation, block, good.t, good.truth, good.known)
+    if first == "late":
+        return late(case("cars-nlos" if rest == "robots" else rest, seed), seed, rest == "robots")
+    if kind in ("hand", "drones"):
+        run = getattr(space_runs, kind)(seed)
+        t = np.arange(0.5, space_runs.SECONDS - 0.1, 0.1)
+        pairs, where = run.constellation.pairs, run.positions(t)
+        truth = where[:, pairs[:, 1]] - where[:, pairs[:, 0]]
+        return Case(run.constellation, run.block, t, truth, np.ones(truth.shape[:2], dtype=bool))
+    if first == "world":
+        log = record(draw(seed - FIRST, kind=WORLDS[rest]))
+    elif kind in RECORDINGS:
+        log = recording(kind)
+    else:
+        log = simulate(scenario=kind, seconds=60.0, seed=seed)
+    start, last = log.block.t[log.block.valid].min(), log.block.t[log.block.valid].max()
+    t = np.arange(start + 0.5, last, 0.1)
+    truth, known = log.truth.pairs(log.constellation, t)
+    return Case(log.constellation, log.block, t, truth, known)
+
+
+def late(of: Case, seed: int, are_robots: bool) -> Case:
+    """A run whose tracker begins in motion; of cars whose wheels it does not know."""
+    at, kind = of.t[0] + LATE + seed % 7, of.block.kind[0]
+    block = of.block.take((of.block.t[0] >= at) | (kind == Kind.SURVEY))
+    # Surveyed distances hold from the start on.
+    block = replace(block, t=np.where(block.kind == Kind.SURVEY, at, block.t))
+    who, times = of.constellation, of.t >= at
+    if are_robots:
+        nodes = tuple(replace(node, vehicle="robot") for node in who.nodes)
+        who = Constellation(nodes=nodes, dimensions=who.dimensions)
+    block = block.take(block.order()[0])
+    return Case(who, block, of.t[times], of.truth[times], of.known[times])
+
+
+def recording(name: str) -> Any:
+    """A recorded log."""
+    return read_log(data() / "logs" / name)
+
+
+def data() -> Path:
+    """Where recordings are."""
+    default = Path(__file__).resolve().parents[2] / "shared" / "data"
+    return Path(os.environ.get("RELPOS_DATA", default))
