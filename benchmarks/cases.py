@@ -50,7 +50,8 @@ def spoiled(block: Any, fault: str, seed: int) -> Any:
     """Measurements with one node at fault from `FAULT_AT` on.
 
     ``offset``: its ranges are 0.6 m too long, as by a wrong calibration. ``outliers``: half of them
-    mean nothing. ``silent``: nothing of it for 3 s. ``frozen``: a pair of it repeats a range, 10 s.
+    mean nothing, ``made up``: all of them. ``silent``: nothing of it for 3 s. ``frozen``: a pair of
+    it repeats a range, 10 s.
     """
     rng, node = np.random.default_rng(seed), 0
     block = replace(block, values=block.values.copy())  # the run without the fault is kept
@@ -60,8 +61,8 @@ def spoiled(block: Any, fault: str, seed: int) -> Any:
     hit = np.flatnonzero(of_node & ranges & late)
     if fault == "offset":
         block.values[0, hit, 0] += 0.6
-    elif fault == "outliers":
-        hit = hit[rng.random(len(hit)) < 0.5]
+    elif fault in ("outliers", "made up"):
+        hit = hit[rng.random(len(hit)) < (0.5 if fault == "outliers" else 1.0)]
         block.values[0, hit, 0] = rng.uniform(0.2, 20.0, len(hit))
     elif fault == "silent":
         return block.take(~(of_node & late & (t < FAULT_AT + 3.0)))

@@ -91,6 +91,7 @@ MECHANISMS: dict[str, Callable[[TrackerParams], TrackerParams]] = {
     "reflections of degenerate layouts": part("alignment", degenerate=ALWAYS),
     "merging": part("start", merge_distance=ALWAYS),
     "fault: bias": joint(lambda p: replace(p, node_bias_limit=NEVER)),
+    "fault: outliers": part("supervision", outlier_ratio=2.0),
     "fault: position": part("supervision", position_misfit=NEVER),
     "fault: alignment": part("start", respawn_nis=NEVER),
     "frozen ranges": part("supervision", frozen_ranges=NEVER),
@@ -129,7 +130,7 @@ def rows(n_runs: int, names: list[str]) -> Iterator[dict[str, Any]]:
     kinds = ["cars-los", "cars-nlos", "human", "drones", "hand"]
     kinds += [f"late {kind}" for kind in ("cars-nlos", "robots", "human", "drones", "hand")]
     kinds += [f"world {kind}" for kind in WORLDS]
-    faults = ("offset", "outliers", "silent", "frozen")
+    faults = ("offset", "outliers", "made up", "silent", "frozen")
     kinds += [f"{kind}, {fault}" for kind in ("cars-nlos", "drones") for fault in faults]
     jobs = [(kind, FIRST + k, names) for kind in kinds for k in range(n_runs)]
     jobs += [(kind, 0, names) for kind in RECORDINGS if (data() / "logs" / kind).is_dir()]

@@ -78,6 +78,7 @@ PAIR = np.dtype(
         ("interval", "f8"),  # running mean of the time between two ranges [s]
         ("nis", "f8"),  # NIS of the last range in the best hypothesis [-]
         ("mean_nis", "f8"),  # running mean of it, ranges that mean nothing with the largest [-]
+        ("outlier_ratio", "f8"),  # running share of ranges that do not fit [-]
         ("last_range", "f8"),  # its last range as reported [m]
         ("t_last", "f8"),  # when it came [s]
         ("n_equal", "i8"),  # ranges before it that were equal

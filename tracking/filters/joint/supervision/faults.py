@@ -20,6 +20,8 @@ from tracking.filters.joint.supervision.residuals import (
     has_large_residual,
     is_informative,
     mean_range_error,
+    node_outlier_ratio,
+    others_fit,
 )
 from tracking.kernels.jit import kernel
 from tracking.maths.exponentials import decay
@@ -33,16 +35,19 @@ class Fault(IntEnum):
     """Nothing."""
     BIAS = 1
     """All ranges of a node err alike: a wrong calibration, or an obstacle that hides it."""
-    POSITION = 2
+    OUTLIERS = 2
+    """Most ranges of a node do not fit, those among the others do: random ranges."""
+    POSITION = 3
     """Steady ranges of a node are too long and too short, and another position fits them all."""
-    DIVERGED = 3
+    DIVERGED = 4
     """In space: a node is metres from where its ranges have it."""
-    ALIGNMENT = 4
+    ALIGNMENT = 5
     """The ranges of the group fit badly for seconds: it is rotated or reflected wrongly."""
 
 
 ACTIONS: dict[Fault, str] = {
     Fault.BIAS: "an offset common to the node's ranges becomes a state",
+    Fault.OUTLIERS: "the same, and its position and velocity become uncertain",
     Fault.POSITION: "the node moves to where its ranges fit, if there is such a position",
     Fault.DIVERGED: "the node joins again; where most do, the group starts again",
     Fault.ALIGNMENT: "all rotations and reflections compete again",
@@ -50,7 +55,7 @@ ACTIONS: dict[Fault, str] = {
 """Fault to what is done about it."""
 
 # Plain numbers: kernels do not know enums.
-NONE, BIAS, POSITION, DIVERGED, ALIGNMENT = (f.value for f in Fault)
+NONE, BIAS, OUTLIERS, POSITION, DIVERGED, ALIGNMENT = (f.value for f in Fault)
 
 
 @kernel
@@ -68,6 +73,7 @@ def find_fault(c, s, layout, t, but_positions):
     ratio = alignment_ratio(c, s)
     if ratio > most:
         found, most = ALIGNMENT, ratio
+    worst = worst_node(c, s, layout, t)
     for i in range(s.nodes.shape[0]):
         node = s.nodes[i]
         if not node.present:
@@ -80,7 +86,23 @@ def find_fault(c, s, layout, t, but_positions):
             ratio = bias_ratio(c, s, layout, i, t)
             if ratio > most:
                 found, at, most = BIAS, i, ratio
+            if i == worst:
+                ratio = node_outlier_ratio(c, s, layout, i, t) / c.outlier_ratio
+                if ratio > most:
+                    found, at, most = OUTLIERS, i, ratio
     return found, at
+
+
+@kernel
+def worst_node(c, s, layout, t):
+    """The node with the largest share of outliers, -1 unless the others fit without it."""
+    worst, most = -1, 0.0
+    for i in range(s.nodes.shape[0]):
+        if s.nodes[i].present:
+            ratio = node_outlier_ratio(c, s, layout, i, t)
+            if ratio > most:
+                worst, most = i, ratio
+    return worst if worst >= 0 and others_fit(c, s, worst, t) else -1
 
 
 @kernel

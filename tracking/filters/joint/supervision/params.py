@@ -15,13 +15,15 @@ class SupervisionParams:
     """
 
     nis_gain: float = 0.05
-    """[-] Weight of a range in the running mean of a pair's NIS."""
+    """[-] Weight of a range in the running means of a pair's NIS and outliers."""
     group_nis_gain: float = 0.01
     """[-] The same in that of all pairs."""
     residual_gain: float = 0.1
     """[-] The same of its residuals, which have to follow those who drift away."""
     largest_nis: float = 25.0
     """[-] A single range moves the mean NIS by no more; one that means nothing counts as this."""
+    outlier_nis: float = 6.0
+    """[-] A range with a larger NIS does not fit, one in seventy."""
     residual_clip: float = 1.0
     """[m] A single range moves these means by no more."""
     fastest: float = 10.0
@@ -35,10 +37,14 @@ class SupervisionParams:
     stale_share: float = 0.5
     """[-] Share of `JointParams.stale_std` squared, from which on a node that was silent starts
     again: the line of sight at 2 m may be off by 20 degrees."""
+    outlier_ratio: float = 0.6
+    """[-] A node of whose ranges a larger share does not fit is faulty, if the others fit."""
     fault_hysteresis: float = 0.5
     """[-] A fault lasts while its residual is above this share of its limit."""
     fault_time: float = 2.0
     """[s] And for so long after that."""
+    fault_rate: float = 0.7
+    """[m/sqrt(s), m/s/sqrt(s)] Process noise of a faulty node's position and velocity."""
     offset_std: float = 0.7
     """[m] Standard deviation of the range offset that a faulty node may have at first."""
     offset_rate: float = 1.0

@@ -13,7 +13,7 @@ from tracking.kernels.jit import kernel, small_kernel
 @small_kernel
 def reset_residuals(pair):
     """Forget how well the ranges of a pair fit."""
-    pair.n_ranges, pair.mean_nis = 0, 1.0
+    pair.n_ranges, pair.mean_nis, pair.outlier_ratio = 0, 1.0, 0.0
     pair.mean_residual, pair.mean_abs_residual, pair.rate_violation = 0.0, 0.0, 0.0
 
 
@@ -34,6 +34,8 @@ def update_residuals(c, s, p, dt, distance, nu, misfit, sane):
     pair, gain = s.pairs[p], c.nis_gain
     is_sane, nis = sane > 0.5, min(misfit, c.largest_nis)
     pair.mean_nis += gain * ((nis if is_sane else c.largest_nis) - pair.mean_nis)
+    outlier = 0.0 if is_sane and misfit < c.outlier_nis else 1.0
+    pair.outlier_ratio += gain * (outlier - pair.outlier_ratio)
     if s.nodes[pair.i].fault == 0 and s.nodes[pair.j].fault == 0:
         s.group[0].mean_nis += c.group_nis_gain * (sane * nis - s.group[0].mean_nis)
     gain = c.residual_gain
@@ -53,6 +55,30 @@ def is_ranging(c, s, p, t):
     both = s.nodes[pair.i].present and s.nodes[pair.j].present
     waits = max(c.lost_after, c.missed_intervals * pair.interval)
     return both and pair.n_ranges > 0 and t - pair.t_range < waits
+
+
+@kernel
+def node_outlier_ratio(c, s, layout, i, t):
+    """Mean share of outliers over the pairs of node i that range [-]."""
+    total, n = 0.0, 0
+    for k in range(s.nodes.shape[0]):
+        if k != i and is_ranging(c, s, layout.pair_index[i, k], t):
+            total += s.pairs[layout.pair_index[i, k]].outlier_ratio
+            n += 1
+    return total / max(n, 1)
+
+
+@kernel
+def others_fit(c, s, i, t):
+    """True if pairs without node i range, and none of them contradicts the rest."""
+    n = 0
+    for p in range(s.pairs.shape[0]):
+        pair = s.pairs[p]
+        if pair.i != i and pair.j != i and is_ranging(c, s, p, t):
+            n += 1
+            if pair.mean_nis > c.pair_nis_limit:
+                return False
+    return n > 0
 
 
 @kernel
