@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from tracking import Constellation, NodeConfig
 from tracking.filters.joint.coefficients import make_coefficients
+from tracking.filters.joint.ekf.columns import DV, NOISE
 from tracking.filters.joint.ekf.preintegration import process_attitude
 from tracking.filters.joint.hypotheses.initialisation import (
     initial_nlos_prob,
@@ -41,9 +42,9 @@ def test_after_a_blow_the_speed_is_uncertain(vehicle, accel, is_blow):
         process_attitude(c, s.nodes, s.last_attitude_accel, s.preintegrated, 0, t, values, 0, k)
     carrier = VEHICLES[vehicle]
     expected = (carrier.impact_noise_ratio * accel * 0.01) ** 2 * is_blow
-    assert s.preintegrated[0, 11] == pytest.approx(expected)
+    assert s.preintegrated[0, NOISE] == pytest.approx(expected)
     # Half before and half after: what is missing of it is not known.
-    assert s.preintegrated[0, 1] == pytest.approx(accel * 0.01)
+    assert s.preintegrated[0, DV] == pytest.approx(accel * 0.01)
 
 
 @pytest.mark.parametrize("at_rest", [True, False])

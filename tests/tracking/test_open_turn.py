@@ -11,8 +11,8 @@ from tests.exact_motion import ExactGroup
 from tracking import Status, Tracker
 from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.ekf import propagation
+from tracking.filters.joint.ekf.columns import TILT_GAIN
 from tracking.filters.joint.ekf.preintegration import preintegrate
-from tracking.filters.joint.ekf.tilt_correction import GAIN
 from tracking.filters.joint.hypotheses import alignment_modes, alignment_sensitivity
 from tracking.filters.joint.hypotheses.alignment import Alignment
 from tracking.filters.joint.hypotheses.geometric_degeneracy import degeneracy_ratio, least_axis
@@ -227,7 +227,7 @@ def test_what_an_orientation_is_turned_upright_by_turns_with_the_frame():
         for i in range(3):
             s.nodes["t_pre"][i] = 0.0
             preintegrate(c, s.nodes, s.last_attitude_accel, s.preintegrated, i, 0.05)
-        s.preintegrated[:, GAIN : GAIN + 2] = given_
+        s.preintegrated[:, TILT_GAIN : TILT_GAIN + 2] = given_
         propagation.predict(c, s, 0, 0.05, work)
         alignment_sensitivity.propagate_sensitivity(c, s, 0, work)
         reached.append((s.x[0].copy(), s.sensitivity[0].copy()))

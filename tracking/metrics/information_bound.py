@@ -7,6 +7,7 @@ changes those, which is what the variance of a sum over time needs.
 
 from __future__ import annotations
 
+from tracking.filters.joint.ekf.columns import N_PRE
 from tracking.filters.joint.ekf.heading_gauge import add_rotation_uncertainty
 from tracking.filters.joint.ekf.preintegration import preintegrate, process_attitude
 from tracking.filters.joint.ekf.propagation import predict
@@ -17,7 +18,6 @@ from tracking.filters.joint.hypotheses.initialisation import (
     initialise_pair,
     reset_preintegration,
 )
-from tracking.filters.joint.state import N_PRE
 from tracking.filters.joint.updates.gyro_bias_at_rest import update_gyro_bias_at_rest
 from tracking.filters.joint.updates.lever_arm import antenna_offset
 from tracking.filters.joint.updates.motion_constraints import centre, constrain_nodes

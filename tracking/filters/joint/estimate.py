@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from tracking.filters.clear_estimate import clear_estimate, is_heard
+from tracking.filters.joint.ekf.columns import N_PRE
 from tracking.filters.joint.ekf.preintegration import preintegrate
 from tracking.filters.joint.ekf.propagation import predict
 from tracking.filters.joint.hypotheses.alignment import LINEAR, MODES, NONE, STATIC
-from tracking.filters.joint.state import N_PRE, JointState
+from tracking.filters.joint.state import JointState
 from tracking.kernels.addresses import by_reference
 from tracking.kernels.jit import kernel
 from tracking.maths.covariance import apply_downdate

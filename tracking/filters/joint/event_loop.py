@@ -32,7 +32,7 @@ from tracking.filters.joint.hypotheses.bank import (
 )
 from tracking.filters.joint.hypotheses.initialisation import can_join, can_start
 from tracking.filters.joint.hypotheses.static_initialisation import all_static, may_move
-from tracking.filters.joint.state import N_PRE, one_env
+from tracking.filters.joint.state import one_env
 from tracking.filters.joint.supervision.frozen_range import is_frozen
 from tracking.filters.joint.supervision.residuals import update_residuals
 from tracking.filters.joint.supervision.staleness import is_silent, note_seen, update_interval
@@ -212,8 +212,7 @@ def propagate(c, s, work, t):
                     update_gyro_bias_at_rest(s, h, i, work)
             s.bias_retention[h, :] = 1.0
     for i in range(s.nodes.shape[0]):
-        for k in range(N_PRE):
-            s.preintegrated[i, k] = 0.0
+        s.preintegrated[i, :] = 0.0
     group.t = t
 
 

@@ -29,14 +29,12 @@ from tracking.filters.joint.coefficients import (
     make_coefficients,
     moving_pairs,
 )
+from tracking.filters.joint.ekf.columns import N_PRE
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.records import GROUP, NODE, PAIR
 from tracking.kernels.jit import kernel
 from tracking.maths.starting_rotations import starting_rotations
 from tracking.records import Records
-
-N_PRE = 39
-"""Columns of `JointState.preintegrated`."""
 
 
 class JointState(NamedTuple):
@@ -48,11 +46,7 @@ class JointState(NamedTuple):
     """q_wb and accel_w [m/s2] of the last STATE event, the acceleration levelled where the
     carrier stays level, (env, node, 7)."""
     preintegrated: F64
-    """Sums over inertial samples since the states' time, (env, node, N_PRE): time [s]; velocity
-    and way that they add [m/s, m]; cosine and sine that turn a bias, summed once and twice;
-    noise of the velocity [m2/s2]; the orientation, row by row, summed once and twice, of nodes
-    whose accelerometer has an offset; of these the bias that they gain as they are turned upright
-    [m/s2], and what VQF reports of their gyroscopes (`gyro_bias`)."""
+    """Sums over inertial samples since the states' time, (env, node, N_PRE), see `ekf.columns`."""
     pairs: Records
     """PAIR, (env, pair)."""
     group: Records

@@ -15,16 +15,19 @@ measure it better.
 
 from __future__ import annotations
 
+from tracking.filters.joint.ekf.columns import (
+    BY_GYRO,
+    GYRO_CHANGE,
+    GYRO_INFORMATION,
+    GYRO_SUM,
+    ROTATION_V,
+    TILT_STEP,
+    row_times,
+)
 from tracking.geometry import GRAVITY
 from tracking.kernels.jit import small_kernel
 from tracking.measurements import GYRO_BIAS, GYRO_VAR, TOLD
 
-CHANGE, KNOWN, REST = 32, 35, 36
-"""Columns of the sums since the states' time: what was added to what is taken off, three [rad/s];
-information that rest gave, and information times bias."""
-STEP, LEAN = 31, 33
-"""First of two columns of a step: all that is added to the two biases [m/s2]; of nine: what g adds
-to these and the heading error."""
 RESTS = 2.0
 """Value of `TOLD` at rest."""
 
@@ -42,15 +45,15 @@ def process_gyro_bias(node, pre, i, values, e, k, begins):
     var = values[e, k, GYRO_VAR]
     if not begins:
         d0, d1, d2 = g0 - node.gyro0, g1 - node.gyro1, g2 - node.gyro2
-        pre[i, CHANGE] += d0
-        pre[i, CHANGE + 1] += d1
-        pre[i, CHANGE + 2] += d2
+        pre[i, GYRO_CHANGE] += d0
+        pre[i, GYRO_CHANGE + 1] += d1
+        pre[i, GYRO_CHANGE + 2] += d2
         if values[e, k, TOLD] == RESTS and 0.0 < var < node.gyro_var:
             gained = 1.0 / var - 1.0 / node.gyro_var
-            pre[i, KNOWN] += gained
-            pre[i, REST] += gained * g0 + d0 / node.gyro_var
-            pre[i, REST + 1] += gained * g1 + d1 / node.gyro_var
-            pre[i, REST + 2] += gained * g2 + d2 / node.gyro_var
+            pre[i, GYRO_INFORMATION] += gained
+            pre[i, GYRO_SUM] += gained * g0 + d0 / node.gyro_var
+            pre[i, GYRO_SUM + 1] += gained * g1 + d1 / node.gyro_var
+            pre[i, GYRO_SUM + 2] += gained * g2 + d2 / node.gyro_var
     node.gyro0, node.gyro1, node.gyro2, node.gyro_var = g0, g1, g2, var
 
 
@@ -63,14 +66,14 @@ def gyro_bias_transition(node, pre, x, h, i, cos_r, sin_r, w):
     """
     at, b0, b1, y = node.i_gyro_bias, 0.0, 0.0, 0.0
     for k in range(3):
-        s0, s1, s2 = pre[i, 12 + k], pre[i, 15 + k], pre[i, 18 + k]
-        w[i, LEAN + k] = GRAVITY * (sin_r * s0 + cos_r * s1)
-        w[i, LEAN + 3 + k] = -GRAVITY * (cos_r * s0 - sin_r * s1)
-        w[i, LEAN + 6 + k] = -s2 if node.by_gyroscope else 0.0
-        b0 += w[i, LEAN + k] * x[h, at + k]
-        b1 += w[i, LEAN + 3 + k] * x[h, at + k]
-        y += w[i, LEAN + 6 + k] * x[h, at + k]
-        x[h, at + k] -= pre[i, CHANGE + k]
+        s0, s1, s2 = pre[i, ROTATION_V + k], pre[i, ROTATION_V + 3 + k], pre[i, ROTATION_V + 6 + k]
+        w[i, BY_GYRO + k] = GRAVITY * (sin_r * s0 + cos_r * s1)
+        w[i, BY_GYRO + 3 + k] = -GRAVITY * (cos_r * s0 - sin_r * s1)
+        w[i, BY_GYRO + 6 + k] = -s2 if node.by_gyroscope else 0.0
+        b0 += w[i, BY_GYRO + k] * x[h, at + k]
+        b1 += w[i, BY_GYRO + 3 + k] * x[h, at + k]
+        y += w[i, BY_GYRO + 6 + k] * x[h, at + k]
+        x[h, at + k] -= pre[i, GYRO_CHANGE + k]
     return b0, b1, y
 
 
@@ -78,11 +81,11 @@ def gyro_bias_transition(node, pre, x, h, i, cos_r, sin_r, w):
 def decay_gyro_bias_transition(node, i, w, scale):
     """What is added to biases and heading error of node i as they were, to what is left of them."""
     for k in range(2):
-        w[i, STEP + k] *= scale[node.i_tilt_bias + k]
+        w[i, TILT_STEP + k] *= scale[node.i_tilt_bias + k]
     for k in range(3):
-        w[i, LEAN + k] *= scale[node.i_tilt_bias]
-        w[i, LEAN + 3 + k] *= scale[node.i_tilt_bias + 1]
-        w[i, LEAN + 6 + k] *= scale[node.i_heading]
+        w[i, BY_GYRO + k] *= scale[node.i_tilt_bias]
+        w[i, BY_GYRO + 3 + k] *= scale[node.i_tilt_bias + 1]
+        w[i, BY_GYRO + 6 + k] *= scale[node.i_heading]
 
 
 @small_kernel
@@ -91,11 +94,11 @@ def propagate_gyro_bias_rows(node, P, h, i, w, scale):
     b, y, g, undo = node.i_tilt_bias, node.i_heading, node.i_gyro_bias, 1.0 / scale[node.i_heading]
     for k in range(P.shape[2]):
         g0, g1, g2, y0 = P[h, g, k], P[h, g + 1, k], P[h, g + 2, k], undo * P[h, y, k]
-        b0 = w[i, LEAN] * g0 + w[i, LEAN + 1] * g1 + w[i, LEAN + 2] * g2
-        b1 = w[i, LEAN + 3] * g0 + w[i, LEAN + 4] * g1 + w[i, LEAN + 5] * g2
-        P[h, b, k] += b0 - w[i, STEP + 1] * y0
-        P[h, b + 1, k] += b1 + w[i, STEP] * y0
-        P[h, y, k] += w[i, LEAN + 6] * g0 + w[i, LEAN + 7] * g1 + w[i, LEAN + 8] * g2
+        b0 = row_times(w, i, BY_GYRO, g0, g1, g2)
+        b1 = row_times(w, i, BY_GYRO + 3, g0, g1, g2)
+        P[h, b, k] += b0 - w[i, TILT_STEP + 1] * y0
+        P[h, b + 1, k] += b1 + w[i, TILT_STEP] * y0
+        P[h, y, k] += row_times(w, i, BY_GYRO + 6, g0, g1, g2)
 
 
 @small_kernel
@@ -104,18 +107,18 @@ def propagate_gyro_bias_columns(node, P, h, i, w, scale):
     b, y, g, undo = node.i_tilt_bias, node.i_heading, node.i_gyro_bias, 1.0 / scale[node.i_heading]
     for r in range(P.shape[2]):
         g0, g1, g2, y0 = P[h, r, g], P[h, r, g + 1], P[h, r, g + 2], undo * P[h, r, y]
-        b0 = w[i, LEAN] * g0 + w[i, LEAN + 1] * g1 + w[i, LEAN + 2] * g2
-        b1 = w[i, LEAN + 3] * g0 + w[i, LEAN + 4] * g1 + w[i, LEAN + 5] * g2
-        P[h, r, b] += b0 - w[i, STEP + 1] * y0
-        P[h, r, b + 1] += b1 + w[i, STEP] * y0
-        P[h, r, y] += w[i, LEAN + 6] * g0 + w[i, LEAN + 7] * g1 + w[i, LEAN + 8] * g2
+        b0 = row_times(w, i, BY_GYRO, g0, g1, g2)
+        b1 = row_times(w, i, BY_GYRO + 3, g0, g1, g2)
+        P[h, r, b] += b0 - w[i, TILT_STEP + 1] * y0
+        P[h, r, b + 1] += b1 + w[i, TILT_STEP] * y0
+        P[h, r, y] += row_times(w, i, BY_GYRO + 6, g0, g1, g2)
 
 
 @small_kernel
-def propagate_gyro_bias_sensitivity(node, z, w, scale):
-    """The same for one row of slopes by an open turn, from a row w of the step."""
+def propagate_gyro_bias_sensitivity(node, z, w, i, scale):
+    """The same for one row of slopes by an open turn, from row i of the step."""
     g0, g1, g2 = z[node.i_gyro_bias], z[node.i_gyro_bias + 1], z[node.i_gyro_bias + 2]
     y0 = z[node.i_heading] / scale[node.i_heading]
-    z[node.i_tilt_bias] += w[LEAN] * g0 + w[LEAN + 1] * g1 + w[LEAN + 2] * g2 - w[STEP + 1] * y0
-    z[node.i_tilt_bias + 1] += w[LEAN + 3] * g0 + w[LEAN + 4] * g1 + w[LEAN + 5] * g2 + w[STEP] * y0
-    z[node.i_heading] += w[LEAN + 6] * g0 + w[LEAN + 7] * g1 + w[LEAN + 8] * g2
+    z[node.i_tilt_bias] += row_times(w, i, BY_GYRO, g0, g1, g2) - w[i, TILT_STEP + 1] * y0
+    z[node.i_tilt_bias + 1] += row_times(w, i, BY_GYRO + 3, g0, g1, g2) + w[i, TILT_STEP] * y0
+    z[node.i_heading] += row_times(w, i, BY_GYRO + 6, g0, g1, g2)

@@ -28,6 +28,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from tracking.filters.joint.ekf.columns import DT
 from tracking.filters.joint.ekf.scalar_update import flush_updates
 from tracking.kernels.jit import allocating_kernel, kernel, small_kernel
 from tracking.maths.covariance import mirror, sum_rows
@@ -72,7 +73,7 @@ def propagate_corrections(c, s, h):
         node = s.nodes[i]
         if node.present and not node.static:
             for k in range(c.d):
-                moved[node.i_pos + k] += s.preintegrated[i, 0] * moved[node.i_vel + k]
+                moved[node.i_pos + k] += s.preintegrated[i, DT] * moved[node.i_vel + k]
 
 
 @allocating_kernel

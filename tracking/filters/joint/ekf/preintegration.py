@@ -8,6 +8,16 @@ from __future__ import annotations
 
 import math
 
+from tracking.filters.joint.ekf.columns import (
+    BIAS_P,
+    BIAS_V,
+    DP,
+    DT,
+    DV,
+    NOISE,
+    ROTATION_P,
+    ROTATION_V,
+)
 from tracking.filters.joint.ekf.tilt_correction import process_tilt_correction
 from tracking.filters.level_vehicle import angle_between, direction, level
 from tracking.kernels.jit import small_kernel
@@ -33,20 +43,20 @@ def preintegrate(c, nodes, held, pre, i, t):
     aided = is_aided(c, node, t)
     for k in range(3):
         a = held[i, 4 + k] if aided else 0.0
-        pre[i, 4 + k] += dt * pre[i, 1 + k] + half * a
-        pre[i, 1 + k] += dt * a
+        pre[i, DP + k] += dt * pre[i, DV + k] + half * a
+        pre[i, DV + k] += dt * a
     if not aided:
-        pre[i, 11] += dt * c.unaided_psd2
+        pre[i, NOISE] += dt * c.unaided_psd2
     cos_b, sin_b = (1.0, 0.0) if aided else (0.0, 0.0)
     if node.levelled and aided:
         cos_b, sin_b = node.cos_yaw, node.sin_yaw
-    pre[i, 9] += dt * pre[i, 7] + half * cos_b
-    pre[i, 10] += dt * pre[i, 8] + half * sin_b
-    pre[i, 7] += dt * cos_b
-    pre[i, 8] += dt * sin_b
+    pre[i, BIAS_P] += dt * pre[i, BIAS_V] + half * cos_b
+    pre[i, BIAS_P + 1] += dt * pre[i, BIAS_V + 1] + half * sin_b
+    pre[i, BIAS_V] += dt * cos_b
+    pre[i, BIAS_V + 1] += dt * sin_b
     if node.i_acc_bias >= 0:
         preintegrate_rotation(held, pre, i, dt, 1.0 if aided else 0.0)
-    pre[i, 0] += dt
+    pre[i, DT] += dt
 
 
 @small_kernel
@@ -60,8 +70,8 @@ def preintegrate_rotation(held, pre, i, dt, share):
     )  # fmt: skip
     for k in range(9):
         once = share * dt * rotation[k]
-        pre[i, 21 + k] += dt * pre[i, 12 + k] + 0.5 * dt * once
-        pre[i, 12 + k] += once
+        pre[i, ROTATION_P + k] += dt * pre[i, ROTATION_V + k] + 0.5 * dt * once
+        pre[i, ROTATION_V + k] += once
 
 
 @small_kernel
@@ -71,7 +81,7 @@ def process_attitude(c, nodes, held, pre, i, t, values, e, k):
     noise = values[e, k, ACCEL_NOISE]
     if node.has_state and (noise > 0.0 or node.accel_noise > 0.0):
         dt = min(max(t - node.t_state, 0.0), c.imu_timeout)
-        pre[i, 11] += dt * max(noise, node.accel_noise) ** 2
+        pre[i, NOISE] += dt * max(noise, node.accel_noise) ** 2
     node.accel_noise = noise
     preintegrate(c, nodes, held, pre, i, t)
     w, x, y, z = values[e, k, 0], values[e, k, 1], values[e, k, 2], values[e, k, 3]
@@ -99,15 +109,15 @@ def process_attitude(c, nodes, held, pre, i, t, values, e, k):
     if not fresh:
         # The first sample was held; the mean of both is nearer to what happened.
         half_v, half_p = 0.5 * dt, 0.25 * dt * dt
-        pre[i, 1] += half_v * (a0 - held[i, 4])
-        pre[i, 2] += half_v * (a1 - held[i, 5])
-        pre[i, 3] += half_v * (a2 - held[i, 6])
-        pre[i, 4] += half_p * (a0 - held[i, 4])
-        pre[i, 5] += half_p * (a1 - held[i, 5])
-        pre[i, 6] += half_p * (a2 - held[i, 6])
+        pre[i, DV] += half_v * (a0 - held[i, 4])
+        pre[i, DV + 1] += half_v * (a1 - held[i, 5])
+        pre[i, DV + 2] += half_v * (a2 - held[i, 6])
+        pre[i, DP] += half_p * (a0 - held[i, 4])
+        pre[i, DP + 1] += half_p * (a1 - held[i, 5])
+        pre[i, DP + 2] += half_p * (a2 - held[i, 6])
         squared = a0 * a0 + a1 * a1
         if squared > node.impact_threshold * node.impact_threshold:
-            pre[i, 11] += (node.impact_noise_ratio * dt) ** 2 * squared
+            pre[i, NOISE] += (node.impact_noise_ratio * dt) ** 2 * squared
     held[i, 4], held[i, 5], held[i, 6] = a0, a1, a2
     node.cos_yaw, node.sin_yaw = cos_yaw, sin_yaw
     node.t_state = t

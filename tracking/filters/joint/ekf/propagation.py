@@ -21,6 +21,21 @@ from tracking.filters.joint.ekf.attitude_coupling import (
     write_accel_bias_jacobian,
     write_attitude_coupling,
 )
+from tracking.filters.joint.ekf.columns import (
+    BIAS_P,
+    BIAS_V,
+    BY_HEADING_P,
+    BY_HEADING_V,
+    DT,
+    NOISE,
+    STEP_BIAS_P,
+    STEP_BIAS_V,
+    STEP_T,
+    UP_BY_HEADING_P,
+    UP_BY_HEADING_V,
+    UP_P,
+    UP_V,
+)
 from tracking.filters.joint.ekf.gyro_bias import (
     decay_gyro_bias_transition,
     propagate_gyro_bias_columns,
@@ -100,7 +115,7 @@ def predict(c, s, h, step, work):
 @small_kernel
 def propagate_state(c, node, pre, x, h, i, scale, w, speed):
     """The states of node i, and the derivatives of the step, written to row i of w."""
-    d, T = c.d, pre[i, 0]
+    d, T = c.d, pre[i, DT]
     p, v, b, y = node.i_pos, node.i_vel, node.i_tilt_bias, node.i_heading
     psi = x[h, y]
     cos_psi, sin_psi = cosine_sine(psi)
@@ -112,19 +127,26 @@ def propagate_state(c, node, pre, x, h, i, scale, w, speed):
     dp0, dp1 = cos_r * dp0 - sin_r * dp1, sin_r * dp0 + cos_r * dp1
     if not node.levelled:
         cos_r, sin_r = 1.0, 0.0
-    vc, vs = cos_r * pre[i, 7] - sin_r * pre[i, 8], sin_r * pre[i, 7] + cos_r * pre[i, 8]
-    pc, ps = cos_r * pre[i, 9] - sin_r * pre[i, 10], sin_r * pre[i, 9] + cos_r * pre[i, 10]
+    vc, vs = (
+        cos_r * pre[i, BIAS_V] - sin_r * pre[i, BIAS_V + 1],
+        sin_r * pre[i, BIAS_V] + cos_r * pre[i, BIAS_V + 1],
+    )
+    pc, ps = (
+        cos_r * pre[i, BIAS_P] - sin_r * pre[i, BIAS_P + 1],
+        sin_r * pre[i, BIAS_P] + cos_r * pre[i, BIAS_P + 1],
+    )
     if node.i_acc_bias >= 0:
         vc, pc = vc + PER_GRAVITY * dv2, pc + PER_GRAVITY * dp2
     b0, b1 = x[h, b], x[h, b + 1]
     bv0, bv1 = vc * b0 - vs * b1, vs * b0 + vc * b1
     bp0, bp1 = pc * b0 - ps * b1, ps * b0 + pc * b1
-    w[i, 0], w[i, 1], w[i, 2], w[i, 3], w[i, 4] = T, pc, ps, vc, vs
+    w[i, STEP_T], w[i, STEP_BIAS_P], w[i, STEP_BIAS_P + 1] = T, pc, ps
+    w[i, STEP_BIAS_V], w[i, STEP_BIAS_V + 1] = vc, vs
     share = 1.0 if node.levelled else 0.0
-    w[i, 5], w[i, 6] = -(dp1 - share * bp1), dp0 - share * bp0
-    w[i, 7], w[i, 8] = -(dv1 - share * bv1), dv0 - share * bv0
-    w[i, 27], w[i, 28] = dv2, dp2
-    w[i, 29], w[i, 30] = -dv1 * b0 + dv0 * b1, -dp1 * b0 + dp0 * b1
+    w[i, BY_HEADING_P], w[i, BY_HEADING_P + 1] = -(dp1 - share * bp1), dp0 - share * bp0
+    w[i, BY_HEADING_V], w[i, BY_HEADING_V + 1] = -(dv1 - share * bv1), dv0 - share * bv0
+    w[i, UP_V], w[i, UP_P] = dv2, dp2
+    w[i, UP_BY_HEADING_V], w[i, UP_BY_HEADING_P] = -dv1 * b0 + dv0 * b1, -dp1 * b0 + dp0 * b1
     x[h, p] += T * x[h, v] + dp0 - bp0
     x[h, p + 1] += T * x[h, v + 1] + dp1 - bp1
     x[h, v] += dv0 - bv0
@@ -151,20 +173,29 @@ def propagate_state(c, node, pre, x, h, i, scale, w, speed):
 
 
 @small_kernel
+def turned(pre, i, at, cos_r, sin_r):
+    """Two columns of node i, turned by an angle."""
+    return (
+        cos_r * pre[i, at] - sin_r * pre[i, at + 1],
+        sin_r * pre[i, at] + cos_r * pre[i, at + 1],
+    )
+
+
+@small_kernel
 def time_since_epoch(s, i):
     """How much older than the sums of node i the states are [s]; 0 for a static node."""
-    return 0.0 if s.nodes[i].static else s.preintegrated[i, 0]
+    return 0.0 if s.nodes[i].static else s.preintegrated[i, DT]
 
 
 @small_kernel
 def displacement_since_epoch(c, s, h, i):
     """What `propagate_state` would add to the position of node i, three numbers [m]."""
-    node, pre, x, T = s.nodes[i], s.preintegrated, s.x, s.preintegrated[i, 0]
+    node, pre, x, T = s.nodes[i], s.preintegrated, s.x, s.preintegrated[i, DT]
     psi = x[h, node.i_heading]
     cos_r, sin_r = cosine_sine(psi)
     b0, b1 = x[h, node.i_tilt_bias], x[h, node.i_tilt_bias + 1]
     _, _, _, dp0, dp1, dp2 = corrected_increments(node, pre, x, h, i)
-    bp0, bp1 = pre[i, 9], pre[i, 10]
+    bp0, bp1 = pre[i, BIAS_P], pre[i, BIAS_P + 1]
     way0, way1, way2 = cos_r * dp0 - sin_r * dp1, sin_r * dp0 + cos_r * dp1, 0.0
     if node.levelled:
         bp0, bp1 = cos_r * bp0 - sin_r * bp1, sin_r * bp0 + cos_r * bp1
@@ -193,13 +224,15 @@ def n_bias_states(node):
 @small_kernel
 def write_derivatives(d, node, w, i, F, scale):
     """What position and velocity of node i gain by what is left of the states behind, to F."""
-    T, pc, ps, vc, vs = w[i, 0], w[i, 1], w[i, 2], w[i, 3], w[i, 4]
+    T, pc, ps = w[i, STEP_T], w[i, STEP_BIAS_P], w[i, STEP_BIAS_P + 1]
+    vc, vs = w[i, STEP_BIAS_V], w[i, STEP_BIAS_V + 1]
     y = node.i_heading - node.i_tilt_bias
     F[i, :, :] = 0.0
     F[i, STATES, :d] = T
     F[i, 0, 0], F[i, 0, 1], F[i, 0, d], F[i, 0, d + 1] = -pc, -ps, -vc, -vs
     F[i, 1, 0], F[i, 1, 1], F[i, 1, d], F[i, 1, d + 1] = ps, -pc, vs, -vc
-    F[i, y, 0], F[i, y, 1], F[i, y, d], F[i, y, d + 1] = w[i, 5], w[i, 6], w[i, 7], w[i, 8]
+    for k in range(2):
+        F[i, y, k], F[i, y, d + k] = w[i, BY_HEADING_P + k], w[i, BY_HEADING_V + k]
     if d == 3:
         F[i, 2, 2], F[i, 2, 5] = -0.5 * T * T, -T
     if node.i_acc_bias >= 0:
@@ -225,8 +258,8 @@ def add_noise(c, node, pre, P, h, i, scale, step):
             P[h, p + k, p + k] += c.static_drift2 * step
         return
     v, b, y = node.i_vel, node.i_tilt_bias, node.i_heading
-    T = pre[i, 0]
-    q = node.psd2 * T + pre[i, 11]
+    T = pre[i, DT]
+    q = node.psd2 * T + pre[i, NOISE]
     for k in range(c.d):
         P[h, p + k, p + k] += q * T * T / 3.0
         P[h, p + k, v + k] += 0.5 * q * T

@@ -12,13 +12,11 @@ otherwise.
 
 from __future__ import annotations
 
-from tracking.filters.joint.ekf.gyro_bias import STEP, gyro_bias_transition, process_gyro_bias
+from tracking.filters.joint.ekf.columns import TILT_GAIN, TILT_STEP
+from tracking.filters.joint.ekf.gyro_bias import gyro_bias_transition, process_gyro_bias
 from tracking.geometry import GRAVITY
 from tracking.kernels.jit import small_kernel
 from tracking.measurements import TOLD, UPRIGHT
-
-GAIN = 30
-"""First of two columns of the sums since the states' time: the bias that was added [m/s2]."""
 
 
 @small_kernel
@@ -29,8 +27,8 @@ def process_tilt_correction(node, pre, i, values, e, k, is_new):
         turned0, turned1 = values[e, k, UPRIGHT], values[e, k, UPRIGHT + 1]
         begins = is_new or not node.has_ahrs_feedback
         if not begins:
-            pre[i, GAIN] += GRAVITY * (turned1 - node.tilt_correction1)
-            pre[i, GAIN + 1] -= GRAVITY * (turned0 - node.tilt_correction0)
+            pre[i, TILT_GAIN] += GRAVITY * (turned1 - node.tilt_correction1)
+            pre[i, TILT_GAIN + 1] -= GRAVITY * (turned0 - node.tilt_correction0)
         node.tilt_correction0, node.tilt_correction1 = turned0, turned1
         process_gyro_bias(node, pre, i, values, e, k, begins)
     node.has_ahrs_feedback = reported
@@ -39,13 +37,13 @@ def process_tilt_correction(node, pre, i, values, e, k, is_new):
 @small_kernel
 def apply_tilt_correction(node, pre, x, h, i, cos_r, sin_r, w):
     """Add that to the bias of node i in hypothesis h, and write it to row i of w."""
-    w[i, STEP] = cos_r * pre[i, GAIN] - sin_r * pre[i, GAIN + 1]
-    w[i, STEP + 1] = sin_r * pre[i, GAIN] + cos_r * pre[i, GAIN + 1]
+    w[i, TILT_STEP] = cos_r * pre[i, TILT_GAIN] - sin_r * pre[i, TILT_GAIN + 1]
+    w[i, TILT_STEP + 1] = sin_r * pre[i, TILT_GAIN] + cos_r * pre[i, TILT_GAIN + 1]
     b0, b1, y = gyro_bias_transition(node, pre, x, h, i, cos_r, sin_r, w)
-    w[i, STEP] += b0
-    w[i, STEP + 1] += b1
-    x[h, node.i_tilt_bias] += w[i, STEP]
-    x[h, node.i_tilt_bias + 1] += w[i, STEP + 1]
+    w[i, TILT_STEP] += b0
+    w[i, TILT_STEP + 1] += b1
+    x[h, node.i_tilt_bias] += w[i, TILT_STEP]
+    x[h, node.i_tilt_bias + 1] += w[i, TILT_STEP + 1]
     x[h, node.i_heading] += y
 
 

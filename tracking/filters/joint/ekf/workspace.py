@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from tracking.arrays import F64, I64, aligned
-from tracking.filters.joint.state import N_PRE, room_to_wait
+from tracking.filters.joint.ekf.columns import N_PRE, N_STEP
+from tracking.filters.joint.state import room_to_wait
 from tracking.maths.covariance import ROOM, STATES
 
 # What is rare and large is compiled apart (`rare`). In the order in which a range needs them:
@@ -38,7 +39,7 @@ class Workspace(NamedTuple):
     scale: F64
     """(state)"""
     step: F64
-    """(node, 42)"""
+    """The last step of each node, (node, N_STEP), see `columns`."""
     derivatives: F64
     """Of position and velocity by the states behind, see `covariance`."""
     speed: F64
@@ -75,7 +76,7 @@ def make_workspace(n_nodes: int, n_pairs: int, n_states: int) -> Workspace:
         w=aligned(n_states),
         share=np.zeros(room_to_wait(n_states)),
         scale=aligned(n_states),
-        step=np.zeros((n_nodes, 42)),
+        step=np.zeros((n_nodes, N_STEP)),
         derivatives=aligned(n_nodes, STATES + 1, ROOM),
         speed=np.zeros(n_nodes),
         x=aligned(1, n_states),

@@ -22,7 +22,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.filters.joint.ekf.gyro_bias import STEP, propagate_gyro_bias_sensitivity
+from tracking.filters.joint.ekf.columns import BY_HEADING_P, BY_HEADING_V, TILT_STEP, UP_P, UP_V
+from tracking.filters.joint.ekf.gyro_bias import propagate_gyro_bias_sensitivity
 from tracking.filters.joint.ekf.propagation import moves, n_bias_states
 from tracking.filters.joint.hypotheses.alignment import FILTERED, LINEAR, has_modes
 from tracking.filters.joint.updates.lever_arm import attach_to_world
@@ -126,11 +127,11 @@ def propagate_sensitivity(c, s, h, work):
                 for q in range(n_bias_states(node)):
                     z[p + r] += F[q, r] * z[b + q]
             if node.has_ahrs_feedback:
-                propagate_gyro_bias_sensitivity(node, z, w, work.scale)
-                z[b + row] += (w[STEP], w[STEP + 1], 0.0)[column]
+                propagate_gyro_bias_sensitivity(node, z, work.step, i, work.scale)
+                z[b + row] += (w[TILT_STEP], w[TILT_STEP + 1], 0.0)[column]
             # A turn by the heading error is one of M as well.
-            z[p + row] += (w[6], -w[5], w[28])[column]
-            z[v + row] += (w[8], -w[7], w[27])[column]
+            z[p + row] += (w[BY_HEADING_P + 1], -w[BY_HEADING_P], w[UP_P])[column]
+            z[v + row] += (w[BY_HEADING_V + 1], -w[BY_HEADING_V], w[UP_V])[column]
 
 
 @small_kernel

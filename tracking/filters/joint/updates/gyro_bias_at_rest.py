@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tracking.filters.joint.ekf.gyro_bias import KNOWN, REST
+from tracking.filters.joint.ekf.columns import GYRO_INFORMATION, GYRO_SUM
 from tracking.filters.joint.ekf.scalar_update import compute_pht, kalman_update
 from tracking.filters.joint.hypotheses.alignment import is_linear
 from tracking.filters.joint.hypotheses.alignment_sensitivity import (
@@ -16,13 +16,13 @@ from tracking.kernels.jit import small_kernel
 def update_gyro_bias_at_rest(s, h, i, work):
     """Correct hypothesis h with what VQF has learned of the gyroscope of node i at rest."""
     node, pre = s.nodes[i], s.preintegrated
-    if pre[i, KNOWN] == 0.0:
+    if pre[i, GYRO_INFORMATION] == 0.0:
         return
-    taken, R = (node.gyro0, node.gyro1, node.gyro2), 1.0 / pre[i, KNOWN]
+    taken, R = (node.gyro0, node.gyro1, node.gyro2), 1.0 / pre[i, GYRO_INFORMATION]
     for k in range(3):
         work.idx[0], work.val[0] = node.i_gyro_bias + k, 1.0
         S = compute_pht(s, h, 1, work) + R
-        nu = pre[i, REST + k] * R - taken[k] - s.x[h, node.i_gyro_bias + k]
+        nu = pre[i, GYRO_SUM + k] * R - taken[k] - s.x[h, node.i_gyro_bias + k]
         if is_linear(s.group[0]):
             work.direct[:] = 0.0
             innovation_sensitivity(s, h, 1, work)
