@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 from tracking.kernels.jit import small_kernel
+from tracking.maths.angles import turn
 
 GRAVITY = 9.81
 
@@ -56,4 +57,4 @@ def level(w, x, y, z, a0, a1, a2, cos_yaw, sin_yaw):
     f0 += 2.0 * (x * z - w * y) * (a2 + GRAVITY)
     f1 = 2.0 * (x * y - w * z) * a0 + (1.0 - 2.0 * (x * x + z * z)) * a1
     f1 += 2.0 * (y * z + w * x) * (a2 + GRAVITY)
-    return cos_yaw * f0 - sin_yaw * f1, sin_yaw * f0 + cos_yaw * f1
+    return turn(cos_yaw, sin_yaw, f0, f1)

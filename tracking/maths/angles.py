@@ -1,4 +1,4 @@
-"""Cosine and sine of angles that are nearly always small, without a call of the C library."""
+"""Turns by angles that are nearly always small, without a call of the C library."""
 
 from __future__ import annotations
 
@@ -29,3 +29,9 @@ def cosine_sine(angle):
         cosine, sine = small_turn(square)
         return cosine, sine * angle
     return math.cos(angle), math.sin(angle)
+
+
+@small_kernel
+def turn(cosine, sine, a, b):
+    """A vector in the plane, turned by an angle."""
+    return cosine * a - sine * b, sine * a + cosine * b

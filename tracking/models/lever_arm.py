@@ -9,7 +9,7 @@ part of the range that the lever arm of its second end adds.
 from __future__ import annotations
 
 from tracking.kernels.jit import small_kernel
-from tracking.maths.angles import cosine_sine
+from tracking.maths.angles import cosine_sine, turn
 
 
 @small_kernel
@@ -27,8 +27,7 @@ def antenna_in_world(w, x, y, z, o0, o1, o2):
 @small_kernel
 def rotate_lever_arm(psi, l0, l1):
     """Correct the horizontal part of a lever arm [m] by the heading error [rad]."""
-    cos_r, sin_r = cosine_sine(psi)
-    return cos_r * l0 - sin_r * l1, sin_r * l0 + cos_r * l1
+    return turn(*cosine_sine(psi), l0, l1)
 
 
 @small_kernel

@@ -27,6 +27,7 @@ from tracking.filters.joint.ekf.columns import (
 )
 from tracking.geometry import GRAVITY
 from tracking.kernels.jit import small_kernel
+from tracking.maths.angles import turn
 from tracking.maths.covariance import STATES
 from tracking.maths.exponentials import decay
 
@@ -56,8 +57,7 @@ def write_accel_bias_jacobian(node, pre, x, h, i, cos_r, sin_r, scale, w):
     tilt0, tilt1 = PER_GRAVITY * x[h, node.i_tilt_bias], PER_GRAVITY * x[h, node.i_tilt_bias + 1]
     for of, by in ((ROTATION_V, BY_OFFSET_V), (ROTATION_P, BY_OFFSET_P)):
         for k in range(3):
-            o0 = cos_r * pre[i, of + k] - sin_r * pre[i, of + 3 + k]
-            o1 = sin_r * pre[i, of + k] + cos_r * pre[i, of + 3 + k]
+            o0, o1 = turn(cos_r, sin_r, pre[i, of + k], pre[i, of + 3 + k])
             o2 = pre[i, of + 6 + k]
             w[i, by + k], w[i, by + 3 + k] = o0 - tilt0 * o2, o1 - tilt1 * o2
             w[i, by + 6 + k] = o2 + tilt0 * o0 + tilt1 * o1

@@ -12,6 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from tracking.filters.joint.ekf.group_centre import group_centre
+from tracking.filters.joint.ekf.observability import write_tangents
 from tracking.kernels.jit import allocating_kernel, kernel
 
 
@@ -70,33 +72,14 @@ def add_rotation_uncertainty(c, s, h, variance):
         h: Hypothesis without pending updates, updated.
         variance: What is added [rad2].
     """
-    mean, mean_v, present, moving = np.zeros(3), np.zeros(3), 0, 0
-    for i in range(s.nodes.shape[0]):
-        node = s.nodes[i]
+    n_axes, (mean, mean_v) = 3 if c.d == 3 else 1, group_centre(c, s, h)
+    D = np.zeros((n_axes, c.n))
+    for node in s.nodes:
         if node.present:
-            present += 1
-            mean[: c.d] += s.x[h, node.i_pos : node.i_pos + c.d]
-            if not node.static:
-                moving += 1
-                mean_v[: c.d] += s.x[h, node.i_vel : node.i_vel + c.d]
-    mean /= max(present, 1)
-    # With static nodes velocities are not free to shift.
-    mean_v *= 1.0 / max(moving, 1) if moving == present else 0.0
-    D = np.zeros(c.n)
-    for axis in range(3 if c.d == 3 else 1):
-        u, v = (3 - axis) % 3, (4 - axis) % 3  # z first: the only axis of the plane
-        D[:] = 0.0
-        for i in range(s.nodes.shape[0]):
-            node = s.nodes[i]
-            if node.present:
-                D[node.i_pos + u] = -(s.x[h, node.i_pos + v] - mean[v])
-                D[node.i_pos + v] = s.x[h, node.i_pos + u] - mean[u]
-                if not node.static:
-                    D[node.i_vel + u] = -(s.x[h, node.i_vel + v] - mean_v[v])
-                    D[node.i_vel + v] = s.x[h, node.i_vel + u] - mean_v[u]
-        # Clones of a time at which no node had moved either are rotated alike (`smoothing`).
-        for r in range(min(c.n_motion, c.n - c.n_own)):
-            D[c.n_own + r] = D[r]
-        for r in range(c.n):
-            for k in range(c.n):
-                s.P[h, r, k] += variance * D[r] * D[k]
+            write_tangents(D, node.i_pos, s.x[h, node.i_pos : node.i_pos + c.d] - mean)
+        if node.present and not node.static:
+            write_tangents(D, node.i_vel, s.x[h, node.i_vel : node.i_vel + c.d] - mean_v)
+    # Clones of a time at which no node had moved either are rotated alike (`smoothing`).
+    for r in range(min(c.n_motion, c.n - c.n_own)):
+        D[:, c.n_own + r] = D[:, r]
+    s.P[h] += variance * (D.T.copy() @ D)

@@ -43,7 +43,7 @@ from tracking.filters.joint.ekf.gyro_bias import (
 )
 from tracking.filters.joint.ekf.tilt_correction import apply_tilt_correction, tilt_bias_tau
 from tracking.kernels.jit import kernel, small_kernel
-from tracking.maths.angles import cosine_sine
+from tracking.maths.angles import cosine_sine, turn
 from tracking.maths.covariance import STATES, add_to_columns, add_to_rows, apply_downdate, mirror
 from tracking.maths.exponentials import decay
 
@@ -123,18 +123,12 @@ def propagate_state(c, node, pre, x, h, i, scale, w, speed):
     if node.i_acc_bias >= 0:
         write_accel_bias_jacobian(node, pre, x, h, i, cos_r, sin_r, scale, w)
     dv0, dv1, dv2, dp0, dp1, dp2 = corrected_increments(node, pre, x, h, i)
-    dv0, dv1 = cos_r * dv0 - sin_r * dv1, sin_r * dv0 + cos_r * dv1
-    dp0, dp1 = cos_r * dp0 - sin_r * dp1, sin_r * dp0 + cos_r * dp1
+    dv0, dv1 = turn(cos_r, sin_r, dv0, dv1)
+    dp0, dp1 = turn(cos_r, sin_r, dp0, dp1)
     if not node.levelled:
         cos_r, sin_r = 1.0, 0.0
-    vc, vs = (
-        cos_r * pre[i, BIAS_V] - sin_r * pre[i, BIAS_V + 1],
-        sin_r * pre[i, BIAS_V] + cos_r * pre[i, BIAS_V + 1],
-    )
-    pc, ps = (
-        cos_r * pre[i, BIAS_P] - sin_r * pre[i, BIAS_P + 1],
-        sin_r * pre[i, BIAS_P] + cos_r * pre[i, BIAS_P + 1],
-    )
+    vc, vs = turn(cos_r, sin_r, pre[i, BIAS_V], pre[i, BIAS_V + 1])
+    pc, ps = turn(cos_r, sin_r, pre[i, BIAS_P], pre[i, BIAS_P + 1])
     if node.i_acc_bias >= 0:
         vc, pc = vc + PER_GRAVITY * dv2, pc + PER_GRAVITY * dp2
     b0, b1 = x[h, b], x[h, b + 1]
@@ -173,15 +167,6 @@ def propagate_state(c, node, pre, x, h, i, scale, w, speed):
 
 
 @small_kernel
-def turned(pre, i, at, cos_r, sin_r):
-    """Two columns of node i, turned by an angle."""
-    return (
-        cos_r * pre[i, at] - sin_r * pre[i, at + 1],
-        sin_r * pre[i, at] + cos_r * pre[i, at + 1],
-    )
-
-
-@small_kernel
 def time_since_epoch(s, i):
     """How much older than the sums of node i the states are [s]; 0 for a static node."""
     return 0.0 if s.nodes[i].static else s.preintegrated[i, DT]
@@ -196,9 +181,9 @@ def displacement_since_epoch(c, s, h, i):
     b0, b1 = x[h, node.i_tilt_bias], x[h, node.i_tilt_bias + 1]
     _, _, _, dp0, dp1, dp2 = corrected_increments(node, pre, x, h, i)
     bp0, bp1 = pre[i, BIAS_P], pre[i, BIAS_P + 1]
-    way0, way1, way2 = cos_r * dp0 - sin_r * dp1, sin_r * dp0 + cos_r * dp1, 0.0
+    (way0, way1), way2 = turn(cos_r, sin_r, dp0, dp1), 0.0
     if node.levelled:
-        bp0, bp1 = cos_r * bp0 - sin_r * bp1, sin_r * bp0 + cos_r * bp1
+        bp0, bp1 = turn(cos_r, sin_r, bp0, bp1)
     if node.i_acc_bias >= 0:
         way2 = PER_GRAVITY * (way0 * b0 + way1 * b1)
         bp0 += PER_GRAVITY * dp2

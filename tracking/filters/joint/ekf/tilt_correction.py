@@ -16,6 +16,7 @@ from tracking.filters.joint.ekf.columns import TILT_GAIN, TILT_STEP
 from tracking.filters.joint.ekf.gyro_bias import gyro_bias_transition, process_gyro_bias
 from tracking.geometry import GRAVITY
 from tracking.kernels.jit import small_kernel
+from tracking.maths.angles import turn
 from tracking.measurements import TOLD, UPRIGHT
 
 
@@ -37,11 +38,9 @@ def process_tilt_correction(node, pre, i, values, e, k, is_new):
 @small_kernel
 def apply_tilt_correction(node, pre, x, h, i, cos_r, sin_r, w):
     """Add that to the bias of node i in hypothesis h, and write it to row i of w."""
-    w[i, TILT_STEP] = cos_r * pre[i, TILT_GAIN] - sin_r * pre[i, TILT_GAIN + 1]
-    w[i, TILT_STEP + 1] = sin_r * pre[i, TILT_GAIN] + cos_r * pre[i, TILT_GAIN + 1]
+    gain0, gain1 = turn(cos_r, sin_r, pre[i, TILT_GAIN], pre[i, TILT_GAIN + 1])
     b0, b1, y = gyro_bias_transition(node, pre, x, h, i, cos_r, sin_r, w)
-    w[i, TILT_STEP] += b0
-    w[i, TILT_STEP + 1] += b1
+    w[i, TILT_STEP], w[i, TILT_STEP + 1] = gain0 + b0, gain1 + b1
     x[h, node.i_tilt_bias] += w[i, TILT_STEP]
     x[h, node.i_tilt_bias + 1] += w[i, TILT_STEP + 1]
     x[h, node.i_heading] += y

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
+from tracking.filters.joint.ekf.group_centre import group_centre
 from tracking.kernels.jit import allocating_kernel
 
 
@@ -40,19 +39,7 @@ def rotate_hypothesis(c, s, h, M):
         h: Hypothesis without pending updates, updated.
         M: Orthogonal, (d, d).
     """
-    d = c.d
-    mean, mean_v, present, moving = np.zeros(d), np.zeros(d), 0, 0
-    for i in range(s.nodes.shape[0]):
-        node = s.nodes[i]
-        if node.present:
-            present += 1
-            mean += s.x[h, node.i_pos : node.i_pos + d]
-            if not node.static:
-                moving += 1
-                mean_v += s.x[h, node.i_vel : node.i_vel + d]
-    mean /= max(present, 1)
-    # With static nodes velocities are not free to shift.
-    mean_v *= 1.0 / max(moving, 1) if moving == present else 0.0
+    mean, mean_v = group_centre(c, s, h)
     for i in range(s.nodes.shape[0]):
         node = s.nodes[i]
         if node.present:

@@ -6,12 +6,13 @@ import math
 
 import numpy as np
 
+from tracking.filters.joint.ekf.group_centre import group_centre
 from tracking.filters.joint.hypotheses.alignment import CHALLENGED, STATIC, has_modes
 from tracking.filters.joint.hypotheses.alignment_sensitivity import has_linear_alignment
-from tracking.kernels.jit import allocating_kernel, kernel, small_kernel
+from tracking.kernels.jit import allocating_kernel
 
 
-@kernel
+@allocating_kernel
 def are_same(c, s, a, b, turn):
     """True when two hypotheses agree in position and velocity of every node round the centre.
 
@@ -27,8 +28,7 @@ def are_same(c, s, a, b, turn):
     """
     # Those that come from one filter, turned, are bent by that.
     limit = c.merge_distance * (2.0 if has_modes(s.group[0]) else 1.0)
-    way, pace = centre_of(c, s, b, False), centre_of(c, s, b, True)
-    way_a, pace_a = centre_of(c, s, a, False), centre_of(c, s, a, True)
+    (way, pace), (way_a, pace_a) = group_centre(c, s, b), group_centre(c, s, a)
     for i in range(s.nodes.shape[0]):
         node = s.nodes[i]
         if not node.present:
@@ -56,7 +56,7 @@ def rotation_between(c, s, a, b, turn):
     stands for all turns and mirror images, in space, it may be any of them; while each stands for
     the turns near its own, those nearer than its peaks can be. By Procrustes.
     """
-    way_a, way_b = centre_of(c, s, a, False), centre_of(c, s, b, False)
+    (way_a, _), (way_b, _) = group_centre(c, s, a), group_centre(c, s, b)
     scatter = np.zeros((c.d, c.d))
     for i in range(s.nodes.shape[0]):
         if s.nodes[i].present:
@@ -75,26 +75,3 @@ def rotation_between(c, s, a, b, turn):
     limit = c.same_mode if has_modes(s.group[0]) else c.same_rotation
     if np.trace(nearest) > (c.d - 2) + 2.0 * math.cos(limit):
         turn[:] = nearest
-
-
-@small_kernel
-def centre_of(c, s, h, of_velocities):
-    """Where hypothesis h puts the centre of the group, or how it moves, three numbers.
-
-    With static nodes, velocities have no common part that is free: 0.
-    """
-    total0, total1, total2, present, moving = 0.0, 0.0, 0.0, 0, 0
-    for i in range(s.nodes.shape[0]):
-        node = s.nodes[i]
-        if node.present:
-            present += 1
-            moving += not node.static
-            at = node.i_vel if of_velocities else node.i_pos
-            if not (of_velocities and node.static):
-                total0 += s.x[h, at]
-                total1 += s.x[h, at + 1]
-                if c.d == 3:
-                    total2 += s.x[h, at + 2]
-    if present == 0 or (of_velocities and moving != present):
-        return 0.0, 0.0, 0.0
-    return total0 / present, total1 / present, total2 / present

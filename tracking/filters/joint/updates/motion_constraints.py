@@ -23,6 +23,7 @@ from tracking.filters.joint.hypotheses.alignment_sensitivity import (
 )
 from tracking.filters.joint.hypotheses.static_initialisation import is_at_rest
 from tracking.kernels.jit import kernel, small_kernel
+from tracking.maths.angles import turn
 from tracking.models.mean_velocity import mean_velocity_model
 from tracking.models.nonholonomic import nonholonomic_model
 from tracking.models.zero_velocity import zero_velocity_model
@@ -101,10 +102,7 @@ def nonholonomic_constraint(c, s, h, i, work):
     node, x = s.nodes[i], work.x[0]
     error = x[node.i_heading]
     cos_e, sin_e = math.cos(error), math.sin(error)
-    cos_y, sin_y = (
-        node.cos_yaw * cos_e - node.sin_yaw * sin_e,
-        node.sin_yaw * cos_e + node.cos_yaw * sin_e,
-    )
+    cos_y, sin_y = turn(cos_e, sin_e, node.cos_yaw, node.sin_yaw)
     ahead, slip, m = node.ahead, node.slip, 3
     idx, val = work.idx, work.val
     idx[0], idx[1], idx[2] = node.i_vel, node.i_vel + 1, node.i_heading
