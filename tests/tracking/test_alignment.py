@@ -12,11 +12,11 @@ from tracking.measurements import Kind
 
 ALLOWED = {(a, b) for a, following in TRANSITIONS.items() for b in following}
 WITHIN_ONE_EVENT = {
-    # A node moves and the group is supervised; a Gaussian sum ends and is pruned; its only
-    # hypothesis fits badly.
-    (Alignment.STATIC, Alignment.MODES),
-    (Alignment.MODES, Alignment.FILTERED),
-    (Alignment.MODES, Alignment.CHALLENGED),
+    # A node moves and the group is supervised; a Gaussian sum is pruned; its only hypothesis fits
+    # badly.
+    (Alignment.STATIC, Alignment.CANDIDATES),
+    (Alignment.LINEAR, Alignment.FILTERED),
+    (Alignment.LINEAR, Alignment.CHALLENGED),
 }
 """Steps of the table that one event can make in a row."""
 
@@ -75,7 +75,8 @@ def test_only_transitions_of_the_table_occur(vehicle, dimensions, n, data):
 
 
 def test_a_group_in_space_that_moves_is_filtered_in_its_modes():
-    states = [a for a, _ in walk(ExactGroup("hand", range(5), at_rest=True, dimensions=3))]
+    group = ExactGroup("hand", range(5), at_rest=True, dimensions=3, seconds=30.0)
+    states = [a for a, _ in walk(group)]
     order = list(dict.fromkeys(states))
     assert order[:3] == [Alignment.NONE, Alignment.STATIC, Alignment.LINEAR]
-    assert order[3] == Alignment.MODES
+    assert order[3] == Alignment.CANDIDATES
