@@ -75,8 +75,7 @@ def test_only_transitions_of_the_table_occur(vehicle, dimensions, n, data):
 
 
 def test_a_group_in_space_that_moves_is_filtered_in_its_modes():
-    group = ExactGroup("hand", range(5), at_rest=True, dimensions=3, seconds=30.0)
-    states = [a for a, _ in walk(group)]
+    states = [a for a, _ in walk(ExactGroup("hand", range(5), at_rest=True, dimensions=3))]
     order = list(dict.fromkeys(states))
     assert order[:3] == [Alignment.NONE, Alignment.STATIC, Alignment.LINEAR]
     assert order[3] == Alignment.CANDIDATES

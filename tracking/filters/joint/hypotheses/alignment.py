@@ -43,7 +43,7 @@ TRANSITIONS: dict[Alignment, dict[Alignment, str]] = {
         Alignment.NONE: "fewer than two nodes are left",
     },
     Alignment.LINEAR: {
-        Alignment.CANDIDATES: "each mode is known to 0.15 rad",
+        Alignment.CANDIDATES: "each mode is known to 0.2 rad",
         Alignment.NONE: "fewer than two nodes are left",
     },
     Alignment.CHALLENGED: {

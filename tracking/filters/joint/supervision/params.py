@@ -118,7 +118,7 @@ class AlignmentParams:
     same_mode: float = 0.3
     """[rad] Modes that differ by a smaller rotation are one; no rotation is that near a mirror
     image."""
-    mode_std: float = 0.15
+    mode_std: float = 0.2
     """[rad] Each mode is filtered by itself, its rotation in its covariance, once all are known so
     well."""
 
