@@ -84,6 +84,7 @@ MECHANISMS: dict[str, Callable[[TrackerParams], TrackerParams]] = {
     "heading error at first": vehicles(first_heading_std=None),
     "null space of rotations": part("update", follow_share=NEVER, follow_false=NEVER),
     "null space at every range": part("alignment", gauge_std=NEVER),
+    "modes apart": part("alignment", mode_std=0.15),
     "static start": part("alignment", settling=ALWAYS, orienting=ALWAYS),
     "patience with wheels": part("alignment", wheels_after=ALWAYS),
     "two sides of a newcomer": part("start", join_spread=ALWAYS),

@@ -12,11 +12,11 @@ from tracking.measurements import Kind
 
 ALLOWED = {(a, b) for a, following in TRANSITIONS.items() for b in following}
 WITHIN_ONE_EVENT = {
-    # A node moves and the group is supervised; a Gaussian sum is pruned; its only hypothesis fits
-    # badly.
-    (Alignment.STATIC, Alignment.CANDIDATES),
-    (Alignment.LINEAR, Alignment.FILTERED),
-    (Alignment.LINEAR, Alignment.CHALLENGED),
+    # A node moves and the group is supervised; a Gaussian sum ends and is pruned; its only
+    # hypothesis fits badly.
+    (Alignment.STATIC, Alignment.MODES),
+    (Alignment.MODES, Alignment.FILTERED),
+    (Alignment.MODES, Alignment.CHALLENGED),
 }
 """Steps of the table that one event can make in a row."""
 
@@ -78,4 +78,4 @@ def test_a_group_in_space_that_moves_is_filtered_in_its_modes():
     states = [a for a, _ in walk(ExactGroup("hand", range(5), at_rest=True, dimensions=3))]
     order = list(dict.fromkeys(states))
     assert order[:3] == [Alignment.NONE, Alignment.STATIC, Alignment.LINEAR]
-    assert order[3] == Alignment.CANDIDATES
+    assert order[3] == Alignment.MODES

@@ -6,7 +6,7 @@ from tracking.filters.clear_estimate import clear_estimate, is_heard
 from tracking.filters.joint.ekf.columns import N_PRE
 from tracking.filters.joint.ekf.preintegration import preintegrate
 from tracking.filters.joint.ekf.propagation import predict
-from tracking.filters.joint.hypotheses.alignment import LINEAR, NONE, STATIC
+from tracking.filters.joint.hypotheses.alignment import LINEAR, MODES, NONE, STATIC
 from tracking.filters.joint.state import JointState
 from tracking.kernels.addresses import by_reference
 from tracking.kernels.jit import kernel
@@ -55,7 +55,7 @@ def write_estimate(c, s, work, t, e, o, out):
                 cov[e, o, p, q, r] = v
             if a < d:
                 squared_error += cov[e, o, p, a, a]
-        if group.n_alive > 1 or group.alignment in (STATIC, LINEAR):
+        if group.n_alive > 1 or group.alignment in (STATIC, LINEAR, MODES):
             status[e, o, p] = AMBIGUOUS
         elif node_i.static and node_j.static:
             status[e, o, p] = OK

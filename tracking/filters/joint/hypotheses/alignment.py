@@ -25,9 +25,11 @@ class Alignment(IntEnum):
     """One filter with sensitivities to the rotation stands for all rotations."""
     CHALLENGED = 3
     """As `LINEAR`, with a rotation that is reported until another one is clearly likelier."""
-    CANDIDATES = 4
-    """Each hypothesis is a mode of the rotation, which is a part of its covariance."""
-    FILTERED = 5
+    MODES = 4
+    """Each hypothesis is a mode of the rotation, with sensitivities to rotations near it."""
+    CANDIDATES = 5
+    """Each hypothesis is such a mode, its rotation a part of its covariance."""
+    FILTERED = 6
     """The rotation is a part of the covariance of each hypothesis: of the bank, or the last one."""
 
 
@@ -43,12 +45,18 @@ TRANSITIONS: dict[Alignment, dict[Alignment, str]] = {
         Alignment.NONE: "fewer than two nodes are left",
     },
     Alignment.LINEAR: {
-        Alignment.CANDIDATES: "each mode is known to 0.2 rad",
+        Alignment.MODES: "each mode is known to 0.7 rad",
         Alignment.NONE: "fewer than two nodes are left",
     },
     Alignment.CHALLENGED: {
-        Alignment.LINEAR: "another rotation is clearly likelier",
+        Alignment.MODES: "another rotation is clearly likelier",
         Alignment.FILTERED: "no other rotation is likelier",
+        Alignment.LINEAR: "the group has just started on wheels in motion",
+        Alignment.NONE: "fewer than two nodes are left",
+    },
+    Alignment.MODES: {
+        Alignment.CANDIDATES: "each mode is known to 0.15 rad",
+        Alignment.LINEAR: "the group has just started on wheels in motion",
         Alignment.NONE: "fewer than two nodes are left",
     },
     Alignment.CANDIDATES: {
@@ -64,10 +72,16 @@ TRANSITIONS: dict[Alignment, dict[Alignment, str]] = {
 """State to the states that follow it, and why."""
 
 # Plain numbers: kernels do not know enums.
-NONE, STATIC, LINEAR, CHALLENGED, CANDIDATES, FILTERED = (a.value for a in Alignment)
+NONE, STATIC, LINEAR, CHALLENGED, MODES, CANDIDATES, FILTERED = (a.value for a in Alignment)
 
 
 @small_kernel
 def is_linear(group):
     """True while the rotation is estimated by sensitivities, outside of the states."""
-    return group.alignment in (LINEAR, CHALLENGED)
+    return LINEAR <= group.alignment <= MODES
+
+
+@small_kernel
+def has_modes(group):
+    """True while hypotheses are modes of one rotation, copied from one filter."""
+    return MODES <= group.alignment <= CANDIDATES

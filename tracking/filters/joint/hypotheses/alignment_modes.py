@@ -1,11 +1,13 @@
-"""Modes of the rotation of a group in space.
+"""Modes of the rotation of a group in space, each filtered by itself.
 
 At first one filter stands for all rotations (`alignment_sensitivity`), and its frame is rotated to
 the likeliest mode ten times a second: that is reported. But headings and sensor offsets turn with
 the body, so their estimates are right for one rotation only, and so are the gains once either
-counts. So once each mode is known to a few degrees, it is filtered by itself, its rotation error a
-part of P: a Gaussian sum [1] over rotations. As long as all is linear its members have one
-covariance, so how well they fit decides between them, not how sure they are.
+counts. So once each mode is known roughly, it is filtered in a frame of its own, by the likelihood
+of later measurements, and follows the maximum near it: a Gaussian sum [1] over rotations. As long
+as all is linear its members have one covariance, so how well they fit decides between them, not
+how sure they are. Once all are known to a few degrees, the rest of the rotation error becomes a
+part of P, and frames are rotated no more.
 
 References:
     [1] Alspach and Sorenson, Nonlinear Bayesian estimation using Gaussian sum approximations, IEEE
@@ -14,6 +16,8 @@ References:
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from tracking.filters.joint.hypotheses.alignment import (
@@ -21,8 +25,10 @@ from tracking.filters.joint.hypotheses.alignment import (
     CHALLENGED,
     FILTERED,
     LINEAR,
+    MODES,
 )
 from tracking.filters.joint.hypotheses.alignment_sensitivity import (
+    small_rotation_derivatives,
     start_alignment,
     update_alignment_cov,
 )
@@ -31,10 +37,13 @@ from tracking.filters.joint.hypotheses.static_initialisation import TIE
 from tracking.kernels.jit import allocating_kernel
 from tracking.maths.rotation_modes import (
     climb_to_mode,
+    curvature,
     find_modes,
+    gain,
     inverse,
     is_near,
     least_curvature,
+    rotation_exp,
 )
 
 
@@ -64,6 +73,8 @@ def monitor_modes(c, s, layout):
         return
     if group.alignment == CHALLENGED and group.n_alive == 1:
         resolve_challenge(c, s, layout)
+    elif group.alignment == MODES:
+        refine_modes(c, s)
     else:
         group.alignment = LINEAR
         track_all_modes(c, s, layout)
@@ -77,16 +88,18 @@ def resolve_challenge(c, s, layout):
     turns, values = likely_modes(c, s, layout, group.best)
     if values[0] > value + c.challenger_lead:
         R[:], value = turns[0], values[0]
-    # A mode near it is measured by these seconds alone; the filter knows it better.
-    if value >= c.challenger_lead and not is_near(R, np.eye(3), c.same_mode):
-        group.alignment = LINEAR
-    elif len(values) == 1 or group.t - group.t_alignment > c.challenge_longest:
-        group.alignment = FILTERED
+    if value < c.challenger_lead or is_near(R, np.eye(3), c.same_mode):
+        # A mode near it is measured by these seconds alone; the filter knows it better.
+        if len(values) == 1 or group.t - group.t_alignment > c.challenge_longest:
+            group.alignment = FILTERED
+        return
+    group.alignment = MODES
+    spawn_modes(c, s, group.best, turns, values)
 
 
 @allocating_kernel
 def track_all_modes(c, s, layout):
-    """Turn every frame to the likeliest of all turns; filter each by itself once all are known."""
+    """Turn every frame to the likeliest of all turns; part with them once each is known roughly."""
     was_alive, known, H = s.alive.copy(), True, np.zeros((3, 3))
     for h in range(s.alive.shape[0]):
         if not was_alive[h]:
@@ -103,7 +116,7 @@ def track_all_modes(c, s, layout):
         update_alignment_cov(c, s, h)
     if not known:
         return
-    s.group[0].alignment = CANDIDATES
+    s.group[0].alignment = MODES
     for h in range(s.alive.shape[0]):
         if was_alive[h]:
             turns, values = likely_modes(c, s, layout, h)
@@ -131,7 +144,43 @@ def spawn_modes(c, s, h, turns, values):
         if target >= 0:
             s.loglik[target] += values[a]
             rotate_frame(c, s, target, turns[a].copy())
-            add_mode_uncertainty(c, s, target)
+            update_alignment_cov(c, s, target)
+
+
+@allocating_kernel
+def refine_modes(c, s):
+    """Turn every frame to the likeliest turn near it; hypotheses follow once all are known."""
+    known = True
+    for h in range(s.alive.shape[0]):
+        if s.alive[h]:
+            known = move_to_mode(c, s, h) and known
+            update_alignment_cov(c, s, h)
+    if not known:
+        return
+    s.group[0].alignment = CANDIDATES
+    for h in range(s.alive.shape[0]):
+        if s.alive[h]:
+            add_mode_uncertainty(c, s, h)
+
+
+@allocating_kernel
+def move_to_mode(c, s, h):
+    """Turn the frame of hypothesis h to the likeliest turn near it; true once that is known."""
+    g, w, H, J = np.zeros(9), np.zeros(3), np.zeros((3, 3)), small_rotation_derivatives()
+    curvature(s.alignment_information[h], np.eye(3), s.alignment_score[h], w, H)
+    known = least_curvature(H) > c.candidate_std**-2
+    # Only about axes of which more is known than which of the frames it is.
+    values, axes = np.linalg.eigh(J @ (s.alignment_information[h] @ J.T.copy()))
+    move = np.zeros(3)
+    for a in range(3):
+        if values[a] > c.mode_std**-2:
+            axis = axes[:, a].copy()
+            move += axis * (np.sum(axis * w) / values[a])
+    length = math.sqrt(np.sum(move * move))
+    R = rotation_exp(move * min(1.0, c.mode_std / max(length, c.mode_step)))
+    if length > c.mode_step and gain(s.alignment_information[h], s.alignment_score[h], R, g) > 0.0:
+        rotate_frame(c, s, h, R)
+    return known
 
 
 @allocating_kernel
@@ -170,6 +219,9 @@ def add_mode_uncertainty(c, s, h):
     """Add to P what is not known of the turn, which is the likeliest: none."""
     H = np.zeros((3, 3))
     climb_to_mode(s.alignment_information[h], s.alignment_score[h], np.eye(3), H)
+    least = least_curvature(H)
+    for a in range(3):
+        H[a, a] += max(c.candidate_std**-2 - least, 0.0)
     J, cov = np.zeros((3, c.n)), np.zeros((3, 3))
     inverse(H, cov)
     for a in range(3):

@@ -25,7 +25,7 @@ import numpy as np
 from tracking.filters.joint.ekf.columns import BY_HEADING_P, BY_HEADING_V, TILT_STEP, UP_P, UP_V
 from tracking.filters.joint.ekf.gyro_bias import propagate_gyro_bias_sensitivity
 from tracking.filters.joint.ekf.propagation import moves, n_bias_states
-from tracking.filters.joint.hypotheses.alignment import FILTERED, LINEAR
+from tracking.filters.joint.hypotheses.alignment import FILTERED, LINEAR, has_modes
 from tracking.filters.joint.updates.lever_arm import attach_to_world
 from tracking.kernels.jit import allocating_kernel, kernel, small_kernel
 from tracking.maths.covariance import STATES
@@ -83,8 +83,23 @@ def start_alignment(c, s, layout, h):
 
 @allocating_kernel
 def update_alignment_cov(c, s, h):
-    """Work out how uncertain the elements of the turn are."""
-    s.alignment_cov[h] = np.linalg.inv(s.alignment_information[h] + LOOSE * np.eye(9))
+    """Work out how uncertain the elements of the turn are: those of any, or of one that is near."""
+    if has_modes(s.group[0]):
+        J = small_rotation_derivatives()
+        H = J @ (s.alignment_information[h] @ J.T.copy()) + np.eye(3) / c.mode_std**2
+        s.alignment_cov[h] = J.T.copy() @ (np.linalg.inv(H) @ J)
+    else:
+        s.alignment_cov[h] = np.linalg.inv(s.alignment_information[h] + LOOSE * np.eye(9))
+
+
+@allocating_kernel
+def small_rotation_derivatives():
+    """Derivatives of the elements of a small turn by its three components, (3, 9)."""
+    J = np.zeros((3, 9))
+    for a in range(3):
+        u, v = (a + 1) % 3, (a + 2) % 3
+        J[a, 3 * u + v], J[a, 3 * v + u] = -1.0, 1.0
+    return J
 
 
 @kernel

@@ -22,6 +22,7 @@ from tracking.filters.joint.hypotheses.alignment import (
     FILTERED,
     NONE,
     STATIC,
+    has_modes,
 )
 from tracking.filters.joint.hypotheses.copying import copy_hypothesis, rotate_hypothesis
 from tracking.filters.joint.hypotheses.geometric_degeneracy import (
@@ -129,7 +130,7 @@ def prune_bank(c, s):
             if a == b or b == group.best or not (s.alive[a] and s.alive[b] and better):
                 continue
             turn[:] = np.eye(c.d)
-            if a == group.best or group.alignment == CANDIDATES:
+            if a == group.best or has_modes(group):
                 rotation_between(c, s, a, b, turn)
             if are_same(c, s, a, b, turn):
                 s.alive[b] = False

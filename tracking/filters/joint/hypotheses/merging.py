@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from tracking.filters.joint.ekf.group_centre import group_centre
-from tracking.filters.joint.hypotheses.alignment import CANDIDATES, CHALLENGED, STATIC
+from tracking.filters.joint.hypotheses.alignment import CHALLENGED, STATIC, has_modes
 from tracking.filters.joint.hypotheses.alignment_sensitivity import has_linear_alignment
 from tracking.kernels.jit import allocating_kernel
 
@@ -27,7 +27,7 @@ def are_same(c, s, a, b, turn):
         turn: by this, orthogonal, (d, d).
     """
     # Those that come from one filter, turned, are bent by that.
-    limit = c.merge_distance * (2.0 if s.group[0].alignment == CANDIDATES else 1.0)
+    limit = c.merge_distance * (2.0 if has_modes(s.group[0]) else 1.0)
     (way, pace), (way_a, pace_a) = group_centre(c, s, b), group_centre(c, s, a)
     for i in range(s.nodes.shape[0]):
         node = s.nodes[i]
@@ -72,6 +72,6 @@ def rotation_between(c, s, a, b, turn):
         u[:, c.d - 1] *= -1.0
     nearest = u @ v
     # The trace is 2 cos in the plane, 1 + 2 cos in space.
-    limit = c.same_mode if s.group[0].alignment == CANDIDATES else c.same_rotation
+    limit = c.same_mode if has_modes(s.group[0]) else c.same_rotation
     if np.trace(nearest) > (c.d - 2) + 2.0 * math.cos(limit):
         turn[:] = nearest

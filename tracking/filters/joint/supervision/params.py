@@ -118,9 +118,12 @@ class AlignmentParams:
     same_mode: float = 0.3
     """[rad] Modes that differ by a smaller rotation are one; no rotation is that near a mirror
     image."""
-    mode_std: float = 0.2
-    """[rad] Each mode is filtered by itself, its rotation in its covariance, once all are known so
-    well."""
+    mode_step: float = 0.02
+    """[rad] The frame is turned to its mode by no smaller a step."""
+    mode_std: float = 0.7
+    """[rad] Each mode is filtered by itself once it is known so well."""
+    candidate_std: float = 0.15
+    """[rad] Its rotation goes into the covariance once it is known so well."""
 
     def __post_init__(self) -> None:
         check_numbers(self)
