@@ -1,8 +1,9 @@
 """Simulated and recorded runs that several figures are measured on.
 
 Faults are those of one node from 25 s on. "Late" runs are those in which the tracker begins while
-everything moves; "robots" are late cars whose wheels are not known. Recordings are read from
-`RELPOS_DATA`, else `../shared/data`.
+everything moves; "robots" are late cars whose wheels are not known. "Exact" groups begin in motion
+as well, five in space with exact measurements, three in the plane with 5 cm of noise on ranges.
+Recordings are read from `RELPOS_DATA`, else `../shared/data`.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import space_runs
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from agents.simulation.simulate import simulate
+from tests.exact_motion import ExactGroup
 from tests.second_world.record import record
 from tests.second_world.world import draw
 from tracking.arrays import F64
@@ -78,8 +80,8 @@ def case(kind: str, seed: int) -> Case:
     """One run, made once.
 
     Args:
-        kind: Of run: a scenario, ``hand``, ``drones``, the name of a recording, ``world KIND``;
-            ``KIND, FAULT`` is one with a fault, ``late KIND`` begins in motion.
+        kind: Of run: a scenario, ``hand``, ``drones``, the name of a recording, ``world KIND``,
+            ``exact VEHICLE``; ``KIND, FAULT`` is one with a fault, ``late KIND`` begins in motion.
         seed: Of its random numbers.
     """
     first, _, rest = kind.partition(" ")
@@ -90,6 +92,8 @@ def case(kind: str, seed: int) -> Case:
         return Case(good.constellation, block, good.t, good.truth, good.known)
     if first == "late":
         return late(case("cars-nlos" if rest == "robots" else rest, seed), seed, rest == "robots")
+    if first == "exact":
+        return exact(rest, seed)
     if kind in ("hand", "drones"):
         run = getattr(space_runs, kind)(seed)
         t = np.arange(0.5, space_runs.SECONDS - 0.1, 0.1)
@@ -106,6 +110,20 @@ def case(kind: str, seed: int) -> Case:
     t = np.arange(start + 0.5, last, 0.1)
     truth, known = log.truth.pairs(log.constellation, t)
     return Case(log.constellation, log.block, t, truth, known)
+
+
+def exact(vehicle: str, seed: int) -> Case:
+    """A group on circles of its own, in a numbering and at a rate of its own."""
+    rng = np.random.default_rng(seed)
+    n, d, seconds = (3, 2, 25.0) if vehicle == "robot" else (5, 3, 20.0)
+    hz = float(rng.uniform(28.0, 125.0))
+    group = ExactGroup(vehicle, list(rng.permutation(n)), hz=hz, dimensions=d, seconds=seconds)
+    if vehicle == "robot":
+        ranges = group.block.kind[0] == Kind.RANGE
+        group.block.values[0, ranges, 0] += 0.05 * rng.standard_normal(ranges.sum())
+    t = np.arange(0.2, seconds - 0.5, 0.1)
+    truth = group.pairs(t)
+    return Case(group.constellation, group.block, t, truth, np.ones(truth.shape[:2], dtype=bool))
 
 
 def late(of: Case, seed: int, are_robots: bool) -> Case:

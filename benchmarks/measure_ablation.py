@@ -129,6 +129,7 @@ def rows(n_runs: int, names: list[str]) -> Iterator[dict[str, Any]]:
     """A row for each mechanism and kind of run."""
     kinds = ["cars-los", "cars-nlos", "human", "drones", "hand"]
     kinds += [f"late {kind}" for kind in ("cars-nlos", "robots", "human", "drones", "hand")]
+    kinds += ["exact robot", "exact hand", "exact drone"]
     kinds += [f"world {kind}" for kind in WORLDS]
     faults = ("offset", "outliers", "made up", "silent", "frozen")
     kinds += [f"{kind}, {fault}" for kind in ("cars-nlos", "drones") for fault in faults]
@@ -169,7 +170,9 @@ def tables(lines: list[str]) -> str:
     groups: dict[str, list[str]] = {}
     for kind in kinds:
         of = kind.partition(",")[0] if "," in kind else kind.partition(" ")[0]
-        groups.setdefault(of if of in ("late", "world") or "," in kind else "", []).append(kind)
+        groups.setdefault(of if of in ("late", "exact", "world") or "," in kind else "", []).append(
+            kind
+        )
     parts = []
     for some in groups.values():
         head = ["without", *some]
