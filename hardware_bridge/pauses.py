@@ -1,4 +1,4 @@
-"""Garbage collection that keeps nobody waiting."""
+"""Garbage collection that delays no command."""
 
 from __future__ import annotations
 

@@ -143,7 +143,7 @@ class HeartbeatReading(NamedTuple):
 
 
 class OperatorReading(NamedTuple):
-    """Somebody with a remote control trims a car: a velocity on top of what the plan asks for."""
+    """A person with a remote control trims a car: a velocity on top of what the plan asks for."""
 
     source: Source
     to: str

@@ -1,4 +1,4 @@
-"""Observations without the others: what a car sees that knows nobody."""
+"""Observations without the others: what a car sees that knows no other."""
 
 from __future__ import annotations
 
@@ -26,6 +26,6 @@ class Blindfold:
         self._nobody = layout.alone()
 
     def __call__(self, observations: F32) -> F32:
-        """The same, but nobody is known, (..., size)."""
+        """The same, but no other car is known, (..., size)."""
         blind: F32 = np.where(self._kept, observations, self._nobody)
         return blind

@@ -53,22 +53,22 @@ class Driven:
 
     @property
     def place_error(self) -> F64:
-        """Nobody knows."""
+        """Not known."""
         return self._unknown[:, 0]
 
     @property
     def tracking_error(self) -> F64:
-        """Nobody knows."""
+        """Not known."""
         return self._unknown
 
     @property
     def collisions(self) -> F64:
-        """Nobody knows."""
+        """Not known."""
         return self._unknown
 
     @property
     def clearance(self) -> F64:
-        """Nobody knows."""
+        """Not known."""
         return self._unknown
 
     @property

@@ -26,7 +26,7 @@ from hardware_bridge.live.env import HardwareFormationEnv
 from hardware_bridge.live.opened import OpenBridge
 
 EPISODES = 10
-"""[-] Of each driver, where nobody says how many."""
+"""[-] Of each driver, where the number is not given."""
 STOPPED = " stopped: "
 
 
@@ -173,7 +173,7 @@ class _Orders:
         bridge.start.attend = lambda: self._quit
 
     def check(self) -> None:
-        """After every decision: end it all if somebody said so."""
+        """After every decision: end it all if that was asked for."""
         if self._quit:
             raise KeyboardInterrupt
 

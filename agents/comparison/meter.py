@@ -1,4 +1,4 @@
-"""What is measured in an episode, whoever moves the cars: a simulation or motors."""
+"""What is measured in an episode, of a simulation or of real cars."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class EpisodeResult:
 
 
 class Running(Protocol):
-    """Episodes side by side, in arrays over (env, car); what nobody knows is NaN."""
+    """Episodes side by side, in arrays over (env, car); what is not known is NaN."""
 
     @property
     def car(self) -> CarParams:

@@ -63,7 +63,7 @@ class Simulated:
 
     @property
     def place_error(self) -> F64:
-        """By the truth, (env) [m]; NaN where nobody is present or has a place."""
+        """By the truth, (env) [m]; NaN where no car is present or has a place."""
         f, present = self.formation, self.formation.state.present
         count = (present & f.task.has_target.any(axis=-1)).sum(axis=-1)
         off = np.where(present[..., None], f.state.pos_w - f.task.goal_w, 0.0).sum(axis=1)

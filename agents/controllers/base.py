@@ -72,7 +72,7 @@ class Sight:
 
     @property
     def used(self) -> Bool:
-        """Known others with a place; where nobody has one, as at a rendezvous, all known."""
+        """Known others with a place; where no car has one, as at a rendezvous, all known."""
         return self.ok & (self.placed | ~self.placed.any(axis=-1, keepdims=True))
 
 

@@ -4,7 +4,7 @@
 
 the law of [1] with the operator's command fed forward, over the n others that are known and have
 a place; estimates count by how sure they are (`caution`). K is larger along the car than across
-it, where a correction has to wait until the car has turned. Where nobody has a place, the cars
+it, where a correction has to wait until the car has turned. Where no car has a place, the cars
 gather round their middle.
 
 References:

@@ -79,7 +79,7 @@ def corrected(
     steering: SteeringParams,
     avoidance: AvoidanceParams,
 ) -> F32:
-    """Actions of cars that follow the command, corrected, and come too near to nobody, (..., 2).
+    """Actions of cars that follow the command, corrected to keep their distance, (..., 2).
 
     Args:
         sight: What they see.

@@ -1,4 +1,4 @@
-"""What nobody sees: without distance sensors a car finds walls and boxes with its bumper.
+"""What is not seen: without distance sensors a car finds walls and boxes with its bumper.
 
 A car that the operator sends somewhere, that does not move though it wants to, and whose wheels are
 already turned as they should be, is taken for blocked; one that has just started still has its

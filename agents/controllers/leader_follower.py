@@ -5,10 +5,10 @@
 for the leader l; [1]. An observation has no number of the own car, so the leader is chosen by what
 all cars are told alike: **it is the car whose place is farthest east by north** (20 degrees north
 of the x axis of the world: in usual shapes no two cars are equally far there), which each finds by
-its heading among the places of the others and its own. Who does not know the leader follows the
-farthest of those that it knows; who knows nobody farther than itself follows the command. So there
-are no cycles, and in a formation that does not turn the leader stays the same. Without places, as
-at a rendezvous, it is who stands farthest.
+its heading among the places of the others and its own. A car that does not know the leader follows
+the farthest of those that it knows; one that knows none farther than itself follows the command. So
+there are no cycles, and in a formation that does not turn the leader stays the same. Without
+places, as at a rendezvous, it is the car that is farthest.
 
 References:
     [1] Desai, Ostrowski, Kumar, Modeling and control of formations of nonholonomic mobile robots,
@@ -61,7 +61,7 @@ def leader(sight: Sight) -> Bool:
     x = np.where(unplaced, sight.pos[0], sight.target[0])
     y = np.where(unplaced, sight.pos[1], sight.target[1])
     east, north = cosine * x - sine * y, sine * x + cosine * y
-    # The own place is at 0. Who does not know its heading knows nobody farther.
+    # The own place is at 0. A car that does not know its heading knows none farther.
     lead = np.where(sight.used, cos(FOREMOST) * east + sin(FOREMOST) * north, 0.0)
     first = np.arange(lead.shape[-1]) == lead.argmax(axis=-1)[..., None]
     chosen: Bool = first & (lead > 0.0)

@@ -1,4 +1,4 @@
-"""Trackers find each other by motion: who knows nobody and is sent nowhere drives to and fro."""
+"""Trackers find each other by motion: without a command, a car that knows no other drives about."""
 
 from __future__ import annotations
 

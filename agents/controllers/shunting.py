@@ -30,7 +30,7 @@ class ShuntingParams:
     below: float = 0.45
     """[m/s] Velocity wanted: faster is farther than the turning circle. 0 never shunts."""
     unsent: float = 0.3
-    """[m/s] Commands below this send nobody anywhere."""
+    """[m/s] Commands below this are none."""
     horizon: float = 1.4
     """[s] d per velocity wanted: the inverse of the gain."""
     speed: float = 0.25

@@ -60,7 +60,7 @@ class SteeringParams:
     shunting: ShuntingParams = field(default_factory=ShuntingParams)
     """Places aside of the car."""
     freeing: FreeingParams = field(default_factory=FreeingParams)
-    """What nobody saw."""
+    """What was not seen."""
 
 
 def drive(

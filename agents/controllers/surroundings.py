@@ -1,4 +1,4 @@
-"""What the distance sensors tell: points on walls, boxes and cars that nobody else told of.
+"""What the distance sensors tell: points on walls, boxes and cars that no other source reports.
 
 A beam is a cone, and its reading does not say where in it the nearest surface is. Where the
 neighbour on one side reads less, the surface slants towards that side, and so does the point: for a
@@ -30,7 +30,7 @@ HALF_CONE = radians(13.5)
 BELONGS = 0.45
 """[m] Points so near to the middle of a known car are of its body, its estimate in error."""
 REACH = 0.9 * FARTHEST
-"""[m] What is farther is in nobody's way."""
+"""[m] What is farther is in no car's way."""
 ENOUGH = 6
 """[-] With fewer beams the neighbours of one say nothing of it."""
 NOTHING = 1e3

@@ -133,7 +133,7 @@ ROBUSTNESS = (
     ),
     Case(
         name="indoor",
-        about="channel `indoor`: radios that nobody calibrated, in a building",
+        about="channel `indoor`: radios without calibration, in a building",
         scenario=_channel(INDOOR),
     ),
     Case(

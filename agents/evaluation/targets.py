@@ -1,6 +1,6 @@
 """What is asked of a filter in a case, and whether it is reached.
 
-Where the bound itself lies above what is asked, nobody can reach that: the target is `NEAR`
+Where the bound itself lies above what is asked, that cannot be reached: the target is `NEAR`
 times the bound there.
 """
 

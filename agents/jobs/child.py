@@ -12,8 +12,8 @@ from multiprocessing.connection import wait
 def follow_parent() -> None:
     """End this process when the one that began it is gone; leave interrupts to that one.
 
-    To be called first in the process. It would else go on for long, and write into what somebody
-    has taken up again.
+    To be called first in the process. It would else go on for long, and write into what another
+    process has taken up again.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     end_with_parent()

@@ -120,7 +120,7 @@ def cluster(cores: int, address: str | None) -> Iterator[Any]:
 
 
 def start_ray(cores: int, address: str | None) -> None:
-    """Start a cluster on this machine, or join one; it is quiet, and reports to nobody.
+    """Start a cluster on this machine, or join one; it is quiet, and sends no reports.
 
     Args:
         cores: Of a cluster that is started.
@@ -162,10 +162,10 @@ def start_ray(cores: int, address: str | None) -> None:
 
 
 def _see_that_it_answers(address: str) -> None:
-    """Somebody listens at ``host:port``; Ray itself would wait for minutes.
+    """A process listens at ``host:port``; Ray itself would wait for minutes.
 
     Raises:
-        UsageError: Nobody does.
+        UsageError: None does.
     """
     host, _, port = address.removeprefix("ray://").rpartition(":")
     if not host or not port.isdecimal():

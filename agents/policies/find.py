@@ -61,7 +61,7 @@ def read_bounded(path: Path, most: int) -> bytes:
         PolicyError: It is none, cannot be read, or has more than so many.
     """
     try:
-        # A pipe would wait for somebody to write into it.
+        # A pipe would wait for a writer.
         number = os.open(
             path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
         )

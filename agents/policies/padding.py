@@ -35,7 +35,7 @@ class Padding:
         """The observations padded, (..., wanted size).
 
         Args:
-            observations: (..., given size). Those of nobody, which are zeros, stay zeros.
+            observations: (..., given size). Those of absent cars, which are zeros, stay zeros.
         """
         lead = observations.shape[:-1]
         padded: F32 = np.zeros((*lead, self._size), dtype=np.float32)

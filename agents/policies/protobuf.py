@@ -1,8 +1,8 @@
 """The wire format of protocol buffers, read as far as it takes to see what a file is made of.
 
 A message is a row of fields, each a tag (number * 8 + wire type) and a value [1]. Every field that
-is there is given, also repeated ones, of which other readers take the last or join them: whoever
-looks at all of them cannot be told another story than they are.
+is there is given, also repeated ones, of which other readers take the last or join them: a reader
+that looks at all of them cannot be deceived.
 
 References:
     [1] Protocol Buffers documentation, Encoding, https://protobuf.dev/programming-guides/encoding

@@ -1,4 +1,4 @@
-"""JSON from somebody else: finite numbers, no key twice, every type checked and named."""
+"""JSON of other origin: finite numbers, no key twice, every type checked and named."""
 
 from __future__ import annotations
 

@@ -91,7 +91,7 @@ def notes(result: CompareResult) -> list[str]:
     ]
     if result.errors_from == "estimates":
         lines.append(
-            "Errors are what the cars believed themselves: nobody knows the truth, tracking error "
+            "Errors are what the cars estimated themselves: the truth is not known, tracking error "
             "and collisions among it."
         )
     lines += [f"Left out: {note}." for note in result.notes]

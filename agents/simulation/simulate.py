@@ -38,7 +38,7 @@ def simulate(
 
     Args:
         scenario: One of `relpos_env.scenarios.RECORDABLE`, or a TOML file.
-        seconds: Length of the recording; nobody moves in the first two.
+        seconds: Length of the recording; no car moves in the first two.
         seed: Same seed, same recording, bit for bit.
         cars: Number of cars; by default that of the scenario. People have none.
         channel: What the place does to the radio, one of
@@ -90,7 +90,7 @@ def record(
 
     Args:
         scenario: The world and its sensors.
-        seconds: Length of the recording; nobody moves in the first two.
+        seconds: Length of the recording; no car moves in the first two.
         seed: Same seed, same recording, bit for bit.
         progress: Called with the share done, 0 to 1.
 

@@ -57,7 +57,7 @@ class Evaluation:
 
         Means are over cars and times, so scenarios with more cars count for more. An episode that
         ends early earns nothing for the rest of its time, and costs nothing: where time is paid
-        for, to be through is better than to hover. The tracking error is None where nobody could
+        for, to be through is better than to hover. The tracking error is None where no car could
         use any estimate.
         """
         actor = Actor(policy).eval()

@@ -1,7 +1,7 @@
 """Times of samples that come at a steady rate and tell none.
 
 Their arrival alone is a bad time: a hub that hands them on in bunches, or a message that held up
-the line, makes gaps in which nothing was lost, and whoever fills such gaps integrates a turn twice.
+the line, makes gaps in which nothing was lost, and to fill such gaps integrates a turn twice.
 The samples themselves were taken one period after the other; so a late one is put where it was due.
 Only when all of a while come late by as much, samples were lost.
 """

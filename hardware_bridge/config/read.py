@@ -187,7 +187,7 @@ def _check_keys(config: SwarmConfig, where: Where) -> None:
     """Refuse one key for a node and a car.
 
     A controller and the node on its car have one id: with one key, what one said passes for the
-    other when somebody sends it again on the other's line.
+    other when it is sent again on the other's line.
     """
     links = {link.key: link.port.name for link in config.links if link.key is not None}
     for car in config.cars:

@@ -48,7 +48,7 @@ class CarConfig:
     """As for links."""
     watchdog: float | None = None
     """[s] After which it stops by itself when it hears nothing, as `relpos doctor --watchdog`
-    measures it; None where nobody has, which is refused for cars that move."""
+    measures it; None where it was not measured, which is refused for cars that move."""
     cells: int = 0
     """In a row in its battery, for its voltage to be looked at; 0 where it is not."""
 

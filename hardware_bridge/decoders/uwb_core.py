@@ -10,7 +10,7 @@ The forms that say a range, of the years 2019 to 2021:
 
 Ids are numbers, or texts in hex; here they are always four capital hex digits. Numbers may be
 texts; an integer where metres belong is the bit pattern of a float32, null is what was not
-measured. The last form names nobody: its range goes to "", for two boards that know only each
+measured. The last form names no node: its range goes to "", for two boards that know only each
 other.
 
 A board also prints ranges that others measured and sent it, so `uid` is an end of the range and

@@ -31,7 +31,7 @@ class World(Protocol):
 
     @property
     def at_rest(self) -> bool:
-        """True while the cars are held in place at first, and nobody asks them for anything."""
+        """True while the cars are held in place at first, and none is commanded to move."""
 
     @property
     def present(self) -> Bool:
@@ -80,7 +80,7 @@ class Emulator:
             world: Where they are.
             nodes: One a car, in the order of the world.
             cars: One a car, in the order of the world.
-            operator: None where nobody holds a remote control.
+            operator: None for no remote control.
             plan: The script of what goes wrong; its chances are in the lines already.
 
         Raises:

@@ -123,19 +123,19 @@ class EmulatedNode:
 
     def _reading(self, row: Measured) -> Reading | None:
         """What a row is in SI units; the magnetometer's goes with the next IMU sample."""
-        v, nobody = row.values, Source()
+        v, unnamed = row.values, Source()
         if row.kind is Kind.MAG:
             self._mag = v[0], v[1], v[2]
             return None
         if row.kind is Kind.STATE:
-            return StateReading(nobody, (v[0], v[1], v[2], v[3]), (v[4], v[5], v[6]))
+            return StateReading(unnamed, (v[0], v[1], v[2], v[3]), (v[4], v[5], v[6]))
         if row.kind is Kind.RANGE:
             to = str(self._ids[row.other])
             powers = (v[1], v[2]) if row.has_power else (None, None)
-            return RangeReading(nobody, to, v[0], *powers)
+            return RangeReading(unnamed, to, v[0], *powers)
         if self._sample is None or row.t >= self._stuck_until:
             gyr, acc = (v[0], v[1], v[2]), (v[3], v[4], v[5])
-            self._sample = ImuReading(nobody, gyr, acc, self._mag)
+            self._sample = ImuReading(unnamed, gyr, acc, self._mag)
         self._mag = None
         return self._sample
 

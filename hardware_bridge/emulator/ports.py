@@ -19,7 +19,7 @@ class LineCounts:
     dropped: int = 0
     """The host did not read in time, and the line was full."""
     unheard: int = 0
-    """Nobody had the port open, or the device was unplugged."""
+    """The port was not open, or the device was unplugged."""
     read: int = 0
 
 

@@ -20,13 +20,13 @@ from hardware_bridge.systems import expect_posix
 READ_SIZE = 1 << 16
 """[bytes] Read at a time."""
 GONE = (errno.EIO, errno.EBADF)
-"""What the system says when nobody has the other end open."""
+"""Error of the system when the other end is not open."""
 
 
 class PtyPort:
     """The device's end of a pseudo terminal in raw mode; a `DevicePort`.
 
-    As at a real port, what is sent while nobody has it open is lost. The buffer of the line is
+    As at a real port, what is sent while it is not open is lost. The buffer of the line is
     that of the system, some ten thousand bytes.
     """
 

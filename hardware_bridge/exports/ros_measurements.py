@@ -18,7 +18,7 @@ RANGES = "/uwb/ranges"
 TESLA = 1e-6
 """[T/uT]"""
 _UNKNOWN = [0.0] * 9
-"""A covariance of zeros is one that nobody gave."""
+"""A covariance of zeros is one that was not given."""
 _ABSENT = [-1.0, *_UNKNOWN[1:]]
 """What belongs to this covariance was not measured."""
 _NONE = (0.0, 0.0, 0.0)

@@ -166,7 +166,7 @@ class ReadyPerception:
         return np.where(known, status, Status.ABSENT)
 
     def _note_distances(self) -> None:
-        """A position is a distance too, for whoever looks at ranges."""
+        """A position is a distance too, for readers of ranges."""
         e, view, n = self.estimate, self.view, self.view.heard.shape[1]
         cars = (self._i < n) & (self._j < n) & (e.status[0] != Status.ABSENT)
         i, j = self._i[cars], self._j[cars]

@@ -41,10 +41,10 @@ class Identities:
     """
 
     notices: list[tuple[int, str]]
-    """Time [ns] and what an operator should read; whoever takes them clears the list."""
+    """Time [ns] and what an operator should read; taking them clears the list."""
 
     def __init__(self, authenticated: bool = False, params: IdentityParams | None = None) -> None:
-        """Begin with nobody known.
+        """Begin with no node known.
 
         Args:
             authenticated: Every message that comes here passed the check of its MAC, and boots

@@ -27,7 +27,7 @@ class Place(Enum):
     """Lower than the highest, not seen."""
     SEEN = "seen"
     OLD = "old"
-    """Below the window: nobody knows whether it was seen."""
+    """Below the window: whether it was seen is not known."""
 
 
 class SequenceWindow:

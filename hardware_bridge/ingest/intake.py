@@ -82,7 +82,7 @@ class Intake:
         self.refused: Counter[str] = Counter()
         """Readings that were not used, by reason."""
         self.notices: list[tuple[int, str]] = []
-        """Time [ns] and what the user should read; whoever takes them clears the list."""
+        """Time [ns] and what the user should read; taking them clears the list."""
         rates = [node.imu_hz for node in self.group.nodes]
         self.sample_rates = SampleRates(rates)
         self.at_rest = AtRest(self.group.nodes)

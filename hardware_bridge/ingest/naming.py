@@ -18,10 +18,10 @@ def node_of(
     """Id of the node that a device is; None where the configuration makes it none.
 
     Args:
-        device: As its format writes it; None is whoever speaks.
+        device: As its format writes it; None is the sender.
         speaker: Id of who does, None for unknown.
-        ids: Of the link. Where it has some, whoever is not among them is a stranger.
-        mixed: Others go by the ids of nodes, too, but for those that `ids` gives to somebody.
+        ids: Of the link. Where it has some, a device that is not among them is unknown.
+        mixed: Others go by the ids of nodes, too, but for those that `ids` gives to a device.
     """
     if device is None:
         return speaker
@@ -38,7 +38,7 @@ class Naming:
     def __init__(
         self, group: Constellation, refused: Counter[str], notices: list[tuple[int, str]]
     ) -> None:
-        """Begin with nobody heard.
+        """Begin with no device received.
 
         Args:
             group: Whose nodes they are.
@@ -61,9 +61,9 @@ class Naming:
 
         Args:
             stream: That tells of it.
-            device: As its format writes it; None is whoever speaks on this stream.
+            device: As its format writes it; None is the sender on this stream.
             t_ns: Now, by the host's clock [ns].
-            named: Somebody else names it.
+            named: Another device names it.
             mixed: See `node_of`.
         """
         node = node_of(device, stream.node, stream.ids, mixed=mixed)

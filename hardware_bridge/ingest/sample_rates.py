@@ -16,7 +16,7 @@ PAUSE = 0.5
 """[s] After a longer one they are counted again."""
 OFF = 0.3
 """[-] A rate that differs by more is another one. What comes in bunches, or is lost, is within it;
-rates that somebody has mistaken differ by a factor of two."""
+rates that were mistaken differ by a factor of two."""
 
 
 def is_off(rate: float, configured: float) -> bool:

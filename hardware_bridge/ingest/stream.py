@@ -29,11 +29,11 @@ class Stream:
     name: str
     decoder: Decoder
     node: int | None
-    """Id of who speaks, where the format does not say."""
+    """Id of the sender, where the format does not name it."""
     ids: dict[str, int]
     identities: Identities
     is_car: bool = False
-    """Of a car's controller: nobody else speaks there."""
+    """Of a car's controller: no other device sends there."""
     scanner: ScannerMount | None = None
     """Where it is on its car, if it is one."""
     times: dict[int, StreamTime] = field(default_factory=dict)

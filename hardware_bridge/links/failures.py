@@ -20,7 +20,7 @@ _WORDS = {
     errno.EBADF: "closed",
     errno.EPIPE: "closed by the other end",
     errno.ECONNRESET: "closed by the other end",
-    errno.ECONNREFUSED: "nobody listens there",
+    errno.ECONNREFUSED: "no program listens there",
     errno.ETIMEDOUT: "no answer",
     errno.EHOSTUNREACH: "no way to that host",
     errno.ENETUNREACH: "no way to that host",

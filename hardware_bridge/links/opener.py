@@ -1,4 +1,4 @@
-"""Opening ports aside, so that one that takes its time holds up nobody.
+"""Opening ports aside, so that a slow one delays no other.
 
 A name that must be resolved, a host that does not answer, an adapter that is just being plugged in:
 each may take seconds to open or to fail.

@@ -21,5 +21,5 @@ def port_users(path: str, processes: Path = Path("/proc")) -> list[str]:
             if held:
                 users.append(f"{(process / 'comm').read_text().strip()} ({process.name})")
         except OSError:
-            continue  # ended meanwhile, or somebody else's
+            continue  # ended meanwhile, or another user's
     return sorted(users)

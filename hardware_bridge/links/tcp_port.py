@@ -26,7 +26,7 @@ class TcpPort:
         """Connect.
 
         Raises:
-            BridgeError: Nobody answers there; says what to do.
+            BridgeError: No answer from there; says what to do.
         """
         host, port = tcp_address(spec)
         try:

@@ -1,4 +1,4 @@
-"""Where cars believe themselves to be, in the place of a truth that nobody has.
+"""Where cars believe themselves to be, in the place of a truth that is not known.
 
 Relative positions leave one place open: it is chosen so that the middle of the cars with a place
 is the origin. Tasks ask for nothing that depends on it but where a path lies in the room.
@@ -26,7 +26,7 @@ class Believed:
         self.accel_w: F64 = np.zeros((*shape, 2))
         """[m/s2] From one decision to the next."""
         self.clearance: F64 = np.full(shape, np.inf)
-        """[m] Infinite: nobody knows what stands next to them."""
+        """[m] Infinite: what stands next to them is not known."""
         self.present: Bool = np.zeros(shape, dtype=bool)
         self.known: Bool = np.zeros(shape, dtype=bool)
         """Whose place is known relative to the others'."""
@@ -46,7 +46,7 @@ class Believed:
         ok = view.ok[0] & present[:, None] & present[None, :]
         self.known[0] = False
         if present.any():
-            # Seen from whoever knows most of the others.
+            # Seen from the car that knows most of the others.
             seer = int(np.argmax(ok.sum(axis=1) + 0.5 * present))
             known = ok[seer].copy()
             known[seer] = True

@@ -17,7 +17,7 @@ class HardwareFormationEnv(BaseFormationParallelEnv):
     """Cars that are moved by motors, in real time: a step takes a tenth of a second.
 
     What the gate allows is what happens. Infos have the keys of the simulation but `collisions`,
-    which nobody counts; formation errors and rewards are those of the estimates. They say
+    which are not counted; formation errors and rewards are those of the estimates. They say
     what the gate made of the last action: ``asked_speed`` and ``allowed_speed`` [m/s],
     ``allowed_steering`` [rad], ``gate``, why that is less than asked, and ``stopped``, True where
     the car is not armed, so that the transition is not the policy's.

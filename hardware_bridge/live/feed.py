@@ -58,7 +58,7 @@ class LiveFeed:
         self.report: Report | None = None
         """What the gate did, the latest."""
         self.notices: list[tuple[int, str]] = []
-        """Time [ns] and what the user should read; whoever takes them clears the list."""
+        """Time [ns] and what the user should read; taking them clears the list."""
         self.n_late = 0
         """Decisions that were due while the one before was still made."""
         self.attend: Callable[[], None] | None = None
@@ -150,7 +150,7 @@ class LiveFeed:
                 case Notice(text):
                     self.note(self._now_ns(), text)
         if self._supervisor.gone:
-            # Their controllers stop them by themselves; nobody is left to tell them anything.
+            # Their controllers stop them by themselves; no process is left to command them.
             raise BridgeError("supervisor: it is gone, so the cars stand; start the drive again")
 
     def _note_links(self) -> None:

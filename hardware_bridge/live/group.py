@@ -94,7 +94,7 @@ class LiveGroup:
         """Whether places were given out knowing where all cars are."""
         self._newest: F32 = np.zeros((1, n, self._size), np.float32)
         self._mode = mode
-        self._nobody: F64 = np.zeros((1, n))
+        self._no_cars: F64 = np.zeros((1, n))
 
     def seed(self, env: int, rng: np.random.Generator) -> None:
         """Nothing here is drawn."""
@@ -128,9 +128,9 @@ class LiveGroup:
     def infos(self) -> Columns:
         """What infos say of every car; errors and rewards are those of the estimates."""
         swarm = self.swarm
-        nobody = np.full((1, self.believed.present.shape[1]), np.nan)
+        unknown = np.full((1, self.believed.present.shape[1]), np.nan)
         write_figures(
-            self.task.error, nobody, swarm.view.ok, swarm.view.present, self._nobody,
+            self.task.error, unknown, swarm.view.ok, swarm.view.present, self._no_cars,
             self.task.rewards, self._weights, self.task.done, self._figures,
         )  # fmt: skip
         columns = car_columns(
@@ -164,7 +164,7 @@ class LiveGroup:
         believed.update(swarm.view, seconds)
         here = slice(0, 1)
         if (swarm.armed & ~self._armed).any():
-            # While it stood the plan went on: nobody is near the place that was given to it.
+            # While it stood the plan went on: no car is near the place that was given to it.
             self.placed = False
         self._armed = swarm.armed.copy()
         if first or (not self.placed and believed.complete):
@@ -173,7 +173,7 @@ class LiveGroup:
             task.reset(believed, here)
             self._begun = self.cycles
         now = np.array([(self.cycles - self._begun) * DECISION])
-        task.update(believed, now, self._nobody, here)
+        task.update(believed, now, self._no_cars, here)
         self._ask()
         self.rewards[0] = np.where(believed.present[0], task.rewards[0] @ self._weights, 0.0)
         self.terminated[:] = task.done

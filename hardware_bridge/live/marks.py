@@ -44,8 +44,8 @@ def read_marks(path: Path) -> Marks:
         return parse_marks(json.loads(text))
     except (ValueError, TypeError, AttributeError, RecursionError) as error:
         raise BridgeError(
-            f"{path}: damaged, so nobody knows which signed messages are old; delete it if nobody "
-            "can have recorded any"
+            f"{path}: damaged, so which signed messages are old is not known; delete it if none "
+            "can have been recorded"
         ) from error
 
 
@@ -93,7 +93,7 @@ class KeptMarks:
             raise BridgeError(f"{path}: cannot be written ({error.strerror})") from error
 
     def keep(self, t_ns: int) -> None:
-        """Write them now and then; a disk that is slow keeps nobody waiting.
+        """Write them now and then; a slow disk delays no command.
 
         Args:
             t_ns: Now, by the host's clock [ns].

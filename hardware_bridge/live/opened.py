@@ -17,7 +17,7 @@ class OpenFeed(Feed, Gated, Protocol):
     """A feed with a gate at its end."""
 
     notices: list[tuple[int, str]]
-    """Time [ns] and what the user should read; whoever takes them clears the list."""
+    """Time [ns] and what the user should read; taking them clears the list."""
     n_late: int
     """Decisions that were due while the one before was still made."""
     attend: Callable[[], None] | None

@@ -3,7 +3,7 @@
 While they stand, ranges leave open how the group is turned or mirrored. So at first every car
 wriggles within 0.4 m of its place (three cars), each in its own rhythm, until the trackers
 are sure; only then is it asked for anything. Every car ends where it began, and pointing as it
-did: what somebody has put down in a formation is still one, and not turned towards a wall.
+did: cars that were put down in a formation are still in it, and not turned towards a wall.
 """
 
 from __future__ import annotations
@@ -207,7 +207,7 @@ def check_pace(config: SwarmConfig, params: StartParams | None = None) -> None:
 
 
 def check_watchdogs(config: SwarmConfig) -> None:
-    """Refuse cars of which nobody knows when they stop by themselves.
+    """Refuse cars of which it is not known when they stop by themselves.
 
     Raises:
         BridgeError: Names the first of them.

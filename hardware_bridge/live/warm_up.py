@@ -1,4 +1,4 @@
-"""A drive that nobody sees, before the real one: what is loaded when first used is loaded then.
+"""A drive without cars, before the real one: what is loaded when first used is loaded then.
 
 Compiled code comes from the disk when it is first called, which takes longer than a car may be
 left without a decision.

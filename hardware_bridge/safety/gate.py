@@ -95,7 +95,7 @@ class Gate:
         self._held[:] = NOT_ARMED
 
     def interrupt(self) -> None:
-        """Nobody was watching for a while: let all cars stand, and be well again."""
+        """There was no supervision for a while: let all cars stand, and be well again."""
         self.armed[:] = False
         self._held[:] = HELD_UP
         self._well_since[:] = np.inf

@@ -75,7 +75,7 @@ class Picture(NamedTuple):
 
 
 def blank_picture(n_envs: int, n_cars: int) -> Picture:
-    """Nobody is there, and nobody wants to go anywhere."""
+    """No car is there, and none is commanded to move."""
     own, pair = (n_envs, n_cars), (n_envs, n_cars, n_cars)
     z = np.zeros
     return Picture(

@@ -138,7 +138,7 @@ def separation(m: Moment, p: SafetyParams) -> Verdict:
     """Another car is nearer than both need to stop.
 
     Of the room between two, a car may use half, or what the other cannot use at its speed if that
-    is more; of one that nobody holds to rules it may use that alone. Such a one, a person or a car
+    is more; of one that is held to no rules it may use that alone. Such a one, a person or a car
     that is pushed, is as fast as it is seen to be, and may turn any way.
     """
     q, recent = m.picture, m.recent

@@ -122,7 +122,7 @@ class Supervisor:
         self.quit, self._ended = True, why
 
     def interrupt(self) -> None:
-        """Nobody was watching for longer than cars go on by themselves: they stand by now.
+        """There was no supervision for longer than cars go on by themselves: they stand by now.
 
         Words and pictures of before may be of a time that no clock has counted.
         """

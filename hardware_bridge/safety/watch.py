@@ -221,6 +221,6 @@ def _hurry() -> None:
     """Ask for a place before other processes; without the right to, the default has to do."""
     with contextlib.suppress(OSError, AttributeError):
         os.setpriority(os.PRIO_PROCESS, 0, -10)
-    # It computes for a twentieth of the time at most, and whoever it keeps waiting can wait.
+    # It computes for a twentieth of the time at most, and those that it keeps waiting can wait.
     with contextlib.suppress(OSError, AttributeError):
         os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(10))

@@ -53,7 +53,7 @@ class Batch:
 class Codec:
     """Of one key: what is decoded carries a right MAC, what is encoded carries one if it says so.
 
-    Without a key MACs are not checked: whoever has none reads, and believes, every whole frame.
+    Without a key MACs are not checked: a reader without one accepts every whole frame.
     """
 
     def __init__(self, key: bytes | None = None) -> None:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 VERSION = 1
 HOST = 0xFFFF
-"""The node of whoever commands the cars; nodes have 0 to 65534."""
+"""The node of the host that commands the cars; nodes have 0 to 65534."""
 MOST_ROWS = 32
 """[-] Of a message with rows."""
 MOST_FRAME = 512
@@ -194,7 +194,7 @@ COMMAND = Message(
     ),
 )  # fmt: skip
 REMOTE = Message(
-    type=17, name="remote", meaning="somebody with a remote control asks a car for a velocity",
+    type=17, name="remote", meaning="a person with a remote control asks a car for a velocity",
     fields=(
         _to(),
         Field(

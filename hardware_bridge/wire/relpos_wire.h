@@ -126,7 +126,7 @@ typedef struct {
     uint8_t flags; /* brake: stand still, whatever the others say */
 } relpos_command;
 
-/* somebody with a remote control asks a car for a velocity */
+/* a person with a remote control asks a car for a velocity */
 #define RELPOS_REMOTE 17u
 typedef struct {
     uint16_t to; /* node of the car that is meant */

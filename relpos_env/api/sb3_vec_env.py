@@ -49,7 +49,7 @@ class FormationVecEnv(SharedAttributeVecEnv):
 
         Args:
             n_envs: How many.
-            threads: The batch is stepped in so many parts at a time.
+            threads: Number of parts of the batch that are stepped at a time.
             render_mode: None, ``human`` or ``rgb_array``: pictures of the first environment.
             with_truth: Every observation is followed by that of
                 `relpos_env.api.state_space.truth_of_each`, for critics.

@@ -59,7 +59,7 @@ class FormationVectorEnv(VectorEnv[F32, Any, Any]):
             autoreset_mode: ``NextStep``: an environment whose episode is over begins the next one
                 in the next step; ``SameStep``: in the same step, the last observation is in
                 ``infos["final_obs"]``; ``Disabled``: by ``reset(options={"reset_mask": ...})``.
-            threads: The batch is stepped in so many parts at a time.
+            threads: Number of parts of the batch that are stepped at a time.
             render_mode: None or ``rgb_array``; `render` gives a picture of each environment.
             max_episode_steps: Another name of ``max_cycles``; the smaller one counts.
             arguments: Fields of `relpos_env.config.FormationConfig`.

@@ -50,7 +50,7 @@ class EnvCore:
         Args:
             parts: What the environments are made of.
             n_envs: How many.
-            threads: The batch is stepped in so many parts at a time.
+            threads: Number of parts of the batch that are stepped at a time.
             physics: Where the configuration says nothing.
         """
         n_envs = whole_number("n_envs", n_envs, 1, MOST_ENVS)

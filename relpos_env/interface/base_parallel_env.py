@@ -1,4 +1,4 @@
-"""A group of cars as a PettingZoo environment, whoever moves them: a simulation or motors.
+"""A group of cars as a PettingZoo environment, moved by a simulation or by motors.
 
 What PettingZoo promises, agents that come and go, spaces and dicts, is here; what happens in a
 step is the business of a `Group`.
@@ -221,7 +221,7 @@ class BaseFormationParallelEnv(ParallelEnv, ABC):  # type: ignore[misc]
         return rows
 
     def _decode(self, actions: dict[str, Any]) -> tuple[F64, F64]:
-        """Commands of all cars; those of nobody are zero."""
+        """Commands of all cars; those of absent cars are zero."""
         n, mode, agents = len(self.possible_agents), self._actions, self.agents
         if len(actions) != len(agents):
             for agent in actions:

@@ -1,4 +1,4 @@
-"""What cars may know at one instant, whoever provides it: simulation or hardware."""
+"""What cars may know at one instant, from simulation or hardware."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class AgentView(NamedTuple):
 
 
 def make_view(n_envs: int, n_cars: int, n_beams: int = 0) -> AgentView:
-    """A view in which nobody knows anything, and no beam meets anything."""
+    """A view in which nothing is known, and no beam meets anything."""
     own, other = (n_envs, n_cars), (n_envs, n_cars, n_cars)
     return AgentView(
         pos=np.zeros((*other, 2)),

@@ -77,7 +77,7 @@ def _pause(size: SkeletonSize, path: Path, way: float, seconds: float, dt: float
 
 
 def _sway(t: F64, still: float, rng: np.random.Generator) -> F64:
-    """Nobody stands like a statue: the pelvis sways by some millimetres, (time, 3) [m]."""
+    """People do not stand still: the pelvis sways by some millimetres, (time, 3) [m]."""
     hz, phase = rng.uniform(0.15, 0.6, (3, 2)), rng.uniform(0.0, 2.0 * np.pi, (3, 2))
     wave = np.sin(2.0 * np.pi * hz * t[:, None, None] + phase).sum(axis=1)
     sway = np.zeros((len(t), 3))

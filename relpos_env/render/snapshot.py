@@ -1,4 +1,4 @@
-"""What one picture shows: plain arrays, whoever fills them."""
+"""What one picture shows, as plain arrays."""
 
 from __future__ import annotations
 

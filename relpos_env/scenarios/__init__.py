@@ -46,7 +46,7 @@ def scenario(name: str | Path | Scenario) -> Scenario:
         name: One of `SCENARIOS`, the path of a file that ends in `.toml`, or a scenario itself.
 
     Raises:
-        EnvError: No scenario of that name, or one with a person, whom nobody can drive; or
+        EnvError: No scenario of that name, or one with a person, who cannot be driven; or
             something is wrong with the file.
     """
     if isinstance(name, Scenario):

@@ -42,7 +42,7 @@ class Scenario:
     `with_gap` puts both in."""
     n_cars: int = 3
     n_cars_range: tuple[int, int] = (2, 20)
-    """[-] Fewest and most cars that the room is made for, whoever asks for them."""
+    """[-] Fewest and most cars that the room is made for."""
     ring: tuple[float, float]
     """[m] Half axes of the loop on which the cars start and drive round the centre."""
     layout: Layout = "ring"

@@ -1,7 +1,7 @@
 """People with six trackers who exercise in the room of the paper, 3 m x 5 m.
 
 From Armani and Holz, ICRA 2024, section III: trackers on right upper arm, right wrist, right
-hip, left wrist, right knee and left knee; walking, jumping jacks, squats. Nobody drives a
+hip, left wrist, right knee and left knee; walking, jumping jacks, squats. No policy drives a
 person, so these scenarios can be recorded and tracked but not be an environment.
 """
 

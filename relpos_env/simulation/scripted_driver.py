@@ -1,4 +1,4 @@
-"""Whoever drives the cars of a recorded run: people with remote controls, who see the room."""
+"""The drivers of a recorded run: people with remote controls, who see the room."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ class Simulation:
 
         Args:
             scenario: As many cars as it has at most.
-            rng: A child of it is for whoever drives: `driver_rng`.
+            rng: A child of it is for the driver: `driver_rng`.
             seconds: Length of the episode.
         """
         n = scenario.most_cars

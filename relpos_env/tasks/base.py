@@ -41,7 +41,7 @@ class Truth(Protocol):
 
     @property
     def clearance(self) -> F64:
-        """Way to what is nearest to the car's body, (env, car) [m]; infinite where nobody knows."""
+        """Distance to what is nearest to the car's body, (env, car) [m]; infinite if not known."""
 
     @property
     def present(self) -> Bool:
@@ -97,7 +97,7 @@ class Task(ABC):
             state: The truth, of all environments.
             envs: Which begin, contiguous.
             boxes: What stands in the rooms: centre, half width and depth [m], cosine, sine,
-                (env, box, 6), of all environments; None where nobody knows.
+                (env, box, 6), of all environments; None where they are not known.
         """
         start, stop = self._range(envs)
         for env in range(start, stop):

@@ -43,12 +43,12 @@ def begin_decision(bodies, events, t, next_life, speed, steering):
         bodies: Bodies, updated.
         events: Events, updated.
         t: Now, (env) [s].
-        next_life: When somebody comes or goes next, (env) [s].
+        next_life: When a car comes or goes next, (env) [s].
         speed: Commands, (env, car) [m/s], updated.
         steering: Commands, (env, car) [rad], updated.
 
     Returns:
-        In how many environments somebody comes or goes now.
+        In how many environments a car comes or goes now.
     """
     n_due = 0
     for e in range(bodies.done.shape[0]):

@@ -14,7 +14,7 @@ from relpos_env.world.car import CAR, car_record
 
 Array = NDArray[Any]
 NO_BOX = (1e6, 1e6, 0.0, 0.0, 1.0, 0.0)
-"""A place that no box has taken must be in nobody's way."""
+"""A place that no box has taken must be in no car's way."""
 LONG_AGO = -(1 << 40)
 """[-] A step that never was."""
 

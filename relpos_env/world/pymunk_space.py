@@ -45,7 +45,7 @@ Rectangle = tuple[float, float, float, float, float]
 class PhysicsSpace:
     """The cars that are present and all that they can touch.
 
-    The arrays of `Bodies` have the state of cars and boxes too. As long as nobody else has the
+    The arrays of `Bodies` have the state of cars and boxes too. As long as no other code has the
     space, compiled code steps it (`relpos_env.world.solver`); from then on `step` does, by the
     public interface of pymunk, to the same result.
     """
@@ -83,7 +83,7 @@ class PhysicsSpace:
                 self._add(pymunk.Poly(space.static_body, [tuple(c) for c in box.corners()]))
         self._own = set(space.shapes)
         self.is_open = False
-        """True from when somebody else has the space."""
+        """True from when other code has the space."""
         self._rectangles: dict[tuple[Any, ...], Rectangle] = {}
 
     def add_car(self, n: int) -> None:

@@ -181,7 +181,7 @@ class RoomState:
 
 
 def _makes_sense(event: LifeEvent, present: Bool) -> bool:
-    """Whether an event can happen: others were drawn as if nobody ever had to wait outside.
+    """Whether an event can happen: others were drawn as if no car ever had to wait outside.
 
     Two cars at least stay.
     """

@@ -153,7 +153,7 @@ def find_gap(c, s, e, n, t):
     if gap <= c.max_gap[n]:
         return round(gap * c.rate[n]) - 1
     if c.magnetic[n]:
-        # Where it points now, nobody knows; what its gyroscope reads at rest is still true.
+        # Where it points now is not known; what its gyroscope reads at rest is still true.
         start_vqf(s, c, e, n, worst_variance(s.bias, c, e, n))
         m[e, n, SEEN_FIELD] = m[e, n, MOVED] = 0.0
     return 0

@@ -91,7 +91,7 @@ def calibrate_imu(
     if rest.duration < MIN_REST:
         raise CalibrationError(
             f"{rest.duration:.1f} s at rest, expected a phase of at least {MIN_REST:g} s in which "
-            "nobody touches the node"
+            "the node is not touched"
         )
     poses = _poses(rest)
     if level:

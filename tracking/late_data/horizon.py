@@ -210,7 +210,7 @@ class Horizon:
         state.released[env] = -np.inf
 
     def _check_memory(self, state: HorizonState) -> None:
-        """Nobody goes on with arrays that others no longer read."""
+        """No kernel goes on with arrays that others no longer read."""
         whole, shared = self._whole or (self, state)
         if self.state is not state or whole.state is not shared:
             raise ConfigError("horizon: room was made since; bind it, or take its part, again")

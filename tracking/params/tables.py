@@ -77,7 +77,7 @@ class TableReader:
             table: Of a TOML file.
             where: The table is, for messages.
             base: What the table does not say; None are the defaults of the class.
-            beside: Keys that somebody else reads.
+            beside: Keys that another reader takes.
 
         Raises:
             ConfigError: Names the file and the key; or what `where` says.

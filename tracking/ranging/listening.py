@@ -1,6 +1,6 @@
 """What one node makes of the messages that it hears: who is there, and ranges of all pairs.
 
-Every message tells when it was sent and when its sender heard each of the others. Whoever
+Every message tells when it was sent and when its sender received each of the others. A node that
 also heard those others knows both ends of their messages, and so the range of two nodes that
 it is not one of.
 """

@@ -53,7 +53,7 @@ class Members:
         Args:
             peers: Who was heard, by this node or by others.
             at: Begin of the next round, own clock.
-            drop_after: Rounds in which nobody hears a member until it is dropped.
+            drop_after: Rounds without a message of a member until it is dropped.
         """
         # What the last to speak have heard is told a round later: look two rounds back.
         since, self._asked = self._asked[0], (self._asked[1], at)

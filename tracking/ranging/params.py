@@ -28,7 +28,7 @@ class SessionParams:
     idle: tuple[float, float] = (0.005, 0.02)
     """[s] Pause of an initiator that is alone, drawn again every time."""
     drop_after: int = 5
-    """[rounds] A member that nobody has heard for so long is dropped."""
+    """[rounds] A member that no node has received for so long is dropped."""
     first_check: tuple[float, float] = (0.2, 1.2)
     """[s] After joining, a responder once keeps silent in its own slot and listens whether
     another one uses its ID; when, is drawn from this interval."""

@@ -37,7 +37,7 @@ class Peer:
     fresh: bool = False
     """Heard since this node's own last message."""
     missed: int = 0
-    """Rounds in which nobody heard it."""
+    """Rounds without a message of it."""
     misfits: int = 0
     """Messages in a row that do not fit its clock."""
     silences: int = 0
@@ -114,7 +114,7 @@ class Peers:
         return max(peer.heard, peer.reported) > since
 
     def table(self, members: tuple[int, ...], most: int) -> list[Entry]:
-        """Rows of the next message, so many at most: the members, then whoever else was heard."""
+        """Rows of the next message, at most: the members, then other nodes received."""
         others = sorted(k for k, peer in self if peer.fresh and k not in members)
         return [self._row(k) for k in (*members, *others)][:most]
 

@@ -255,7 +255,7 @@ class Session:
             return
         turns = self._turns
         if self.role is Role.INITIATOR and self._dice.bits(2) == 0:
-            turns.check_at = self._time.now  # not in step with whoever spoke at the same time
+            turns.check_at = self._time.now  # not in step with a node that sent at the same time
         turns.unreadable(self._time.now, follows=self.role is Role.RESPONDER)
         if turns.before in (Waiting.TAKEOVER, Waiting.WATCHDOG):
             turns.request_missing(self.root)

@@ -21,7 +21,7 @@ CHECK_ROUNDS = 64
 class Waiting(Enum):
     """What the deadline is for."""
 
-    START = "nobody may be there: become initiator"
+    START = "no other node may be there: become initiator"
     FRAME = "a frame is coming in"
     TURN = "own turn: speak if the gap stays silent"
     SLOT = "the slot is silent if no preamble comes"
@@ -116,7 +116,7 @@ class Turns:
             root: The initiator that this node follows.
 
         Returns:
-            False if it was the slot of the request and nobody hears the initiator any more.
+            False if it was the slot of the request and no node receives the initiator any more.
         """
         n, missing = len(self._members), self.at_request
         node = root if missing else self._members.ids[self.cursor]

@@ -1,4 +1,4 @@
-"""Who drives the cars that are timed: somebody who follows the task, or chance.
+"""Who drives the cars that are timed: a controller that follows the task, or chance.
 
 Both give shares of the largest speed and steering, (env, car, 2), for a whole batch.
 """

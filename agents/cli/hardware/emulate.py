@@ -105,7 +105,7 @@ def emulate(
             f"ports {', '.join(rig.ports)} and swarm.toml in {rig.folder}"
         )
 
-    # Whoever started it in the background ends it so; the ports are to go then, too.
+    # A process in the background is ended so; the ports are to go then, too.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     result = run(
         folder=folder,

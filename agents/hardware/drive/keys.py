@@ -26,7 +26,7 @@ NO_KEYS = "no keys, cars are stopped: another program has the terminal, fg takes
 
 
 def check_stop_source(source: str) -> None:
-    """See that somebody can stop the cars.
+    """See that a person can stop the cars.
 
     Args:
         source: ``terminal`` or ``stdin``.

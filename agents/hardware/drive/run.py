@@ -161,7 +161,7 @@ class _Orders:
 def _drive(
     env: HardwareFormationEnv, driver: Driver, log: DriveLog, is_over: Callable[[], bool]
 ) -> None:
-    """Decide until the time is up, the task is done, or somebody says so."""
+    """Decide until the time is up, the task is done, or it is stopped."""
     for space in env.observation_spaces.values():
         driver.act(np.zeros(space.shape, np.float32))  # loads what is loaded when first used
     observations, _ = env.reset()

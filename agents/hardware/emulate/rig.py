@@ -73,7 +73,7 @@ class EmulatedRig:
         ids = self.constellation.ids
         for node in ids:
             make_firmware(options.driver, node, options.driver_options, self.options.car_key)
-        # Links must mean the same wherever somebody else stands.
+        # Links must mean the same in any working directory.
         self.folder = None if folder is None else folder.resolve()
         if self.folder is not None:
             try:

@@ -1,4 +1,4 @@
-"""The swarm.toml of an emulation: what somebody would write who had plugged the devices in."""
+"""The swarm.toml of an emulation: what a person would write who had plugged the devices in."""
 
 from __future__ import annotations
 

@@ -74,7 +74,7 @@ class VirtualFeed:
             watchdog={config.slot_of(car): car.watchdog for car in config.cars if car.watchdog},
             believed={config.slot_of(car): Believed(car, {}) for car in config.cars},
         )
-        """Gate and drivers of the cars; whoever watches may ask it, but tells it nothing."""
+        """Gate and drivers of the cars; observers may read it, but send it nothing."""
         self._up: set[int] = set()
         self._decided: tuple[int, Picture] | None = None
         self.report: Report | None = None

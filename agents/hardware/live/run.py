@@ -73,7 +73,7 @@ def _listen(
     watch: Watch | None,
     notices: list[tuple[float, str]],
 ) -> None:
-    """Decide until the time is up or somebody says so."""
+    """Decide until the time is up or it is stopped."""
     intake = bridge.swarm.intake
     while seconds is None or intake.seconds(monitor.t_ns) < seconds:
         t_ns = bridge.feed.advance()

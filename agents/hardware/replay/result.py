@@ -67,7 +67,7 @@ class ReplayResult:
     lost: tuple[tuple[float, int, str], ...]
     """Where the recorder had to drop records: time [s], how many, why."""
     stopped: bool
-    """Whether somebody ended the replay before the recording did."""
+    """Whether the replay was ended before the recording did."""
     realtime_factor: float
     """[-] Recorded time over the time that the replay took."""
     scored: Scored | None = None

@@ -20,7 +20,7 @@ class SwarmRolloutBuffer(RolloutBuffer):  # type: ignore[misc]
     ) -> None:
         """Generalised advantages; what comes after a car has gone says nothing about its action.
 
-        Nobody learns what an absent car's zeros are worth, so nothing may rest on it: the step
+        The value of an absent car's zeros is not learned, so nothing may rest on it: the step
         after which a car is gone, for a while or for good, has no advantage, and no other looks
         beyond it.
 

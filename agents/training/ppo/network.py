@@ -191,7 +191,7 @@ class _Where:
         self.others = _join([stands[f.name] for f in fields if f.per_other])
         self.own = _join([stands[f.name] for f in fields if not f.per_other])[0]
         self.near = stands["near"].ravel() if "near" in stands else None
-        # Somebody counts whose position is known, or who has a place; the newest says.
+        # A car counts whose position is known, or that has a place; the newest says.
         self.newest = {n: np.ascontiguousarray(stands[n][0, :, 0]) for n in ("mask", "wanted")}
         self.gain = np.ones(self.size, np.float32)
         for f in fields:

@@ -45,7 +45,7 @@ class PwmFirmware:
         return readings
 
     def encode(self, readings: list[Reading]) -> bytes:
-        """What the board says of its remote control, which nobody touches."""
+        """What the board reports of its remote control, which is not touched."""
         options = self._options
         return b"%d, %d\r\n" % (options.steering_centre, options.throttle_centre)
 

@@ -29,6 +29,6 @@ class Dwm1001Encoder:
 
 
 def distances_line(ranges: list[RangeReading]) -> str:
-    """The line; anchors whose place nobody entered stand at the origin."""
+    """The line; anchors whose position was not entered stand at the origin."""
     anchors = (f",AN{k},{r.to},0.00,0.00,0.00,{r.distance:.2f}" for k, r in enumerate(ranges))
     return f"DIST,{len(ranges)}{''.join(anchors)}\r\n"

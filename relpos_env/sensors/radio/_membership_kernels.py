@@ -35,7 +35,7 @@ def note_members(air, members, t, events, e, k):
         if air.nodes[e, n].on and air.sessions[e, n].role == INITIATOR:
             table |= air.sessions[e, n].members
     if table == 0:
-        return k  # nobody leads, and nobody knows
+        return k  # no node leads
     for n in range(members.shape[1]):
         if k >= events.t.shape[1]:
             break

@@ -239,7 +239,7 @@ def detect(p, radio, c, seed, air, scene, s, r, t, dt):
 
 @small_kernel
 def end_message(p, radio, c, seed, air, scene, s, t, dt, out, e):
-    """A message is over: whoever was locked on it has it, and all are free for others."""
+    """A message is over: radios that were locked on it have it, and all are free for others."""
     n = air.nodes.shape[0]
     air.flights[s].active, air.flights[s].end = False, np.inf
     air.nodes[s].sent += 1

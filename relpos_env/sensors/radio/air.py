@@ -208,7 +208,7 @@ class Air:
             self._take(r, t, self._session(r).preamble(local_now(self._nodes, r, t) % MODULUS))
 
     def _end(self, s: int, t: float) -> None:
-        """A message is over: whoever was locked on it has it, and all are free for others."""
+        """A message is over: radios that were locked on it have it, and all are free for others."""
         message = self._queue[s].pop(0)
         self._nodes[s]["sent"] += 1
         free = [s]

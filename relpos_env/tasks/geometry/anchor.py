@@ -1,4 +1,4 @@
-"""Where a formation can stand: nobody is asked for a place that an obstacle takes."""
+"""Where a formation can stand: no car is asked for a place that an obstacle takes."""
 
 from __future__ import annotations
 

@@ -74,7 +74,7 @@ def formation_error(env, pos, present, target, error):
 
 @small_kernel
 def all_within(env, pos, present, goal, tolerance):
-    """True if somebody is present, and all who are stand within a distance [m] of their goals."""
+    """True if a car is present, and all that are stand within a distance [m] of their goals."""
     anybody = False
     for k in range(present.shape[1]):
         if present[env, k]:

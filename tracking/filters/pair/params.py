@@ -45,7 +45,7 @@ class MdsParams:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RangeErrorParams:
-    """How a range errs in sight: white noise, and a part that lasts while nobody moves."""
+    """How a range errs in sight: white noise, and a part that lasts while no node moves."""
 
     white_std: float = 0.06
     """[m] Of a single range."""

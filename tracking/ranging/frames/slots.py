@@ -22,7 +22,7 @@ class Slots:
         self.turnaround = ticks(phy.turnaround)
         self.gap = ticks(phy.gap)
         self.silent = ticks(phy.sense + phy.turnaround)
-        """What a slot costs in which nobody speaks."""
+        """What a slot costs in which no node transmits."""
         self.join = ticks(airtime(phy, FIXED_BYTES) + phy.gap)
         """A message without a table, with its gap."""
         self.longest = ticks(airtime(phy, phy.max_frame) + phy.gap)
