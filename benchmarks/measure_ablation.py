@@ -80,6 +80,7 @@ MECHANISMS: dict[str, Callable[[TrackerParams], TrackerParams]] = {
     "settling orientations": lambda p: replace(
         p, orientation=replace(p.orientation, settling=ALWAYS)
     ),
+    "waiting for orientations": part("alignment", orientation_patience=ALWAYS),
     "heading error": vehicles(heading_std=ALWAYS, first_heading_std=None),
     "heading error at first": vehicles(first_heading_std=None),
     "null space of rotations": part("update", follow_share=NEVER, follow_false=NEVER),
