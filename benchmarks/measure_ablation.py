@@ -170,8 +170,8 @@ def tables(lines: list[str]) -> str:
     found = {(row["without"], row["kind"]): row for row in rows}
     groups: dict[str, list[str]] = {}
     for kind in kinds:
-        of = kind.partition(",")[0] if "," in kind else kind.partition(" ")[0]
-        groups.setdefault(of if of in ("late", "exact", "world") or "," in kind else "", []).append(
+        first, fault = kind.split(" ")[0], kind.partition(", ")[2]
+        groups.setdefault(first if fault or first in ("late", "exact", "world") else "", []).append(
             kind
         )
     parts = []

@@ -1,7 +1,7 @@
 """What is done about a fault: one action for each of the catalogue (`faults.ACTIONS`).
 
-A faulty node: an offset common to its ranges becomes a state and, with outliers, its position and
-velocity become uncertain. Its ranges then move the node and the offset and hardly the others.
+A faulty node: an offset common to its ranges becomes a state. Its ranges then move the node and the
+offset and hardly the others.
 
 A node at a wrong position: after a start or a join from few ranges a node can settle on the wrong
 side of the others. Some of its ranges fit, the others hardly count, and it stays. In space it can
@@ -49,22 +49,9 @@ def follow_node_faults(c, s, layout, t):
         has_outliers = i == worst and node_outlier_ratio(c, s, layout, i, t) > c.outlier_ratio
         if has_outliers or bias_ratio(c, s, layout, i, t) > c.fault_hysteresis**2:
             activate_node_bias(c, s, layout, i, c.offset_rate**2 * dt)
-            if has_outliers:
-                inflate_node(c, s, i, c.fault_rate**2 * dt)
             node.t_fault = t
         elif t - node.t_fault > c.fault_time:
             node.fault = NONE
-
-
-@kernel
-def inflate_node(c, s, i, variance):
-    """Know less about where node i is and how it moves."""
-    node = s.nodes[i]
-    for h in range(s.alive.shape[0]):
-        if s.alive[h] and not node.static:
-            for k in range(c.d):
-                s.P[h, node.i_pos + k, node.i_pos + k] += variance
-                s.P[h, node.i_vel + k, node.i_vel + k] += variance
 
 
 @kernel

@@ -43,8 +43,6 @@ class SupervisionParams:
     """[-] A fault lasts while its residual is above this share of its limit."""
     fault_time: float = 2.0
     """[s] And for so long after that."""
-    fault_rate: float = 0.7
-    """[m/sqrt(s), m/s/sqrt(s)] Process noise of a faulty node's position and velocity."""
     offset_std: float = 0.7
     """[m] Standard deviation of the range offset that a faulty node may have at first."""
     offset_rate: float = 1.0
