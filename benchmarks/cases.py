@@ -3,6 +3,7 @@
 Faults are those of one node from 25 s on. "Late" runs are those in which the tracker begins while
 everything moves; "robots" are late cars whose wheels are not known. "Exact" groups begin in motion
 as well, five in space with exact measurements, three in the plane with 5 cm of noise on ranges.
+Vehicles in a "convoy" follow each other (`tests/convoy.py`).
 Recordings are read from `RELPOS_DATA`, else `../shared/data`.
 """
 
@@ -21,6 +22,7 @@ import space_runs
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from agents.simulation.simulate import simulate
+from tests.convoy import Convoy
 from tests.exact_motion import ExactGroup
 from tests.second_world.record import record
 from tests.second_world.world import draw
@@ -81,7 +83,8 @@ def case(kind: str, seed: int) -> Case:
 
     Args:
         kind: Of run: a scenario, ``hand``, ``drones``, the name of a recording, ``world KIND``,
-            ``exact VEHICLE``; ``KIND, FAULT`` is one with a fault, ``late KIND`` begins in motion.
+            ``exact VEHICLE``, ``convoy VEHICLE``; ``KIND, FAULT`` is one with a fault, ``late
+            KIND`` begins in motion.
         seed: Of its random numbers.
     """
     first, _, rest = kind.partition(" ")
@@ -94,6 +97,8 @@ def case(kind: str, seed: int) -> Case:
         return late(case("cars-nlos" if rest == "robots" else rest, seed), seed, rest == "robots")
     if first == "exact":
         return exact(rest, seed)
+    if first == "convoy":
+        return of_group(Convoy(rest, 3 + seed % 2, seed), 60.0)
     if kind in ("hand", "drones"):
         run = getattr(space_runs, kind)(seed)
         t = np.arange(0.5, space_runs.SECONDS - 0.1, 0.1)
@@ -121,6 +126,11 @@ def exact(vehicle: str, seed: int) -> Case:
     if vehicle == "robot":
         ranges = group.block.kind[0] == Kind.RANGE
         group.block.values[0, ranges, 0] += 0.05 * rng.standard_normal(ranges.sum())
+    return of_group(group, seconds)
+
+
+def of_group(group: ExactGroup, seconds: float) -> Case:
+    """A group of the tests with its truth."""
     t = np.arange(0.2, seconds - 0.5, 0.1)
     truth = group.pairs(t)
     return Case(group.constellation, group.block, t, truth, np.ones(truth.shape[:2], dtype=bool))

@@ -89,6 +89,7 @@ MECHANISMS: dict[str, Callable[[TrackerParams], TrackerParams]] = {
     "static start": part("alignment", settling=ALWAYS, orienting=ALWAYS),
     "patience with wheels": part("alignment", wheels_after=ALWAYS),
     "two sides of a newcomer": part("start", join_spread=ALWAYS),
+    "split rotations": part("alignment", split_std=NEVER),
     "reflections of degenerate layouts": part("alignment", degenerate=ALWAYS),
     "merging": part("start", merge_distance=ALWAYS),
     "fault: bias": joint(lambda p: replace(p, node_bias_limit=NEVER)),
@@ -130,7 +131,7 @@ def rows(n_runs: int, names: list[str]) -> Iterator[dict[str, Any]]:
     """A row for each mechanism and kind of run."""
     kinds = ["cars-los", "cars-nlos", "human", "drones", "hand"]
     kinds += [f"late {kind}" for kind in ("cars-nlos", "robots", "human", "drones", "hand")]
-    kinds += ["exact robot", "exact hand", "exact drone"]
+    kinds += ["convoy car", "convoy robot", "exact robot", "exact hand", "exact drone"]
     kinds += [f"world {kind}" for kind in WORLDS]
     faults = ("offset", "outliers", "made up", "silent", "frozen")
     kinds += [f"{kind}, {fault}" for kind in ("cars-nlos", "drones") for fault in faults]
@@ -171,9 +172,9 @@ def tables(lines: list[str]) -> str:
     groups: dict[str, list[str]] = {}
     for kind in kinds:
         first, fault = kind.split(" ")[0], kind.partition(", ")[2]
-        groups.setdefault(first if fault or first in ("late", "exact", "world") else "", []).append(
-            kind
-        )
+        groups.setdefault(
+            first if fault or first in ("late", "exact", "convoy", "world") else "", []
+        ).append(kind)
     parts = []
     for some in groups.values():
         head = ["without", *some]

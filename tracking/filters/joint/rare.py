@@ -20,6 +20,7 @@ from tracking.filters.joint.hypotheses.bank import (
     challenge,
     drop_timed_out,
     remove_node,
+    split_rotation,
 )
 from tracking.filters.joint.hypotheses.initialisation import join, start
 from tracking.filters.joint.hypotheses.static_initialisation import spawn_rotation_hypotheses
@@ -70,6 +71,13 @@ def modes(coefficients, layout, state, work, t):
     """Move each hypothesis to its mode of the rotation."""
     cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
     monitor_modes(coefficients[0], by_reference(one_env(state, cursor[ENV])), layout)
+
+
+@kernel
+def split(coefficients, layout, state, work, t):
+    """Follow all rotations and mirror images of a group whose rotation is too uncertain."""
+    cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
+    split_rotation(coefficients[0], by_reference(one_env(state, cursor[ENV])), layout)
 
 
 @kernel
@@ -149,6 +157,7 @@ ACTIONS: dict[int, tuple[Rare, ...]] = {
     workspace.SPAWN: (spawn,),
     workspace.STALE: (stale,),
     workspace.TIME_OUT_LATER: (time_out,),
+    workspace.SPLIT: (split,),
     workspace.REFLECT: (reflect,),
     workspace.CHALLENGE: (challenge_in_plane,),
     workspace.REINITIALISE: (reinitialise,),

@@ -13,9 +13,9 @@ from tracking.maths.covariance import ROOM, STATES
 
 # What is rare and large is compiled apart (`rare`). In the order in which a range needs them:
 (
-    NOTHING, TIME_OUT, SPAWN, STALE, SUPERVISED, TIME_OUT_LATER, MODES_STEP, REFLECT, CHALLENGE,
-    REINITIALISE, START, JOIN, JOIN_OTHER, REMOVE,
-) = range(14)  # fmt: skip
+    NOTHING, TIME_OUT, SPAWN, STALE, SUPERVISED, TIME_OUT_LATER, MODES_STEP, SPLIT, REFLECT,
+    CHALLENGE, REINITIALISE, START, JOIN, JOIN_OTHER, REMOVE,
+) = range(15)  # fmt: skip
 
 ENV, EVENT, OUT, DONE, NODE, FLAG = range(6)
 """Elements of `Workspace.cursor`."""

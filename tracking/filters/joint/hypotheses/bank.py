@@ -6,7 +6,12 @@ side. So the mirror image is filtered as well from there, until one is unlikely.
 
 A hypothesis whose ranges fit badly for seconds is rotated or reflected wrongly, by a start or join
 from few ranges: ranges alone fit any rotation, accelerations do not. Then all rotations and
-reflections compete again.
+reflections compete again. So they do where no motion has shown for long how a group in the plane is
+turned, as in cars that drive one behind the other.
+
+References:
+    [1] Alspach and Sorenson, Nonlinear Bayesian estimation using Gaussian sum approximations, IEEE
+        Trans. Automatic Control 17 (1972) 439.
 """
 
 from __future__ import annotations
@@ -16,6 +21,7 @@ import numpy as np
 from tracking.filters.best_hypothesis import choose_best
 from tracking.filters.first_ranges import forget_first
 from tracking.filters.joint.ekf.gyro_bias import last_state
+from tracking.filters.joint.ekf.heading_gauge import heading_functional
 from tracking.filters.joint.ekf.scalar_update import reset_state
 from tracking.filters.joint.hypotheses.alignment import (
     CANDIDATES,
@@ -77,10 +83,25 @@ def challenge(c, s, layout):
     for p in range(s.pairs.shape[0]):
         if s.nodes[s.pairs[p].i].present and s.nodes[s.pairs[p].j].present:
             initialise_pair(c, s, h, p, s.nlos[h, p])
-    spawn_rotations(c, s, layout, h)
-    for k in range(s.alive.shape[0]):
-        if s.alive[k] and k != h:
-            s.loglik[k] -= c.challenger_penalty
+    spawn_rotations(c, s, layout, h, 0.0)
+
+
+@allocating_kernel
+def split_rotation(c, s, layout):
+    """Follow all rotations and mirror images in place of one whose rotation is too uncertain.
+
+    A Gaussian so wide is no longer moved as its mean is: it becomes a sum of narrow ones [1], each
+    as uncertain as the gap between two. They are as likely as it says, but for its tails, which are
+    nothing that it knows.
+    """
+    group, A = s.group[0], np.zeros(c.n)
+    h = group.best
+    heading_functional(s, h, -1, A)
+    w = s.P[h] @ A
+    variance = A @ w
+    s.P[h] -= np.outer(w, w) * ((1.0 - c.rotation_var / variance) / variance)
+    s.loglik[h], group.heading_gauge_var = 0.0, c.rotation_var
+    spawn_rotations(c, s, layout, h, variance)
 
 
 @kernel

@@ -7,6 +7,8 @@ filtered, and the others are spawned from it when the first node moves.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from tracking.filters.joint.ekf.heading_gauge import add_rotation_uncertainty, heading_variance
@@ -97,7 +99,7 @@ def spawn_rotation_hypotheses(c, s, layout, work):
         if original < 0:
             return
         was_alive[original] = False
-        spawn_rotations(c, s, layout, original)
+        spawn_rotations(c, s, layout, original, math.inf)
 
 
 @kernel
@@ -113,8 +115,12 @@ def reset_heading_uncertainty(c, s, h, work):
 
 
 @allocating_kernel
-def spawn_rotations(c, s, layout, original):
-    """Follow a hypothesis in all other rotations and mirrored, while the bank has room."""
+def spawn_rotations(c, s, layout, original, variance):
+    """Follow a hypothesis in all other rotations and mirrored, while the bank has room.
+
+    Each is less likely by its angle in a Gaussian of this variance [rad2], by `challenger_penalty`
+    at most, like mirror images; all are as likely where it is infinite.
+    """
     d = c.d
     first = layout.rotations[0, :d, :d].copy()
     for r in range(1, layout.rotations.shape[0]):
@@ -122,3 +128,9 @@ def spawn_rotations(c, s, layout, original):
         if h >= 0:
             turn = layout.rotations[r, :d, :d].copy() @ first.T.copy()
             rotate_hypothesis(c, s, h, np.ascontiguousarray(turn))
+            angle, penalty = math.acos(min(max(turn[0, 0], -1.0), 1.0)), c.challenger_penalty
+            if variance == math.inf:
+                penalty = 0.0
+            elif d == 2 and np.linalg.det(turn) > 0.0 and variance > 0.0:
+                penalty = min(0.5 * angle * angle / variance, penalty)
+            s.loglik[h] -= penalty

@@ -12,6 +12,7 @@ from tracking.filters.joint.ekf.workspace import (
     NOTHING,
     REFLECT,
     REINITIALISE,
+    SPLIT,
     TIME_OUT_LATER,
 )
 from tracking.filters.joint.hypotheses.alignment import is_linear
@@ -47,6 +48,9 @@ def supervise(c, s, layout, work, t, done):
     if done < REFLECT:
         prune_bank(c, s)
         update_heading_variance(c, s)
+        is_wide = s.group[0].heading_gauge_var > c.split_std**2
+        if done < SPLIT and is_wide and s.group[0].n_alive == 1:
+            return SPLIT
         if needs_reflection(c, s):
             return REFLECT
     is_helpless = done == REINITIALISE and work.cursor[FLAG] == 0
