@@ -80,7 +80,6 @@ MECHANISMS: dict[str, Callable[[TrackerParams], TrackerParams]] = {
     "settling orientations": lambda p: replace(
         p, orientation=replace(p.orientation, settling=ALWAYS)
     ),
-    "waiting for orientations": part("alignment", orientation_patience=ALWAYS),
     "heading error": vehicles(heading_std=ALWAYS, first_heading_std=None),
     "heading error at first": vehicles(first_heading_std=None),
     "null space of rotations": part("update", follow_share=NEVER, follow_false=NEVER),
@@ -172,9 +171,8 @@ def tables(lines: list[str]) -> str:
     groups: dict[str, list[str]] = {}
     for kind in kinds:
         first, fault = kind.split(" ")[0], kind.partition(", ")[2]
-        groups.setdefault(
-            first if fault or first in ("late", "exact", "convoy", "world") else "", []
-        ).append(kind)
+        is_own = fault or first in ("late", "exact", "convoy", "world")
+        groups.setdefault(first if is_own else "", []).append(kind)
     parts = []
     for some in groups.values():
         head = ["without", *some]

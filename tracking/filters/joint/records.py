@@ -8,8 +8,7 @@ NODE = np.dtype(
     [
         ("t_pre", "f8"),  # time up to which the inertial samples are summed [s]
         ("t_state", "f8"),  # time of the last STATE event [s]
-        ("t_seen", "f8"),  # time of the first range it took part in, since it last left [s]
-        ("t_last_range", "f8"),  # time of the last one [s]
+        ("t_last_range", "f8"),  # time of the last range it took part in [s]
         ("interval", "f8"),  # running mean of the time between two of these [s]
         ("antenna", "i8"),  # with which
         ("cos_yaw", "f8"),  # of the last STATE event, as measured

@@ -42,10 +42,7 @@ from tracking.models.range_bias import slow_error_var
 def can_start(c, s, layout, members, t):
     """How many nodes can start, 0 for none; writes them."""
     m = choose_members(c, s, layout, members, t)
-    for a in range(m):
-        if awaits_orientation(c, s.nodes[members[a]], t):
-            return 0
-    return m
+    return 0 if m == 0 or is_motion_unknown(c, s, members, m, t) else m
 
 
 @allocating_kernel
@@ -106,16 +103,17 @@ def start(c, s, layout, t):
 
 
 @kernel
-def awaits_orientation(c, node, t):
-    """True while a node's samples are too few to show whether it moves, or it has no orientation.
+def is_motion_unknown(c, s, members, m, t):
+    """True while a node's samples are too few to show whether it moves.
 
     Nodes at rest are followed in one rotation that stands for all; of nodes that move it would use
-    the accelerations in a wrong one. Without accelerations a group that moves turns, within
-    seconds, by more than a linear filter can follow.
+    the accelerations in a wrong one.
     """
-    if node.static:
-        return False
-    return is_settling(c, node, t) if node.has_state else t - node.t_seen < c.orientation_patience
+    for a in range(m):
+        node = s.nodes[members[a]]
+        if node.has_state and not node.static and is_settling(c, node, t):
+            return True
+    return False
 
 
 @kernel
@@ -201,8 +199,6 @@ def can_join(c, s, layout, new, ready, t):
     """With how many others a node is ready to join them, 0 if too few; writes them."""
     n = s.nodes.shape[0]
     n_present, n_ready = 0, 0
-    if awaits_orientation(c, s.nodes[new], t):
-        return 0
     for k in range(n):
         if s.nodes[k].present:
             n_present += 1

@@ -80,8 +80,6 @@ class AlignmentParams:
 
     settling: float = 0.5
     """[s] The first samples of a node look like motion: its orientation is still being found."""
-    orientation_patience: float = 2.0
-    """[s] A node without an orientation so long after its first range has no IMU."""
     orienting: float = 1.5
     """[s] Rotation means nothing for so long."""
     wheels_after: float = 4.0

@@ -24,8 +24,6 @@ def note_seen(c, node, t):
     """Note that a node takes part in a range, and how often it does."""
     if node.seen:
         update_interval(c, node, t - node.t_last_range)
-    else:
-        node.t_seen = t
     node.seen, node.t_last_range = True, t
 
 
