@@ -32,7 +32,7 @@ from tracking.log import read_log
 from tracking.measurements import Kind
 
 FIRST = 7000
-"""Seed of the first run, of the second world 0 for it; no parameter was chosen on these runs."""
+"""Seed of the first run, of the second world 0 for it; no number was chosen on these runs."""
 RECORDINGS = ("isas_walk1", "inrol_env1")
 FAULT_AT = 25.0
 """[s]"""

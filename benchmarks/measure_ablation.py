@@ -72,7 +72,7 @@ MECHANISMS: dict[str, Callable[[TrackerParams], TrackerParams]] = {
     "level vehicles": vehicles(levelled=False),
     "impacts": vehicles(impact_threshold=None),
     "zero velocity": vehicles(rests=False),
-    "gliding nodes": part("update", glide_nis=NEVER),
+    "motion that looks like rest": part("update", glide_nis=NEVER),
     "bias of accelerations": vehicles(bias_std=ALWAYS, vertical_bias_std=ALWAYS),
     "offset of accelerometers": vehicles(offset_std=None),
     "residual bias of gyroscopes": vehicles(gyro_std=ALWAYS, gyro_drift=ALWAYS),
@@ -86,7 +86,7 @@ MECHANISMS: dict[str, Callable[[TrackerParams], TrackerParams]] = {
     "null space at every range": part("alignment", gauge_std=NEVER),
     "modes apart": part("alignment", mode_std=0.15),
     "static start": part("alignment", settling=ALWAYS, orienting=ALWAYS),
-    "patience with wheels": part("alignment", wheels_after=ALWAYS),
+    "delay of wheel likelihoods": part("alignment", wheels_after=ALWAYS),
     "two sides of a newcomer": part("start", join_spread=ALWAYS),
     "split rotations": part("alignment", split_std=NEVER),
     "reflections of degenerate layouts": part("alignment", degenerate=ALWAYS),
@@ -163,7 +163,7 @@ def rows(n_runs: int, names: list[str]) -> Iterator[dict[str, Any]]:
 
 
 def tables(lines: list[str]) -> str:
-    """Rows as tables in Markdown: in motion from rest, begun late, of the second world, faults."""
+    """Rows as tables in Markdown, one for each group of kinds."""
     rows = [json.loads(line) for line in lines]
     kinds = list(dict.fromkeys(row["kind"] for row in rows))
     names = list(dict.fromkeys(row["without"] for row in rows))

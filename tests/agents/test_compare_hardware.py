@@ -98,7 +98,7 @@ def test_the_report_has_dashes_and_no_films(result):
     assert {len(r) for r in short_rows(result, "emulated cars-nlos")} == {len(SHORT_HEADER)}
     text = "\n".join(notes(result))
     assert "3 episodes of 1 s each, in rounds" in text
-    assert "what the cars believed" in text
+    assert "what the cars estimated" in text
     assert "Left out: consensus on truth" in text
     files = compare_files(result)
     assert set(files) == {

@@ -19,7 +19,6 @@ import hashlib
 import logging
 import re
 from collections.abc import Iterator
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +31,7 @@ from numba.core.types import Record
 from numba.core.types.misc import unliteral
 from numba.core.untyped_passes import ExtractByteCode
 
-from tracking.kernels.fingerprint import fingerprint
+from tracking.kernels.fingerprint import fingerprint, name_of_record
 from tracking.kernels.processors import fitting_levels
 
 _FORMAT = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
@@ -44,19 +43,7 @@ MANY = 5
 _log = logging.getLogger("tracking.kernels.jit")
 _kernels: dict[tuple[str, str], Any] = {}
 """Dispatchers by module and name, for units that are called by cached code."""
-
-
-@lru_cache
-def _name_of_record(record: Any) -> tuple[str, tuple[str]]:
-    """A record in the names of machine code: a hash of its fields.
-
-    Numba has a number of the process there. So code from the disk and code of this process can
-    have one name for functions of different records, and be taken for each other.
-    """
-    return "Record", (hashlib.sha256(record.name.encode()).hexdigest()[:20],)
-
-
-setattr(Record, "mangling_args", property(_name_of_record))  # noqa: B010
+setattr(Record, "mangling_args", property(name_of_record))  # noqa: B010
 
 
 def compile_as_unit(compiled: Any) -> None:

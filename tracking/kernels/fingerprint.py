@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator
 from dis import opmap
+from functools import lru_cache
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
@@ -36,6 +37,16 @@ def fingerprint(kernel: Any) -> str:
                 sha.update(f"{name}={_describe(function.__globals__[name])};".encode())
         found = kernel._fingerprint = sha.hexdigest()
     return found
+
+
+@lru_cache
+def name_of_record(record: Any) -> tuple[str, tuple[str]]:
+    """A record in the names of machine code: a hash of its fields.
+
+    Numba has a number of the process there. So code from the disk and code of this process can
+    have one name for functions of different records, and be taken for each other.
+    """
+    return "Record", (hashlib.sha256(record.name.encode()).hexdigest()[:20],)
 
 
 def _code_parts(code: CodeType) -> Iterator[str]:

@@ -30,7 +30,7 @@ def kernel(function: Function) -> Function:
 
 
 def allocating_kernel(function: Function) -> Function:
-    """A kernel that makes arrays of its own: what runs now and then, not for every measurement.
+    """A kernel that makes arrays of its own, small ones where it runs for many measurements.
 
     It counts who holds them. So it must not take an array that a plain kernel returns, which
     is not counted.

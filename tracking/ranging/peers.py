@@ -114,7 +114,7 @@ class Peers:
         return max(peer.heard, peer.reported) > since
 
     def table(self, members: tuple[int, ...], most: int) -> list[Entry]:
-        """Rows of the next message, at most: the members, then other nodes received."""
+        """At most `most` rows of the next message: the members, then other nodes received."""
         others = sorted(k for k, peer in self if peer.fresh and k not in members)
         return [self._row(k) for k in (*members, *others)][:most]
 

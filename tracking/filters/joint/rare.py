@@ -77,7 +77,8 @@ def modes(coefficients, layout, state, work, t):
 def split(coefficients, layout, state, work, t):
     """Follow all rotations and mirror images of a group whose rotation is too uncertain."""
     cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
-    split_rotation(coefficients[0], by_reference(one_env(state, cursor[ENV])), layout)
+    s = by_reference(one_env(state, cursor[ENV]))
+    split_rotation(coefficients[0], s, layout, work)
 
 
 @kernel
@@ -170,7 +171,7 @@ ACTIONS: dict[int, tuple[Rare, ...]] = {
 WITH_RANGES = (survey_group, survey_newcomer)
 """Those that share most of their code with what a range reaches."""
 ACTIONS_IN_SPACE: dict[int, tuple[Rare, ...]] = {
-    **ACTIONS,
+    **{action: done for action, done in ACTIONS.items() if action != workspace.SPLIT},
     workspace.SPAWN: (spawn, align),
     workspace.MODES_STEP: (modes,),
     workspace.CHALLENGE: (challenge_in_space,),

@@ -54,7 +54,7 @@ PAIR = np.dtype(
         ("surveyed", "f8"),  # surveyed distance [m]; 0 for none
         ("t_used", "f8"),  # time of the last accepted range that meant anything [s]
         ("interval", "f8"),  # running mean of the time between two ranges [s]
-        ("n_ranges", "i8"),  # accepted ranges since the pair started or was silent
+        ("n_ranges", "i8"),  # accepted ranges since the pair started
         ("n_rejected", "i8"),  # ranges the gate has refused, ever
         ("in_a_row", "i8"),  # ranges refused since the last accepted one
         ("i", "i8"),  # constant: node indices, i < j

@@ -1,4 +1,4 @@
-"""The centre of a group and how it moves, in the best knowledge of a hypothesis."""
+"""The centre of a group and how it moves, as a hypothesis estimates it."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ ENV, EVENT, OUT, DONE, NODE, FLAG = range(6)
 
 
 class Workspace(NamedTuple):
-    """Room for intermediate results, so that no event allocates."""
+    """Room for intermediate results, so that most events allocate nothing."""
 
     cursor: I64
     """Where the loop over events goes on: environment, event, estimate, what of the event is done;

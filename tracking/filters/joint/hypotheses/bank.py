@@ -22,6 +22,7 @@ from tracking.filters.best_hypothesis import choose_best
 from tracking.filters.first_ranges import forget_first
 from tracking.filters.joint.ekf.gyro_bias import last_state
 from tracking.filters.joint.ekf.heading_gauge import heading_functional
+from tracking.filters.joint.ekf.observability import shift_nullspace
 from tracking.filters.joint.ekf.scalar_update import reset_state
 from tracking.filters.joint.hypotheses.alignment import (
     CANDIDATES,
@@ -87,15 +88,16 @@ def challenge(c, s, layout):
 
 
 @allocating_kernel
-def split_rotation(c, s, layout):
+def split_rotation(c, s, layout, work):
     """Follow all rotations and mirror images in place of one whose rotation is too uncertain.
 
     A Gaussian so wide is no longer moved as its mean is: it becomes a sum of narrow ones [1], each
-    as uncertain as the gap between two. They are as likely as it says, but for its tails, which are
-    nothing that it knows.
+    as uncertain as the gap between two. They are as likely as it says, but no less likely than by
+    `challenger_penalty`, like mirror images.
     """
     group, A = s.group[0], np.zeros(c.n)
     h = group.best
+    shift_nullspace(c, s, h, 1.0, work)  # by what moved lately
     heading_functional(s, h, -1, A)
     w = s.P[h] @ A
     variance = A @ w

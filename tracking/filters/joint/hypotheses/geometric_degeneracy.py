@@ -21,7 +21,7 @@ def degeneracy_ratio(c, s, h, turns):
     d = c.d
     X, members = centred_positions(c, s, h)
     m = len(members)
-    if m <= d:
+    if m <= d or not np.all(np.isfinite(X)):
         return np.inf
     squared, E = np.linalg.eigh(X.T.copy() @ X)
     # What the error of the positions across the layout has in common is none of its extent; nor is

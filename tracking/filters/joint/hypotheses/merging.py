@@ -52,7 +52,7 @@ def rotation_between(c, s, a, b, turn):
     """Write how b is to be turned to be nearest to a, (d, d); leaves what is written if far.
 
     Each rotation that was tried stands for those near it. Two of them that have come nearer than
-    `SAME_TURN` are one, before a drive shows which is better. While each
+    `AlignmentParams.same_rotation` are one, before a drive shows which is better. While each
     stands for all turns and mirror images, in space, it may be any of them; while each stands for
     the turns near its own, those nearer than its peaks can be. By Procrustes.
     """

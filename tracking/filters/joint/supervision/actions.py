@@ -40,7 +40,7 @@ def begin_node_fault(c, s, layout, i, fault, t):
 
 @kernel
 def follow_node_faults(c, s, layout, t):
-    """Process noise of faulty nodes; a fault ends a while after its statistic has fallen."""
+    """Process noise of faulty nodes' offsets; a fault ends a while after its statistic falls."""
     dt, worst = t - s.group[0].t_check, worst_node(c, s, layout, t)
     for i in range(s.nodes.shape[0]):
         node = s.nodes[i]

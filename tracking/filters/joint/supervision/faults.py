@@ -47,7 +47,7 @@ class Fault(IntEnum):
 
 ACTIONS: dict[Fault, str] = {
     Fault.BIAS: "an offset common to the node's ranges becomes a state",
-    Fault.OUTLIERS: "the same",
+    Fault.OUTLIERS: "an offset common to the node's ranges becomes a state",
     Fault.POSITION: "the node moves to where its ranges fit, if there is such a position",
     Fault.DIVERGED: "the node joins again; where most do, the group starts again",
     Fault.ALIGNMENT: "all rotations and reflections compete again",

@@ -95,8 +95,9 @@ class AlignmentParams:
     """[-] Log-likelihood by which another hypothesis has to lead to be reported."""
     same_rotation: float = 0.15
     """[rad] Hypotheses that differ by a smaller rotation of the group alone are one."""
-    split_std: float = 0.2
-    """[rad] A hypothesis in the plane whose rotation is less certain becomes all of the bank."""
+    split_std: float = 0.25
+    """[rad] A hypothesis in the plane whose rotation is less certain is replaced by one for every
+    rotation and mirror image."""
     gauge_std: float = 0.05
     """[rad] While the rotation is less certain, the null space is kept at every range."""
     misfit_time: float = 3.3

@@ -15,7 +15,7 @@ from tracking.filters.joint.ekf.workspace import (
     SPLIT,
     TIME_OUT_LATER,
 )
-from tracking.filters.joint.hypotheses.alignment import is_linear
+from tracking.filters.joint.hypotheses.alignment import FILTERED, is_linear
 from tracking.filters.joint.hypotheses.bank import (
     any_timed_out,
     needs_reflection,
@@ -30,7 +30,8 @@ from tracking.filters.joint.supervision.faults import (
     find_fault,
     update_group_misfit,
 )
-from tracking.kernels.jit import kernel
+from tracking.filters.joint.supervision.staleness import is_silent
+from tracking.kernels.jit import kernel, small_kernel
 
 
 @kernel
@@ -48,8 +49,7 @@ def supervise(c, s, layout, work, t, done):
     if done < REFLECT:
         prune_bank(c, s)
         update_heading_variance(c, s)
-        is_wide = s.group[0].heading_gauge_var > c.split_std**2
-        if done < SPLIT and is_wide and s.group[0].n_alive == 1:
+        if done < SPLIT and needs_split(c, s, t):
             return SPLIT
         if needs_reflection(c, s):
             return REFLECT
@@ -69,3 +69,19 @@ def supervise(c, s, layout, work, t, done):
     follow_node_faults(c, s, layout, t)
     s.group[0].t_check = t
     return NOTHING
+
+
+@small_kernel
+def needs_split(c, s, t):
+    """True where the only hypothesis of a group that has moved knows its rotation too badly.
+
+    A node without ranges for a while may be anywhere, which says nothing of the rotation. A
+    smoother, which has no room for others, takes the rotation as it is.
+    """
+    group = s.group[0]
+    if group.alignment != FILTERED or group.n_alive != 1 or c.n > c.n_own:
+        return False
+    for node in s.nodes:
+        if is_silent(c, node, t):
+            return False
+    return group.heading_gauge_var > c.split_std**2
