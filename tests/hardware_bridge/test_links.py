@@ -448,9 +448,7 @@ def test_tcp_speaks_and_is_lost_when_the_other_end_closes(server):
 def test_tcp_tells_what_is_wrong(server):
     port = server.getsockname()[1]
     server.close()
-    with pytest.raises(
-        BridgeError, match=r"cannot connect to 127\.0\.0\.1 port .*program listens"
-    ):
+    with pytest.raises(BridgeError, match=r"cannot connect to 127\.0\.0\.1 port .*program listens"):
         Links([spec(f"tcp:127.0.0.1:{port}")], NOW)
     for bad in ("tcp:host", "tcp::5", "tcp:host:0", "tcp:host:99999", "tcp:host:a"):
         with pytest.raises(BridgeError, match="expected tcp:host:port"):
