@@ -53,8 +53,12 @@ def check_folder(folder: Path, names: Iterable[str]) -> None:
         raise UsageError(f"--out {folder}: cannot be written to ({error.strerror})") from error
 
 
-def check_new(folder: Path) -> None:
+def check_new(folder: Path, hint: str = "") -> None:
     """See that a folder is new or empty, for results that must not mix with others.
+
+    Args:
+        folder: That is to be written to.
+        hint: What else would do.
 
     Raises:
         UsageError: It exists and is no empty folder.
@@ -64,7 +68,7 @@ def check_new(folder: Path) -> None:
     except OSError as error:
         raise UsageError(f"--out {folder}: cannot be written to ({error.strerror})") from error
     if taken:
-        raise UsageError(f"--out {folder}: exists already, expected a new or empty folder")
+        raise UsageError(f"--out {folder}: exists already, expected a new or empty folder{hint}")
 
 
 def _check_free(folder: Path, name: str) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 Command = Callable[..., Any]
 
@@ -38,6 +39,49 @@ policy_option = click.option(
     metavar="NAME_OR_PATH",
     help="Trained policy that drives: a name, a file or a folder; see `relpos policy list`.",
 )
+
+
+def out_options(
+    text: str, *, default: Path | None = None, required: bool = False
+) -> Callable[[Command], Command]:
+    """Return `--out`, a new or empty folder, and `--overwrite`, with which it need not be either.
+
+    A folder that is not given is the command's own, which replaces what it wrote there.
+
+    Args:
+        text: What is written, a noun phrase.
+        default: The command's own folder.
+        required: The command does nothing but write.
+    """
+
+    def check(context: click.Context, _: click.Parameter, folder: Path | None) -> Path | None:
+        from agents.output import check_new
+
+        given = ParameterSource.COMMANDLINE
+        is_free = context.get_parameter_source("overwrite") is given
+        if folder is not None and context.get_parameter_source("out") is given and not is_free:
+            check_new(folder, hint=" or --overwrite")
+        return folder
+
+    def add(command: Command) -> Command:
+        command = click.option(
+            "--overwrite",
+            is_flag=True,
+            is_eager=True,
+            expose_value=False,
+            help="Replace files of the same names in the folder of --out.",
+        )(command)
+        return click.option(
+            "--out",
+            type=Path,
+            default=default,
+            show_default=default is not None,
+            required=required,
+            callback=check,
+            help=f"New or empty folder for {text}.",
+        )(command)
+
+    return add
 
 
 def jobs_options(text: str) -> Callable[[Command], Command]:

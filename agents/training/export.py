@@ -35,6 +35,7 @@ def export_policy(
     name: str | None = None,
     results: Iterable[dict[str, Any]] = (),
     last: bool = False,
+    overwrite: bool = False,
 ) -> Path:
     """Write a policy of a run as a network and a card.
 
@@ -44,13 +45,21 @@ def export_policy(
         name: Of the policy; by default that of the run's folder.
         results: What it reached, for the card, as of `relpos compare`.
         last: That of the last leg of one run instead of what was chosen.
+        overwrite: Replace a policy of that name.
 
     Returns:
         The file with the network.
 
     Raises:
-        UsageError: No run, nothing trained yet, or the folder cannot be written to.
+        UsageError: No run, nothing trained yet, a policy of that name is there already, or the
+            folder cannot be written to.
     """
+    name = name or run.resolve().name
+    file = out / f"{name}.onnx"
+    if file.exists() and not overwrite:
+        raise UsageError(
+            f"--out {out}: {file.name} exists already, expected a new --name or --overwrite"
+        )
     chosen = None if last else read_choice(run)
     folder, which = RunFolder(run), LAST if last else BEST
     asked = folder.config()
@@ -68,7 +77,7 @@ def export_policy(
     measured = progress.log[-1]
     policy = make_policy(config)
     restore_weights(policy, tensors)
-    layout, name = layout_of(config), name or run.resolve().name
+    layout = layout_of(config)
     training = {
         "command": shlex.join(["relpos", "train", "--out", name, *as_options(asked)]),
         "observation": config.env.observation,
@@ -84,7 +93,7 @@ def export_policy(
     }
     card = Card(name=name, layout=layout, training=training, results=tuple(results))
     write_policy(out, card.name, to_onnx(Actor(policy), layout.size), card)
-    return out / f"{card.name}.onnx"
+    return file
 
 
 def read_results(path: Path, names: Iterable[str]) -> list[dict[str, Any]]:

@@ -81,7 +81,7 @@ def train_policy(
         results = train_side_by_side(configs, folders, tell)
     choice = choose(config, folders)
     keep_choice(folder, choice)
-    policy = export_policy(folder, folder)
+    policy = export_policy(folder, folder, overwrite=True)
     records = [
         {"seed": seed, **row}
         for seed, result in zip(seeds, results, strict=True)

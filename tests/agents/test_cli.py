@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from agents.cli.main import cli
 from agents.simulation.frames import NAMES
 from tests.command_line import relpos
 from tracking.filters import FILTERS
@@ -228,7 +229,7 @@ def test_faults_end_in_one_clear_message_and_status_2(args, message, tmp_path):
 
 def test_results_are_whole_or_not_at_all(recording, tmp_path):
     (tmp_path / "estimates.csv").mkdir()
-    done = relpos("track", recording, "--out", tmp_path)
+    done = relpos("track", recording, "--out", tmp_path, "--overwrite")
     assert done.returncode == 2
     assert "estimates.csv is a folder" in done.stderr
     assert [p.name for p in tmp_path.iterdir()] == ["estimates.csv"]
@@ -300,6 +301,45 @@ def test_simulate_takes_every_kind_of_scenario(scenario, tmp_path):
     done = relpos("simulate", tmp_path / "run", "--scenario", scenario, "--seconds", 5, "--json")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["ranges"] > 0
+
+
+def out_commands():
+    """Names of all commands that write results into a folder of files."""
+    for name, command in cli.commands.items():
+        parts = getattr(command, "commands", {"": command})
+        for part, each in parts.items():
+            if {"out", "overwrite"} <= {option.name for option in each.params}:
+                yield f"{name} {part}".strip()
+
+
+@pytest.mark.parametrize("name", sorted({*out_commands()} - {"export"}))
+def test_a_folder_that_holds_anything_is_refused_before_any_work(name, recording, tmp_path):
+    (tmp_path / "mine.txt").write_text("mine")
+    needed = [recording] if name.split()[0] in ("track", "calibrate") else []
+    done = relpos(*name.split(), *needed, "--out", tmp_path)
+    assert done.returncode == 2
+    assert "exists already, expected a new or empty folder or --overwrite" in done.stderr
+    assert [p.name for p in tmp_path.iterdir()] == ["mine.txt"]
+
+
+def test_overwrite_replaces_files_of_the_same_names_alone(recording, tmp_path):
+    for name in ("mine.txt", "report.html"):
+        (tmp_path / name).write_text("mine")
+    # Whichever of the two comes first.
+    done = relpos("track", recording, "--out", tmp_path, "--overwrite")
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "mine.txt").read_text() == "mine"
+    assert "<html" in (tmp_path / "report.html").read_text()
+    (tmp_path / "report.html").write_text("mine")
+    assert relpos("track", recording, "--overwrite", "--out", tmp_path).returncode == 0
+    assert "<html" in (tmp_path / "report.html").read_text()
+
+
+def test_every_command_that_writes_results_knows_overwrite():
+    assert set(out_commands()) == {
+        "track", "calibrate imu", "calibrate mag", "calibrate uwb", "evaluate", "protocol",
+        "demo", "compare", "export", "demo-hardware", "bench tracker", "bench env",
+    }  # fmt: skip
 
 
 def test_simulate_does_not_overwrite(recording):

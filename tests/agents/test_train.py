@@ -353,6 +353,11 @@ def test_the_command_tells_every_leg_and_the_policy(tmp_path):
     )
     assert json.loads(done.stdout)["name"] == "p"
     assert {p.name for p in out.iterdir()} == {"p.onnx", "p.json"}
+    command = ["export", str(tmp_path / "run"), "--out", str(out), "--name", "p"]
+    again = CliRunner().invoke(cli, command)
+    assert isinstance(again.exception, UsageError)
+    assert "p.onnx exists already" in str(again.exception)
+    assert CliRunner().invoke(cli, [*command, "--overwrite"]).exit_code == 0
 
 
 def test_a_name_that_no_policy_can_have_is_refused_at_once(tmp_path):

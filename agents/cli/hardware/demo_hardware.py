@@ -12,6 +12,7 @@ from agents.cli.console import emit_json, print_table, progress_bar
 from agents.cli.options import (
     cars_option,
     json_option,
+    out_options,
     policy_option,
     scenario_option,
     task_option,
@@ -49,7 +50,7 @@ from agents.errors import UsageError
 @click.option(
     "--virtual", is_flag=True, help="Run in memory under a virtual clock, as fast as possible."
 )
-@click.option("--out", type=Path, default=Path("demo-hardware"), show_default=True)
+@out_options("report.html", default=Path("demo-hardware"))
 @json_option
 def demo_hardware(
     seed: int,

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from agents.cli.console import emit_json, print_table, progress_bar
-from agents.cli.options import json_option
+from agents.cli.options import json_option, out_options
 from agents.errors import UsageError
 
 
@@ -19,7 +19,7 @@ def bench() -> None:
 
 @bench.command("tracker")
 @click.option("--rounds", default=2000, show_default=True, help="Ranging rounds per figure.")
-@click.option("--out", type=Path, help="Folder for a picture of the time over the group's size.")
+@out_options("a picture of the time over the group's size")
 @json_option
 def bench_tracker(rounds: int, out: Path | None, as_json: bool) -> None:
     """Measure the time of ranging rounds, messages and an hour next to filterpy and GTSAM."""
@@ -130,7 +130,7 @@ def bench_cold(install: bool, as_json: bool) -> None:
 
 @bench.command("env")
 @click.option("--quick", is_flag=True, help="Measure fewer and shorter figures.")
-@click.option("--out", type=Path, help="Folder for a picture of the curves and the parts.")
+@out_options("a picture of the curves and the parts")
 @json_option
 def bench_env(quick: bool, out: Path | None, as_json: bool) -> None:
     """Measure environment steps per second next to mpe2 and bare pymunk."""

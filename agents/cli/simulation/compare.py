@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from agents.cli.console import emit_json, print_table, progress_bar
-from agents.cli.options import cars_option, jobs_options, json_option, scenario_option, task_option
+from agents.cli.options import (
+    cars_option,
+    jobs_options,
+    json_option,
+    out_options,
+    scenario_option,
+    task_option,
+)
 from agents.errors import UsageError
 
 if TYPE_CHECKING:
@@ -68,7 +75,7 @@ WHY = "which has its own cars and task; they drive one after the other"
 @click.option("--swarm", type=Path, help="A swarm.toml: compare on real cars, in turns.")
 @click.option("--arm", is_flag=True, help="Allow the cars of --swarm to move.")
 @json_option
-@click.option("--out", type=Path, help="New folder for report.html, its pictures, results.jsonl.")
+@out_options("report.html, its pictures and results.jsonl")
 def compare(
     names: tuple[str, ...],
     observations: tuple[str, ...],
@@ -86,11 +93,10 @@ def compare(
     With --swarm on real cars, in real time; errors are what the cars believe. On a terminal:
     space stops all at once, c clears the stop, q quits.
     """
-    from agents.output import check_folder, check_new, write_results
+    from agents.output import check_folder, write_results
     from agents.reports import compare_report as report
 
     if out is not None:
-        check_new(out)
         check_folder(out, ["report.html"])
     chosen = {k: v for k, v in options.items() if v is not None}
     if swarm is None:

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from agents.cli.console import emit_json, print_table, progress_bar
-from agents.cli.options import cars_option, json_option, policy_option, scenario_option
+from agents.cli.options import cars_option, json_option, out_options, policy_option, scenario_option
 from agents.cli.tracking.track import print_tracks
 from agents.errors import UsageError
 
@@ -45,7 +45,7 @@ from agents.errors import UsageError
 )
 @click.option("--window", is_flag=True, help="Show the drive in a window; needs pygame.")
 @click.option("--gif", is_flag=True, help="Write drive.gif too; needs pygame.")
-@click.option("--out", type=Path, default=Path("demo"), show_default=True)
+@out_options("report.html and drive.gif", default=Path("demo"))
 @json_option
 def demo(
     seconds: float,

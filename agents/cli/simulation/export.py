@@ -21,11 +21,18 @@ from agents.errors import UsageError
 @click.option(
     "--last", is_flag=True, help="Export the last policy of a run in place of the chosen one."
 )
+@click.option("--overwrite", is_flag=True, help="Replace a policy of that name.")
 @click.option(
     "--json", "as_json", is_flag=True, help="Print the card as JSON on stdout, nothing else."
 )
 def export(
-    run: Path, out: Path, name: str | None, results: Path | None, last: bool, as_json: bool
+    run: Path,
+    out: Path,
+    name: str | None,
+    results: Path | None,
+    last: bool,
+    overwrite: bool,
+    as_json: bool,
 ) -> None:
     """Write the policy that a training run ended with as files that run without torch."""
     try:
@@ -36,7 +43,7 @@ def export(
         ) from error
     names = {run.resolve().name, name or run.resolve().name}
     told = read_results(results, names) if results is not None else []
-    path = export_policy(run, out, name=name, results=told, last=last)
+    path = export_policy(run, out, name=name, results=told, last=last, overwrite=overwrite)
     if as_json:
         from agents.policies import load_policy
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from agents.cli.console import emit_json, print_table
+from agents.cli.options import json_option, out_options
 from agents.errors import UsageError
 
 if TYPE_CHECKING:
@@ -20,12 +21,8 @@ FILES = ("calibration.toml", "report.html")
 def _shared(function: Callable[..., Any]) -> Callable[..., Any]:
     """The arguments of every kind of calibration."""
     for decorate in (
-        click.option(
-            "--json", "as_json", is_flag=True, help="Print JSON lines on stdout, nothing else."
-        ),
-        click.option(
-            "--out", type=Path, required=True, help="Folder for calibration.toml and report.html."
-        ),
+        json_option,
+        out_options("calibration.toml and report.html", required=True),
         click.argument("log", type=Path),
     ):
         function = decorate(function)

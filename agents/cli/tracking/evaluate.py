@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from agents.cli.console import emit_json, print_table, progress_bar
-from agents.cli.options import jobs_options, json_option
+from agents.cli.options import jobs_options, json_option, out_options
 
 
 @click.command()
@@ -37,7 +37,7 @@ from agents.cli.options import jobs_options, json_option
 )
 @jobs_options("Only the time of a round depends on it.")
 @json_option
-@click.option("--out", type=Path, help="New folder for report.html, its pictures, results.jsonl.")
+@out_options("report.html, its pictures and results.jsonl")
 def evaluate(
     suite: str,
     filters: tuple[str, ...],
@@ -51,12 +51,11 @@ def evaluate(
 ) -> None:
     """Evaluate filters over many simulated runs: errors, consistency, lost runs, time."""
     from agents.evaluation.evaluate import evaluate as run
-    from agents.output import check_folder, check_new, write_results
+    from agents.output import check_folder, write_results
     from agents.reports import evaluate_report as report
     from agents.warm_up import warm_up_first
 
     if out is not None:
-        check_new(out)
         check_folder(out, ["report.html"])
     warm_up_first(filters)
     with progress_bar(f"evaluate {suite}") as tell:

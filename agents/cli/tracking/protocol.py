@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from agents.cli.console import emit_json, print_table, progress_bar
-from agents.cli.options import json_option
+from agents.cli.options import json_option, out_options
 from agents.errors import UsageError
 
 
@@ -24,7 +24,7 @@ from agents.errors import UsageError
 @click.option(
     "--seed", default=0, show_default=True, help="Seed; the same seed gives the same figures."
 )
-@click.option("--out", type=Path, help="Folder for report.html and the pictures in it.")
+@out_options("report.html and the pictures in it")
 @json_option
 def protocol(events: int, nodes: str, seed: int, out: Path | None, as_json: bool) -> None:
     """Measure the ranging protocol: rate, recovery when nodes come and go, clock errors."""

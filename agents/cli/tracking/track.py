@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from agents.cli.console import emit_json, print_table, progress_bar
-from agents.cli.options import json_option
+from agents.cli.options import json_option, out_options
 from agents.errors import UsageError
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ if TYPE_CHECKING:
     show_default=True,
     help="Time after the first range that is not scored [s].",
 )
-@click.option("--out", type=Path, help="Folder for estimates.csv and report.html.")
+@out_options("report.html and estimates.csv")
 @json_option
 def track(
     logs: tuple[Path, ...],
