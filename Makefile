@@ -14,11 +14,11 @@ WARM   ?= --for all
 .PHONY: demo demo-hardware test check docs dist lowest format wheel clean
 
 demo: $(VENV)/.core
-	$(BIN)/relpos demo --out demo
+	$(BIN)/relpos demo
 
 # Emulated nodes and cars behind pseudo terminals, driven through the whole hardware path.
 demo-hardware: $(VENV)/.hardware
-	$(BIN)/relpos demo-hardware --out demo-hardware
+	$(BIN)/relpos demo-hardware
 
 test: $(VENV)/.dev
 	$(BIN)/relpos warmup --for all

@@ -54,6 +54,11 @@ def out_options(
         required: The command does nothing but write.
     """
 
+    # A default of None would satisfy what is required.
+    kept: dict[str, Any] = {"required": required}
+    if default is not None:
+        kept |= {"default": default, "show_default": True}
+
     def check(context: click.Context, _: click.Parameter, folder: Path | None) -> Path | None:
         from agents.output import check_new
 
@@ -74,11 +79,9 @@ def out_options(
         return click.option(
             "--out",
             type=Path,
-            default=default,
-            show_default=default is not None,
-            required=required,
             callback=check,
             help=f"New or empty folder for {text}.",
+            **kept,
         )(command)
 
     return add
