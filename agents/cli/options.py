@@ -53,7 +53,6 @@ def out_options(
         default: The command's own folder.
         required: The command does nothing but write.
     """
-
     # A default of None would satisfy what is required.
     kept: dict[str, Any] = {"required": required}
     if default is not None:
