@@ -28,7 +28,7 @@ COMMANDS = {
     "compile for env": "-m agents.cli.main warmup --for env",
     "simulate a log": "-m agents.cli.main simulate log{n} --seconds 30",
     "relpos track LOG, compiled": "-m agents.cli.main track log1",
-    "relpos demo, compiled for env": "-m agents.cli.main demo --out demo",
+    "relpos demo, compiled for env": "-m agents.cli.main demo --out demo{n}",
 }
 """Commands of Python by what they are."""
 Tell = Callable[[float], None]
