@@ -16,6 +16,7 @@ import numpy as np
 from cases import Case, case
 
 from tracking import Tracker
+from tracking.geometry import best_rotation
 from tracking.measurements import Kind
 from tracking.metrics.integrity import beyond_protection
 
@@ -34,10 +35,16 @@ def started(of: Case, at: float) -> tuple[int, int]:
     block = replace(block, t=np.where(block.kind == Kind.SURVEY, at, block.t))
     block = block.take(block.order()[0])
     times = (of.t >= at) & (of.t < at + LENGTH)
+    truth = of.truth[times]
     estimate = Tracker(of.constellation).run(block, of.t[times]).take(0)
     judged = of.known[times] & ~of.constellation.is_static[of.constellation.pairs].all(axis=1)
-    n = int((judged & estimate.ok).sum())
-    share = beyond_protection(estimate, of.truth[times], judged)
+    counted = judged & estimate.ok
+    n = int(counted.sum())
+    if n and of.constellation.heading == "initial":
+        # The heading that the constellation states is that at the start of the drive, not here.
+        turn = best_rotation(truth[counted], estimate.pos_ij_w[counted], planar=True)
+        truth = truth @ turn.T
+    share = beyond_protection(estimate, truth, judged)
     return n, round((share or 0.0) * n)
 
 
