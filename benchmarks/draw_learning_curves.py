@@ -11,13 +11,13 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from agents.reports.page import png
+from agents.reports.style import svg
 from agents.reports.train_report import curves
 from agents.training.run_folder import LOG, RunFolder
 
 ROOT = Path(__file__).resolve().parents[1]
 ROWS = ROOT / "benchmarks" / "results" / "learning-curves.jsonl"
-PICTURE = ROOT / "docs" / "images" / "learning-curves.png"
+PICTURE = ROOT / "docs" / "images" / "learning-curves.svg"
 
 
 def collect(folders: list[Path]) -> list[dict[str, Any]]:
@@ -38,7 +38,7 @@ def draw(rows: list[dict[str, Any]]) -> bytes:
     for row in rows:
         label = f"{row['task']}, on {row['trained_on']}"
         runs.setdefault((label, row["seed"]), []).append(row)
-    return png(curves([(label, run) for (label, _), run in runs.items()]))
+    return svg(curves([(label, run) for (label, _), run in runs.items()]))
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ import numpy as np
 
 from agents.evaluation.calibrate import CalibrateResult
 from agents.reports.page import Page
+from agents.reports.style import in_style, new_figure
 from tracking.calibration import MagResult
 from tracking.geometry import GRAVITY
 from tracking.measurements import Kind
@@ -121,35 +122,35 @@ def _numbers(values: object, digits: int) -> str:
     return "-" if values is None else ", ".join(f"{v:.{digits}f}" for v in np.asarray(values))
 
 
+@in_style
 def _rest(r: CalibrateResult) -> Figure:
-    from matplotlib.figure import Figure
 
     drawn = list(r.imu.items())[:MAX_NODES]
-    figure = Figure(figsize=(11, 2.6 * len(drawn)), layout="constrained")
+    figure = new_figure(11, 2.6 * len(drawn))
     axes = figure.subplots(len(drawn), 2, squeeze=False)
     block, index_of = r.log.block, r.log.constellation.index_of
     for (n, one), (left, right) in zip(drawn, axes, strict=True):
         mine = block.valid[0] & (block.kind[0] == Kind.IMU) & (block.i[0] == index_of[n])
         t, imu = block.t[0, mine], block.values[0, mine, :6]
-        left.plot(t, np.linalg.norm(imu[:, :3], axis=1), color="tab:blue", lw=0.6)
-        right.plot(t, np.linalg.norm(imu[:, 3:], axis=1), color="tab:orange", lw=0.6)
+        left.plot(t, np.linalg.norm(imu[:, :3], axis=1), color="C0", lw=0.6, rasterized=True)
+        right.plot(t, np.linalg.norm(imu[:, 3:], axis=1), color="C1", lw=0.6, rasterized=True)
         right.axhline(GRAVITY, color="k", lw=0.6, ls="--")
         low, high = np.percentile(np.linalg.norm(imu[:, 3:], axis=1), [0.2, 99.8])
         right.set_ylim(min(low, GRAVITY) - 0.5, max(high, GRAVITY) + 0.5)
         for ax in (left, right):
             for start, stop in one.rest.span:
-                ax.axvspan(start, stop, color="tab:green", alpha=0.25, lw=0)
+                ax.axvspan(start, stop, color="C2", alpha=0.25, lw=0)
             ax.set_xlabel("t [s]")
         left.set(title=f"node {n}", ylabel="|gyr| [rad/s]")
         right.set(title=f"node {n}", ylabel="|acc| [m/s2]")
     return figure
 
 
+@in_style
 def _clouds(r: CalibrateResult) -> Figure:
-    from matplotlib.figure import Figure
 
     drawn = list(r.mag.items())[:MAX_NODES]
-    figure = Figure(figsize=(11, 5.0 * len(drawn)), layout="constrained")
+    figure = new_figure(11, 5.0 * len(drawn))
     axes = figure.subplots(len(drawn), 2, squeeze=False)
     block, index_of = r.log.block, r.log.constellation.index_of
     corrected = r.calibration.apply(block, r.log.constellation)
@@ -161,7 +162,7 @@ def _clouds(r: CalibrateResult) -> Figure:
             ax.set(title=f"node {n}", xlabel=f"{'xyz'[a]} [uT]", ylabel=f"{'xyz'[b]} [uT]")
         if one.method != "ellipsoid":
             _circle(row[0], one.field)
-        row[0].legend(loc="best", fontsize=8)
+        row[0].legend(loc="best")
     return figure
 
 
@@ -170,11 +171,11 @@ def _cloud(
 ) -> None:
     """Readings in one plane."""
     thin = slice(None, None, 1 + len(before) // MAX_POINTS)
-    ax.plot(*before[thin].T, ".", color="0.7", ms=2, label="before")
+    ax.plot(*before[thin].T, ".", color="0.7", ms=2, rasterized=True, label="before")
     ok = one.inlier[thin]
-    ax.plot(*after[thin][ok].T, ".", color="tab:blue", ms=2, label="after")
+    ax.plot(*after[thin][ok].T, ".", color="C0", ms=2, rasterized=True, label="after")
     if not ok.all():
-        ax.plot(*after[thin][~ok].T, "x", color="tab:red", ms=4, label="outliers")
+        ax.plot(*after[thin][~ok].T, "x", color="C3", ms=4, label="outliers")
     if circle:
         _circle(ax, one.field)
     ax.plot(0, 0, "k+", ms=9)
@@ -188,10 +189,10 @@ def _circle(ax: Axes, radius: float) -> None:
     ax.plot(radius * np.cos(angle), radius * np.sin(angle), color="k", lw=0.8)
 
 
+@in_style
 def _residuals(r: CalibrateResult) -> Figure:
-    from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(11, 4.0), layout="constrained")
+    figure = new_figure(11, 4.0)
     axes = figure.subplots(1, 2, sharey=True)
     u, table = r.uwb, r.ranges
     if u is None or table is None:
@@ -200,19 +201,27 @@ def _residuals(r: CalibrateResult) -> Figure:
         axes, (u.error_before, u.error_after), ("before", "after"), strict=True
     ):
         groups = (
-            (u.inlier, "tab:blue", f"agree ({u.inlier.sum()})"),
-            (u.used & ~u.inlier, "tab:red", f"outliers ({(u.used & ~u.inlier).sum()})"),
+            (u.inlier, "C0", f"agree ({u.inlier.sum()})"),
+            (u.used & ~u.inlier, "C3", f"outliers ({(u.used & ~u.inlier).sum()})"),
             (table.known & ~u.used, "0.7", f"not used ({(table.known & ~u.used).sum()})"),
         )
         for chosen, colour, label in groups:
             rows = np.nonzero(chosen)[0]
             rows = rows[:: 1 + len(rows) // MAX_POINTS]
             if len(rows):
-                ax.plot(table.true[rows], error[rows], ".", color=colour, ms=2, label=label)
+                ax.plot(
+                    table.true[rows],
+                    error[rows],
+                    ".",
+                    color=colour,
+                    ms=2,
+                    label=label,
+                    rasterized=True,
+                )
         ax.axhline(0.0, color="k", lw=0.8)
         ax.set(title=title, xlabel="true distance [m]")
     shown = np.concatenate([u.error_before[u.used], u.error_after[u.used]])
     low, high = np.percentile(shown, [0.5, 99.5])
     axes[0].set(ylabel="range - distance [m]", ylim=(min(low, -0.2) * 1.3, max(high, 0.2) * 1.3))
-    axes[1].legend(loc="best", fontsize=8, markerscale=4)
+    axes[1].legend(loc="best", markerscale=4)
     return figure

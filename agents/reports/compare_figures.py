@@ -10,6 +10,7 @@ import numpy as np
 from agents.comparison.meter import IN_FORMATION
 from agents.comparison.result import FIGURES, CompareResult, Row
 from agents.comparison.statistics import Interval
+from agents.reports.style import BAND, COLOURS, in_style, new_figure, plain_ticks
 from relpos_env.timing import DECISION
 
 if TYPE_CHECKING:
@@ -17,11 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COLOURS = (
-    "#2563eb", "#d97706", "#059669", "#dc2626", "#7c3aed", "#0891b2", "#be185d", "#65a30d",
-    "#475467", "#92400e",
-)  # fmt: skip
-"""Of the contenders, in order."""
 LABELS = {
     "formation_error": "formation error [m]",
     "place_error": "distance from the goals [m]",
@@ -37,17 +33,18 @@ COLUMNS = 3
 """[-] Panels side by side."""
 
 
+@in_style
 def figures(result: CompareResult) -> dict[str, tuple[str, Figure, str]]:
     """Title, picture and caption by file name."""
     settle = result.rows[0].setting.settle
     drawn = {
-        "compare-figures.png": (
+        "compare-figures.svg": (
             "Figures",
             _bars(result),
             "Means over the episodes with 95 % intervals. The axis of the energy does not begin at "
             "0: differences are small compared with what rolling takes.",
         ),
-        "compare-time.png": (
+        "compare-time.svg": (
             "Formation error over time",
             _over_time(result),
             f"Median over the episodes, and the band of the middle half of them. Grey: before "
@@ -55,14 +52,14 @@ def figures(result: CompareResult) -> dict[str, tuple[str, Figure, str]]:
         ),
     }
     if "tracking_error" in _measured(result):
-        drawn["compare-scatter.png"] = (
+        drawn["compare-scatter.svg"] = (
             "What the tracker costs",
             _scatter(result),
             "Every episode: formation error over the error of the relative positions that the "
             "cars knew. Rings: means.",
         )
     if len(result.contenders) > 1:
-        drawn["compare-ratios.png"] = (
+        drawn["compare-ratios.svg"] = (
             "Ratio to the best controller",
             _ratios(result),
             "Formation error over that of the reference on the same seeds (real cars: in the same "
@@ -83,12 +80,11 @@ def _colours(result: CompareResult) -> dict[str, str]:
 
 
 def _bars(result: CompareResult) -> Figure:
-    from matplotlib.figure import Figure
 
     colours, scenarios, measured = _colours(result), result.scenarios, _measured(result)
     counts = [len(result.of(s)) for s in scenarios]
     height = sum(0.34 * n + 0.9 for n in counts) + 0.2
-    figure = Figure(figsize=(3.0 + 2.0 * len(measured), height), layout="constrained")
+    figure = new_figure(3.0 + 2.0 * len(measured), height)
     axes = figure.subplots(
         len(scenarios), len(measured), squeeze=False, sharey="row",
         height_ratios=[n + 0.6 for n in counts],
@@ -101,14 +97,16 @@ def _bars(result: CompareResult) -> Figure:
                 bar = name != "energy"
                 _bar(ax, y, row.means[name], scale, colours[row.contender.label], bar=bar)
             ax.set_xlim(_limits(name, [row.means[name] for row in rows]))
-            ax.grid(alpha=0.3, axis="x")
+            ax.grid(visible=False, axis="y")
             ax.set_ylim(len(rows) - 0.4, -0.6)
             ax.tick_params(axis="y", length=0)
             ax.locator_params(axis="x", nbins=3)
         line[0].set_yticks(range(len(rows)), [r.contender.label for r in rows])
-        line[0].set_title(scenario, fontsize=10, loc="left", fontweight="bold")
+        line[0].set_title(scenario, loc="left", fontweight="bold")
     for ax, name in zip(axes[-1], measured, strict=True):
         ax.set_xlabel(LABELS[name])
+    n = len(result.rows[0].episodes)
+    figure.suptitle(f"means of {n} episodes, 95 % intervals", fontsize=9)
     return figure
 
 
@@ -143,19 +141,16 @@ def _scale(name: str) -> float:
 
 def _panels(result: CompareResult, width: float, height: float) -> tuple[Figure, list[Axes]]:
     """A picture with a panel for each scenario."""
-    from matplotlib.figure import Figure
-
     names = result.scenarios
     columns = min(len(names), COLUMNS)
     lines = -(-len(names) // columns)
     width = max(width * columns, 7.0)
-    figure = Figure(figsize=(width, height * lines + 0.4), layout="constrained")
+    figure = new_figure(width, height * lines + 0.4)
     axes = figure.subplots(lines, columns, squeeze=False).ravel()
     for ax in axes[len(names) :]:
         ax.remove()
     for ax, name in zip(axes, names, strict=False):
-        ax.set_title(name, fontsize=10)
-        ax.grid(alpha=0.3)
+        ax.set_title(name)
     return figure, list(axes[: len(names)])
 
 
@@ -169,12 +164,13 @@ def _over_time(result: CompareResult) -> Figure:
         for row in rows:
             t, (low, middle, high) = _quartiles(row)
             colour = colours[row.contender.label]
-            ax.fill_between(t, low, high, color=colour, alpha=0.18, lw=0)
+            ax.fill_between(t, low, high, color=colour, alpha=BAND, lw=0)
             ax.plot(t, middle, color=colour, lw=1.3, label=row.contender.label)
             scored = high[t > setting.settle]
             top = max(top, float(np.nanmax(scored if len(scored) else high)))
         ax.set(xlim=(0, setting.seconds), ylim=(0, 1.3 * top or 1.0), xlabel="t [s]")
-    _finish(figure, "formation error [m]")
+    n = len(result.rows[0].episodes)
+    _finish(figure, "formation error [m]", f"median and middle half of {n} episodes")
     return figure
 
 
@@ -208,17 +204,15 @@ def _scatter(result: CompareResult) -> Figure:
         ax.locator_params(axis="x", nbins=6)
         ax.set_xlim(left=-0.03 * ax.get_xlim()[1])
         ax.set_ylim(bottom=0)
-    _finish(figure, "formation error [m]")
+    n = len(result.rows[0].episodes)
+    _finish(figure, "formation error [m]", f"{n} episodes, ring: their mean")
     return figure
 
 
 def _ratios(result: CompareResult) -> Figure:
-    from matplotlib.figure import Figure
-    from matplotlib.ticker import FormatStrFormatter, LogLocator, NullLocator
-
     colours, scenarios = _colours(result), result.scenarios
     counts = [len(result.of(s)) for s in scenarios]
-    figure = Figure(figsize=(9, sum(0.34 * n + 0.9 for n in counts) + 0.2), layout="constrained")
+    figure = new_figure(9, sum(0.34 * n + 0.9 for n in counts) + 0.2)
     heights = [n + 0.6 for n in counts]
     axes = figure.subplots(len(scenarios), 1, squeeze=False, height_ratios=heights)[:, 0]
     for ax, scenario in zip(axes, scenarios, strict=True):
@@ -243,21 +237,19 @@ def _ratios(result: CompareResult) -> Figure:
         ax.axvline(0.8, color="k", lw=1, ls=":")
         ax.set_yticks(range(len(rows)), [r.contender.label for r in rows])
         ax.set_ylim(len(rows) - 0.4, -0.8)
-        ax.grid(alpha=0.3, axis="x")
+        ax.grid(visible=False, axis="y")
         title = f"{scenario}: over {reference.contender.label}"
-        ax.set_title(title, fontsize=10, loc="left", fontweight="bold")
+        ax.set_title(title, loc="left", fontweight="bold")
         ax.margins(x=0.08)
         low, high = ax.dataLim.intervalx
         if high > WIDE * low > 0.0:
             ax.set_xscale("log")
-            ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=30))
-            ax.xaxis.set_major_formatter(FormatStrFormatter("%g"))
-            ax.xaxis.set_minor_locator(NullLocator())
+            plain_ticks(ax.xaxis)
     axes[-1].set_xlabel("ratio of formation errors")
     return figure
 
 
-def _finish(figure: Figure, label: str) -> None:
+def _finish(figure: Figure, label: str, title: str) -> None:
     """Label the panels at the left, and one legend above all."""
     for ax in figure.axes:
         spec = ax.get_subplotspec()
@@ -267,10 +259,9 @@ def _finish(figure: Figure, label: str) -> None:
     figure.legend(
         handles,
         labels,
+        title=title,
         loc="outside upper center",
         ncols=3,
-        fontsize=9,
-        frameon=False,
         markerscale=1.5,
     )
 

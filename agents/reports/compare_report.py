@@ -11,7 +11,8 @@ from agents.comparison.meter import IN_FORMATION
 from agents.comparison.result import CompareResult, Row
 from agents.reports import compare_figures as figures
 from agents.reports.animation import player_markup
-from agents.reports.page import Page, metres, png
+from agents.reports.page import Page, metres
+from agents.reports.style import svg
 
 _TO = "\N{NO-BREAK SPACE}to\N{NO-BREAK SPACE}"
 HEADER = (
@@ -127,7 +128,7 @@ def compare_files(
     return {
         "report.html": page.render(),
         "results.jsonl": "".join(json.dumps(r, allow_nan=False) + "\n" for r in lines),
-        **{name: png(figure) for name, (_, figure, _) in drawn.items()},
+        **{name: svg(figure) for name, (_, figure, _) in drawn.items()},
     }
 
 

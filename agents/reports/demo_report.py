@@ -9,6 +9,7 @@ import numpy as np
 
 from agents.reports.animation import animation_markup
 from agents.reports.page import Page, metres
+from agents.reports.style import in_style, new_figure
 from agents.simulation.demo import SETTLE, DemoResult
 from tracking.filters import DESCRIPTIONS
 
@@ -62,16 +63,15 @@ def demo_report(result: DemoResult, missing: Sequence[str] = ()) -> str:
     return page.render()
 
 
+@in_style
 def _over_time(result: DemoResult) -> Figure:
-    from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(11, 3.2), layout="constrained")
+    figure = new_figure(11, 3.2)
     ax = figure.subplots()
     f = result.frames
     tracking = [np.nan if v is None else v for v in f["tracking"]]
-    ax.plot(f["t"], tracking, color="tab:blue", label="tracking error")
-    ax.plot(f["t"], f["formation"], color="tab:green", label="formation error")
+    ax.plot(f["t"], tracking, color="C0", label="tracking error")
+    ax.plot(f["t"], f["formation"], color="C2", label="formation error")
     ax.set(xlabel="t [s]", ylabel="error [m]", ylim=(0, None))
     ax.legend()
-    ax.grid(alpha=0.3)
     return figure

@@ -10,44 +10,43 @@ import numpy as np
 from agents.evaluation.evaluate import CaseResult, EvaluateResult
 from agents.evaluation.over_time import NIS_EDGES
 from agents.evaluation.run import SKIP
+from agents.reports.style import BAND, COLOURS, in_style, new_figure, plain_ticks
 from tracking.metrics.consistency import chi_square_band
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
-COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple", "tab:brown")
-"""Of the filters, in order."""
-BAND = 0.95
+LIKELY = 0.95
 """[-] Probability of the chi-square band."""
 
 
+@in_style
 def figures(result: EvaluateResult) -> dict[str, tuple[str, Figure, str]]:
     """Title, picture and caption by file name."""
     has_paper = any(c.paper is not None for c in result.cases)
     paper = " Dotted: the paper's error of that filter." if has_paper else ""
     drawn = {
-        "evaluate-time.png": (
+        "evaluate-time.svg": (
             "Error over time",
             _over_time(result),
             "Position error after one constant yaw, mean over the pairs: median over the seeds, "
             f"and the band from 10 % to 90 % of them.{paper}",
         ),
-        "evaluate-seeds.png": (
+        "evaluate-seeds.svg": (
             "Error over seeds",
             _over_seeds(result),
             "rmse_yaw of every run with the median as a bar; lost runs as crosses. Dashed: the "
             "expected error of an efficient estimator, median over the seeds.",
         ),
-        "evaluate-nees.png": (
+        "evaluate-nees.svg": (
             "Consistency: position errors",
             _nees(result),
             "NEES over time, mean over pairs and seeds; 1 is right, above it the filter is too "
             "sure. The first seconds may lie beyond the frame. Grey: 95 % of the chi-square "
             "distribution that alike and independent errors of the nodes would have.",
         ),
-        "evaluate-nis.png": (
+        "evaluate-nis.svg": (
             "Consistency: ranges",
             _nis(result),
             "NIS of the ranges of all seeds and the share of those above 10; black: the chi-square "
@@ -55,7 +54,7 @@ def figures(result: EvaluateResult) -> dict[str, tuple[str, Figure, str]]:
         ),
     }
     if result.suite.name == "scaling":
-        drawn["evaluate-scaling.png"] = (
+        drawn["evaluate-scaling.svg"] = (
             "Cost and error over the size of the group",
             _scaling(result),
             "Left: time of the tracker for a ranging round. Right: errors, medians over the "
@@ -68,18 +67,15 @@ def _panels(
     result: EvaluateResult, width: float, height: float
 ) -> tuple[Figure, Iterator[tuple[Axes, list[CaseResult]]]]:
     """A picture with a panel for each case."""
-    from matplotlib.figure import Figure
-
     cases = result.by_case
     columns = min(len(cases), 3)
     lines = -(-len(cases) // columns)
-    figure = Figure(figsize=(width * columns, height * lines + 0.4), layout="constrained")
+    figure = new_figure(width * columns, height * lines + 0.4)
     axes = figure.subplots(lines, columns, squeeze=False, sharey=True).ravel()
     for ax in axes[len(cases) :]:
         ax.remove()
     for ax, (case, _) in zip(axes, cases, strict=False):
-        ax.set_title(case.name, fontsize=10)
-        ax.grid(alpha=0.3)
+        ax.set_title(case.name)
     return figure, iter([(ax, rows) for ax, (_, rows) in zip(axes, cases, strict=False)])
 
 
@@ -90,13 +86,13 @@ def _over_time(result: EvaluateResult) -> Figure:
             t = c.runs[0].over_time.t
             error = np.array([r.over_time.error for r in c.runs])
             low, middle, high = _quantiles(error, (0.1, 0.5, 0.9))
-            ax.fill_between(t, low, high, color=colour, alpha=0.18, lw=0)
+            ax.fill_between(t, low, high, color=colour, alpha=BAND, lw=0)
             ax.plot(t, middle, color=colour, lw=1.3, label=c.filter)
             if c.paper is not None:
                 ax.axhline(c.paper, color=colour, ls=":", lw=1.2)
         ax.set(yscale="log", xlim=(0, result.seconds), xlabel="t [s]")
-        _plain_ticks(ax.yaxis)
-    _finish(figure, "error [m]")
+        plain_ticks(ax.yaxis)
+    _finish(figure, "error [m]", f"median, 10 to 90 % of {result.seeds} seeds")
     return figure
 
 
@@ -126,8 +122,9 @@ def _over_seeds(result: EvaluateResult) -> Figure:
             ax.axhline(bound, color="k", ls="--", lw=1)
         ax.set(yscale="log", xlim=(-0.6, len(rows) - 0.4))
         ax.set_xticks(range(len(rows)), [c.filter for c in rows], fontsize=9, rotation=20)
-        _plain_ticks(ax.yaxis)
-    _finish(figure, "rmse_yaw [m]", legend=False)
+        plain_ticks(ax.yaxis)
+    _finish(figure, "rmse_yaw [m]")
+    figure.suptitle(f"{result.seeds} seeds, bar: their median", fontsize=9)
     return figure
 
 
@@ -140,7 +137,7 @@ def _nees(result: EvaluateResult) -> Figure:
         # n - 1 independent positions.
         dimensions = 3 if rows[0].case.scenario.name.startswith("human") else 2
         free = dimensions * (rows[0].runs[0].nodes - 1) * result.seeds
-        low, high = chi_square_band(free, 1, BAND)
+        low, high = chi_square_band(free, 1, LIKELY)
         ax.axhspan(low, high, color="0.8")
         top = 2.0
         for colour, c in zip(COLOURS, rows, strict=False):
@@ -153,8 +150,8 @@ def _nees(result: EvaluateResult) -> Figure:
         # What is off before the scored time would squeeze all the rest.
         highest = max(highest, 1.5 * top)
         ax.set(yscale="log", xlim=(0, result.seconds), xlabel="t [s]", ylim=(0.2, highest))
-        _plain_ticks(ax.yaxis, (1.0, 3.0))
-    _finish(figure, "NEES")
+        plain_ticks(ax.yaxis, (1.0, 3.0))
+    _finish(figure, "NEES", f"mean of {result.seeds} seeds")
     return figure
 
 
@@ -172,16 +169,16 @@ def _nis(result: EvaluateResult) -> Figure:
             ax.stairs(density, NIS_EDGES, color=colour, lw=1.3, label=label)
         ax.stairs(right, NIS_EDGES, color="k", lw=1)
         ax.set(yscale="log", xlim=(0, NIS_EDGES[-1]), ylim=(2e-4, 10), xlabel="NIS")
-        _plain_ticks(ax.yaxis, (1.0,))
-        ax.legend(fontsize=7)
-    _finish(figure, "density", legend=False)
+        plain_ticks(ax.yaxis, (1.0,))
+        ax.legend()
+    _finish(figure, "density")
+    figure.suptitle(f"ranges of {result.seeds} seeds", fontsize=9)
     return figure
 
 
 def _scaling(result: EvaluateResult) -> Figure:
-    from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(10, 3.6), layout="constrained")
+    figure = new_figure(10, 3.6)
     cost, errors = figure.subplots(1, 2)
     nodes = [c.runs[0].nodes for c in result.cases if c.filter == result.filters[0]]
     for colour, name in zip(COLOURS, result.filters, strict=False):
@@ -197,32 +194,22 @@ def _scaling(result: EvaluateResult) -> Figure:
     errors.set(ylabel="error [m]")
     for ax in (cost, errors):
         ax.set(xscale="log", yscale="log", xlabel="nodes")
-        _plain_ticks(ax.yaxis)
+        plain_ticks(ax.yaxis)
         ax.set_xticks(nodes, [str(n) for n in nodes])
         ax.minorticks_off()
-        ax.grid(alpha=0.3)
-    cost.legend(fontsize=8)
-    errors.legend(fontsize=7, ncols=2)
+    cost.legend()
+    errors.legend(ncols=2)
     return figure
 
 
-def _finish(figure: Figure, label: str, *, legend: bool = True) -> None:
-    """Label the panels at the left, and a legend in the first."""
+def _finish(figure: Figure, label: str, legend: str = "") -> None:
+    """Label the panels at the left, and a legend of that title in the first."""
     for ax in figure.axes:
         spec = ax.get_subplotspec()
         if spec is not None and spec.is_first_col():
             ax.set_ylabel(label)
     if legend:
-        figure.axes[0].legend(fontsize=8)
-
-
-def _plain_ticks(axis: Axis, subs: tuple[float, ...] = (1.0, 2.0, 5.0)) -> None:
-    """Numbers at the given steps of every decade: a logarithmic axis may span less than one."""
-    from matplotlib.ticker import FormatStrFormatter, LogLocator, NullLocator
-
-    axis.set_major_locator(LogLocator(subs=subs, numticks=30))
-    axis.set_major_formatter(FormatStrFormatter("%g"))
-    axis.set_minor_locator(NullLocator())
+        figure.axes[0].legend(title=legend)
 
 
 def _or_nan(value: float | None) -> float:

@@ -9,7 +9,8 @@ from agents.evaluation.lost import FOR, WRONG
 from agents.evaluation.run import SKIP
 from agents.evaluation.targets import NEAR
 from agents.reports import evaluate_figures as figures
-from agents.reports.page import Page, metres, percent, png
+from agents.reports.page import Page, metres, percent
+from agents.reports.style import svg
 from tracking.metrics.integrity import LIMIT, SIGMAS
 
 TARGETS = ["case", "filter", "figure", "reached", "asked", "target", ""]
@@ -117,7 +118,7 @@ def evaluate_files(result: EvaluateResult) -> dict[str, str | bytes]:
     return {
         "report.html": page.render(),
         "results.jsonl": "".join(json.dumps(r, allow_nan=False) + "\n" for r in lines),
-        **{name: png(figure) for name, (_, figure, _) in drawn.items()},
+        **{name: svg(figure) for name, (_, figure, _) in drawn.items()},
     }
 
 

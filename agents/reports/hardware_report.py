@@ -9,6 +9,7 @@ import numpy as np
 
 from agents.hardware.demo import HardwareDemoResult, error_ratio
 from agents.reports.page import Page, metres
+from agents.reports.style import COLOURS, in_style, new_figure
 from agents.simulation.demo import SETTLE
 from relpos_env.timing import DECISION
 
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 HEADER = ("seed", "through the bridge [m]", "simulator [m]", "ratio", "collisions", "late p99 [ms]")
-COLOURS = ("tab:blue", "tab:red", "tab:green", "tab:orange", "tab:purple", "tab:cyan")
 
 
 def demo_rows(results: Sequence[HardwareDemoResult]) -> list[list[str]]:
@@ -81,21 +81,17 @@ def hardware_report(results: Sequence[HardwareDemoResult], room: tuple[float, fl
     return page.render()
 
 
+@in_style
 def drive_figure(result: HardwareDemoResult, room: tuple[float, float]) -> Figure:
     """Ways of the cars, and errors over time."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(11, 3.8), layout="constrained")
+    figure = new_figure(11, 3.8)
     ways, errors = figure.subplots(1, 2, width_ratios=(1, 2.2))
     _ways(ways, result, room)
-    errors.plot(result.t, result.error, color="tab:blue", label="through the bridge")
+    errors.plot(result.t, result.error, color="C0", label="through the bridge")
     t = DECISION * np.arange(1, len(result.simulated) + 1)
-    errors.plot(t, result.simulated, color="tab:gray", label="simulator")
-    errors.plot(
-        result.t, result.drive.error, color="tab:green", lw=0.8, label="what the cars believe"
-    )
+    errors.plot(t, result.simulated, color="0.5", label="simulator")
+    errors.plot(result.t, result.drive.error, color="C2", lw=0.8, label="what the cars believe")
     errors.set(xlabel="t [s]", ylabel="formation error [m]", ylim=(0, None))
-    errors.grid(alpha=0.3)
     errors.legend()
     return figure
 
@@ -115,4 +111,4 @@ def _ways(axes: Axes, result: HardwareDemoResult, room: tuple[float, float]) -> 
         corners = np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)]) * half
         axes.fill(x + corners @ (c, -s), y + corners @ (s, c), color="0.6", zorder=0)
     axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
-    axes.legend(fontsize=7, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, frameon=False)
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, frameon=False)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import base64
 import html
-import io
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
+
+from agents.reports.style import svg
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -57,11 +58,11 @@ class Page:
 
     def figure(self, figure: Figure, caption: str) -> None:
         """A matplotlib figure as an embedded picture."""
-        data = base64.b64encode(png(figure)).decode()
+        data = base64.b64encode(svg(figure)).decode()
         key = f"<p class='key'>{html.escape(caption)}</p>"
         alt = html.escape(caption, quote=True)
         self._parts.append(
-            f"<section><img alt='{alt}' src='data:image/png;base64,{data}'>{key}</section>"
+            f"<section><img alt='{alt}' src='data:image/svg+xml;base64,{data}'>{key}</section>"
         )
 
     def raw(self, markup: str) -> None:
@@ -77,13 +78,6 @@ class Page:
             f"<title>{html.escape(self._title)}</title><style>{_STYLE}</style></head>"
             f"<body><main>{body}</main></body></html>\n"
         )
-
-
-def png(figure: Figure) -> bytes:
-    """A matplotlib figure as a picture."""
-    raw = io.BytesIO()
-    figure.savefig(raw, format="png", dpi=110)
-    return raw.getvalue()
 
 
 def percent(share: float | None, digits: int = 0) -> str:

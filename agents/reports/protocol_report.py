@@ -10,18 +10,19 @@ from agents.protocol.experiment import ProtocolResult
 from agents.protocol.recovery import EVENTS, MODES
 from agents.protocol.timeline import SCRIPT
 from agents.reports.page import Page
+from agents.reports.style import in_style, new_figure, plain_ticks
 
 if TYPE_CHECKING:
-    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 PAPER_MS = {"responder-join": 12.3, "responder-leave": 12.3, "initiator-loss": 733.4}
 """Mean recovery times of Armani and Holz, ICRA 2024."""
 
 
-PICTURES = ("protocol-timeline.png", "protocol-recovery.png", "protocol-rates.png")
+PICTURES = ("protocol-timeline.svg", "protocol-recovery.svg", "protocol-rates.svg")
 
 
+@in_style
 def figures(result: ProtocolResult) -> dict[str, Figure]:
     """The pictures by name."""
     drawn = _timeline(result), _recovery(result), _rates(result)
@@ -36,15 +37,15 @@ def protocol_report(result: ProtocolResult, pictures: dict[str, Figure]) -> str:
     )
     page.heading("Ranging frequency while nodes come and go")
     page.figure(
-        pictures["protocol-timeline.png"],
+        pictures["protocol-timeline.svg"],
         "Rounds per second in which every node that is on spoke, mean over ten groups.",
     )
     page.heading("Recovery")
     page.table(RECOVERY_HEADER, recovery_rows(result))
-    page.figure(pictures["protocol-recovery.png"], "All recovery times.")
+    page.figure(pictures["protocol-recovery.svg"], "All recovery times.")
     page.heading("Rate")
     page.table(RATE_HEADER, rate_rows(result))
-    page.figure(pictures["protocol-rates.png"], "Rounds per second over the size of the group.")
+    page.figure(pictures["protocol-rates.svg"], "Rounds per second over the size of the group.")
     page.heading("Clocks")
     page.text(
         "Errors of the ranges between node 0 and the node in each slot, 2 m/s, clocks off by so "
@@ -104,57 +105,45 @@ def clock_rows(result: ProtocolResult) -> list[list[str]]:
 
 
 def _timeline(result: ProtocolResult) -> Figure:
-    from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(10, 4.6), layout="constrained")
+    figure = new_figure(10, 4.6)
     for ax, line in zip(figure.subplots(2, 1, sharex=True), result.timelines, strict=True):
-        ax.step(line.t, line.hz, where="mid", color="tab:blue", lw=1.2)
+        ax.step(line.t, line.hz, where="mid", color="C0", lw=1.2)
         for at, what, _, _ in SCRIPT:
             ax.axvline(at, color="0.6", lw=0.8, ls="--")
             if ax.get_subplotspec().is_first_row():
                 ax.annotate(what, (at, 1.02), xycoords=("data", "axes fraction"), fontsize=8)
         ax.set(ylabel="rounds per second", ylim=(0, 65))
         ax.text(0.005, 0.06, line.mode, transform=ax.transAxes, weight="bold")
-        ax.grid(alpha=0.3)
     ax.set(xlabel="t [s]")
     return figure
 
 
 def _recovery(result: ProtocolResult) -> Figure:
-    from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(10, 3.0), layout="constrained")
+    figure = new_figure(10, 3.0)
     for ax, event in zip(figure.subplots(1, 3), EVENTS, strict=True):
         ms = [1e3 * np.sort(result.times[event, mode]) for mode in MODES]
-        for values, mode, colour in zip(ms, MODES, ("tab:orange", "tab:blue"), strict=True):
+        for values, mode, colour in zip(ms, MODES, ("C1", "C0"), strict=True):
             share = np.arange(1, len(values) + 1) / len(values)
-            ax.step(values, share, where="post", color=colour, label=mode)
+            ax.step(
+                values, share, where="post", color=colour, label=f"{mode}, {len(values)} events"
+            )
         ax.axvline(PAPER_MS[event], color="k", ls=":", lw=1, label="paper, mean")
         ax.set(title=event, xlabel="ms", ylim=(0, 1.02))
         if event == "initiator-loss":
             ax.set_xscale("log")
-            _plain_ticks(ax.xaxis)
-        ax.grid(alpha=0.3)
+            plain_ticks(ax.xaxis)
     figure.axes[0].set_ylabel("share of events")
-    figure.axes[0].legend(fontsize=8)
+    figure.axes[0].legend()
     return figure
 
 
-def _plain_ticks(axis: Axis) -> None:
-    """Numbers at 1, 2 and 5 of every decade: a logarithmic axis may span less than one."""
-    from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
-
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=30))
-    axis.set_major_formatter(FormatStrFormatter("%g"))
-    axis.set_minor_formatter(NullFormatter())
-
-
 def _rates(result: ProtocolResult) -> Figure:
-    from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(10, 3.6), layout="constrained")
+    figure = new_figure(10, 3.6)
     ax, right = figure.subplots(1, 2)
-    for phy, colour in (("110k", "tab:blue"), ("6M8", "tab:orange")):
+    for phy, colour in (("110k", "C0"), ("6M8", "C1")):
         rows = [r for r in result.rates if r["phy"] == phy]
         n = [r["n"] for r in rows]
         ax.plot(n, [r["law_hz"] for r in rows], color=colour, lw=1, label=f"{phy}, airtime")
@@ -167,9 +156,8 @@ def _rates(result: ProtocolResult) -> Figure:
     right.set(ylabel="us per round, one core", title="cost in simulation, batch")
     for axis in (ax, right):
         axis.set(xscale="log", yscale="log", xlabel="nodes")
-        _plain_ticks(axis.yaxis)
+        plain_ticks(axis.yaxis)
         axis.set_xticks([r["n"] for r in result.cost], [str(r["n"]) for r in result.cost])
         axis.minorticks_off()
-        axis.grid(alpha=0.3)
-    ax.legend(fontsize=8)
+    ax.legend()
     return figure

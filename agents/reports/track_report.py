@@ -9,6 +9,7 @@ import numpy as np
 
 from agents.evaluation.track import ERRORS, TrackResult, pair_name
 from agents.reports.page import Page, metres, percent
+from agents.reports.style import in_style, new_figure
 from tracking.estimate import Status
 from tracking.findings import KINDS
 from tracking.measurements import Kind
@@ -101,14 +102,14 @@ def _known(r: TrackResult, p: int) -> np.ndarray:
 
 
 def _axes(n: int, height: float) -> tuple[Figure, np.ndarray]:
-    from matplotlib.figure import Figure
 
     columns = min(n, 3)
     lines = -(-n // columns)
-    figure = Figure(figsize=(11, height * lines), layout="constrained")
+    figure = new_figure(11, height * lines)
     return figure, np.atleast_1d(figure.subplots(lines, columns, squeeze=False)).ravel()
 
 
+@in_style
 def _trajectories(r: TrackResult, pairs: list[int]) -> Figure:
     figure, axes = _axes(len(pairs), 3.6)
     yaw = np.radians(r.score.yaw_deg or 0.0)
@@ -118,35 +119,37 @@ def _trajectories(r: TrackResult, pairs: list[int]) -> Figure:
         x, y = r.estimate.pos_ij_w[ok, p, 0], r.estimate.pos_ij_w[ok, p, 1]
         seen = r.has_truth[:, p]
         ax.plot(*r.truth_ij_w[seen, p, :2].T, color="0.6", lw=2.2, label="truth")
-        ax.plot(c * x - s * y, s * x + c * y, color="tab:blue", lw=0.9, label="estimate, one yaw")
+        ax.plot(c * x - s * y, s * x + c * y, color="C0", lw=0.9, label="estimate, one yaw")
         ax.plot(0, 0, "k+", ms=9)
         ax.set(title=pair_name(r.log.constellation, p), xlabel="x [m]", ylabel="y [m]")
         ax.set_aspect("equal", "datalim")
-    axes[0].legend(loc="best", fontsize=8)
+    axes[0].legend(loc="best")
     for ax in axes[len(pairs) :]:
         ax.remove()
     return figure
 
 
+@in_style
 def _errors(r: TrackResult, pairs: list[int]) -> Figure:
     figure, axes = _axes(len(pairs), 2.6)
     error = errors_after(r.estimate, r.truth_ij_w, np.radians(r.score.yaw_deg or 0.0))
     for ax, p in zip(axes, pairs, strict=False):
         ok = _known(r, p) & r.has_truth[:, p]
         t = r.estimate.t
-        for axis, colour in zip(range(r.log.constellation.dimensions), "rgb", strict=False):
-            e = np.where(ok, error[:, p, axis], np.nan)
-            ax.plot(t, e, color=f"tab:{dict(r='red', g='green', b='blue')[colour]}", lw=0.8)
+        for axis, name in enumerate("xyz"[: r.log.constellation.dimensions]):
+            ax.plot(t, np.where(ok, error[:, p, axis], np.nan), f"C{axis}", lw=0.8, label=name)
         band = np.where(ok, 3.0 * r.estimate.pos_std[:, p].max(axis=1), np.nan)
-        ax.fill_between(t, -band, band, color="0.85", zorder=0)
+        ax.fill_between(t, -band, band, color="0.85", zorder=0, label="3 sigma")
         ax.set(title=pair_name(r.log.constellation, p), xlabel="t [s]", ylabel="error [m]")
         limit = np.nanpercentile(np.abs(error[ok, p]), 99) * 1.3 if ok.any() else 1.0
         ax.set_ylim(-max(limit, 0.2), max(limit, 0.2))
+    axes[0].legend()
     for ax in axes[len(pairs) :]:
         ax.remove()
     return figure
 
 
+@in_style
 def _ranges(r: TrackResult, pairs: list[int]) -> Figure:
     figure, axes = _axes(len(pairs), 2.6)
     block = r.log.block
@@ -155,16 +158,25 @@ def _ranges(r: TrackResult, pairs: list[int]) -> Figure:
         mine = (block.kind[0] == Kind.RANGE) & (
             ((block.i[0] == i) & (block.j[0] == j)) | ((block.i[0] == j) & (block.j[0] == i))
         )
-        ax.plot(block.t[0, mine], block.values[0, mine, 0], ".", color="0.75", ms=2)
+        ax.plot(
+            block.t[0, mine],
+            block.values[0, mine, 0],
+            ".",
+            color="0.75",
+            ms=2,
+            label="ranges",
+            rasterized=True,
+        )
         ok, seen = _known(r, p), r.has_truth[:, p]
         t, length = r.estimate.t, np.linalg.norm(r.estimate.pos_ij_w[:, p], axis=1)
-        ax.plot(t, np.where(ok, length, np.nan), color="tab:blue", lw=0.9)
+        ax.plot(t, np.where(ok, length, np.nan), color="C0", lw=0.9, label="estimate")
         true = np.linalg.norm(r.truth_ij_w[:, p], axis=1)
-        ax.plot(t, np.where(seen, true, np.nan), "--", color="k", lw=0.8)
+        ax.plot(t, np.where(seen, true, np.nan), "--", color="k", lw=0.8, label="truth")
         ax.set(title=pair_name(r.log.constellation, p), xlabel="t [s]", ylabel="distance [m]")
         if mine.any():
             top = np.percentile(block.values[0, mine, 0], 99.5) * 1.15
             ax.set_ylim(0, max(float(top), 0.5))
+    axes[0].legend()
     for ax in axes[len(pairs) :]:
         ax.remove()
     return figure

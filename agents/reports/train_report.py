@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from agents.reports.page import Page, metres
+from agents.reports.style import in_style, new_figure
 from agents.settings import to_json
 
 if TYPE_CHECKING:
@@ -98,15 +99,14 @@ def _seeds(seeds: Sequence[int]) -> str:
     return f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {seeds[0]} to {seeds[-1]}"
 
 
+@in_style
 def curves(runs: Sequence[tuple[str, Rows]]) -> Figure:
     """Return, formation error and collisions over the frames of some runs.
 
     Args:
         runs: Label and rows of each; runs of equal labels are drawn alike.
     """
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(10.0, 3.4), layout="constrained")
+    figure = new_figure(10.0, 3.4)
     axes = figure.subplots(1, 3)
     names = ("return", "formation_error", "collisions_per_min")
     titles = ("mean return of a decision", "formation error [m]", "collisions per minute")
@@ -124,11 +124,10 @@ def curves(runs: Sequence[tuple[str, Rows]]) -> Figure:
                 alpha=0.8,
             )
             shown.add(label)
-        axis.set_title(title, fontsize=10)
+        axis.set_title(title)
         axis.set_xlabel("million frames")
-        axis.grid(alpha=0.3)
         if name == "formation_error":
             axis.set_yscale("log")
         if any(labels):
-            axis.legend(fontsize=8)
+            axis.legend()
     return figure

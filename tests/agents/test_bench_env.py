@@ -146,9 +146,9 @@ def test_every_figure_is_a_row(monkeypatch):
 
 def check_picture(found):
     from agents.reports.bench.env_figures import env_figure
-    from agents.reports.page import png
+    from agents.reports.style import svg
 
-    assert png(env_figure(found)).startswith(b"\x89PNG")
+    assert svg(env_figure(found)).startswith(b"<?xml")
 
 
 def check_table(found, monkeypatch):

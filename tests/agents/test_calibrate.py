@@ -122,7 +122,7 @@ def test_files_and_json(folder, tmp_path, sensor):
     raw = tomllib.loads((out / "calibration.toml").read_text())
     assert set(raw) == {"format", {"imu": "nodes", "uwb": "ranges"}[sensor]}
     page = (out / "report.html").read_text()
-    assert page.count("data:image/png;base64") == 1
+    assert page.count("data:image/svg+xml;base64") == 1
 
 
 def test_tables_and_pictures_of_magnetometers(log, tmp_path):
@@ -131,7 +131,7 @@ def test_tables_and_pictures_of_magnetometers(log, tmp_path):
     assert done.returncode == 0, done.stderr
     assert "ellipse" in done.stdout
     assert "written" in done.stdout
-    assert "image/png" in (tmp_path / "out" / "report.html").read_text()
+    assert "image/svg+xml" in (tmp_path / "out" / "report.html").read_text()
 
 
 def test_tracking_with_calibrations(folder, tmp_path):

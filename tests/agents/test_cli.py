@@ -40,7 +40,7 @@ def test_track_writes_results_and_json(recording, tmp_path):
     assert keys <= set(records[0])
     assert set(records[0]["pair_rmse"]) == {"1-2", "1-3", "2-3"}
     page = (out / "report.html").read_text()
-    assert page.count("data:image/png;base64") == 6
+    assert page.count("data:image/svg+xml;base64") == 6
     assert "http" not in page.replace("http-equiv", "")
     tables = sorted(out.rglob("estimates.csv"))
     assert len(tables) == 2
@@ -259,7 +259,7 @@ def test_protocol_in_json_and_pictures(tmp_path):
     assert max(abs(r["bias_cm"]) for r in clock) < 2.0
     assert all(r["std_ratio"] < 1.2 for r in clock)
     names = {p.name for p in (tmp_path / "out").iterdir()}
-    assert {"report.html", "protocol-timeline.png", "protocol-rates.png"} <= names
+    assert {"report.html", "protocol-timeline.svg", "protocol-rates.svg"} <= names
 
 
 def test_help_names_the_filters_scenarios_and_tasks():

@@ -206,7 +206,7 @@ def test_the_median_episode_is_filmed_as_it_was(result):
     files = compare_files(result, films)
     page = files["report.html"]
     assert page.count("<canvas") == 2
-    assert page.count("data:image/png;base64") == 4
+    assert page.count("data:image/svg+xml;base64") == 4
     assert len(files["results.jsonl"].splitlines()) == 4 + 12
     for scenario in result.scenarios:
         assert {len(line) for line in rows(result, scenario)} == {len(HEADER)}
@@ -248,8 +248,8 @@ def test_the_command_line_writes_a_report_and_rows(tmp_path):
     kept = (tmp_path / "out" / "results.jsonl").read_text().splitlines()
     assert json.loads(kept[0]) == row
     assert {p.name for p in (tmp_path / "out").iterdir()} == {
-        "report.html", "results.jsonl", "compare-figures.png", "compare-time.png",
-        "compare-scatter.png",
+        "report.html", "results.jsonl", "compare-figures.svg", "compare-time.svg",
+        "compare-scatter.svg",
     }  # fmt: skip
 
 

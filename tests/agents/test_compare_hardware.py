@@ -102,8 +102,8 @@ def test_the_report_has_dashes_and_no_films(result):
     assert "Left out: consensus on truth" in text
     files = compare_files(result)
     assert set(files) == {
-        "report.html", "results.jsonl", "compare-figures.png", "compare-time.png",
-        "compare-ratios.png",
+        "report.html", "results.jsonl", "compare-figures.svg", "compare-time.svg",
+        "compare-ratios.svg",
     }  # fmt: skip
     assert "<canvas" not in files["report.html"]
     assert len(files["results.jsonl"].splitlines()) == 2 + 6

@@ -128,11 +128,11 @@ def test_command_line_writes_a_report_and_rows(tmp_path):
     kept = [json.loads(line) for line in lines]
     assert kept[: len(rows)] == rows
     assert [r["seed"] for r in kept[len(rows) :]] == [0] * 6
-    pictures = {p.name for p in (tmp_path / "out").glob("*.png")}
+    pictures = {p.name for p in (tmp_path / "out").glob("*.svg")}
     assert len(pictures) == 5
-    assert "evaluate-scaling.png" in pictures
+    assert "evaluate-scaling.svg" in pictures
     page = (tmp_path / "out" / "report.html").read_text()
-    assert page.count("data:image/png;base64") == 5
+    assert page.count("data:image/svg+xml;base64") == 5
     again = relpos("evaluate", *args, "--out", tmp_path / "out")
     assert again.returncode == 2
     assert "exists already, expected a new or empty folder" in again.stderr

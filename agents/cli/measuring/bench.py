@@ -44,11 +44,11 @@ def _draw_growth(out: Path) -> None:
     from agents.bench.tracker.growth import growth
     from agents.output import write_results
     from agents.reports.bench.tracker_figures import PICTURE, cost_figure
-    from agents.reports.page import png
+    from agents.reports.style import svg
 
     with progress_bar("sizes of groups") as report:
         result = growth(progress=report)
-    write_results(out, {PICTURE: png(cost_figure(result))})
+    write_results(out, {PICTURE: svg(cost_figure(result))})
 
 
 @bench.command("radio")
@@ -138,7 +138,7 @@ def bench_env(quick: bool, out: Path | None, as_json: bool) -> None:
     from agents.bench.env.effort import FULL, QUICK
     from agents.output import check_folder, write_results
     from agents.reports.bench.env_figures import ENV_PICTURE, env_figure
-    from agents.reports.page import png
+    from agents.reports.style import svg
 
     if out is not None:
         check_folder(out, [ENV_PICTURE])
@@ -149,7 +149,7 @@ def bench_env(quick: bool, out: Path | None, as_json: bool) -> None:
             tell=lambda note: click.echo(note, err=True),
         )
     if out is not None:
-        write_results(out, {ENV_PICTURE: png(env_figure(rows))})
+        write_results(out, {ENV_PICTURE: svg(env_figure(rows))})
     if as_json:
         emit_json(rows)
     else:

@@ -31,7 +31,7 @@ def protocol(events: int, nodes: str, seed: int, out: Path | None, as_json: bool
     from agents.output import check_folder, write_results
     from agents.protocol.experiment import protocol as run
     from agents.reports import protocol_report as report
-    from agents.reports.page import png
+    from agents.reports.style import svg
 
     try:
         sizes = tuple(int(n) for n in nodes.split(","))
@@ -43,7 +43,7 @@ def protocol(events: int, nodes: str, seed: int, out: Path | None, as_json: bool
         result = run(events=events, nodes=sizes, seed=seed, progress=tell)
     if out is not None:
         figures = report.figures(result)
-        pictures = {name: png(figure) for name, figure in figures.items()}
+        pictures = {name: svg(figure) for name, figure in figures.items()}
         write_results(out, {"report.html": report.protocol_report(result, figures), **pictures})
     if as_json:
         emit_json(result.records)

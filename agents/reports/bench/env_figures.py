@@ -5,26 +5,27 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from agents.reports.style import in_style, new_figure, plain_ticks
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-ENV_PICTURE = "env_cost.png"
+ENV_PICTURE = "env_cost.svg"
 LONG = 5.0
 """[-] Times that differ by more are drawn on a logarithmic scale."""
 
 
+@in_style
 def env_figure(rows: Sequence[dict[str, Any]]) -> Figure:
     """Time of an env-step over environments, over cars, and of its parts.
 
     Args:
         rows: Of `agents.bench.env.bench_env`.
     """
-    from matplotlib.figure import Figure
-
     curves = [r for r in rows if r["what"].startswith("growth")]
     first = curves[0]["what"]
-    figure = Figure(figsize=(12, 3.6), layout="constrained")
+    figure = new_figure(12, 3.6)
     envs, cars, parts = figure.subplots(1, 3, width_ratios=(1, 1, 1.2))
     _curve(envs, [r for r in curves if r["what"] == first], "envs", "environments, 3 cars")
     over_cars = [r for r in curves if r["what"] != first]
@@ -34,20 +35,16 @@ def env_figure(rows: Sequence[dict[str, Any]]) -> Figure:
 
 
 def _curve(axes: Axes, rows: Sequence[dict[str, Any]], key: str, label: str) -> None:
-    from matplotlib.ticker import FuncFormatter, LogLocator
-
     x, y = [r[key] for r in rows], [r["us_per_env_step"] for r in rows]
-    axes.plot(x, y, "o-", color="tab:blue")
+    axes.plot(x, y, "o-", color="C0")
     axes.set(xscale="log", xlabel=label, ylabel="us per env-step, one core")
     axes.set_xticks(x, [str(n) for n in x], fontsize=7)
     if max(y) > LONG * min(y):
         axes.set_yscale("log")
-        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
+        plain_ticks(axes.yaxis)
     else:
         axes.set_ylim(0.0, 1.1 * max(y))
     axes.minorticks_off()
-    axes.grid(alpha=0.3)
 
 
 def _bars(axes: Axes, rows: Sequence[dict[str, Any]]) -> None:
@@ -55,7 +52,7 @@ def _bars(axes: Axes, rows: Sequence[dict[str, Any]]) -> None:
     what = next(r["what"] for r in rows if "solver_share" in r)
     parts = [r for r in rows if r["what"].startswith(f"{what}: ")]
     names = [r["what"].removeprefix(f"{what}: ") for r in parts]
-    axes.barh(names, [r["us_per_env_step"] for r in parts], color="tab:blue")
+    axes.barh(names, [r["us_per_env_step"] for r in parts], color="C0")
     axes.invert_yaxis()
     axes.set(title=what, xlabel="us per env-step, one core")
-    axes.grid(axis="x", alpha=0.3)
+    axes.grid(visible=False, axis="y")
