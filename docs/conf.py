@@ -9,7 +9,7 @@ copyright = "2026, the relpos-env developers"
 version = release = installed("relpos-env")
 
 extensions = [
-    "myst_parser",
+    "myst_nb",
     "sphinx.ext.autodoc",
     "sphinx.ext.intersphinx",
     "sphinx.ext.napoleon",
@@ -23,6 +23,7 @@ templates_path: list[str] = []
 exclude_patterns = ["images"]
 myst_enable_extensions = ["colon_fence", "dollarmath"]
 myst_heading_anchors = 4
+nb_execution_raise_on_error = True
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"
 default_role = "code"

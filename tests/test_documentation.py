@@ -13,7 +13,7 @@ from agents.cli.main import cli
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
-BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
+BLOCK = re.compile(r"^```(?:\{code-cell\} )?(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 PLACEHOLDER = re.compile(r"[<>…]|\.\.\.")
 
 
@@ -52,7 +52,8 @@ def test_documented_commands_have_such_options(page, words):
 
 
 @pytest.mark.parametrize("page", ["README.md", "docs/tutorials/environment.md",
-                                  "docs/tutorials/tracking.md"])  # fmt: skip
+                                  "docs/tutorials/tracking.md",
+                                  "docs/tutorials/notebook.md"])  # fmt: skip
 def test_python_of_the_first_pages_runs(page, tmp_path):
     code = "\n".join(blocks(ROOT / page, "python"))
     done = subprocess.run(
