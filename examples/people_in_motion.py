@@ -2,7 +2,7 @@
 
 Prints a table. With a path as argument it also draws the exercises as stick figures:
 
-    python examples/people_in_motion.py people.png
+    python examples/people_in_motion.py people.svg
 """
 
 import sys

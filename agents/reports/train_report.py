@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from agents.reports.page import Page, metres
-from agents.reports.style import in_style, new_figure
+from agents.reports.style import in_style, new_figure, plain_ticks
 from agents.settings import to_json
 
 if TYPE_CHECKING:
@@ -110,7 +111,8 @@ def curves(runs: Sequence[tuple[str, Rows]]) -> Figure:
     axes = figure.subplots(1, 3)
     names = ("return", "formation_error", "collisions_per_min")
     titles = ("mean return of a decision", "formation error [m]", "collisions per minute")
-    labels = list(dict.fromkeys(label for label, _ in runs))
+    counts = Counter(label for label, _ in runs)
+    labels = list(counts)
     for axis, name, title in zip(axes, names, titles, strict=True):
         shown = set()
         for label, rows in runs:
@@ -119,7 +121,7 @@ def curves(runs: Sequence[tuple[str, Rows]]) -> Figure:
                 [r["frames"] / 1e6 for r in rows],
                 [r[name] for r in rows],
                 color=colour,
-                label=label if label and label not in shown else None,
+                label=f"{label}, {counts[label]} runs" if label and label not in shown else None,
                 marker="." if len(rows) < 30 else None,
                 alpha=0.8,
             )
@@ -128,6 +130,7 @@ def curves(runs: Sequence[tuple[str, Rows]]) -> Figure:
         axis.set_xlabel("million frames")
         if name == "formation_error":
             axis.set_yscale("log")
+            plain_ticks(axis.yaxis)
         if any(labels):
             axis.legend()
     return figure
