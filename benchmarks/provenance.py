@@ -1,9 +1,9 @@
 """Where results and figures come from, and which of them are older than their code.
 
 `results/provenance.json` has an entry for every file of results, every picture of the documents and
-every card of a policy: the command that made it, version, commit, date and machine, and a hash of the code that it depends
-on. Run `python benchmarks/provenance.py` to list what is stale, with `--stamp FILE ...` after files
-have been made again.
+every card of a policy: the command that made it, version, commit, date and machine, and a hash of
+the code that it depends on. Run `python benchmarks/provenance.py` to list what is stale, with
+`--stamp FILE ...` after files have been made again.
 """
 
 from __future__ import annotations

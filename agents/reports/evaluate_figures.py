@@ -203,13 +203,14 @@ def _scaling(result: EvaluateResult) -> Figure:
 
 
 def _finish(figure: Figure, label: str, legend: str = "") -> None:
-    """Label the panels at the left, and a legend of that title in the first."""
+    """Label the panels at the left, and one legend of that title above all."""
     for ax in figure.axes:
         spec = ax.get_subplotspec()
         if spec is not None and spec.is_first_col():
             ax.set_ylabel(label)
     if legend:
-        figure.axes[0].legend(title=legend)
+        handles, labels = figure.axes[0].get_legend_handles_labels()
+        figure.legend(handles, labels, title=legend, loc="outside upper center", ncols=len(labels))
 
 
 def _or_nan(value: float | None) -> float:
