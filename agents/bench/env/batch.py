@@ -48,13 +48,10 @@ class Batch:
         self.env.reset(seed=0)
         self.env.formation.cycles[:] = EPISODE * np.arange(n_envs) // n_envs
 
-    def warm_up(self, steps: int, patience: float = np.inf) -> None:
-        """Drive so many steps, or for so long [s]."""
-        until = time.perf_counter() + patience
+    def warm_up(self, steps: int) -> None:
+        """Drive so many steps."""
         for _ in range(steps):
             self._step()
-            if time.perf_counter() > until:
-                return
 
     def turn(self) -> float:
         """Time of a turn [us per env-step]."""

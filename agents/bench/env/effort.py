@@ -28,7 +28,7 @@ class Effort:
     warm_up: int = 100
     """Steps before the first turn: until the trackers have settled."""
     patience: float = 8.0
-    """[s] A point of a curve takes no new turn, and no more warm-up, after so long."""
+    """[s] A point of a curve takes no new turn after so long."""
 
 
 FULL = Effort()

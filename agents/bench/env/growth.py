@@ -57,7 +57,7 @@ def _point(scenario: str, n_envs: int, n_cars: int, effort: Effort) -> Point:
     before = resident_bytes()
     resets = max(RESETS, LEAST_STEPS * n_envs // EPISODE)
     batch = Batch(n_envs, followed, resets=resets, scenario=scenario, n_cars=n_cars)
-    batch.warm_up(effort.warm_up, effort.patience)
+    batch.warm_up(effort.warm_up)
     cost, until = batch.turn(), time.perf_counter() + effort.patience
     for _ in range(effort.turns - 1):
         if time.perf_counter() > until:
