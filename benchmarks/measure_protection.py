@@ -41,7 +41,8 @@ def started(of: Case, at: float) -> tuple[int, int]:
     counted = judged & estimate.ok
     n = int(counted.sum())
     if n and of.constellation.heading == "initial":
-        # The heading that the constellation states is that at the start of the drive, not here.
+        # The heading that the constellation states is that at the start of the drive, not here:
+        # one constant yaw is taken out.
         turn = best_rotation(truth[counted], estimate.pos_ij_w[counted], planar=True)
         truth = truth @ turn.T
     share = beyond_protection(estimate, truth, judged)
