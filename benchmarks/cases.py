@@ -45,9 +45,11 @@ WORLDS = {"car": "car", "hand": "hand", "drone": "drone", "body": "human"}
 class Case:
     """Measurements with the truth."""
 
-    def __init__(self, constellation: Any, block: Any, t: F64, truth: F64, known: Any) -> None:
+    def __init__(
+        self, constellation: Any, block: Any, t: F64, truth: F64, known: Any, heading: Any = None
+    ) -> None:
         self.constellation, self.block, self.t = constellation, block, t
-        self.truth, self.known = truth, known
+        self.truth, self.known, self.heading = truth, known, heading
 
 
 def spoiled(block: Any, fault: str, seed: int) -> Any:
@@ -104,7 +106,8 @@ def case(kind: str, seed: int) -> Case:
         t = np.arange(0.5, space_runs.SECONDS - 0.1, 0.1)
         pairs, where = run.constellation.pairs, run.positions(t)
         truth = where[:, pairs[:, 1]] - where[:, pairs[:, 0]]
-        return Case(run.constellation, run.block, t, truth, np.ones(truth.shape[:2], dtype=bool))
+        known = np.ones(truth.shape[:2], dtype=bool)
+        return Case(run.constellation, run.block, t, truth, known, run.heading)
     if first == "world":
         log = record(draw(seed - FIRST, kind=WORLDS[rest]))
     elif kind in RECORDINGS:

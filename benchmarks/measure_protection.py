@@ -16,7 +16,6 @@ import numpy as np
 from cases import Case, case
 
 from tracking import Tracker
-from tracking.geometry import best_rotation
 from tracking.measurements import Kind
 from tracking.metrics.integrity import beyond_protection
 
@@ -35,17 +34,15 @@ def started(of: Case, at: float) -> tuple[int, int]:
     block = replace(block, t=np.where(block.kind == Kind.SURVEY, at, block.t))
     block = block.take(block.order()[0])
     times = (of.t >= at) & (of.t < at + LENGTH)
-    truth = of.truth[times]
-    estimate = Tracker(of.constellation).run(block, of.t[times]).take(0)
+    who = of.constellation
+    if of.heading is not None:
+        # What the constellation states is the heading at the start of the run, not here.
+        mover = replace(who.nodes[0], initial_heading=of.heading(at))
+        who = replace(who, nodes=(mover, *who.nodes[1:]))
+    estimate = Tracker(who).run(block, of.t[times]).take(0)
     judged = of.known[times] & ~of.constellation.is_static[of.constellation.pairs].all(axis=1)
-    counted = judged & estimate.ok
-    n = int(counted.sum())
-    if n and of.constellation.heading == "initial":
-        # The heading that the constellation states is that at the start of the drive, not here:
-        # one constant yaw is taken out.
-        turn = best_rotation(truth[counted], estimate.pos_ij_w[counted], planar=True)
-        truth = truth @ turn.T
-    share = beyond_protection(estimate, truth, judged)
+    n = int((judged & estimate.ok).sum())
+    share = beyond_protection(estimate, of.truth[times], judged)
     return n, round((share or 0.0) * n)
 
 

@@ -127,6 +127,8 @@ class Run:
     block: MeasurementBlock
     positions: Callable[[F64], F64]
     """Of all nodes at given times, (time, node, 3) [m]."""
+    heading: Callable[[float], float] | None = None
+    """Of the first node at a time [rad], where the world begins with its heading."""
 
 
 def make_ranges(
@@ -167,10 +169,13 @@ def hand(seed: int) -> Run:
     heights = (tiers, rng.uniform(0.0, 2.5, n), rng.uniform(0.8, 2.0, n))[rng.integers(3)]
     fixed = np.column_stack([rng.uniform(-2.5, 2.5, n), rng.uniform(-3.0, 3.0, n), heights])
     lever = rng.normal(0.0, 0.05, 3)
-    yaw = float(mover.turns(0.0).as_euler("ZYX")[0])
+
+    def heading(t: float) -> float:
+        return float(mover.turns(t).as_euler("ZYX")[0])
+
     constellation = Constellation(
         nodes=(
-            NodeConfig(id=1, vehicle="hand", imu_hz=hz, initial_heading=yaw),
+            NodeConfig(id=1, vehicle="hand", imu_hz=hz, initial_heading=heading(0.0)),
             *(NodeConfig(id=100 + k, kind="static") for k in range(n)),
         ),
         heading="initial",
@@ -198,7 +203,7 @@ def hand(seed: int) -> Run:
         still = np.broadcast_to(fixed, (len(t), n, 3))
         return np.concatenate([mover.position(t)[:, None], still], axis=1)
 
-    return Run(constellation, MeasurementBlock.concatenate(blocks).sorted(), positions)
+    return Run(constellation, MeasurementBlock.concatenate(blocks).sorted(), positions, heading)
 
 
 def drones(seed: int) -> Run:

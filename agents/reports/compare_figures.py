@@ -105,8 +105,7 @@ def _bars(result: CompareResult) -> Figure:
         line[0].set_title(scenario, loc="left", fontweight="bold")
     for ax, name in zip(axes[-1], measured, strict=True):
         ax.set_xlabel(LABELS[name])
-    n = len(result.rows[0].episodes)
-    figure.suptitle(f"means of {n} episodes, 95 % intervals", fontsize=9)
+    figure.suptitle(f"means of {_episodes(result)}, 95 % intervals", fontsize=9)
     return figure
 
 
@@ -169,8 +168,7 @@ def _over_time(result: CompareResult) -> Figure:
             scored = high[t > setting.settle]
             top = max(top, float(np.nanmax(scored if len(scored) else high)))
         ax.set(xlim=(0, setting.seconds), ylim=(0, 1.3 * top or 1.0), xlabel="t [s]")
-    n = len(result.rows[0].episodes)
-    _finish(figure, "formation error [m]", f"median and middle half of {n} episodes")
+    _finish(figure, "formation error [m]", f"median and middle half of {_episodes(result)}")
     return figure
 
 
@@ -204,8 +202,7 @@ def _scatter(result: CompareResult) -> Figure:
         ax.locator_params(axis="x", nbins=6)
         ax.set_xlim(left=-0.03 * ax.get_xlim()[1])
         ax.set_ylim(bottom=0)
-    n = len(result.rows[0].episodes)
-    _finish(figure, "formation error [m]", f"{n} episodes, ring: their mean")
+    _finish(figure, "formation error [m]", f"{_episodes(result)}, ring: their mean")
     return figure
 
 
@@ -247,6 +244,13 @@ def _ratios(result: CompareResult) -> Figure:
             plain_ticks(ax.xaxis)
     axes[-1].set_xlabel("ratio of formation errors")
     return figure
+
+
+def _episodes(result: CompareResult) -> str:
+    """How many episodes contenders have."""
+    counts = [len(row.episodes) for row in result.rows]
+    low, high = min(counts), max(counts)
+    return f"{high} episodes" if low == high else f"{low} to {high} episodes"
 
 
 def _finish(figure: Figure, label: str, title: str) -> None:

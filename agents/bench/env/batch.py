@@ -49,7 +49,7 @@ class Batch:
         self.env.formation.cycles[:] = EPISODE * np.arange(n_envs) // n_envs
 
     def warm_up(self, steps: int) -> None:
-        """Drive so many steps."""
+        """Drive for a number of steps."""
         for _ in range(steps):
             self._step()
 
