@@ -87,9 +87,9 @@ def best_positions(c, known, distance, sides):
     across = axes[d - 1].copy()
     side = np.sum((sides[0, :d] - centre) * across)
     for a in order[1:]:
-        relative_covariance = np.sum((places[a] - sides[0]) ** 2) >= c.merge_distance**2
+        is_apart = np.sum((places[a] - sides[0]) ** 2) >= c.merge_distance**2
         beyond = np.sum((places[a, :d] - centre) * across) * side < -ON_EDGE
-        if relative_covariance and beyond and said[a] < said[order[0]] + c.second_side_loss:
+        if is_apart and beyond and said[a] < said[order[0]] + c.second_side_loss:
             sides[1] = places[a]
             if said[a] < said[order[0]] + EQUAL:
                 sort_sides(d, known, sides)

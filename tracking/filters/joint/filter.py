@@ -120,8 +120,7 @@ def bank_size(constellation: Constellation, layout: Layout) -> int:
     """How many hypotheses there is room for.
 
     Those of all rotations, and the reflections of nodes that join meanwhile. Where one filter
-    stands for all rotations (`Alignment.LINEAR`), those of their likeliest modes: of 60 simulated
-    groups eight had more than six.
+    stands for all rotations (`Alignment.LINEAR`), those of their likeliest modes.
     """
     n_rotations = len(layout.rotations)
     if constellation.dimensions == 2:

@@ -83,10 +83,10 @@ def reset_bias_on_transition(c, s, h, p, switched, is_far):
     for k in range(s.sensitivity.shape[1]):
         s.sensitivity[h, k, at] *= stays
     hidden = s.nlos[h, p]
-    relative_covariance = c.nlos_bias_large - c.nlos_bias
+    extra = c.nlos_bias_large - c.nlos_bias
     within = c.nlos_bias_var + is_far * (c.nlos_bias_large_var - c.nlos_bias_var)
-    nlos_bias_var = within + is_far * (1.0 - is_far) * relative_covariance * relative_covariance
-    excess = c.nlos_bias + is_far * relative_covariance
+    nlos_bias_var = within + is_far * (1.0 - is_far) * extra * extra
+    excess = c.nlos_bias + is_far * extra
     new_var = slow_error_var(c.slow_var, hidden, excess, nlos_bias_var)
     off = s.x[h, at] - hidden * excess
     # Of the mixture of both; pending updates hold what has been taken off already.
