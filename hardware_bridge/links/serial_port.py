@@ -128,7 +128,7 @@ def _set_line(port: serial.Serial) -> None:
     settings[6][termios.VMIN], settings[6][termios.VTIME] = 1, 0
     termios.tcsetattr(fd, termios.TCSANOW, settings)
     # FTDI adapters hold bytes back for 16 ms otherwise; many ports know nothing of it.
-    with contextlib.suppress(OSError, ValueError, AttributeError, NotImplementedError):
+    with contextlib.suppress(ValueError, NotImplementedError):
         port.set_low_latency_mode(True)
 
 

@@ -69,7 +69,7 @@ def test_they_keep_their_formation(name):
         ("hold-beams", "hold", "ring-nlos", 3),
         pytest.param(
             *("hold-beams", "hold", "ring-nlos", 4),
-            marks=pytest.mark.xfail(strict=True, reason="0.36 m"),
+            marks=pytest.mark.xfail(strict=True, reason="formation error 0.36 m with four cars"),
         ),
         *(("hold-beams", "hold", "hall", n) for n in (4, 6)),
     ],

@@ -11,9 +11,10 @@ from tracking.constellation import Constellation, NodeConfig
 from tracking.errors import ConfigError, LogError
 from tracking.filters.joint import JointEkf
 from tracking.filters.joint.params import JointParams
+from tracking.filters.params import FilterParams
 from tracking.log import read_log, write_log
 from tracking.mount import Mount
-from tracking.tracker import Tracker
+from tracking.tracker import Tracker, TrackerParams
 from tracking.vehicles import VEHICLES
 
 CAR = VEHICLES["car"]
@@ -81,3 +82,23 @@ def test_curves_tell_how_far_ahead_of_its_axle_it_is(run):
         std = np.sqrt(state.P[0, h, at, at])
         assert std < 0.6 * CAR.ahead_std
         assert abs(state.x[0, h, at] - vehicle.ahead) < 3.0 * std
+
+
+@pytest.mark.parametrize(("n", "states"), [(12, True), (13, False)])
+def test_groups_of_more_than_twelve_have_no_states_of_mounts(n, states):
+    nodes = tuple(NodeConfig(id=k, vehicle="car") for k in range(n))
+    found = JointEkf(Constellation(nodes=nodes, dimensions=2), JointParams()).save()
+    assert (found.nodes["i_mount"] >= 0).all() == states
+
+
+def test_an_unknown_mount_without_states_is_noise(run):
+    """A mount that is known to be there says the same, and more surely."""
+    ahead, _, slip, _ = Mount().prior(CAR)
+    params = TrackerParams(filter=FilterParams(joint=JointParams(max_mounts=2)))
+    variance = []
+    for mount in (Mount(), Mount(ahead=ahead, slip=slip)):
+        nodes = tuple(replace(n, mount=mount) for n in run.constellation.nodes)
+        who = replace(run.constellation, nodes=nodes)
+        estimate = Tracker(who, params).run(run.block, np.array([39.0])).take(0)
+        variance.append(np.trace(estimate.cov[0], axis1=-2, axis2=-1).mean())
+    assert variance[0] > 1.05 * variance[1]
