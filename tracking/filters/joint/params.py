@@ -265,8 +265,8 @@ class JointParams:
     """[m] A node all of whose ranges err by so much, over the root of their number, is doubted."""
     max_mounts: int = 12
     """[-] Larger groups have no states for where trackers sit on cars: it counts as noise. In
-    groups of ten they are worth up to a tenth of the error, in groups of twenty nothing and a third of
-    the time of a start."""
+    groups of ten they are worth up to a tenth of the error, in groups of twenty nothing, at a third
+    of the time of a start."""
     stale_std: float = 1.0
     """[m] Of positions of nodes that were silent, see `range_timeout`."""
     accuracy: float | None = None
