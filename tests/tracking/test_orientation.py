@@ -196,6 +196,27 @@ def test_lost_samples_are_bridged():
     assert abs(np.angle(np.exp(1j * difference))) < 0.01
 
 
+@pytest.mark.parametrize("stamps", ["jitter", "repeated", "pairs", "slow"])
+def test_a_turn_adds_up_to_the_time_that_passed(stamps):
+    """A body turns at 1 rad/s for 10 s: whatever single samples are stamped, it turned by 10."""
+    rng, t = np.random.default_rng(4), np.arange(1, 1001) / 100.0
+    if stamps == "jitter":
+        stamped = np.sort(t + 0.005 * rng.standard_normal(len(t)))
+    elif stamps == "repeated":
+        stamped = np.where(rng.random(len(t)) < 0.3, np.r_[t[0], t[:-1]], t)
+    elif stamps == "pairs":
+        stamped = t[np.arange(len(t)) // 2 * 2 + 1]
+    else:
+        stamped = 1.1 * t  # a sensor that is slower than it says
+    stamped[[0, -1]] = t[0], stamped[-1]
+    samples = 1e-3 * rng.standard_normal((len(t), 6)) + [0.0, 0.0, 1.0, 0.0, 0.0, GRAVITY]
+    node = np.zeros(len(t), dtype=np.int64)
+    block = MeasurementBlock.of_kind(Kind.IMU, stamped, node, samples)
+    states = Orientation(constellation("initial", "car"), OrientationParams()).step(block)
+    turned = np.unwrap(yaw_of(states.values[0, states.valid[0], :4]))
+    assert turned[-1] - turned[0] == pytest.approx(stamped[-1] - stamped[0], abs=0.02)
+
+
 def test_a_noisy_gyroscope_is_seen_to_rest():
     """Its bias and the length of gravity are learned: otherwise its tilt runs away."""
     rng, n = np.random.default_rng(3), 800

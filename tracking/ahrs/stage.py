@@ -82,8 +82,8 @@ def take_sample(c, s, e, n, t, kind, values, valid, k):
         return
     ax, ay, az = good[e, n, GOOD + 3], good[e, n, GOOD + 4], good[e, n, GOOD + 5]
     cut_x, cut_y, cut_z, upright = find_limits(c.sanity[0], s.limits, e, n, ax, ay, az)
-    n_lost = find_gap(c, s, e, n, t)
-    integrate_over(c, s, e, n, n_lost, upright)
+    n_lost, dt = find_gap(c, s, e, n, t)
+    integrate_over(c, s, e, n, n_lost, dt, upright)
     is_settling = settles(c, s, e, n, ax, ay, az)
     if has_field:
         if is_settling:
@@ -145,22 +145,28 @@ def tell_upright(s, e, n, cos, sin, values, k):
 
 @small_kernel
 def find_gap(c, s, e, n, t):
-    """Samples lost before one at time t [s]; after a long silence VQF starts again instead."""
+    """Samples lost before one at time t [s], and the time between two then [s].
+
+    After a long silence VQF starts again instead.
+    """
     m = s.node
     gap = t - m[e, n, T]
-    if m[e, n, STARTED] == 0.0 or gap * c.rate[n] <= STEADY:
-        return 0
+    if m[e, n, STARTED] == 0.0:
+        return 0, c.dt[n]
+    if gap * c.rate[n] <= STEADY:
+        return 0, gap
     if gap <= c.max_gap[n]:
-        return round(gap * c.rate[n]) - 1
+        n_steps = round(gap * c.rate[n])
+        return n_steps - 1, gap / n_steps
     if c.magnetic[n]:
         # Where it points now is not known; what its gyroscope reads at rest is still true.
         start_vqf(s, c, e, n, worst_variance(s.bias, c, e, n))
         m[e, n, SEEN_FIELD] = m[e, n, MOVED] = 0.0
-    return 0
+    return 0, c.dt[n]
 
 
 @small_kernel
-def integrate_over(c, s, e, n, n_lost, upright):
+def integrate_over(c, s, e, n, n_lost, dt, upright):
     """Give VQF the believed sample, and before it those that were lost, interpolated."""
     m, good = s.node, s.health
     for step in range(n_lost, -1, -1):
@@ -176,7 +182,7 @@ def integrate_over(c, s, e, n, n_lost, upright):
             az += w * (m[e, n, LAST_ACC + 2] - az)
         elif not upright:
             ax = ay = az = 0.0  # tells no tilt
-        update_vqf(s, c, e, n, gx, gy, gz, ax, ay, az)
+        update_vqf(s, c, e, n, dt, gx, gy, gz, ax, ay, az)
     for a in range(3):
         m[e, n, LAST_GYR + a] = good[e, n, GOOD + a]
         m[e, n, LAST_ACC + a] = good[e, n, GOOD + 3 + a]

@@ -78,12 +78,12 @@ def store_unit(q, e, n, at, w, x, y, z):
 
 
 @small_kernel
-def integrate(s, c, e, n, gx, gy, gz):
-    """Take a reading of the gyroscope [rad/s]: rest detection, then strapdown."""
+def integrate(s, c, e, n, dt, gx, gy, gz):
+    """Take a reading of the gyroscope [rad/s], over dt [s]: rest detection, then strapdown."""
     q = s.tilt
     q[e, n, N_GYR_READ] += 1.0
     watch_gyroscope(s.rest, c, e, n, q[e, n, N_GYR_READ], gx, gy, gz)
-    half = 0.5 * c.dt[n]
+    half = 0.5 * dt
     x = half * (gx - s.bias[e, n, BIAS])
     y = half * (gy - s.bias[e, n, BIAS + 1])
     z = half * (gz - s.bias[e, n, BIAS + 2])
@@ -145,14 +145,18 @@ def correct_tilt(s, c, e, n, ax, ay, az):
 
 
 @small_kernel
-def update_vqf(s, c, e, n, gx, gy, gz, ax, ay, az):
+def update_vqf(s, c, e, n, dt, gx, gy, gz, ax, ay, az):
     """Take an inertial sample of node n; an accelerometer that reads zero tells no tilt.
+
+    The gyroscope turns for the time that passed, so that stamps that jitter or repeat turn no
+    further; low passes count samples.
 
     Args:
         s: OrientationState, its memories `tilt`, `rest` and `bias` updated.
         c: OrientationCoefficients.
         e: Environment.
         n: Node.
+        dt: Time since the sample before [s].
         gx: Gyroscope, body frame [rad/s].
         gy: Gyroscope, body frame [rad/s], along y.
         gz: Gyroscope, body frame [rad/s], along z.
@@ -160,7 +164,7 @@ def update_vqf(s, c, e, n, gx, gy, gz, ax, ay, az):
         ay: Specific force, body frame [m/s2], along y.
         az: Specific force, body frame [m/s2], along z.
     """
-    integrate(s, c, e, n, gx, gy, gz)
+    integrate(s, c, e, n, dt, gx, gy, gz)
     if ax != 0.0 or ay != 0.0 or az != 0.0:
         correct_tilt(s, c, e, n, ax, ay, az)
     else:
@@ -208,7 +212,7 @@ def run_vqf(c, s, samples, field, has_field, q_6d, q_9d, bias, resting):
             for k in range(samples.shape[2]):
                 gx, gy, gz = samples[e, n, k, 0], samples[e, n, k, 1], samples[e, n, k, 2]
                 ax, ay, az = samples[e, n, k, 3], samples[e, n, k, 4], samples[e, n, k, 5]
-                update_vqf(s, c, e, n, gx, gy, gz, ax, ay, az)
+                update_vqf(s, c, e, n, c.dt[n], gx, gy, gz, ax, ay, az)
                 if has_field[e, n, k]:
                     mx, my, mz = field[e, n, k, 0], field[e, n, k, 1], field[e, n, k, 2]
                     update_heading(s, c, e, n, mx, my, mz)

@@ -11,8 +11,8 @@ from tracking.constellation import FASTEST_HZ, SLOWEST_HZ, Constellation
 from tracking.errors import LogError
 from tracking.measurements import Kind, MeasurementBlock
 
-MOST_AT_ONCE = 0.4
-"""[-] Share of samples that may have the time of the one before."""
+MOST_AT_ONCE = 0.6
+"""[-] Share of samples that may have the time of the one before: those in pairs may."""
 FEW = 20
 """[-] Of fewer samples nothing is said."""
 TOGETHER = 0.5
@@ -84,7 +84,11 @@ def with_rates(constellation: Constellation, block: MeasurementBlock) -> Constel
             )
         mag_hz = _rate(block.t[0, mine & (block.kind[0] == Kind.MAG)])
         nodes.append(
-            replace(config, imu_hz=imu_hz, mag_hz=None if mag_hz in (0.0, imu_hz) else mag_hz)
+            replace(
+                config,
+                imu_hz=imu_hz,
+                mag_hz=None if mag_hz in (0.0, imu_hz, None) or mag_hz > FASTEST_HZ else mag_hz,
+            )
         )
     return replace(constellation, nodes=tuple(nodes))
 
@@ -93,14 +97,16 @@ def _rate(t: F64) -> float | None:
     """Nominal rate of a sensor from its times, rounded to 0.01 Hz; samples may be missing.
 
     Times are often rounded to a millisecond: what is between two is wrong, what is between many
-    is not. So each step is counted as the whole number of periods that it must be.
+    is not. So each step is counted as the whole number of periods that it must be. Where samples
+    come in packets, there are more of them than periods.
     """
-    dt = np.diff(t)
-    dt = dt[dt > 0.0]
+    every = np.diff(t)
+    dt = every[every > 0.0]
     if len(dt) < 2:
         return None
     period = float(np.median(dt))
-    dt = dt[dt < LONG_GAP * period]
+    dt, every = dt[dt < LONG_GAP * period], every[every < LONG_GAP * period]
     for _ in range(3):
         period = float(dt.sum() / np.maximum(np.round(dt / period), 1.0).sum())
-    return round(1.0 / period, 2)
+    in_packets = len(every) / float(dt.sum()) if len(every) >= FEW else 0.0
+    return round(max(1.0 / period, in_packets), 2)
