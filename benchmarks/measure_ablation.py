@@ -95,6 +95,7 @@ MECHANISMS: dict[str, Callable[[TrackerParams], TrackerParams]] = {
     "fault: outliers": part("supervision", outlier_ratio=2.0),
     "fault: position": part("supervision", position_misfit=NEVER),
     "fault: alignment": part("start", respawn_nis=NEVER),
+    "group outliers": part("supervision", group_outlier_ratio=2.0),
     "frozen ranges": part("supervision", frozen_ranges=NEVER),
     "stale nodes": joint(lambda p: replace(p, range_timeout=NEVER)),
 }

@@ -69,6 +69,19 @@ def node_outlier_ratio(c, s, layout, i, t):
 
 
 @kernel
+def group_outlier_ratio(c, s, t):
+    """Mean share of outliers over the pairs that range, nodes with a fault left out [-]."""
+    total, n = 0.0, 0
+    for p in range(s.pairs.shape[0]):
+        pair = s.pairs[p]
+        has_fault = s.nodes[pair.i].fault != 0 or s.nodes[pair.j].fault != 0
+        if not has_fault and is_ranging(c, s, p, t):
+            total += pair.outlier_ratio
+            n += 1
+    return total / max(n, 1)
+
+
+@kernel
 def others_fit(c, s, i, t):
     """True if pairs without node i range, and none of them contradicts the rest."""
     n = 0
