@@ -174,7 +174,7 @@ def test_the_nis_is_over_the_variance_that_the_correction_used():
         return distance, scalar_update.compute_pht(s, h, m, work)
 
     before, v = predicted()
-    nu, _, nis, sane = range_update.range_update(
+    nu, _, nis, sane, _ = range_update.range_update(
         c, s, h, p, 0.02, before + 0.05, levers, sight, work
     )
     _, after = predicted()

@@ -1,11 +1,14 @@
 """What inertial samples of a log must be, and what is said of those that cannot be used."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tracking import Constellation, NodeConfig
 from tracking.errors import LogError
 from tracking.findings import find_unused
+from tracking.findings.stamps import find_bad_stamps
 from tracking.log import Log, read_log, write_log
 from tracking.log.inertial import with_rates
 from tracking.measurements import Kind, MeasurementBlock
@@ -48,6 +51,11 @@ def test_times_that_are_rounded_do_not_change_the_rate(hz, lost):
     assert rates.nodes[0].imu_hz == pytest.approx(hz, rel=2e-3)
 
 
+def test_samples_in_pairs_have_the_rate_of_the_sensor():
+    log = log_of([(0, np.repeat(np.arange(0.0, SECONDS, 0.02), 2))], heading="initial")
+    assert with_rates(log.constellation, log.block).nodes[0].imu_hz == pytest.approx(100.0, rel=0.02)
+
+
 def test_samples_that_come_all_at_once_are_refused(tmp_path):
     t = np.repeat(np.arange(0.0, SECONDS, 0.05), 5)
     write_log(tmp_path / "log", log_of([(0, t)], heading="initial"))
@@ -62,6 +70,17 @@ def test_a_magnetometer_on_another_clock_is_refused(tmp_path, scale):
     write_log(tmp_path / "log", log_of([(0, t)], [(0, mag)]))
     with pytest.raises(LogError, match=r"mag\.csv, t_s: .*expected one clock"):
         read_log(tmp_path / "log")
+
+
+@pytest.mark.parametrize(("jitter", "repeats", "count"), [(0.0, 1, 0), (0.004, 1, 1), (0.0, 2, 1)])
+def test_times_that_repeat_or_jitter_are_said(jitter, repeats, count):
+    t = np.repeat(np.arange(0.0, SECONDS, 0.01 * repeats), repeats)
+    t += jitter * np.random.default_rng(1).standard_normal(len(t))
+    log = log_of([(0, np.sort(t))], heading="initial")
+    log = replace(log, constellation=with_rates(log.constellation, log.block))
+    found = find_bad_stamps(log)
+    assert [f.name for f in found] == ["bad-stamps"] * count
+    assert all("expected when each was taken" in f.text for f in found)
 
 
 def test_what_cannot_be_used_is_said():

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from tracking.findings.at_rest import find_at_rest
+from tracking.findings.at_rest import correct_at_rest
 from tracking.findings.clock_offset import correct_clocks
 from tracking.findings.finding import KINDS, Finding, refuse_errors
 from tracking.findings.gyroscope import find_gyroscope
+from tracking.findings.imu_against_ranges import find_suspects, find_wrong_axes
 from tracking.findings.ranges import find_range_errors
+from tracking.findings.stamps import find_bad_stamps
 from tracking.findings.use import find_refused, find_unplaced, find_unused
 from tracking.log.folder import Log
 
@@ -23,13 +25,23 @@ def examine(
         progress: Called with the share done, 0 to 1, where clocks are looked at.
 
     Returns:
-        The log, with clocks corrected where that can be done, and what was found.
+        The log, with biases of gyroscopes and clocks corrected where that can be done, and what was
+        found.
     """
-    found = [*find_unused(log), *find_at_rest(log), *find_gyroscope(log)]
-    if any(f.severity == "error" or f.name == "gyro-bias" for f in found):
+    log, at_rest = correct_at_rest(log)
+    found = [*find_unused(log), *find_bad_stamps(log), *at_rest, *find_gyroscope(log)]
+    if any(f.severity == "error" for f in found):
         return log, found  # what follows needs sensors that are right
-    log, of_clocks = correct_clocks(log, progress)
-    return log, [*found, *of_clocks, *find_range_errors(log)]
+    suspects = find_suspects(log)
+    log, of_clocks = correct_clocks(log, suspects, progress)
+    found += of_clocks
+    if any(f.severity == "error" for f in of_clocks):
+        return log, found
+    if of_clocks and suspects:
+        suspects = find_suspects(log)
+    if suspects:
+        return log, [*found, *find_wrong_axes(log, suspects)]
+    return log, [*found, *find_range_errors(log)]
 
 
 __all__ = [

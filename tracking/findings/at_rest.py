@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -72,13 +72,22 @@ def rest_of(t: F64, values: F64) -> AtRest:
     return AtRest(WINDOW * len(rests), rest[3:], float(np.linalg.norm(rest[3:])), rest[:3])
 
 
-def find_at_rest(log: Log) -> list[Finding]:
-    """Units, axes and biases of every IMU of a recording."""
+def correct_at_rest(log: Log) -> tuple[Log, list[Finding]]:
+    """Units, axes and biases of every IMU of a recording.
+
+    Returns:
+        The log, large biases of gyroscopes taken off, and what was found.
+    """
     found, block = list[Finding](), log.block
     for n, node in enumerate(log.constellation.nodes):
-        rows = (block.kind[0] == Kind.IMU) & (block.i[0] == n) & block.valid[0]
-        found += find_in_samples(node, block.t[0, rows], block.values[0, rows, :6])
-    return found
+        rows = np.flatnonzero((block.kind[0] == Kind.IMU) & (block.i[0] == n) & block.valid[0])
+        of_node = find_in_samples(node, block.t[0, rows], block.values[0, rows, :6])
+        if any(f.name == "gyro-bias" for f in of_node):
+            values = block.values.copy()
+            values[0, rows, :3] -= rest_of(block.t[0, rows], values[0, rows, :6]).rate
+            block = replace(block, values=values)
+        found += of_node
+    return (log if block is log.block else replace(log, block=block)), found
 
 
 def find_in_samples(node: NodeConfig, t: F64, values: F64) -> list[Finding]:

@@ -9,73 +9,107 @@ import numpy as np
 
 from tracking.arrays import F64
 from tracking.findings.finding import Finding, names
-from tracking.findings.trials import inertial, lowest, misfit, moved_in_time, parts_of
+from tracking.findings.trials import Explained, beginning, best, misfit, moved_in_time, of_nodes
 from tracking.log.folder import Log
 from tracking.measurements import Kind
 
 NEAR = np.array([-0.2, -0.1, 0.0, 0.1, 0.2])
-"""[s] Tried of all together."""
+"""[s] Tried of all together, and of each node."""
 ALL = np.concatenate([-np.arange(0.4, 4.1, 0.4)[::-1], NEAR, np.arange(0.4, 4.1, 0.4)])
-"""[s] Tried where the fit is best at the ends of that, and where clocks are suspected."""
-LEAST_GAIN = 0.04
-"""[-] By so much ranges have to fit better."""
+"""[s] Tried where ranges are likeliest at the ends of that, and where an IMU is suspected."""
+LEAST_GAIN, LEAST_ALONE = 0.01, 0.02
+"""[-] By so much the log-likelihood of a range has to grow: of all together, of a single node, whose
+mount on its vehicle looks a little like a clock."""
 TOLD = 0.04
 """[s] Smaller offsets are not told apart from none."""
 CARRIED = 0.5
 """[s] Larger ones are refused."""
-OFTEN_OK, SELDOM_OK = 0.3, 0.6
-"""[-] Shares of time with pairs ok: with a right clock at least; with suspected ones at most."""
+DRIFT = 0.15
+"""[s] If the offsets of both halves differ by more, clocks run too fast or too slowly; that of a
+single node that is not suspected is not the reason then."""
+MOST_NODES = 8
+"""[-] In larger groups nodes are tried that are suspected; of the others all together."""
 
 
-def correct_clocks(log: Log, progress: Callable[[float], None]) -> tuple[Log, list[Finding]]:
+def correct_clocks(
+    log: Log, suspects: dict[int, F64], progress: Callable[[float], None]
+) -> tuple[Log, list[Finding]]:
     """Find by how much IMUs are stamped late, and move them back.
 
-    That of a single node is looked for where pairs are seldom ok: among others that are right, a
-    tenth of a second of one is lost in the noise.
+    What makes ranges likeliest is corrected first: all IMUs together, or that of a node.
 
     Args:
         log: A recording.
+        suspects: Nodes whose IMU contradicts the ranges (`imu_against_ranges.find_suspects`). A
+            clock explains that only if ranges are likelier with the IMU then than without it.
         progress: Called with the share done, 0 to 1.
 
     Returns:
         The log with what could be corrected, and what was found.
     """
-    carriers = np.unique(log.block.i[0, log.block.kind[0] == Kind.IMU])
-    if len(carriers) == 0 or log.constellation.n_nodes < 3:
+    carriers = np.unique(log.block.i[0, log.block.kind[0] == Kind.IMU]).tolist()
+    if not carriers or log.constellation.n_nodes < 3:
         return log, []
-    is_suspected = misfit(log, parts_of(log)[0])[1] < SELDOM_OK
-    groups, found = [tuple(carriers.tolist())], list[Finding]()
-    if is_suspected and len(carriers) > 1:
-        groups += [(n,) for n in carriers.tolist()]
-    for k, nodes in enumerate(groups):
-        progress(k / len(groups))
-        offset, is_carried = _offset(log, nodes, ALL if is_suspected else NEAR)
-        ids = tuple(log.constellation.ids[n] for n in nodes)
-        way = "later" if offset > 0.0 else "earlier"
-        text = f"{names(ids)}: the motion of IMU samples comes {abs(offset):.2f} s {way} than "
-        if not is_carried:
-            found.append(Finding("clock-offset", ids, f"{text}that of ranges, expected one clock"))
+    alone = carriers if len(carriers) <= MOST_NODES else list(suspects)
+    groups = [tuple(carriers)] + [(n,) for n in alone if len(carriers) > 1]
+    found, than = list[Finding](), list(suspects.values())[-1] if suspects else None
+    while groups:
+        tried = list[Explained | None]()
+        for k, nodes in enumerate(groups):
+            progress(k / len(groups))
+            found_here = _offset(log, nodes, bool(suspects), than)
+            is_alone = len(nodes) == 1 and nodes[0] not in suspects and len(carriers) > 1
+            if found_here is not None and is_alone:
+                is_sure = found_here.gain >= LEAST_ALONE and not _drifts(found_here)
+                found_here = found_here if is_sure else None
+            tried.append(found_here)
+        gains = [0.0 if one is None else one.gain for one in tried]
+        nodes, offset = groups[int(np.argmax(gains))], tried[int(np.argmax(gains))]
+        if offset is None:
             break
-        if abs(offset) > TOLD:
-            own = inertial(log.block) & np.isin(log.block.i[0], nodes)
-            # Ranges keep their order, so that labels still belong to them.
-            log = replace(log, block=moved_in_time(log.block, -offset, own))
-            found.append(Finding("clock-corrected", ids, f"{text}that of ranges, corrected"))
+        found.append(_finding(log, nodes, offset))
+        if found[-1].severity == "error":
+            break
+        # Ranges keep their order, so that labels still belong to them.
+        own = of_nodes(log.block, nodes)
+        log = replace(log, block=moved_in_time(log.block, -offset.at, own))
+        groups = [] if len(nodes) > 1 else [one for one in groups[1:] if one != nodes]
     return log, found
 
 
-def _offset(log: Log, nodes: tuple[int, ...], trials: F64) -> tuple[float, bool]:
-    """How late samples of some nodes are stamped [s]; and whether that can be corrected."""
-    parts = parts_of(log)
+def _offset(
+    log: Log, nodes: tuple[int, ...], is_far: bool, than: F64 | None
+) -> Explained | None:
+    """How late samples of some nodes are stamped [s]; arguments as of `best`."""
+    block = beginning(log)
+    own = of_nodes(block, nodes)
 
-    def cost(part: int, late: float) -> tuple[float, float]:
-        block = parts[part]
-        own = inertial(block) & np.isin(block.i[0], nodes)
-        return misfit(log, moved_in_time(block, -late, own))
+    def cost(late: float) -> F64:
+        return misfit(log, moved_in_time(block, -late, own)).surprise
 
-    found = lowest(cost, trials, LEAST_GAIN, OFTEN_OK)
-    if found is not None and not found[1] and len(trials) < len(ALL):
-        found = lowest(cost, ALL, LEAST_GAIN, OFTEN_OK)
-    if found is None:
-        return 0.0, True
-    return found[0], found[1] and abs(found[0]) <= CARRIED
+    found = best(cost, ALL if is_far else NEAR, LEAST_GAIN, than)
+    if found is not None and not found.is_within and not is_far:
+        found = best(cost, ALL, LEAST_GAIN, than)
+    return None if found is None or abs(found.at) <= TOLD else found
+
+
+def _drifts(offset: Explained) -> bool:
+    early, late = offset.halves
+    return abs(late - early) > DRIFT
+
+
+def _finding(log: Log, nodes: tuple[int, ...], offset: Explained) -> Finding:
+    ids = tuple(log.constellation.ids[n] for n in nodes)
+    if _drifts(offset):
+        early, late = offset.halves
+        seconds = 0.5 * (log.t_range[1] - log.t_range[0])
+        text = (
+            f"{names(ids)}: the motion of IMU samples comes {early:+.2f} s later than that of "
+            f"ranges at first, {late:+.2f} s after {seconds:.0f} s, expected clocks of one rate"
+        )
+        return Finding("clock-rate", ids, text)
+    way = "later" if offset.at > 0.0 else "earlier"
+    text = f"{names(ids)}: the motion of IMU samples comes {abs(offset.at):.2f} s {way} than "
+    if not offset.is_within or abs(offset.at) > CARRIED:
+        return Finding("clock-offset", ids, f"{text}that of ranges, expected one clock")
+    return Finding("clock-corrected", ids, f"{text}that of ranges, corrected")

@@ -38,7 +38,11 @@ KINDS: dict[str, Kind] = {
     "gravity-length": Kind(
         "warning", "an IMU at rest reads too much or too little", "`relpos calibrate imu`"
     ),
-    "gyro-bias": Kind("warning", "a gyroscope at rest reads a rotation", "`relpos calibrate imu`"),
+    "gyro-bias": Kind(
+        "warning",
+        "a gyroscope at rest reads a rotation, which is taken off a recording",
+        "`relpos calibrate imu`",
+    ),
     "gyro-units": Kind("error", "angular rates are not in rad/s", "multiply them by pi / 180"),
     "gyro-axes": Kind(
         "error",
@@ -55,6 +59,17 @@ KINDS: dict[str, Kind] = {
         "an IMU is stamped too late or too early; its samples are moved",
         "stamp both on one clock",
     ),
+    "clock-rate": Kind(
+        "error",
+        "an IMU has a clock that runs faster or slower than that of the ranges",
+        "stamp both on one clock",
+    ),
+    "imu-contradicts": Kind(
+        "error",
+        "the motion that an IMU reports is not the one that ranges show",
+        "look for its axes (x forward, y left, z up), its clock, its calibration, or another "
+        "node's IMU under its id",
+    ),
     "range-offset": Kind(
         "warning", "ranges are longer or shorter than fits", "`relpos calibrate uwb`"
     ),
@@ -65,6 +80,11 @@ KINDS: dict[str, Kind] = {
         "note",
         "a node never rests, so the bias of its gyroscope is not known at first",
         "leave it alone for two seconds before it moves",
+    ),
+    "bad-stamps": Kind(
+        "note",
+        "times of IMU samples repeat or jitter; rotations add up to the time that passed",
+        "stamp samples when they are taken, on the device",
     ),
     "no-imu": Kind(
         "note",

@@ -1,15 +1,14 @@
-"""Ranges against each other and against surveyed distances: what calibration would take off."""
+"""Ranges against each other and surveyed distances: what calibration would take off."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from tracking.arrays import F64
 from tracking.findings.finding import Finding
-from tracking.findings.trials import lowest, misfit, parts_of
+from tracking.findings.trials import PARAMS, beginning, best, misfit
 from tracking.log.folder import Log
 from tracking.measurements import Kind
 
@@ -17,45 +16,42 @@ OFFSETS = np.array([-0.6, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6])
 """[m] That all ranges may have in common."""
 SCALES = np.array([-0.09, -0.06, -0.03, 0.0, 0.03, 0.06, 0.09])
 """[-] Relative errors of all ranges."""
-LEAST_GAIN = 0.03
-"""[-] By so much ranges have to fit better."""
+LEAST_GAIN = 0.01
+"""[-] By so much the log-likelihood of a range has to grow."""
 TOLD_OFFSET, TOLD_SCALE = 0.1, 0.015
 """[m], [-] Smaller errors are not told apart from none."""
 
 
 def find_range_errors(log: Log) -> list[Finding]:
     """A length, or a factor, that all ranges have too much."""
-    parts, found = parts_of(log), list[Finding]()
     if log.constellation.n_nodes < 3:
-        return found
+        return []
+    block = beginning(log)
+    is_range = block.kind[0] == Kind.RANGE
 
-    def changed(part: int, offset: float, scale: float) -> tuple[float, float]:
-        values = parts[part].values.copy()
-        is_range = parts[part].kind[0] == Kind.RANGE
+    def cost(offset: float, scale: float) -> F64:
+        values = block.values.copy()
         metres = (values[0, is_range, 0] - offset) / (1.0 + scale)
         values[0, is_range, 0] = np.maximum(metres, 0.01)
-        cost, ok = misfit(log, replace(parts[part], values=values))
-        # What is left over counts in the ranges' own metres, or shorter ranges always fit better.
-        return cost * (1.0 + scale) ** 2, ok
+        # The likelihood of ranges as recorded: where they shrink, so does their noise.
+        error = PARAMS.range_error
+        error = replace(error, white_std=error.white_std / (1.0 + scale))
+        params = replace(PARAMS, range_error=error)
+        found = misfit(log, replace(block, values=values), params)
+        # Where excesses are expected, long ranges are likely; where outliers are none, they fit.
+        return np.concatenate([found.surprise + np.log1p(scale), 0.5 * found.nis])
 
-    # Without an IMU pairs stay ambiguous, whatever ranges are like.
-    often_ok = 0.3 if np.isin(log.block.kind[0], (Kind.IMU, Kind.STATE)).any() else 0.0
-    offset = _found(lambda part, x: changed(part, x, 0.0), OFFSETS, often_ok)
-    if abs(offset) > TOLD_OFFSET:
-        way = "shorter" if offset > 0.0 else "longer"
-        text = f"ranges of all pairs fit better when {abs(offset):.2f} m {way}"
+    offset = best(lambda x: cost(x, 0.0), OFFSETS, LEAST_GAIN)
+    # Motion tells a factor only badly.
+    is_surveyed = (log.block.kind[0] == Kind.SURVEY).any()
+    scale = best(lambda x: cost(0.0, x), SCALES, LEAST_GAIN) if is_surveyed else None
+    found = list[Finding]()
+    if offset is not None and abs(offset.at) > TOLD_OFFSET:
+        way = "shorter" if offset.at > 0.0 else "longer"
+        text = f"ranges of all pairs fit better when {abs(offset.at):.2f} m {way}"
         found.append(Finding("range-offset", (), text))
-    if (log.block.kind[0] == Kind.SURVEY).any():
-        scale = _found(lambda part, x: changed(part, 0.0, x), SCALES, often_ok)
-        if abs(scale) > TOLD_SCALE:
-            way = "shorter" if scale > 0.0 else "longer"
-            text = f"ranges of all pairs fit better when {100 * abs(scale):.0f} % {way}"
-            found.append(Finding("range-scale", (), text))
+    if scale is not None and abs(scale.at) > TOLD_SCALE:
+        way = "shorter" if scale.at > 0.0 else "longer"
+        text = f"ranges of all pairs fit better when {100 * abs(scale.at):.0f} % {way}"
+        found.append(Finding("range-scale", (), text))
     return found
-
-
-def _found(
-    cost: Callable[[int, float], tuple[float, float]], trials: F64, often_ok: float
-) -> float:
-    found = lowest(cost, trials, LEAST_GAIN, often_ok)
-    return found[0] if found is not None and found[1] else 0.0

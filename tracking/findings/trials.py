@@ -1,87 +1,137 @@
-"""Trials of the tracker on parts of a recording, with times or ranges changed.
+"""Trials of the tracker on the beginning of a recording, with some of it changed.
 
-A wrong clock or a wrong calibration shows in how well ranges fit: the mean NIS of the joint filter,
-whose noise is not learned meanwhile, has its minimum at what is right. What is found on one part of
-the recording has to hold on another.
+Wrong axes, clocks and calibrations show in how likely ranges are, given all that came before them:
+what is right makes them likeliest [1, sec. 5.4]. What explains a recording has to do so in both
+halves of its beginning.
+
+References:
+    [1] Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking and Navigation,
+        Wiley 2001.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
+from tracking.ahrs.orientation import Orientation
 from tracking.arrays import F64, Bool
+from tracking.filters.joint import JointEkf
 from tracking.filters.joint.params import JointParams, NoiseLearningParams
-from tracking.filters.params import FilterParams
 from tracking.log.folder import Log
 from tracking.measurements import Kind, MeasurementBlock
-from tracking.tracker import Tracker, TrackerParams
+from tracking.sanity.blocks import usable
+from tracking.tracker import TrackerParams
 
-LONGEST = 30.0
-"""[s] Length of a part."""
+LONGEST = 60.0
+"""[s] Length of the beginning."""
 BEFORE = 5.0
 """[s] Inertial samples before its first range, which find the orientation."""
-PARAMS = TrackerParams(
-    filter=FilterParams(
-        joint=replace(
-            JointParams(noise_learning=NoiseLearningParams(learns=False)),
-            nlos=replace(JointParams().nlos, nlos_bias_length=2.0),
-            nlos_in_space=replace(JointParams().nlos_in_space, nlos_bias_length=2.0),
-        )
-    )
+PLAUSIBLE = -0.8
+"""[-] What explains a recording leaves less surprise: more is that of a group that is lost, with one
+range in seven an outlier; right sensors leave -2.7 to -1.1."""
+PARAMS = replace(
+    JointParams(noise_learning=NoiseLearningParams(learns=False)),
+    nlos=replace(JointParams().nlos, nlos_bias_length=2.0),
+    nlos_in_space=replace(JointParams().nlos_in_space, nlos_bias_length=2.0),
 )
 """Neither learned noise nor a lasting excess may explain what is wrong with a recording."""
 
 
-def parts_of(log: Log) -> list[MeasurementBlock]:
-    """The first two parts of a recording."""
+class Explained(NamedTuple):
+    """What makes ranges likelier than they are as recorded."""
+
+    at: float
+    """Where they are likeliest."""
+    is_within: bool
+    """False at the ends of the trials: it may be further off."""
+    gain: float
+    """Log-likelihood of a range, in the half where it gains less [-]."""
+    halves: tuple[float, float]
+    """Where they are likeliest in either half."""
+
+
+class Misfit(NamedTuple):
+    """How badly the ranges of a recording fit."""
+
+    surprise: F64
+    """Mean negative log-likelihood of a range but for a constant, (half) [-]."""
+    nis: F64
+    """Mean NIS of the ranges that are no outliers, (half) [-]."""
+
+
+def beginning(log: Log) -> MeasurementBlock:
+    """The events that trials are made with."""
     (first, last), t = log.t_range, log.block.t[0]
-    length = min(LONGEST, 0.5 * (last - first))
-    starts = first, first + length
-    return [log.block.take((t > at - BEFORE) & (t < at + length)) for at in starts]
+    return log.block.take((t > first - BEFORE) & (t <= min(first + LONGEST, last)))
 
 
-def misfit(log: Log, block: MeasurementBlock) -> tuple[float, float]:
-    """Mean NIS of the ranges of a block, and the share of time that pairs are ok [-]."""
-    tracker = Tracker(log.constellation, PARAMS)
-    estimate = tracker.run(block, np.arange(block.t[0, 0], block.t[0, -1], 0.5)).take(0)
-    moving = ~log.constellation.is_static[log.constellation.pairs].all(axis=1)
-    ok = estimate.ok[:, moving]
-    return float(tracker.mean_nis()[0]), float(ok.mean()) if ok.size else 0.0
+def misfit(log: Log, block: MeasurementBlock, params: JointParams = PARAMS) -> Misfit:
+    """How badly the ranges of a block fit.
+
+    Args:
+        log: The recording.
+        block: Its beginning, changed or not; halves are those of the recording's time.
+        params: What the filter believes.
+    """
+    first, last = log.t_range
+    middle = first + 0.5 * min(LONGEST, last - first)
+    states = Orientation(log.constellation, TrackerParams().orientation, follows_bias=True)
+    events, tracker = states.step(usable(block)), JointEkf(log.constellation, params)
+    sums = np.zeros((3, 4))
+    for half in range(2):
+        t = events.t[0]
+        part = events.take(t <= middle if half == 0 else t > middle)
+        tracker.run(part, np.zeros((1, 0)))
+        sums[half + 1] = tracker.fit_sums()[0]
+    loglik, count, nis, accepted = np.diff(sums, axis=0).T
+    return Misfit(-loglik / np.maximum(count, 1), nis / np.maximum(accepted, 1))
 
 
-def lowest(
-    costs: Callable[[int, float], tuple[float, float]], at: F64, least: float, often_ok: float
-) -> tuple[float, bool] | None:
+def best(
+    cost: Callable[[float], F64], at: F64, least: float, than: F64 | None = None
+) -> Explained | None:
     """Where a cost is lowest: a parabola through the lowest of some trials and its neighbours.
 
     Args:
-        costs: Cost and share of time that is ok, by part and trial.
+        cost: Of a trial, (half) or (2 half); all have to be lower.
         at: Trials, ascending, 0 among them.
-        least: By so much, as a share, it has to be lower than at 0; by half on the other part.
-        often_ok: A trial means something if pairs are ok for such a share of the time.
+        least: By so much they have to be lower than at 0.
+        than: And lower than this.
+
+    The first two, the surprise in each half, have to be plausible.
 
     Returns:
-        Where, and whether it is within the trials; None where 0 is as good, or nothing is known.
+        What explains the recording; None where 0 is as good.
     """
-    found = np.array([costs(0, float(x)) for x in at])
-    cost = np.where(np.isfinite(found[:, 0]), found[:, 0], np.inf)  # without ranges there is none
-    k = int(np.argmin(cost))
-    is_lower = cost[k] < (1.0 - least) * cost[at == 0.0][0]
-    if not is_lower or found[k, 1] < often_ok:
+    costs = np.array([cost(float(x)) for x in at])
+    gains = costs[at == 0.0][0] - costs
+    k = int(np.argmax(gains.min(axis=1)))
+    is_better = gains[k].min() >= least and (than is None or (costs[k] < than).all())
+    if not is_better or (costs[k, :2] > PLAUSIBLE).any():
         return None
-    there, here = costs(1, float(at[k])), costs(1, 0.0)
-    if there[0] > (1.0 - 0.5 * least) * here[0]:
-        return None
+    halves = tuple(_vertex(at, half)[0] for half in costs.T[:2])
+    where, is_within = _vertex(at, costs.mean(axis=1), k)
+    return Explained(where, is_within, float(gains[k].min()), (halves[0], halves[1]))
+
+
+def _vertex(at: F64, cost: F64, k: int | None = None) -> tuple[float, bool]:
+    """Where a cost is lowest, near trial k; and whether that is within the trials."""
+    k = int(np.argmin(cost)) if k is None else k
     if k in (0, len(at) - 1):
         return float(at[k]), False
-    near = cost[k - 1 : k + 2]
-    if not np.isfinite(near).all():
-        return float(at[k]), True
-    (a, b, _), x = np.polyfit(at[k - 1 : k + 2], near, 2), at[k]
-    return (float(-0.5 * b / a) if a > 0.0 else float(x)), True
+    a, b, _ = np.polyfit(at[k - 1 : k + 2], cost[k - 1 : k + 2], 2)
+    vertex = -0.5 * b / a if a > 0.0 else at[k]
+    return float(np.clip(vertex, at[k - 1], at[k + 1])), True
+
+
+def of_nodes(block: MeasurementBlock, nodes: tuple[int, ...]) -> Bool:
+    """True for samples of the IMUs and magnetometers of some nodes, (event)."""
+    own = np.isin(block.kind[0], (Kind.IMU, Kind.MAG)) & np.isin(block.i[0], nodes)
+    return np.asarray(own)
 
 
 def moved_in_time(block: MeasurementBlock, by: float, which: Bool) -> MeasurementBlock:
@@ -90,8 +140,3 @@ def moved_in_time(block: MeasurementBlock, by: float, which: Bool) -> Measuremen
     t[0, which] += by
     moved = replace(block, t=t)
     return moved.take(moved.order()[0])
-
-
-def inertial(block: MeasurementBlock) -> Bool:
-    """True for samples of IMUs and magnetometers, (event)."""
-    return np.asarray(np.isin(block.kind[0], (Kind.IMU, Kind.MAG)))

@@ -234,8 +234,12 @@ def update_range(c, s, layout, work, p, a_i, a_j, t, distance, sight, is_survey)
         if is_survey:
             surveyed_distance_update(c, s, h, p, distance, is_news, work)
             continue
-        nu, misfit, nis, weight = range_update(c, s, h, p, dt, distance, levers, sight, work)
+        nu, misfit, nis, weight, loglik = range_update(
+            c, s, h, p, dt, distance, levers, sight, work
+        )
         if h == group.best:
+            group.loglik_sum += loglik
+            group.loglik_n += 1
             pair.nis = nis
             update_residuals(c, s, p, dt, distance, nu, misfit, weight)
             if weight > 0.5:

@@ -100,6 +100,16 @@ class JointEkf(BatchedFilter):
         run_to_end(partial(run_events, *arguments), arguments)
         return read_clones(clones, estimate, self._state.x.shape[2])
 
+    def fit_sums(self) -> F64:
+        """How well ranges fitted so far, (env, 4).
+
+        Sum of the log-likelihoods of all ranges, but for a constant, and their number; sum of the
+        NIS of those accepted, and their number.
+        """
+        group = self._state.group[:, 0]
+        names = "loglik_sum", "loglik_n", "nis_sum", "nis_n"
+        return np.stack([group[name].astype(np.float64) for name in names], axis=-1)
+
     def part(self, envs: slice) -> Self:
         """Some of the environments; shares their memory."""
         part = super().part(envs)

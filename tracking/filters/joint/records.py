@@ -121,6 +121,8 @@ GROUP = np.dtype(
         ("misfit_limit", "f8"),  # how much of it brings up other rotations [-]
         ("nis_sum", "f8"),
         ("nis_n", "i8"),
+        ("loglik_sum", "f8"),  # of all ranges, in the hypothesis that was the best
+        ("loglik_n", "i8"),
         ("white_var", "f8"),  # of ranges, as it is learned [m2]
     ]
 )

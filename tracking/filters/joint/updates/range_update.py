@@ -191,7 +191,8 @@ def range_update(c, s, h, p, dt, distance, levers, sight, work):
 
     Returns:
         Innovation [m] and its square over the variance it was expected to have, its square over
-        the variance that the correction used, and the probability that the range meant anything.
+        the variance that the correction used; the probability that the range meant anything;
+        and the logarithm of its likelihood [m], but for a constant.
     """
     if s.group[0].heading_gauge_var > c.gauge_std * c.gauge_std:
         enforce_observability(c, s, h, work)
@@ -209,10 +210,11 @@ def range_update(c, s, h, p, dt, distance, levers, sight, work):
     switched, sane, likelihood, is_far = update_nlos_posterior(
         c, s, h, p, dt, nu, expected, sight, work.w
     )
+    loglik = math.log(likelihood)
     if s.group[0].n_alive > 1:
         # Rotations and mirror images of one group are equally uncertain but for how far each was
         # bent, and wrong ones, bent most, look surest: only how well they fit counts.
-        s.loglik[h] += max(math.log(likelihood) + 0.5 * math.log(S), -0.5 * c.nis_cap)
+        s.loglik[h] += max(loglik + 0.5 * math.log(S), -0.5 * c.nis_cap)
     before, misfit = nu, nu * nu / S
     if switched < c.reset_at_once or s.pairs[p].i_range_error < 0:
         s.bias_retention[h, p] *= 1.0 - switched
@@ -237,4 +239,4 @@ def range_update(c, s, h, p, dt, distance, levers, sight, work):
         if is_linear(s.group[0]):
             accumulate_alignment_information(s, h, work, nu, variance + R / trust)
         kalman_update(s, h, work.w, nu, variance + R / trust)
-    return before, misfit, nis, sane
+    return before, misfit, nis, sane, loglik

@@ -1,0 +1,93 @@
+"""An IMU against the ranges: they must be likelier with it than without it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from tracking.arrays import F64
+from tracking.findings.finding import Finding
+from tracking.findings.trials import PLAUSIBLE, beginning, misfit, of_nodes
+from tracking.log.folder import Log
+from tracking.measurements import Kind, MeasurementBlock
+
+CONTRADICTS = 0.1
+"""[-] By so much the log-likelihood of a range grows, in both halves, without an IMU that is wrong.
+Without one that is right it falls by 0.05 to 0.3."""
+
+AXES = {
+    "y, -x": ((1, 0), (1, -1)),
+    "-y, x": ((1, 0), (-1, 1)),
+    "-x, -y": ((0, 1), (-1, -1)),
+    "y, x": ((1, 0), (1, 1)),
+    "-y, -x": ((1, 0), (-1, -1)),
+    "-x, y": ((0, 1), (-1, 1)),
+    "x, -y": ((0, 1), (1, -1)),
+}
+"""Columns x and y of a sensor that is read with wrong axes or signs along the ground."""
+SENSORS = {"accelerometer": (Kind.IMU, 3), "magnetometer": (Kind.MAG, 0)}
+"""What they are tried of, and its first column."""
+
+
+def find_suspects(log: Log) -> dict[int, F64]:
+    """Nodes without whose IMU ranges are likelier: each without those before it, the worst first.
+
+    Returns:
+        By node, the surprise without its IMU, `Misfit.surprise`.
+    """
+    if log.constellation.n_nodes < 3:
+        return {}
+    block, suspects = beginning(log), dict[int, F64]()
+    carriers = np.unique(block.i[0, block.kind[0] == Kind.IMU]).tolist()
+    cost = misfit(log, block).surprise
+    while carriers:
+        costs = [misfit(log, without(block, n)).surprise for n in carriers]
+        gains = [float((cost - bare).min()) for bare in costs]
+        k = int(np.argmax(gains))
+        if gains[k] < CONTRADICTS:
+            break
+        suspects[carriers[k]] = cost = costs[k]
+        block = without(block, carriers.pop(k))
+    return suspects if (cost < PLAUSIBLE).all() else {}
+
+
+def find_wrong_axes(log: Log, suspects: Iterable[int]) -> list[Finding]:
+    """What is wrong with IMUs that contradict the ranges: axes, where others explain them."""
+    block, found = beginning(log), list[Finding]()
+    for n in suspects:
+        bare = without(block, n)
+        least, named = misfit(log, bare).surprise, ""
+        for sensor, (kind, column) in SENSORS.items():
+            for axes, (order, signs) in AXES.items():
+                turned = _turned(block, n, kind, column, order, signs)
+                cost = misfit(log, turned).surprise
+                if (cost < least).all():
+                    least, named = cost, f"x, y of its {sensor} were {axes}"
+        node = log.constellation.ids[n]
+        text = f"node {node}: ranges are likelier without its IMU and magnetometer than with them"
+        if named:
+            text += f"; they are likeliest if {named}"
+        found.append(Finding("imu-contradicts", (node,), text))
+        block = bare
+    return found
+
+
+def without(block: MeasurementBlock, n: int) -> MeasurementBlock:
+    """A block but for the IMU and the magnetometer of node n."""
+    return block.take(~of_nodes(block, (n,)))
+
+
+def _turned(
+    block: MeasurementBlock,
+    n: int,
+    kind: Kind,
+    column: int,
+    order: tuple[int, int],
+    signs: tuple[int, int],
+) -> MeasurementBlock:
+    rows = np.flatnonzero((block.kind[0] == kind) & (block.i[0] == n))
+    values = block.values.copy()
+    values[0, rows, column : column + 2] = values[0, rows][:, [column + k for k in order]] * signs
+    return replace(block, values=values)
