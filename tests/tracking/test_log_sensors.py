@@ -53,7 +53,9 @@ def test_times_that_are_rounded_do_not_change_the_rate(hz, lost):
 
 def test_samples_in_pairs_have_the_rate_of_the_sensor():
     log = log_of([(0, np.repeat(np.arange(0.0, SECONDS, 0.02), 2))], heading="initial")
-    assert with_rates(log.constellation, log.block).nodes[0].imu_hz == pytest.approx(100.0, rel=0.02)
+    assert with_rates(log.constellation, log.block).nodes[0].imu_hz == pytest.approx(
+        100.0, rel=0.02
+    )
 
 
 def test_samples_that_come_all_at_once_are_refused(tmp_path):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from tracking.findings.at_rest import correct_at_rest
 from tracking.findings.clock_offset import correct_clocks
 from tracking.findings.finding import KINDS, Finding, refuse_errors
@@ -11,18 +9,17 @@ from tracking.findings.gyroscope import find_gyroscope
 from tracking.findings.imu_against_ranges import find_suspects, find_wrong_axes
 from tracking.findings.ranges import find_range_errors
 from tracking.findings.stamps import find_bad_stamps
+from tracking.findings.trials import Progress
 from tracking.findings.use import find_refused, find_unplaced, find_unused
 from tracking.log.folder import Log
 
 
-def examine(
-    log: Log, progress: Callable[[float], None] = lambda share: None
-) -> tuple[Log, list[Finding]]:
+def examine(log: Log, progress: Progress = lambda share: None) -> tuple[Log, list[Finding]]:
     """Look at what sensors read, at clocks and at ranges.
 
     Args:
         log: A recording.
-        progress: Called with the share done, 0 to 1, where clocks are looked at.
+        progress: Called with the share done, 0 to 1.
 
     Returns:
         The log, with biases of gyroscopes and clocks corrected where that can be done, and what was
@@ -32,16 +29,21 @@ def examine(
     found = [*find_unused(log), *find_bad_stamps(log), *at_rest, *find_gyroscope(log)]
     if any(f.severity == "error" for f in found):
         return log, found  # what follows needs sensors that are right
-    suspects = find_suspects(log)
-    log, of_clocks = correct_clocks(log, suspects, progress)
+    suspects = find_suspects(log, _part(progress, 0.0, 0.3))
+    log, of_clocks = correct_clocks(log, suspects, _part(progress, 0.3, 0.8))
     found += of_clocks
     if any(f.severity == "error" for f in of_clocks):
         return log, found
     if of_clocks and suspects:
-        suspects = find_suspects(log)
+        suspects = find_suspects(log, _part(progress, 0.8, 0.9))
+    rest = _part(progress, 0.9, 1.0)
     if suspects:
-        return log, [*found, *find_wrong_axes(log, suspects)]
-    return log, [*found, *find_range_errors(log)]
+        return log, [*found, *find_wrong_axes(log, list(suspects), rest)]
+    return log, [*found, *find_range_errors(log, rest)]
+
+
+def _part(progress: Progress, first: float, last: float) -> Progress:
+    return lambda share: progress(first + (last - first) * share)
 
 
 __all__ = [

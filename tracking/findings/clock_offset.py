@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from tracking.arrays import F64
 from tracking.findings.finding import Finding, names
-from tracking.findings.trials import Explained, beginning, best, misfit, moved_in_time, of_nodes
+from tracking.findings.trials import (
+    Explained,
+    Progress,
+    beginning,
+    best,
+    misfit,
+    moved_in_time,
+    of_nodes,
+    through,
+)
 from tracking.log.folder import Log
 from tracking.measurements import Kind
 
@@ -18,8 +26,8 @@ NEAR = np.array([-0.2, -0.1, 0.0, 0.1, 0.2])
 ALL = np.concatenate([-np.arange(0.4, 4.1, 0.4)[::-1], NEAR, np.arange(0.4, 4.1, 0.4)])
 """[s] Tried where ranges are likeliest at the ends of that, and where an IMU is suspected."""
 LEAST_GAIN, LEAST_ALONE = 0.01, 0.02
-"""[-] By so much the log-likelihood of a range has to grow: of all together, of a single node, whose
-mount on its vehicle looks a little like a clock."""
+"""[-] By so much the log-likelihood of a range has to grow: of all together, of a single node, as
+its mount on its vehicle looks a little like a clock."""
 TOLD = 0.04
 """[s] Smaller offsets are not told apart from none."""
 CARRIED = 0.5
@@ -32,7 +40,7 @@ MOST_NODES = 8
 
 
 def correct_clocks(
-    log: Log, suspects: dict[int, F64], progress: Callable[[float], None]
+    log: Log, suspects: dict[int, F64], progress: Progress
 ) -> tuple[Log, list[Finding]]:
     """Find by how much IMUs are stamped late, and move them back.
 
@@ -55,8 +63,7 @@ def correct_clocks(
     found, than = list[Finding](), list(suspects.values())[-1] if suspects else None
     while groups:
         tried = list[Explained | None]()
-        for k, nodes in enumerate(groups):
-            progress(k / len(groups))
+        for nodes in through(groups, len(found), progress):
             found_here = _offset(log, nodes, bool(suspects), than)
             is_alone = len(nodes) == 1 and nodes[0] not in suspects and len(carriers) > 1
             if found_here is not None and is_alone:
@@ -77,9 +84,7 @@ def correct_clocks(
     return log, found
 
 
-def _offset(
-    log: Log, nodes: tuple[int, ...], is_far: bool, than: F64 | None
-) -> Explained | None:
+def _offset(log: Log, nodes: tuple[int, ...], is_far: bool, than: F64 | None) -> Explained | None:
     """How late samples of some nodes are stamped [s]; arguments as of `best`."""
     block = beginning(log)
     own = of_nodes(block, nodes)

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from tracking.arrays import F64
 from tracking.findings.finding import Finding
-from tracking.findings.trials import PLAUSIBLE, beginning, misfit, of_nodes
+from tracking.findings.trials import (
+    PLAUSIBLE,
+    Progress,
+    beginning,
+    misfit,
+    of_nodes,
+    through,
+)
 from tracking.log.folder import Log
 from tracking.measurements import Kind, MeasurementBlock
 
@@ -31,7 +38,7 @@ SENSORS = {"accelerometer": (Kind.IMU, 3), "magnetometer": (Kind.MAG, 0)}
 """What they are tried of, and its first column."""
 
 
-def find_suspects(log: Log) -> dict[int, F64]:
+def find_suspects(log: Log, progress: Progress) -> dict[int, F64]:
     """Nodes without whose IMU ranges are likelier: each without those before it, the worst first.
 
     Returns:
@@ -43,7 +50,8 @@ def find_suspects(log: Log) -> dict[int, F64]:
     carriers = np.unique(block.i[0, block.kind[0] == Kind.IMU]).tolist()
     cost = misfit(log, block).surprise
     while carriers:
-        costs = [misfit(log, without(block, n)).surprise for n in carriers]
+        tried = through(carriers, len(suspects), progress)
+        costs = [misfit(log, without(block, n)).surprise for n in tried]
         gains = [float((cost - bare).min()) for bare in costs]
         k = int(np.argmax(gains))
         if gains[k] < CONTRADICTS:
@@ -53,10 +61,10 @@ def find_suspects(log: Log) -> dict[int, F64]:
     return suspects if (cost < PLAUSIBLE).all() else {}
 
 
-def find_wrong_axes(log: Log, suspects: Iterable[int]) -> list[Finding]:
+def find_wrong_axes(log: Log, suspects: Sequence[int], progress: Progress) -> list[Finding]:
     """What is wrong with IMUs that contradict the ranges: axes, where others explain them."""
     block, found = beginning(log), list[Finding]()
-    for n in suspects:
+    for n in through(suspects, 0, progress):
         bare = without(block, n)
         least, named = misfit(log, bare).surprise, ""
         for sensor, (kind, column) in SENSORS.items():

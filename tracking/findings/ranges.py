@@ -8,7 +8,7 @@ import numpy as np
 
 from tracking.arrays import F64
 from tracking.findings.finding import Finding
-from tracking.findings.trials import PARAMS, beginning, best, misfit
+from tracking.findings.trials import PARAMS, Progress, beginning, best, misfit
 from tracking.log.folder import Log
 from tracking.measurements import Kind
 
@@ -22,7 +22,7 @@ TOLD_OFFSET, TOLD_SCALE = 0.1, 0.015
 """[m], [-] Smaller errors are not told apart from none."""
 
 
-def find_range_errors(log: Log) -> list[Finding]:
+def find_range_errors(log: Log, progress: Progress) -> list[Finding]:
     """A length, or a factor, that all ranges have too much."""
     if log.constellation.n_nodes < 3:
         return []
@@ -41,7 +41,9 @@ def find_range_errors(log: Log) -> list[Finding]:
         # Where excesses are expected, long ranges are likely; where outliers are none, they fit.
         return np.concatenate([found.surprise + np.log1p(scale), 0.5 * found.nis])
 
+    progress(0.0)
     offset = best(lambda x: cost(x, 0.0), OFFSETS, LEAST_GAIN)
+    progress(0.5)
     # Motion tells a factor only badly.
     is_surveyed = (log.block.kind[0] == Kind.SURVEY).any()
     scale = best(lambda x: cost(0.0, x), SCALES, LEAST_GAIN) if is_surveyed else None

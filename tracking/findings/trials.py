@@ -11,9 +11,9 @@ References:
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -26,13 +26,14 @@ from tracking.measurements import Kind, MeasurementBlock
 from tracking.sanity.blocks import usable
 from tracking.tracker import TrackerParams
 
+T = TypeVar("T")
 LONGEST = 60.0
 """[s] Length of the beginning."""
 BEFORE = 5.0
 """[s] Inertial samples before its first range, which find the orientation."""
 PLAUSIBLE = -0.8
-"""[-] What explains a recording leaves less surprise: more is that of a group that is lost, with one
-range in seven an outlier; right sensors leave -2.7 to -1.1."""
+"""[-] What explains a recording leaves less surprise: a group that is lost has more, with a range
+in seven an outlier; right sensors leave -2.7 to -1.1."""
 PARAMS = replace(
     JointParams(noise_learning=NoiseLearningParams(learns=False)),
     nlos=replace(JointParams().nlos, nlos_bias_length=2.0),
@@ -52,6 +53,10 @@ class Explained(NamedTuple):
     """Log-likelihood of a range, in the half where it gains less [-]."""
     halves: tuple[float, float]
     """Where they are likeliest in either half."""
+
+
+Progress = Callable[[float], None]
+"""Called with the share done, 0 to 1."""
 
 
 class Misfit(NamedTuple):
@@ -126,6 +131,19 @@ def _vertex(at: F64, cost: F64, k: int | None = None) -> tuple[float, bool]:
     a, b, _ = np.polyfit(at[k - 1 : k + 2], cost[k - 1 : k + 2], 2)
     vertex = -0.5 * b / a if a > 0.0 else at[k]
     return float(np.clip(vertex, at[k - 1], at[k + 1])), True
+
+
+def through(items: Sequence[T], again: int, progress: Progress) -> Iterator[T]:
+    """Items one after the other, with progress: the first round of them is half of the whole.
+
+    Args:
+        items: What is tried.
+        again: Rounds before this one; each takes half of what is left.
+        progress: Told before each item.
+    """
+    for k, item in enumerate(items):
+        progress(1.0 - 0.5**again * (1.0 - 0.5 * k / len(items)))
+        yield item
 
 
 def of_nodes(block: MeasurementBlock, nodes: tuple[int, ...]) -> Bool:

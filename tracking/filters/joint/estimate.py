@@ -63,9 +63,12 @@ def write_estimate(c, s, work, t, e, o, out):
             status[e, o, p] = OK
         elif age[e, o, p] > max(c.lost_after, c.missed_intervals * pair.interval):
             status[e, o, p] = LOST
-        elif is_group_doubtful or pair.mean_nis > c.pair_nis_limit:
-            status[e, o, p] = DOUBTFUL
-        elif node_i.fault != 0 or node_j.fault != 0:
+        elif (
+            is_group_doubtful
+            or pair.mean_nis > c.pair_nis_limit
+            or node_i.fault != 0
+            or node_j.fault != 0
+        ):
             status[e, o, p] = DOUBTFUL
         elif squared_error > max(node_i.accuracy, node_j.accuracy) ** 2:
             status[e, o, p] = LOST
