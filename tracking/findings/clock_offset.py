@@ -29,7 +29,7 @@ LEAST_GAIN, LEAST_ALONE = 0.01, 0.02
 """[-] By so much the log-likelihood of a range has to grow: of all together, of a single node, as
 its mount on its vehicle looks a little like a clock."""
 TOLD = 0.04
-"""[s] Smaller offsets are not told apart from none."""
+"""[s] Smaller offsets are not distinguished from none."""
 CARRIED = 0.5
 """[s] Larger ones are refused."""
 DRIFT = 0.15

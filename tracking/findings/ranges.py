@@ -19,7 +19,7 @@ SCALES = np.array([-0.09, -0.06, -0.03, 0.0, 0.03, 0.06, 0.09])
 LEAST_GAIN = 0.01
 """[-] By so much the log-likelihood of a range has to grow."""
 TOLD_OFFSET, TOLD_SCALE = 0.1, 0.015
-"""[m], [-] Smaller errors are not told apart from none."""
+"""[m], [-] Smaller errors are not distinguished from none."""
 
 
 def find_range_errors(log: Log, progress: Progress) -> list[Finding]:

@@ -80,7 +80,7 @@ def misfit(log: Log, block: MeasurementBlock, params: JointParams = PARAMS) -> M
     Args:
         log: The recording.
         block: Its beginning, changed or not; halves are those of the recording's time.
-        params: What the filter believes.
+        params: What the filter assumes.
     """
     first, last = log.t_range
     middle = first + 0.5 * min(LONGEST, last - first)
@@ -139,7 +139,7 @@ def through(items: Sequence[T], again: int, progress: Progress) -> Iterator[T]:
     Args:
         items: What is tried.
         again: Rounds before this one; each takes half of what is left.
-        progress: Told before each item.
+        progress: Called before each item.
     """
     for k, item in enumerate(items):
         progress(1.0 - 0.5**again * (1.0 - 0.5 * k / len(items)))

@@ -92,7 +92,6 @@ def run_bound(coefficients, layout, s, work, block, hidden, truth, turn_var, t_o
     for k in range(t.shape[1]):
         what, now = kind[0, k], t[0, k]
         while o < t_out.shape[0] and t_out[o] < now:
-            flush_updates(s, 0)
             write_positions(s, d, n, o, out)
             variance += add_to_sum(c, s, yaw[o], v)
             o += 1
@@ -112,7 +111,6 @@ def run_bound(coefficients, layout, s, work, block, hidden, truth, turn_var, t_o
             for i in range(n):
                 if not s.nodes[i].static:
                     preintegrate(c, s.nodes, s.last_attitude_accel, s.preintegrated, i, now)
-            flush_updates(s, 0)
             predict(c, s, 0, now - group.t, work)
             for i in range(n):
                 if s.nodes[i].has_ahrs_feedback:
@@ -133,7 +131,6 @@ def run_bound(coefficients, layout, s, work, block, hidden, truth, turn_var, t_o
             i, j, a_i, a_j = j, i, a_j, a_i
         learn_range(c, s, layout, work, layout.pair_index[i, j], a_i, a_j, hidden[k], what)
     while o < t_out.shape[0]:
-        flush_updates(s, 0)
         write_positions(s, d, n, o, out)
         variance += add_to_sum(c, s, yaw[o], v)
         o += 1
@@ -146,10 +143,11 @@ def add_to_sum(c, s, yaw, v):
 
     Args:
         c: Coefficients.
-        s: JointState of one environment; nothing waits.
+        s: JointState of one environment.
         yaw: Derivatives of the positions, (node * d) [m].
         v: Room, (state).
     """
+    flush_updates(s, 0)
     a, P, added = c.n_own, s.P, 0.0
     for r in range(c.n):
         v[r] = 0.0
@@ -190,10 +188,10 @@ def learn_range(c, s, layout, work, p, a_i, a_j, is_hidden, what):
 @small_kernel
 def write_positions(s, d, n, o, out):
     """The covariance of all positions."""
+    P = s.P
+    flush_updates(s, 0)
     for i in range(n):
         for j in range(n):
             for a in range(d):
                 for b in range(d):
-                    out[o, i * d + a, j * d + b] = s.P[
-                        0, s.nodes[i].i_pos + a, s.nodes[j].i_pos + b
-                    ]
+                    out[o, i * d + a, j * d + b] = P[0, s.nodes[i].i_pos + a, s.nodes[j].i_pos + b]

@@ -102,6 +102,7 @@ def run_events(coefficients, layout, state, work, block, t_out, out):
                 cursor[NODE], action = i, REMOVE
             cursor[DONE] = action
             if action != NOTHING:
+                flush_all_updates(s)  # what is done elsewhere finds the covariance whole
                 cursor[ENV], cursor[EVENT], cursor[OUT] = e, k, o
                 return action
         while o < t_out.shape[1]:
@@ -261,7 +262,6 @@ def collect_initial_range(c, s, layout, work, i, j, p, t, distance, sight, is_su
         s.pairs[p].start_nlos_llr = 0.0
     if not is_survey:
         s.pairs[p].start_nlos_llr += sight[0]
-    flush_all_updates(s)
     if s.group[0].alignment == NONE:
         return START if can_start(c, s, layout, work.idx, t) > 0 else NOTHING
     if s.group[0].alignment == STATIC and may_move(c, s, t):

@@ -11,7 +11,6 @@ from collections.abc import Callable
 from typing import Any
 
 from tracking.filters.joint.ekf import workspace
-from tracking.filters.joint.ekf.scalar_update import flush_all_updates
 from tracking.filters.joint.ekf.workspace import ENV, EVENT, FLAG, NODE
 from tracking.filters.joint.hypotheses.alignment_modes import challenge_alignment, monitor_modes
 from tracking.filters.joint.hypotheses.alignment_sensitivity import start_alignments
@@ -37,7 +36,6 @@ def time_out(coefficients, layout, state, work, t):
     """Remove nodes without ranges for long."""
     cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
     s = by_reference(one_env(state, cursor[ENV]))
-    flush_all_updates(s)
     drop_timed_out(coefficients[0], s, layout, t)
 
 
@@ -46,7 +44,6 @@ def spawn(coefficients, layout, state, work, t):
     """Follow all rotations and mirror images, as the first node moves."""
     cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
     s = by_reference(one_env(state, cursor[ENV]))
-    flush_all_updates(s)
     spawn_rotation_hypotheses(coefficients[0], s, layout, work)
 
 
@@ -62,7 +59,6 @@ def stale(coefficients, layout, state, work, t):
     """Remove nodes that were silent and may be anywhere."""
     cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
     s = by_reference(one_env(state, cursor[ENV]))
-    flush_all_updates(s)
     drop_stale(coefficients[0], s, layout, t)
 
 
@@ -131,7 +127,6 @@ def join_group(coefficients, layout, state, work, t):
     """Let a node join."""
     cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
     c, s, new = coefficients[0], by_reference(one_env(state, cursor[ENV])), cursor[NODE]
-    flush_all_updates(s)
     join(c, s, layout, new, t)
 
 
@@ -148,7 +143,6 @@ def remove(coefficients, layout, state, work, t):
     """Remove a node that has left."""
     cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
     s = by_reference(one_env(state, cursor[ENV]))
-    flush_all_updates(s)
     remove_node(coefficients[0], s, layout, cursor[NODE])
 
 

@@ -61,7 +61,6 @@ def enforce_observability(c, s, h, work):
     if present < 3:
         moved[:] = 0.0
     elif moved2 > c.follow_share**2 * extent2 or false2 > c.follow_false**2:
-        flush_updates(s, h)
         shift_nullspace(c, s, h, min(1.0, c.follow_most * np.sqrt(extent2 / moved2)), work)
 
 
@@ -78,10 +77,8 @@ def propagate_corrections(c, s, h):
 
 @allocating_kernel
 def shift_nullspace(c, s, h, share, work):
-    """Make rotations of what was moved, and ``P <- T P T^T`` for the given share of it.
-
-    Hypothesis h has no pending updates.
-    """
+    """Make rotations of what was moved, and ``P <- T P T^T`` for the given share of it."""
+    flush_updates(s, h)
     d, n_axes, x, moved = c.d, 3 if c.d == 3 else 1, s.x[h], s.accumulated_correction[h]
     A, B, G = work.turns[0, :n_axes], work.turns[1, :n_axes], work.turns[2, :n_axes]
     P, end, m = s.P, c.n_motion, 0

@@ -87,7 +87,11 @@ def kalman_update(s, h, w, nu, S):
 
 @small_kernel
 def flush_updates(s, h):
-    """Apply pending updates: from here on P is the covariance of hypothesis h."""
+    """Apply pending updates: from here on P is the covariance of hypothesis h.
+
+    What reads or writes more of P than the functions of this module begins with it. What is rare
+    (`rare`, `supervise`) finds P whole.
+    """
     if s.n_pending[h] > 0:
         apply_downdate(s.P, h, s.pending_updates, h, s.n_pending[h], None)
         s.n_pending[h] = 0
@@ -111,6 +115,18 @@ def reset_state(s, h, n, at, variance):
     s.x[h, at] = 0.0
     for k in range(s.sensitivity.shape[1]):
         s.sensitivity[h, k, at] = 0.0
+
+
+@small_kernel
+def scale_state(s, h, n, at, share):
+    """Keep a share of what is known about one state and of its correlations."""
+    for r in range(n):
+        s.P[h, at, r] *= share
+        s.P[h, r, at] *= share
+    for q in range(s.n_pending[h]):
+        s.pending_updates[h, q, at] *= share
+    for k in range(s.sensitivity.shape[1]):
+        s.sensitivity[h, k, at] *= share
 
 
 @small_kernel

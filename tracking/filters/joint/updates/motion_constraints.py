@@ -180,6 +180,7 @@ def centre(c, s, h, w):
         present += s.nodes[i].present
     if present == 0:
         return
+    P = s.P
     flush_updates(s, h)
     for k in range(c.d):
         mean = 0.0
@@ -190,23 +191,23 @@ def centre(c, s, h, w):
                 at = s.nodes[i].i_pos + k
                 mean += s.x[h, at] / present
                 for r in range(c.n):
-                    w[r] += s.P[h, at, r] / present
+                    w[r] += P[h, at, r] / present
         for i in range(n_nodes):
             if s.nodes[i].present:
                 at = s.nodes[i].i_pos + k
                 s.x[h, at] -= mean
                 for r in range(c.n):
-                    s.P[h, at, r] -= w[r]
+                    P[h, at, r] -= w[r]
         for r in range(c.n):
             total = 0.0
             for i in range(n_nodes):
                 if s.nodes[i].present:
-                    total += s.P[h, r, s.nodes[i].i_pos + k]
+                    total += P[h, r, s.nodes[i].i_pos + k]
             for i in range(n_nodes):
                 if s.nodes[i].present:
-                    s.P[h, r, s.nodes[i].i_pos + k] -= total / present
+                    P[h, r, s.nodes[i].i_pos + k] -= total / present
         for i in range(n_nodes):
             for j in range(n_nodes):
                 if s.nodes[i].present and s.nodes[j].present:
-                    s.P[h, s.nodes[i].i_pos + k, s.nodes[j].i_pos + k] += c.centre_std**2
-    symmetrise(s.P, h, c.n)
+                    P[h, s.nodes[i].i_pos + k, s.nodes[j].i_pos + k] += c.centre_std**2
+    symmetrise(P, h, c.n)

@@ -7,7 +7,7 @@ hypothesis.
 
 from __future__ import annotations
 
-from tracking.filters.joint.ekf.scalar_update import covariance
+from tracking.filters.joint.ekf.scalar_update import covariance, scale_state
 from tracking.kernels.jit import small_kernel
 from tracking.maths.exponentials import exponential, likelihood
 from tracking.models.nlos import nlos_posterior, outlier_density, transition_probs
@@ -75,13 +75,7 @@ def reset_bias_on_transition(c, s, h, p, switched, is_far):
         return
     stays = 1.0 - switched
     before = covariance(s, h, at, at)
-    for r in range(c.n):
-        s.P[h, at, r] *= stays
-        s.P[h, r, at] *= stays
-    for q in range(s.n_pending[h]):
-        s.pending_updates[h, q, at] *= stays
-    for k in range(s.sensitivity.shape[1]):
-        s.sensitivity[h, k, at] *= stays
+    scale_state(s, h, c.n, at, stays)
     hidden = s.nlos[h, p]
     extra = c.nlos_bias_large - c.nlos_bias
     within = c.nlos_bias_var + is_far * (c.nlos_bias_large_var - c.nlos_bias_var)

@@ -7,7 +7,7 @@ is used once more when they do. It is kept while a node is away.
 from __future__ import annotations
 
 from tracking.filters.joint.ekf.observability import enforce_observability
-from tracking.filters.joint.ekf.scalar_update import compute_pht, flush_all_updates, kalman_update
+from tracking.filters.joint.ekf.scalar_update import compute_pht, kalman_update
 from tracking.filters.joint.hypotheses.alignment import is_linear
 from tracking.filters.joint.hypotheses.alignment_sensitivity import (
     accumulate_alignment_information,
@@ -59,4 +59,3 @@ def apply_surveys(c, s, layout, work, i, end):
                 for h in range(s.alive.shape[0]):
                     if s.alive[h]:
                         surveyed_distance_update(c, s, h, p, s.pairs[p].surveyed, True, work)
-    flush_all_updates(s)
