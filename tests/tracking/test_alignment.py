@@ -7,18 +7,9 @@ from hypothesis import strategies as st
 
 from tests.exact_motion import ExactGroup
 from tracking import Tracker
-from tracking.filters.joint.hypotheses.alignment import TRANSITIONS, Alignment
+from tracking.filters.joint.hypotheses.alignment import TRANSITIONS, Alignment, set_alignment
+from tracking.filters.joint.records import GROUP
 from tracking.measurements import Kind
-
-ALLOWED = {(a, b) for a, following in TRANSITIONS.items() for b in following}
-WITHIN_ONE_EVENT = {
-    # A node moves and the group is supervised; a Gaussian sum ends and is pruned; its only
-    # hypothesis fits badly.
-    (Alignment.STATIC, Alignment.MODES),
-    (Alignment.MODES, Alignment.FILTERED),
-    (Alignment.MODES, Alignment.CHALLENGED),
-}
-"""Steps of the table that one event can make in a row."""
 
 
 def test_every_state_follows_the_first_one_and_ends():
@@ -33,7 +24,7 @@ def test_every_state_follows_the_first_one_and_ends():
 
 
 def walk(group, silences=(), reflected=None):
-    """Alignment and number of hypotheses after every event."""
+    """Alignment and number of hypotheses after every event, and steps that are not in the table."""
     block, tracker = group.block, Tracker(group.constellation)
     t, kind = block.t[0], block.kind[0]
     kept = np.ones(len(t), dtype=bool)
@@ -48,7 +39,7 @@ def walk(group, silences=(), reflected=None):
         tracker.step(block.take(slice(int(k), int(k) + 1)), t[k])
         record = tracker.save()["filter"].group[0, 0]
         states.append((Alignment(record["alignment"]), int(record["n_alive"])))
-    return states
+    return states, tracker.save()["filter"].group[0, 0]["n_illegal_steps"]
 
 
 @pytest.mark.parametrize(
@@ -68,14 +59,21 @@ def test_only_transitions_of_the_table_occur(vehicle, dimensions, n, data):
         hz=28.0,
     )
     silences = data.draw(st.lists(silence, max_size=2))
-    states = walk(group, silences, data.draw(st.none() | st.floats(3.0, 6.0)))
-    for (before, _), (after, n_alive) in zip(states, states[1:], strict=False):
-        assert before == after or (before, after) in ALLOWED | WITHIN_ONE_EVENT
-        assert (n_alive == 0) == (after == Alignment.NONE)
+    states, n_illegal = walk(group, silences, data.draw(st.none() | st.floats(3.0, 6.0)))
+    assert n_illegal == 0
+    assert all((n_alive == 0) == (state == Alignment.NONE) for state, n_alive in states)
+
+
+def test_a_step_that_is_not_in_the_table_is_counted():
+    group = np.zeros(1, dtype=GROUP).view(np.recarray)[0]
+    set_alignment(group, Alignment.STATIC)
+    assert group.n_illegal_steps == 0
+    set_alignment(group, Alignment.CANDIDATES)
+    assert group.n_illegal_steps == 1
 
 
 def test_a_group_in_space_that_moves_is_filtered_in_its_modes():
-    states = [a for a, _ in walk(ExactGroup("hand", range(5), at_rest=True, dimensions=3))]
+    states = [a for a, _ in walk(ExactGroup("hand", range(5), at_rest=True, dimensions=3))[0]]
     order = list(dict.fromkeys(states))
     assert order[:3] == [Alignment.NONE, Alignment.STATIC, Alignment.LINEAR]
     assert order[3] == Alignment.MODES
@@ -87,4 +85,4 @@ def test_rotations_of_a_small_group_at_rest_are_not_split(vehicle, monkeypatch):
     monkeypatch.setattr("tests.exact_motion.STAND", 30.0)
     group = ExactGroup(vehicle, range(4), at_rest=True, hz=10.0, seconds=29.0)
     group.block.values[0, group.block.kind[0] == Kind.RANGE, 0] *= 0.06
-    assert set(walk(group)) <= {(Alignment.NONE, 0), (Alignment.STATIC, 1)}
+    assert set(walk(group)[0]) <= {(Alignment.NONE, 0), (Alignment.STATIC, 1)}

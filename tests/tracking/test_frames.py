@@ -40,6 +40,7 @@ def open_bank(n_hyps=3):
     n = s.x.shape[1]
     A = np.random.default_rng(5).standard_normal((n, n))
     s.P[0] = A @ A.T / n + 0.1 * np.eye(n)
+    s.group["alignment"] = Alignment.LINEAR
     alignment_sensitivity.start_alignment(c, s, layout, 0)
     s.group["alignment"] = Alignment.MODES
     return c, s, work, layout

@@ -99,6 +99,7 @@ def open_group(vehicle="human", static=()):
     A = rng.standard_normal((n, n))
     s.P[0] = A @ A.T / n + 0.1 * np.eye(n)
     s.x[0, s.pairs["i_range_error"].min() :] = 0.0
+    s.group["alignment"] = Alignment.LINEAR
     alignment_sensitivity.start_alignment(c, s, layout, 0)
     return c, s, work, layout
 
@@ -253,6 +254,7 @@ def test_what_stands_still_tells_nothing_of_a_turn():
         s.x[0, [s.nodes["i_heading"][i], *(s.nodes["i_vel"][i] + np.arange(3))]] = 0.0
         s.x[0, s.nodes["i_tilt_bias"][i] + np.arange(3)] *= 0.01
         s.last_attitude_accel[i, 4:] = s.x[0, s.nodes["i_tilt_bias"][i] + np.arange(3)]
+    s.group["alignment"] = Alignment.LINEAR
     alignment_sensitivity.start_alignment(c, s, layout, 0)
     for p in range(len(s.pairs)):
         i, j = s.pairs["i"][p], s.pairs["j"][p]
@@ -294,6 +296,7 @@ def test_fixed_nodes_of_a_room_are_rather_flat_than_tall():
     at = s.nodes["i_pos"]
     for k, place in enumerate(([0.0, 0.0, 0.0], [0.3, 0.0, 4.0], [0.3, 0.2, 9.0])):
         s.x[0, at[k] : at[k] + 3] = place
+    s.group["alignment"] = Alignment.LINEAR
     alignment_sensitivity.start_alignment(c, s, layout, 0)
     turns, _ = rotation_modes.find_modes(
         s.alignment_information[0], s.alignment_score[0], layout.rotations, c["same_mode"]

@@ -105,6 +105,7 @@ PAIR = np.dtype(
 GROUP = np.dtype(
     [
         ("alignment", "i8"),  # see `alignment.Alignment`
+        ("n_illegal_steps", "i8"),  # of the alignment, see `alignment.set_alignment`
         ("degenerate", "?"),  # the layout could not be told from its mirror image
         ("n_alive", "i8"),
         ("best", "i8"),

@@ -11,6 +11,8 @@ from __future__ import annotations
 
 from enum import IntEnum
 
+import numpy as np
+
 from tracking.kernels.jit import small_kernel
 
 
@@ -71,8 +73,19 @@ TRANSITIONS: dict[Alignment, dict[Alignment, str]] = {
 }
 """State to the states that follow it, and why."""
 
+ALLOWED = np.array([[b == a or b in TRANSITIONS[a] for b in Alignment] for a in Alignment])
+"""The same for kernels, (from, to)."""
+
 # Plain numbers: kernels do not know enums.
 NONE, STATIC, LINEAR, CHALLENGED, MODES, CANDIDATES, FILTERED = (a.value for a in Alignment)
+
+
+@small_kernel
+def set_alignment(group, to):
+    """Go on to a state. Steps that `TRANSITIONS` does not have are counted; tests find none."""
+    if not ALLOWED[group.alignment, to]:
+        group.n_illegal_steps += 1
+    group.alignment = to
 
 
 @small_kernel

@@ -26,6 +26,7 @@ from tracking.filters.joint.hypotheses.alignment import (
     FILTERED,
     LINEAR,
     MODES,
+    set_alignment,
 )
 from tracking.filters.joint.hypotheses.alignment_sensitivity import (
     small_rotation_derivatives,
@@ -54,11 +55,12 @@ def challenge_alignment(c, s, layout):
     It has a head start, of which a mirror image feels all.
     """
     h = s.group[0].best
+    set_alignment(s.group[0], CHALLENGED)
     start_alignment(c, s, layout, h)
     for k in range(9):
         s.alignment_information[h, k, k] += 0.5 * c.challenger_penalty
     update_alignment_cov(c, s, h)
-    s.group[0].alignment, s.group[0].misfit = CHALLENGED, 0.0
+    s.group[0].misfit = 0.0
 
 
 @allocating_kernel
@@ -67,6 +69,7 @@ def monitor_modes(c, s, layout):
     group, was_alive = s.group[0], s.alive.copy()
     if group.t < group.t_scoring_starts - TIE:
         # Nothing counts yet for or against any.
+        set_alignment(group, LINEAR)
         for h in range(s.alive.shape[0]):
             if was_alive[h]:
                 start_alignment(c, s, layout, h)
@@ -76,7 +79,7 @@ def monitor_modes(c, s, layout):
     elif group.alignment == MODES:
         refine_modes(c, s)
     else:
-        group.alignment = LINEAR
+        set_alignment(group, LINEAR)
         track_all_modes(c, s, layout)
 
 
@@ -91,9 +94,9 @@ def resolve_challenge(c, s, layout):
     if value < c.challenger_lead or is_near(R, np.eye(3), c.same_mode):
         # A mode near it is measured by these seconds alone; the filter knows it better.
         if len(values) == 1 or group.t - group.t_alignment > c.challenge_longest:
-            group.alignment = FILTERED
+            set_alignment(group, FILTERED)
         return
-    group.alignment = MODES
+    set_alignment(group, MODES)
     spawn_modes(c, s, group.best, turns, values)
 
 
@@ -116,7 +119,7 @@ def track_all_modes(c, s, layout):
         update_alignment_cov(c, s, h)
     if not known:
         return
-    s.group[0].alignment = MODES
+    set_alignment(s.group[0], MODES)
     for h in range(s.alive.shape[0]):
         if was_alive[h]:
             turns, values = likely_modes(c, s, layout, h)
@@ -157,7 +160,7 @@ def refine_modes(c, s):
             update_alignment_cov(c, s, h)
     if not known:
         return
-    s.group[0].alignment = CANDIDATES
+    set_alignment(s.group[0], CANDIDATES)
     for h in range(s.alive.shape[0]):
         if s.alive[h]:
             add_mode_uncertainty(c, s, h)

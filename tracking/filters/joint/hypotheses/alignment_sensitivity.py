@@ -25,7 +25,7 @@ import numpy as np
 from tracking.filters.joint.ekf.columns import BY_HEADING_P, BY_HEADING_V, TILT_STEP, UP_P, UP_V
 from tracking.filters.joint.ekf.gyro_bias import propagate_gyro_bias_sensitivity
 from tracking.filters.joint.ekf.propagation import moves, n_bias_states
-from tracking.filters.joint.hypotheses.alignment import FILTERED, LINEAR, has_modes
+from tracking.filters.joint.hypotheses.alignment import LINEAR, has_modes
 from tracking.filters.joint.updates.lever_arm import attach_to_world
 from tracking.kernels.jit import allocating_kernel, kernel, small_kernel
 from tracking.maths.covariance import STATES
@@ -47,7 +47,7 @@ def has_linear_alignment(c, s):
 @allocating_kernel
 def start_alignments(c, s, layout):
     """Let one filter stand for all rotations from now on, if the group does not rest."""
-    if s.group[0].alignment == FILTERED:
+    if s.group[0].alignment == LINEAR:
         for h in range(s.alive.shape[0]):
             if s.alive[h]:
                 start_alignment(c, s, layout, h)
@@ -56,6 +56,8 @@ def start_alignments(c, s, layout):
 @allocating_kernel
 def start_alignment(c, s, layout, h):
     """Forget what is known of the rotation of hypothesis h, which has no pending updates.
+
+    The group is `LINEAR` or `CHALLENGED` already.
 
     But that fixed nodes differ less in height than in width, where people put them.
     """
@@ -77,7 +79,7 @@ def start_alignment(c, s, layout, h):
                         out[r] * out[q] / c.height_var
                     )
     group = s.group[0]
-    group.alignment, group.t_alignment = LINEAR, group.t
+    group.t_alignment = group.t
     update_alignment_cov(c, s, h)
 
 

@@ -30,6 +30,7 @@ from tracking.filters.joint.hypotheses.alignment import (
     NONE,
     STATIC,
     has_modes,
+    set_alignment,
 )
 from tracking.filters.joint.hypotheses.copying import copy_hypothesis, rotate_hypothesis
 from tracking.filters.joint.hypotheses.geometric_degeneracy import (
@@ -129,7 +130,7 @@ def prune_bank(c, s):
     group = s.group[0]
     if group.n_alive < 2:
         if group.alignment == CANDIDATES:
-            group.alignment = FILTERED
+            set_alignment(group, FILTERED)
         return
     n_hyps = s.alive.shape[0]
     is_scored = group.alignment == STATIC or group.t >= group.t_scoring_starts - TIE
@@ -196,7 +197,7 @@ def remove_node(c, s, layout, i):
             s.nodes[k].fault = 0
         s.alive[:] = False
         s.group[0].n_alive = 0
-        s.group[0].alignment = NONE
+        set_alignment(s.group[0], NONE)
 
 
 @kernel

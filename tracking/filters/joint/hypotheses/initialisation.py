@@ -23,7 +23,7 @@ from tracking.filters.first_ranges import (
 from tracking.filters.joint.ekf.heading_gauge import add_rotation_uncertainty, heading_functional
 from tracking.filters.joint.ekf.propagation import initial_tilt_variance
 from tracking.filters.joint.ekf.scalar_update import reset_state
-from tracking.filters.joint.hypotheses.alignment import FILTERED, STATIC
+from tracking.filters.joint.hypotheses.alignment import FILTERED, LINEAR, STATIC, set_alignment
 from tracking.filters.joint.hypotheses.alignment_sensitivity import has_linear_alignment
 from tracking.filters.joint.hypotheses.copying import copy_hypothesis
 from tracking.filters.joint.hypotheses.static_initialisation import (
@@ -89,7 +89,7 @@ def start(c, s, layout, t):
         initialise_interval(s.pairs[p], t)
         reset_residuals(s.pairs[p])
     group = s.group[0]
-    group.alignment = STATIC if asleep else FILTERED
+    set_alignment(group, STATIC if asleep else LINEAR if opens else FILTERED)
     group.degenerate = False
     group.n_alive = n_first
     group.best, group.undecided = 0, n_first > 1

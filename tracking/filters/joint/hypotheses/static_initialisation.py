@@ -14,7 +14,7 @@ import numpy as np
 from tracking.filters.joint.ekf.heading_gauge import add_rotation_uncertainty, heading_variance
 from tracking.filters.joint.ekf.observability import shift_nullspace
 from tracking.filters.joint.ekf.scalar_update import reset_state
-from tracking.filters.joint.hypotheses.alignment import FILTERED
+from tracking.filters.joint.hypotheses.alignment import FILTERED, LINEAR, set_alignment
 from tracking.filters.joint.hypotheses.alignment_sensitivity import has_linear_alignment
 from tracking.filters.joint.hypotheses.copying import copy_hypothesis, rotate_hypothesis
 from tracking.kernels.jit import allocating_kernel, kernel, small_kernel
@@ -76,7 +76,9 @@ def spawn_rotation_hypotheses(c, s, layout, work):
     room for a few rotations of the second.
     """
     group = s.group[0]
-    group.alignment, group.undecided = FILTERED, not has_linear_alignment(c, s)
+    opens = has_linear_alignment(c, s)
+    set_alignment(group, LINEAR if opens else FILTERED)
+    group.undecided = not opens
     if group.t > group.t_scoring_starts - c.wheels_after + c.stood_for + TIE:
         group.t_scoring_starts = group.t
     was_alive = s.alive.copy()
@@ -88,7 +90,7 @@ def spawn_rotation_hypotheses(c, s, layout, work):
                 reset_state(s, h, c.n, node.i_heading, node.first_heading_var)
         if was_alive[h]:
             reset_heading_uncertainty(c, s, h, work)
-    if has_linear_alignment(c, s):
+    if opens:
         return
     for _ in range(s.alive.shape[0]):
         # The likelier layout first.
