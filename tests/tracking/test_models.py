@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from tracking.filters.joint.params import NlosParams
 from tracking.geometry import rotate
-from tracking.models import MODELS
+from tracking.models import MODELS, Model
 from tracking.models.lever_arm import antenna_in_world
 from tracking.models.nlos import nlos_posterior, transition_probs
 from tracking.records import record_of
@@ -17,10 +17,27 @@ from tracking.records import record_of
 STEP = 1e-6
 
 
+def bearing(r0, r1):
+    """A model of one's own, as docs/how-to/adding.md has it: direction of a neighbour [rad]."""
+    squared = r0 * r0 + r1 * r1
+    return math.atan2(r1, r0), -r1 / squared, r0 / squared
+
+
+def mistaken(r0, r1):
+    z_hat, d0, d1 = bearing(r0, r1)
+    return z_hat, -d0, d1
+
+
+OWN = {
+    "bearing": Model(bearing, 2, 0, "BearingParams.std"),
+    "mistaken": Model(mistaken, 2, 0, "BearingParams.std"),
+}
+
+
 def function(name):
     """A model as a function of its state and constants; angles as such, not as cosine and sine."""
     if name != "non-holonomic":
-        return MODELS[name].function
+        return (MODELS | OWN)[name].function
 
     def with_yaw(v0, v1, error, ahead, slip, yaw, _, yaw_rate, aside):
         c, s = math.cos(yaw + error), math.sin(yaw + error)
@@ -30,10 +47,19 @@ def function(name):
 
 
 @settings(max_examples=50, deadline=None)
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", [*MODELS, "bearing"])
 @given(seed=st.integers(0, 2**31))
 def test_derivatives_are_finite_differences(name, seed):
-    model, rng = MODELS[name], np.random.default_rng(seed)
+    check_derivatives(name, seed)
+
+
+def test_a_wrong_derivative_is_found():
+    with pytest.raises(AssertionError):
+        check_derivatives("mistaken", 1)
+
+
+def check_derivatives(name, seed):
+    model, rng = (MODELS | OWN)[name], np.random.default_rng(seed)
     x = rng.uniform(0.2, 2.0, model.n_state + model.n_constants) * rng.choice([-1.0, 1.0])
     call = function(name)
     _, *derivatives = call(*x)
