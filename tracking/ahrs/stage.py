@@ -23,7 +23,7 @@ from tracking.ahrs.vqf import (
 )
 from tracking.kernels.jit import kernel, small_kernel
 from tracking.measurements import ACCEL_NOISE, GYRO_BIAS, GYRO_VAR, TOLD, UPRIGHT
-from tracking.sanity.imu import GOOD, N_ODD, inspect_sample
+from tracking.sanity.imu import GOOD, inspect_sample, noise_scale
 from tracking.sanity.saturation import find_limits
 
 # Plain numbers of `Kind`: kernels do not know enums.
@@ -106,9 +106,8 @@ def take_sample(c, s, e, n, t, kind, values, valid, k):
     kind[e, k] = STATE
     values[e, k, 0], values[e, k, 1], values[e, k, 2], values[e, k, 3] = qw, qx, qy, qz
     values[e, k, 4], values[e, k, 5], values[e, k, 6] = x, y, z - m[e, n, GRAVITY]
-    # A vehicle that stays level does not need what is across its plane.
-    doubted = cut_x or cut_y or (cut_z and not c.levelled[n]) or s.health[e, n, N_ODD] > 0.0
-    values[e, k, ACCEL_NOISE] = c.doubtful_psd[n] if doubted else 0.0
+    scale = noise_scale(s.health, e, n, cut_x, cut_y, cut_z, c.levelled[n])
+    values[e, k, ACCEL_NOISE] = scale * c.doubtful_psd[n]
     tell_upright(s, e, n, cos, sin, values, k)
     valid[e, k] = (m[e, n, SEEN_FIELD] != 0.0 or not c.magnetic[n]) and not is_settling
 

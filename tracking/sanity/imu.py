@@ -16,6 +16,23 @@ a row; the last reading; the last that was believed."""
 
 
 @small_kernel
+def noise_scale(health, e, n, cut_x, cut_y, cut_z, levelled):
+    """How much of `OrientationParams.doubtful_psd` an acceleration is worse by [-].
+
+    Args:
+        health: Memory, (env, node, N_HEALTH).
+        e: Environment.
+        n: Node.
+        cut_x: True where the scale of the accelerometer cut its x off.
+        cut_y: The same of y.
+        cut_z: The same of z, which a vehicle that stays level does not need.
+        levelled: True for such a vehicle.
+    """
+    is_cut = cut_x or cut_y or (cut_z and not levelled)
+    return 1.0 if is_cut or health[e, n, N_ODD] > 0.0 else 0.0
+
+
+@small_kernel
 def inspect_sample(q, health, e, n, values, row, k):
     """Judge a sample; what is to be used instead of it is in the columns GOOD.
 

@@ -19,7 +19,7 @@ def make_coefficients(constellation: Constellation, params: JointParams) -> Reco
     white_var = e.white_std**2
     if not has_states:
         # What lasts counts as white noise of the same weight over a second of driving.
-        white_var += 10.0 * (e.fast_std**2 + e.slow_std**2)
+        white_var += e.lasting_weight * (e.fast_std**2 + e.slow_std**2)
     values = {
         "white_var": white_var,
         "fast_var": e.fast_std**2,
@@ -30,7 +30,8 @@ def make_coefficients(constellation: Constellation, params: JointParams) -> Reco
         "height_var": s.height_std**2,
         "start_k": s.k,
         "start_max_age": s.max_age,
-        "rotation_var": (0.4 if constellation.dimensions == 3 else 2.4 / s.rotations_2d) ** 2,
+        "rotation_var": (s.rotation_std_3d if constellation.dimensions == 3 else s.rotation_std_2d)
+        ** 2,
         "position_var": s.position_std**2,
         "start_speed_var": s.speed_std**2,
         "unaided_psd2": params.unaided_accel_psd**2,

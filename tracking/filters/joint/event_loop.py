@@ -243,7 +243,7 @@ def update_range(c, s, layout, work, p, a_i, a_j, t, distance, sight, is_survey)
             group.loglik_n += 1
             pair.nis = nis
             update_residuals(c, s, p, dt, distance, nu, misfit, weight)
-            if weight > 0.5:
+            if weight > c.least_sane:
                 group.nis_sum += nis
                 group.nis_n += 1
                 pair.t_used = t

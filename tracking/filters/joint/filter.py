@@ -27,7 +27,7 @@ from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.ekf.smoothing import read_clones, with_clones
 from tracking.filters.joint.ekf.workspace import Workspace, make_workspace
 from tracking.filters.joint.event_loop import predict_all, run_events
-from tracking.filters.joint.params import JointParams
+from tracking.filters.joint.params import JointParams, JointStartParams
 from tracking.filters.joint.rare import compile_all, rare_calls, run_to_end
 from tracking.filters.joint.state import Layout, make_layout, make_state
 from tracking.kernels.jit import Call, bind
@@ -44,7 +44,7 @@ class JointEkf(BatchedFilter):
     def __init__(self, constellation: Constellation, params: JointParams, n_envs: int = 1) -> None:
         self._coefficients = make_coefficients(constellation, params)
         self._layout = make_layout(constellation, params)
-        n_hyps = bank_size(constellation, self._layout)
+        n_hyps = bank_size(constellation, self._layout, params.start)
         state = make_state(constellation, params, n_envs, n_hyps)
         # Of one hypothesis: all begin alike.
         super().__init__(constellation, state, make_state(constellation, params, 1, 1))
@@ -126,7 +126,7 @@ class JointEkf(BatchedFilter):
         return make_workspace(constellation.n_nodes, constellation.n_pairs, n_states)
 
 
-def bank_size(constellation: Constellation, layout: Layout) -> int:
+def bank_size(constellation: Constellation, layout: Layout, start: JointStartParams) -> int:
     """How many hypotheses there is room for.
 
     Those of all rotations, and the reflections of nodes that join meanwhile. Where one filter
@@ -134,5 +134,5 @@ def bank_size(constellation: Constellation, layout: Layout) -> int:
     """
     n_rotations = len(layout.rotations)
     if constellation.dimensions == 2:
-        return n_rotations + 8
-    return 9 if constellation.n_nodes > 3 else 2 * n_rotations
+        return n_rotations + start.spare_hypotheses
+    return start.modes_3d if constellation.n_nodes > 3 else 2 * n_rotations

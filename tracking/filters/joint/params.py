@@ -29,6 +29,9 @@ class RangeErrorParams:
     second-order error there. That error lasts, so it weighs more than once."""
     max_pairs: int = 28
     """[-] Larger groups have no states for these errors: their ranges count as worse and white."""
+    lasting_weight: float = 10.0
+    """[-] Factor on the variances of these errors there, as white noise of the same weight over
+    a second of driving."""
 
     def __post_init__(self) -> None:
         check_numbers(self, may_be_zero=("fast_std", "slow_std", "nonlinearity_gain"))
@@ -116,6 +119,16 @@ class JointStartParams:
     unknown: one may be absurd."""
     rotations_2d: int = 16
     """[-] Rotations tried in the plane, each with its mirror image."""
+    rotation_std_2d: float = 0.15
+    """[rad] Uncertainty of each of them: two fifths of the gap between two."""
+    rotation_std_3d: float = 0.4
+    """[rad] The same of a first rotation in space."""
+    spare_hypotheses: int = 8
+    """[-] Room in the plane for more hypotheses than rotations: two sides of newcomers."""
+    modes_3d: int = 9
+    """[-] Room for modes of the rotation of a group in space."""
+    first_powers_most: float = 7.0
+    """[-] Log-likelihood ratio that the powers of a pair's first ranges make at most."""
     position_std: float = 0.25
     """[m] Error of a node in the first shape."""
     speed_std: float = 1.5
@@ -170,7 +183,13 @@ class UpdateParams:
     prediction, which costs nothing."""
     contradiction_share: float = 0.7
     """[-] A pair whose mean NIS is above this share of `JointParams.pair_nis_limit` counts
-    less, by the fourth power."""
+    less, by this power of what it is above it."""
+    contradiction_power: float = 4.0
+    """[-]"""
+    least_sane: float = 0.5
+    """[-] A range that means anything with less probability is refused."""
+    least_trust: float = 1e-3
+    """[-] A range that is trusted less corrects nothing."""
     glide_nis: float = 9.0
     """[-] A node that looks at rest, but whose velocity is known with this NIS, glides."""
     centre_std: float = 1.0
@@ -188,6 +207,9 @@ class UpdateParams:
     """[s] Low pass of the yaw rate of a vehicle that cannot move sideways."""
     rest_tau: float = 0.1
     """[s] Low passes of the rest detection."""
+    rest_mean_share: float = 0.25
+    """[-] Share of the squared mean acceleration that counts as variation there: a long push is no
+    rest."""
 
     def __post_init__(self) -> None:
         check_numbers(self)

@@ -144,7 +144,7 @@ def process_attitude(c, s, layout, i, t, values, e, k):
         for other in range(s.nodes.shape[0]):
             if other != i and s.nodes[other].present:
                 advance_pair(c, s, layout.pair_index[i, other], t)
-        add_mean_velocity(s, i, t)
+        add_mean_velocity(c, s, i, t)
     note_heading(c, node, t, values[e, k])
     for column in range(7):
         s.held[i, column] = values[e, k, column]

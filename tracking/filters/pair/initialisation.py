@@ -34,7 +34,7 @@ def initialise_pair(c, s, h, p, pos, t):
         s.P[p, h, k, k] = 1.0
         s.P[p, h, 3 + k, 3 + k] = 0.0 if both_static else 1.0
     s.P[p, h, E, E] = c.slow_var
-    s.nlos[p, h] = 0.1
+    s.nlos[p, h] = c.first_prob
     pair.t = t
     n = min(pair.start_n, N_FIRST)
     first = pair.start_t[(pair.start_n - n) % N_FIRST]

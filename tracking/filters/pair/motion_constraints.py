@@ -36,12 +36,12 @@ def note_heading(c, node, t, q):
 
 
 @small_kernel
-def add_mean_velocity(s, i, t):
+def add_mean_velocity(c, s, i, t):
     """Sum what the acceleration of node i adds to the mean velocity until time t."""
     node = s.nodes[i]
     dt = t - node.t_sum
     node.t_sum = t
-    if node.has_state and 0.0 < dt < 1.0:
+    if node.has_state and 0.0 < dt < c.longest_gap:
         s.group[0].dv0 += dt * s.held[i, 4]
         s.group[0].dv1 += dt * s.held[i, 5]
 
@@ -73,7 +73,7 @@ def apply_motion_constraints(c, s, layout, t, work):
             psd2 += node.psd * node.psd
             any_wheels = any_wheels or node.sideways_var > 0.0
             if not node.static:
-                add_mean_velocity(s, i, t)
+                add_mean_velocity(c, s, i, t)
     dv0, dv1 = group.dv0 / max(m, 1), group.dv1 / max(m, 1)
     group.dv0, group.dv1 = 0.0, 0.0
     if m < 3 or not any_wheels:

@@ -95,6 +95,8 @@ class NlosParams:
     """[-] Share of ranges that mean nothing."""
     outlier_span: float = 20.0
     """[m] They lie anywhere in so much."""
+    first_prob: float = 0.1
+    """[-] Probability that the first ranges of a pair have no line of sight."""
 
     def __post_init__(self) -> None:
         check_numbers(self)
@@ -114,6 +116,8 @@ class WheelParams:
     """[s] Low pass of the yaw rate."""
     group_speed_std: float = 2.0
     """[m/s] Mean velocity of a group before its wheels tell."""
+    longest_gap: float = 1.0
+    """[s] Accelerations are summed to it over no longer time between two samples."""
 
     def __post_init__(self) -> None:
         check_numbers(self)
@@ -178,6 +182,16 @@ class PairEkfParams:
     """[-] Or without one for this many of its usual intervals, where those are long."""
     node_timeout: float = 5.0
     """[s] A node not heard for so long has left; its filters are destroyed."""
+    least_sane: float = 0.5
+    """[-] A range that means anything with less probability does not count as one."""
+    least_trust: float = 1e-3
+    """[-] A range that means anything with less probability corrects nothing."""
+    misfit_gain: float = 0.01
+    """[-] Weight of a range in the running mean of a group's NIS."""
+    largest_nis: float = 25.0
+    """[-] A single range moves it by no more."""
+    interval_gain: float = 0.1
+    """[-] Weight of an interval between two ranges of a pair in its running mean."""
     gate: GateParams = field(default_factory=GateParams)
     mds: MdsParams = field(default_factory=MdsParams)
     range_error: RangeErrorParams = field(default_factory=RangeErrorParams)

@@ -141,18 +141,18 @@ def range_update(c, s, layout, p, t, distance, evidence, antenna_i, antenna_j, w
         R = c.range_var + s.nlos[p, h] * c.nlos_white_var
         variance, _ = predicted_variance(s.P, p, h, work)
         nis = nu * nu / (variance + R)
-        if sane > 1e-3:
+        if sane > c.least_trust:
             correct(s.x, s.P, p, h, work, nu, R / sane)
         s.loglik[h] += c.likelihood_tempering * max(loglik, -0.5 * (c.nis_cap + math.log(expected)))
         if h == group.best:
             pair.nis = nis
             group.nis_sum += nis
             group.nis_n += 1
-            group.misfit += 0.01 * (sane * min(misfit, 25.0) - group.misfit)
-            if sane > 0.5:
+            group.misfit += c.misfit_gain * (sane * min(misfit, c.largest_nis) - group.misfit)
+            if sane > c.least_sane:
                 pair.t_used = t
     if dt > TIE:
-        pair.interval += 0.1 * (min(dt, c.node_timeout) - pair.interval)
+        pair.interval += c.interval_gain * (min(dt, c.node_timeout) - pair.interval)
     pair.t_range = t
     pair.n_ranges += 1
 

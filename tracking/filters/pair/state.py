@@ -163,8 +163,11 @@ def make_state(
         for node, vehicle in zip(constellation.nodes, vehicles, strict=True)
     ]
     nodes["levelled"] = [vehicle.levelled for vehicle in vehicles]
-    cars = [node.vehicle == "car" and node.kind == "moving" for node in constellation.nodes]
-    nodes["sideways_var"] = np.where(cars, params.wheels.std**2, 0.0)
+    rolls = [
+        vehicle.sideways_std is not None and node.kind == "moving"
+        for node, vehicle in zip(constellation.nodes, vehicles, strict=True)
+    ]
+    nodes["sideways_var"] = np.where(rolls, params.wheels.std**2, 0.0)
     priors = [n.mount.prior(v) for n, v in zip(constellation.nodes, vehicles, strict=True)]
     ahead, ahead_std, slip, slip_std = np.array(priors).T
     nodes["ahead"], nodes["ahead_var"] = ahead, ahead_std**2

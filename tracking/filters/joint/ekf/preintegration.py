@@ -139,7 +139,7 @@ def update_rest_detector(c, node, t, dt, accel, fresh):
     off = accel - node.accel_mean
     node.accel_mean += (1.0 - keep) * off
     node.accel_var = keep * node.accel_var + (1.0 - keep) * off * off
-    shaken = node.accel_var + 0.25 * node.accel_mean * node.accel_mean
+    shaken = node.accel_var + c.rest_mean_share * node.accel_mean * node.accel_mean
     if shaken >= c.rest_accel * c.rest_accel:
         node.t_moved = node.t_accelerated = t
     elif node.turning >= c.rest_rate:

@@ -176,9 +176,8 @@ def initialise_node(c, s, h, i, t):
 @kernel
 def initial_nlos_prob(c, pair):
     """Probability that the first ranges of a pair had no line of sight, by their powers."""
-    odds = (
-        c.los_to_nlos_rate / c.nlos_to_los_rate * math.exp(min(max(pair.start_nlos_llr, -7.0), 7.0))
-    )
+    ratio = min(max(pair.start_nlos_llr, -c.first_powers_most), c.first_powers_most)
+    odds = c.los_to_nlos_rate / c.nlos_to_los_rate * math.exp(ratio)
     return odds / (1.0 + odds)
 
 

@@ -32,7 +32,7 @@ def update_residuals(c, s, p, dt, distance, nu, misfit, sane):
         sane: Probability that the range means anything.
     """
     pair, gain = s.pairs[p], c.nis_gain
-    is_sane, nis = sane > 0.5, min(misfit, c.largest_nis)
+    is_sane, nis = sane > c.least_sane, min(misfit, c.largest_nis)
     pair.mean_nis += gain * ((nis if is_sane else c.largest_nis) - pair.mean_nis)
     outlier = 0.0 if is_sane and misfit < c.outlier_nis else 1.0
     pair.outlier_ratio += gain * (outlier - pair.outlier_ratio)

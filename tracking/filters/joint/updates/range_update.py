@@ -231,11 +231,11 @@ def range_update(c, s, h, p, dt, distance, levers, sight, work):
     doubt = s.pairs[p].mean_nis / (c.contradiction_share * c.pair_nis_limit)
     trust = sane
     if doubt > 1.0:
-        trust /= doubt * doubt * doubt * doubt
+        trust /= doubt**c.contradiction_power
     if learns_noise(c, s):
         gain = distance_covariance(s, p, variance, work.w) / (variance + R / max(trust, 1e-9))
         learn_white_noise(c, s.group[0], s.pairs[p], longer, longer - gain * nu, dt)
-    if trust > 1e-3:
+    if trust > c.least_trust:
         if is_linear(s.group[0]):
             accumulate_alignment_information(s, h, work, nu, variance + R / trust)
         kalman_update(s, h, work.w, nu, variance + R / trust)
