@@ -11,7 +11,7 @@ from __future__ import annotations
 import ast
 import inspect
 import textwrap
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, asdict, field, fields, is_dataclass
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
@@ -28,19 +28,21 @@ def number(default: float, low: float, high: float) -> Any:
 
 
 def options(cls: type) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Decorate a command with an option for every leaf; lists are given with commas between."""
+    """Decorate a command with an option for every leaf; those of lists are repeated."""
 
     def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
         for leaf in reversed(list(leaves(cls))):
             default = leaf.default
             shown = ",".join(map(str, default)) if isinstance(default, tuple) else default
+            repeats = " Repeatable." if leaf.many else ""
             option = click.option(
-                f"--{leaf.name.replace('_', '-')}",
+                leaf.option,
                 leaf.name,
                 default=None,
                 type=str,
+                multiple=leaf.many,
                 metavar=leaf.metavar,
-                help=f"{leaf.help} [default: {shown if shown != '' else 'none'}]",
+                help=f"{leaf.help}{repeats} [default: {shown if shown != '' else 'none'}]",
             )
             command = option(command)
         return command
@@ -48,13 +50,22 @@ def options(cls: type) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     return decorate
 
 
-def from_options(cls: type[T], given: Mapping[str, str | None], base: T | None = None) -> T:
-    """Settings from texts by leaf name; what is None is as in `base` or by default.
+Given = Mapping[str, str | Sequence[str] | None]
+"""Texts of options by leaf name: one, or one for each time it is given; None where it is not."""
+
+
+def is_given(text: str | Sequence[str] | None) -> bool:
+    """True for an option that was given."""
+    return text is not None and (isinstance(text, str) or len(text) > 0)
+
+
+def from_options(cls: type[T], given: Given, base: T | None = None) -> T:
+    """Settings from texts by leaf name; what is not given is as in `base` or by default.
 
     Raises:
         UsageError: A text that is no such value, or out of range; the option is named.
     """
-    texts = {k: v for k, v in given.items() if v is not None}
+    texts = {k: v for k, v in given.items() if v is not None and is_given(v)}
 
     def value(leaf: Leaf, old: Any) -> Any:
         return _parse(leaf, texts[leaf.name]) if leaf.name in texts else old
@@ -71,8 +82,9 @@ def as_options(settings: Any) -> list[str]:
     for leaf in leaves(type(settings)):
         value = values[leaf.name]
         if value != leaf.default:
-            text = ",".join(map(str, value)) if leaf.many else str(value)
-            words += [f"--{leaf.name.replace('_', '-')}", text]
+            # An empty text is one of no value.
+            for one in (value or ("",)) if leaf.many else (value,):
+                words += [leaf.option, str(one)]
     return words
 
 
@@ -129,8 +141,13 @@ class Leaf:
     @property
     def metavar(self) -> str:
         """What to write in its place."""
-        one = "|".join(self.choices) or {int: "N", float: "X"}.get(self.kind, "NAME")
-        return f"{one},..." if self.many else one
+        return "|".join(self.choices) or {int: "N", float: "X"}.get(self.kind, "NAME")
+
+    @property
+    def option(self) -> str:
+        """The option that it is given by; that of a list is given once for each value."""
+        name = self.name.removesuffix("s") if self.many else self.name
+        return f"--{name.replace('_', '-')}"
 
 
 def leaves(cls: type) -> Iterator[Leaf]:
@@ -157,12 +174,11 @@ def _map(cls: Any, old: Mapping[str, Any], value: Callable[[Leaf, Any], Any]) ->
     return cls(**found)
 
 
-def _parse(leaf: Leaf, text: str) -> Any:
-    """A value from the text of an option."""
-    option = f"--{leaf.name.replace('_', '-')}"
-    parts = [p.strip() for p in text.split(",") if p.strip()] if leaf.many else [text]
+def _parse(leaf: Leaf, text: str | Sequence[str]) -> Any:
+    """A value from the text of an option, or the texts of one that is repeated."""
+    option, texts = leaf.option, [text] if isinstance(text, str) else text
     values = []
-    for part in parts:
+    for part in [t.strip() for t in texts if t.strip()] if leaf.many else texts:
         try:
             values.append(leaf.kind(part) if leaf.kind in (int, float) else part)
         except ValueError as error:

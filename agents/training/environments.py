@@ -59,7 +59,7 @@ def weights_of(config: TrainConfig, done: float) -> dict[str, float]:
         UsageError: One is not TERM=WEIGHT.
     """
     env = config.env
-    first, final = _weights("weights", env.weights), _weights("final-weights", env.final_weights)
+    first, final = _weights("weight", env.weights), _weights("final-weight", env.final_weights)
     known = DEFAULT_WEIGHTS.get(env.task, {})
     gone = min(max((done - CHANGE[0]) / (CHANGE[1] - CHANGE[0]), 0.0), 1.0)
     moving = {
@@ -81,7 +81,7 @@ def _weights(option: str, given: tuple[str, ...]) -> dict[str, float]:
         try:
             weights[term] = float(weight)
         except ValueError as error:
-            raise UsageError(f"--{option}: expected TERM=WEIGHT,..., got {text!r}") from error
+            raise UsageError(f"--{option}: expected TERM=WEIGHT, got {text!r}") from error
     return weights
 
 
@@ -102,11 +102,11 @@ def check_environments(config: TrainConfig) -> tuple[Parts, ...]:
         )
     names, others = config.env.scenarios, config.choice_scenarios
     if not names:
-        raise UsageError("--scenarios: expected at least one")
+        raise UsageError("--scenario: expected at least one")
     known = [name for name in others if name in names]
     if known:
         raise UsageError(
-            f"--choice-scenarios: expected scenarios that are not learned in, got {known[0]!r}"
+            f"--choice-scenario: expected scenarios that are not learned in, got {known[0]!r}"
         )
     for option, given, needed in (
         ("envs", config.ppo.envs, len(names)),

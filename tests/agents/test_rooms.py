@@ -8,7 +8,7 @@ from agents.training.environments import make_rooms
 
 
 def test_rooms_of_several_scenarios_share_the_seats():
-    config = small(scenarios="cars-nlos,hall", cars="6")
+    config = small(scenarios=("cars-nlos", "hall"), cars="6")
     rooms = make_rooms(config, None)
     rooms.seed(3)
     seen = rooms.reset()
@@ -27,7 +27,7 @@ def test_rooms_are_the_same_on_any_number_of_threads():
     """One, as many as rooms, and more: rooms are then stepped in parts."""
     driven = []
     for threads in ("1", "2", "3"):
-        config = small(scenarios="cars-nlos,hall", threads=threads, envs="8")
+        config = small(scenarios=("cars-nlos", "hall"), threads=threads, envs="8")
         rooms = make_rooms(config, None)
         rooms.seed(3)
         steps = [(rooms.reset(),)]

@@ -20,7 +20,7 @@ from agents.cli.main import cli
 from agents.errors import UsageError
 from agents.policies import load_policy
 from agents.policies.layout import Layout
-from agents.settings import as_options, from_options
+from agents.settings import as_options, from_options, leaves
 from agents.training.begin import begin_with
 from agents.training.config import TrainConfig
 from agents.training.environments import (
@@ -43,8 +43,11 @@ from relpos_env.errors import EnvError
 
 def from_words(words):
     """Settings from what a command is given."""
-    names = (word.removeprefix("--").replace("-", "_") for word in words[::2])
-    return from_options(TrainConfig, dict(zip(names, words[1::2], strict=True)))
+    named, given = {leaf.option: leaf for leaf in leaves(TrainConfig)}, {}
+    for option, text in zip(words[::2], words[1::2], strict=True):
+        leaf = named[option]
+        given[leaf.name] = [*given.get(leaf.name, []), text] if leaf.many else text
+    return from_options(TrainConfig, given)
 
 
 @pytest.fixture(scope="module")
@@ -197,7 +200,7 @@ def test_every_scenario_needs_an_episode():
 
 def test_rooms_that_tell_which_policy_is_kept_are_not_learned_in():
     config = small(scenarios="cars-los")
-    with pytest.raises(UsageError, match="--choice-scenarios: expected .* not learned in"):
+    with pytest.raises(UsageError, match="--choice-scenario: expected .* not learned in"):
         check_environments(replace(config, choice_scenarios=("cars-los",)))
     with pytest.raises(EnvError, match="nowhere"):
         check_environments(replace(config, choice_scenarios=("nowhere",)))
@@ -226,7 +229,7 @@ def test_a_run_that_was_killed_goes_on_as_if_it_had_not_been(run, tmp_path):
 
 
 def test_the_curriculum_goes_through_its_levels(tmp_path):
-    config = small(levels="0,2,3", frames="1000", scenarios="cars-nlos")
+    config = small(levels=("0", "2", "3"), frames="1000", scenarios="cars-nlos")
     assert [level_of(config, f) for f in (0, 333, 334, 700, 5000)] == [0, 0, 1 + 1, 3, 3]
     result = train(config, tmp_path / "run")
     assert [r["level"] for r in result.records] == sorted(r["level"] for r in result.records)
@@ -399,22 +402,17 @@ def test_a_task_that_is_done_ends_an_episode_of_the_evaluation():
             "runs": st.integers(1, 64).map(str),
             "gamma": st.floats(0, 1).map(str),
             "log_std": st.floats(-5, 1).map(str),
-            "scenarios": st.sampled_from(["open", "cars-nlos,hall"]),
-            "levels": st.lists(st.integers(0, 4), max_size=3).map(lambda n: ",".join(map(str, n))),
+            "scenarios": st.sampled_from([("open",), ("cars-nlos", "hall")]),
+            "levels": st.lists(st.integers(0, 4).map(str), max_size=3),
             "critic": st.sampled_from(["own", "central"]),
-            "weights": st.sampled_from(["collision=5", "collision=8,place=0"]),
-            "final_weights": st.sampled_from(["", "collision=12"]),
+            "weights": st.sampled_from([("",), ("collision=8", "place=0")]),
+            "final_weights": st.sampled_from([(), ("collision=12",)]),
         },
     )
 )
 def test_settings_as_options_are_the_same_settings(given):
     config = from_options(TrainConfig, given)
-    words = as_options(config)
-    options = {
-        k.removeprefix("--").replace("-", "_"): v
-        for k, v in zip(words[::2], words[1::2], strict=True)
-    }
-    assert from_options(TrainConfig, options) == config
+    assert from_words(as_options(config)) == config
 
 
 def test_the_card_tells_by_which_command_a_policy_was_made(policy):
@@ -422,16 +420,12 @@ def test_the_card_tells_by_which_command_a_policy_was_made(policy):
     assert (training["task"], training["scenario"]) == ("ring", "cars-nlos")
     words = training["command"].split()
     assert words[:4] == ["relpos", "train", "--out", "small"]
-    options = {
-        k.removeprefix("--").replace("-", "_"): v
-        for k, v in zip(words[4::2], words[5::2], strict=True)
-    }
-    assert from_options(TrainConfig, options) == small()
+    assert from_words(words[4:]) == small()
 
 
 def test_what_cannot_be_trained_is_refused(tmp_path):
     for changes, said in (
-        ({"scenarios": ""}, "--scenarios: expected at least one"),
+        ({"scenarios": ""}, "--scenario: expected at least one"),
         ({"envs": "1"}, "--envs: expected at least 2"),
         ({"cars": "3"}, "--cars: expected at least 6"),
     ):

@@ -10,7 +10,7 @@ import click
 from agents.cli.console import emit_json, print_table, progress_bar
 from agents.cli.options import json_option
 from agents.errors import UsageError
-from agents.settings import from_options, options
+from agents.settings import from_options, is_given, leaves, options
 from agents.training.config import TrainConfig
 
 
@@ -19,7 +19,7 @@ from agents.training.config import TrainConfig
 @click.option("--resume", type=Path, metavar="RUN", help="Go on with the run in this folder.")
 @json_option
 @options(TrainConfig)
-def train(out: Path | None, resume: Path | None, as_json: bool, **given: str | None) -> None:
+def train(out: Path | None, resume: Path | None, as_json: bool, **given: Any) -> None:
     """Train one policy for all cars; ends with a file that runs without torch, and a report.
 
     How good a policy gets depends much on the seed: --runs 2 trains two at a time and keeps the
@@ -27,10 +27,10 @@ def train(out: Path | None, resume: Path | None, as_json: bool, **given: str | N
     """
     if (out is None) == (resume is None):
         raise UsageError("--out, --resume: expected one of them, a new folder or that of a run")
-    changed = [k for k, v in given.items() if v is not None]
+    changed = [k for k, v in given.items() if is_given(v)]
     if resume is not None and changed:
         raise UsageError(
-            f"--{changed[0].replace('_', '-')}: a run goes on with its own configuration, "
+            f"{_option(changed[0])}: a run goes on with its own configuration, "
             "expected no other options with --resume"
         )
     config = from_options(TrainConfig, given)
@@ -74,6 +74,10 @@ def train(out: Path | None, resume: Path | None, as_json: bool, **given: str | N
         ],
     )
     click.echo(f"written: {result.policy} and its card; open {folder / 'report.html'}")
+
+
+def _option(name: str) -> str:
+    return next(leaf.option for leaf in leaves(TrainConfig) if leaf.name == name)
 
 
 def _line(row: dict[str, Any]) -> str:
