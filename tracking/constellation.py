@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from tracking.arrays import F64, I64, Bool
+from tracking.axes import Axes
 from tracking.errors import ConfigError
 from tracking.mount import Mount
 from tracking.vehicles import VEHICLES
@@ -48,6 +49,11 @@ class NodeConfig:
     """[Hz] Nominal rate of the magnetometer where it is not that of the IMU."""
     mount: Mount = Mount()
     """Where it sits on a vehicle that cannot move sideways."""
+    imu_axes: Axes = Axes()
+    """Of gyroscope and accelerometer in the body; readings are turned where they come in, so that
+    measurements are in axes of the body already."""
+    mag_axes: Axes = Axes()
+    """The same of the magnetometer."""
 
 
 @dataclass(frozen=True, kw_only=True)

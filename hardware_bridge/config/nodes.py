@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from hardware_bridge.config.keys import node_id, tables_of
+from tracking.axes import Axes
 from tracking.constellation import Antenna, Constellation, NodeConfig
 from tracking.errors import ConfigError
 from tracking.mount import KEYS, Mount
@@ -34,6 +35,8 @@ class _Node:
     imu_hz: float = 100.0
     mag_hz: float | None = None
     mount: _Mount = _Mount()
+    imu_axes: tuple[str, str, str] = ("x", "y", "z")
+    mag_axes: tuple[str, str, str] = ("x", "y", "z")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,6 +67,12 @@ def read_constellation(
             mount.check("mount")
         except ConfigError as error:
             raise at.error(str(error)) from error
+        axes = {}
+        for name, mirrored in (("imu_axes", False), ("mag_axes", True)):
+            try:
+                axes[name] = Axes.parse(getattr(node, name), mirrored=mirrored)
+            except ConfigError as error:
+                raise at.key(name).error(str(error)) from error
         nodes.append(
             NodeConfig(
                 id=node_id(key, at),
@@ -73,6 +82,7 @@ def read_constellation(
                 imu_hz=node.imu_hz,
                 mag_hz=node.mag_hz,
                 mount=mount,
+                **axes,
             )
         )
     for key, table in tables_of(raw, "antennas", where):

@@ -210,8 +210,10 @@ class Intake:
                 if reading.source.ticks is None:
                     even = stream.even.setdefault(node, EvenTime(self.group.nodes[node].imu_hz))
                     t = self.seconds(even.map(None, arrival_ns))
+                config = self.group.nodes[node]
                 if mag is not None:
-                    self.events.add(t, Kind.MAG, node, mag)
+                    self.events.add(t, Kind.MAG, node, config.mag_axes.turn_one(mag))
+                gyr, acc = config.imu_axes.turn_one(gyr), config.imu_axes.turn_one(acc)
                 self.events.add(t, Kind.IMU, node, (*gyr, *acc))
                 if self.sample_rates.note(node, arrival_ns):
                     self.notices.append((arrival_ns, self.wrong_rate(node)))

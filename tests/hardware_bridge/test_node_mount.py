@@ -1,4 +1,4 @@
-"""``[nodes.N.mount]`` of swarm.toml."""
+"""Where a node and its sensors sit: ``[nodes.N.mount]``, ``imu_axes``, ``mag_axes``."""
 
 import tomllib
 from pathlib import Path
@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from hardware_bridge.config.nodes import read_constellation
+from tracking.axes import Axes
 from tracking.errors import ConfigError
 from tracking.mount import Mount
 from tracking.params.tables import Where
@@ -42,6 +43,14 @@ def test_it_is_what_the_file_says_and_unknown_otherwise():
 def test_what_cannot_be_is_refused_by_name(line, message):
     with pytest.raises(ConfigError, match=message):
         read(FILE.replace("ahead_m = 0.21", line))
+
+
+def test_axes_of_sensors_are_those_of_the_file():
+    node = read(FILE.replace("[nodes.1]", '[nodes.1]\nimu_axes = ["-y", "x", "z"]')).nodes[0]
+    assert node.imu_axes.turn_one((1.0, 2.0, 3.0)) == (-2.0, 1.0, 3.0)
+    assert node.mag_axes == Axes()
+    with pytest.raises(ConfigError, match=r"nodes\.1.*imu_axes: expected right-handed"):
+        read(FILE.replace("[nodes.1]", '[nodes.1]\nimu_axes = ["y", "x", "z"]'))
 
 
 def test_the_example_is_read():

@@ -28,7 +28,7 @@ KINDS: dict[str, Kind] = {
     "gravity-axis": Kind(
         "error",
         "gravity is not on +z of a vehicle that stays level",
-        "turn the IMU, or its axes where it is read: x forward, y left, z up",
+        "turn the IMU, or say how it is mounted: `imu_axes` of the node; x forward, y left, z up",
     ),
     "gravity-tilt": Kind(
         "warning",
@@ -47,7 +47,7 @@ KINDS: dict[str, Kind] = {
     "gyro-axes": Kind(
         "error",
         "gyroscope and magnetometer of a node have different axes or signs",
-        "turn the axes of one of them: both have x forward, y left, z up",
+        "say how they are mounted: `imu_axes`, `mag_axes` of the node; x forward, y left, z up",
     ),
     "clock-offset": Kind(
         "error",

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tracking.arrays import F64
+from tracking.axes import Axes
 from tracking.constellation import FASTEST_HZ, SLOWEST_HZ, Constellation
 from tracking.errors import LogError
 from tracking.measurements import Kind, MeasurementBlock
@@ -61,6 +62,25 @@ def _check_times(
                 f"{constellation.ids[n]} have the time of the one before; expected when each was "
                 "taken"
             )
+
+
+def in_body_axes(
+    constellation: Constellation, block: MeasurementBlock
+) -> tuple[Constellation, MeasurementBlock]:
+    """The samples turned to axes of the body, and the constellation of such samples."""
+    if all(node.imu_axes.is_body and node.mag_axes.is_body for node in constellation.nodes):
+        return constellation, block
+    values = block.values.copy()
+    for n, node in enumerate(constellation.nodes):
+        imu = (block.kind[0] == Kind.IMU) & (block.i[0] == n)
+        mag = (block.kind[0] == Kind.MAG) & (block.i[0] == n)
+        for first in (0, 3):
+            values[0, imu, first : first + 3] = node.imu_axes.turn(
+                values[0, imu, first : first + 3]
+            )
+        values[0, mag, :3] = node.mag_axes.turn(values[0, mag, :3])
+    nodes = tuple(replace(n, imu_axes=Axes(), mag_axes=Axes()) for n in constellation.nodes)
+    return replace(constellation, nodes=nodes), replace(block, values=values)
 
 
 def with_rates(constellation: Constellation, block: MeasurementBlock) -> Constellation:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from tracking.axes import Axes
 from tracking.constellation import Antenna, Constellation, NodeConfig
 from tracking.errors import ConfigError, LogError
 from tracking.log.folder import FORMAT
@@ -105,7 +106,20 @@ def _node(key: str, table: Any) -> NodeConfig:
         if heading is None
         else _number(f"{where}.initial_heading_rad", heading),
         mount=_mount(f"{where}.mount", table.get("mount", {})),
+        imu_axes=_axes(f"{where}.imu_axes", table.get("imu_axes"), mirrored=False),
+        mag_axes=_axes(f"{where}.mag_axes", table.get("mag_axes"), mirrored=True),
     )
+
+
+def _axes(where: str, value: Any, *, mirrored: bool) -> Axes:
+    if value is None:
+        return Axes()
+    if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
+        raise LogError(f'meta.toml, {where}: expected ["x", "y", "z"], found {value!r}')
+    try:
+        return Axes.parse(value, mirrored=mirrored)
+    except ConfigError as error:
+        raise LogError(f"meta.toml, {where}: {error}") from error
 
 
 def _mount(where: str, table: Any) -> Mount:

@@ -15,7 +15,7 @@ from tracking.arrays import F64, I64, Bool
 from tracking.constellation import Constellation
 from tracking.errors import ConfigError, LogError
 from tracking.log.folder import ACC, GYR, MAG, POWERS, QUAT, Log
-from tracking.log.inertial import check_inertial, with_rates
+from tracking.log.inertial import check_inertial, in_body_axes, with_rates
 from tracking.log.meta import read_meta
 from tracking.log.table import Table, find_table
 from tracking.log.truth import Truth
@@ -52,7 +52,7 @@ def read_log(folder: Path | str) -> Log:
     blocks = [ranges, imu, *_read_optional(folder, constellation, skipped)]
     # RANGE events keep their order, since a stable sort by time, kind and nodes is used on
     # rows that come in time order; the labels must follow the same order.
-    block = MeasurementBlock.concatenate(blocks)
+    constellation, block = in_body_axes(constellation, MeasurementBlock.concatenate(blocks))
     order = np.lexsort((block.j[0], block.i[0], block.kind[0], block.t[0]))
     is_range = block.kind[0][order] == Kind.RANGE
     check_inertial(block, constellation)
