@@ -26,13 +26,13 @@ class Convoy(ExactGroup):
         driven = SPEED * np.cumsum(u**3 * (10.0 - 15.0 * u + 6.0 * u**2)) / FINE
         at = driven[:, None] - GAP * np.arange(n)
         self._yaw = np.interp(at, s, yaw)
-        self._pos = np.stack([np.interp(at, s, path[:, k]) for k in range(2)], axis=-1)
+        self.pos = np.stack([np.interp(at, s, path[:, k]) for k in range(2)], axis=-1)
         if vehicle != "car":  # it need not follow the path to the centimetre
             out = rng.normal(0.0, 0.08, n) + 0.05 * np.sin(0.8 * at + rng.uniform(0.0, 6.0, n))
             left = np.stack([-np.sin(self._yaw), np.cos(self._yaw)], axis=-1)
-            self._pos += out[..., None] * left
-        self._pos = np.concatenate([self._pos, np.zeros((*at.shape, 1))], axis=-1)
-        self._vel = np.gradient(self._pos, self.fine, axis=0)
+            self.pos += out[..., None] * left
+        self.pos = np.concatenate([self.pos, np.zeros((*at.shape, 1))], axis=-1)
+        self._vel = np.gradient(self.pos, self.fine, axis=0)
         self.block = self._measure(1.0 / hz)
         self._add_errors(rng)
 

@@ -39,8 +39,8 @@ class ExactGroup:
             pos, yaw = centre + np.stack(axes, axis=-1), np.zeros_like(phase)
         pos[..., dimensions:] = 0.0
         order = np.asarray(numbering)
-        self._pos, self._yaw = pos[:, order], yaw[:, order]
-        self._vel = np.gradient(self._pos, self.fine, axis=0)
+        self.pos, self._yaw = pos[:, order], yaw[:, order]
+        self._vel = np.gradient(self.pos, self.fine, axis=0)
         self.t = np.arange(1, int(seconds * hz)) / hz
         self.block = self._measure(1.0 / hz)
 
@@ -58,19 +58,19 @@ class ExactGroup:
 
     def pairs(self, t):
         """True relative positions, (time, pair, 3)."""
-        pos = self._at(self._pos, t)
+        pos = self.at(self.pos, t)
         i, j = self.constellation.pairs.T
         return pos[:, j] - pos[:, i]
 
-    def _at(self, values, t):
+    def at(self, values, t):
         flat = values.reshape(len(values), -1)
         columns = [np.interp(t, self.fine, column) for column in flat.T]
         return np.stack(columns, axis=-1).reshape(len(t), *values.shape[1:])
 
     def _measure(self, dt):
         t, parts = self.t, []
-        accel = (self._at(self._vel, t + dt) - self._at(self._vel, t)) / dt
-        half = 0.5 * self._at(self._yaw, t)
+        accel = (self.at(self._vel, t + dt) - self.at(self._vel, t)) / dt
+        half = 0.5 * self.at(self._yaw, t)
         for k in range(self.constellation.n_nodes):
             values = np.zeros((len(t), 7))
             values[:, 0], values[:, 3] = np.cos(half[:, k]), np.sin(half[:, k])

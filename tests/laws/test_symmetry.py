@@ -14,7 +14,9 @@ import pytest
 from agents.simulation.simulate import simulate
 from tests.exact_motion import ExactGroup
 from tracking import Status, TeamEstimate, Tracker, TrackerParams
-from tracking.filters import FILTERS, FilterParams
+from tracking.ahrs.orientation import Orientation
+from tracking.ahrs.params import OrientationParams
+from tracking.filters import FILTERS, FilterParams, filter_builder
 from tracking.filters.paper import PaperParams
 from tracking.measurements import Kind, MeasurementBlock
 
@@ -121,7 +123,8 @@ def in_old_numbers(found, constellation, new):
 
 def states(name, constellation, block):
     """The block with orientations in place of inertial samples, as the filter gets them."""
-    return Tracker(constellation, filter=name)._orientation.step(block)
+    follows_bias = filter_builder(name)(constellation, FilterParams(), 1).follows_bias
+    return Orientation(constellation, OrientationParams(), follows_bias=follows_bias).step(block)
 
 
 def turn(block, angle):

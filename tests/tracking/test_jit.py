@@ -10,7 +10,7 @@ from numba import config, typeof
 from numba.core.errors import TypingError
 
 from tracking.kernels.addresses import by_reference
-from tracking.kernels.jit import _type_of, kernel, small_kernel
+from tracking.kernels.jit import kernel, small_kernel, type_of
 
 KERNEL = """
 from tracking.kernels.jit import kernel
@@ -173,7 +173,7 @@ def of_types():
 def test_remembered_types_are_those_of_numba():
     for _ in range(2):
         for value in of_types():
-            assert _type_of(value) == typeof(value), value
+            assert type_of(value) == typeof(value), value
 
 
 @kernel

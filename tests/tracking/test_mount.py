@@ -29,7 +29,7 @@ def test_what_is_given_has_no_variance_and_no_state():
     known = Mount(ahead=0.2, slip=0.0)
     assert known.prior(CAR) == (0.2, 0.0, 0.0, 0.0)
     n = [
-        JointEkf(group(mount=m), JointParams())._state.nodes["i_mount"][0] for m in (known, Mount())
+        JointEkf(group(mount=m), JointParams()).save().nodes["i_mount"][0] for m in (known, Mount())
     ]
     assert n[0].tolist() == [-1, -1]
     assert n[1][0] >= 0

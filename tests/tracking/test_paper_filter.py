@@ -99,7 +99,7 @@ def test_mds_reproduces_the_distances():
 def test_given_its_first_layout_it_follows_exact_data_in_the_frame_of_the_world():
     """With the true derivative of a range; without the layout its frame is arbitrary."""
     group = ExactGroup("human", range(4), hz=100.0, seconds=6.0)
-    first = group._at(group._pos, np.array([0.08]))[0]
+    first = group.at(group.pos, np.array([0.08]))[0]
     params = PaperParams(
         speed="rate", speed_std=1e3, first_layout=tuple(tuple(map(float, p)) for p in first)
     )
