@@ -368,7 +368,7 @@ def test_robots_without_imu_are_followed_but_for_rotation_and_mirror(data):
     found = track_log(convert(data / "raw" / "tiers_ros2", preset="tiers"))
     assert found.score.rmse_mirror is not None
     assert found.score.rmse_mirror < 0.6
-    assert {"no-imu", "range-offset"} <= {f.name for f in found.findings}
+    assert "no-imu" in {f.name for f in found.findings}
 
 
 def residuals(log):

@@ -129,7 +129,7 @@ def test_the_noise_of_actions_falls_to_what_is_asked(run, tmp_path):
 
 def test_weights_of_rewards_go_to_their_final_values_along_the_run(tmp_path):
     config = small(
-        task="hold", weights="collision=8", final_weights="progress=0,collision=12", levels=""
+        task="hold", weights="collision=8", final_weights=("progress=0", "collision=12"), levels=""
     )
     assert weights_of(config, 0.0) == {"collision": 8.0, "progress": 5.0}
     assert weights_of(config, 0.375) == pytest.approx({"collision": 10.0, "progress": 2.5})

@@ -65,6 +65,10 @@ class OrientationCoefficients(NamedTuple):
     """Share by which a sample at rest moves the length of gravity, (node)."""
     max_gap: F64
     """`OrientationParams.max_gap`, (node) [s]."""
+    lost_after: F64
+    """`OrientationParams.lost_after`, (node) [-]."""
+    stamp_gain: F64
+    """`OrientationParams.stamp_gain`, (node) [-]."""
     settling_samples: F64
     """Samples of `OrientationParams.settling`, (node); 0 for vehicles that stay level."""
     settling_accel: F64
@@ -157,6 +161,8 @@ def make_coefficients(
         vertical_var=motion_var / b.vertical_share,
         gravity_gain=dt / params.gravity_tau,
         max_gap=np.full(len(nodes), params.max_gap),
+        lost_after=np.full(len(nodes), params.lost_after),
+        stamp_gain=np.full(len(nodes), params.stamp_gain),
         settling_samples=np.where([v.levelled for v in vehicles], 0.0, params.settling / dt),
         settling_accel=np.full(len(nodes), params.settling_accel),
         heading=np.array([node.initial_heading or 0.0 for node in nodes]),

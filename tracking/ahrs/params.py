@@ -108,6 +108,11 @@ class OrientationParams:
     """[s] Missing samples up to here are filled by interpolation, so that the gyroscope is
     integrated over them. After a longer silence the orientation is initialised again, where there
     is a magnetometer; elsewhere it goes on from where it was."""
+    lost_after: float = 1.5
+    """[-] Factor on the period of a sensor: samples further apart have lost some between."""
+    stamp_gain: float = 0.05
+    """[-] Share of the difference between a sample's stamp and that of a steady sensor by which the
+    integration of the gyroscope follows it: jitter is smoothed over 20 samples."""
     gravity_tau: float = 0.5
     """[s] Time constant with which a node at rest learns the length of gravity that its own
     accelerometer reads, which removes the vertical part of its offset."""

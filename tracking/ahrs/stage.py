@@ -28,18 +28,17 @@ from tracking.sanity.saturation import find_limits
 
 # Plain numbers of `Kind`: kernels do not know enums.
 MAG, IMU, STATE = 1, 2, 3
-STEADY = 1.5
-"""[-] Samples that are further apart than so many nominal intervals have lost some between."""
 
 STARTED, T, GRAVITY, COS_YAW, SIN_YAW = 0, 1, 2, 3, 4
 LAST_GYR, LAST_ACC, FIELD, HAS_FIELD, SEEN_FIELD, TURNED = 5, 8, 11, 14, 15, 16
-MOVED = 18
-N_NODE = 19
+MOVED, INTEGRATED = 18, 19
+N_NODE = 20
 """Columns of what a node remembers in addition to its VQF: 1 after the first sample; its time
 [s]; length of gravity [m/s2]; cosine and sine of half the turn that gives the initial heading;
 the last sample, gyroscope [rad/s] and specific force [m/s2]; a field that no sample followed yet,
 and 1 if there is one; 1 after a field was used; by how much it was turned upright, about x and y
-of the world [rad]; 1 where it moved while its orientation settled."""
+of the world [rad]; 1 where it moved while its orientation settled; the time that its gyroscope was
+integrated up to [s]."""
 
 
 @kernel
@@ -146,22 +145,24 @@ def tell_upright(s, e, n, cos, sin, values, k):
 def find_gap(c, s, e, n, t):
     """Samples lost before one at time t [s], and the time between two then [s].
 
-    After a long silence VQF starts again instead.
+    Samples are taken at a steady rate, whatever their stamps: the time that the gyroscope was
+    integrated over follows the stamps slowly, so that jitter is smoothed and time adds up. After a
+    long silence VQF starts again instead.
     """
-    m = s.node
-    gap = t - m[e, n, T]
-    if m[e, n, STARTED] == 0.0:
-        return 0, c.dt[n]
-    if gap * c.rate[n] <= STEADY:
-        return 0, gap
-    if gap <= c.max_gap[n]:
-        n_steps = round(gap * c.rate[n])
-        return n_steps - 1, gap / n_steps
-    if c.magnetic[n]:
-        # Where it points now is not known; what its gyroscope reads at rest is still true.
-        start_vqf(s, c, e, n, worst_variance(s.bias, c, e, n))
-        m[e, n, SEEN_FIELD] = m[e, n, MOVED] = 0.0
-    return 0, c.dt[n]
+    m, dt, n_lost = s.node, c.dt[n], 0
+    gap, behind = t - m[e, n, T], t - m[e, n, INTEGRATED]
+    if m[e, n, STARTED] == 0.0 or gap > c.max_gap[n]:
+        if m[e, n, STARTED] != 0.0 and c.magnetic[n]:
+            # Where it points now is not known; what its gyroscope reads at rest is still true.
+            start_vqf(s, c, e, n, worst_variance(s.bias, c, e, n))
+            m[e, n, SEEN_FIELD] = m[e, n, MOVED] = 0.0
+        m[e, n, INTEGRATED] = t
+        return 0, dt
+    if min(gap, behind) * c.rate[n] > c.lost_after[n]:
+        n_lost = round(behind * c.rate[n]) - 1
+    dt += c.stamp_gain[n] * (behind / (n_lost + 1) - dt)
+    m[e, n, INTEGRATED] += (n_lost + 1) * dt
+    return n_lost, dt
 
 
 @small_kernel

@@ -148,15 +148,14 @@ def correct_tilt(s, c, e, n, ax, ay, az):
 def update_vqf(s, c, e, n, dt, gx, gy, gz, ax, ay, az):
     """Take an inertial sample of node n; an accelerometer that reads zero tells no tilt.
 
-    The gyroscope turns for the time that passed, so that stamps that jitter or repeat turn no
-    further; low passes count samples.
+    Low passes count samples.
 
     Args:
         s: OrientationState, its memories `tilt`, `rest` and `bias` updated.
         c: OrientationCoefficients.
         e: Environment.
         n: Node.
-        dt: Time since the sample before [s].
+        dt: Time that the gyroscope is integrated over [s].
         gx: Gyroscope, body frame [rad/s].
         gy: Gyroscope, body frame [rad/s], along y.
         gz: Gyroscope, body frame [rad/s], along z.

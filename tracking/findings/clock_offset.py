@@ -95,7 +95,13 @@ def _offset(log: Log, nodes: tuple[int, ...], is_far: bool, than: F64 | None) ->
     found = best(cost, ALL if is_far else NEAR, LEAST_GAIN, than)
     if found is not None and not found.is_within and not is_far:
         found = best(cost, ALL, LEAST_GAIN, than)
-    return None if found is None or abs(found.at) <= TOLD else found
+    if found is None or abs(found.at) <= TOLD:
+        return None
+    if found.is_within and abs(found.at) > NEAR[-1]:
+        coarse = found.at
+        finer = best(lambda late: cost(coarse + late), NEAR, 0.0)
+        found = found if finer is None else found._replace(at=coarse + finer.at)
+    return found
 
 
 def _drifts(offset: Explained) -> bool:
