@@ -211,7 +211,7 @@ def training() -> str:
     for leaf in leaves(TrainConfig):
         default = ",".join(map(str, leaf.default)) if leaf.many else leaf.default
         shown = f"`{default}`" if default != "" else "none"
-        rows.append([f"`--{leaf.name.replace('_', '-')}`", shown, leaf.help])
+        rows.append([f"`{leaf.option}`", shown, leaf.help])
     return markdown(("option", "default", "meaning"), rows)
 
 

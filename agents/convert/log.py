@@ -10,6 +10,7 @@ from agents.convert.mapping import Plan
 from tracking.arrays import F64, I64
 from tracking.constellation import Constellation
 from tracking.log import Log
+from tracking.log.inertial import in_body_axes
 from tracking.log.truth import Truth
 from tracking.measurements import Kind, MeasurementBlock
 
@@ -50,7 +51,7 @@ def build_log(plan: Plan, tables: dict[str, F64], restamp: bool) -> Log:
             rows = tables[name]
             nodes = _indices(group, rows[:, 1])
             blocks.append(MeasurementBlock.of_kind(kind, rows[:, 0], nodes, rows[:, 2:]))
-    block = MeasurementBlock.concatenate(blocks)
+    group, block = in_body_axes(group, MeasurementBlock.concatenate(blocks))
     return Log(
         name=plan.meta.name,
         source=plan.meta.source,

@@ -134,7 +134,7 @@ def track_log(
             (`tracking.metrics.bound.recorded_bound`).
         params: What the tracker believes.
         findings: What `tracking.findings.examine` found of the log already, or nothing, for a log
-            that is to be taken as it is; None examines it, and corrects its clocks.
+            that is to be taken as it is; None examines it, and corrects clocks and gyroscopes.
         progress: Called with the share done, 0 to 1.
 
     Raises:

@@ -1,7 +1,7 @@
 """How often inertial samples come, next to how often the configuration says.
 
-Turns are integrated sample by sample, each for one period of the configured rate: with a wrong
-rate every turn is taken for another by that factor, and nothing else tells.
+Orientations are filtered sample by sample at the configured rate: with a wrong one their time
+constants are wrong by that factor and they lag behind turns, and nothing else tells.
 """
 
 from __future__ import annotations

@@ -98,6 +98,18 @@ def folder(tmp_path):
     return tmp_path
 
 
+def test_axes_of_a_sensor_are_turned_to_those_of_the_body(folder):
+    path = folder / "map.toml"
+    as_it_is = convert(folder / "tables", mapping=path)
+    path.write_text(path.read_text().replace("[nodes.1]", '[nodes.1]\nimu_axes = ["-y", "x", "z"]'))
+    log = convert(folder / "tables", folder / "log", mapping=path)
+    for got in (log, read_log(folder / "log")):
+        own = (got.block.kind[0] == Kind.IMU) & (got.block.i[0] == 0)
+        before = as_it_is.block.values[0, own]
+        np.testing.assert_allclose(got.block.values[0, own, 0], -before[:, 1])
+        np.testing.assert_allclose(got.block.values[0, own, 1], before[:, 0])
+
+
 def test_tables_become_a_log(folder):
     log = convert(folder / "tables", folder / "log", mapping=folder / "map.toml")
     back = read_log(folder / "log")

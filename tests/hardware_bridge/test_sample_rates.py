@@ -17,6 +17,7 @@ from hardware_bridge.live.start import Start
 from hardware_bridge.live.swarm import LiveSwarm
 from hardware_bridge.readings import MICROSECONDS_32, ImuReading, Source, StatusReading
 from hardware_bridge.wire.encoder import RelposEncoder
+from tracking.measurements import Kind, MeasurementBlock
 
 S = 1_000_000_000
 
@@ -105,6 +106,26 @@ def test_cars_are_not_armed_by_an_imu_that_reads_at_rest_what_none_does(acc, rea
     with pytest.raises(BridgeError, match=reason):
         Start(None, arm=True)._rates_fit(type("Group", (), {"swarm": swarm}), [0])
     assert len(swarm.intake.notices) == 1
+
+
+def test_samples_are_turned_to_axes_of_the_body():
+    """A board upside down whose mounting is said is none that is wrong."""
+    axes = 'imu_axes = ["x", "-y", "-z"]\nmag_axes = ["-x", "y", "z"]\n'
+    swarm = parse_config(f"[nodes.1]\n{axes}[nodes.2]\n{NODES}", file="swarm.toml", beside=Path())
+    intake = Intake(swarm, 0)
+    noise = np.random.default_rng(2).normal(0.0, 0.01, 250)
+    field = (20.0, 5.0, -40.0)
+    samples = [
+        (k * S // 100 + S, ImuReading(Source(), (0.0, 0.0, 1e-3 * z), (0.0, z, -9.8), field))
+        for k, z in enumerate(noise)
+    ]
+    relpos(intake, 1, samples)
+    assert intake.at_rest.wrong == {}
+    block = MeasurementBlock.empty(1, len(intake.events))
+    intake.events.move_into(block)
+    imu, mag = (block.values[0, block.kind[0] == kind] for kind in (Kind.IMU, Kind.MAG))
+    np.testing.assert_allclose(imu[:, 5], 9.8, rtol=1e-6)
+    np.testing.assert_allclose(mag[:, :3], [[-20.0, 5.0, -40.0]] * len(mag), rtol=1e-6)
 
 
 def test_faults_are_told_when_they_change():

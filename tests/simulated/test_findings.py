@@ -12,7 +12,7 @@ from tests.second_world.world import draw
 from tracking.constellation import NodeConfig
 from tracking.errors import LogError
 from tracking.findings import KINDS, Finding, examine, find_refused, refuse_errors
-from tracking.findings.at_rest import find_in_samples, rest_of
+from tracking.findings.at_rest import correct_at_rest, find_in_samples, rest_of
 from tracking.findings.gyroscope import find_gyroscope
 from tracking.measurements import Kind
 
@@ -96,6 +96,31 @@ def test_a_gyroscope_that_reads_a_rotation_at_rest_is_a_warning(drive):
     imu = drive.block.kind[0] == Kind.IMU
     left = corrected.block.values[0, imu, :3] - drive.block.values[0, imu, :3]
     assert np.abs(left).max() < 0.01
+
+
+def test_a_steady_turn_is_no_bias_that_is_taken_off(drive):
+    """A car on a circle seems to rest all the time."""
+    t = drive.block.t[0][(drive.block.kind[0] == Kind.IMU) & (drive.block.i[0] == 0)]
+    turning = np.random.default_rng(1).normal(0.0, 0.01, (len(t), 3)) + [0.0, 0.0, 0.15]
+
+    def turn(values):
+        return np.c_[turning, np.tile([0.0, 0.2, 9.81], (len(t), 1)), values[:, 6:]]
+
+    circle = of_first(turn)(drive)
+    corrected, found = correct_at_rest(circle)
+    assert "gyro-bias" in {f.name for f in found}
+    np.testing.assert_array_equal(corrected.block.values, circle.block.values)
+
+
+def test_two_clocks_that_are_late_are_both_corrected(drive):
+    corrected, found = examine(stamped(stamped(drive, 0.4, node=0), -0.3, node=2))
+    assert {f.name for f in found} == {"clock-corrected"}
+    assert {n for f in found for n in f.nodes} == {1, 3}
+    now = corrected.block
+    for node in (0, 2):
+        before = drive.block.t[0][(drive.block.kind[0] == Kind.IMU) & (drive.block.i[0] == node)]
+        after = now.t[0][(now.kind[0] == Kind.IMU) & (now.i[0] == node)]
+        assert np.abs(after - before).max() < 0.05
 
 
 def of_first(change, kind=Kind.IMU):

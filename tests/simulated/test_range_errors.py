@@ -5,15 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from agents.evaluation.track import track_log
 from agents.simulation.simulate import simulate
 from relpos_env.core.oracle_params import matched_params
 from relpos_env.scenarios import recordable
 from tracking.calibration.distances import range_table
 from tracking.calibration.range_errors import measure_range_errors
 from tracking.errors import LogError
+from tracking.filters.joint.params import JointParams
+from tracking.filters.joint.supervision.params import SupervisionParams
+from tracking.filters.params import FilterParams
 from tracking.log import Truth
 from tracking.measurements import Kind
 from tracking.metrics.bound import UNKNOWN_TURN, posterior_bound, recorded_bound
+from tracking.tracker import TrackerParams
 
 
 @pytest.fixture(scope="module")
@@ -117,3 +122,14 @@ def test_it_says_why_it_cannot_be_told(drive):
     still = replace(drive.truth, pos_w=np.zeros_like(drive.truth.pos_w))
     with pytest.raises(LogError, match="ranges"):
         measure_range_errors(replace(drive, truth=still))
+
+
+def test_nothing_is_ok_while_a_tenth_of_the_ranges_does_not_fit():
+    """In a hall of steel a quarter of the ranges is too long by more than half a metre."""
+    log = simulate(scenario="warehouse", seconds=60.0, seed=22)
+    strict = track_log(log, findings=()).score
+    lenient = JointParams(supervision=SupervisionParams(group_outlier_ratio=1.0))
+    params = TrackerParams(filter=FilterParams(joint=lenient))
+    trusting = track_log(log, findings=(), params=params).score
+    assert strict.integrity_share < 0.05 < trusting.integrity_share
+    assert strict.ok_share < 0.3 < trusting.ok_share

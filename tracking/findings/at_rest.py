@@ -33,6 +33,11 @@ TILTED, OVERTURNED = np.radians(8.0), np.radians(45.0)
 MOST_BIAS = 0.035
 """[rad/s] A steady rate above this is not learned as a bias (`RestParams.largest_bias`)."""
 
+LARGEST_BIAS = 0.2
+"""[rad/s] A gyroscope whose bias is larger is broken, or its units are others."""
+MOST_AT_REST = 0.9
+"""[-] Share of time. What seems to rest for longer has no motion to be told apart from."""
+
 
 @dataclass(frozen=True, slots=True)
 class AtRest:
@@ -72,6 +77,16 @@ def rest_of(t: F64, values: F64) -> AtRest:
     return AtRest(WINDOW * len(rests), rest[3:], float(np.linalg.norm(rest[3:])), rest[:3])
 
 
+def is_bias(rest: AtRest, seconds: float) -> bool:
+    """Whether a rate at rest is a bias: what turns steadily all the time may just turn.
+
+    Args:
+        rest: Of an IMU.
+        seconds: Length of its samples [s].
+    """
+    return bool(np.abs(rest.rate).max() < LARGEST_BIAS and rest.seconds < MOST_AT_REST * seconds)
+
+
 def correct_at_rest(log: Log) -> tuple[Log, list[Finding]]:
     """Units, axes and biases of every IMU of a recording.
 
@@ -83,9 +98,11 @@ def correct_at_rest(log: Log) -> tuple[Log, list[Finding]]:
         rows = np.flatnonzero((block.kind[0] == Kind.IMU) & (block.i[0] == n) & block.valid[0])
         of_node = find_in_samples(node, block.t[0, rows], block.values[0, rows, :6])
         if any(f.name == "gyro-bias" for f in of_node):
-            values = block.values.copy()
-            values[0, rows, :3] -= rest_of(block.t[0, rows], values[0, rows, :6]).rate
-            block = replace(block, values=values)
+            rest = rest_of(block.t[0, rows], block.values[0, rows, :6])
+            if is_bias(rest, float(np.ptp(block.t[0, rows]))):
+                values = block.values.copy()
+                values[0, rows, :3] -= rest.rate
+                block = replace(block, values=values)
         found += of_node
     return (log if block is log.block else replace(log, block=block)), found
 

@@ -9,11 +9,13 @@ import numpy as np
 from tracking.arrays import F64
 from tracking.findings.finding import Finding, names
 from tracking.findings.trials import (
+    LONGEST,
     Explained,
     Progress,
     beginning,
     best,
     misfit,
+    most_surprise,
     moved_in_time,
     of_nodes,
     through,
@@ -49,7 +51,7 @@ def correct_clocks(
     Args:
         log: A recording.
         suspects: Nodes whose IMU contradicts the ranges (`imu_against_ranges.find_suspects`). A
-            clock explains that only if ranges are likelier with the IMU then than without it.
+            clock explains that only if ranges are likelier then than without all of these IMUs.
         progress: Called with the share done, 0 to 1.
 
     Returns:
@@ -60,11 +62,11 @@ def correct_clocks(
         return log, []
     alone = carriers if len(carriers) <= MOST_NODES else list(suspects)
     groups = [tuple(carriers)] + [(n,) for n in alone if len(carriers) > 1]
-    found, than = list[Finding](), list(suspects.values())[-1] if suspects else None
+    found = list[Finding]()
     while groups:
         tried = list[Explained | None]()
         for nodes in through(groups, len(found), progress):
-            found_here = _offset(log, nodes, bool(suspects), than)
+            found_here = _offset(log, nodes, suspects)
             is_alone = len(nodes) == 1 and nodes[0] not in suspects and len(carriers) > 1
             if found_here is not None and is_alone:
                 is_sure = found_here.gain >= LEAST_ALONE and not _drifts(found_here)
@@ -80,27 +82,33 @@ def correct_clocks(
         # Ranges keep their order, so that labels still belong to them.
         own = of_nodes(log.block, nodes)
         log = replace(log, block=moved_in_time(log.block, -offset.at, own))
-        groups = [] if len(nodes) > 1 else [one for one in groups[1:] if one != nodes]
+        # What all have in common is tried once; the others then one by one.
+        groups = [one for one in groups if len(one) == 1 and one != nodes]
     return log, found
 
 
-def _offset(log: Log, nodes: tuple[int, ...], is_far: bool, than: F64 | None) -> Explained | None:
-    """How late samples of some nodes are stamped [s]; arguments as of `best`."""
-    block = beginning(log)
-    own = of_nodes(block, nodes)
+def _offset(log: Log, nodes: tuple[int, ...], suspects: dict[int, F64]) -> Explained | None:
+    """How late samples of some nodes are stamped [s]; suspects as of `correct_clocks`."""
+    block, is_far = beginning(log), bool(suspects)
+    own, than = of_nodes(block, nodes), list(suspects.values())[-1] if suspects else None
 
     def cost(late: float) -> F64:
         return misfit(log, moved_in_time(block, -late, own)).surprise
 
-    found = best(cost, ALL if is_far else NEAR, LEAST_GAIN, than)
+    most = most_surprise(log)
+    found = best(cost, ALL if is_far else NEAR, LEAST_GAIN, most, than)
     if found is not None and not found.is_within and not is_far:
-        found = best(cost, ALL, LEAST_GAIN, than)
+        found = best(cost, ALL, LEAST_GAIN, most, than)
     if found is None or abs(found.at) <= TOLD:
         return None
     if found.is_within and abs(found.at) > NEAR[-1]:
         coarse = found.at
-        finer = best(lambda late: cost(coarse + late), NEAR, 0.0)
-        found = found if finer is None else found._replace(at=coarse + finer.at)
+        finer = best(lambda late: cost(coarse + late), NEAR, 0.0, most)
+        if finer is not None:
+            found = found._replace(at=coarse + finer.at)
+        if finer is not None and len(nodes) > 1:
+            early, late = finer.halves
+            found = found._replace(halves=(coarse + early, coarse + late))
     return found
 
 
@@ -113,7 +121,7 @@ def _finding(log: Log, nodes: tuple[int, ...], offset: Explained) -> Finding:
     ids = tuple(log.constellation.ids[n] for n in nodes)
     if _drifts(offset):
         early, late = offset.halves
-        seconds = 0.5 * (log.t_range[1] - log.t_range[0])
+        seconds = 0.5 * min(LONGEST, log.t_range[1] - log.t_range[0])
         text = (
             f"{names(ids)}: the motion of IMU samples comes {early:+.2f} s later than that of "
             f"ranges at first, {late:+.2f} s after {seconds:.0f} s, expected clocks of one rate"

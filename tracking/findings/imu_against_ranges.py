@@ -10,10 +10,10 @@ import numpy as np
 from tracking.arrays import F64
 from tracking.findings.finding import Finding
 from tracking.findings.trials import (
-    PLAUSIBLE,
     Progress,
     beginning,
     misfit,
+    most_surprise,
     of_nodes,
     through,
 )
@@ -58,7 +58,7 @@ def find_suspects(log: Log, progress: Progress) -> dict[int, F64]:
             break
         suspects[carriers[k]] = cost = costs[k]
         block = without(block, carriers.pop(k))
-    return suspects if (cost < PLAUSIBLE).all() else {}
+    return suspects if (cost < most_surprise(log)).all() else {}
 
 
 def find_wrong_axes(log: Log, suspects: Sequence[int], progress: Progress) -> list[Finding]:

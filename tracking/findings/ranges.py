@@ -8,7 +8,14 @@ import numpy as np
 
 from tracking.arrays import F64
 from tracking.findings.finding import Finding
-from tracking.findings.trials import PARAMS, Progress, beginning, best, misfit
+from tracking.findings.trials import (
+    Progress,
+    beginning,
+    best,
+    misfit,
+    most_surprise,
+    params_of,
+)
 from tracking.log.folder import Log
 from tracking.measurements import Kind
 
@@ -34,19 +41,22 @@ def find_range_errors(log: Log, progress: Progress) -> list[Finding]:
         metres = (values[0, is_range, 0] - offset) / (1.0 + scale)
         values[0, is_range, 0] = np.maximum(metres, 0.01)
         # The likelihood of ranges as recorded: where they shrink, so does their noise.
-        error = PARAMS.range_error
+        params = params_of(log)
+        error = params.range_error
         error = replace(error, white_std=error.white_std / (1.0 + scale))
-        params = replace(PARAMS, range_error=error)
+        params = replace(params, range_error=error)
         found = misfit(log, replace(block, values=values), params)
         # Where excesses are expected, long ranges are likely; where outliers are none, they fit.
         return np.concatenate([found.surprise + np.log1p(scale), 0.5 * found.nis])
 
     progress(0.0)
-    offset = best(lambda x: cost(x, 0.0), OFFSETS, LEAST_GAIN)
+    offset = best(lambda x: cost(x, 0.0), OFFSETS, LEAST_GAIN, most_surprise(log))
     progress(0.5)
     # Motion tells a factor only badly.
     is_surveyed = (log.block.kind[0] == Kind.SURVEY).any()
-    scale = best(lambda x: cost(0.0, x), SCALES, LEAST_GAIN) if is_surveyed else None
+    scale = None
+    if is_surveyed:
+        scale = best(lambda x: cost(0.0, x), SCALES, LEAST_GAIN, most_surprise(log))
     found = list[Finding]()
     if offset is not None and abs(offset.at) > TOLD_OFFSET:
         way = "shorter" if offset.at > 0.0 else "longer"

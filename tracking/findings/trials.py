@@ -32,8 +32,8 @@ LONGEST = 60.0
 BEFORE = 5.0
 """[s] Inertial samples before its first range, which find the orientation."""
 PLAUSIBLE = -0.8
-"""[-] What explains a recording leaves less surprise: a group that is lost has more, with a range
-in seven an outlier; right sensors leave -2.7 to -1.1."""
+"""[-] What explains a recording leaves less surprise, at the usual noise of ranges: a group that is
+lost has more, with a range in seven an outlier; right sensors leave -2.7 to -1.1."""
 PARAMS = replace(
     JointParams(noise_learning=NoiseLearningParams(learns=False)),
     nlos=replace(JointParams().nlos, nlos_bias_length=2.0),
@@ -74,18 +74,33 @@ def beginning(log: Log) -> MeasurementBlock:
     return log.block.take((t > first - BEFORE) & (t <= min(first + LONGEST, last)))
 
 
-def misfit(log: Log, block: MeasurementBlock, params: JointParams = PARAMS) -> Misfit:
+def params_of(log: Log) -> JointParams:
+    """What the filter assumes of a recording: its white noise of ranges, where that is known."""
+    error = PARAMS.range_error
+    if log.range_noise is None:
+        return PARAMS
+    return replace(PARAMS, range_error=replace(error, white_std=log.range_noise))
+
+
+def most_surprise(log: Log) -> float:
+    """Surprise of a range above which a group is lost: with more noise there is more of it."""
+    white, usual = params_of(log).range_error.white_std, PARAMS.range_error.white_std
+    return PLAUSIBLE + max(float(np.log(white / usual)), 0.0)
+
+
+def misfit(log: Log, block: MeasurementBlock, params: JointParams | None = None) -> Misfit:
     """How badly the ranges of a block fit.
 
     Args:
         log: The recording.
         block: Its beginning, changed or not; halves are those of the recording's time.
-        params: What the filter assumes.
+        params: What the filter assumes; that of `params_of` by default.
     """
     first, last = log.t_range
     middle = first + 0.5 * min(LONGEST, last - first)
     states = Orientation(log.constellation, TrackerParams().orientation, follows_bias=True)
-    events, tracker = states.step(usable(block)), JointEkf(log.constellation, params)
+    events = states.step(usable(block))
+    tracker = JointEkf(log.constellation, params or params_of(log))
     sums = np.zeros((3, 4))
     for half in range(2):
         t = events.t[0]
@@ -97,7 +112,7 @@ def misfit(log: Log, block: MeasurementBlock, params: JointParams = PARAMS) -> M
 
 
 def best(
-    cost: Callable[[float], F64], at: F64, least: float, than: F64 | None = None
+    cost: Callable[[float], F64], at: F64, least: float, most: float, than: F64 | None = None
 ) -> Explained | None:
     """Where a cost is lowest: a parabola through the lowest of some trials and its neighbours.
 
@@ -105,9 +120,8 @@ def best(
         cost: Of a trial, (half) or (2 half); all have to be lower.
         at: Trials, ascending, 0 among them.
         least: By so much they have to be lower than at 0.
-        than: And lower than this.
-
-    The first two, the surprise in each half, have to be plausible.
+        most: And the first two, the surprise in each half, lower than this (`most_surprise`).
+        than: And all lower than this.
 
     Returns:
         What explains the recording; None where 0 is as good.
@@ -116,7 +130,7 @@ def best(
     gains = costs[at == 0.0][0] - costs
     k = int(np.argmax(gains.min(axis=1)))
     is_better = gains[k].min() >= least and (than is None or (costs[k] < than).all())
-    if not is_better or (costs[k, :2] > PLAUSIBLE).any():
+    if not is_better or (costs[k, :2] > most).any():
         return None
     halves = tuple(_vertex(at, half)[0] for half in costs.T[:2])
     where, is_within = _vertex(at, costs.mean(axis=1), k)

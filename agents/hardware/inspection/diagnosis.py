@@ -251,7 +251,9 @@ def _wrong_samples(
         if known is None or known not in nodes or not voice.samples:
             continue
         node = nodes[known]
+        turn = node.imu_axes.turn
         values = np.array(voice.samples)
+        values = np.concatenate([turn(values[:, :3]), turn(values[:, 3:])], axis=1)
         for found in find_in_samples(node, np.arange(len(values)) / node.imu_hz, values):
             if found.severity != "note":
                 problems.append(f"{found.text}: {KINDS[found.name].remedy}")
@@ -264,7 +266,7 @@ def _wrong_rates(report: LinkReport, nodes: Mapping[int, NodeConfig], seconds: f
         return []  # too short to say, or there were none for a while
     return [
         f"node {node.node}: {node.imu_hz:.0f} inertial samples a second, configured "
-        f"{nodes[int(node.node)].imu_hz:g}: set imu_hz, or every turn is taken for another"
+        f"{nodes[int(node.node)].imu_hz:g}: set imu_hz, or orientations lag behind"
         for node in report.nodes
         if node.known and node.imu_hz > 0.0 and is_off(node.imu_hz, nodes[int(node.node)].imu_hz)
     ]

@@ -14,6 +14,8 @@ def make_coefficients(constellation: Constellation, params: JointParams) -> Reco
     """Derive the constants of the kernels, (1); ``_var`` and ``2``: squared."""
     e, s = params.range_error, params.start
     v = params.nlos_in_space if constellation.dimensions == 3 else params.nlos
+    gap_share = s.rotation_width_2d / s.rotations_2d
+    rotation_std = s.rotation_std_3d if constellation.dimensions == 3 else gap_share
     has_states = has_range_errors(constellation, params)
     moving = [n for n in constellation.nodes if n.kind != "static"] or constellation.nodes
     white_var = e.white_std**2
@@ -30,8 +32,7 @@ def make_coefficients(constellation: Constellation, params: JointParams) -> Reco
         "height_var": s.height_std**2,
         "start_k": s.k,
         "start_max_age": s.max_age,
-        "rotation_var": (s.rotation_std_3d if constellation.dimensions == 3 else s.rotation_std_2d)
-        ** 2,
+        "rotation_var": rotation_std**2,
         "position_var": s.position_std**2,
         "start_speed_var": s.speed_std**2,
         "unaided_psd2": params.unaided_accel_psd**2,

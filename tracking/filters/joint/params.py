@@ -119,8 +119,8 @@ class JointStartParams:
     unknown: one may be absurd."""
     rotations_2d: int = 16
     """[-] Rotations tried in the plane, each with its mirror image."""
-    rotation_std_2d: float = 0.15
-    """[rad] Uncertainty of each of them: two fifths of the gap between two."""
+    rotation_width_2d: float = 2.4
+    """[rad] Uncertainty of each of them, times their number: two fifths of the gap between two."""
     rotation_std_3d: float = 0.4
     """[rad] The same of a first rotation in space."""
     spare_hypotheses: int = 8
@@ -183,9 +183,9 @@ class UpdateParams:
     prediction, which costs nothing."""
     contradiction_share: float = 0.7
     """[-] A pair whose mean NIS is above this share of `JointParams.pair_nis_limit` counts
-    less, by this power of what it is above it."""
+    less (`contradiction_power`)."""
     contradiction_power: float = 4.0
-    """[-]"""
+    """[-] Power of the ratio of the two by which such a pair counts less."""
     least_sane: float = 0.5
     """[-] A range that means anything with less probability is refused."""
     least_trust: float = 1e-3

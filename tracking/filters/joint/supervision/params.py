@@ -25,7 +25,8 @@ class SupervisionParams:
     outlier_nis: float = 6.0
     """[-] A range with a larger NIS does not fit, one in seventy."""
     group_outlier_ratio: float = 0.1
-    """[-] Nothing of a group is ok while more of its ranges do not fit."""
+    """[-] Nothing of a group is ok while more of its ranges do not fit, in the mean over its
+    pairs."""
     residual_clip: float = 1.0
     """[m] A single range moves these means by no more."""
     fastest: float = 10.0
