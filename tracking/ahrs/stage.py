@@ -31,14 +31,14 @@ MAG, IMU, STATE = 1, 2, 3
 
 STARTED, T, GRAVITY, COS_YAW, SIN_YAW = 0, 1, 2, 3, 4
 LAST_GYR, LAST_ACC, FIELD, HAS_FIELD, SEEN_FIELD, TURNED = 5, 8, 11, 14, 15, 16
-MOVED, INTEGRATED = 18, 19
+MOVED, BEHIND = 18, 19
 N_NODE = 20
 """Columns of what a node remembers in addition to its VQF: 1 after the first sample; its time
 [s]; length of gravity [m/s2]; cosine and sine of half the turn that gives the initial heading;
 the last sample, gyroscope [rad/s] and specific force [m/s2]; a field that no sample followed yet,
 and 1 if there is one; 1 after a field was used; by how much it was turned upright, about x and y
-of the world [rad]; 1 where it moved while its orientation settled; the time that its gyroscope was
-integrated up to [s]."""
+of the world [rad]; 1 where it moved while its orientation settled; by how much the time that its
+gyroscope was integrated over is behind the last stamp [s]."""
 
 
 @kernel
@@ -150,18 +150,19 @@ def find_gap(c, s, e, n, t):
     long silence VQF starts again instead.
     """
     m, dt, n_lost = s.node, c.dt[n], 0
-    gap, behind = t - m[e, n, T], t - m[e, n, INTEGRATED]
+    gap = t - m[e, n, T]
+    behind = gap + m[e, n, BEHIND]
     if m[e, n, STARTED] == 0.0 or gap > c.max_gap[n]:
         if m[e, n, STARTED] != 0.0 and c.magnetic[n]:
             # Where it points now is not known; what its gyroscope reads at rest is still true.
             start_vqf(s, c, e, n, worst_variance(s.bias, c, e, n))
             m[e, n, SEEN_FIELD] = m[e, n, MOVED] = 0.0
-        m[e, n, INTEGRATED] = t
+        m[e, n, BEHIND] = 0.0
         return 0, dt
     if min(gap, behind) * c.rate[n] > c.lost_after[n]:
         n_lost = round(behind * c.rate[n]) - 1
     dt += c.stamp_gain[n] * (behind / (n_lost + 1) - dt)
-    m[e, n, INTEGRATED] += (n_lost + 1) * dt
+    m[e, n, BEHIND] = behind - (n_lost + 1) * dt
     return n_lost, dt
 
 
