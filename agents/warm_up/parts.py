@@ -186,7 +186,7 @@ def _compile_tasks() -> None:
 def _swarm() -> Any:
     from hardware_bridge.config.read import parse_config
 
-    return parse_config(SWARM, file="swarm.toml", beside=Path(), with_files=False)
+    return parse_config(SWARM, file="swarm.toml", folder=Path(), with_files=False)
 
 
 def _compile_hardware() -> None:

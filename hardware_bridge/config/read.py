@@ -60,17 +60,17 @@ def read_config(path: Path | str) -> SwarmConfig:
         raise BridgeError(f"{path}: cannot be read ({error.strerror})") from error
     except UnicodeDecodeError as error:
         raise BridgeError(f"{path.name}: expected TOML, found bytes that are no text") from error
-    config = parse_config(text, file=path.name, beside=path.parent)
+    config = parse_config(text, file=path.name, folder=path.parent)
     return replace(config, marks=path.with_suffix(".marks.json")) if any(config.keys) else config
 
 
-def parse_config(text: str, *, file: str, beside: Path, with_files: bool = True) -> SwarmConfig:
+def parse_config(text: str, *, file: str, folder: Path, with_files: bool = True) -> SwarmConfig:
     """The configuration that a text is.
 
     Args:
         text: Of a swarm.toml.
         file: Its name, for messages.
-        beside: The folder that relative paths in it start from.
+        folder: The folder that relative paths in it start from.
         with_files: Whether the files that it names must be there, and modules of others may be
             imported that it names; not so of what a recording holds.
 
@@ -90,12 +90,12 @@ def parse_config(text: str, *, file: str, beside: Path, with_files: bool = True)
         _Head, {k: raw[k] for k in ("name", "dimensions", "heading") if k in raw}, where
     )
     constellation = read_constellation(raw, head.dimensions, head.heading, where)
-    calibration, uncalibrated_ranges = _calibration(raw, where, beside, with_files)
+    calibration, uncalibrated_ranges = _calibration(raw, where, folder, with_files)
     config = SwarmConfig(
         name=head.name or Path(file).stem,
         constellation=constellation,
-        links=tuple(read_links(raw, constellation, where, beside)),
-        cars=tuple(read_cars(raw, constellation, where, beside)),
+        links=tuple(read_links(raw, constellation, where, folder)),
+        cars=tuple(read_cars(raw, constellation, where, folder)),
         calibration=calibration,
         uncalibrated_ranges=uncalibrated_ranges,
         task=_task(raw, constellation, where, with_files),
@@ -108,14 +108,14 @@ def parse_config(text: str, *, file: str, beside: Path, with_files: bool = True)
 
 
 def _calibration(
-    raw: Mapping[str, Any], where: Where, beside: Path, with_files: bool
+    raw: Mapping[str, Any], where: Where, folder: Path, with_files: bool
 ) -> tuple[tuple[Path, ...] | None, bool]:
     """The files, and whether ranges are good without."""
     if "calibration" not in raw:
         return None, False
     at = where.key("calibration")
     table = TableReader().read(_Calibration, raw["calibration"], at)
-    files = tuple(beside / name for name in table.files)
+    files = tuple(folder / name for name in table.files)
     for path in files:
         if with_files and not path.is_file():
             raise at.key("files").error(f"no file {path}: make one with `relpos calibrate`")

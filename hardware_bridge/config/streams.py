@@ -44,7 +44,7 @@ class _Car:
 
 
 def read_links(
-    raw: Mapping[str, Any], group: Constellation, where: Where, beside: Path
+    raw: Mapping[str, Any], group: Constellation, where: Where, folder: Path
 ) -> Iterator[LinkConfig]:
     """Read the streams that measure; relative paths start from a folder."""
     from hardware_bridge.decoders import DECODERS
@@ -52,7 +52,7 @@ def read_links(
     for key, table in tables_of(raw, "links", where):
         at = where.key("links").key(key)
         rest, ids = without(table, "ids", at)
-        link = TableReader().read(_Link, rest, at, beside=("ids",))
+        link = TableReader().read(_Link, rest, at, others=("ids",))
         if link.format not in DECODERS:
             known = ", ".join(DECODERS)
             raise at.key("format").error(f"expected one of {known}, got {link.format!r}")
@@ -77,7 +77,7 @@ def read_links(
             name=key,
             port=PortSpec(
                 name=f"links.{key}",
-                port=_placed(link.port, beside, at),
+                port=_placed(link.port, folder, at),
                 baud=_baud(link.baud, entry.baud, at),
                 request=entry.request,
                 dtr=entry.dtr,
@@ -117,7 +117,7 @@ def _check_scanner(
 
 
 def read_cars(
-    raw: Mapping[str, Any], group: Constellation, where: Where, beside: Path
+    raw: Mapping[str, Any], group: Constellation, where: Where, folder: Path
 ) -> list[CarConfig]:
     """Read the cars, in the order of their nodes; relative paths start from a folder."""
     from hardware_bridge.drivers import driver_entry, driver_options
@@ -126,7 +126,7 @@ def read_cars(
     for key, table in tables_of(raw, "cars", where):
         at = where.key("cars").key(key)
         rest, options = without(table, "options", at)
-        car, node = TableReader().read(_Car, rest, at, beside=("options",)), node_id(key, at)
+        car, node = TableReader().read(_Car, rest, at, others=("options",)), node_id(key, at)
         check_node(node, group, at)
         if group.is_static[group.index_of[node]]:
             raise at.error(f"node {node} is static, expected one that moves")
@@ -144,7 +144,7 @@ def read_cars(
         if not 0 <= car.cells <= MOST_CELLS:
             raise at.key("cells").error(f"expected 0 to {MOST_CELLS}, got {car.cells}")
         baud = _baud(car.baud, entry.baud, at)
-        port = _placed(car.port, beside, at)
+        port = _placed(car.port, folder, at)
         spec = PortSpec(name=f"cars.{node}", port=port, baud=baud)
         cars.append(
             CarConfig(
@@ -166,7 +166,7 @@ def _baud(given: int | None, usual: int, where: Where) -> int:
     return usual if given is None else given
 
 
-def _placed(port: str, beside: Path, where: Where) -> str:
+def _placed(port: str, folder: Path, where: Where) -> str:
     """A port; the path of a file starts from the folder of the configuration."""
     if not port or "\0" in port:
         raise where.key("port").error(f"expected the name of a port, got {port!r}")
@@ -175,7 +175,7 @@ def _placed(port: str, beside: Path, where: Where) -> str:
     name = port.removeprefix("file:")
     if not name:
         raise where.key("port").error("expected file:path")
-    return f"file:{beside / name}"
+    return f"file:{folder / name}"
 
 
 def _key(text: str | None, where: Where) -> bytes | None:

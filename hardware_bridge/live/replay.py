@@ -52,7 +52,7 @@ class ReplayFeed:
         """
         self.recording, self._pace = recording, pace
         file = recording.path.name
-        config = parse_config(recording.header.config, file=file, beside=Path(), with_files=False)
+        config = parse_config(recording.header.config, file=file, folder=Path(), with_files=False)
         if filter is not None:
             filter_builder(filter)
             config = replace(config, tracker=replace(config.tracker, filter=filter))

@@ -73,16 +73,16 @@ class Layout:
         panel = size[0] >= _NO_PANEL[0] and size[1] >= _NO_PANEL[1]
         right = (size[0] - round(_PANEL_RIGHT * unit) - 2 * m, size[1] - m)
         below = (size[0], size[1] - round(_PANEL_BELOW * unit) - 2 * m)
-        beside = _scale(right, room, unit) >= _scale(below, room, unit)
-        width, height = (right if beside else below) if panel else size
+        is_wide = _scale(right, room, unit) >= _scale(below, room, unit)
+        width, height = (right if is_wide else below) if panel else size
         floor = Rect(0, 0, max(width, 8), max(height, 8))
         scale = _scale((width, height), room, unit)
         free = floor.height - _FOOT * unit
-        if beside:
+        if is_wide:
             card = Rect(floor.right + m, m, size[0] - floor.right - 2 * m, size[1] - 2 * m)
         else:
             card = Rect(m, floor.bottom + m, size[0] - 2 * m, size[1] - floor.bottom - 2 * m)
-        head, legend, plot = _columns(card, unit) if not beside else _rows(card, unit)
+        head, legend, plot = _columns(card, unit) if not is_wide else _rows(card, unit)
         return cls(
             size=size,
             room=room,

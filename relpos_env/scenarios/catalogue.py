@@ -69,7 +69,7 @@ def shipped(name: str) -> Scenario:
 
 
 def scenario_from(
-    table: Mapping[str, Any], *, file: str, name: str, beside: Path | None = None, depth: int = 0
+    table: Mapping[str, Any], *, file: str, name: str, folder: Path | None = None, depth: int = 0
 ) -> Scenario:
     """A scenario from the content of a file.
 
@@ -77,7 +77,7 @@ def scenario_from(
         table: What TOML gave.
         file: For messages.
         name: Of the scenario, unless the file says one.
-        beside: The folder in which `extends = "other.toml"` is looked for; None is here.
+        folder: The folder in which `extends = "other.toml"` is looked for; None is here.
         depth: How many files extend this one.
 
     Raises:
@@ -90,7 +90,7 @@ def scenario_from(
         if not is_path(wanted):
             base = look_up(SHIPPED, wanted, "extends")
         elif depth < DEEPEST:
-            base = _load(_within(beside, wanted, ""), depth + 1)
+            base = _load(_within(folder, wanted, ""), depth + 1)
         else:
             raise EnvError(f"expected files that extend each other at most {DEEPEST} deep")
         inherited.append(base.gap)
@@ -105,7 +105,7 @@ def scenario_from(
         if furnish is not None:
             read = replace(read, furnish=look_up({}, furnish, "furnish", group="relpos_env.worlds"))
         if plan is not None:
-            walls = read_floor_plan(_within(beside, str(plan), "floor_plan: "))
+            walls = read_floor_plan(_within(folder, str(plan), "floor_plan: "))
             read = replace(read, obstacles=read.obstacles + walls)
     except EnvError as error:
         raise where.error(str(error)) from error
@@ -151,7 +151,7 @@ def _load(path: Path, depth: int) -> Scenario:
         raise EnvError(f"scenario: cannot read {str(path)!r}: {reason}") from error
     except (ValueError, RecursionError) as error:  # of TOML, of UTF-8, and of endless brackets
         raise EnvError(f"{path.name}: expected TOML: {error}") from error
-    return scenario_from(table, file=path.name, name=path.stem, beside=path.parent, depth=depth)
+    return scenario_from(table, file=path.name, name=path.stem, folder=path.parent, depth=depth)
 
 
 SHIPPED = Catalogue()

@@ -18,6 +18,7 @@ from agents.convert import PRESETS, convert
 from agents.convert.arrays import Arrays
 from agents.convert.sources import pattern
 from agents.errors import UsageError
+from tracking.findings import examine
 from tracking.log import read_log
 from tracking.measurements import Kind
 
@@ -381,6 +382,15 @@ def test_robots_without_imu_are_followed_but_for_rotation_and_mirror(data):
     assert found.score.rmse_mirror is not None
     assert found.score.rmse_mirror < 0.6
     assert "no-imu" in {f.name for f in found.findings}
+
+
+@pytest.mark.xfail(
+    strict=True, reason="in some seconds of them it gains 0.002 of log-likelihood a range: chance"
+)
+def test_their_ranges_are_found_to_be_long_in_an_excerpt(data):
+    """By 0.36 m; in the whole recording they are (tests/real_data)."""
+    log = convert(data / "raw" / "tiers_ros2", preset="tiers")
+    assert "range-offset" in {f.name for f in examine(log)[1]}
 
 
 def residuals(log):

@@ -131,7 +131,7 @@ class TestNode:
         swarm = parse_config(
             "[nodes.1]\n[nodes.2]\n[nodes.3]\n[links.a]\nport = '/dev/x'\nformat = 'relpos'\n",
             file="swarm.toml",
-            beside=ROOT,
+            folder=ROOT,
         )
         intake = Intake(swarm, 0)
         data = run(built / "node", 3000).stdout
@@ -237,7 +237,7 @@ class TestExample:
         for line in re.findall(r"^# ((?:\[|\w+ = ).*)$", text, flags=re.MULTILINE):
             text = text.replace(f"# {line}\n", f"{line}\n")
         text = text.replace('"2" = 3 }', '"2" = 3, "3" = 4 }')
-        swarm = parse_config(text, file=EXAMPLE.name, beside=ROOT, with_files=False)
+        swarm = parse_config(text, file=EXAMPLE.name, folder=ROOT, with_files=False)
         assert swarm.safety.fence.node == 4
         assert len(swarm.links) == 4
         assert len(swarm.calibration) == 2

@@ -47,7 +47,7 @@ def swarm_text(**options):
 
 
 def config_of(text):
-    return parse_config(text, file="swarm.toml", beside=Path())
+    return parse_config(text, file="swarm.toml", folder=Path())
 
 
 def test_a_recording_holds_no_keys_and_is_still_a_configuration():
@@ -84,7 +84,7 @@ def test_a_recording_imports_nothing(tmp_path, monkeypatch, table, name):
     text = swarm_text().split("[task]")[0]
     text += f'\n[{table}]\n{name} = "foreign:Thing"\n'
     with pytest.raises(BridgeError, match=f"{name}: expected one of"):
-        parse_config(text, file="a", beside=Path(), with_files=False)
+        parse_config(text, file="a", folder=Path(), with_files=False)
 
 
 def test_a_key_may_stand_in_a_file(tmp_path):

@@ -43,7 +43,7 @@ port = "/dev/car{node}"
 driver = "relpos"
 {key}
 """
-    swarm = LiveSwarm(parse_config(text, file="swarm.toml", beside=Path()), 0)
+    swarm = LiveSwarm(parse_config(text, file="swarm.toml", folder=Path()), 0)
     swarm.key = request.param
     return swarm
 

@@ -75,7 +75,7 @@ def test_a_number_of_beams_is_checked():
     text = VirtualBridge(RING).config.text
     with pytest.raises(BridgeError, match=r"task.proximity: expected 0 to 32, got 99"):
         parse_config(
-            text.replace("proximity = 8", "proximity = 99"), file="swarm.toml", beside=None
+            text.replace("proximity = 8", "proximity = 99"), file="swarm.toml", folder=None
         )
     with pytest.raises(EnvError, match="proximity: expected a whole number from 0 to 32"):
         EmulateOptions(proximity=40)

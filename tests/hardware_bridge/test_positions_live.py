@@ -41,7 +41,7 @@ format = "positions"
 
 
 def parsed(text):
-    return parse_config(text, file="swarm.toml", beside=Path("/there"))
+    return parse_config(text, file="swarm.toml", folder=Path("/there"))
 
 
 def line(**said):

@@ -23,7 +23,7 @@ S = 1_000_000_000
 
 
 def parsed(links):
-    return parse_config(f"[nodes.1]\n[nodes.2]\n{links}", file="swarm.toml", beside=Path())
+    return parse_config(f"[nodes.1]\n[nodes.2]\n{links}", file="swarm.toml", folder=Path())
 
 
 def relpos(intake, node, readings):
@@ -111,7 +111,7 @@ def test_cars_are_not_armed_by_an_imu_that_reads_at_rest_what_none_does(acc, rea
 def test_samples_are_turned_to_axes_of_the_body():
     """A board upside down whose mounting is said is none that is wrong."""
     axes = 'imu_axes = ["x", "-y", "-z"]\nmag_axes = ["-x", "y", "z"]\n'
-    swarm = parse_config(f"[nodes.1]\n{axes}[nodes.2]\n{NODES}", file="swarm.toml", beside=Path())
+    swarm = parse_config(f"[nodes.1]\n{axes}[nodes.2]\n{NODES}", file="swarm.toml", folder=Path())
     intake = Intake(swarm, 0)
     noise = np.random.default_rng(2).normal(0.0, 0.01, 250)
     field = (20.0, 5.0, -40.0)

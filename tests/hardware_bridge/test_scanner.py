@@ -44,7 +44,7 @@ MOUNT = ScannerMount(x=0.1, y=-0.03, yaw=0.4)
 
 
 def parsed(text):
-    return parse_config(text, file="swarm.toml", beside=Path())
+    return parse_config(text, file="swarm.toml", folder=Path())
 
 
 def in_a_corridor(mount, bearing):

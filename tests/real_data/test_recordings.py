@@ -76,17 +76,23 @@ def test_ranges_of_radios_that_were_not_calibrated_are_found_to_be_long(data):
     assert 0.2 < float(found.text.split(" when ")[1].split(" m shorter")[0]) < 0.4
 
 
-LATE = pytest.mark.xfail(strict=True, reason="its heading drifts by 7 degrees, to 0.175 m")
+LATE = pytest.mark.xfail(strict=True, reason="it takes 12 s to find the heading: 0.18 m")
+DRIFTS = pytest.mark.xfail(
+    strict=True, reason="its heading drifts by 7 degrees in three minutes: 0.177 and 0.153 m"
+)
 
 
-@pytest.mark.parametrize("limit", [pytest.param(0.15, marks=LATE), 0.18])
+@pytest.mark.parametrize(
+    "limit", [pytest.param(0.15, marks=LATE), pytest.param(0.165, marks=DRIFTS), 0.18]
+)
 def test_it_does_so_from_ten_seconds_on(results, limit):
     assert results["inrol_env1", "joint"].score.rmse_yaw <= limit
 
 
-def test_once_it_is_found_how_the_group_is_turned_it_is_so_for_good(data):
+@pytest.mark.parametrize("limit", [pytest.param(0.15, marks=DRIFTS), 0.16])
+def test_once_it_is_found_how_the_group_is_turned_it_is_so_for_good(data, limit):
     found = track_log(data / "logs" / "inrol_env1", skip=20.0).score
-    assert found.rmse_yaw <= 0.16
+    assert found.rmse_yaw <= limit
 
 
 @pytest.fixture(scope="module")

@@ -68,7 +68,7 @@ class TableReader:
         where: Where,
         base: T | None = None,
         *,
-        beside: Sequence[str] = (),
+        others: Sequence[str] = (),
     ) -> T:
         """Make an instance of a dataclass from a table.
 
@@ -77,7 +77,7 @@ class TableReader:
             table: Of a TOML file.
             where: The table is, for messages.
             base: What the table does not say; None are the defaults of the class.
-            beside: Keys that another reader takes.
+            others: Keys that another reader takes.
 
         Raises:
             ConfigError: Names the file and the key; or what `where` says.
@@ -86,7 +86,7 @@ class TableReader:
             raise where.error(f"expected a table, got {_described(table)}")
         hints = readable(kind)  # type: ignore[arg-type]
         preset = self.presets.get(kind)
-        expected = [*([preset.key] if preset else []), *hints, *beside]
+        expected = [*([preset.key] if preset else []), *hints, *others]
         for name in table:
             if name not in expected:
                 shown = where.key(name if name.isprintable() and name else repr(name))

@@ -191,7 +191,7 @@ class VirtualBridge(OpenBridge):
         """
         self.rig = EmulatedRig(options, ports=ports, record=record)
         text = self.rig.swarm_toml(NOWHERE)
-        self.config: SwarmConfig = parse_config(text, file="swarm.toml", beside=NOWHERE)
+        self.config: SwarmConfig = parse_config(text, file="swarm.toml", folder=NOWHERE)
         self.swarm = LiveSwarm(self.config, START_NS, load_calibration(self.config))
         self.feed = VirtualFeed(self.rig, self.swarm, arm=arm, lag=lag)
         self.start = Start(self.feed, arm=arm, params=StartParams(wait=wait))

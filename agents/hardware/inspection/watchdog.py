@@ -104,7 +104,7 @@ def with_watchdogs(path: Path, found: Iterable[Watchdog]) -> None:
         for each in found:
             if each.seconds is not None and not each.problem:
                 text = _set(text, each.car, each.seconds)
-        parse_config(text, file=path.name, beside=path.parent)
+        parse_config(text, file=path.name, folder=path.parent)
         write_safely(path, text, mode=path.stat().st_mode & 0o777)
     except OSError as error:
         raise BridgeError(f"{path}: cannot be written ({error.strerror or error})") from error
