@@ -57,7 +57,9 @@ def spoiled(block: Any, fault: str, seed: int) -> Any:
 
     ``offset``: its ranges are 0.6 m too long, as by a wrong calibration. ``outliers``: half of them
     mean nothing, ``made up``: all of them. ``silent``: nothing of it for 3 s. ``frozen``: a pair of
-    it repeats a range, 10 s.
+    it repeats a range, 10 s. ``stuck IMU``: it repeats one reading, 5 s. ``IMU spikes``: one of 100
+    readings is random, +-30 rad/s and +-500 m/s2. ``cut off``: its accelerometer reads 3 m/s2 at
+    most along x and y.
     """
     rng, node = np.random.default_rng(seed), 0
     block = replace(block, values=block.values.copy())  # the run without the fault is kept
@@ -76,7 +78,23 @@ def spoiled(block: Any, fault: str, seed: int) -> Any:
         other = block.j[0] + block.i[0] - node
         hit = hit[(other[hit] == other[hit[0]]) & (t[hit] < FAULT_AT + 10.0)]
         block.values[0, hit, 0] = block.values[0, hit[0], 0]
+    else:
+        spoil_imu(block, fault, np.flatnonzero((block.kind[0] == Kind.IMU) & of_node & late), rng)
     return block
+
+
+def spoil_imu(block: Any, fault: str, hit: Any, rng: np.random.Generator) -> None:
+    """Spoil these IMU samples of a block in place."""
+    if fault == "stuck IMU":
+        block.values[0, hit[block.t[0, hit] < FAULT_AT + 5.0], :6] = block.values[0, hit[0], :6]
+    elif fault == "IMU spikes":
+        hit = hit[rng.random(len(hit)) < 0.01]
+        span = np.repeat([30.0, 500.0], 3)
+        block.values[0, hit, :6] = span * rng.uniform(-1.0, 1.0, (len(hit), 6))
+    elif fault == "cut off":
+        block.values[0, hit, 3:5] = np.clip(block.values[0, hit, 3:5], -3.0, 3.0)
+    else:
+        raise ValueError(f"fault: unknown {fault!r}")
 
 
 @cache

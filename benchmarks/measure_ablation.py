@@ -58,6 +58,13 @@ def nlos(**values: Any) -> Callable[[TrackerParams], TrackerParams]:
     )
 
 
+def sanity(**values: Any) -> Callable[[TrackerParams], TrackerParams]:
+    """Parameters with some of the checks of IMU samples changed."""
+    return lambda p: replace(
+        p, orientation=replace(p.orientation, sanity=replace(p.orientation.sanity, **values))
+    )
+
+
 MECHANISMS: dict[str, Callable[[TrackerParams], TrackerParams]] = {
     "states of range errors": part("range_error", max_pairs=ALWAYS),
     "fast range error": part("range_error", fast_std=0.0),
@@ -71,6 +78,7 @@ MECHANISMS: dict[str, Callable[[TrackerParams], TrackerParams]] = {
     "states of mounts": vehicles(ahead_std=0.0, slip_std=0.0),
     "level vehicles": vehicles(levelled=False),
     "impacts": vehicles(impact_threshold=None),
+    "mean velocity": vehicles(speed_std=NEVER),
     "zero velocity": vehicles(rests=False),
     "motion that looks like rest": part("update", glide_nis=NEVER),
     "bias of accelerations": vehicles(bias_std=ALWAYS, vertical_bias_std=ALWAYS),
@@ -97,6 +105,9 @@ MECHANISMS: dict[str, Callable[[TrackerParams], TrackerParams]] = {
     "fault: alignment": part("start", respawn_nis=NEVER),
     "group outliers": part("supervision", group_outlier_ratio=2.0),
     "frozen ranges": part("supervision", frozen_ranges=NEVER),
+    "IMU: stuck": sanity(stuck_after=NEVER),
+    "IMU: spikes": sanity(gyr_jump=NEVER, acc_jump=NEVER),
+    "IMU: saturation": sanity(chance=1e-300, held_long=NEVER),
     "stale nodes": joint(lambda p: replace(p, range_timeout=NEVER)),
 }
 """Name to parameters without it."""
@@ -134,6 +145,7 @@ def rows(n_runs: int, names: list[str]) -> Iterator[dict[str, Any]]:
     kinds += ["convoy car", "convoy robot", "exact robot", "exact hand", "exact drone"]
     kinds += [f"world {kind}" for kind in WORLDS]
     faults = ("offset", "outliers", "made up", "silent", "frozen")
+    faults += ("stuck IMU", "IMU spikes", "cut off")
     kinds += [f"{kind}, {fault}" for kind in ("cars-nlos", "drones") for fault in faults]
     jobs = [(kind, FIRST + k, names) for kind in kinds for k in range(n_runs)]
     jobs += [(kind, 0, names) for kind in RECORDINGS if (data() / "logs" / kind).is_dir()]

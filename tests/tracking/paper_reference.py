@@ -31,6 +31,9 @@ from tracking.geometry import (
 )
 from tracking.measurements import Kind, MeasurementBlock
 
+ORIENTATION_STD = 0.02
+"""[-] Noise n_q of a quaternion component; positions and velocities do not depend on it."""
+
 
 class PaperReference:
     """The filters of one group."""
@@ -203,7 +206,7 @@ class PaperReference:
                 u[3 * side : 3 * side + 3] = self.u[node][:3]
             u[6 + 4 * side : 10 + 4 * side] = self.u[node][3:]
             sigma[3 * side : 3 * side + 3] = self.c.accel_std * moves
-            sigma[6 + 4 * side : 10 + 4 * side] = self.c.orientation_std * moves
+            sigma[6 + 4 * side : 10 + 4 * side] = ORIENTATION_STD * moves
         return u, sigma
 
     def remove(self, node: int) -> None:

@@ -131,12 +131,23 @@ def first_shape(c, s, layout, members, m):
         for b in range(m):
             if a != b:
                 D2[a, b] = start_distance(c, s, layout, members[a], members[b])[0] ** 2
-    J = np.eye(m) - 1.0 / m
+    return classical_mds(D2, c.d, 0.5)
+
+
+@allocating_kernel
+def classical_mds(D2, d, power):
+    """Positions about their centre, (node, 3), from squared distances D2, (node, node).
+
+    ``K = -J D2 J / 2``, its eigenvectors times powers of its eigenvalues: 0.5 reproduces the
+    distances (`tracking.maths.mds`).
+    """
+    n = D2.shape[0]
+    J = np.eye(n) - 1.0 / n
     eigenvalues, E = np.linalg.eigh(-0.5 * J @ D2 @ J)
-    X = np.zeros((m, 3))
-    for k in range(min(c.d, m)):
-        along = E[:, m - 1 - k]
+    X = np.zeros((n, 3))
+    for k in range(min(d, n)):
+        along = E[:, n - 1 - k]
         # LAPACK's signs differ with machine and numbering; here the longer tail is ahead.
         sign = -1.0 if np.sum(along**3) < 0.0 else 1.0
-        X[:, k] = sign * along * np.sqrt(max(eigenvalues[m - 1 - k], 0.0))
+        X[:, k] = sign * along * max(eigenvalues[n - 1 - k], 0.0) ** power
     return X

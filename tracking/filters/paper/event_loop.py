@@ -6,13 +6,7 @@ import numpy as np
 
 from tracking.filters.clear_estimate import clear_estimate
 from tracking.filters.paper.group_feedback import initialise, refine, remove_node
-from tracking.filters.paper.pair_filter import (
-    ORIENTATION,
-    correct,
-    passes_gate,
-    predict,
-    relative_orientation,
-)
+from tracking.filters.paper.pair_filter import correct, passes_gate, predict
 from tracking.filters.paper.state import PaperState
 from tracking.kernels.jit import allocating_kernel, kernel
 
@@ -37,14 +31,14 @@ def run_events(constants, layout, state, block, t_out, out):
     """
     t, kind, node_i, node_j, _, _, values, _, valid = block
     c = constants[0]
-    H, PH = np.zeros((2, 6)), np.zeros((6, 2))
-    x, P = np.zeros(10), np.zeros((10, 10))
+    work = np.zeros((4, 6))
+    x, P = np.zeros(state.x.shape[1:]), np.zeros(state.P.shape[1:])
     for e in range(t.shape[0]):
         s = PaperState(
             state.nodes[e],
-            state.control[e],
+            state.accel[e],
+            state.q[e],
             state.pairs[e],
-            state.q_sum[e],
             state.group[e],
             state.x[e],
             state.P[e],
@@ -61,7 +55,7 @@ def run_events(constants, layout, state, block, t_out, out):
                 process_attitude(c, s, layout, i, t[e, k], values[e, k])
             elif kind[e, k] in (RANGE, SURVEY):
                 is_survey = kind[e, k] == SURVEY
-                update_range(c, s, layout, i, j, t[e, k], values[e, k, 0], is_survey, H, PH)
+                update_range(c, s, layout, i, j, t[e, k], values[e, k, 0], is_survey, work)
             elif kind[e, k] == LEAVE:
                 remove_node(s, layout, i)
         while o < t_out.shape[1]:
@@ -76,17 +70,17 @@ def process_attitude(c, s, layout, i, t, values):
         for j in range(s.nodes.shape[0]):
             if j != i and s.nodes[j].present:
                 p = layout.pair_index[i, j]
-                predict(c, s, p, t, s.x[p], s.P[p])
+                predict(c, s, p, t, s.x, s.P)
                 s.pairs[p].t = t
     for a in range(3):
-        s.control[i, a] = values[4 + a] if a < c.d else 0.0
+        s.accel[i, a] = values[4 + a] if a < c.d else 0.0
     for a in range(4):
-        s.control[i, 3 + a] = values[a]
+        s.q[i, a] = values[a]
     s.nodes[i].t_imu = t
 
 
 @allocating_kernel
-def update_range(c, s, layout, i, j, t, distance, is_survey, H, PH):
+def update_range(c, s, layout, i, j, t, distance, is_survey, work):
     """Correct the filter of nodes i < j, or collect their first k measurements."""
     present = 0
     for node in range(s.nodes.shape[0]):
@@ -101,32 +95,19 @@ def update_range(c, s, layout, i, j, t, distance, is_survey, H, PH):
         pair.surveyed = distance
     if not (s.nodes[i].present and s.nodes[j].present):
         if pair.first_n < c.k and not is_survey:
-            collect(s, p, distance)
+            pair.first_sum += distance
+            pair.first_n += 1
         initialise(c, s, layout, t)
         return
-    predict(c, s, p, t, s.x[p], s.P[p])
+    predict(c, s, p, t, s.x, s.P)
     pair.t = t
     if passes_gate(c, s, p, t, distance):
-        pair.nis = correct(c, s, p, distance, H, PH)
+        pair.nis = correct(c, s, p, distance, work)
         group.nis_sum += pair.nis
         group.nis_n += 1
         group.n_since_mds += 1
     if group.n_since_mds >= present * (present - 1) // 2 and present > 2:
         refine(c, s, layout, t)
-
-
-@allocating_kernel
-def collect(s, p, distance):
-    """Add one of the first measurements of a pair: its range and its relative orientation."""
-    pair, q = s.pairs[p], np.zeros(10)
-    relative_orientation(s.control, pair.i, pair.j, q)
-    dot = 0.0
-    for a in range(4):
-        dot += q[ORIENTATION + a] * s.q_sum[p, a]
-    for a in range(4):
-        s.q_sum[p, a] += q[ORIENTATION + a] if dot >= 0.0 else -q[ORIENTATION + a]
-    pair.first_sum += distance
-    pair.first_n += 1
 
 
 @allocating_kernel
@@ -137,7 +118,7 @@ def write_estimate(c, s, t, e, o, out, x, P):
     for n in range(s.nodes.shape[0]):
         has_q[e, o, n] = s.nodes[n].t_imu > -np.inf
         for k in range(4):
-            q_wb[e, o, n, k] = s.control[n, 3 + k]
+            q_wb[e, o, n, k] = s.q[n, k]
     for p in range(s.pairs.shape[0]):
         pair = s.pairs[p]
         node_i, node_j = s.nodes[pair.i], s.nodes[pair.j]
@@ -146,10 +127,10 @@ def write_estimate(c, s, t, e, o, out, x, P):
             oldest = min(node_i.t_last_range, node_j.t_last_range)
             status[e, o, p] = STARTING if t - oldest <= c.node_timeout else 0
             continue
-        x[:], P[:, :] = s.x[p], s.P[p]
+        x[p], P[p] = s.x[p], s.P[p]
         predict(c, s, p, t, x, P)
-        pos[e, o, p], vel[e, o, p] = x[:3], x[3:6]
-        cov[e, o, p] = P[:6, :6]
+        pos[e, o, p], vel[e, o, p] = x[p, 0, :3], x[p, 0, 3:]
+        cov[e, o, p] = P[p, 0]
         age[e, o, p] = t - pair.t_range
         both_static = node_i.static and node_j.static
         status[e, o, p] = OK if age[e, o, p] <= c.lost_after or both_static else LOST

@@ -6,34 +6,13 @@ import math
 
 import numpy as np
 
-from tracking.filters.paper.pair_filter import (
-    ORIENTATION,
-    VELOCITY,
-    mean_orientation,
-    predict,
-    update_position,
-)
+from tracking.filters.first_ranges import classical_mds
+from tracking.filters.paper.pair_filter import POS, VEL, correct_position, predict
 from tracking.geometry import FLAT
 from tracking.kernels.jit import allocating_kernel, kernel
 
 REPLACE, NONE = 0, 2
 """Values of `feedback`."""
-
-
-@allocating_kernel
-def mds(c, D):
-    """Positions (node, 3) with the distances D (node, node): ``K = -J D^2 J / 2``, its vectors."""
-    n = D.shape[0]
-    J = np.eye(n) - 1.0 / n
-    eigenvalues, E = np.linalg.eigh(-0.5 * J @ (D * D) @ J)
-    X = np.zeros((n, 3))
-    for axis in range(min(c.d, n)):
-        k = n - 1 - axis
-        # LAPACK's signs differ with machine and numbering; here the longer tail is ahead.
-        sign = -1.0 if np.sum(E[:, k] ** 3) < 0.0 else 1.0
-        scale = max(eigenvalues[k], 0.0) ** c.power * sign
-        X[:, axis] = E[:, k] * scale
-    return X
 
 
 @allocating_kernel
@@ -83,7 +62,7 @@ def filter_positions(s, layout, members, m):
             i, j = members[a], members[b]
             if a != b and s.nodes[i].present and s.nodes[j].present:
                 p = layout.pair_index[i, j]
-                pos[b] += s.x[p, :3] if i < j else -s.x[p, :3]
+                pos[b] += s.x[p, 0, :3] if i < j else -s.x[p, 0, :3]
     return pos / max(present, 1)
 
 
@@ -158,7 +137,7 @@ def spawn(c, s, layout, new, t):
         for b in range(a + 1, m):
             D[a, b] = distance_between(c, s, layout, members[a], members[b], t)
             D[b, a] = D[a, b]
-    X = mds(c, D)
+    X = classical_mds(D * D, c.d, c.power)
     if present > 0:
         align(X, filter_positions(s, layout, members, m), known, c.d)
     elif c.has_layout:
@@ -181,9 +160,9 @@ def distance_between(c, s, layout, i, j, t):
     p = layout.pair_index[i, j]
     pair = s.pairs[p]
     if s.nodes[i].present and s.nodes[j].present:
-        predict(c, s, p, t, s.x[p], s.P[p])
+        predict(c, s, p, t, s.x, s.P)
         pair.t = t
-        return math.sqrt(s.x[p, 0] ** 2 + s.x[p, 1] ** 2 + s.x[p, 2] ** 2)
+        return math.sqrt(s.x[p, 0, 0] ** 2 + s.x[p, 0, 1] ** 2 + s.x[p, 0, 2] ** 2)
     if pair.surveyed > 0.0:
         return pair.surveyed
     return pair.first_sum / pair.first_n
@@ -191,17 +170,14 @@ def distance_between(c, s, layout, i, j, t):
 
 @kernel
 def start_filter(c, s, p, x_0, distance, t):
-    """The filter of a new pair: x_0, v_0 = 0, q_0, P_0 = I."""
+    """The filter of a new pair: x_0, v_0 = 0, P_0 = I."""
     pair = s.pairs[p]
     both_static = s.nodes[pair.i].static and s.nodes[pair.j].static
-    s.x[p, :], s.P[p, :, :] = 0.0, 0.0
+    s.x[p], s.P[p] = 0.0, 0.0
     for a in range(c.d):
-        s.x[p, a] = x_0[a]
-        s.P[p, a, a] = 1.0
-        s.P[p, VELOCITY + a, VELOCITY + a] = 0.0 if both_static else 1.0
-    mean_orientation(s.q_sum, p, s.x[p, ORIENTATION:])
-    for a in range(4):
-        s.P[p, ORIENTATION + a, ORIENTATION + a] = 1.0
+        s.x[p, 0, POS + a] = x_0[a]
+        s.P[p, 0, POS + a, POS + a] = 1.0
+        s.P[p, 0, VEL + a, VEL + a] = 0.0 if both_static else 1.0
     pair.t, pair.t_range = t, t
     pair.mean, pair.last, pair.rate, pair.in_a_row = distance, distance, 0.0, 0
     forget_first(s, p)
@@ -211,7 +187,6 @@ def start_filter(c, s, p, x_0, distance, t):
 def forget_first(s, p):
     """Begin to collect the first measurements of a pair."""
     s.pairs[p].first_sum, s.pairs[p].first_n = 0.0, 0
-    s.q_sum[p, :] = 0.0
 
 
 @allocating_kernel
@@ -231,18 +206,18 @@ def refine(c, s, layout, t):
         for b in range(a + 1, m):
             D[a, b] = distance_between(c, s, layout, members[a], members[b], t)
             D[b, a] = D[a, b]
-    X = mds(c, D)
+    X = classical_mds(D * D, c.d, c.power)
     if c.aligned:
         align(X, filter_positions(s, layout, members, m), np.ones(m, np.bool_), c.d)
-    K = np.zeros(6)
+    work = np.zeros((4, 6))
     for a in range(m):
         for b in range(a + 1, m):
             p = layout.pair_index[members[a], members[b]]
             pos = X[b] - X[a]
             if c.feedback == REPLACE:
-                s.x[p, :3] = pos
+                s.x[p, 0, :3] = pos
             else:
-                update_position(s.x[p], s.P[p], pos, c.d, c.mds_std * c.mds_std, K)
+                correct_position(s, p, pos, c.d, c.mds_std * c.mds_std, work)
 
 
 @kernel

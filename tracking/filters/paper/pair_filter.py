@@ -1,20 +1,22 @@
 """The EKF of one pair: prediction and correction, eq. (7) to (11) of the paper, in place.
 
-`tests/tracking/paper_reference_ekf.py` has the same equations as matrices. Position and velocity
-are never correlated with the orientation, so the blocks of P are updated one by one.
+`tests/tracking/paper_reference_ekf.py` has the same equations as matrices. The orientation q_ij of
+the paper's state is a function of the inputs alone and never correlated with position and velocity:
+it is reported from the inputs and has no states here. The algebra is that of the other pair filters
+(`pair.dynamics`), with one hypothesis.
 """
 
 from __future__ import annotations
 
 import math
 
-from tracking.kernels.jit import kernel, small_kernel
+from tracking.filters.pair import dynamics
+from tracking.kernels.jit import kernel
 
 TINY = 1e-6
 """[m, m/s] Shorter vectors have no direction."""
-
-VELOCITY, ORIENTATION = 3, 6
-"""First elements of v_ij and q_ij in the state of a pair."""
+POS, VEL = 0, 3
+"""First elements of x_ij and v_ij in the state of a pair."""
 
 
 @kernel
@@ -26,55 +28,20 @@ def predict(c, s, p, t, x, P):
         s: PaperState of one environment.
         p: Pair.
         t: Time [s].
-        x: State, (10), written.
-        P: Covariance, (10, 10), written.
+        x: States, (pair, 1, 6), that of pair p written.
+        P: Covariances, (pair, 1, 6, 6), that of pair p written.
     """
-    i, j = s.pairs[p].i, s.pairs[p].j
-    dt = t - s.pairs[p].t
-    relative_orientation(s.control, i, j, x)
-    if dt <= 0.0:
-        return
+    i, j, dt = s.pairs[p].i, s.pairs[p].j, t - s.pairs[p].t
     node_i, node_j = s.nodes[i], s.nodes[j]
     w_i = 1.0 if t - node_i.t_imu <= c.imu_timeout else 0.0
     w_j = 1.0 if t - node_j.t_imu <= c.imu_timeout else 0.0
+    a0 = w_j * s.accel[j, 0] - w_i * s.accel[i, 0]
+    a1 = w_j * s.accel[j, 1] - w_i * s.accel[i, 1]
+    a2 = w_j * s.accel[j, 2] - w_i * s.accel[i, 2]
     moving = (0.0 if node_i.static else 1.0) + (0.0 if node_j.static else 1.0)
-    q = moving * c.accel_std * c.accel_std
-    half = 0.5 * dt * dt
-    for a in range(c.d):
-        accel = w_j * s.control[j, a] - w_i * s.control[i, a]
-        x[a] += dt * x[VELOCITY + a] + half * accel
-        x[VELOCITY + a] += dt * accel
-    for a in range(c.d):
-        for b in range(c.d):
-            P[a, b] += dt * (P[a, VELOCITY + b] + P[VELOCITY + a, b])
-            P[a, b] += dt * dt * P[VELOCITY + a, VELOCITY + b]
-    for a in range(c.d):
-        for b in range(c.d):
-            P[a, VELOCITY + b] += dt * P[VELOCITY + a, VELOCITY + b]
-    for a in range(c.d):
-        for b in range(c.d):
-            P[VELOCITY + b, a] = P[a, VELOCITY + b]
-    for a in range(c.d):
-        P[a, a] += half * half * q
-        P[a, VELOCITY + a] += half * dt * q
-        P[VELOCITY + a, a] += half * dt * q
-        P[VELOCITY + a, VELOCITY + a] += dt * dt * q
-    # W_q (sigma^2 1) W_q^T: the derivatives of a product of unit quaternions are orthogonal.
-    q = moving * c.orientation_std * c.orientation_std
-    for a in range(4):
-        for b in range(4):
-            P[ORIENTATION + a, ORIENTATION + b] = q if a == b else 0.0
-
-
-@small_kernel
-def relative_orientation(control, i, j, x):
-    """Write ``q_ij = q_i^-1 q_j`` into a state."""
-    w, u, v, z = control[i, 3], -control[i, 4], -control[i, 5], -control[i, 6]
-    a, b, c, d = control[j, 3], control[j, 4], control[j, 5], control[j, 6]
-    x[ORIENTATION] = w * a - u * b - v * c - z * d
-    x[ORIENTATION + 1] = w * b + u * a + v * d - z * c
-    x[ORIENTATION + 2] = w * c - u * d + v * a + z * b
-    x[ORIENTATION + 3] = w * d + u * c - v * b + z * a
+    # The paper's noise is that of a step, not a density.
+    psd = c.accel_std * math.sqrt(moving * max(dt, 0.0))
+    dynamics.predict(x, P, p, 0, dt, a0, a1, a2, psd, c.d)
 
 
 @kernel
@@ -82,8 +49,8 @@ def passes_gate(c, s, p, t, distance):
     """Gate a range of pair p; update its running average and its low-passed derivative."""
     pair = s.pairs[p]
     age = t - pair.t_range
-    x = s.x[p]
-    speed = math.sqrt(x[3] * x[3] + x[4] * x[4] + x[5] * x[5])
+    v0, v1, v2 = s.x[p, 0, VEL], s.x[p, 0, VEL + 1], s.x[p, 0, VEL + 2]
+    speed = math.sqrt(v0 * v0 + v1 * v1 + v2 * v2)
     if abs(distance - pair.mean) > c.gate_floor + c.gate_gain * speed:
         pair.n_rejected += 1
         pair.in_a_row += 1
@@ -101,86 +68,57 @@ def passes_gate(c, s, p, t, distance):
 
 
 @kernel
-def correct(c, s, p, distance, H, PH):
-    """Correct pair p with a range and its derivative.
+def correct(c, s, p, distance, work):
+    """Correct pair p with a range and its derivative, whose errors are independent.
 
     Args:
         c: Constants.
         s: PaperState of one environment.
         p: Pair.
         distance: The range [m]; the derivative is that of the pair.
-        H: Room, (2, 6).
-        PH: Room, (6, 2).
+        work: Rows as of `dynamics.correct`; row 2 holds the derivatives of the speed, row 3 the
+            state before; (4, 6).
+
+    Returns:
+        Squared innovation of the range over its variance.
     """
-    x, P, rate = s.x[p], s.P[p], s.pairs[p].rate
+    x, rate = s.x[p, 0], s.pairs[p].rate
     d = math.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
     speed = math.sqrt(x[3] * x[3] + x[4] * x[4] + x[5] * x[5])
-    x_v = x[0] * x[3] + x[1] * x[4] + x[2] * x[5]
-    H[:, :] = 0.0
+    along = (x[0] * x[3] + x[1] * x[4] + x[2] * x[5]) / d if d > TINY else 0.0
     for a in range(3):
-        H[0, a] = x[a] / d if d > TINY else 0.0
+        u = x[a] / d if d > TINY else 0.0
+        work[0, POS + a], work[0, VEL + a] = u, 0.0
+        if c.speed_is_norm:
+            work[2, POS + a] = 0.0
+            work[2, VEL + a] = x[VEL + a] / speed if speed > TINY else 0.0
+        else:
+            work[2, POS + a] = (x[VEL + a] - u * along) / d if d > TINY else 0.0
+            work[2, VEL + a] = u
+        work[3, POS + a], work[3, VEL + a] = x[POS + a], x[VEL + a]
     nu_d = distance - d
-    if c.speed_is_norm:
-        for a in range(3):
-            H[1, VELOCITY + a] = x[VELOCITY + a] / speed if speed > TINY else 0.0
-        nu_v = abs(rate) - speed
-    else:
-        along = x_v / d if d > TINY else 0.0
-        for a in range(3):
-            H[1, a] = (x[VELOCITY + a] - H[0, a] * along) / d if d > TINY else 0.0
-            H[1, VELOCITY + a] = H[0, a]
-        nu_v = rate - along
-    S00, S01, S11 = c.range_std * c.range_std, 0.0, c.speed_std * c.speed_std
+    nu_v = abs(rate) - speed if c.speed_is_norm else rate - along
+    S = dynamics.correct(s.x, s.P, p, 0, work, nu_d, c.range_std * c.range_std)
     for a in range(6):
-        for row in range(2):
-            total = 0.0
-            for b in range(6):
-                total += P[a, b] * H[row, b]
-            PH[a, row] = total
-    for a in range(6):
-        S00 += H[0, a] * PH[a, 0]
-        S01 += H[0, a] * PH[a, 1]
-        S11 += H[1, a] * PH[a, 1]
-    det = S00 * S11 - S01 * S01
-    for a in range(6):
-        k0 = (PH[a, 0] * S11 - PH[a, 1] * S01) / det
-        k1 = (PH[a, 1] * S00 - PH[a, 0] * S01) / det
-        x[a] += k0 * nu_d + k1 * nu_v
-        for b in range(a, 6):
-            value = P[a, b] - k0 * PH[b, 0] - k1 * PH[b, 1]
-            P[a, b] = value
-            P[b, a] = value
-    return nu_d * nu_d / S00
+        work[0, a] = work[2, a]
+        nu_v -= work[2, a] * (x[a] - work[3, a])
+    dynamics.correct(s.x, s.P, p, 0, work, nu_v, c.speed_std * c.speed_std)
+    return nu_d * nu_d / S
 
 
 @kernel
-def update_position(x, P, pos, d, variance, K):
-    """Correct a filter with a measurement of its position, one axis after the other.
+def correct_position(s, p, pos, d, variance, work):
+    """Correct pair p with a measured position, one axis after the other.
 
     Args:
-        x: State, (10), updated.
-        P: Covariance, (10, 10), updated.
+        s: PaperState of one environment.
+        p: Pair.
         pos: Measured position, (3) [m].
         d: 2 or 3.
         variance: Of the measurement along each axis [m2].
-        K: Room, (6).
+        work: Room, (4, 6).
     """
     for k in range(d):
-        S, nu = P[k, k] + variance, pos[k] - x[k]
-        for a in range(6):
-            K[a] = P[a, k]
-        for a in range(6):
-            x[a] += K[a] / S * nu
-            for b in range(6):
-                P[a, b] -= K[a] * K[b] / S
-
-
-@small_kernel
-def mean_orientation(q_sum, p, q):
-    """Write the mean of a pair's first orientations, (4)."""
-    squared = 0.0
-    for a in range(4):
-        squared += q_sum[p, a] * q_sum[p, a]
-    length = math.sqrt(squared)
-    for a in range(4):
-        q[a] = q_sum[p, a] / length if length > 0.0 else (1.0 if a == 0 else 0.0)
+        work[0, :] = 0.0
+        work[0, k] = 1.0
+        dynamics.correct(s.x, s.P, p, 0, work, pos[k] - s.x[p, 0, k], variance)

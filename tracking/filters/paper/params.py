@@ -27,8 +27,6 @@ class PaperParams:
 
     accel_std: float = 0.2
     """[m/s2] Noise n_a of a node's world acceleration: the root of the diagonal of Q_a, eq. (2)."""
-    orientation_std: float = 0.02
-    """[-] Noise n_q of a quaternion component: the root of the diagonal of Q_q, eq. (1)."""
     range_std: float = 0.02
     """[m] Noise of a range: the root of the first element of R."""
     speed_std: float = 10.0

@@ -52,18 +52,18 @@ class PaperState(NamedTuple):
 
     nodes: Records
     """NODE, (env, node)."""
-    control: F64
-    """World acceleration [m/s2] and orientation q_wb of each node, (env, node, 7)."""
+    accel: F64
+    """World acceleration of each node, (env, node, 3) [m/s2]."""
+    q: F64
+    """Orientation q_wb of each node, (env, node, 4)."""
     pairs: Records
     """PAIR, (env, pair)."""
-    q_sum: F64
-    """Sum of the first relative orientations of a pair, (env, pair, 4)."""
     group: Records
     """GROUP, (env, 1)."""
     x: F64
-    """(x_ij, v_ij, q_ij) of each pair, (env, pair, 10) [m, m/s, -]."""
+    """(x_ij, v_ij) of each pair, (env, pair, 1, 6) [m, m/s]."""
     P: F64
-    """Its covariance, (env, pair, 10, 10)."""
+    """Its covariance, (env, pair, 1, 6, 6)."""
 
 
 class Layout(NamedTuple):
@@ -104,16 +104,16 @@ def make_state(constellation: Constellation, n_envs: int) -> PaperState:
     nodes = np.zeros((n_envs, n), dtype=NODE)
     nodes["t_imu"] = nodes["t_last_range"] = -np.inf
     nodes["static"] = constellation.is_static
-    control = np.zeros((n_envs, n, 7))
-    control[..., 3] = 1.0
+    q = np.zeros((n_envs, n, 4))
+    q[..., 0] = 1.0
     pairs = np.zeros((n_envs, p), dtype=PAIR)
     pairs["i"], pairs["j"] = constellation.pairs.T
     return PaperState(
         nodes=nodes,
-        control=control,
+        accel=np.zeros((n_envs, n, 3)),
+        q=q,
         pairs=pairs,
-        q_sum=np.zeros((n_envs, p, 4)),
         group=np.zeros((n_envs, 1), dtype=GROUP),
-        x=np.zeros((n_envs, p, 10)),
-        P=np.zeros((n_envs, p, 10, 10)),
+        x=np.zeros((n_envs, p, 1, 6)),
+        P=np.zeros((n_envs, p, 1, 6, 6)),
     )
