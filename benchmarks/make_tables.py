@@ -41,8 +41,7 @@ from relpos_env.tasks.needs import DEFAULT_SCENARIO
 from tracking.ahrs.params import OrientationParams
 from tracking.filters.joint.hypotheses.alignment import TRANSITIONS, Alignment
 from tracking.filters.joint.params import JointParams
-from tracking.filters.joint.supervision.faults import ACTIONS as REMEDIES
-from tracking.filters.joint.supervision.faults import Fault
+from tracking.filters.joint.supervision.faults import CATALOGUE, Fault
 from tracking.findings import KINDS
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -262,10 +261,13 @@ def alignment() -> str:
 
 
 def faults() -> str:
-    """The catalogue of faults, and what is done about each."""
-    told = docstrings(Fault)
-    rows = [[f"`{f.name}`", " ".join(told[f.name].split()), do] for f, do in REMEDIES.items()]
-    return markdown(("fault", "what it is", "action"), rows)
+    """The catalogue of faults."""
+    meaning = docstrings(Fault)
+    rows = [
+        [f"`{f.name}`", " ".join(meaning[f.name].split()), f"`{r.limit}`", r.decided, r.action]
+        for f, r in CATALOGUE.items()
+    ]
+    return markdown(("fault", "meaning", "limit", "decided", "action"), rows)
 
 
 def findings() -> str:

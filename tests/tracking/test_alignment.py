@@ -1,14 +1,21 @@
 """The alignment of a group goes from state to state as its table says, whatever is measured."""
 
+import re
+from operator import attrgetter
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import tracking
 from tests.exact_motion import ExactGroup
 from tracking import Tracker
 from tracking.filters.joint.hypotheses.alignment import TRANSITIONS, Alignment, set_alignment
+from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.records import GROUP
+from tracking.filters.joint.supervision.faults import CATALOGUE, Fault
 from tracking.measurements import Kind
 
 
@@ -21,6 +28,14 @@ def test_every_state_follows_the_first_one_and_ends():
     assert found == set(Alignment)
     for state in set(Alignment) - {Alignment.NONE}:
         assert Alignment.NONE in TRANSITIONS[state]
+
+
+def test_only_its_own_file_writes_the_alignment():
+    """So that no step goes past the table."""
+    writes = re.compile(r"""\.alignment = |\.alignment, .* = |\["alignment"\] = """)
+    root = Path(tracking.__file__).parent
+    found = {path.name for path in root.rglob("*.py") if writes.search(path.read_text("utf-8"))}
+    assert found == {"alignment.py"}
 
 
 def walk(group, silences=(), reflected=None):
@@ -86,3 +101,9 @@ def test_rotations_of_a_small_group_at_rest_are_not_split(vehicle, monkeypatch):
     group = ExactGroup(vehicle, range(4), at_rest=True, hz=10.0, seconds=29.0)
     group.block.values[0, group.block.kind[0] == Kind.RANGE, 0] *= 0.06
     assert set(walk(group)[0]) <= {(Alignment.NONE, 0), (Alignment.STATIC, 1)}
+
+
+def test_the_limits_of_the_catalogue_are_parameters():
+    assert set(CATALOGUE) == set(Fault) - {Fault.NONE}
+    for remedy in CATALOGUE.values():
+        assert attrgetter(remedy.limit)(JointParams()) > 0.0, remedy.limit

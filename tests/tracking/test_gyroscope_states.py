@@ -10,7 +10,7 @@ from test_upright import walk
 from tracking.filters.joint.ekf import gyro_bias as gyroscope
 from tracking.filters.joint.ekf import propagation
 from tracking.filters.joint.hypotheses.alignment import Alignment
-from tracking.filters.joint.updates.gyro_bias_at_rest import update_gyro_bias_at_rest
+from tracking.filters.joint.updates.motion_constraints import update_gyro_bias_at_rest
 from tracking.measurements import GYRO_BIAS, GYRO_VAR, N_VALUES, TOLD
 from tracking.vehicles import VEHICLES
 

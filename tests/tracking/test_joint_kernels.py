@@ -11,6 +11,7 @@ from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.ekf import observability, preintegration, propagation, scalar_update
 from tracking.filters.joint.ekf.workspace import make_workspace
 from tracking.filters.joint.hypotheses.alignment import Alignment
+from tracking.filters.joint.hypotheses.bank import flush_all_updates
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.state import JointState, make_layout, make_state
 from tracking.filters.joint.updates import motion_constraints
@@ -220,7 +221,7 @@ def test_corrections_are_the_textbook_ones(seed, n, m, corrections, room):
         assert scalar_update.covariance(s, 0, a, b) == pytest.approx(P[a, b], abs=1e-8)
     np.testing.assert_allclose(s.x[0], x, atol=1e-8)
     np.testing.assert_allclose(s.accumulated_correction[0], moved, atol=1e-8)
-    scalar_update.flush_all_updates(s)
+    flush_all_updates(s)
     assert s.n_pending[0] == 0
     np.testing.assert_allclose(s.P[0], P, atol=1e-7)
     np.testing.assert_array_equal(s.P[0], s.P[0].T)

@@ -15,15 +15,16 @@ from tracking.filters.joint.ekf.columns import TILT_GAIN
 from tracking.filters.joint.ekf.preintegration import preintegrate
 from tracking.filters.joint.hypotheses import alignment_modes, alignment_sensitivity
 from tracking.filters.joint.hypotheses.alignment import Alignment
+from tracking.filters.joint.hypotheses.alignment_sensitivity import lever_arm_sensitivity
 from tracking.filters.joint.hypotheses.geometric_degeneracy import degeneracy_ratio, least_axis
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.state import JointState, make_state
 from tracking.filters.joint.updates import motion_constraints, surveyed_distance
-from tracking.filters.joint.updates.lever_arm import antenna_offset, lever_arm_sensitivity
 from tracking.filters.joint.updates.range_update import predict_range
 from tracking.maths import rotation_modes
 from tracking.maths.starting_rotations import starting_rotations
 from tracking.measurements import Kind
+from tracking.models.lever_arm import antenna_offset
 from tracking.records import as_records
 
 MIRROR = np.diag([1.0, 1.0, -1.0])

@@ -5,18 +5,18 @@ import pytest
 
 from tracking import Constellation, NodeConfig
 from tracking.filters.joint.coefficients import make_coefficients
-from tracking.filters.joint.ekf.heading_gauge import (
+from tracking.filters.joint.ekf.gauge import (
     add_rotation_uncertainty,
     update_heading_variance,
 )
 from tracking.filters.joint.ekf.observability import enforce_observability
 from tracking.filters.joint.ekf.scalar_update import flush_updates
-from tracking.filters.joint.ekf.smoothing import with_clones
 from tracking.filters.joint.ekf.workspace import make_workspace
 from tracking.filters.joint.hypotheses.alignment import Alignment
 from tracking.filters.joint.hypotheses.initialisation import add_node
 from tracking.filters.joint.hypotheses.static_initialisation import reset_heading_uncertainty
 from tracking.filters.joint.params import JointParams
+from tracking.filters.joint.smoothing import with_clones
 from tracking.filters.joint.state import JointState, make_layout, make_state
 from tracking.filters.joint.updates.surveyed_distance import surveyed_distance_update
 from tracking.records import as_records

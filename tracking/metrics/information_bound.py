@@ -8,22 +8,24 @@ changes those, which is what the variance of a sum over time needs.
 from __future__ import annotations
 
 from tracking.filters.joint.ekf.columns import N_PRE
-from tracking.filters.joint.ekf.heading_gauge import add_rotation_uncertainty
+from tracking.filters.joint.ekf.gauge import add_rotation_uncertainty, centre
 from tracking.filters.joint.ekf.preintegration import preintegrate, process_attitude
 from tracking.filters.joint.ekf.propagation import predict
 from tracking.filters.joint.ekf.scalar_update import compute_pht, flush_updates, kalman_update
-from tracking.filters.joint.hypotheses.alignment import FILTERED, NONE
+from tracking.filters.joint.hypotheses.alignment import FILTERED, NONE, set_alignment
 from tracking.filters.joint.hypotheses.initialisation import (
     initialise_node,
     initialise_pair,
     reset_preintegration,
 )
-from tracking.filters.joint.updates.gyro_bias_at_rest import update_gyro_bias_at_rest
-from tracking.filters.joint.updates.lever_arm import antenna_offset
-from tracking.filters.joint.updates.motion_constraints import centre, constrain_nodes
+from tracking.filters.joint.updates.motion_constraints import (
+    constrain_nodes,
+    update_gyro_bias_at_rest,
+)
 from tracking.filters.joint.updates.nlos_model import reset_bias_on_transition
 from tracking.filters.joint.updates.range_update import predict_range
 from tracking.kernels.jit import kernel, small_kernel
+from tracking.models.lever_arm import antenna_offset
 
 STATE, SURVEY, RANGE = 3, 4, 5
 GAUGE_PERIOD = 1.0
@@ -42,7 +44,8 @@ def begin(c, s, t):
     for p in range(s.pairs.shape[0]):
         initialise_pair(c, s, 0, p, 0.0)
     group = s.group[0]
-    group.alignment, group.n_alive = FILTERED, 1
+    set_alignment(group, FILTERED)
+    group.n_alive = 1
     group.t, group.t_constraints, group.t_gauge = t, t, t
 
 

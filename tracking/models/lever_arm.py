@@ -25,6 +25,19 @@ def antenna_in_world(w, x, y, z, o0, o1, o2):
 
 
 @small_kernel
+def antenna_offset(held, layout, n, antenna):
+    """Position of an antenna relative to its node, world frame as measured [m]."""
+    o0, o1, o2 = (
+        layout.antenna_b[antenna, 0],
+        layout.antenna_b[antenna, 1],
+        layout.antenna_b[antenna, 2],
+    )
+    if o0 == 0.0 and o1 == 0.0 and o2 == 0.0:
+        return 0.0, 0.0, 0.0
+    return antenna_in_world(held[n, 0], held[n, 1], held[n, 2], held[n, 3], o0, o1, o2)
+
+
+@small_kernel
 def rotate_lever_arm(psi, l0, l1):
     """Correct the horizontal part of a lever arm [m] by the heading error [rad]."""
     return turn(*cosine_sine(psi), l0, l1)

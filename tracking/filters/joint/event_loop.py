@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from tracking.filters.first_ranges import collect
+from tracking.filters.joint.ekf.gauge import centre
 from tracking.filters.joint.ekf.observability import enforce_observability, propagate_corrections
 from tracking.filters.joint.ekf.preintegration import preintegrate, process_attitude
 from tracking.filters.joint.ekf.propagation import moves, predict
-from tracking.filters.joint.ekf.scalar_update import flush_all_updates
 from tracking.filters.joint.ekf.workspace import (
     DONE,
     ENV,
@@ -27,9 +27,7 @@ from tracking.filters.joint.ekf.workspace import (
 from tracking.filters.joint.estimate import write_estimate
 from tracking.filters.joint.hypotheses.alignment import NONE, STATIC, is_linear
 from tracking.filters.joint.hypotheses.alignment_sensitivity import propagate_sensitivity
-from tracking.filters.joint.hypotheses.bank import (
-    hypothesis_range,
-)
+from tracking.filters.joint.hypotheses.bank import flush_all_updates, hypothesis_range
 from tracking.filters.joint.hypotheses.initialisation import can_join, can_start
 from tracking.filters.joint.hypotheses.static_initialisation import all_static, may_move
 from tracking.filters.joint.state import one_env
@@ -37,13 +35,15 @@ from tracking.filters.joint.supervision.frozen_range import is_frozen
 from tracking.filters.joint.supervision.residuals import update_residuals
 from tracking.filters.joint.supervision.staleness import is_silent, note_seen, update_interval
 from tracking.filters.joint.supervision.supervise import supervise
-from tracking.filters.joint.updates.gyro_bias_at_rest import update_gyro_bias_at_rest
-from tracking.filters.joint.updates.lever_arm import antenna_offset
-from tracking.filters.joint.updates.motion_constraints import apply_motion_constraints, centre
+from tracking.filters.joint.updates.motion_constraints import (
+    apply_motion_constraints,
+    update_gyro_bias_at_rest,
+)
 from tracking.filters.joint.updates.range_update import range_update
 from tracking.filters.joint.updates.surveyed_distance import surveyed_distance_update
 from tracking.kernels.addresses import by_reference
 from tracking.kernels.jit import kernel
+from tracking.models.lever_arm import antenna_offset
 from tracking.models.nlos import power_evidence
 
 # Plain numbers of `Kind`: kernels do not know enums.

@@ -24,11 +24,11 @@ from tracking.constellation import Constellation
 from tracking.estimate import TeamEstimate
 from tracking.filters.batched import BatchedFilter
 from tracking.filters.joint.coefficients import make_coefficients
-from tracking.filters.joint.ekf.smoothing import read_clones, with_clones
 from tracking.filters.joint.ekf.workspace import Workspace, make_workspace
 from tracking.filters.joint.event_loop import predict_all, run_events
 from tracking.filters.joint.params import JointParams, JointStartParams
 from tracking.filters.joint.rare import compile_all, rare_calls, run_to_end
+from tracking.filters.joint.smoothing import read_clones, with_clones
 from tracking.filters.joint.state import Layout, make_layout, make_state
 from tracking.kernels.jit import Call, bind
 from tracking.measurements import MeasurementBlock

@@ -16,7 +16,7 @@ from tracking.filters.pair.nlos_model import (
     update_nlos_posterior,
 )
 from tracking.kernels.jit import kernel, small_kernel
-from tracking.models.lever_arm import antenna_in_world
+from tracking.models.lever_arm import antenna_offset
 
 TIE = 1e-6
 """[s] Times that differ by less are equal, whatever the clock began with."""
@@ -59,18 +59,6 @@ def node_variance(c, node, aided):
     if not aided:
         return c.unaided_accel_psd * c.unaided_accel_psd
     return node.psd * node.psd + node.accel_noise * node.accel_noise
-
-
-@small_kernel
-def antenna_offset(s, layout, n, antenna):
-    """Position of an antenna relative to its node in the world frame [m]."""
-    o0, o1, o2 = (
-        layout.antenna_b[antenna, 0],
-        layout.antenna_b[antenna, 1],
-        layout.antenna_b[antenna, 2],
-    )
-    held = s.held
-    return antenna_in_world(held[n, 0], held[n, 1], held[n, 2], held[n, 3], o0, o1, o2)
 
 
 @small_kernel
@@ -119,8 +107,8 @@ def range_update(c, s, layout, p, t, distance, evidence, antenna_i, antenna_j, w
     if not passes_gate(c, s, p, t, distance):
         return
     pair = s.pairs[p]
-    i0, i1, i2 = antenna_offset(s, layout, pair.i, antenna_i)
-    j0, j1, j2 = antenna_offset(s, layout, pair.j, antenna_j)
+    i0, i1, i2 = antenna_offset(s.held, layout, pair.i, antenna_i)
+    j0, j1, j2 = antenna_offset(s.held, layout, pair.j, antenna_j)
     l0, l1, l2 = j0 - i0, j1 - i1, j2 - i2
     dt = max(t - pair.t_range, 0.0)
     group = s.group[0]

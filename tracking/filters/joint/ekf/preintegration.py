@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 
+from tracking.filters.joint.ekf.ahrs_feedback import process_tilt_correction
 from tracking.filters.joint.ekf.columns import (
     BIAS_P,
     BIAS_V,
@@ -18,7 +19,6 @@ from tracking.filters.joint.ekf.columns import (
     ROTATION_P,
     ROTATION_V,
 )
-from tracking.filters.joint.ekf.tilt_correction import process_tilt_correction
 from tracking.filters.level_vehicle import angle_between, direction, level
 from tracking.kernels.jit import small_kernel
 from tracking.maths.exponentials import decay

@@ -15,6 +15,13 @@ from __future__ import annotations
 
 import math
 
+from tracking.filters.joint.ekf.ahrs_feedback import (
+    apply_tilt_correction,
+    decay_gyro_bias_transition,
+    propagate_gyro_bias_columns,
+    propagate_gyro_bias_rows,
+    tilt_bias_tau,
+)
 from tracking.filters.joint.ekf.attitude_coupling import (
     PER_GRAVITY,
     corrected_increments,
@@ -36,12 +43,6 @@ from tracking.filters.joint.ekf.columns import (
     UP_P,
     UP_V,
 )
-from tracking.filters.joint.ekf.gyro_bias import (
-    decay_gyro_bias_transition,
-    propagate_gyro_bias_columns,
-    propagate_gyro_bias_rows,
-)
-from tracking.filters.joint.ekf.tilt_correction import apply_tilt_correction, tilt_bias_tau
 from tracking.kernels.jit import kernel, small_kernel
 from tracking.maths.angles import cosine_sine, turn
 from tracking.maths.covariance import STATES, add_to_columns, add_to_rows, apply_downdate, mirror

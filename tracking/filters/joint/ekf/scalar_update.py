@@ -56,6 +56,51 @@ def covariance(s, h, a, b):
 
 
 @small_kernel
+def relative_covariance(P, h, i, j, a, b):
+    """Covariance of components a and b of a relative position, pending updates left out [m2]."""
+    return P[h, i + a, i + b] + P[h, j + a, j + b] - P[h, i + a, j + b] - P[h, j + a, i + b]
+
+
+@small_kernel
+def relative_variance_bound(s, h, i, j, d):
+    """Upper bound of the summed variances of a relative position: pending updates lower it [m2].
+
+    Args:
+        s: JointState of one environment.
+        h: Hypothesis.
+        i: First state of one position.
+        j: Of the other.
+        d: 2 or 3.
+    """
+    trace = relative_covariance(s.P, h, i, j, 0, 0) + relative_covariance(s.P, h, i, j, 1, 1)
+    return trace + relative_covariance(s.P, h, i, j, 2, 2) if d == 3 else trace
+
+
+@small_kernel
+def relative_variance_across(s, h, i, j, u0, u1, u2, d):
+    """Summed variances of a relative position across a direction u, pending updates off [m2]."""
+    P, W = s.P, s.pending_updates
+    trace = relative_variance_bound(s, h, i, j, d)
+    along = u0 * u0 * relative_covariance(P, h, i, j, 0, 0)
+    along += u1 * u1 * relative_covariance(P, h, i, j, 1, 1)
+    along += 2.0 * u0 * u1 * relative_covariance(P, h, i, j, 0, 1)
+    if d == 3:
+        across = u0 * relative_covariance(P, h, i, j, 0, 2)
+        across += u1 * relative_covariance(P, h, i, j, 1, 2)
+        along += u2 * (2.0 * across + u2 * relative_covariance(P, h, i, j, 2, 2))
+    # A sum for each axis: additions do not depend on each other.
+    t0, t1, t2 = 0.0, 0.0, 0.0
+    for q in range(s.n_pending[h]):
+        off0, off1, off2 = W[h, q, j] - W[h, q, i], W[h, q, j + 1] - W[h, q, i + 1], 0.0
+        if d == 3:
+            off2 = W[h, q, j + 2] - W[h, q, i + 2]
+        t0, t1, t2 = t0 + off0 * off0, t1 + off1 * off1, t2 + off2 * off2
+        part = u0 * off0 + u1 * off1 + u2 * off2
+        along -= part * part
+    return trace - (t0 + t1 + t2) - along
+
+
+@small_kernel
 def kalman_update(s, h, w, nu, S):
     """Correct hypothesis h with an innovation nu of variance S; w is ``P H``, overwritten.
 
@@ -89,20 +134,12 @@ def kalman_update(s, h, w, nu, S):
 def flush_updates(s, h):
     """Apply pending updates: from here on P is the covariance of hypothesis h.
 
-    What reads or writes more of P than the functions of this module begins with it. What is rare
+    Functions that read or write more of P than those of this module begin with it. Rare work
     (`rare`, `supervise`) finds P whole.
     """
     if s.n_pending[h] > 0:
         apply_downdate(s.P, h, s.pending_updates, h, s.n_pending[h], None)
         s.n_pending[h] = 0
-
-
-@small_kernel
-def flush_all_updates(s):
-    """Apply the pending updates of every hypothesis."""
-    for h in range(s.alive.shape[0]):
-        if s.alive[h]:
-            flush_updates(s, h)
 
 
 @small_kernel

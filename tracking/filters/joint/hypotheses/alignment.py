@@ -14,6 +14,7 @@ from enum import IntEnum
 import numpy as np
 
 from tracking.kernels.jit import small_kernel
+from tracking.records import Records
 
 
 class Alignment(IntEnum):
@@ -98,3 +99,13 @@ def is_linear(group):
 def has_modes(group):
     """True while hypotheses are modes of one rotation, copied from one filter."""
     return MODES <= group.alignment <= CANDIDATES
+
+
+def freeze_alignment(group: Records) -> None:
+    """Take the reported hypothesis for the only one, in a copy of groups that is not reported.
+
+    Args:
+        group: GROUP, (env, 1), updated.
+    """
+    group["best"], group["n_alive"] = 0, np.minimum(group["n_alive"], 1)
+    group["alignment"] = np.where(group["alignment"] >= LINEAR, FILTERED, group["alignment"])

@@ -22,13 +22,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from tracking.filters.joint.ekf.ahrs_feedback import propagate_gyro_bias_sensitivity
 from tracking.filters.joint.ekf.columns import BY_HEADING_P, BY_HEADING_V, TILT_STEP, UP_P, UP_V
-from tracking.filters.joint.ekf.gyro_bias import propagate_gyro_bias_sensitivity
 from tracking.filters.joint.ekf.propagation import moves, n_bias_states
 from tracking.filters.joint.hypotheses.alignment import LINEAR, has_modes
-from tracking.filters.joint.updates.lever_arm import attach_to_world
 from tracking.kernels.jit import allocating_kernel, kernel, small_kernel
 from tracking.maths.covariance import STATES
+from tracking.models.lever_arm import antenna_offset
 
 LOOSE = 3.0
 """[-] Each element of M has a variance of a third, over all rotations."""
@@ -157,6 +157,36 @@ def innovation_sensitivity(s, h, m, work):
         for q in range(9):
             variance += g[k] * s.alignment_cov[h, k, q] * g[q]
     return variance
+
+
+@small_kernel
+def lever_arm_sensitivity(levers, work):
+    """Derivatives of a range by the turn, the positions held: only its antennas turn with M."""
+    u, direct = work.val, work.direct
+    for k in range(3):
+        lever = levers[3 + k] - levers[k]
+        direct[k], direct[3 + k], direct[6 + k] = u[2] * lever, u[3] * lever, u[5] * lever
+
+
+@small_kernel
+def attach_to_world(s, layout, h):
+    """Sensitivities of what was estimated while hypothesis h had its present rotation.
+
+    Ranges measure where the antenna of a node is in the frame, whatever M is: its origin is an
+    offset away that turns with M. So does a bias of the accelerations, which is one of the world.
+    With both the same for all M, ranges and rest would measure a rotation that they do not observe.
+    """
+    s.sensitivity[h] = 0.0
+    for i in range(s.nodes.shape[0]):
+        node = s.nodes[i]
+        if not node.present:
+            continue
+        offset = antenna_offset(s.last_attitude_accel, layout, i, node.antenna)
+        for r in range(3):
+            for q in range(3):
+                s.sensitivity[h, 3 * r + q, node.i_pos + r] = -offset[q]
+                if moves(node) and not node.levelled:
+                    s.sensitivity[h, 3 * r + q, node.i_tilt_bias + r] = s.x[h, node.i_tilt_bias + q]
 
 
 @small_kernel

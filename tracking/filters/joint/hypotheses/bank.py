@@ -20,10 +20,10 @@ import numpy as np
 
 from tracking.filters.best_hypothesis import choose_best
 from tracking.filters.first_ranges import forget_first
-from tracking.filters.joint.ekf.gyro_bias import last_state
-from tracking.filters.joint.ekf.heading_gauge import heading_functional
+from tracking.filters.joint.ekf.ahrs_feedback import last_state
+from tracking.filters.joint.ekf.gauge import heading_functional
 from tracking.filters.joint.ekf.observability import shift_nullspace
-from tracking.filters.joint.ekf.scalar_update import reset_state
+from tracking.filters.joint.ekf.scalar_update import flush_updates, reset_state
 from tracking.filters.joint.hypotheses.alignment import (
     CANDIDATES,
     FILTERED,
@@ -53,6 +53,14 @@ def hypothesis_range(s):
     if group.n_alive > 1:
         return 0, s.alive.shape[0]
     return group.best, group.best + 1
+
+
+@small_kernel
+def flush_all_updates(s):
+    """Apply the pending updates of every hypothesis."""
+    for h in range(s.alive.shape[0]):
+        if s.alive[h]:
+            flush_updates(s, h)
 
 
 @allocating_kernel

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tracking.filters.joint.ekf.group_centre import group_centre
+from tracking.filters.joint.ekf.gauge import group_centre
 from tracking.kernels.jit import allocating_kernel
 
 

@@ -20,7 +20,11 @@ from tracking.filters.first_ranges import (
     is_ready,
     start_distance,
 )
-from tracking.filters.joint.ekf.heading_gauge import add_rotation_uncertainty, heading_functional
+from tracking.filters.joint.ekf.gauge import (
+    add_rotation_uncertainty,
+    add_translation_uncertainty,
+    heading_functional,
+)
 from tracking.filters.joint.ekf.propagation import initial_tilt_variance
 from tracking.filters.joint.ekf.scalar_update import reset_state
 from tracking.filters.joint.hypotheses.alignment import FILTERED, LINEAR, STATIC, set_alignment
@@ -123,16 +127,6 @@ def initialise_interval(pair, t):
     first = pair.start_t[(pair.start_n - n) % N_FIRST]
     pair.interval = (t - first) / (n - 1) if n > 1 else 0.0
     pair.t_range, pair.t_used = t, t
-
-
-@kernel
-def add_translation_uncertainty(c, s, h, members, m):
-    """Add to P of hypothesis h that nothing is known of where the centre is."""
-    for a in range(m):
-        for b in range(m):
-            at_a, at_b = s.nodes[members[a]].i_pos, s.nodes[members[b]].i_pos
-            for k in range(c.d):
-                s.P[h, at_a + k, at_b + k] += c.centre_std**2
 
 
 @kernel

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from tracking.filters.joint.ekf.group_centre import group_centre
+from tracking.filters.joint.ekf.gauge import group_centre
 from tracking.filters.joint.hypotheses.alignment import CHALLENGED, STATIC, has_modes
 from tracking.filters.joint.hypotheses.alignment_sensitivity import has_linear_alignment
 from tracking.kernels.jit import allocating_kernel

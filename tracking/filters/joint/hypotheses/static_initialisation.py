@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from tracking.filters.joint.ekf.heading_gauge import add_rotation_uncertainty, heading_variance
+from tracking.filters.joint.ekf.gauge import add_rotation_uncertainty, heading_variance
 from tracking.filters.joint.ekf.observability import shift_nullspace
 from tracking.filters.joint.ekf.scalar_update import reset_state
 from tracking.filters.joint.hypotheses.alignment import FILTERED, LINEAR, set_alignment

@@ -1,4 +1,4 @@
-"""What is done about a fault: one action for each of the catalogue (`faults.ACTIONS`).
+"""What is done about a fault: one action for each of the catalogue (`faults.CATALOGUE`).
 
 A faulty node: an offset common to its ranges becomes a state. Its ranges then move the node and the
 offset and hardly the others.

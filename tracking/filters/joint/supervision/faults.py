@@ -1,17 +1,16 @@
-"""Fault detection: a catalogue of faults, one decision a period, one action.
+"""Fault detection: a catalogue of faults, each with its statistic, its limit and its action.
 
-Each fault has a statistic of the residuals (`residuals`) and a limit; the fault with the largest
-ratio of the two, if that is above 1, is the one that is acted on. In units of a log-likelihood
-ratio, as far as the residuals are Gaussian: squares over variances.
-
-A link alone that contradicts the rest needs no decision: its ranges count less by themselves
-(`range_update`), and its pair is reported as doubtful.
+Once a period, the fault of a node or of the group whose statistic is most beyond its limit is acted
+on: statistics are squares over variances of the residuals (`residuals`), log-likelihood ratios as
+far as these are Gaussian. Faults of a link or of missing ranges need no comparison: they are
+decided with each range.
 """
 
 from __future__ import annotations
 
 import math
 from enum import IntEnum
+from typing import NamedTuple
 
 from tracking.filters.joint.hypotheses.alignment import CANDIDATES
 from tracking.filters.joint.hypotheses.geometric_degeneracy import degeneracy_ratio
@@ -29,12 +28,12 @@ from tracking.maths.multilateration import misfit
 
 
 class Fault(IntEnum):
-    """What is wrong with a node or the group."""
+    """A fault of a link, a node or the group."""
 
     NONE = 0
-    """Nothing."""
+    """No fault."""
     BIAS = 1
-    """All ranges of a node err alike: a wrong calibration, or an obstacle that hides it."""
+    """All ranges of a node err alike: a wrong calibration, or an obstacle around it."""
     OUTLIERS = 2
     """Most ranges of a node do not fit, those among the others do: random ranges."""
     POSITION = 3
@@ -43,19 +42,64 @@ class Fault(IntEnum):
     """In space: a node is metres from where its ranges have it."""
     ALIGNMENT = 5
     """The ranges of the group fit badly for seconds: it is rotated or reflected wrongly."""
+    LINK = 6
+    """The ranges of one pair contradict those of the other pairs."""
+    GROUP = 7
+    """Ranges all over the group do not fit: the estimate, or the error model, is wrong."""
+    FROZEN = 8
+    """A pair repeats one range while its ends travel."""
+    STALE = 9
+    """A node had no range until its distances to all others became uncertain."""
 
 
-ACTIONS: dict[Fault, str] = {
-    Fault.BIAS: "an offset common to the node's ranges becomes a state",
-    Fault.OUTLIERS: "an offset common to the node's ranges becomes a state",
-    Fault.POSITION: "the node moves to where its ranges fit, if there is such a position",
-    Fault.DIVERGED: "the node joins again; where most do, the group starts again",
-    Fault.ALIGNMENT: "all rotations and reflections compete again",
+class Remedy(NamedTuple):
+    """How a fault is decided, and the action."""
+
+    limit: str
+    """The parameter that its statistic is compared with, a field of `JointParams`."""
+    decided: str
+    """When: once a supervision period, or with each range."""
+    action: str
+
+
+PERIOD, RANGE = "each period, by the largest ratio", "each range"
+CATALOGUE: dict[Fault, Remedy] = {
+    Fault.BIAS: Remedy(
+        "node_bias_limit", PERIOD, "an offset common to the node's ranges becomes a state"
+    ),
+    Fault.OUTLIERS: Remedy(
+        "supervision.outlier_ratio",
+        PERIOD,
+        "an offset common to the node's ranges becomes a state",
+    ),
+    Fault.POSITION: Remedy(
+        "supervision.position_misfit",
+        PERIOD,
+        "the node moves to where its ranges fit, if there is such a position",
+    ),
+    Fault.DIVERGED: Remedy(
+        "supervision.far_residual",
+        PERIOD,
+        "the node joins again; where most do, the group starts again",
+    ),
+    Fault.ALIGNMENT: Remedy(
+        "start.respawn_nis", PERIOD, "all rotations and reflections compete again"
+    ),
+    Fault.LINK: Remedy(
+        "pair_nis_limit", RANGE, "its ranges count less and less; the pair is `doubtful`"
+    ),
+    Fault.GROUP: Remedy(
+        "supervision.group_outlier_ratio", RANGE, "every pair of the group is `doubtful`"
+    ),
+    Fault.FROZEN: Remedy(
+        "supervision.frozen_ranges", RANGE, "the range is ignored until another number comes"
+    ),
+    Fault.STALE: Remedy("stale_std", RANGE, "the node joins again with its next range"),
 }
-"""Fault to what is done about it."""
+"""Fault to how it is decided and the action."""
 
 # Plain numbers: kernels do not know enums.
-NONE, BIAS, OUTLIERS, POSITION, DIVERGED, ALIGNMENT = (f.value for f in Fault)
+NONE, BIAS, OUTLIERS, POSITION, DIVERGED, ALIGNMENT = (f.value for f in list(Fault)[:6])
 
 
 @kernel

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from tracking.filters.joint.ekf.heading_gauge import update_heading_variance
-from tracking.filters.joint.ekf.scalar_update import flush_all_updates
+from tracking.filters.joint.ekf.gauge import heading_variance
 from tracking.filters.joint.ekf.workspace import (
     CHALLENGE,
     FLAG,
@@ -18,6 +17,7 @@ from tracking.filters.joint.ekf.workspace import (
 from tracking.filters.joint.hypotheses.alignment import FILTERED, is_linear
 from tracking.filters.joint.hypotheses.bank import (
     any_timed_out,
+    flush_all_updates,
     needs_reflection,
     prune_bank,
 )
@@ -85,3 +85,10 @@ def needs_split(c, s, t):
         if is_silent(c, node, t):
             return False
     return group.heading_gauge_var > c.split_std**2
+
+
+@kernel
+def update_heading_variance(c, s):
+    """Keep how uncertain the turn of the reported hypothesis is."""
+    if c.d == 2:
+        s.group[0].heading_gauge_var = heading_variance(c, s, s.group[0].best)

@@ -1,21 +1,11 @@
-"""Motion constraints: zero velocity, non-holonomic vehicles, mean velocity; and the gauge.
-
-Ranges and accelerations do not observe where the group as a whole is. Its centre is moved back to
-the origin from time to time, with a fixed uncertainty that is independent of all else; differences
-between nodes are not affected.
-"""
+"""Motion constraints: rest (velocity and gyroscope), non-holonomic vehicles, mean velocity."""
 
 from __future__ import annotations
 
 import math
 
-from tracking.filters.joint.ekf.scalar_update import (
-    compute_pht,
-    covariance,
-    flush_updates,
-    kalman_update,
-    symmetrise,
-)
+from tracking.filters.joint.ekf.columns import GYRO_INFORMATION, GYRO_SUM
+from tracking.filters.joint.ekf.scalar_update import compute_pht, covariance, kalman_update
 from tracking.filters.joint.hypotheses.alignment import is_linear
 from tracking.filters.joint.hypotheses.alignment_sensitivity import (
     accumulate_alignment_information,
@@ -67,6 +57,24 @@ def constrain_nodes(c, s, h, t, work):
                 apply_constraint(c, s, h, -predicted, 1, c.rest_var, work)
         elif node.sideways_var > 0.0:
             nonholonomic_constraint(c, s, h, i, work)
+
+
+@small_kernel
+def update_gyro_bias_at_rest(s, h, i, work):
+    """Correct hypothesis h with the gyroscope bias that VQF learned at rest (`ahrs_feedback`)."""
+    node, pre = s.nodes[i], s.preintegrated
+    if pre[i, GYRO_INFORMATION] == 0.0:
+        return
+    taken, R = (node.gyro0, node.gyro1, node.gyro2), 1.0 / pre[i, GYRO_INFORMATION]
+    for k in range(3):
+        work.idx[0], work.val[0] = node.i_gyro_bias + k, 1.0
+        S = compute_pht(s, h, 1, work) + R
+        nu = pre[i, GYRO_SUM + k] * R - taken[k] - s.x[h, node.i_gyro_bias + k]
+        if is_linear(s.group[0]):
+            work.direct[:] = 0.0
+            innovation_sensitivity(s, h, 1, work)
+            accumulate_alignment_information(s, h, work, nu, S)
+        kalman_update(s, h, work.w, nu, S)
 
 
 @small_kernel
@@ -165,49 +173,3 @@ def mean_velocity_prior(c, s, h, dt, work):
             innovation_sensitivity(s, h, m, work)
             accumulate_alignment_information(s, h, work, -mean, S)
         kalman_update(s, h, work.w, -mean, S)
-
-
-@kernel
-def centre(c, s, h, w):
-    """Move the centre of the group to the origin: ``p <- p - mean p``, and P with it.
-
-    The covariance becomes ``T P T^T`` with the projection T, plus a common variance, so that
-    it stays positive definite and bounded.
-    """
-    n_nodes = s.nodes.shape[0]
-    present = 0
-    for i in range(n_nodes):
-        present += s.nodes[i].present
-    if present == 0:
-        return
-    P = s.P
-    flush_updates(s, h)
-    for k in range(c.d):
-        mean = 0.0
-        for r in range(c.n):
-            w[r] = 0.0
-        for i in range(n_nodes):
-            if s.nodes[i].present:
-                at = s.nodes[i].i_pos + k
-                mean += s.x[h, at] / present
-                for r in range(c.n):
-                    w[r] += P[h, at, r] / present
-        for i in range(n_nodes):
-            if s.nodes[i].present:
-                at = s.nodes[i].i_pos + k
-                s.x[h, at] -= mean
-                for r in range(c.n):
-                    P[h, at, r] -= w[r]
-        for r in range(c.n):
-            total = 0.0
-            for i in range(n_nodes):
-                if s.nodes[i].present:
-                    total += P[h, r, s.nodes[i].i_pos + k]
-            for i in range(n_nodes):
-                if s.nodes[i].present:
-                    P[h, r, s.nodes[i].i_pos + k] -= total / present
-        for i in range(n_nodes):
-            for j in range(n_nodes):
-                if s.nodes[i].present and s.nodes[j].present:
-                    P[h, s.nodes[i].i_pos + k, s.nodes[j].i_pos + k] += c.centre_std**2
-    symmetrise(P, h, c.n)

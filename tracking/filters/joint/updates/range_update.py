@@ -15,13 +15,18 @@ import math
 
 from tracking.filters.joint.ekf.observability import enforce_observability
 from tracking.filters.joint.ekf.propagation import displacement_since_epoch, time_since_epoch
-from tracking.filters.joint.ekf.scalar_update import compute_pht, kalman_update
+from tracking.filters.joint.ekf.scalar_update import (
+    compute_pht,
+    kalman_update,
+    relative_variance_across,
+    relative_variance_bound,
+)
 from tracking.filters.joint.hypotheses.alignment import is_linear
 from tracking.filters.joint.hypotheses.alignment_sensitivity import (
     accumulate_alignment_information,
     innovation_sensitivity,
+    lever_arm_sensitivity,
 )
-from tracking.filters.joint.updates.lever_arm import lever_arm_sensitivity
 from tracking.filters.joint.updates.nlos_model import (
     reset_bias_on_transition,
     update_nlos_posterior,
@@ -109,47 +114,21 @@ def predict_range(c, s, h, p, lever_i, lever_j, idx, val):
 
 @small_kernel
 def second_order_variance(c, s, h, p, val):
-    """What the straight line misses, as noise of the range [m2].
+    """Noise of a range that stands for the nonlinearity of its model [m2].
 
     A range is longer than predicted by ``tr(P_across) / (2 d)`` on average, to second order, with
     P_across the covariance of the relative position across the line of sight.
     """
-    i, j, W = s.nodes[s.pairs[p].i].i_pos, s.nodes[s.pairs[p].j].i_pos, s.pending_updates
+    i, j = s.nodes[s.pairs[p].i].i_pos, s.nodes[s.pairs[p].j].i_pos
     r0, r1, r2 = s.x[h, j] - s.x[h, i], s.x[h, j + 1] - s.x[h, i + 1], 0.0
-    trace = relative_covariance(s.P, h, i, j, 0, 0) + relative_covariance(s.P, h, i, j, 1, 1)
     if c.d == 3:
         r2 = s.x[h, j + 2] - s.x[h, i + 2]
-        trace += relative_covariance(s.P, h, i, j, 2, 2)
     gain = 0.5 * c.nonlinearity_gain / math.sqrt(r0 * r0 + r1 * r1 + r2 * r2 + 0.01)
-    if (gain * trace) ** 2 < NEGLIGIBLE * s.group[0].white_var:
-        return 0.0  # and less by pending updates
-    u0, u1, u2 = val[2], val[3], val[5] if c.d == 3 else 0.0
-    along = u0 * u0 * relative_covariance(s.P, h, i, j, 0, 0) + u1 * u1 * relative_covariance(
-        s.P, h, i, j, 1, 1
-    )
-    along += 2.0 * u0 * u1 * relative_covariance(s.P, h, i, j, 0, 1)
-    if c.d == 3:
-        across = u0 * relative_covariance(s.P, h, i, j, 0, 2) + u1 * relative_covariance(
-            s.P, h, i, j, 1, 2
-        )
-        along += u2 * (2.0 * across + u2 * relative_covariance(s.P, h, i, j, 2, 2))
-    # A sum for each axis: additions do not depend on each other.
-    t0, t1, t2 = 0.0, 0.0, 0.0
-    for q in range(s.n_pending[h]):
-        off0, off1, off2 = W[h, q, j] - W[h, q, i], W[h, q, j + 1] - W[h, q, i + 1], 0.0
-        if c.d == 3:
-            off2 = W[h, q, j + 2] - W[h, q, i + 2]
-        t0, t1, t2 = t0 + off0 * off0, t1 + off1 * off1, t2 + off2 * off2
-        part = u0 * off0 + u1 * off1 + u2 * off2
-        along -= part * part
-    trace -= t0 + t1 + t2
-    return min(gain * max(trace - along, 0.0), c.largest_bend) ** 2
-
-
-@small_kernel
-def relative_covariance(P, h, i, j, a, b):
-    """Covariance of components a and b of the position at j relative to that at i."""
-    return P[h, i + a, i + b] + P[h, j + a, j + b] - P[h, i + a, j + b] - P[h, j + a, i + b]
+    if (gain * relative_variance_bound(s, h, i, j, c.d)) ** 2 < NEGLIGIBLE * s.group[0].white_var:
+        return 0.0
+    u2 = val[5] if c.d == 3 else 0.0
+    across = relative_variance_across(s, h, i, j, val[2], val[3], u2, c.d)
+    return min(gain * max(across, 0.0), c.largest_bend) ** 2
 
 
 @small_kernel

@@ -1,8 +1,14 @@
-"""Residual gyroscope bias: what VQF has not removed, three states in the body.
+"""Feedback of the attitude filter: its tilt corrections, and the residual gyroscope bias.
 
-VQF removes a bias that it learns at rest, and in motion from its corrections of the tilt. The
-residual g turns its orientation by ``R(q_wb) g`` a second: the tilt error changes the horizontal
-bias by gravity, and the heading error grows:
+VQF corrects its tilt over some seconds by its accelerometer, whose offset and lasting motion it so
+takes for tilt. A horizontal bias b is gravity seen through a tilt (`attitude_coupling`), so after a
+correction by (t_x, t_y) about x and y of the world it is
+
+    b + g_0 (t_y, -t_x)
+
+VQF also removes a gyroscope bias, which it learns at rest, and in motion from these corrections.
+The residual g, three states in the body, turns its orientation by ``R(q_wb) g`` a second: the tilt
+error changes the horizontal bias by gravity, and the heading error grows:
 
     theta = S g,  b += g_0 (theta_y, -theta_x),  heading error -= theta_z,  S = int R(q_wb) dt
 
@@ -21,12 +27,14 @@ from tracking.filters.joint.ekf.columns import (
     GYRO_INFORMATION,
     GYRO_SUM,
     ROTATION_V,
+    TILT_GAIN,
     TILT_STEP,
     row_times,
 )
 from tracking.geometry import GRAVITY
 from tracking.kernels.jit import small_kernel
-from tracking.measurements import GYRO_BIAS, GYRO_VAR, TOLD
+from tracking.maths.angles import turn
+from tracking.measurements import GYRO_BIAS, GYRO_VAR, TOLD, UPRIGHT
 
 RESTS = 2.0
 """Value of `TOLD` at rest."""
@@ -122,3 +130,35 @@ def propagate_gyro_bias_sensitivity(node, z, w, i, scale):
     z[node.i_tilt_bias] += row_times(w, i, BY_GYRO, g0, g1, g2) - w[i, TILT_STEP + 1] * y0
     z[node.i_tilt_bias + 1] += row_times(w, i, BY_GYRO + 3, g0, g1, g2) + w[i, TILT_STEP] * y0
     z[node.i_heading] += row_times(w, i, BY_GYRO + 6, g0, g1, g2)
+
+
+@small_kernel
+def process_tilt_correction(node, pre, i, values, e, k, is_new):
+    """Note how node i was turned upright between two STATE events, the later in column k."""
+    reported = node.i_acc_bias >= 0 and values[e, k, TOLD] != 0.0
+    if reported:
+        turned0, turned1 = values[e, k, UPRIGHT], values[e, k, UPRIGHT + 1]
+        begins = is_new or not node.has_ahrs_feedback
+        if not begins:
+            pre[i, TILT_GAIN] += GRAVITY * (turned1 - node.tilt_correction1)
+            pre[i, TILT_GAIN + 1] -= GRAVITY * (turned0 - node.tilt_correction0)
+        node.tilt_correction0, node.tilt_correction1 = turned0, turned1
+        process_gyro_bias(node, pre, i, values, e, k, begins)
+    node.has_ahrs_feedback = reported
+
+
+@small_kernel
+def apply_tilt_correction(node, pre, x, h, i, cos_r, sin_r, w):
+    """Add that to the bias of node i in hypothesis h, and write it to row i of w."""
+    gain0, gain1 = turn(cos_r, sin_r, pre[i, TILT_GAIN], pre[i, TILT_GAIN + 1])
+    b0, b1, y = gyro_bias_transition(node, pre, x, h, i, cos_r, sin_r, w)
+    w[i, TILT_STEP], w[i, TILT_STEP + 1] = gain0 + b0, gain1 + b1
+    x[h, node.i_tilt_bias] += w[i, TILT_STEP]
+    x[h, node.i_tilt_bias + 1] += w[i, TILT_STEP + 1]
+    x[h, node.i_heading] += y
+
+
+@small_kernel
+def tilt_bias_tau(node):
+    """How long the horizontal bias of a node stays the same [s]."""
+    return node.bias_tau_with_ahrs_feedback if node.has_ahrs_feedback else node.bias_tau

@@ -17,7 +17,7 @@ import numpy as np
 
 from tracking.arrays import F64, aligned, whole_lines
 from tracking.estimate import Status, TeamEstimate
-from tracking.filters.joint.hypotheses.alignment import Alignment
+from tracking.filters.joint.hypotheses.alignment import freeze_alignment
 from tracking.filters.joint.state import JointState, room_to_wait
 from tracking.records import Records
 
@@ -39,10 +39,7 @@ def with_clones(state: JointState, coefficients: Records) -> tuple[JointState, R
     every = np.concatenate([np.arange(n), np.arange(n_motion)])
     width = whole_lines(len(every))
     group = state.group.copy()
-    group["best"], group["n_alive"] = 0, np.minimum(group["n_alive"], 1)
-    # The reported rotation is taken as it is.
-    linear = group["alignment"] >= Alignment.LINEAR
-    group["alignment"] = np.where(linear, Alignment.FILTERED, group["alignment"])
+    freeze_alignment(group)
     wider = coefficients.copy()
     wider["n"] = width
     clones = JointState(
