@@ -5,8 +5,7 @@ import pytest
 
 from agents.simulation.simulate import simulate
 from tracking import Tracker
-from tracking.filters.joint import state
-from tracking.filters.joint.ekf import smoothing
+from tracking.filters.joint import smoothing, state
 from tracking.filters.joint.params import JointParams, NoiseLearningParams
 from tracking.filters.params import FilterParams
 from tracking.measurements import Kind

@@ -8,13 +8,18 @@ from scipy.spatial.transform import Rotation
 
 from tracking import Constellation, NodeConfig
 from tracking.filters.joint.coefficients import make_coefficients
-from tracking.filters.joint.ekf import observability, preintegration, propagation, scalar_update
+from tracking.filters.joint.ekf import (
+    gauge,
+    observability,
+    preintegration,
+    propagation,
+    scalar_update,
+)
 from tracking.filters.joint.ekf.workspace import make_workspace
 from tracking.filters.joint.hypotheses.alignment import Alignment
 from tracking.filters.joint.hypotheses.bank import flush_all_updates
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.state import JointState, make_layout, make_state
-from tracking.filters.joint.updates import motion_constraints
 from tracking.filters.joint.updates.range_update import predict_range
 from tracking.geometry import GRAVITY
 from tracking.records import as_records
@@ -168,7 +173,7 @@ def test_moving_the_centre_changes_nothing_relative(dimensions):
         difference[k, at[1] + k], difference[k, at[0] + k] = 1.0, -1.0
         difference[d + k, at[2] + k], difference[d + k, at[0] + k] = 1.0, -1.0
     x0, P0 = difference @ s.x[0], difference @ s.P[0] @ difference.T
-    motion_constraints.centre(c, s, 0, work.w)
+    gauge.centre(c, s, 0, work.w)
     np.testing.assert_allclose(difference @ s.x[0], x0, atol=1e-12)
     np.testing.assert_allclose(difference @ s.P[0] @ difference.T, P0, atol=1e-12)
     centre = np.mean([s.x[0, a : a + d] for a in at], axis=0)

@@ -7,7 +7,6 @@ from tracking import Constellation, NodeConfig
 from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.ekf.gauge import (
     add_rotation_uncertainty,
-    update_heading_variance,
 )
 from tracking.filters.joint.ekf.observability import enforce_observability
 from tracking.filters.joint.ekf.scalar_update import flush_updates
@@ -18,6 +17,7 @@ from tracking.filters.joint.hypotheses.static_initialisation import reset_headin
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.smoothing import with_clones
 from tracking.filters.joint.state import JointState, make_layout, make_state
+from tracking.filters.joint.supervision.supervise import update_heading_variance
 from tracking.filters.joint.updates.surveyed_distance import surveyed_distance_update
 from tracking.records import as_records
 
