@@ -1,11 +1,11 @@
 """What each mechanism of the joint filter is worth: each left out on the same runs.
 
-For `docs/explanation/tracker.md`. A mechanism is left out by parameters alone. Errors are paired
+For `docs/benchmarks/tracker.md`. A mechanism is left out by parameters alone. Errors are paired
 with those of the whole filter on the same seeds: the median ratio and its 95 % interval by the
 bootstrap.
 
 The runs are those of `cases`. Run `python benchmarks/measure_ablation.py [RUNS] [MECHANISM ...] >
-rows.jsonl`, then `python benchmarks/measure_ablation.py --table rows.jsonl`.
+benchmarks/results/ablation.jsonl`, then `python benchmarks/make_tables.py`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from multiprocessing import Pool
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -175,47 +174,8 @@ def rows(n_runs: int, names: list[str]) -> Iterator[dict[str, Any]]:
             }
 
 
-def tables(lines: list[str]) -> str:
-    """Rows as tables in Markdown, one for each group of kinds."""
-    rows = [json.loads(line) for line in lines]
-    kinds = list(dict.fromkeys(row["kind"] for row in rows))
-    names = list(dict.fromkeys(row["without"] for row in rows))
-    found = {(row["without"], row["kind"]): row for row in rows}
-    groups: dict[str, list[str]] = {}
-    for kind in kinds:
-        first, fault = kind.split(" ")[0], kind.partition(", ")[2]
-        is_own = fault or first in ("late", "exact", "convoy", "world")
-        groups.setdefault(first if is_own else "", []).append(kind)
-    parts = []
-    for some in groups.values():
-        head = ["without", *some]
-        text = [head, ["---"] * len(head)]
-        for name in names:
-            cells = [cell(found[name, k]) for k in some]
-            if set(cells) != {"="}:
-                text.append([name or "all of them", *cells])
-        parts.append("\n".join("| " + " | ".join(row) + " |" for row in text))
-    return "\n\n".join(parts)
-
-
-def cell(row: dict[str, Any]) -> str:
-    """One figure: errors [m] of the whole filter, else their ratio to it; what is wrong and ok."""
-    shares = f"{100.0 * row['wrong']:.2g} of {100.0 * row['ok']:.0f} %"
-    if not row["without"]:
-        return f"{row['yaw']:.3f} / {row['shape']:.3f} m; {shares}"
-    if not row["changed"]:
-        return "="
-    (yaw, low, high), (shape, *_) = row["yaw"], row["shape"]
-    if row["runs"] == 1:
-        return f"{yaw:.2f} / {shape:.2f}; {shares}"
-    return f"{yaw:.2f} ({low:.2f}-{high:.2f}) / {shape:.2f}; {shares}"
-
-
 def main() -> None:
-    """Print the rows as JSON lines, or rows of before as tables."""
-    if sys.argv[1:2] == ["--table"]:
-        print(tables(Path(sys.argv[2]).read_text().splitlines()))
-        return
+    """Print the rows as JSON lines."""
     n_runs = int(sys.argv[1]) if len(sys.argv) > 1 else 30
     for row in rows(n_runs, sys.argv[2:] or list(MECHANISMS)):
         print(json.dumps(row), flush=True)

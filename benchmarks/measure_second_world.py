@@ -1,6 +1,6 @@
 """The default filter in the second world (`tests/second_world`), which shares nothing with ours.
 
-For `docs/explanation/tracker.md`: worlds are drawn at random and tracked: cars with the mounts of
+For `docs/benchmarks/tracker.md`: worlds are drawn at random and tracked: cars with the mounts of
 their trackers given, unknown, and labelled robots; hands, drones and bodies in space. The bound
 of each world is that of an efficient estimator that knows the world's noise and the mounts.
 

@@ -1,6 +1,6 @@
 """How a tracker does in space from nothing but raw sensors: hands next to fixed nodes, and drones.
 
-For `docs/explanation/tracker.md`; the runs are those of `space_runs.py`. Nothing of them is in a
+For `docs/benchmarks/tracker.md`; the runs are those of `space_runs.py`. Nothing of them is in a
 log, so filters can be compared on hundreds before a recording is looked at.
 
 Run `python benchmarks/measure_space.py hand|drones [RUNS] [FIRST SEED] [FILTER]`.

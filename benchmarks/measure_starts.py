@@ -1,6 +1,6 @@
 """How soon a tracker that begins in the middle of a recording knows where everybody is.
 
-For `docs/explanation/tracker.md`: a recording is cut at many places, and the tracker knows
+For `docs/benchmarks/tracker.md`: a recording is cut at many places, and the tracker knows
 nothing of what was before; for half a minute each it is judged as `relpos track` does, from ten
 seconds on.
 
