@@ -53,7 +53,7 @@ class _Sections(click.Group):
 @click.group(cls=_Sections, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="relpos-env", prog_name="relpos")
 def cli() -> None:
-    """Relative positions without anchors: track, simulate, train, drive."""
+    """Estimate relative positions without anchors: track, simulate, train, drive."""
 
 
 for commands in SECTIONS.values():

@@ -67,10 +67,7 @@ def _receive(end: Connection) -> Any:
 
 
 def _serve(end: Connection, n_envs: int, resets: int, warm_up: int) -> None:
-    """Run turns on request in a worker process.
-
-    The time includes the actions, since all processes must be busy all the time.
-    """
+    """Run turns on request in a worker; times include actions, so that all are always busy."""
     batch = Batch(n_envs, followed, resets=resets)
     batch.warm_up(warm_up)
     end.send("ready")

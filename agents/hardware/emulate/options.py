@@ -47,8 +47,7 @@ class EmulateOptions:
     seed: int = 0
     """[-] Seed of the episode, as of `relpos_env.api.parallel_env.FormationEnv.reset`."""
     seconds: float = 60.0
-    """[s] Length after the release of the cars, which rest for
-    `relpos_env.timing.STAND_STILL` first."""
+    """[s] Length after the release of the cars, at `relpos_env.timing.STAND_STILL`."""
     format: str = "relpos"
     """Format of the nodes, see `hardware_bridge.emulator.formats`."""
     imu_format: str | None = None

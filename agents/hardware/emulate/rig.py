@@ -42,8 +42,7 @@ TRUTH_EVERY = 2
 class EmulatedRig:
     """World, devices and ports, stepped without waiting for real time.
 
-    Property: the same options and the same bytes to the cars at the same times give the same
-    results, bit for bit.
+    Property: equal options and equal bytes to cars at equal times give equal results, bit for bit.
     """
 
     def __init__(

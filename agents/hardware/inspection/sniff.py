@@ -39,7 +39,7 @@ class Sniffed:
     damaged: int
     skipped: int
     strange: int
-    """Bytes between frames."""
+    """[-] Bytes outside of frames."""
 
     @property
     def record(self) -> dict[str, Any]:
@@ -69,8 +69,7 @@ def sniff(
         seconds: Duration [s]; None runs until interrupted.
         key: Key of formats with signed messages.
         show: Called with each reading and its time since the start [s].
-        show_chunk: Called with the time since the start [s] and the raw bytes; then it is no error
-            if the bytes fit no format.
+        show_chunk: Called with the time [s] and the raw bytes, which then need not fit any format.
         show_notice: Called when the port is lost or reconnected.
         formats: Formats to try; by default all known formats.
         now_ns: Monotonic clock of the host [ns].

@@ -202,11 +202,7 @@ class _Trial:
         return abs(self._speeds[-1][1])
 
     def _wait(self, is_so: Callable[[], bool], seconds: float, speed: float | None = None) -> bool:
-        """Receive until `is_so`, up to `seconds`, while sending `speed` [m/s] if given.
-
-        Returns:
-            True if `is_so` returned True in time.
-        """
+        """Wait for `is_so`, driving at `speed` [m/s] if given; return whether it holds in time."""
         end, due = time.monotonic() + seconds, 0.0
         while (now := time.monotonic()) < end:
             if now >= due:
