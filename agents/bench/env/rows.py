@@ -20,7 +20,7 @@ Row = dict[str, Any]
 CURVES_FROM = 0.6
 """[-] Share done when the curves begin."""
 NLOS = "ring-nlos"
-"""The same room with a wall in it."""
+"""Scenario of the same room with a wall."""
 DRIVES: dict[str, Callable[[], Drive]] = {"followed": lambda: followed, "by chance": Chance}
 """Drivers: following the task, and random with frequent contacts, which keeps the solver busy."""
 

@@ -63,7 +63,7 @@ class EmulateOptions:
     key: bytes | None = None
     """Key of 16 bytes for messages of our own format; None signs none. Cars have `car_key`."""
     operator: bool = True
-    """Whether to emulate the operator's remote control, which adds a velocity to the plan."""
+    """True to emulate the operator's remote control, which adds a velocity to the plan."""
     faults: FaultPlan = field(default_factory=FaultPlan)
     """Faults to inject."""
     nodes: NodeParams = field(default_factory=NodeParams)
