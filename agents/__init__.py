@@ -1,6 +1,6 @@
 """Controllers, training, evaluation, reports and the command line.
 
-The functions that most users need, imported when they are first used:
+The functions for most users, imported on first use:
 
 >>> from agents import compare, demo, evaluate, simulate, track, train
 """
@@ -18,7 +18,7 @@ _FUNCTIONS = {
     "track": "agents.evaluation.track:track_log",
     "train": "agents.training.run:train_policy",
 }
-"""Name to module, and the function's own name where it differs."""
+"""Module of each name, with the name of the function if it differs."""
 
 __all__ = ["compare", "demo", "evaluate", "simulate", "track", "train"]
 

@@ -1,4 +1,4 @@
-"""Whatever drives cars: controllers and policies alike."""
+"""Interface of controllers and policies."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from relpos_env.interface.observations.base import F32
 
 
 class Driver(Protocol):
-    """One law for every car; it keeps no state, what it remembers is in the observation."""
+    """A stateless control law for every car; any memory is part of the observation."""
 
     def act(self, observations: F32) -> F32:
-        """Actions of the cars that see the observations.
+        """Return the actions for observations.
 
         Args:
-            observations: (..., size), as the layout says that the driver was made for.
+            observations: Observations in the layout of the driver, (..., size).
 
         Returns:
-            (..., 2), speed and steering as shares of their largest values, -1 to 1.
+            Speed and steering as shares of their largest values, -1 to 1, (..., 2).
         """

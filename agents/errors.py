@@ -1,5 +1,5 @@
-"""What a user of the command line can mend."""
+"""User errors."""
 
 
 class UsageError(Exception):
-    """A request that makes no sense: names the option and what is allowed."""
+    """Invalid request of a user; the message names the option and its allowed values."""

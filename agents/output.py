@@ -1,4 +1,4 @@
-"""Results on disk: whole or not at all."""
+"""Writing of results to disk."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from agents.errors import UsageError
 
 
 def write_results(folder: Path, files: Mapping[str, str | bytes]) -> Path:
-    """Write named texts and pictures into a folder, all of them or none.
+    """Write named texts and pictures into a folder, replacing files of the same names.
 
-    All are written next to their places first and only then moved, so that a full disk leaves
-    nothing and a kill no half file. Files of the same names are replaced.
+    All files are written to a temporary folder first and then moved, so that a full disk leaves
+    none of them and a killed process no partial file.
 
     Raises:
         UsageError: The folder cannot be written to.
@@ -41,10 +41,10 @@ def write_results(folder: Path, files: Mapping[str, str | bytes]) -> Path:
 
 
 def check_folder(folder: Path, names: Iterable[str]) -> None:
-    """See that files of these names can be written, before any work is done for them.
+    """Check that files of these names can be written, before any computation.
 
     Raises:
-        UsageError: They cannot.
+        UsageError: A file cannot be written.
     """
     try:
         for name in names:
@@ -54,14 +54,14 @@ def check_folder(folder: Path, names: Iterable[str]) -> None:
 
 
 def check_new(folder: Path, hint: str = "") -> None:
-    """See that a folder is new or empty, for results that must not mix with others.
+    """Check that a folder is new or empty, for results that must not mix with others.
 
     Args:
-        folder: That is to be written to.
-        hint: What else would do.
+        folder: Target folder.
+        hint: Alternative for the error message.
 
     Raises:
-        UsageError: It exists and is no empty folder.
+        UsageError: The folder exists and is not empty.
     """
     try:
         taken = folder.exists() and (not folder.is_dir() or any(folder.iterdir()))
@@ -72,7 +72,7 @@ def check_new(folder: Path, hint: str = "") -> None:
 
 
 def _check_free(folder: Path, name: str) -> None:
-    """See that a file can take its place: no folder there, no file where a folder must be."""
+    """Check that the path of a file is no folder, and that its parents are folders."""
     target = folder / name
     if target.is_dir():
         raise UsageError(f"--out {folder}: {name} is a folder there, expected a file or nothing")
@@ -80,6 +80,6 @@ def _check_free(folder: Path, name: str) -> None:
         if parent.exists():
             if not parent.is_dir():
                 raise UsageError(f"--out {folder}: {parent} is a file, expected a folder")
-            # What may be done there is known for sure once it is done.
+            # Only writing shows for certain whether the folder is writable.
             tempfile.TemporaryDirectory(prefix=".writing-", dir=parent).cleanup()
             return

@@ -1,9 +1,9 @@
-"""Frozen dataclasses as command-line options and as JSON, both from the fields alone.
+"""Frozen dataclasses as command-line options and as JSON, both derived from the fields.
 
-A settings class has fields that are numbers, texts, choices (`Literal`), tuples of numbers or
-texts, or settings classes again. The docstring below a field is its help; its metadata may hold
-the least and the largest value, see `number`. Names are unique over all nested classes, so that
-options need no prefix.
+A settings class has fields that are numbers, strings, choices (`Literal`), tuples of numbers or
+strings, or nested settings classes. The docstring below a field is its help; its metadata may
+hold the smallest and the largest value, see `number`. Names are unique over all nested classes, so
+that options need no prefix.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ T = TypeVar("T")
 
 
 def number(default: float, low: float, high: float) -> Any:
-    """A field for a number in a range, both ends in it."""
+    """Return a field for a number in a closed range."""
     return field(default=default, metadata={"low": low, "high": high})
 
 
 def options(cls: type) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Decorate a command with an option for every leaf; those of lists are repeated."""
+    """Decorate a command with an option for every leaf; options of lists are repeatable."""
 
     def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
         for leaf in reversed(list(leaves(cls))):
@@ -51,19 +51,19 @@ def options(cls: type) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
 
 
 Given = Mapping[str, str | Sequence[str] | None]
-"""Texts of options by leaf name: one, or one for each time it is given; None where it is not."""
+"""Text of each option by leaf name: one, several if repeated, or None if not given."""
 
 
 def is_given(text: str | Sequence[str] | None) -> bool:
-    """True for an option that was given."""
+    """Return whether an option was given."""
     return text is not None and (isinstance(text, str) or len(text) > 0)
 
 
 def from_options(cls: type[T], given: Given, base: T | None = None) -> T:
-    """Settings from texts by leaf name; what is not given is as in `base` or by default.
+    """Return settings from texts by leaf name; other values are those of `base` or the defaults.
 
     Raises:
-        UsageError: A text that is no such value, or out of range; the option is named.
+        UsageError: A text is invalid or out of range; the message names the option.
     """
     texts = {k: v for k, v in given.items() if v is not None and is_given(v)}
 
@@ -76,20 +76,20 @@ def from_options(cls: type[T], given: Given, base: T | None = None) -> T:
 
 
 def as_options(settings: Any) -> list[str]:
-    """What a command must be given for these settings: options that are not as by default."""
+    """Return the command-line arguments of all settings that differ from their defaults."""
     values = dict(_values(settings))
     words = []
     for leaf in leaves(type(settings)):
         value = values[leaf.name]
         if value != leaf.default:
-            # An empty text is one of no value.
+            # An empty text gives an empty list.
             for one in (value or ("",)) if leaf.many else (value,):
                 words += [leaf.option, str(one)]
     return words
 
 
 def _values(settings: Any) -> Iterator[tuple[str, Any]]:
-    """Name and value of every leaf."""
+    """Yield name and value of every leaf."""
     for f in fields(settings):
         value = getattr(settings, f.name)
         if is_dataclass(value):
@@ -99,15 +99,15 @@ def _values(settings: Any) -> Iterator[tuple[str, Any]]:
 
 
 def to_json(settings: Any) -> dict[str, Any]:
-    """The settings as nested JSON objects."""
+    """Return the settings as nested JSON objects."""
     return asdict(settings)
 
 
 def from_json(cls: type[T], data: Any, where: str = "config") -> T:
-    """Settings from nested JSON objects, every field there and no other.
+    """Return settings from nested JSON objects with exactly the fields of the class.
 
     Raises:
-        UsageError: They are not; the field is named.
+        UsageError: A field is unknown, missing or invalid; the message names it.
     """
     hints = get_type_hints(cls)
     names = [f.name for f in fields(cls)]  # type: ignore[arg-type]
@@ -128,7 +128,7 @@ def from_json(cls: type[T], data: Any, where: str = "config") -> T:
 
 
 class Leaf:
-    """A field that holds a value."""
+    """A field with a value, in contrast to a nested settings class."""
 
     def __init__(
         self, name: str, kind: Any, default: Any, text: str, metadata: Mapping[str, Any]
@@ -140,18 +140,18 @@ class Leaf:
 
     @property
     def metavar(self) -> str:
-        """What to write in its place."""
+        """Placeholder of the value in the help."""
         return "|".join(self.choices) or {int: "N", float: "X"}.get(self.kind, "NAME")
 
     @property
     def option(self) -> str:
-        """The option that it is given by; that of a list is given once for each value."""
+        """Name of the option; singular for a list, whose option is repeated for each value."""
         name = self.name.removesuffix("s") if self.many else self.name
         return f"--{name.replace('_', '-')}"
 
 
 def leaves(cls: type) -> Iterator[Leaf]:
-    """The fields that hold values, nested ones too, with their defaults and helps."""
+    """Yield the leaves of a class and its nested classes, with defaults and help texts."""
     hints, texts = get_type_hints(cls), _docstrings(cls)
     for f in fields(cls):  # type: ignore[arg-type]
         if is_dataclass(hints[f.name]):
@@ -162,7 +162,7 @@ def leaves(cls: type) -> Iterator[Leaf]:
 
 
 def _map(cls: Any, old: Mapping[str, Any], value: Callable[[Leaf, Any], Any]) -> Any:
-    """Build nested settings from values by field."""
+    """Return nested settings, with `value(leaf, old)` as the value of every leaf."""
     hints = get_type_hints(cls)
     found = {}
     for f in fields(cls):
@@ -175,7 +175,7 @@ def _map(cls: Any, old: Mapping[str, Any], value: Callable[[Leaf, Any], Any]) ->
 
 
 def _parse(leaf: Leaf, text: str | Sequence[str]) -> Any:
-    """A value from the text of an option, or the texts of one that is repeated."""
+    """Return the value of an option from its text, or from the texts of a repeated option."""
     option, texts = leaf.option, [text] if isinstance(text, str) else text
     values = []
     for part in [t.strip() for t in texts if t.strip()] if leaf.many else texts:
@@ -187,7 +187,7 @@ def _parse(leaf: Leaf, text: str | Sequence[str]) -> Any:
 
 
 def _check(leaf: Leaf, value: Any, where: str) -> Any:
-    """A value of the leaf's type and range, lists as tuples."""
+    """Return a value after a check of type and range, lists as tuples."""
     if leaf.many:
         if not isinstance(value, list | tuple):
             raise UsageError(f"{where}: expected a list, got {value!r}")
@@ -212,7 +212,7 @@ def _check_one(leaf: Leaf, value: Any, where: str) -> Any:
 
 
 def _docstrings(cls: type) -> dict[str, str]:
-    """Field to the first paragraph of the text below it."""
+    """Return the docstring of each field on a single line."""
     body = ast.parse(textwrap.dedent(inspect.getsource(cls))).body[0]
     assert isinstance(body, ast.ClassDef)
     found = {}

@@ -1,7 +1,7 @@
-"""How long everything takes the first time: installing, importing, compiling, running.
+"""Benchmark of cold starts: installing, importing, compiling and running for the first time.
 
-The second time, in the same environment, is the peer. Nothing of this machine is used but what pip
-keeps of packages: environment, byte code and compiled kernels are new.
+The peer is a second run in the same environment. Environment, byte code and compiled kernels are
+new; only the package cache of pip is reused.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from typing import Any
 from agents.errors import UsageError
 
 SOURCE = Path(__file__).resolve().parents[2]
-"""What is installed where it is a source tree."""
+"""Package to install if it is a source tree."""
 COMMANDS = {
     "import relpos_env": "-c 'import relpos_env'",
     "relpos --help": "-m agents.cli.main --help",
@@ -30,20 +30,20 @@ COMMANDS = {
     "relpos track LOG, compiled": "-m agents.cli.main track log1",
     "relpos demo, compiled for env": "-m agents.cli.main demo --out demo{n}",
 }
-"""Commands of Python by what they are."""
+"""Arguments of the Python interpreter by case."""
 Tell = Callable[[float], None]
 
 
 def bench_cold(*, install: bool = False, progress: Tell | None = None) -> list[dict[str, Any]]:
-    """Seconds of the first and the second time.
+    """Measure the times of first and second runs, and the memory of compilation.
 
     Args:
-        install: Also install into a new environment, from what pip finds, and use that; else the
-            packages of this one.
-        progress: Called with the share done.
+        install: Whether to install into a new environment with pip and use it; False uses the
+            packages of the current environment.
+        progress: Called with the share done, 0 to 1.
 
     Raises:
-        UsageError: There is nothing to install from, or a step failed; the message has its words.
+        UsageError: There is no source tree, or a step failed; the message has its last line.
     """
     with tempfile.TemporaryDirectory(prefix="relpos-cold-") as folder:
         cold, rows = _Cold(Path(folder)), list[dict[str, Any]]()
@@ -62,7 +62,7 @@ def bench_cold(*, install: bool = False, progress: Tell | None = None) -> list[d
 
 
 class _Cold:
-    """A place where nothing was done before."""
+    """Folder with empty caches of byte code and kernels."""
 
     def __init__(self, folder: Path) -> None:
         self._folder, self._python = folder, sys.executable
@@ -74,7 +74,7 @@ class _Cold:
         self._env.pop("PYTHONDONTWRITEBYTECODE", None)
 
     def install(self) -> tuple[float, float]:
-        """A new environment with the package, and the same once more."""
+        """Install the package into a new environment twice; return both times [s]."""
         if not (SOURCE / "pyproject.toml").is_file():
             raise UsageError(f"--install: expected a source tree with pyproject.toml at {SOURCE}")
         began = time.perf_counter()
@@ -90,13 +90,13 @@ class _Cold:
         return first, time.perf_counter() - began
 
     def run(self, command: str, n: int) -> tuple[float, str]:
-        """Time of a command [s], whose ``{n}`` is replaced, and what it writes."""
+        """Run a command with ``{n}`` replaced; return its time [s] and standard output."""
         began = time.perf_counter()
         said = self._run(*shlex.split(command.format(n=n)))
         return time.perf_counter() - began, said
 
     def loading_mb(self) -> float:
-        """Memory of a process that only loads the code of the tracker [MB]."""
+        """Return the peak memory of a process that only loads the compiled tracker [MB]."""
         code = (
             "import resource; from agents.warm_up import parts_of;"
             "[part.compile() for part in parts_of('track')];"

@@ -1,4 +1,4 @@
-"""How long a message-level ranging round takes in a batch of environments, on one core."""
+"""Benchmark of message-level ranging rounds in a batch of environments, on one core."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from tracking.ranging.params import SessionParams
 
 DT = 0.01
 REPEATS = 5
-"""The fastest of so many runs counts."""
+"""[-] Number of timed runs, of which the fastest counts."""
 LONG_FRAMES = RadioSimParams(session=SessionParams(phy=replace(PAPER_PHY, max_frame=1023)))
 
 
 def bench_radio(*, progress: Callable[[float], None] | None = None) -> list[dict[str, Any]]:
-    """Microseconds per round of moving nodes among four obstacles, all pairs ranged.
+    """Measure the time per round [us] of moving nodes among four obstacles, all pairs ranged.
 
-    The peer is the reference: the same air with the session as objects and real bytes.
+    The peer is the reference implementation of the radio, with session objects and real bytes.
     """
     cases = ((3, 256), (6, 128), (10, 64), (20, 16), (50, 4))
     rows = []
@@ -51,7 +51,7 @@ def bench_radio(*, progress: Callable[[float], None] | None = None) -> list[dict
 
 
 def radio_cost(n: int, envs: int) -> tuple[float, float]:
-    """Time per round that the airtime allows [us], and share of its ranges that were resolved."""
+    """Return the time per round at the airtime-limited rate [us], and the resolved range share."""
     rng = np.random.default_rng(n)
     radio = Radio(LONG_FRAMES, n, [int(s) for s in rng.integers(1 << 62, size=envs)], DT)
     for e in range(envs):
@@ -77,7 +77,7 @@ def radio_cost(n: int, envs: int) -> tuple[float, float]:
 
 
 def _reference_cost(n: int) -> float:
-    """The same of the reference air [us], one environment."""
+    """Return the time per round of the reference implementation in one environment [us]."""
     rng = np.random.default_rng(n)
     air, motion = Air(LONG_FRAMES, n, 1, DT), _motion(n, 1, rng)
     for k in range(n):
@@ -95,7 +95,7 @@ def _reference_cost(n: int) -> float:
 
 
 def _motion(n: int, envs: int, rng: np.random.Generator) -> Callable[[float], F64]:
-    """Nodes that go round ellipses of their own at about 1.2 m/s, (env, node, 3) [m]."""
+    """Return a function of time for node positions on ellipses at ~1.2 m/s, (env, node, 3) [m]."""
     phase = rng.uniform(0.0, 2.0 * np.pi, (envs, n))
     size = rng.uniform(0.8, 1.2, (envs, n))
 
@@ -109,6 +109,6 @@ def _motion(n: int, envs: int, rng: np.random.Generator) -> Callable[[float], F6
 
 
 def _boxes() -> F64:
-    """Four boxes of half a metre, (4, 6)."""
+    """Return four boxes of half a metre, (4, 6)."""
     centres = np.array([[0.0, 0.0], [0.6, 0.9], [-0.6, 0.9], [0.0, -1.0]])
     return np.column_stack([centres, np.full((4, 2), 0.25), np.ones(4), np.zeros(4)])

@@ -1,1 +1,1 @@
-"""The command line `relpos`: options, output, and one module for each command."""
+"""The command line `relpos`: options, output, and one module per command."""

@@ -1,4 +1,4 @@
-"""What a command shows: JSON lines and tables on stdout, progress on stderr."""
+"""Output of commands: JSON lines and tables on stdout, progress on stderr."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from typing import Any
 import click
 
 WIDEST = 10_000
-"""[-] Letters of a line."""
+"""[-] Largest width of a line in characters."""
 
 
 def emit_json(records: Iterable[Mapping[str, Any]]) -> None:
-    """One JSON object a line."""
+    """Print one JSON object per line."""
     for record in records:
         click.echo(json.dumps(record, allow_nan=False))
 
 
 @contextmanager
 def progress_bar(label: str, *, shown: bool = True) -> Iterator[Callable[[float], None]]:
-    """A bar on stderr, drawn only on a terminal; gives the function to report the share done."""
+    """Show a progress bar on stderr, if that is a terminal; yield a function for the share done."""
     from rich.console import Console
     from rich.progress import (
         BarColumn,
@@ -48,7 +48,7 @@ def progress_bar(label: str, *, shown: bool = True) -> Iterator[Callable[[float]
 
 
 def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """A table on stdout."""
+    """Print a table on stdout."""
     from rich import box
     from rich.console import Console
     from rich.markup import escape
@@ -60,6 +60,6 @@ def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]
     for row in rows:
         table.add_row(*(escape(cell) for cell in row))
     console = Console(width=None if sys.stdout.isatty() else 120)
-    # Figures that are cut off are worth nothing: a narrow window breaks the lines instead.
+    # Figures must not be truncated: a narrow window wraps the lines instead.
     console.width = max(console.width, Console(width=WIDEST).measure(table).maximum)
     console.print(table)

@@ -1,4 +1,4 @@
-"""The command line `relpos`. Imports of a command happen when it runs, so that help is quick."""
+"""The command line `relpos`. Commands import their code when they run, so that help is fast."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ SECTIONS = {
     "Hardware": (doctor, sniff, live, drive, replay, emulate, demo_hardware),
     "Measure": (bench, warmup),
 }
-"""Commands as help shows them."""
+"""Commands by section of the help."""
 
 
 class _Sections(click.Group):
@@ -53,7 +53,7 @@ class _Sections(click.Group):
 @click.group(cls=_Sections, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="relpos-env", prog_name="relpos")
 def cli() -> None:
-    """Relative positions without anchors: track, simulate, train, drive."""
+    """Estimate relative positions without anchors: track, simulate, train, drive."""
 
 
 for commands in SECTIONS.values():
@@ -62,7 +62,7 @@ for commands in SECTIONS.values():
 
 
 def main() -> None:
-    """Run the command line; what a user can mend ends in one line and status 2."""
+    """Run the command line; user errors end with a one-line message and status 2."""
     try:
         cli(standalone_mode=False)
     except click.exceptions.Abort:
@@ -80,8 +80,8 @@ def main() -> None:
 
 
 def _is_expected(error: Exception) -> bool:
-    """True for errors that say what a user can mend."""
-    # The packages take longer to import than help takes to print.
+    """Return whether an error is a user error."""
+    # Importing the packages takes longer than printing the help.
     from hardware_bridge.errors import BridgeError
     from relpos_env.errors import EnvError
     from tracking.errors import TrackingError

@@ -1,4 +1,4 @@
-"""Options that several commands share, with one name, meaning and text."""
+"""Options shared by several commands, with the same name, meaning and help."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Command = Callable[..., Any]
 
 
 def shipped_names() -> list[str]:
-    """Names of the scenarios of the package; nothing of it is imported, so that help is quick."""
+    """Return the names of shipped scenarios without importing the package, for fast help."""
     spec = find_spec("relpos_env")
     assert spec is not None
     assert spec.origin is not None
@@ -44,16 +44,16 @@ policy_option = click.option(
 def out_options(
     text: str, *, default: Path | None = None, required: bool = False
 ) -> Callable[[Command], Command]:
-    """Return `--out`, a new or empty folder, and `--overwrite`, with which it need not be either.
+    """Return `--out` for a new or empty folder, and `--overwrite`, which allows any folder.
 
-    A folder that is not given is the command's own, which replaces what it wrote there.
+    Without `--out`, files in the default folder are replaced.
 
     Args:
-        text: What is written, a noun phrase.
-        default: The command's own folder.
-        required: The command does nothing but write.
+        text: Written files, a noun phrase.
+        default: Default folder.
+        required: Whether `--out` is required.
     """
-    # A default of None would satisfy what is required.
+    # A default of None would count as a given value.
     kept: dict[str, Any] = {"required": required}
     if default is not None:
         kept |= {"default": default, "show_default": True}
@@ -90,7 +90,7 @@ def jobs_options(text: str) -> Callable[[Command], Command]:
     """Return the options `--jobs`, `--engine` and `--address`.
 
     Args:
-        text: Which figures depend on the number of processes, a sentence.
+        text: Sentence about figures that depend on the number of processes.
     """
 
     def add(command: Command) -> Command:
@@ -118,13 +118,13 @@ def jobs_options(text: str) -> Callable[[Command], Command]:
 def scenario_option(
     more: str, *names: str, default: str | None = None, multiple: bool = False
 ) -> Callable[[Command], Command]:
-    """The option of a command.
+    """Return the option `--scenario`.
 
     Args:
-        more: What else its help says.
-        names: Of the option, by default that alone.
-        default: A scenario; None where it follows from something else.
-        multiple: May be given several times.
+        more: Text appended to the help.
+        names: Additional names of the option or its parameter.
+        default: Default scenario; None if it depends on other options.
+        multiple: Whether the option is repeatable.
     """
     return click.option(
         "--scenario",

@@ -1,4 +1,4 @@
-"""Strangers' recordings become log folders: what `relpos convert` does, as a function."""
+"""Convert recordings of other projects to log folders (`relpos convert`)."""
 
 from agents.convert.convert import convert
 from agents.convert.mapping import PRESETS

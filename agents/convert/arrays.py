@@ -21,15 +21,15 @@ ALLOWED = {
       for name in ("_reconstruct", "scalar")),
     *((f"numpy.{core}.numeric", "_frombuffer") for core in ("core", "_core")),
 }  # fmt: skip
-"""What a pickle of arrays calls; anything else could run code of a stranger."""
+"""Functions that a pickle of arrays may call; any other could run untrusted code."""
 
 
 class Arrays:
-    """Streams are the arrays, records their rows.
+    """Source with arrays as streams and their rows as records.
 
     A field is a path of indices: ``3``, or ``2.0`` for row[2, 0]. A path that begins with the name
-    of an array reads the same row of that array: ``imu_ori.2``. A path that ends early returns an
-    array.
+    of an array reads the same row of that array: ``imu_ori.2``. A path with fewer indices than
+    axes returns an array.
     """
 
     def __init__(self, path: Path, time: str) -> None:
@@ -37,14 +37,14 @@ class Arrays:
 
         Args:
             path: File whose ending is .mat, .npz, .pkl or .pickle.
-            time: Column with the time [s]; empty where the mapping gives rates.
+            time: Column with the time [s]; empty if the mapping gives rates.
 
         Raises:
             UsageError: The file cannot be read or holds no arrays of numbers.
         """
         try:
             found = _load(path)
-        except Exception as error:  # the readers raise whatever a damaged file leads to
+        except Exception as error:  # readers raise various errors for damaged files
             raise UsageError(f"{path}: no arrays that can be read ({error})") from error
         self._arrays: dict[str, NDArray[Any]] = {
             name: array
@@ -102,7 +102,7 @@ def _load(path: Path) -> dict[str, Any]:
 
 
 class _ArraysOnly(pickle.Unpickler):
-    """Unpickles arrays and plain containers and calls nothing else."""
+    """Unpickler that only allows arrays and plain containers."""
 
     def find_class(self, module: str, name: str) -> Any:
         if (module, name) not in ALLOWED:

@@ -12,13 +12,13 @@ from agents.errors import UsageError
 
 
 class Bag:
-    """Streams are topics."""
+    """Source with topics as streams."""
 
     def __init__(self, path: Path, time: str) -> None:
         """Open the bag.
 
         Args:
-            path: File of ROS 1 or folder of ROS 2.
+            path: ROS 1 file or ROS 2 folder.
             time: ``stamp`` for the stamp of the header, ``receipt`` for the time of receipt.
 
         Raises:
@@ -44,7 +44,7 @@ class Bag:
         return [connection.topic for connection in self._reader.connections]
 
     def records(self, names: list[str]) -> Iterator[Record]:
-        """Yield messages in the order of receipt."""
+        """Yield the messages of some topics in the order of receipt."""
         wanted = [c for c in self._reader.connections if c.topic in names]
         counts: Counter[str] = Counter()
         for connection, receipt, raw in self._reader.messages(connections=wanted):
@@ -57,12 +57,12 @@ class Bag:
             counts[connection.topic] += 1
 
     def close(self) -> None:
-        """Close its files."""
+        """Close the bag."""
         self._reader.close()
 
 
 def getter(message: Any) -> Get:
-    """Return the access to fields of a message by their path: ``pose.position.x``."""
+    """Return a function that reads a field of a message by its path: ``pose.position.x``."""
 
     def get(path: str) -> Any:
         value = message

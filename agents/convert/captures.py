@@ -1,4 +1,4 @@
-"""Bytes of a serial port, captured as the device sent them, in a format with a clock of its own."""
+"""A capture of the raw bytes of a serial port, in a format with device timestamps."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ FORMATS = tuple(
     for name, entry in DECODERS.items()
     if entry.has_time and not entry.keyed and RangeReading in entry.tells
 )
-"""Formats that can be dated by their own clock."""
+"""Unsigned formats with ranges and device timestamps."""
 CHUNK = 65536
-"""[bytes] Read at a time."""
+"""[bytes] Size of a read."""
 
 
 class Capture:
@@ -28,7 +28,7 @@ class Capture:
         """Decode the file.
 
         Args:
-            path: File of bytes of one port.
+            path: File with the bytes of one port.
             form: One of `FORMATS`.
 
         Raises:
@@ -57,7 +57,7 @@ class Capture:
         return [name for name, rows in self._streams.items() if rows]
 
     def records(self, names: list[str]) -> Iterator[Record]:
-        """Yield readings in the order in which they were sent."""
+        """Yield the readings of some streams, stream by stream, in the order of transmission."""
         for name in names:
             for k, (t, fields) in enumerate(self._streams[name]):
                 yield Record(name, k, t, fields.__getitem__)
@@ -82,7 +82,7 @@ class Capture:
         self._streams["ranges"].append((t, fields))
 
     def _time(self, reading: RangeReading | ImuReading) -> float:
-        """Return the time by the device's clock [s], its wraps undone."""
+        """Return the unwrapped time of the device clock [s]."""
         ticks, clock, device = reading.source.ticks, reading.source.clock, reading.source.device
         if ticks is None or clock is None:
             raise UsageError(f"{self._path}: a frame has no time; record it with `relpos live`")

@@ -1,4 +1,4 @@
-"""Read a recording and write it as a log folder."""
+"""Conversion of a recording to a log folder."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ KINDS: dict[str, Callable[[Path, Mapping], Source]] = {
     "arrays": lambda path, mapping: Arrays(path, mapping.time),
     "capture": lambda path, mapping: Capture(path, mapping.capture),
 }
-"""Kind of recording to the reader of one."""
+"""Reader by kind of recording."""
 ITEMS = ("imu", "mag", "state", "ranges", "truth")
 
 
@@ -48,12 +48,12 @@ def convert(
         source: A bag, a folder of tables, a file of arrays or a capture of a port.
         out: Folder to write; None writes nothing.
         preset: One of `PRESETS`.
-        mapping: A mapping file, where there is no preset.
+        mapping: A mapping file, if there is no preset.
         restamp: Replace the times of IMU samples by those of a steady rate.
-        progress: Called with the share of streams done.
+        progress: Called with the share of streams done, 0 to 1.
 
     Raises:
-        UsageError: The recording or the mapping cannot be read, or lacks something; names it.
+        UsageError: The recording or the mapping cannot be read or is incomplete.
         LogError: The folder cannot be written.
     """
     plan = read_plan(preset, None if mapping is None else Path(mapping))
@@ -78,14 +78,14 @@ def convert(
 
 
 def _with_streams(plan: Plan, names: list[str]) -> Plan:
-    """Return the plan with the streams that a capture has, where the mapping names none."""
+    """Return the plan with the default streams of a capture for those that the mapping omits."""
     found: dict[str, Any] = {k: v for k, v in OF_CAPTURES.items() if k in names}
     found = {k: v for k, v in found.items() if not getattr(plan.mapping, k)}
     return replace(plan, mapping=replace(plan.mapping, **found))
 
 
 def _read(plan: Plan, source: Source, progress: Callable[[float], None]) -> dict[str, F64]:
-    """Return the rows of each table that has some."""
+    """Return the rows of each table that is not empty."""
     items = [(name, item) for name in ITEMS for item in getattr(plan.mapping, name)]
     parts: dict[str, list[F64]] = {}
     for k, (name, item) in enumerate(items):

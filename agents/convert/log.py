@@ -1,4 +1,4 @@
-"""Rows of measurements as a log."""
+"""Conversion of rows of measurements to a log."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from tracking.log.truth import Truth
 from tracking.measurements import Kind, MeasurementBlock
 
 LONG_GAP = 10.0
-"""[-] Periods of an IMU: after a longer silence another line is fitted."""
+"""[-] Longest gap within one line fit, in sample periods of an IMU."""
 OF_ONE_NODE = {"imu": Kind.IMU, "mag": Kind.MAG, "state": Kind.STATE}
-"""Tables whose rows are of one node."""
+"""Measurement kind of tables with one node per row."""
 
 
 def build_log(plan: Plan, tables: dict[str, F64], restamp: bool) -> Log:
@@ -25,12 +25,12 @@ def build_log(plan: Plan, tables: dict[str, F64], restamp: bool) -> Log:
 
     Args:
         plan: The mapping.
-        tables: `imu`, `mag`, `state`, `ranges` and `truth`, as `read_rows` returns them; `ranges`
-            is there, empty ones are not.
+        tables: Non-empty tables of `imu`, `mag`, `state`, `ranges` and `truth`, as `read_rows`
+            returns them; `ranges` is required.
         restamp: Replace the times of IMU samples by those of a steady rate.
 
     Returns:
-        The log, its times from 0. Nodes of the mapping without a measurement are left out.
+        The log with times from 0, without nodes that are neither measured nor surveyed.
 
     Raises:
         ConfigError: Fewer than two nodes are left, or a range does not name the antenna of a node
@@ -39,7 +39,7 @@ def build_log(plan: Plan, tables: dict[str, F64], restamp: bool) -> Log:
     tables = {name: rows[np.lexsort((rows[:, 1], rows[:, 0]))] for name, rows in tables.items()}
     start = min(float(rows[0, 0]) for rows in tables.values())
     for rows in tables.values():
-        rows[:, 0] -= start  # times of an epoch would lose digits
+        rows[:, 0] -= start  # absolute times would lose precision
     if restamp and "imu" in tables:
         tables["imu"] = steady(tables["imu"])
     places = plan.places
@@ -106,7 +106,7 @@ def _ranges(group: Constellation, rows: F64) -> MeasurementBlock:
 def _surveys(
     group: Constellation, places: dict[int, tuple[float, float, float]], t: float
 ) -> MeasurementBlock:
-    """Return the distances between the nodes whose places are given, at a time [s]."""
+    """Return surveyed distances between nodes with known positions, at a time [s]."""
     known = [node for node in group.ids if node in places]
     pairs = [(a, b) for k, a in enumerate(known) for b in known[k + 1 :]]
     ends = np.array(pairs, dtype=np.float64).reshape(-1, 2)
@@ -138,10 +138,10 @@ def _truth(group: Constellation, places: dict[int, tuple[float, float, float]], 
 
 
 def steady(rows: F64) -> F64:
-    """Return samples with the times of a steady rate of each node, without repeats and jitter.
+    """Return samples with times of a steady rate of each node, without repeats and jitter.
 
     Args:
-        rows: (row, column): t [s], node, values.
+        rows: Samples, (row, column): t [s], node, values.
     """
     out = []
     for node in np.unique(rows[:, 1]):
@@ -151,7 +151,7 @@ def steady(rows: F64) -> F64:
         cuts = np.nonzero(steps > LONG_GAP * period)[0] + 1
         for part in np.split(own, cuts):
             if len(part) > 2 and period > 0.0:
-                # A line through the times over the numbers of the samples keeps their count.
+                # A line fit of times over sample indices keeps the number of samples.
                 k = np.arange(len(part), dtype=np.float64)
                 slope, first = np.polyfit(k, part[:, 0], 1)
                 part[:, 0] = first + slope * k

@@ -1,4 +1,4 @@
-"""Which stream of a recording holds which measurements: a mapping file, or a preset."""
+"""Mapping from the streams of a recording to measurements: a mapping file, or a preset."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ FOLDER = Path(__file__).parent / "presets"
 PRESETS = tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
 OF_META = ("format", "name", "source", "licence", "dimensions", "heading", "nodes", "antennas",
            "range_noise_m")  # fmt: skip
-"""Keys of meta.toml, which a mapping has as well."""
+"""Keys of meta.toml that a mapping has as well."""
 Fields = tuple[str, ...]
-"""Names of fields whose numbers are joined; a minus before a name changes the sign."""
+"""Names of fields whose numbers are concatenated; a minus before a name negates them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,9 +25,9 @@ class Stream:
     """Keys of every kind of stream."""
 
     stream: str
-    """A topic, a file or an array, parts of its name in braces: ``/robot{node}/imu``."""
+    """Topic, file or array; braces mark variable parts of its name: ``/robot{node}/imu``."""
     rate: float = 0.0
-    """[Hz] Record k is of the time k / rate; 0 takes the time of the record."""
+    """[Hz] Record k has the time k / rate; 0 uses the time of the record."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,13 +35,13 @@ class Oriented(Stream):
     """Keys of streams with an orientation, body to world; at most one of them is given."""
 
     quat: Fields = ()
-    """w, x, y, z"""
+    """[-] Quaternion w, x, y, z."""
     matrix: Fields = ()
-    """Rotation matrix, row by row."""
+    """[-] Rotation matrix, row by row."""
     euler_deg: Fields = ()
     """[deg] Roll, pitch, yaw, applied in this order about the axes of the world."""
     yaw: Fields = ()
-    """[rad]"""
+    """[rad] Yaw."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +49,7 @@ class Imu(Stream):
     """Samples of a gyroscope and an accelerometer."""
 
     node: str = "node"
-    """A number, a part of the name, or a field."""
+    """Node as a number, a variable part of the stream's name, or a field."""
     gyr: Fields
     acc: Fields
     gyr_scale: float = 1.0
@@ -70,34 +70,34 @@ class Mag(Stream):
 
 @dataclass(frozen=True, kw_only=True)
 class State(Oriented):
-    """Orientations and accelerations that a node filtered itself."""
+    """Orientations and accelerations from the attitude filter of a node."""
 
     node: str = "node"
     acc: Fields
-    """[m/s2] In the world frame, without gravity."""
+    """[m/s2] Acceleration in the world frame, without gravity."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Ranges(Stream):
-    """Ranges."""
+    """Ranges between nodes i and j."""
 
     i: str = "i"
     j: str = "j"
     range: str = ""
     mean_of: Fields = ()
-    """Several fields in place of `range`: their mean."""
+    """Fields whose mean is the range; replaces `range`."""
     pairs: tuple[tuple[str, str], ...] = ()
-    """In place of `range`, `i` and `j`: numbers of the record are ranges of these nodes."""
+    """Nodes of the ranges in a record, number by number; replaces `range`, `i` and `j`."""
     scale: float = 1.0
     """Factor to metres."""
     each: str = ""
-    """A field that is a list of ranges; other fields are looked up in its items first."""
+    """Field with a list of ranges; other fields are looked up in its items first."""
     valid: str = ""
-    """A field that is 0 where the range is invalid."""
+    """Field that is 0 for an invalid range."""
     rx_power: str = ""
-    """[dBm]"""
+    """[dBm] Received power."""
     fp_power: str = ""
-    """[dBm] Of the first path."""
+    """[dBm] First-path power."""
     antenna_i: str = ""
     antenna_j: str = ""
 
@@ -108,7 +108,7 @@ class Truth(Oriented):
 
     node: str = "node"
     pos: Fields
-    """x, y, or x, y, z [m]"""
+    """[m] Position x, y or x, y, z."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,9 +117,9 @@ class Mapping:
 
     kind: Literal["bag", "tables", "arrays", "capture"]
     time: str = ""
-    """Field with the time of a record [s]; of bags `stamp` (of the header) or `receipt`."""
+    """[s] Field with the time of a record; in bags `stamp` (of the header) or `receipt`."""
     capture: str = ""
-    """Format of a capture, such as `linktrack`."""
+    """Serial format of a capture, such as `linktrack`."""
     up: Literal["z", "y"] = "z"
     """Axis of the recording's world frame that points up."""
     ranges: tuple[Ranges, ...] = ()
@@ -131,14 +131,14 @@ class Mapping:
 
 @dataclass(frozen=True)
 class Plan:
-    """A mapping, the constellation, ids of nodes and places of static nodes."""
+    """A mapping with the constellation, the ids of nodes and positions of static nodes."""
 
     mapping: Mapping
     meta: Meta
     ids: dict[str, int]
-    """Name of a node in the recording to its id in the log, where they differ."""
+    """Id of a node in the log by its name in the recording, if they differ."""
     places: dict[int, tuple[float, float, float]]
-    """[m] By id in the log: truth, and surveyed distances between static nodes."""
+    """[m] Positions of static nodes by id in the log, for truth and surveyed distances."""
 
 
 OF_CAPTURES: dict[str, Any] = {
@@ -154,8 +154,7 @@ def read_plan(preset: str | None, file: Path | None) -> Plan:
     """Read a mapping.
 
     Raises:
-        UsageError: Neither or both are given, no such preset, or a key of the file is wrong; names
-            the key.
+        UsageError: Neither or both are given, the preset is unknown, or a key is wrong.
     """
     if (preset is None) == (file is None):
         raise UsageError("--preset or --mapping: expected one of them")

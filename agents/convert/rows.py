@@ -1,4 +1,4 @@
-"""Records of streams as rows of numbers in SI units."""
+"""Conversion of records to rows of numbers in SI units."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ def read_rows(
     Args:
         plan: The mapping.
         item: The entry.
-        records: Its records.
-        parts: By stream, the parts of its name that are in braces.
+        records: Records of the entry.
+        parts: Variable parts of the stream's name, by stream.
 
     Returns:
-        (row, column): t [s], then of an IMU node, gyroscope [rad/s] (3), accelerometer [m/s2] (3);
-        of a magnetometer node, field [uT] (3); of a state node, w x y z, acceleration [m/s2] (3);
-        of ranges i, j, range [m], received and first-path power [dBm], antennas of i and j; of
-        truth node, position [m] (3), w x y z. Nodes and antennas are ids, -1 where the recording
-        names no antenna. Records with a number that is missing are left out, except for powers
-        and orientations of truth.
+        (row, column): t [s], then for an IMU: node, gyroscope [rad/s] (3), accelerometer [m/s2]
+        (3); for a magnetometer: node, field [uT] (3); for a state: node, w x y z, acceleration
+        [m/s2] (3); for ranges: i, j, range [m], received and first-path power [dBm], antennas of i
+        and j; for truth: node, position [m] (3), w x y z. Nodes and antennas are ids; -1 is an
+        unspecified antenna. Records with missing numbers are left out, except for powers and
+        orientations of truth.
 
     Raises:
-        UsageError: A field is missing, or a field has not as many numbers as it must.
+        UsageError: A field is missing or has a wrong number of elements.
     """
     rows: list[list[float]] = []
     for record in records:
@@ -81,7 +81,7 @@ def _rows(plan: Plan, item: Item, get: Get, parts: dict[str, str]) -> Iterator[l
 
 
 def _each(name: str, get: Get) -> Iterable[Get]:
-    """Return the record itself, or the items of a list in it."""
+    """Return accessors of the record itself, or of the items of a list in it."""
     if not name:
         return [get]
 
@@ -109,7 +109,7 @@ def _ranges(plan: Plan, item: Ranges, get: Get, parts: dict[str, str]) -> Iterat
 
 
 def _every_number(get: Get) -> list[float]:
-    """Return the numbers of a row of an array, or of fields that are called 0, 1, ..."""
+    """Return the numbers of an array row, or of the fields named 0, 1, ..."""
     found: list[float] = []
     try:
         while True:
@@ -135,7 +135,7 @@ def _range(
 
 
 def _node(plan: Plan, ref: str, get: Get, parts: dict[str, str]) -> int | None:
-    """Return the id of a node; None for a node that the mapping leaves out."""
+    """Return the id of a node; None if the mapping does not include it."""
     value = parts[ref] if ref in parts else ref if ref.isdigit() else get(ref)
     name = str(int(value)) if not isinstance(value, str) else value.strip()
     node = plan.ids.get(name, int(name) if name.isdigit() else None)
@@ -143,7 +143,7 @@ def _node(plan: Plan, ref: str, get: Get, parts: dict[str, str]) -> int | None:
 
 
 def _numbers(get: Get, item: Item, key: str, n: int) -> list[float]:
-    """Return the numbers of some fields one after the other."""
+    """Return the concatenated numbers of the fields of a key."""
     names: Fields = getattr(item, key)
     found: list[float] = []
     for name in names:
@@ -167,10 +167,10 @@ def _orientation(get: Get, item: State | Truth) -> list[float]:
 
 
 def _oriented(item: Oriented, rows: F64, y_up: bool) -> F64:
-    """Turn the orientation that follows a vector into w x y z, of a world whose z axis points up.
+    """Convert the orientation after a vector to w x y z, in a world with the z axis up.
 
     Returns:
-        (row, column): t, node, then of states w x y z and the vector, else the other way round.
+        (row, column): t, node, then w x y z and vector for states, vector and w x y z for truth.
     """
     head, vector, found = rows[:, :2], rows[:, 2:5], rows[:, 5:]
     quat = np.full((len(rows), 4), np.nan)

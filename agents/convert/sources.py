@@ -1,4 +1,4 @@
-"""A recording as streams of records, whatever files it is in."""
+"""Interface of a recording as streams of records, independent of its file format."""
 
 from __future__ import annotations
 
@@ -14,28 +14,28 @@ class Record(NamedTuple):
 
     stream: str
     k: int
-    """[-] Its number in the stream, from 0."""
+    """[-] Index in the stream, from 0."""
     t: float
-    """[s] NaN where the recording has no time."""
+    """[s] Time; NaN if the recording has no time."""
     get: Get
-    """Its fields by name; raises KeyError for a field that it lacks."""
+    """Function that returns a field by its name; raises KeyError for a missing field."""
 
 
 class Source(Protocol):
     """A recording."""
 
     def names(self) -> list[str]:
-        """Return the names of its streams."""
+        """Return the names of the streams."""
 
     def records(self, names: list[str]) -> Iterator[Record]:
         """Yield the records of some streams."""
 
     def close(self) -> None:
-        """Close its files."""
+        """Close the files of the recording."""
 
 
 def pattern(stream: str) -> re.Pattern[str]:
-    """Return the expression that names of a stream match; parts in braces are named groups."""
+    """Return a regular expression for names of a stream; parts in braces are named groups."""
     parts = re.split(r"\{(\w+)\}", stream)
     text = "".join(
         re.escape(part) if k % 2 == 0 else f"(?P<{part}>[^/]+?)" for k, part in enumerate(parts)

@@ -13,14 +13,14 @@ from agents.errors import UsageError
 
 
 class Tables:
-    """Streams are the files, named by their path in the folder without its ending."""
+    """Source with files as streams, named by their path in the folder without suffix."""
 
     def __init__(self, folder: Path, time: str) -> None:
         """Find the files.
 
         Args:
             folder: Folder of CSV files.
-            time: Column with the time [s]; empty where the mapping gives rates.
+            time: Column with the time [s]; empty if the mapping gives rates.
 
         Raises:
             UsageError: There are no CSV files.

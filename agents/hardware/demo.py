@@ -1,7 +1,7 @@
-"""Emulated cars driven through the whole path, serial bytes and all, next to the simulator.
+"""Drive emulated cars through the whole stack, down to serial bytes, and compare with simulation.
 
-The emulator is a process of its own, or steps together with the drive under a virtual clock; its
-truth scores the drive, which knows nothing of it.
+The emulator is a separate process, or steps together with the drive under a virtual clock. The
+drive is scored with the emulator's ground truth, which the drive does not use.
 """
 
 from __future__ import annotations
@@ -32,34 +32,34 @@ from tracking.params.short_repr import short_repr
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HardwareDemoResult:
-    """One emulated drive and its twin in the simulator."""
+    """One emulated drive and the same drive in the simulator."""
 
     __repr__ = short_repr
 
     seed: int
     drive: DriveResult
     log: Log
-    """What was measured, with the truth."""
+    """Measurements, with the ground truth."""
     t: F64
-    """Since the drive began, (decision) [s]."""
+    """[s] Time since the start of the drive, (decision)."""
     error: F64
-    """Formation error by the truth, mean over the cars, (decision) [m]."""
+    """[m] True formation error, mean over the cars, (decision)."""
     simulated: F64
-    """That of the same driver in the same room of the simulator, (decision) [m]."""
+    """[m] True formation error of the same driver in the same simulated room, (decision)."""
     boxes: F64
-    """What stood in the room at the start, (box, 6), as `relpos_env.world.world.World.boxes`."""
+    """Obstacles of the room at the start, (box, 6), as `relpos_env.world.world.World.boxes`."""
     collisions: int
-    """[-] That cars began, start included."""
+    """[-] Collisions, start-up included."""
     simulated_collisions: int
-    """[-] In the simulator."""
+    """[-] Collisions in the simulator."""
     late_steps: int
-    """[-] Of the emulator, by more than 10 ms: what it then did was no fault of the drive."""
+    """[-] Steps of the emulator more than 10 ms late, which disturb the drive."""
     virtual: bool = False
-    """Whether it was driven in memory, under a virtual clock."""
+    """True if the drive ran in memory, under a virtual clock."""
 
     @property
     def summary(self) -> dict[str, Any]:
-        """The figures."""
+        """Figures of the comparison as a JSON record."""
         error = _settled(self.error[self.t >= SETTLE], self.error)
         twin = _settled(self.simulated[round(SETTLE / DECISION) :], self.simulated)
         return {
@@ -77,7 +77,7 @@ class HardwareDemoResult:
 
 
 def _settled(late: F64, every: F64) -> float | None:
-    """Mean of what came after settling; at the end where a drive was over before; None for none."""
+    """Return the mean of `late`, or the last value of `every` if there is none, else None."""
     late = late[np.isfinite(late)]
     if len(late) == 0:
         late = every[np.isfinite(every)][-1:]
@@ -85,13 +85,13 @@ def _settled(late: F64, every: F64) -> float | None:
 
 
 def error_ratio(results: Sequence[HardwareDemoResult]) -> Interval | None:
-    """Mean formation error through the bridge over that in the simulator, on the same seeds.
+    """Return the ratio of mean formation errors, bridge over simulator, on the same seeds.
 
     Args:
-        results: Of different seeds.
+        results: Results of different seeds.
 
     Returns:
-        With its 95 % interval; None without any drive that could be scored.
+        Ratio with its 95 % interval; None if no drive could be scored.
     """
     rows = [result.summary for result in results]
     ours = np.array([row["formation_error"] for row in rows], dtype=np.float64)
@@ -106,20 +106,20 @@ def hardware_demo(
     virtual: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> HardwareDemoResult:
-    """Emulate cars, drive them, and drive their twins in the simulator.
+    """Drive emulated cars, and the same cars in the simulator.
 
     Args:
-        options: The emulation; its `seconds` are those of the drive.
+        options: Options of the emulation; `seconds` is the length of the drive.
         name: A controller or a policy, as for `relpos drive`.
-        folder: For the ports, the truth and the recording; by default one that is thrown away.
-        virtual: In memory and under a virtual clock, as fast as it goes: the same bytes, without
-            ports, processes and what a machine makes late.
+        folder: Folder for the ports, the truth and the recording; by default a temporary one.
+        virtual: Drive in memory, under a virtual clock and as fast as possible: the same bytes,
+            without ports, processes and delays of the machine.
         progress: Called with the share done, 0 to 1.
 
     Raises:
         EnvError: An unknown name or a number out of range.
         BridgeError: The cars could not be armed.
-        UsageError: No driver of that name, or not for such cars.
+        UsageError: No driver of that name, or it does not fit these cars.
     """
     entry = find_entry(name)
     contender = Contender(name, entry.trained_on or "estimate")
@@ -155,12 +155,12 @@ def hardware_demo(
 
 
 def true_error(result: DriveResult, log: Log, t: F64) -> F64:
-    """Formation error of a drive by the truth, mean over the cars, (decision) [m].
+    """Return the true formation error of a drive, mean over the cars, (decision) [m].
 
     Args:
-        result: What was wanted when.
-        log: With the truth of the same nodes.
-        t: Times of the decisions by the log's clock, (decision) [s].
+        result: Drive with the targets.
+        log: Log with the truth of the same nodes.
+        t: Times of the decisions on the clock of the log, (decision) [s].
     """
     n = log.constellation.n_nodes
     times = log.truth.times()
@@ -177,7 +177,7 @@ def true_error(result: DriveResult, log: Log, t: F64) -> F64:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Drove:
-    """A drive and what the emulator says of it."""
+    """A drive with the log and the counters of the emulator."""
 
     result: DriveResult
     log: Log
@@ -189,7 +189,7 @@ class _Drove:
 def _drive_ports(
     options: EmulateOptions, name: str, place: Path, progress: Callable[[float], None] | None
 ) -> _Drove:
-    """In real time, with ports in a folder."""
+    """Drive in real time, through ports in a folder."""
     with EmulationProcess(options, place) as emulation:
         result = drive(
             config=place / "swarm.toml",
@@ -211,7 +211,7 @@ def _drive_ports(
 def _drive_virtually(
     options: EmulateOptions, name: str, progress: Callable[[float], None] | None
 ) -> _Drove:
-    """In memory."""
+    """Drive in memory, under a virtual clock."""
     longer = replace(options, seconds=options.seconds + LONGEST_START)
     bridge = VirtualBridge(longer, record=True)
     result = drive_on(
@@ -229,7 +229,7 @@ def _drive_virtually(
 def _teller(
     options: EmulateOptions, progress: Callable[[float], None] | None
 ) -> Callable[[Any, Any], None]:
-    """What tells of the share done after every decision."""
+    """Return a callback that reports the share done after every control step."""
 
     def tell(_: Any, env: Any) -> None:
         if progress is not None:

@@ -1,4 +1,4 @@
-"""Where work is done that can be shared out. Adding an engine: a file and a line."""
+"""Engines that run jobs in parallel. A new engine needs a file and a line in `ENGINES`."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from agents.jobs.local import local
 from agents.jobs.ray_engine import ray_engine
 
 ENGINES: dict[str, Engine] = {"local": local, "ray": ray_engine}
-"""Name to engine."""
+"""Engine by name."""
 JOINING = ("ray",)
-"""Engines that take the address of a cluster."""
+"""Engines that can use a running cluster."""
 
 MOST_JOBS = 1024
 
 
 def find_engine(name: str, address: str | None = None) -> Engine:
-    """Look an engine up.
+    """Return an engine by its name.
 
     Args:
         name: One of `ENGINES`.
-        address: Of a cluster that runs, for the engines of `JOINING`.
+        address: Address of a running cluster, for the engines of `JOINING`.
 
     Raises:
-        UsageError: None of that name, or an address that it has no use for.
+        UsageError: No engine of that name, or an address for an engine without clusters.
     """
     if name not in ENGINES:
         raise UsageError(f"--engine: expected one of {', '.join(ENGINES)}, got {name!r}")
@@ -38,10 +38,10 @@ def find_engine(name: str, address: str | None = None) -> Engine:
 
 
 def check_jobs(jobs: int) -> int:
-    """A number of calls at a time.
+    """Check and return the number of simultaneous calls.
 
     Raises:
-        UsageError: Out of range.
+        UsageError: The number is out of range.
     """
     if not 1 <= jobs <= MOST_JOBS:
         raise UsageError(f"--jobs: expected 1 to {MOST_JOBS}, got {jobs}")

@@ -1,4 +1,4 @@
-"""What an engine is: it does the same work on many tasks, somewhere."""
+"""Interface of engines, which run a function on many tasks."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ Result = TypeVar("Result")
 
 
 class Engine(Protocol):
-    """Shares work out.
+    """Function that runs tasks in parallel.
 
-    Law: results are those of calling the function on one task after the other, whatever the
-    engine and the number of jobs; only their order may differ.
+    Property: results are equal to those of sequential calls for any engine and number of jobs; only
+    their order may differ.
     """
 
     def __call__(
@@ -21,12 +21,12 @@ class Engine(Protocol):
         """Call a function with the arguments of every task.
 
         Args:
-            function: Of a module, so that other processes find it by its name.
-            tasks: Positional arguments of each call; they and the results can be pickled.
-            jobs: Calls at a time, at least 1.
+            function: Function of a module, so that other processes can import it.
+            tasks: Positional arguments of each call; arguments and results must be picklable.
+            jobs: Number of simultaneous calls, at least 1.
 
         Returns:
-            Number of the task and what came of it, in any order, as they come.
+            Index and result of each task, in order of completion.
 
         Raises:
             UsageError: A worker was lost.

@@ -1,4 +1,4 @@
-"""What processes that others have begun owe them: they end with them, even if these are killed."""
+"""Terminate worker processes when their parent exits, even if it is killed."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from multiprocessing.connection import wait
 
 
 def follow_parent() -> None:
-    """End this process when the one that began it is gone; leave interrupts to that one.
+    """End this process when its parent exits; ignore SIGINT, which the parent handles.
 
-    To be called first in the process. It would else go on for long, and write into what another
-    process has taken up again.
+    Call this first in the process. An orphaned worker would continue for long, and write into a
+    run that another process has resumed.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     end_with_parent()
 
 
 def end_with_parent() -> None:
-    """As `follow_parent`; interrupts come here, too."""
+    """End this process when its parent exits, without a change to signals."""
     threading.Thread(target=_wait, daemon=True).start()
 
 

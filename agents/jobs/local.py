@@ -1,4 +1,4 @@
-"""Work shared out to processes of this machine."""
+"""Engine with processes of this machine."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ def local(
 ) -> Iterator[tuple[int, Result]]:
     """Call a function with the arguments of every task; see `agents.jobs.base.Engine`.
 
-    One job is done in this process. With more the calling script must be importable: its work
-    belongs below `if __name__ == "__main__"`.
+    A single job runs in this process. For more jobs, the calling script must be importable, with
+    its work below `if __name__ == "__main__"`.
     """
     jobs = min(jobs, len(tasks))
     if jobs <= 1:
         for n, task in enumerate(tasks):
             yield n, function(*task)
         return
-    # New processes, since a forked one would share the threads of compiled libraries.
+    # Spawned processes, since a forked one would share the threads of compiled libraries.
     spawn = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(jobs, mp_context=spawn, initializer=follow_parent)
     try:

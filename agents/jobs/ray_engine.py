@@ -1,8 +1,8 @@
-"""Work shared out over a Ray cluster: one that is started for it on this machine, or one that runs.
+"""Engine with a Ray cluster, started on this machine or already running.
 
-A call whose worker or machine is lost is made again, until it was made `MOST_TRIES` times; an
-error that the function itself raises is not. So results are those of the local engine, bit for
-bit, whatever happens to the workers.
+A call whose worker or machine is lost is repeated, up to `MOST_TRIES` calls; errors raised by the
+function are not retried. Results are equal to those of the local engine, bit for bit, even if
+workers are lost.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from agents.errors import UsageError
 from agents.jobs.base import Result
 
 MOST_TRIES = 4
-"""[-] Calls of one task until its workers have been lost too often."""
+"""[-] Largest number of calls of one task whose workers are lost."""
 STORE = 128 * 1024**2
-"""[B] Shared memory of a cluster that is started here. Results of less than 100 kB, as most of ours
-are, do not go through it, and what does not fit goes to the disk."""
+"""[B] Shared memory of a cluster started here. Results below 100 kB, as most of ours are, do not
+use it; larger data spills to disk."""
 
 ANSWER = 10.0
-"""[s] Within which a cluster answers."""
+"""[s] Timeout of a connection to a cluster."""
 
 
 def ray_engine(
@@ -38,25 +38,25 @@ def ray_engine(
 ) -> Iterator[tuple[int, Result]]:
     """Call a function with the arguments of every task; see `agents.jobs.base.Engine`.
 
-    At most `jobs` calls are under way at a time, so what waits takes no memory in the cluster.
-    Each takes one core.
+    At most `jobs` calls are submitted at a time, so that pending tasks use no memory in the
+    cluster. Each call uses one core.
 
     Args:
-        function: Of a module, which every worker can import.
+        function: Function of a module that every worker can import.
         tasks: Positional arguments of each call.
-        jobs: Calls at a time, at least 1.
-        address: Of a running cluster, as for `ray.init`: ``auto`` or ``host:port``. None starts
-            one with `jobs` cores on this machine and ends it afterwards. A program that has
-            called `ray.init` itself keeps the cluster it has.
+        jobs: Number of simultaneous calls, at least 1.
+        address: Address of a running cluster, as for `ray.init`: ``auto`` or ``host:port``. None
+            starts one with `jobs` cores on this machine and ends it afterwards. A program that has
+            called `ray.init` itself keeps its cluster.
 
     Raises:
-        UsageError: No ray, no cluster at the address, or workers of a task were lost too often.
+        UsageError: Ray is missing, no cluster answers, or workers of a task were lost too often.
     """
     if not tasks:
         return
     jobs = min(jobs, len(tasks))
     with cluster(jobs, address) as ray:
-        # Ray's own retries are off: those after a want of memory have no bound.
+        # Ray's own retries are off: after running out of memory, they are unlimited.
         call = ray.remote(num_cpus=1, max_retries=0)(_call)
         folder = os.getcwd()
         waiting = deque((n, 1) for n in range(len(tasks)))
@@ -83,14 +83,14 @@ def ray_engine(
                         f"for want of memory; expected fewer than {jobs} --jobs, or more memory: "
                         f"{_first_line(error)}"
                     ) from error
-                # Last, so that what makes workers fail does not hold up the rest.
+                # Retried last, so that a failing task does not delay the others.
                 waiting.append((n, times + 1))
                 continue
             yield n, result
 
 
 def _call(folder: str, function: Callable[..., Any], task: tuple[Any, ...]) -> Any:
-    """The call itself, in a worker; names of files mean there what they mean here."""
+    """Call the function in a worker, in the caller's working directory if it exists there."""
     if os.path.isdir(folder):
         os.chdir(folder)
     return function(*task)
@@ -98,15 +98,15 @@ def _call(folder: str, function: Callable[..., Any], task: tuple[Any, ...]) -> A
 
 @contextmanager
 def cluster(cores: int, address: str | None) -> Iterator[Any]:
-    """The module `ray`, joined to a cluster; what was started here ends here.
+    """Yield the module `ray`, connected to a cluster, and disconnect at the end.
 
     Args:
-        cores: Of a cluster that is started.
-        address: Of a cluster that runs; None starts one. Where the program has called `ray.init`
-            itself, it keeps the cluster it has.
+        cores: Number of cores of a new cluster.
+        address: Address of a running cluster; None starts one. A program that has called
+            `ray.init` itself keeps its cluster.
 
     Raises:
-        UsageError: No ray, or no cluster at the address.
+        UsageError: Ray is not installed, or no cluster answers at the address.
     """
     ray = import_ray()
     if ray.is_initialized():
@@ -120,25 +120,25 @@ def cluster(cores: int, address: str | None) -> Iterator[Any]:
 
 
 def start_ray(cores: int, address: str | None) -> None:
-    """Start a cluster on this machine, or join one; it is quiet, and sends no reports.
+    """Start a cluster on this machine, or connect to one, without logs and usage reports.
 
     Args:
-        cores: Of a cluster that is started.
-        address: Of a cluster that runs; None starts one.
+        cores: Number of cores of a new cluster.
+        address: Address of a running cluster; None starts one.
 
     Raises:
-        UsageError: No ray, or no cluster at the address.
+        UsageError: Ray is not installed, or no cluster answers at the address.
     """
     ray = import_ray()
     quiet: dict[str, Any] = {"log_to_driver": False, "logging_level": logging.ERROR}
     if address is None:
         variables = {
-            # Workers find modules where this process does.
+            # Workers use the module search path of this process.
             "PYTHONPATH": _absolute(sys.path),
             "RAY_USAGE_STATS_ENABLED": "0",
         }
         with _inherited(variables):
-            # "local", since nothing would also join whatever cluster happens to run here.
+            # "local", since the default would also connect to any cluster on this machine.
             ray.init(
                 address="local",
                 num_cpus=cores,
@@ -162,10 +162,10 @@ def start_ray(cores: int, address: str | None) -> None:
 
 
 def _see_that_it_answers(address: str) -> None:
-    """A process listens at ``host:port``; Ray itself would wait for minutes.
+    """Check that a process listens at ``host:port``, since Ray itself would wait for minutes.
 
     Raises:
-        UsageError: None does.
+        UsageError: The connection fails.
     """
     host, _, port = address.removeprefix("ray://").rpartition(":")
     if not host or not port.isdecimal():
@@ -178,7 +178,7 @@ def _see_that_it_answers(address: str) -> None:
 
 @contextmanager
 def _inherited(variables: Mapping[str, str]) -> Iterator[None]:
-    """Variables of the environment that processes started meanwhile see."""
+    """Set environment variables for processes started inside the context."""
     before = {name: os.environ.get(name) for name in variables}
     os.environ.update(variables)
     try:
@@ -192,15 +192,15 @@ def _inherited(variables: Mapping[str, str]) -> Iterator[None]:
 
 
 def _absolute(folders: Sequence[str]) -> str:
-    """A search path that means the same in any folder."""
+    """Return a search path of absolute folders."""
     return os.pathsep.join(map(os.path.abspath, folders))
 
 
 def import_ray() -> Any:
-    """The module `ray`.
+    """Return the module `ray`.
 
     Raises:
-        UsageError: It is not installed.
+        UsageError: Ray is not installed.
     """
     try:
         import ray

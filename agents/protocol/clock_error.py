@@ -1,4 +1,4 @@
-"""What clocks that are off do to ranges between nodes that move."""
+"""Range errors due to clock errors between moving nodes."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from tracking.ranging.frames.timestamps import SPEED_OF_LIGHT
 
 PPM = (0.0, 5.0, 10.0, 20.0)
 SPEED = 2.0
-"""[m/s] At which node 0 and each of the others part and meet."""
+"""[m/s] Range rate between node 0 and the others."""
 
 
 def measure_clock_error(
     seed: int, n_nodes: int = 6, envs: int = 8, seconds: float = 30.0
 ) -> list[dict[str, Any]]:
-    """Errors of the ranges of node 0 and each other one, for clocks that are off by so much.
+    """Measure the errors of ranges between node 0 and the others over the clock error of `PPM`.
 
-    Node 0 is fast and the others are slow by the same number of ppm, so that they differ by
-    twice as much. The channel has nothing but the noise of stamps and carrier readings; noise
-    is compared with that of the same group with perfect clocks.
+    Node 0 is fast and the others are slow by the same number of ppm, so that they differ by twice
+    this number. The channel has only noise of timestamps and carrier readings; the noise is
+    compared with that of the same group with perfect clocks.
 
     Args:
-        seed: Same seed, same figures.
+        seed: Seed; the same seed gives the same figures.
         n_nodes: Size of the group.
-        envs: Groups that are averaged.
-        seconds: Length of each run.
+        envs: Number of averaged groups.
+        seconds: Length of each run [s].
     """
     errors = {ppm: _errors(seed, n_nodes, ppm, envs, seconds) for ppm in PPM}
     rows = []
@@ -57,7 +57,7 @@ def measure_clock_error(
 
 
 def _errors(seed: int, n: int, ppm: float, envs: int, seconds: float) -> dict[int, F64]:
-    """Range errors of node 0 and the one in each slot [m]."""
+    """Return the range errors between node 0 and the node of each slot [m]."""
     noisy = replace(EXACT, stamp_std=CALIBRATED.stamp_std, carrier_std=CALIBRATED.carrier_std)
     params = replace(radio_params(), channel=noisy)
     if ppm == 0.0:
@@ -73,7 +73,7 @@ def _errors(seed: int, n: int, ppm: float, envs: int, seconds: float) -> dict[in
     phase = rng.uniform(0.0, 4.0, (envs, 1))
 
     def distance(t: F64 | float) -> F64:
-        """Of node 0 and every other one: to and fro between 3 m and 7 m, (env, ...) [m]."""
+        """Return the distance of node 0 to all others, a 3 m to 7 m triangle wave, (env, ...)."""
         return np.asarray(3.0 + SPEED * np.abs((t + phase) % 4.0 - 2.0))
 
     bearing = 2.0 * np.pi * np.arange(n) / n

@@ -1,4 +1,4 @@
-"""All experiments with the protocol, one after the other: what `relpos protocol` does."""
+"""Run all experiments with the ranging protocol (`relpos protocol`)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tracking.ranging.members import MAX_MEMBERS
 
 @dataclass(frozen=True, slots=True)
 class ProtocolResult:
-    """What was measured."""
+    """Figures of all experiments."""
 
     __repr__ = short_repr
 
@@ -27,12 +27,12 @@ class ProtocolResult:
     clock: list[dict[str, Any]]
     cost: list[dict[str, Any]]
     times: dict[tuple[str, str], list[float]]
-    """Every recovery time by event and mode [s]."""
+    """[s] All recovery times by event and mode."""
     timelines: list[Timeline]
 
     @property
     def records(self) -> list[dict[str, Any]]:
-        """One flat record for each figure."""
+        """JSON records, one for each figure."""
         return [*self.rates, *self.recovery, *self.clock, *self.cost]
 
 
@@ -46,13 +46,13 @@ def protocol(
     """Measure rates, recovery and clock errors of the ranging protocol.
 
     Args:
-        events: Of each kind and mode.
-        nodes: Sizes of the groups whose rate is measured.
-        seed: Same seed, same figures.
+        events: Number of events of each kind and mode.
+        nodes: Sizes of the groups for the rate measurement.
+        seed: Seed; the same seed gives the same figures.
         progress: Called with the share done, 0 to 1.
 
     Raises:
-        UsageError: A number out of range; the argument is named.
+        UsageError: A number is out of range; the message names the argument.
     """
     if not 1 <= events <= 100_000:
         raise UsageError(f"--events: expected 1 to 100000, got {events}")

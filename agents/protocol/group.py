@@ -1,4 +1,4 @@
-"""A group of nodes in the reference air, and what it sent."""
+"""A group of nodes in the reference radio simulation, and its messages."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from tracking.ranging.frames.wire import Frame, decode
 from tracking.ranging.params import SessionParams
 
 DT = 0.01
-"""[s] One window of the air."""
+"""[s] Step of the radio simulation."""
 
 
 @dataclass(frozen=True, slots=True)
 class Heard:
-    """A message as an onlooker sees it."""
+    """A message as received by an ideal observer."""
 
     start: float
-    """When its preamble began [s]."""
+    """[s] Start of the preamble."""
     end: float
-    """[s]"""
+    """[s] End of the message."""
     frame: Frame
 
 
 class Group:
-    """Nodes that stand in a room of 5 m x 5 m, all in sight of each other."""
+    """Static nodes in a room of 5 m x 5 m, all in line of sight."""
 
     def __init__(self, params: RadioSimParams, n_nodes: int, rng: np.random.Generator) -> None:
         self._rng = rng
@@ -39,23 +39,23 @@ class Group:
 
     @property
     def t(self) -> float:
-        """Time [s]."""
+        """[s] Current time."""
         return self.air.t
 
     def switch_on(self, node: int, after: float = 0.0) -> None:
-        """Give a node power."""
+        """Switch a node on, after a delay [s]."""
         self.air.switch_on(node, boot=int(self._rng.integers(256)), at=after)
 
     def run(self, seconds: float) -> None:
-        """Let time pass."""
+        """Advance the simulation by a time [s]."""
         for _ in range(round(seconds / DT)):
             self.air.step(self._pos, self._pos)
 
     def assemble(self, nodes: range, limit: float) -> None:
-        """Run until all the given nodes, and no others, know each other.
+        """Run until the members in the session of each given node are exactly the given nodes.
 
         Raises:
-            UsageError: They do not within so many seconds.
+            UsageError: The time limit [s] is exceeded.
         """
         for _ in range(round(limit / DT)):
             self.run(DT)
@@ -65,7 +65,7 @@ class Group:
         raise UsageError(f"protocol: {len(nodes)} nodes did not find together in {limit:g} s")
 
     def listen(self) -> list[Heard]:
-        """What was sent since the last call."""
+        """Return the messages since the last call."""
         heard = []
         for sent in self.air.sent:
             start = sent.t - self._phy.header_time
@@ -76,5 +76,5 @@ class Group:
 
 
 def radio_params(**session: object) -> RadioSimParams:
-    """The default place, with other settings of the session."""
+    """Return the default radio with other settings of the session."""
     return RadioSimParams(session=SessionParams(**session))  # type: ignore[arg-type]

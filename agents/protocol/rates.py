@@ -1,4 +1,4 @@
-"""How many rounds a second a group of n nodes gets."""
+"""Rate of ranging rounds over the number of nodes."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from tracking.ranging.frames.airtime import PHYS, round_rate
 from tracking.ranging.frames.wire import Type
 
 PAPER_HZ = {("110k", 3): 81.83, ("110k", 6): 28.6}
-"""Armani and Holz, ICRA 2024."""
+"""[Hz] Rate of rounds by radio mode and number of nodes (Armani and Holz, ICRA 2024)."""
 NODES = (3, 4, 5, 6, 10, 20, 50)
 
 
 def measure_rates(
     seed: int, nodes: tuple[int, ...], progress: Callable[[float], None]
 ) -> list[dict[str, Any]]:
-    """Rounds per second of assembled groups, on a channel without losses.
+    """Measure rounds per second of assembled groups on a channel without losses.
 
     Args:
-        seed: Same seed, same figures.
+        seed: Seed; the same seed gives the same figures.
         nodes: Sizes of the groups.
-        progress: Called with the share done.
+        progress: Called with the share done, 0 to 1.
     """
     cases = [(phy, n) for phy in PHYS for n in nodes]
     weights = np.cumsum([n**3 for _, n in cases])
@@ -44,7 +44,7 @@ def _measure(phy: str, n: int, rng: np.random.Generator) -> dict[str, Any]:
         group.switch_on(k, float(rng.uniform(0.0, 0.05)))
     group.assemble(range(n), limit=120.0)
     assembled, law = group.t, round_rate(PHYS[phy], n)
-    group.run(max(5.0 / law, 1.5))  # clocks are known, tables full, IDs checked
+    group.run(max(5.0 / law, 1.5))  # until clocks are estimated, tables full, IDs checked
     group.listen()
     group.air.told.clear()
     group.run(max(6.0 / law, min(2.0, 100.0 / law)))

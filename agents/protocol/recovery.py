@@ -1,12 +1,12 @@
-"""How long the protocol takes to recover when nodes come and go.
+"""Recovery times of the protocol when nodes join and leave.
 
-Measured by an onlooker who hears every message:
+Measured by an ideal observer that receives every message:
 
-- responder-join: from the moment a node has power to the end of its join, which all others hear;
-  `named` is the end of the request that names it, from which on it has a slot of its own.
-- responder-leave: from the moment it has none to the begin of the first message behind its
-  empty slot; from then on it costs no time but that of listening into silence.
-- initiator-loss: from the moment it has no power to the end of the first whole round of the
+- responder-join: from power-on of a node to the end of its join message; `named` is the end of the
+  request that lists the node and assigns its slot.
+- responder-leave: from power-off of a node to the start of the first message after its empty slot;
+  from then on, the empty slot costs only its listening time.
+- initiator-loss: from power-off of the initiator to the end of the first complete round of the
   others.
 """
 
@@ -25,18 +25,18 @@ EVENTS = ("responder-join", "responder-leave", "initiator-loss")
 MODES = ("watchdog", "succession")
 NODES = 4
 LIMIT = 10.0
-"""[s] No recovery takes so long; one that did would be an error, not a figure."""
+"""[s] Upper limit of a recovery; exceeding it is an error."""
 
 
 def measure_recovery(
     seed: int, events: int, progress: Callable[[float], None]
 ) -> tuple[list[dict[str, Any]], dict[tuple[str, str], list[float]]]:
-    """Recovery times of a group of four.
+    """Measure recovery times of a group of four nodes.
 
     Args:
-        seed: Same seed, same figures.
-        events: How many of each kind.
-        progress: Called with the share done.
+        seed: Seed; the same seed gives the same figures.
+        events: Number of events of each kind and mode.
+        progress: Called with the share done, 0 to 1.
 
     Returns:
         One record for each kind of event and mode; all times of each [s].
@@ -77,7 +77,7 @@ def _record(event: str, mode: str, times: Sequence[float]) -> dict[str, Any]:
 
 
 def _assembled(nodes: range, mode: str, rng: np.random.Generator) -> Group:
-    """A group that has ranged for a moment; its phase is random."""
+    """Return an assembled group with a random phase of its rounds."""
     group = Group(radio_params(succession=mode == "succession"), NODES, rng)
     for k in nodes:
         group.switch_on(k, float(rng.uniform(0.0, 0.02)))
@@ -88,7 +88,7 @@ def _assembled(nodes: range, mode: str, rng: np.random.Generator) -> Group:
 
 
 def _responder_comes_and_goes(mode: str, rng: np.random.Generator) -> tuple[float, float, float]:
-    """Times of the join, of the request that names the node, and of the leave [s]."""
+    """Return the times of the join, of the request that lists the node, and of the leave [s]."""
     group = _assembled(range(NODES - 1), mode, rng)
     node = NODES - 1
     on = group.t + (after := float(rng.uniform(0.0, DT)))
@@ -118,7 +118,7 @@ def _initiator_goes(mode: str, rng: np.random.Generator) -> float:
 def _wait(
     group: Group, event: str, found: Callable[[list[Heard]], tuple[float, ...] | None]
 ) -> tuple[float, ...]:
-    """Run until something is found in what was heard."""
+    """Run until `found` returns times in the received messages; return these times [s]."""
     heard: list[Heard] = []
     limit = group.t + LIMIT
     while group.t < limit:
@@ -131,7 +131,7 @@ def _wait(
 
 
 def _known(heard: list[Heard], node: int) -> tuple[float, float] | None:
-    """End of the join of a newcomer, and of the request after it that names it."""
+    """Return the end of a node's join, and of the next request that lists the node [s]."""
     spoken = None
     for h in heard:
         if h.frame.src == node and spoken is None:
@@ -144,8 +144,8 @@ def _known(heard: list[Heard], node: int) -> tuple[float, float] | None:
 
 
 def _closed(heard: list[Heard], node: int, off: float) -> tuple[float] | None:
-    """Begin of the first message that comes behind the empty slot of a node."""
-    slot = NODES - 1  # of the largest ID
+    """Return the start of the first message after the empty slot of a node [s]."""
+    slot = NODES - 1  # slot of the largest ID
     at = -1
     for h in heard:
         if h.start < off:
@@ -160,7 +160,7 @@ def _closed(heard: list[Heard], node: int, off: float) -> tuple[float] | None:
 
 
 def _whole_round(heard: list[Heard], node: int, off: float) -> tuple[float] | None:
-    """End of the first round after a loss in which all the others spoke."""
+    """Return the end of the first round after a loss with messages of all other nodes [s]."""
     others = {k for k in range(NODES) if k != node}
     spoken: set[int] = set()
     for h in heard:

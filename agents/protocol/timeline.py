@@ -1,4 +1,4 @@
-"""Ranging frequency over time while nodes come and go: the experiment of the paper's figure."""
+"""Ranging rate over time while nodes join and leave, as in a figure of the paper."""
 
 from __future__ import annotations
 
@@ -17,32 +17,32 @@ SCRIPT = (
     (4.0, "a smaller ID joins", 0, True),
     (5.5, "it drops out, the initiator", 0, False),
 )
-"""Time [s], what happens, node, whether it is switched on; nodes 1 to 4 are there all along."""
+"""Time [s], event, node, and whether it is switched on; nodes 1 to 4 are always on."""
 END = 8.0
-"""[s]"""
+"""[s] End of the experiment."""
 
 
 BIN = 0.1
-"""[s] Rounds are counted in bins of this length."""
+"""[s] Bin width of the counts of rounds."""
 RUNS = 10
-"""The frequency is the mean over so many groups."""
+"""[-] Number of averaged groups."""
 
 
 @dataclass(frozen=True, slots=True)
 class Timeline:
-    """Ranging frequency over time in one mode."""
+    """Ranging rate over time in one mode."""
 
     __repr__ = short_repr
 
     mode: str
     t: F64
-    """Middle of each bin [s]."""
+    """[s] Centre of each bin."""
     hz: F64
-    """Rounds per second in which every node that is on spoke."""
+    """[Hz] Rate of complete rounds, with messages of all switched-on nodes."""
 
 
 def run_timeline(seed: int, mode: str) -> Timeline:
-    """Let the script run off in several groups, once their first four nodes are together."""
+    """Run the script in several groups, starting after their first four nodes are assembled."""
     edges = np.arange(0.0, END + 0.5 * BIN, BIN)
     ends = np.concatenate([_whole_rounds(seed, mode, k) for k in range(RUNS)])
     count, _ = np.histogram(ends, edges)
@@ -50,7 +50,7 @@ def run_timeline(seed: int, mode: str) -> Timeline:
 
 
 def _whole_rounds(seed: int, mode: str, k: int) -> F64:
-    """Ends of the rounds in which every node that is on spoke [s]."""
+    """Return the ends of the complete rounds, with messages of all switched-on nodes [s]."""
     rng = np.random.default_rng([seed, 99, k])
     group = Group(radio_params(succession=mode == "succession"), 6, rng)
     for node in range(1, 5):

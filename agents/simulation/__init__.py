@@ -1,1 +1,1 @@
-"""Simulated drives: recorded, demonstrated and shown."""
+"""Recording, demonstration and display of simulated drives."""

@@ -1,4 +1,4 @@
-"""Cars keep a formation on estimates: what `relpos demo` does, as a function."""
+"""Simulate cars that keep a formation on estimates (`relpos demo`)."""
 
 from __future__ import annotations
 
@@ -24,54 +24,54 @@ from tracking.log.folder import Log
 from tracking.params.short_repr import short_repr
 
 TOLD = ("estimate", "truth", "nothing")
-"""What the cars are told in the drives of a demonstration."""
+"""Information about other cars in each drive of a demonstration."""
 CONTROLLER, TASK = "consensus", "ring"
-"""Who drives the cars, and what they do, if nothing else is said."""
+"""Default controller and task."""
 SETTLE = 10.0
-"""[s] Errors are averaged from here on."""
+"""[s] Start of the interval over which errors are averaged."""
 
 
 @dataclass(frozen=True, slots=True)
 class DemoResult:
-    """One demonstration."""
+    """Result of one demonstration."""
 
     __repr__ = short_repr
 
     scenario: str
     task: str
     driver: str
-    """The controller or policy."""
+    """Name of the controller or policy."""
     seed: int
     seconds: float
     """[s] Length of the drive on estimates."""
     done: bool
-    """Whether it ended because the task was accomplished."""
+    """True if the drive ended because the task was accomplished."""
     formation_error: float
-    """[m] Mean distance of the others from where they should be, tracker in the loop; as the
-    task says, see `relpos_env.tasks`."""
+    """[m] Formation error of the drive on estimates: mean distance of the others from their target
+    positions, as defined by the task, see `relpos_env.tasks`."""
     formation_error_truth: float | None
-    """[m] The same when the cars are told the truth; None where their observations have no place
-    for it."""
+    """[m] Formation error with true relative positions; None if the observations cannot hold
+    them."""
     formation_error_blind: float
-    """[m] The same when they are told nothing and follow the operator's command alone."""
+    """[m] Formation error without other cars, on the operator's command only."""
     nlos_share: float
-    """[-] Share of the ranges that an obstacle was in the way of."""
+    """[-] Share of NLOS ranges."""
     collisions: int
-    """[-] Contacts that cars began, with each other, obstacles and walls."""
+    """[-] Collisions of cars with each other, obstacles and walls."""
     tracks: tuple[TrackResult, ...]
-    """The same drive tracked by some filters."""
+    """Results of several filters on the drive."""
     frames: dict[str, Any]
-    """What the animation shows."""
+    """Frames of the animation."""
     log: Log
     """Measurements and truth of the drive on estimates."""
 
     def tracked_by(self, filters: Sequence[str]) -> DemoResult:
-        """With the drive tracked by other filters."""
+        """Return the result with the drive tracked by other filters."""
         return replace(self, tracks=_track(self.log, filters))
 
     @property
     def summary(self) -> list[dict[str, Any]]:
-        """The figures, one record a filter and one for the formation."""
+        """JSON records, one per filter and one for the formation."""
         rows: list[dict[str, Any]] = [{"result": "tracking", **r.summary} for r in self.tracks]
         return [
             *rows,
@@ -109,33 +109,32 @@ def demo(
     progress: Callable[[float], None] | None = None,
     watch: Callable[[dict[str, Any], str], None] | None = None,
 ) -> DemoResult:
-    """Drive a formation on estimates and, for comparison, on the truth and on nothing.
+    """Drive a formation on estimates and, for comparison, on the truth and without other cars.
 
     Args:
-        scenario: One of `relpos_env.scenarios.SCENARIOS` or a TOML file; by default one that the
-            policy was trained in, or that of the task.
+        scenario: One of `relpos_env.scenarios.SCENARIOS` or a TOML file; by default the first one
+            that the policy was trained in, or that of the task.
         task: One of `relpos_env.tasks.TASKS`; by default that of the policy, or `TASK`.
-        seconds: Length, less where the task is done before.
-        seed: Same seed, same run.
+        seconds: Largest length [s]; the drive also ends when the task is done.
+        seed: Seed; the same seed gives the same run.
         cars: Number of cars; by default that of the scenario.
-        proximity: Beams that measure distances round each car; by default those of the policy, or
-            none.
+        proximity: Distance sensors per car; by default those of the policy, or none.
         controller: One of `agents.controllers.CONTROLLERS`, by default `CONTROLLER`.
-        policy: A trained policy in its place, as for `load_policy`; the cars observe what it
-            was trained on.
-        filter: The cars' tracker, one of `tracking.filters.FILTERS`.
-        filters: Those that track the drive afterwards, for comparison.
+        policy: A trained policy that replaces the controller, as for `load_policy`; the cars use
+            its observation mode.
+        filter: Filter of the cars, one of `tracking.filters.FILTERS`.
+        filters: Filters that track the recorded drive for comparison.
         window: Show the drive on estimates in a window; needs pygame.
-        film: Called with a picture of it after every decision, uint8 (height, width, 3), where
-            there is no window; needs pygame.
+        film: Called with a picture of the drive on estimates after every control step, uint8
+            (height, width, 3), if there is no window; needs pygame.
         progress: Called with the share done, 0 to 1.
-        watch: Called after every decision with the frames so far and what the cars are told.
+        watch: Called after every control step with the frames so far and an element of `TOLD`.
 
     Raises:
         ConfigError: No such filter.
         EnvError: An unknown name or a number out of range.
-        UsageError: A controller and a policy, or a policy that cannot be loaded or is not for
-            these cars.
+        UsageError: A controller and a policy are given, or the policy cannot be loaded or does not
+            fit these cars.
     """
     if policy is not None and controller is not None:
         raise UsageError("policy: expected either a policy or a controller, got both")
@@ -217,22 +216,22 @@ def demo(
 
 
 def _track(log: Log, filters: Sequence[str]) -> tuple[TrackResult, ...]:
-    """The drive tracked by some filters; of a simulation nothing has to be checked."""
+    """Return the drive tracked by some filters, without the checks for real sensors."""
     return tuple(track_log(log, filter=name, findings=()) for name in filters)
 
 
 def _trained_for(policy: TrainedPolicy | None) -> tuple[str | None, str | None]:
-    """Task and first scenario that a policy was trained for, where its card tells."""
+    """Return task and scenario of a policy's training; None if its card does not name them."""
     training = {} if policy is None else policy.card.training
     task, scenario = training.get("task"), training.get("scenario")
     return None if task is None else str(task), None if scenario is None else str(scenario)
 
 
 def _modes(policy: TrainedPolicy | None) -> dict[str, str]:
-    """The observation mode of each drive, by what the cars are told."""
+    """Return the observation mode of each drive, by element of `TOLD`."""
     modes = {told: "truth" if told == "truth" else "estimate" for told in TOLD}
     if policy is not None and policy.layout.observation not in modes.values():
-        # What this policy sees is measured, and has no true counterpart.
+        # The observations of this policy are measurements, without a true counterpart.
         del modes["truth"]
         return dict.fromkeys(modes, policy.layout.observation)
     return modes
@@ -240,13 +239,13 @@ def _modes(policy: TrainedPolicy | None) -> dict[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """One episode."""
+    """Result of one episode."""
 
     seconds: float
     done: bool
-    """Whether the task was accomplished and ended it."""
+    """True if the episode ended because the task was accomplished."""
     formation_error: float
-    """[m] Mean from `SETTLE` on, or that of the end if it came before."""
+    """[m] Mean formation error from `SETTLE` on, or the last error of a shorter episode."""
     collisions: int
     frames: dict[str, Any]
 
@@ -264,13 +263,13 @@ def drive(
     """Drive one episode.
 
     Args:
-        env: Is reset first.
-        driver: Drives all cars.
-        seed: Of the episode.
-        blind: Whether the observations are changed so that no other car is known.
+        env: Environment, which is reset first.
+        driver: Driver of all cars.
+        seed: Seed of the episode.
+        blind: Whether other cars are removed from the observations.
         progress: Called with the share done, 0 to 1.
-        watch: Called after every decision with the frames so far.
-        film: Called with pictures of an environment that makes them.
+        watch: Called after every control step with the frames so far.
+        film: Called with pictures if the environment renders ``rgb_array``.
     """
     observations, _ = env.reset(seed=seed)
     formation, blindfold = env.formation, Blindfold(Layout.of(env.formation.parts))

@@ -1,4 +1,4 @@
-"""What an animation of a drive shows, as numbers, rounded to a millimetre."""
+"""Frames of an animation of a drive as numbers, rounded to a millimetre."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ NAMES = (
     "t", "pos", "heading", "present", "boxes", "sight", "viewer", "target", "estimate",
     "tracking", "formation",
 )  # fmt: skip
-"""What every frame has, in lists over frames."""
+"""Entries of every frame, stored as lists over frames."""
 
 
 class FrameRecorder:
-    """Collects frames of one environment, as its first car in the room sees it."""
+    """Recorder of the frames of one environment, with the estimates of its first present car."""
 
     def __init__(self, formation: EnvCore) -> None:
         self._formation = formation
@@ -32,7 +32,7 @@ class FrameRecorder:
         self._boxes: list[Any] | None = None
 
     def add(self) -> None:
-        """One frame of the environment as it stands."""
+        """Append a frame of the current state."""
         formation, swarm = self._formation, self._formation.loop.swarm
         state, task, view = swarm.state.take(0), formation.task, formation.loop.view
         i, j = swarm.constellation.pairs.T
@@ -66,14 +66,14 @@ class FrameRecorder:
         for name in NAMES:
             self.frames[name].append(frame[name])
         if self._boxes == frame["boxes"]:
-            self.frames["boxes"][-1] = None  # as before
+            self.frames["boxes"][-1] = None  # unchanged
         self._boxes = frame["boxes"]
 
 
 def errors(formation: EnvCore) -> tuple[float, float]:
-    """Tracking and formation error now, means over the cars that know any, and that are there [m].
+    """Return the current tracking and formation error [m].
 
-    NaN and 0 where there are none.
+    Means over cars with known errors (NaN without any), and over present cars (0 without any).
     """
     tracking, present = formation.tracking_error()[0], formation.state.present[0]
     known = np.isfinite(tracking)
@@ -84,10 +84,10 @@ def errors(formation: EnvCore) -> tuple[float, float]:
 
 
 def corners(boxes: F64) -> F64:
-    """Corners in order, (box, 4, 2) [m], of the boxes that there are.
+    """Return the corners of the used boxes in order, (box, 4, 2) [m].
 
     Args:
-        boxes: Centre, half width and depth [m], cosine, sine, (row, 6); unused rows have no size.
+        boxes: Centre, half width and half depth [m], cosine, sine, (row, 6); zero size if unused.
     """
     x, y, half_width, half_depth, c, s = boxes[boxes[:, 2] > 0.0].T[:, :, None]
     ahead, left = half_width * [-1.0, 1.0, 1.0, -1.0], half_depth * [-1.0, -1.0, 1.0, 1.0]
@@ -96,12 +96,12 @@ def corners(boxes: F64) -> F64:
 
 
 def ellipse(xx: float, yy: float, xy: float) -> tuple[float, float, float]:
-    """Standard deviations along the axes of a covariance, and the angle of the first [rad]."""
+    """Return the principal standard deviations, largest first, and the angle of the first [rad]."""
     values, vectors = np.linalg.eigh([[xx, xy], [xy, yy]])
     a, b = np.sqrt(np.maximum(values[::-1], 0.0))
     return float(a), float(b), float(np.arctan2(vectors[1, 1], vectors[0, 1]))
 
 
 def rounded(numbers: Any) -> Any:
-    """Nested lists of numbers, to a thousandth."""
+    """Return nested lists of numbers, rounded to three decimals."""
     return np.round(numbers, 3).tolist()

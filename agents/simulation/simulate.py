@@ -1,4 +1,4 @@
-"""Recording a simulated run: what `relpos simulate` does, as a function."""
+"""Record a simulated run (`relpos simulate`)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from relpos_env.timing import DT, STAND_STILL
 from tracking.log import Log, check_target, write_log
 
 DECISION = 10
-"""[-] Steps of the world between two decisions of drivers."""
+"""[-] Steps of the world per control step of the drivers."""
 
 Progress = Callable[[float], None]
 
@@ -34,19 +34,18 @@ def simulate(
     out: Path | str | None = None,
     progress: Progress | None = None,
 ) -> Log:
-    """Let people drive cars about, or exercise, and record what their trackers measure.
+    """Simulate driven cars or an exercising person, and record the measurements of the trackers.
 
     Args:
         scenario: One of `relpos_env.scenarios.RECORDABLE`, or a TOML file.
-        seconds: Length of the recording; no car moves in the first two.
-        seed: Same seed, same recording, bit for bit.
-        cars: Number of cars; by default that of the scenario. People have none.
-        channel: What the place does to the radio, one of
-            `relpos_env.sensors.radio.channel.CHANNELS`;
-            by default that of the scenario.
-        antenna_delay: Standard deviation of what each antenna adds to its ranges [m], for
-            recordings to calibrate with; by default that of the scenario.
-        out: Where to write the log folder; None writes nothing.
+        seconds: Length of the recording [s]; no car moves in the first two.
+        seed: Seed; the same seed gives the same recording, bit for bit.
+        cars: Number of cars; by default that of the scenario. Not for scenarios with a person.
+        channel: Radio channel, one of `relpos_env.sensors.radio.channel.CHANNELS`; by default that
+            of the scenario.
+        antenna_delay: Standard deviation of the range offset of each antenna [m], for calibration
+            recordings; by default that of the scenario.
+        out: Path of the log folder; None writes nothing.
         progress: Called with the share done, 0 to 1.
 
     Raises:
@@ -86,16 +85,16 @@ def record(
     seed: int,
     progress: Progress | None = None,
 ) -> Log:
-    """Record any world, those that have no name too.
+    """Record a scenario, registered or not.
 
     Args:
         scenario: The world and its sensors.
-        seconds: Length of the recording; no car moves in the first two.
-        seed: Same seed, same recording, bit for bit.
+        seconds: Length of the recording [s]; no car moves in the first two.
+        seed: Seed; the same seed gives the same recording, bit for bit.
         progress: Called with the share done, 0 to 1.
 
     Raises:
-        EnvError: A person cannot be recorded for so long.
+        EnvError: The length is too large for a person.
     """
     rng, name = np.random.default_rng(seed), f"{scenario.name}-{seed}"
     if isinstance(scenario, HumanScenario):
@@ -106,7 +105,7 @@ def record(
 def _radio(
     radio: RadioSimParams, channel: str | None, antenna_delay: float | None
 ) -> RadioSimParams:
-    """The radio of the scenario with what the caller wants otherwise."""
+    """Return the radio of the scenario with another channel and antenna delay, if given."""
     if channel is not None:
         radio = replace(radio, channel=look_up(CHANNELS, channel, "channel"))
     if antenna_delay is not None:
@@ -119,7 +118,7 @@ def _radio(
 def _drive(
     scenario: Scenario, seconds: float, rng: np.random.Generator, name: str, tell: Progress | None
 ) -> Log:
-    """Cars with drivers."""
+    """Record cars with scripted drivers."""
     from relpos_env.interface.actions import DriveCommand
     from relpos_env.simulation.scripted_driver import LoopDrivers
     from relpos_env.simulation.simulation import Simulation
@@ -144,7 +143,7 @@ def _exercise(
     name: str,
     tell: Progress | None,
 ) -> Log:
-    """A person who exercises."""
+    """Record an exercising person."""
     from relpos_env.people.simulation import BodySimulation
 
     n_chunks = round(seconds / (DECISION * DT))

@@ -1,4 +1,4 @@
-"""A drive on the terminal while it runs: the room from above, in characters."""
+"""Live view of a drive on the terminal: a plan of the room in characters."""
 
 from __future__ import annotations
 
@@ -15,30 +15,30 @@ from rich.text import Text
 
 ARROWS = "→↗↑↖←↙↓↘"
 PLAIN_ARROWS = ">/^\\</v\\"
-"""The same where the terminal has only ASCII."""
+"""Arrows for terminals with ASCII only."""
 COLOURS = ("blue", "red", "green", "dark_orange", "magenta", "cyan")
-"""Of cars, as in the animation of the report."""
+"""Colours of cars, as in the animation of the report."""
 ASPECT = 0.5
 """[-] Width of a character over its height."""
 FINE = 4
-"""[-] Points of a letter along each axis that are looked at."""
+"""[-] Sample points per character along each axis."""
 PERIOD = 0.05
-"""[s] Between two pictures."""
+"""[s] Shortest time between two pictures."""
 
 
 def draw_room(
     frames: dict[str, Any], k: int, *, width: int, height: int, plain: bool = False
 ) -> Text:
-    """One instant from above.
+    """Return the plan of the room in one frame.
 
-    Cars are arrows, obstacles #; where the first car believes others is o, where it wants them +.
+    Arrows are cars, # obstacles, o the estimates of the first car and + its target positions.
 
     Args:
-        frames: Of `agents.simulation.frames.FrameRecorder`.
-        k: Which of them.
+        frames: Frames of `agents.simulation.frames.FrameRecorder`.
+        k: Index of the frame.
         width: Maximum number of characters in a line.
         height: Maximum number of lines.
-        plain: ASCII alone.
+        plain: Whether to use ASCII only.
     """
     across, deep = frames["room"]
     scale = min(width / across, height / (deep * ASPECT))  # characters per metre
@@ -51,7 +51,7 @@ def draw_room(
         if 0 <= row < rows and 0 <= column < columns:
             letters[row, column], colours[row, column] = letter, colour
 
-    # Walls may be thinner than a letter: a few points of each are looked at.
+    # Walls may be thinner than a character: each character is sampled at several points.
     y, x = np.mgrid[0 : rows * FINE, 0 : columns * FINE] + 0.5
     x, y = (x / columns / FINE - 0.5) * across, (0.5 - y / rows / FINE) * deep
     for corners in _boxes(frames, k):
@@ -83,14 +83,14 @@ def draw_room(
 
 
 def _boxes(frames: dict[str, Any], k: int) -> Any:
-    """Corners of the obstacles; frames have them only where they change."""
+    """Return the corners of the obstacles; frames have them only after a change."""
     while k > 0 and frames["boxes"][k] is None:
         k -= 1
     return frames["boxes"][k] or ()
 
 
 def _is_inside(corners: Any, x: Any, y: Any) -> Any:
-    """True for points in a convex polygon."""
+    """Return True for points in a convex polygon."""
     sides = [
         (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])
         for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)
@@ -99,7 +99,7 @@ def _is_inside(corners: Any, x: Any, y: Any) -> Any:
 
 
 class LiveRoom:
-    """Shows a drive on stderr, redrawn in place; nothing where that is no terminal."""
+    """View of a drive on stderr, updated in place; no output without a terminal."""
 
     def __init__(self) -> None:
         self._console = Console(stderr=True)
@@ -117,7 +117,7 @@ class LiveRoom:
             self._live.stop()
 
     def show(self, frames: dict[str, Any], title: str, k: int = -1) -> None:
-        """Draw an instant, the newest by default, unless another was drawn just now."""
+        """Draw a frame, the latest by default, unless the last picture is newer than `PERIOD`."""
         now = time.monotonic()
         if not self.shown or now - self._last < PERIOD or not frames["t"]:
             return
@@ -133,7 +133,7 @@ class LiveRoom:
         self._live.update(Group(panel, Text(f"{told}\n{key}")), refresh=True)
 
     def replay(self, frames: dict[str, Any], title: str, until: Callable[[], bool]) -> None:
-        """Show a drive again and again, at its own pace, until something holds."""
+        """Show a drive repeatedly in real time until `until` returns True."""
         k = 0
         while not until():
             self.show(frames, title, k)

@@ -1,4 +1,4 @@
-"""Compiling ahead, in as many processes as there are cores: what `relpos warmup` does."""
+"""Compile ahead of time, in one process per core by default (`relpos warmup`)."""
 
 from agents.warm_up.background import BackgroundWarmUp
 from agents.warm_up.parts import ORIENTATION, PURPOSES, Part, parts_of

@@ -1,4 +1,4 @@
-"""Trackers compiled while something else runs: what is shown last need not be waited for."""
+"""Compilation in the background of a running command."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from agents.warm_up.processes import PERIOD, Progress, warm_up
 
 
 class BackgroundWarmUp:
-    """Compiles parts in processes of their own from `__enter__` on; ends them on `__exit__`.
+    """Context that compiles parts in separate processes, and ends these on exit.
 
     Args:
-        needed: Compiled first; `wait_for_needed` returns once they are.
-        later: Compiled as soon as a process is free.
+        needed: Parts that are compiled first; `wait_for_needed` waits for them.
+        later: Parts that are compiled as soon as a process is free.
     """
 
     def __init__(self, needed: Iterable[Part], later: Iterable[Part]) -> None:
@@ -26,7 +26,7 @@ class BackgroundWarmUp:
         self._said = 0.0, ""
         self._thread = threading.Thread(target=self._compile, name="warm-up", daemon=True)
         self.missing = tuple(part.name for part in self._later)
-        """Names of those of `later` that were not on the disk."""
+        """Names of the parts of `later` that were not on the disk."""
 
     def __enter__(self) -> Self:
         if self._needed or self._later:
@@ -39,14 +39,14 @@ class BackgroundWarmUp:
             self._thread.join()
 
     def is_done(self) -> bool:
-        """Whether nothing is being compiled any more."""
+        """Return whether the compilation has ended."""
         return not self._thread.is_alive()
 
     def wait_for_needed(self, progress: Progress) -> None:
-        """Return once all that is needed is compiled.
+        """Wait until the needed parts are compiled.
 
         Args:
-            progress: Called several times a second until then.
+            progress: Called several times a second during the wait.
 
         Raises:
             UsageError: A process failed.
@@ -58,7 +58,7 @@ class BackgroundWarmUp:
         self._raise_error()
 
     def wait(self) -> None:
-        """Return once all is compiled.
+        """Wait until all parts are compiled.
 
         Raises:
             UsageError: A process failed.
@@ -80,7 +80,7 @@ class BackgroundWarmUp:
                 finished=self._left.discard,
                 is_stopped=self._stop.is_set,
             )
-        except BaseException as error:  # shown by those who wait
+        except BaseException as error:  # raised in the waiting thread
             self._error.append(error)
 
     def _say(self, share: float, what: str) -> None:

@@ -1,6 +1,6 @@
-"""What there is to compile: trackers, the simulated world, tasks, the hardware bridge.
+"""Parts to compile: trackers, the simulated world, tasks, the hardware bridge.
 
-Each part is compiled by a process of its own (`python -m agents.warm_up NAME`), and shares little
+Each part is compiled by a separate process (`python -m agents.warm_up NAME`), and shares little
 code with the others.
 """
 
@@ -23,11 +23,11 @@ from tracking.measurements import MeasurementBlock
 
 SECONDS = {"env": 38.0, "joint.0": 33.0, "ekf-mds.0": 30.0, "joint.1": 29.0, "joint.2": 18.0,
            "paper-ekf-mds.0": 16.0, "hardware": 6.0, "tasks": 6.0}  # fmt: skip
-"""[s] Time of a part on one core of a laptop, for the progress that is shown."""
+"""[s] Compile time of a part on one core of a laptop, for the progress bar."""
 ORIENTATION = "orientation"
-"""Part that trackers with all filters have."""
+"""Part shared by trackers with any filter."""
 OTHERS = 10.0
-"""[s] Time of a part that is not in the table."""
+"""[s] Assumed compile time of parts that are not in the table."""
 SWARM = """
 [nodes.1]
 [nodes.2]
@@ -36,7 +36,7 @@ SWARM = """
 port = "none"
 format = "relpos"
 """
-"""A swarm that is never opened."""
+"""Configuration of a swarm whose ports are never opened."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,27 +45,27 @@ class Part:
 
     name: str
     is_kept: Callable[[], bool]
-    """Whether the disk has its code."""
+    """Function that returns whether its code is on disk."""
     compile: Callable[[], None]
-    """Load the code of the part from the disk, or compile it."""
+    """Function that loads its code from disk or compiles it."""
     needs_others: bool = False
-    """True if it uses what other parts compile, and so comes after them."""
+    """True if it uses the code of other parts and must be compiled after them."""
 
     @property
     def seconds(self) -> float:
-        """About how long it takes [s]."""
+        """[s] Approximate compile time."""
         return SECONDS.get(self.name, OTHERS)
 
 
 def parts_of(
     purpose: str, filters: tuple[str, ...] = (DEFAULT_FILTER,), *, in_space: bool = True
 ) -> list[Part]:
-    """Parts that something needs.
+    """Return the parts for a purpose.
 
     Args:
         purpose: One of `PURPOSES`.
-        filters: Some of `tracking.filters.FILTERS`; all of them for the purpose ``all``.
-        in_space: Whether groups move in space, too, or in a plane only.
+        filters: Filters of `tracking.filters.FILTERS`; the purpose ``all`` compiles all of them.
+        in_space: Whether groups may be three-dimensional; False covers two dimensions only.
 
     Raises:
         ConfigError: No filter of that name.
@@ -77,7 +77,7 @@ def parts_of(
     others = [OTHER_PARTS[name] for name in PURPOSES[purpose]]
     trackers = list(_tracker_parts(names, in_space))
     if others:
-        # The world is driven with orientations: little is left of that part.
+        # Compiling the world also compiles most of the orientation part.
         of_world = [part for part in trackers if part.name == ORIENTATION]
         late = [replace(part, needs_others=True) for part in of_world]
         trackers = [*(part for part in trackers if part.name != ORIENTATION), *late]
@@ -85,7 +85,7 @@ def parts_of(
 
 
 def _tracker_parts(filters: Iterable[str], in_space: bool) -> Iterator[Part]:
-    """Parts of trackers; what filters share is one part."""
+    """Yield the parts of trackers; code shared by filters is in one part only."""
     known = set[frozenset[Any]]()
     for name in dict.fromkeys(filters):
         for part_name, calls in _kernel_groups(name, in_space):
@@ -97,13 +97,13 @@ def _tracker_parts(filters: Iterable[str], in_space: bool) -> Iterator[Part]:
 
 
 def _kernel_groups(name: str, in_space: bool) -> Iterator[tuple[str, list[Call]]]:
-    """Of one tracker, the same for all groups of nodes in a plane, and for all in space."""
+    """Yield the parts of one tracker, which do not depend on the group except its dimensions."""
     filter_builder(name)
     nodes = tuple(NodeConfig(id=k) for k in range(4))
     who = Constellation(nodes=nodes, dimensions=3 if in_space else 2)
     groups = Tracker(who, filter=name).calls()
     for k, group in enumerate(groups):
-        # The last is that of the orientations, the same for all filters.
+        # The last group has the orientation kernels, which are the same for all filters.
         named = f"{name}.{k}" if k < len(groups) - 1 else ORIENTATION
         yield named, group
 
@@ -118,7 +118,7 @@ def _are_kept(calls: list[Call]) -> bool:
 
 
 class NoFilter:
-    """Estimates nothing: with it the world is compiled while others compile the tracker."""
+    """Dummy filter, with which the world is compiled in parallel with the tracker."""
 
     follows_bias = False
 
@@ -126,36 +126,36 @@ class NoFilter:
         self._constellation, self._n_envs = constellation, n_envs
 
     def run(self, block: MeasurementBlock, t_out: Any) -> TeamEstimate:
-        """An estimate of nothing."""
+        """Return an empty estimate."""
         return TeamEstimate.empty(self._constellation, np.array(t_out, dtype=np.float64))
 
     def bind(self, block: MeasurementBlock, estimate: TeamEstimate) -> Callable[[], None]:
-        """Leaves the estimate as it is."""
+        """Return a function that does not change the estimate."""
         return lambda: None
 
     def calls(self, block: MeasurementBlock, estimate: TeamEstimate) -> list[list[Call]]:
-        """None."""
+        """Return no kernel calls."""
         return []
 
     def reset(self, env: int) -> None:
-        """Nothing is known before, either."""
+        """Do nothing."""
 
     def part(self, envs: slice) -> Self:
-        """The same."""
+        """Return this filter."""
         return self
 
     def save(self) -> None:
-        """Nothing."""
+        """Do nothing."""
 
     def restore(self, saved: None) -> None:
-        """Nothing."""
+        """Do nothing."""
 
     def mean_nis(self) -> Any:
-        """Not a number."""
+        """Return NaN, (env)."""
         return np.full(self._n_envs, np.nan)
 
     def n_rejected(self) -> Any:
-        """None."""
+        """Return zeros, (env)."""
         return np.zeros(self._n_envs)
 
 
@@ -232,4 +232,4 @@ PURPOSES: dict[str, tuple[str, ...]] = {
     "hardware": ("env", "hardware"),
     "all": ("env", "tasks", "hardware"),
 }
-"""Parts that are needed in addition to trackers, by purpose."""
+"""Parts in addition to those of trackers, by purpose."""

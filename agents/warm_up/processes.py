@@ -1,7 +1,6 @@
-"""Parts compiled side by side, each in a process of its own.
+"""Parallel compilation of parts, each in a separate process.
 
-Kernels are kept on disk once they are compiled, so a process that compiles some of them saves all
-later ones the time.
+Compiled kernels stay on disk, so later processes load them instead of compiling them.
 """
 
 from __future__ import annotations
@@ -21,25 +20,25 @@ from agents.warm_up.parts import Part, parts_of
 from tracking.filters import FILTERS
 
 PERIOD = 0.1
-"""[s] Time between two looks at the processes."""
+"""[s] Polling period of the processes."""
 Progress = Callable[[float, str], None]
-"""Takes the share done and what is being done."""
+"""Callback with the share done, 0 to 1, and the current work."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WarmUp:
-    """What was done."""
+    """Result of a compilation."""
 
     parts: tuple[str, ...]
     compiled: tuple[str, ...]
-    """Those of them that had to be compiled."""
+    """Names of the parts that had to be compiled."""
     seconds: float
     largest_mb: float
-    """[MB] Memory of the largest process; 0 if none was needed, or where it is not known."""
+    """[MB] Memory of the largest process; 0 if none was needed or it is unknown."""
 
     @property
     def summary(self) -> dict[str, Any]:
-        """As a line of JSON."""
+        """JSON record."""
         return {
             "parts": list(self.parts),
             "compiled": list(self.compiled),
@@ -60,12 +59,12 @@ def warm_up(
     """Compile parts, unless they are on the disk.
 
     Args:
-        parts: Of `parts_of`; those of one name count once.
-        later: Parts that are begun once a process is free and none of the others is left.
-        jobs: Processes, by default as many as there are cores.
+        parts: Parts of `parts_of`; parts with the same name are compiled once.
+        later: Parts that are started when a process is free and all of `parts` are started.
+        jobs: Number of processes; by default one per core.
         progress: Called several times a second until `parts` are done, if any is compiled.
-        finished: Called with the name of each part that has been compiled.
-        is_stopped: Asked several times a second whether to give up.
+        finished: Called with the name of each compiled part.
+        is_stopped: Polled several times a second; stops the compilation by returning True.
 
     Raises:
         UsageError: A process failed.
@@ -89,12 +88,12 @@ def warm_up_first(
     purpose: str = "track",
     in_space: bool = True,
 ) -> None:
-    """`warm_up` for a command: with a bar, or lines where there is no terminal, if it takes time.
+    """Compile the parts of a command, with a progress bar or, without a terminal, lines.
 
     Args:
-        filters: Those that do not come with the package are compiled when they run.
+        filters: Filters; those outside of the package are compiled when they run.
         purpose: One of `agents.warm_up.parts.PURPOSES`.
-        in_space: Whether groups move in space, too, or in a plane only.
+        in_space: Whether groups may be three-dimensional; False covers two dimensions only.
     """
     names = tuple(name for name in dict.fromkeys(filters) if name in FILTERS)
     with shown_progress() as tell:
@@ -103,7 +102,7 @@ def warm_up_first(
 
 @contextmanager
 def shown_progress() -> Iterator[Progress]:
-    """A bar on a terminal, lines elsewhere; nothing until progress is reported."""
+    """Yield a function that shows progress as a bar on a terminal, or else as lines on stderr."""
     bars: list[Callable[[float], None]] = []
     said: list[str] = []
     label = "compiling, once"
@@ -127,7 +126,7 @@ def shown_progress() -> Iterator[Progress]:
 
 
 def _missing(parts: Iterable[Part]) -> list[Part]:
-    """Parts that the disk does not have, those that take long first."""
+    """Return the parts that are not on disk, longest first, dependent ones last."""
     missing = [part for part in parts if not part.is_kept()]
     return sorted(missing, key=lambda part: (part.needs_others, -part.seconds))
 
@@ -140,7 +139,7 @@ def _run(
     finished: Callable[[str], None],
     is_stopped: Callable[[], bool],
 ) -> None:
-    """Compile parts in processes, one after the other."""
+    """Start the compilation of parts in this order, at most `jobs` at a time."""
     began, waiting = time.monotonic(), [*missing, *others]
     left = {part.name for part in missing}
     running: dict[str, subprocess.Popen[str]] = {}
@@ -167,7 +166,7 @@ def _run(
                     left.discard(name)
                     finished(name)
             if progress is not None and left:
-                # How long it takes is a guess: the bar slows down, it does not stand at its end.
+                # The expected time is a guess: the bar slows down instead of stopping at 100 %.
                 passed = (time.monotonic() - began) / expected
                 share = passed if passed < 0.7 else passed / (0.3 + passed)
                 what = ", ".join(name for name in running if name in left)
@@ -184,10 +183,10 @@ def _command(name: str) -> list[str]:
 
 
 def _largest_child() -> float:
-    """[MB] Largest memory of a process that this one has waited for."""
+    """Return the largest peak memory of a terminated child process [MB]."""
     try:
         import resource
-    except ImportError:  # not there on Windows
+    except ImportError:  # not available on Windows
         return 0.0
     largest = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
     return float(largest) / (1e6 if sys.platform == "darwin" else 1e3)

@@ -1,7 +1,7 @@
-"""Frames per second of our wire format, next to pymavlink in the same run.
+"""Benchmark of our wire format in frames per second, against pymavlink in the same run.
 
-Ours and the peer decode and encode as many frames of their own formats; that each frame comes out
-is checked before anything is timed. They take turns, and of each the best turn counts.
+Both decode and encode the same number of frames of their own format, after a check that every
+frame is decoded. They alternate, and the best turn of each counts.
 """
 
 from agents.bench.codec.rows import bench_codec

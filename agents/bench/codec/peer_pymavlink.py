@@ -1,4 +1,4 @@
-"""The peer: MAVLink 2 in Python, a format of the same kind, with the parser of its own project."""
+"""Peer: MAVLink 2 in Python, a similar format, with the parser of pymavlink."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from typing import Any
 from agents.errors import UsageError
 
 CHUNK = 1024
-"""[bytes] That a port gives at once."""
+"""[bytes] Size of the chunks read from a port."""
 
 
 class Mavlink:
-    """Samples of an inertial sensor, `RAW_IMU`."""
+    """IMU messages, `RAW_IMU`."""
 
     def __init__(self, n: int) -> None:
-        """Make so many messages, and see that they come out again.
+        """Create `n` messages, and check that all of them are decoded.
 
         Raises:
             UsageError: pymavlink is not installed.
@@ -39,11 +39,11 @@ class Mavlink:
             raise AssertionError("pymavlink gives fewer messages than went in")
 
     def encode(self) -> bytes:
-        """Messages to bytes."""
+        """Encode the messages to bytes."""
         return b"".join(message.pack(self._sender) for message in self._messages)
 
     def decode(self) -> int:
-        """Bytes to messages; how many."""
+        """Decode the bytes; return the number of messages."""
         parser, n = self._common.MAVLink(None), 0
         for chunk in self._chunks:
             n += len(parser.parse_buffer(chunk) or ())
@@ -51,5 +51,5 @@ class Mavlink:
 
 
 def _numbers(k: int) -> list[int]:
-    """Nine numbers of 16 bit."""
+    """Return nine 16-bit numbers."""
     return [(7919 * (9 * k + j)) % 65536 - 32768 for j in range(9)]

@@ -1,4 +1,4 @@
-"""The figures of `relpos bench codec`."""
+"""Figures of `relpos bench codec`."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ TURNS = 7
 def bench_codec(
     *, frames: int = 5000, progress: Callable[[float], None] | None = None
 ) -> list[Row]:
-    """Frames per second, decoded and encoded.
+    """Measure decoding and encoding in frames per second.
 
     Args:
-        frames: In a turn.
+        frames: Number of frames per turn.
         progress: Called with the share done, 0 to 1.
 
     Raises:
@@ -59,7 +59,7 @@ def bench_codec(
 
 
 def _reader(stream: Stream) -> Callable[[], None]:
-    """Decode bytes as a port gives them."""
+    """Return a function that decodes the bytes in chunks, as from a port."""
     data = stream.data.tobytes()
     chunks = [data[at : at + CHUNK] for at in range(0, len(data), CHUNK)]
 
@@ -83,7 +83,7 @@ def _writer(stream: Stream) -> Callable[[], bytes]:
 
 
 def _turn(call: Callable[[], Any]) -> Callable[[], float]:
-    """Time of a call [s]."""
+    """Return a function that measures the time of a call [s]."""
 
     def turn() -> float:
         began = time.perf_counter()

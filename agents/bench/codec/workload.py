@@ -1,4 +1,4 @@
-"""What nodes send, in our format."""
+"""Frames of nodes in our wire format."""
 
 from __future__ import annotations
 
@@ -10,37 +10,37 @@ from hardware_bridge.wire.codec import Batch, Codec
 from hardware_bridge.wire.definition import IMU, RANGES, Message
 
 OTHERS = 5
-"""[-] Nodes that a message of ranges is about."""
+"""[-] Ranges per message."""
 IMU_PER_RANGES = 10
-"""[-] In the mixture: 100 samples and 10 rounds a second."""
+"""[-] IMU samples per range message in the mixture: 100 Hz samples and 10 Hz rounds."""
 KEY = bytes(range(16))
 
 
 def imu(k: int) -> Message:
-    """Samples of an inertial sensor only."""
+    """Return the message type of frame k: IMU samples only."""
     return IMU
 
 
 def ranges(k: int) -> Message:
-    """Ranges only."""
+    """Return the message type of frame k: ranges only."""
     return RANGES
 
 
 def mixture(k: int) -> Message:
-    """What a node sends that ranges and has an inertial sensor."""
+    """Return the message type of frame k of a node with ranges and an IMU."""
     return RANGES if k % (IMU_PER_RANGES + 1) == IMU_PER_RANGES else IMU
 
 
 class Stream:
-    """So many frames: as arrays, and as bytes."""
+    """Frames as arrays and as bytes."""
 
     def __init__(self, messages: list[Message], *, key: bytes | None, seed: int = 0) -> None:
-        """Draw values and encode them.
+        """Sample random values and encode them.
 
         Args:
-            messages: Of the frames.
-            key: Frames carry a MAC.
-            seed: Of the values.
+            messages: Message types of the frames.
+            key: Key of the MACs; None sends frames without MAC.
+            seed: Seed of the values.
         """
         rng = np.random.default_rng(seed)
         self.n = len(messages)
@@ -69,9 +69,9 @@ class Stream:
             raise AssertionError("the codec gives other frames than went in")
 
     def encode(self) -> NDArray[np.uint8]:
-        """Arrays to bytes."""
+        """Encode the arrays to bytes."""
         return self.codec.encode(self.sent)
 
     def decode(self) -> None:
-        """Bytes to arrays."""
+        """Decode the bytes to arrays."""
         self.codec.decode(self.data, 0, self.got, Counts())

@@ -1,9 +1,9 @@
-"""How fast the environments step, next to mpe2 and bare pymunk in the same run.
+"""Benchmark of environment steps, against mpe2 and bare pymunk in the same run.
 
-Three cars with sensors at 100 Hz, a radio of messages and the joint tracker; an env-step is one
-decision of 0.1 s, ten steps of the physics, of every car of one environment. Episodes have 600
-steps and the next one begins at once: what that costs is in every figure. The actions of all
-cars are made outside of the time. Ours and the peer take turns, and of each the best turn counts.
+Environments have three cars with sensors at 100 Hz, a message-level radio and the joint tracker. An
+env-step is one control step of 0.1 s, or ten physics steps, of all cars of one environment. Every
+figure includes resets after episodes of 600 steps, but not the computation of actions. Environment
+and peer alternate, and the best turn of each counts.
 """
 
 from agents.bench.env.rows import bench_env

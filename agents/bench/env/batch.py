@@ -16,9 +16,9 @@ SCENARIO, TASK = "ring-los", "ring"
 
 
 class Batch:
-    """Environments that are at evenly spread places of their episodes.
+    """Environments with evenly spread episode phases.
 
-    So a turn has the resets that its steps should have, `resets` in all, and no step has many.
+    A turn therefore has `resets` resets in total, spread evenly over its steps.
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class Batch:
         )
         self.n_envs, self._drive = n_envs, drive
         self.steps = ceil(EPISODE * resets / n_envs)
-        """Of a turn."""
+        """[-] Steps of a turn."""
         self.env.reset(seed=0)
         self.env.formation.cycles[:] = EPISODE * np.arange(n_envs) // n_envs
 
@@ -54,7 +54,7 @@ class Batch:
             self._step()
 
     def turn(self) -> float:
-        """Time of a turn [us per env-step]."""
+        """Run a turn; return its time [us per env-step]."""
         spent = sum(self._step() for _ in range(self.steps))
         return 1e6 * spent / (self.steps * self.n_envs)
 

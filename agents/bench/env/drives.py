@@ -1,6 +1,6 @@
-"""Who drives the cars that are timed: a controller that follows the task, or chance.
+"""Actions of the timed cars: a controller that follows the task, or random noise.
 
-Both give shares of the largest speed and steering, (env, car, 2), for a whole batch.
+Both return shares of the largest speed and steering, (env, car, 2), for a whole batch.
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ from tracking.arrays import F64
 Drive = Callable[[EnvCore], F64]
 
 PULL = 0.8
-"""[1/s] Speed towards the own place per metre that it is away."""
+"""[1/s] Gain from distance to the formation slot to speed."""
 LOOKAHEAD = 0.6
-"""[m] Of the pursuit."""
+"""[m] Lookahead distance of pure pursuit."""
 LEAST_SPEED, MOST_SPEED = 0.3, 0.9
-"""[m/s] Of cars that are driven by chance."""
+"""[m/s] Speed range of random driving."""
 KEEP = 0.95
-"""[-] From step to step of the noise that speed and steering are made of: 2 s."""
+"""[-] Autocorrelation of the noise from step to step, a correlation time of 2 s."""
 
 
 def followed(formation: EnvCore) -> F64:
-    """Pure pursuit of what the operator tells and of the own place, by the truth.
+    """Return actions of pure pursuit of operator command and formation slot, from the truth.
 
-    With the heading error e of the wanted velocity and the lookahead d, the arc has curvature
+    With the heading error e of the target velocity and the lookahead d, the arc has curvature
     2 sin(e) / d (Coulter, CMU-RI-TR-92-01) and the steering is atan(wheelbase curvature).
     """
     state, task = formation.state, formation.task
@@ -43,14 +43,14 @@ def followed(formation: EnvCore) -> F64:
 
 
 class Chance:
-    """Smooth commands that care for nothing: Gauss-Markov noise. The cars end up at the walls."""
+    """Smooth random actions from Gauss-Markov noise, with which cars end up at the walls."""
 
     def __init__(self, seed: int = 0) -> None:
         self._rng = np.random.default_rng(seed)
         self._noise: F64 | None = None
 
     def __call__(self, formation: EnvCore) -> F64:
-        """Actions of now."""
+        """Return the actions of the next step."""
         fresh = self._rng.normal(size=(*formation.active.shape, 2))
         if self._noise is None:
             self._noise = fresh

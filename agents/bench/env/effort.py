@@ -1,34 +1,34 @@
-"""How much is measured, and for how long."""
+"""Size of a benchmark run."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 EPISODE = 600
-"""[-] Steps of an episode, ours and the peers'."""
+"""[-] Steps of an episode, for us and the peers."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Effort:
-    """How much of everything `relpos bench env` does."""
+    """Size of a run of `relpos bench env`."""
 
     envs: int = 64
-    """Environments of the figures with a peer and of the parts."""
+    """[-] Environments of the figures with a peer and of the parts."""
     two_cores: tuple[int, ...] = (64, 256)
-    """Environments that two threads share, one figure each; two processes have the first number
+    """[-] Environments of two threads, one figure each; two processes have the first number
     each."""
     growth_envs: tuple[int, ...] = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024)
-    """Environments of the curve over them, with three cars."""
+    """[-] Numbers of environments of the curve over environments, with three cars."""
     growth_cars: tuple[int, ...] = (2, 3, 5, 10, 20)
-    """Cars of the curve over them, with `envs` environments."""
+    """[-] Numbers of cars of the curve over cars, with `envs` environments."""
     turns: int = 10
-    """The best of so many counts."""
+    """[-] Number of turns, of which the best counts."""
     resets: int = 4
-    """Episodes that begin in a turn, which has as many steps as that takes."""
+    """[-] Resets per turn, which determine its number of steps."""
     warm_up: int = 100
-    """Steps before the first turn: until the trackers have settled."""
+    """[-] Steps before the first turn, enough for the trackers to settle."""
     patience: float = 8.0
-    """[s] A point of a curve takes no new turn after so long."""
+    """[s] Time after which a point of a curve starts no new turn."""
 
 
 FULL = Effort()
@@ -41,4 +41,4 @@ QUICK = Effort(
     warm_up=50,
     patience=3.0,
 )
-"""A first impression in a minute or two."""
+"""Short run of one to two minutes."""

@@ -1,4 +1,4 @@
-"""How time and memory grow with the number of environments and of cars."""
+"""Time and memory over the number of environments and of cars."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from agents.bench.env.effort import EPISODE, Effort
 from agents.bench.env.memory import array_bytes, resident_bytes
 
 WIDE = "open"
-"""The scenario of the curve over cars: twenty have room on its ring."""
+"""Scenario of the curve over cars, whose ring has space for twenty."""
 RESETS = 2
-"""Episodes that begin in a turn; a turn of large batches must have more than a step or two."""
+"""[-] Resets per turn; large batches have more, for `LEAST_STEPS` steps per turn."""
 LEAST_STEPS = 5
 
 
@@ -27,19 +27,19 @@ class Point:
     n_envs: int
     n_cars: int
     cost: float
-    """[us per env-step], one thread."""
+    """[us per env-step] Time with one thread."""
     array_bytes: float
-    """[byte] Of the arrays, per environment."""
+    """[byte] Size of the arrays per environment."""
     resident_bytes: float | None
-    """[byte] That the process grew by, per environment; None where the system does not tell.
-    Small batches fit into what it had."""
+    """[byte] Growth of the resident memory per environment; None if the system does not report it.
+    Small batches may fit into memory that the process already has."""
 
 
 def growth(effort: Effort, *, progress: Callable[[float], None] | None = None) -> list[Point]:
-    """The curve over environments with three cars, then the one over cars.
+    """Measure the curve over environments with three cars, then the curve over cars.
 
     Args:
-        effort: Sizes, turns and patience.
+        effort: Sizes, turns and time limit of a point.
         progress: Called with the share done, 0 to 1.
     """
     cases = [(SCENARIO, e, 3) for e in effort.growth_envs]

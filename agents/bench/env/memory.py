@@ -1,4 +1,4 @@
-"""Memory of environments: of their arrays, and what the process takes from the system."""
+"""Memory of environments: size of their arrays, and resident memory of the process."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ OWN = ("relpos_env.", "tracking.")
 
 
 def array_bytes(root: Any) -> int:
-    """Bytes of all arrays that an object of ours holds, those that share memory once.
+    """Return the bytes of all arrays reachable from an object; shared memory counts once.
 
     Args:
-        root: Searched with its attributes, tuples, lists and dicts.
+        root: Object, searched recursively through attributes, tuples, lists and dicts.
     """
     seen: set[int] = set()
     total, waiting = 0, [root]
@@ -41,7 +41,7 @@ def array_bytes(root: Any) -> int:
 
 
 def resident_bytes() -> int | None:
-    """Memory of this process that is in use [byte]; None where the system does not tell."""
+    """Return the resident memory of this process [byte]; None if the system does not report it."""
     try:
         pages = int(STATM.read_text().split()[1])
     except OSError:

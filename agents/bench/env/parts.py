@@ -1,4 +1,4 @@
-"""Where the time of a step goes: methods of the environment with a stopwatch round each."""
+"""Profile of a step: times of the methods of the environment."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ METHODS: tuple[tuple[str, type, str], ...] = (
     ("observations", EnvCore, "_observe"),
     (RESETS, EnvCore, "begin"),
 )
-"""Part, and the class with the method that is timed for it."""
+"""Name of the part, and class and name of the timed method."""
 BOUND: tuple[tuple[str, str], ...] = (
     ("horizon", "_wait"),
     ("orientation", "_orient"),
@@ -32,31 +32,31 @@ BOUND: tuple[tuple[str, str], ...] = (
     ("view", "_turn"),
     ("view", "_see"),
 )
-"""Part, and the function that a `Perception` has for it."""
+"""Name of the part, and of the timed function of a `Perception`."""
 REST = "rest"
-"""Checks, copies, infos, and Python between the parts."""
+"""Checks, copies, infos, and Python code between the parts."""
 
 
 @dataclass(frozen=True)
 class Parts:
-    """Of one batch, in its best turn."""
+    """Times of the parts of a step in the best turn of a batch."""
 
     total: float
-    """[us per env-step]"""
+    """[us per env-step] Time of all parts."""
     cost: dict[str, float]
-    """[us per env-step] of each part."""
+    """[us per env-step] Time of each part."""
     solver_share: float
-    """[-] Sub-steps that the rigid-body solver makes, since something is about to touch."""
+    """[-] Share of sub-steps that need the rigid-body solver because of possible contacts."""
 
 
 @dataclass
 class _Stopwatch:
-    """Time by name. What is called inside of something timed counts for the outer one."""
+    """Times by part; nested parts count for the outermost one."""
 
     swarm: World
     spent: dict[str, float] = field(default_factory=dict)
     moves_of_resets: int = 0
-    """Of the solver, while episodes began."""
+    """[-] Solver steps during resets."""
     _running: str = ""
 
     @contextmanager
@@ -75,7 +75,7 @@ class _Stopwatch:
                 self.moves_of_resets += self.swarm.solver_moves - moves
 
     def round(self, function: Callable[..., Any], name: str) -> Callable[..., Any]:
-        """The function with its time counted."""
+        """Return the function with a timer for a part."""
 
         def timed(*args: Any, **kwargs: Any) -> Any:
             with self.running(name):
@@ -85,13 +85,13 @@ class _Stopwatch:
 
 
 def parts_of(batch: Batch, turns: int = 1) -> Parts:
-    """Time of the parts over the best turn of a batch with one thread.
+    """Return the times of the parts in the best turn of a batch with one thread.
 
-    The stopwatches themselves add under a microsecond a call, once a step of the whole batch.
+    The timers add less than 1 us per call, once per step of the whole batch.
 
     Args:
-        batch: Warmed up.
-        turns: How many.
+        batch: Batch after its warm-up.
+        turns: Number of turns.
     """
     return min((_turn(batch) for _ in range(turns)), key=lambda parts: parts.total)
 

@@ -1,7 +1,7 @@
-"""mpe2's time for a step: three point masses and three landmarks, nothing measured or tracked.
+"""Peer mpe2: three point masses and three landmarks, without sensors or tracking.
 
-`simple_spread_v3.parallel_env(N=3)`, discrete actions drawn beforehand, with episodes as long as
-ours instead of its 25 steps, which spares it resets.
+`simple_spread_v3.parallel_env(N=3)` with discrete actions sampled beforehand. Its episodes are as
+long as ours, instead of 25 steps, so it has fewer resets.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from agents.bench.env.effort import EPISODE
 
 
 def mpe2_name() -> str | None:
-    """The peer with its version; None where it is not installed."""
+    """Return the name of the peer with its version; None if it is not installed."""
     os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # its greeting on standard output
     try:
         from mpe2 import simple_spread_v3  # noqa: F401
@@ -26,7 +26,7 @@ def mpe2_name() -> str | None:
 
 
 class Spread:
-    """One environment of the peer, reset whenever its episode is over."""
+    """One environment of the peer, reset after every episode."""
 
     def __init__(self) -> None:
         from mpe2 import simple_spread_v3
@@ -38,7 +38,7 @@ class Spread:
         self._actions = [dict(zip(agents, row, strict=True)) for row in numbers]
 
     def turn(self, steps: int) -> float:
-        """Time of so many steps and the resets among them [us per step]."""
+        """Run `steps` steps with their resets; return the time [us per step]."""
         env, spent = self._env, 0.0
         for k in range(steps):
             actions = self._actions[k % EPISODE]

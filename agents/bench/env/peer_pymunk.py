@@ -1,15 +1,15 @@
-"""Bare pymunk's time for the same rooms: what a loop over rigid-body spaces costs at least.
+"""Peer pymunk with the same rooms: a lower bound for a loop over rigid-body spaces.
 
-Every room is a space of its own with the walls, the obstacles of the scenario and three cars as
-boxes. For a step of 0.1 s it does, and nothing else:
+Every room is a separate space with the walls, the obstacles of the scenario and three cars as
+boxes. A step of 0.1 s consists only of:
 
-- ten times: `pymunk.batch.set_space_bodies` with one force on each car, which keeps it on the
-  ring, and `space.step(0.01)`. The forces were computed beforehand; no state is read.
+- ten times `pymunk.batch.set_space_bodies` with one precomputed force on each car, which keeps it
+  on the ring, and `space.step(0.01)`. No state is read.
 - the positions of the three cars and one `segment_query_first` for each pair of them, as line of
   sight.
 
-After 600 steps a room is built again. There are no tyres, sensors, radio, tracker, operator,
-rewards or observations. The cars touch nothing, so the solver has no contacts to solve.
+After 600 steps a room is rebuilt. There are no tyres, sensors, radio, tracker, operator, rewards
+or observations. The cars touch nothing, so the solver has no contacts to solve.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ from tracking.arrays import F64
 CARS = 3
 SUB_STEPS = round(DECISION / DT)
 PERIOD = 800
-"""[-] Sub-steps in which a car goes round: 1.1 m/s on a ring of 1.4 m."""
+"""[-] Sub-steps of one revolution: 1.1 m/s on a ring of 1.4 m."""
 CAR_CATEGORY = 0b10
 
 
 def pymunk_name() -> str:
-    """The peer with its version."""
+    """Return the name of the peer with its version."""
     return f"pymunk {pymunk.version}, no sensors"
 
 
@@ -47,20 +47,20 @@ class _Room:
 
 
 class Rooms:
-    """Spaces that are at evenly spread places of their episodes."""
+    """Spaces with evenly spread episode phases."""
 
     def __init__(self, n_envs: int, *, resets: int, name: str) -> None:
         """Build the rooms.
 
         Args:
-            n_envs: How many.
-            resets: Rooms that are built again in a turn, which has as many steps as that takes.
-            name: Of the scenario.
+            n_envs: Number of rooms.
+            resets: Rebuilt rooms per turn, which determine its number of steps.
+            name: Name of the scenario.
         """
         self.n_envs, self._scenario = n_envs, scenario(name)
         self.steps = ceil(EPISODE * resets / n_envs)
-        # The solver moves by v dt and then changes v by f dt / m, so a car goes round for ever
-        # if v turns by the same angle every sub-step: f = m (v' - v) / dt.
+        # The solver adds v dt to the position, then f dt / m to v. A car stays on the ring if v
+        # rotates by the same angle every sub-step: f = m (v' - v) / dt.
         turn = 2.0 * np.pi / PERIOD
         self._velocity = _ring(self._scenario.ring[0], PERIOD, turn)
         gain = self._scenario.car.mass / DT
@@ -72,14 +72,14 @@ class Rooms:
         self._sight = pymunk.ShapeFilter(mask=pymunk.ShapeFilter.ALL_MASKS() ^ CAR_CATEGORY)
 
     def turn(self) -> float:
-        """Time of a turn [us per env-step]."""
+        """Run a turn; return its time [us per env-step]."""
         began = time.perf_counter()
         for _ in range(self.steps):
             self._step()
         return 1e6 * (time.perf_counter() - began) / (self.steps * self.n_envs)
 
     def positions(self) -> F64:
-        """Where the cars are, (room, car, 2) [m]."""
+        """Return the positions of the cars, (room, car, 2) [m]."""
         bodies = [list(room.space.bodies)[:CARS] for room in self._rooms]
         return np.array([[tuple(body.position) for body in cars] for cars in bodies])
 
@@ -116,7 +116,7 @@ class Rooms:
 
 
 def _ring(radius: float, period: int, turn: float) -> F64:
-    """Velocities of cars that go round a ring, (sub-step, car, 2) [m/s]."""
+    """Return velocities of cars on the ring, (sub-step, car, 2) [m/s]."""
     angle = turn * np.arange(period)[:, None] + 2.0 * np.pi * np.arange(CARS) / CARS
     speed = 2.0 * radius * np.sin(0.5 * turn) / DT
     velocity: F64 = speed * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
@@ -124,12 +124,12 @@ def _ring(radius: float, period: int, turn: float) -> F64:
 
 
 def _cars(s: Scenario, space: pymunk.Space, velocity: F64, spin: float) -> list[pymunk.Body]:
-    """Cars on the ring with given velocities, (car, 2)."""
+    """Add cars on the ring with given velocities, (car, 2) [m/s]; return their bodies."""
     bodies, half = [], 0.5 * spin * DT
     for v in velocity:
         body = pymunk.Body(s.car.mass, s.car.inertia)
         angle = float(np.arctan2(v[1], v[0]))
-        # The chord of a sub-step begins half an angle before its tangent.
+        # The start of a chord is half a sub-step before the point whose tangent is parallel to it.
         x, y = s.ring[0] * np.sin(angle - half), -s.ring[0] * np.cos(angle - half)
         body.position, body.velocity = (float(x), float(y)), (float(v[0]), float(v[1]))
         body.angle, body.angular_velocity = angle, spin
@@ -141,7 +141,7 @@ def _cars(s: Scenario, space: pymunk.Space, velocity: F64, spin: float) -> list[
 
 
 def _buffer(force: F64) -> pymunk.batch.Buffer:
-    """Forces for a space; the solver lists the static body behind the others."""
+    """Return a buffer of forces; the solver lists the static body after the others."""
     buffer = pymunk.batch.Buffer()
     buffer.set_float_buf(np.concatenate([force, np.zeros((1, 2))]))
     return buffer

@@ -1,4 +1,4 @@
-"""The figures of `relpos bench env`."""
+"""Figures of `relpos bench env`."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from agents.bench.env.two_processes import processes_cost
 
 Row = dict[str, Any]
 CURVES_FROM = 0.6
-"""[-] Share of the whole time that is over when the curves begin."""
+"""[-] Share done when the curves begin."""
 NLOS = "ring-nlos"
-"""The same room with a wall in it."""
+"""Scenario of the same room with a wall."""
 DRIVES: dict[str, Callable[[], Drive]] = {"followed": lambda: followed, "by chance": Chance}
-"""Who drives: as intended, and badly, with the solver at work all the time."""
+"""Drivers: following the task, and random with frequent contacts, which keeps the solver busy."""
 
 
 def bench_env(
@@ -31,12 +31,12 @@ def bench_env(
     progress: Callable[[float], None] | None = None,
     tell: Callable[[str], None] | None = None,
 ) -> list[Row]:
-    """Time of env-steps next to mpe2 and pymunk, on two cores, over sizes, and of the parts.
+    """Measure env-steps against mpe2 and pymunk, on two cores, over batch sizes, and by part.
 
     Args:
-        effort: How much of everything.
+        effort: Size of the run.
         progress: Called with the share done, 0 to 1.
-        tell: Called with a note where a peer is missing.
+        tell: Called with a note if a peer is not installed.
     """
     rows: list[Row] = []
 
@@ -63,7 +63,7 @@ def bench_env(
 
 
 def _single(effort: Effort, tell: Callable[[str], None] | None) -> Row:
-    """One environment with the interface of PettingZoo."""
+    """Measure one environment with the PettingZoo interface against mpe2."""
     steps, peer = EPISODE * effort.resets, mpe2_name()
     ours = Single(followed)
     ours.turn(effort.warm_up)
@@ -81,7 +81,7 @@ def _single(effort: Effort, tell: Callable[[str], None] | None) -> Row:
 
 
 def _batch(effort: Effort, name: str, drive: str) -> list[Row]:
-    """A batch on one core next to pymunk, then its parts."""
+    """Measure a batch on one core against pymunk, and its parts."""
     ours = Batch(effort.envs, DRIVES[drive](), resets=effort.resets, scenario=name)
     ours.warm_up(effort.warm_up)
     theirs = Rooms(effort.envs, resets=effort.resets, name=name)
@@ -97,7 +97,7 @@ def _batch(effort: Effort, name: str, drive: str) -> list[Row]:
 
 
 def _kept(effort: Effort) -> Row:
-    """A batch whose every step is made in its spaces, next to pymunk."""
+    """Measure a batch that always uses the rigid-body solver, against pymunk."""
     ours = Batch(effort.envs, followed, resets=effort.resets, physics="pymunk")
     ours.warm_up(effort.warm_up)
     theirs = Rooms(effort.envs, resets=effort.resets, name=SCENARIO)
@@ -108,7 +108,7 @@ def _kept(effort: Effort) -> Row:
 
 
 def _threads(effort: Effort) -> list[Row]:
-    """Two threads next to one, and next to pymunk, which has one."""
+    """Measure two threads against one thread, and against pymunk with one thread."""
     rows = []
     for n_envs in effort.two_cores:
         one, two = (Batch(n_envs, followed, resets=effort.resets, threads=k) for k in (1, 2))
@@ -126,7 +126,7 @@ def _threads(effort: Effort) -> list[Row]:
 
 
 def _processes(effort: Effort, rows: list[Row]) -> Row:
-    """Two processes next to the thread that was measured alone before."""
+    """Measure two processes against the single thread of `rows`."""
     n_envs = effort.two_cores[0]
     cost = processes_cost(
         n_envs, 2, resets=effort.resets, warm_up=effort.warm_up, turns=effort.turns
@@ -162,7 +162,7 @@ def _row(
     peer: str | None = None,
     peer_cost: float | None = None,
 ) -> Row:
-    """A figure; the ratio is that of env-steps/s, ours over the peer's."""
+    """Return a row of figures; the ratio is ours over the peer's in env-steps/s."""
     return {
         "bench": "env",
         "what": what,

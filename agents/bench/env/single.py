@@ -1,4 +1,4 @@
-"""One PettingZoo environment of ours, timed."""
+"""Timing of one PettingZoo environment of ours."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from relpos_env import formation_v0
 
 
 class Single:
-    """A `parallel_env` that is reset whenever its episode is over."""
+    """A `parallel_env` that is reset after every episode."""
 
     def __init__(self, drive: Drive) -> None:
         self._env = formation_v0.parallel_env(
@@ -21,7 +21,7 @@ class Single:
         self._env.reset(seed=0)
 
     def turn(self, steps: int) -> float:
-        """Time of so many steps and the resets among them [us per step]."""
+        """Run `steps` steps with their resets; return the time [us per step]."""
         env, spent = self._env, 0.0
         for _ in range(steps):
             rows = self._drive(env.formation)[0]

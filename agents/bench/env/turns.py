@@ -1,4 +1,4 @@
-"""Taking turns, so that whatever else the machine does hits all alike."""
+"""Alternating timed turns, so that other load on the machine affects all jobs equally."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from math import inf
 
 
 def best_of_turns(jobs: Sequence[Callable[[], float]], turns: int) -> list[float]:
-    """The least that each job returns, over turns in which all take part one after the other.
+    """Run all jobs alternately; return the smallest value of each.
 
     Args:
-        jobs: Each returns the time of one turn [us per env-step].
-        turns: How many.
+        jobs: Functions that return the time of one turn, in any unit.
+        turns: Number of turns.
     """
     best = [inf] * len(jobs)
     for _ in range(turns):

@@ -1,4 +1,4 @@
-"""Batches in processes of their own that step at the same time."""
+"""Timing of batches in separate processes that step at the same time."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from agents.bench.env.batch import Batch
 from agents.bench.env.drives import followed
 
 PATIENCE = 1800.0
-"""[s] A process has so long to start, kernels to be compiled included."""
+"""[s] Longest wait for a process, including the compilation of kernels at its start."""
 
 
 def processes_cost(n_envs: int, processes: int, *, resets: int, warm_up: int, turns: int) -> float:
-    """Time per env-step of all together [us]: the longest process, in the best turn.
+    """Return the time per env-step of all processes [us]: the slowest process in the best turn.
 
     Args:
         n_envs: Environments of each process.
-        processes: How many.
-        resets: Of a turn of each.
+        processes: Number of processes.
+        resets: Resets per turn of each process.
         warm_up: Steps before the first turn.
-        turns: How many.
+        turns: Number of turns.
 
     Raises:
         RuntimeError: A process ended or did not answer.
@@ -51,7 +51,7 @@ def processes_cost(n_envs: int, processes: int, *, resets: int, warm_up: int, tu
 
 
 def _together(ends: list[Connection]) -> float:
-    """A turn of all at once: the longest time of a step [us per env-step of one process]."""
+    """Run a turn in all processes; return the largest time [us per env-step of one process]."""
     for end in ends:
         end.send("turn")
     return max(float(_receive(end)) for end in ends)
@@ -67,7 +67,7 @@ def _receive(end: Connection) -> Any:
 
 
 def _serve(end: Connection, n_envs: int, resets: int, warm_up: int) -> None:
-    """What each process does: its actions count too, since all must be busy all the time."""
+    """Run turns on request in a worker; times include actions, so that all are always busy."""
     batch = Batch(n_envs, followed, resets=resets)
     batch.warm_up(warm_up)
     end.send("ready")

@@ -1,7 +1,7 @@
-"""How long one step of a policy takes, next to the same network in plain numpy in the same run.
+"""Benchmark of policy inference, against the same network in plain numpy in the same run.
 
-Both policies and their peer see the same observations and give the same actions, which is checked
-before anything is timed. They take turns, and of each the best turn counts.
+Policies and peer get the same observations and must return the same actions, which is checked
+before the timing. They alternate, and the best turn of each counts.
 """
 
 from agents.bench.policy.rows import bench_policy

@@ -1,4 +1,4 @@
-"""A network of the usual size, as a policy and in numpy."""
+"""A multilayer perceptron of usual size, as a policy and in numpy."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from agents.policies.trained import TrainedPolicy, check_policy
 from relpos_env.interface.observations.base import F32
 
 HIDDEN = (64, 64)
-"""[-] Widths of the layers, those of Stable-Baselines3 by default."""
+"""[-] Hidden layer sizes, the default of Stable-Baselines3."""
 SCALE = 0.1
-"""[-] Standard deviation of the weights: actions are not at their limits."""
+"""[-] Standard deviation of the weights, small enough that actions do not saturate."""
 
 
 class Perceptron:
-    """Normalised observations, layers with tanh, and tanh of the last as limit: the peer."""
+    """Peer in numpy: normalised observations and layers with tanh, including the output."""
 
     def __init__(self, layout: Layout, seed: int = 0) -> None:
-        """Draw the weights.
+        """Sample random weights.
 
         Args:
-            layout: Of the observations.
-            seed: Of the weights.
+            layout: Layout of the observations.
+            seed: Seed of the weights.
         """
         rng = np.random.default_rng(seed)
         widths = (layout.size, *HIDDEN, 2)
@@ -42,14 +42,14 @@ class Perceptron:
         ]
 
     def act(self, observations: F32) -> F32:
-        """Actions, (..., 2); see `Driver`."""
+        """Return actions, (..., 2); see `Driver`."""
         x: F32 = (observations - self.mean) / self.std
         for weight, bias in self.layers:
             x = np.tanh(x @ weight + bias)
         return x
 
     def policy(self) -> TrainedPolicy:
-        """The same network as a policy that was loaded.
+        """Return the same network as a loaded policy.
 
         Raises:
             UsageError: onnx is not installed.
@@ -64,7 +64,7 @@ class Perceptron:
         return TrainedPolicy(check_policy(data, card, "bench"), card)
 
     def _onnx(self) -> bytes:
-        """The network as a graph."""
+        """Return the network as a serialised ONNX model."""
         try:
             from onnx import TensorProto, helper, numpy_helper
         except ImportError:
@@ -92,7 +92,7 @@ class Perceptron:
             [helper.make_tensor_value_info("actions", one, ["batch", 2])],
             [numpy_helper.from_array(array, name) for name, array in arrays.items()],
         )
-        # Versions that the oldest supported onnxruntime reads.
+        # Versions that the oldest supported onnxruntime can read.
         opsets = [helper.make_opsetid("", 17)]
         model = helper.make_model(graph, opset_imports=opsets, ir_version=8)
         return bytes(model.SerializeToString())

@@ -1,4 +1,4 @@
-"""The figures of `relpos bench policy`."""
+"""Figures of `relpos bench policy`."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ from relpos_env.interface.observations.base import F32
 
 Row = dict[str, Any]
 SCENARIO, SLOTS, BATCH = "cars-nlos", 6, 64
-"""Three cars in a room, a policy that has slots for six, and environments of the batch."""
+"""Scenario with three cars, slots of the policy, and environments of the batch."""
 TURNS = 7
 SETTLE = 50
-"""[-] Decisions before the observations are taken: until the trackers know something."""
+"""[-] Control steps before the observations are taken, enough for trackers to initialise."""
 SAME = 1e-5
-"""[-] The two may differ by the order of sums."""
+"""[-] Tolerance of actions, for the different order of summation."""
 
 
 def bench_policy(
     *, steps: int = 2000, progress: Callable[[float], None] | None = None
 ) -> list[Row]:
-    """Times of a policy, alone and with what makes the observation, next to numpy.
+    """Measure policies, with and without computing the observations, against numpy.
 
     Args:
-        steps: Calls in a turn; a batch has fewer.
+        steps: Calls per turn; fewer for batches.
         progress: Called with the share done, 0 to 1.
 
     Raises:
@@ -79,7 +79,7 @@ def bench_policy(
 
 
 def _room(proximity: int = 0) -> EnvCore:
-    """An environment in which the trackers know something."""
+    """Return an environment with initialised trackers."""
     formation = EnvCore(configure({"scenario": SCENARIO, "proximity": proximity}))
     formation.seed(0, np.random.default_rng(0))
     formation.begin([0])
@@ -90,7 +90,7 @@ def _room(proximity: int = 0) -> EnvCore:
 
 
 def _decision(formation: EnvCore, driver: Driver) -> Callable[[], F32]:
-    """Write the observations of a room, and let one car decide."""
+    """Return a function that writes all observations and computes the action of one car."""
     out = np.zeros_like(formation.observations)
     observe = formation.parts.mode.bind(formation.loop.view, out)
 
@@ -102,7 +102,7 @@ def _decision(formation: EnvCore, driver: Driver) -> Callable[[], F32]:
 
 
 def _turn(call: Callable[[], Any], n: int) -> Callable[[], float]:
-    """Time of a call, mean over so many [us]."""
+    """Return a function that measures the mean time of `n` calls [us]."""
 
     def turn() -> float:
         began = time.perf_counter()
@@ -114,7 +114,7 @@ def _turn(call: Callable[[], Any], n: int) -> Callable[[], float]:
 
 
 def _same(ours: Driver, theirs: Driver, observations: F32) -> None:
-    """See that both do the same thing."""
+    """Check that both drivers return the same actions."""
     difference = float(np.abs(ours.act(observations) - theirs.act(observations)).max())
     if not difference <= SAME:
         raise AssertionError(f"the policy and its peer differ by {difference:g}")

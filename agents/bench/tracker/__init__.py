@@ -1,9 +1,8 @@
-"""How long the tracker takes, next to filterpy and GTSAM on the same measurements.
+"""Benchmark of the tracker against filterpy and GTSAM on the same measurements.
 
-A step is what one moment brings: a new orientation and acceleration of every node, and some
-ranges of that time. In a `round` every pair ranges; in a `message` one node with half the group,
-as in large groups, where every message brings so many. Timed is a group that has long started,
-with the fastest of a few runs.
+A step consists of the orientation and acceleration of every node, and of ranges at one time. In a
+`round`, every pair ranges; in a `message`, one node ranges to half the group, as one message does
+in large groups. The group is initialised before the timing, and the fastest of a few runs counts.
 """
 
 from agents.bench.tracker.rows import bench_tracker

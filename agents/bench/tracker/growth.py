@@ -1,4 +1,4 @@
-"""How the time of a step grows with the group."""
+"""Time of a step over the number of nodes."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from tracking.filters import DEFAULT_FILTER
 
 SIZES = (2, 3, 4, 6, 8, 10, 15, 20, 30, 50)
 GTSAM_UP_TO = 20
-"""[-] Nodes; larger groups take the smoother seconds."""
+"""[-] Largest number of nodes for GTSAM, whose smoother takes seconds per step beyond."""
 
 
 @dataclass(frozen=True)
 class Growth:
-    """Cars that range message by message: one prediction, and half the group as ranges."""
+    """Times of a message of cars: one prediction, and ranges to half the group."""
 
     n: tuple[int, ...]
-    """Nodes."""
+    """[-] Numbers of nodes."""
     ours: list[float]
-    """[us] A message, joint filter."""
+    """[us] Times of a message in the joint filter."""
     ranges: list[int]
-    """[-] Ranges of a message."""
+    """[-] Ranges per message."""
     peers: dict[str, list[float | None]]
-    """[us] The same of each peer, by name; None where it was not measured."""
+    """[us] Times of a message in each peer, by its name; None if not measured."""
 
 
 def growth(
@@ -36,11 +36,11 @@ def growth(
     steps: int = 200,
     progress: Callable[[float], None] | None = None,
 ) -> Growth:
-    """Time of a message for groups of several sizes, and of the peers.
+    """Measure the time of a message over the number of nodes, for the tracker and its peers.
 
     Args:
         sizes: Numbers of nodes.
-        steps: Messages timed in small groups.
+        steps: Timed messages; more for groups larger than this number.
         progress: Called with the share done, 0 to 1.
     """
     filterpy, gtsam = filterpy_name(), gtsam_name()

@@ -1,4 +1,4 @@
-"""The tracker's own time: a step of a group that has started, and an hour of a recording."""
+"""Times of the tracker: a step of an initialised group, and an hour of a recording."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ from tracking.log import Log
 from tracking.tracker import Tracker
 
 REPEATS = 5
-"""The fastest of so many runs counts, for us and for the peers."""
+"""[-] Number of timed runs, of which the fastest counts."""
 STARTING = 5.0
-"""[s] Beginning of a recording, in which the group starts."""
+"""[s] Length of the initialisation at the beginning of a recording."""
 WARM_UP, PATIENCE = 15.0, 60.0
-"""[s] Time a group is given to settle, and time by which one hypothesis must be left."""
+"""[s] Shortest and longest time until one hypothesis is left."""
 FIRST_ROUNDS = 10
-"""Enough to start the group."""
+"""[-] Rounds to initialise the group."""
 
 
 def step_cost(workload: Workload, name: str, steps: int) -> float:
-    """Time of a step [us], once one hypothesis is left.
+    """Return the time of a step with a single hypothesis [us].
 
     Args:
         workload: The group and its steps.
-        name: One of `tracking.filters.FILTERS`.
-        steps: How many to time.
+        name: Filter, one of `tracking.filters.FILTERS`.
+        steps: Number of timed steps.
 
     Raises:
-        RuntimeError: The group does not start.
+        RuntimeError: The group is not initialised in time.
     """
     tracker, done = started(workload, name)
     chunk = workload.block(done, steps)
@@ -48,13 +48,13 @@ def step_cost(workload: Workload, name: str, steps: int) -> float:
 
 
 def started(workload: Workload, name: str) -> tuple[Tracker, int]:
-    """A tracker of one hypothesis, and the number of the next step.
+    """Return an initialised tracker with a single hypothesis, and the index of the next step.
 
     Raises:
-        RuntimeError: The group does not start.
+        RuntimeError: The group is not initialised in time.
     """
     tracker = Tracker(workload.constellation, filter=name)
-    # The first ranges of all pairs come in rounds, whatever the steps are.
+    # The first steps are rounds over all pairs for any workload.
     rounds = replace(workload, step="round")
     first = rounds.block(0, FIRST_ROUNDS)
     until = float(first.t[0, -1])
@@ -73,18 +73,18 @@ def started(workload: Workload, name: str) -> tuple[Tracker, int]:
 
 @dataclass(frozen=True)
 class HourCost:
-    """An hour of a recording."""
+    """Cost of an hour of a recording."""
 
     seconds: float
-    """[s] Its time, orientation filters included."""
+    """[s] Time to process it, orientation filters included."""
     rounds: float
-    """Rounds in it."""
+    """[-] Ranging rounds per hour."""
 
 
 def hour_cost(log: Log) -> HourCost:
-    """Time of an hour that goes on like a shorter recording, ten estimates a second.
+    """Return the cost of an hour, extrapolated from a shorter recording, at ten estimates/s.
 
-    Starting, with many hypotheses, counts once.
+    The initialisation, which has many hypotheses, is not extrapolated.
     """
     first, last = float(log.block.t[0, 0]), float(log.block.t[0, -1])
     split = int(np.searchsorted(log.block.t[0], first + STARTING))

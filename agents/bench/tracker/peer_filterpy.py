@@ -1,6 +1,6 @@
-"""filterpy's time for the same updates: an EKF per pair, or one over the whole group.
+"""Peer filterpy with the same updates: an EKF per pair, or one EKF of the whole group.
 
-Its matrix products are kept on one core, where we are; with two, small products take longer.
+Its matrix products run on one core, as ours do; on two cores, small products are slower.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     from filterpy.kalman import ExtendedKalmanFilter
 
 REPEATS = 5
-"""The fastest of so many runs counts."""
+"""[-] Number of timed runs, of which the fastest counts."""
 
 
 def filterpy_name() -> str:
-    """The peer with its version.
+    """Return the name of the peer with its version.
 
     Raises:
         UsageError: filterpy is not installed.
@@ -41,10 +41,10 @@ def filterpy_name() -> str:
 
 
 def group_cost(workload: Workload, steps: int) -> float:
-    """Time of a step [us]: an EKF of as many states as the joint filter, with its ranges.
+    """Return the time of a step [us] of an EKF with the number of states of the joint filter.
 
-    One prediction, then one scalar update for every range. Biases, headings and range errors
-    are there as states that only decay: the matrices are as large, the models are left out.
+    A step is one prediction and one scalar update per range. States of biases, headings and range
+    errors have no models; they only give the matrices the same size.
     """
     d, dt, n = workload.dimensions, workload.dt, workload.n
     size = count_states(workload.constellation, JointParams())
@@ -70,7 +70,7 @@ def group_cost(workload: Workload, steps: int) -> float:
 
 
 def pairs_cost(workload: Workload, steps: int) -> float:
-    """Time of a round [us]: an EKF of position and velocity for every pair, one range each."""
+    """Return the time of a round [us] with one EKF of position and velocity per pair."""
     d, dt = workload.dimensions, workload.dt
     eye = np.eye(d)
     F = np.block([[eye, dt * eye], [0.0 * eye, eye]])  # noqa: N806
@@ -101,7 +101,7 @@ def pairs_cost(workload: Workload, steps: int) -> float:
 
 
 def _position(node: int, d: int) -> int:
-    """First state of a node's position."""
+    """Return the index of the first position state of a node."""
     return node * (3 * d + 1)
 
 
@@ -115,7 +115,7 @@ def _ekf(size: int, F: F64, Q: F64) -> ExtendedKalmanFilter:  # noqa: N803
 
 
 def _between(i: int, j: int, d: int, size: int) -> tuple[Callable[[F64], F64], Any]:
-    """Jacobian and model of the distance between the positions at states i and j."""
+    """Return Jacobian and model of the distance between the positions at states i and j."""
 
     def jacobian(x: F64) -> F64:
         row = np.zeros((1, size))

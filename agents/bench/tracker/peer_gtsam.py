@@ -1,9 +1,9 @@
-"""GTSAM's time for the same ranges: its incremental fixed-lag smoother.
+"""Peer GTSAM with the same ranges: its incremental fixed-lag smoother.
 
-Position and velocity of every node are variables at every step; a factor of motion ties them
-to the step before, with the acceleration as measured, and a factor each range. All factors
-are GTSAM's own, in C++; building the graph in Python is not timed. Biases, headings, range
-errors and sight are left out, so the peer does less.
+Position and velocity of every node are variables at every step. Motion factors with the measured
+acceleration connect them to the previous step; each range is a factor. All factors are C++ classes
+of GTSAM; building the graph in Python is not timed. Biases, headings, range errors and NLOS are
+not modelled, so the peer does less.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from tracking.arrays import F64
 LAG = 0.2
 """[s] States older than this are marginalised."""
 ACCEL_PSD = 0.06
-"""[m/s2/sqrt(Hz)]"""
+"""[m/s2/sqrt(Hz)] Noise density of the acceleration."""
 LOOSE = 10.0
-"""Standard deviation that keeps the group as a whole from drifting for ever [m, m/s]."""
+"""[m, m/s] Standard deviation of the prior that bounds the unobservable drift of the group."""
 
 
 def gtsam_name() -> str | None:
-    """The peer with its version; None where it is not installed."""
+    """Return the name of the peer with its version; None if it is not installed."""
     try:
         import gtsam  # noqa: F401
     except ImportError:
@@ -36,7 +36,7 @@ def gtsam_name() -> str | None:
 
 
 def smoother_cost(workload: Workload, steps: int) -> float:
-    """Time of a step [us]: the median of those after the lag is full."""
+    """Return the median time of a step after the lag window is full [us]."""
     peer = _Smoother(workload)
     full = round(LAG / workload.dt) + 5
     spent = [peer.step(k) for k in range(full + steps)]
@@ -44,7 +44,7 @@ def smoother_cost(workload: Workload, steps: int) -> float:
 
 
 class _Smoother:
-    """The smoother and where it was at the last step."""
+    """The smoother with its estimates at the last step."""
 
     def __init__(self, workload: Workload) -> None:
         import gtsam
@@ -67,7 +67,7 @@ class _Smoother:
         self._x, self._v = pos[0], (pos[1] - pos[0]) / 1e-4
 
     def step(self, k: int) -> float:
-        """Add the step; returns the time of the smoother [s]."""
+        """Add step k; return the time of the smoother [s]."""
         g, w, d = self._g, self._workload, self._d
         now = k * w.dt
         accel = w.accel(np.array([now - 0.5 * w.dt]))[0, :, :d]
@@ -99,7 +99,7 @@ class _Smoother:
         return spent
 
     def _tie(self, graph: Any, i: int, k: int, accel: F64) -> None:
-        """Dead reckoning of node i from step k - 1 to k."""
+        """Add the motion factors of node i from step k - 1 to k."""
         g, d, dt = self._g, self._d, self._workload.dt
         p0, v0 = self._key("p", i, k - 1), self._key("v", i, k - 1)
         p1, v1 = self._key("p", i, k), self._key("v", i, k)

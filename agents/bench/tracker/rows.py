@@ -1,4 +1,4 @@
-"""The figures of `relpos bench tracker`, each next to a peer."""
+"""Figures of `relpos bench tracker`, each with a peer."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tracking.filters import DEFAULT_FILTER, FILTERS
 
 Row = dict[str, Any]
 CARS, PEOPLE = Workload(3, 2, "round"), Workload(6, 3, "round")
-"""The cars and the body trackers of the paper: three nodes in a plane, six in space."""
+"""Cars and body trackers of the paper: three nodes in 2D, six in 3D."""
 SIX_CARS = Workload(6, 2, "round")
 BODY_HOUR = "1 h of 6 nodes 3D, with VQF"
 
@@ -24,12 +24,12 @@ def bench_tracker(
     progress: Callable[[float], None] | None = None,
     tell: Callable[[str], None] | None = None,
 ) -> list[Row]:
-    """Times of the tracker next to filterpy, and GTSAM where it is installed.
+    """Measure the tracker against filterpy, and against GTSAM if it is installed.
 
     Args:
-        rounds: Steps timed for each figure of small groups; fewer for large ones and peers.
+        rounds: Timed steps per figure of small groups; fewer for large groups and peers.
         progress: Called with the share done, 0 to 1.
-        tell: Called with a note where a peer is missing.
+        tell: Called with a note if a peer is not installed.
 
     Raises:
         UsageError: filterpy is not installed.
@@ -54,7 +54,7 @@ def bench_tracker(
 
 
 def _rounds(workload: Workload, rounds: int, filterpy: str, gtsam: str | None) -> list[Row]:
-    """One prediction and a range of every pair, every filter next to its peers."""
+    """Measure one prediction and a range of every pair, for every filter and its peers."""
     few = max(rounds // 20, 20)
     pairs, group = pairs_cost(workload, few), group_cost(workload, few)
     where = f"{workload.n} nodes {workload.dimensions}D"
@@ -72,7 +72,7 @@ def _rounds(workload: Workload, rounds: int, filterpy: str, gtsam: str | None) -
 
 
 def _message(n: int, rounds: int, filterpy: str) -> list[Row]:
-    """One prediction and the ranges of a message, in a large group of cars."""
+    """Measure one prediction and the ranges of a message in a large group of cars."""
     workload = Workload(n, 2, "message")
     ours = step_cost(workload, DEFAULT_FILTER, max(rounds // 10, 50))
     case = f"{DEFAULT_FILTER}, {n} nodes 2D, {workload.pairs.shape[1]} ranges"
@@ -81,7 +81,7 @@ def _message(n: int, rounds: int, filterpy: str) -> list[Row]:
 
 
 def _hour(rounds: int, filterpy: str) -> Row:
-    """A recording of a person; the peer has the rounds of it, and no orientation filter."""
+    """Measure a recording of a person; the peer has its rounds, without orientation filters."""
     from agents.simulation.simulate import simulate
 
     seconds = min(max(0.03 * rounds, 10.0), 60.0)

@@ -1,4 +1,4 @@
-"""Groups whose measurements are computed, for timing: the same for us and for the peers."""
+"""Synthetic groups with measurements for timing, the same for the tracker and its peers."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from tracking.measurements import Kind, MeasurementBlock
 from tracking.ranging.frames.airtime import PAPER_PHY, round_rate
 
 RANGE_STD = 0.05
-"""[m]"""
+"""[m] Standard deviation of ranges."""
 REAR_AXLE = 0.15
-"""[m] Axle of the cars behind their tracker: what they do fits what the filter knows of cars."""
+"""[m] Distance of the rear axle behind the tracker, consistent with the filter's car model."""
 TURN = 0.8
-"""[rad/s] Of the first node round its circle of 1 m; the others are up to a half faster."""
+"""[rad/s] Mean rate of the first node on its circle of 1 m; other nodes are up to 50 % faster."""
 SWAY, SWAY_RATE = 0.6, 0.9
-"""[rad], [rad/s] They go faster and slower: a steady curve does not show where a tracker sits."""
+"""[rad], [rad/s] Phase modulation: the lever arm is unobservable at a constant rate."""
 
 
 @dataclass(frozen=True)
 class Workload:
-    """Nodes on circles of their own that range in steps."""
+    """Nodes that move on separate circles and range in steps."""
 
     n: int
-    """Number of nodes."""
+    """[-] Number of nodes."""
     dimensions: Literal[2, 3]
-    """2: cars; 3: trackers on a body."""
+    """[-] 2 for cars, 3 for body trackers."""
     step: Literal["round", "message"]
-    """Every pair ranges at once, or one node after another with half the group."""
+    """All pairs range in a step, or one node in turn ranges to half the group."""
 
     @cached_property
     def constellation(self) -> Constellation:
@@ -44,15 +44,15 @@ class Workload:
 
     @property
     def rounds_hz(self) -> float:
-        """Rounds per second that the airtime allows [1/s]."""
+        """[1/s] Largest rate of rounds for the airtime."""
         return round_rate(PAPER_PHY, self.n)
 
     @property
     def dt(self) -> float:
-        """Time between two steps [s].
+        """[s] Period of the steps.
 
-        At least 20 rounds a second or messages for two, which large groups reach with a radio
-        of a higher rate.
+        Not less than 20 rounds, or messages of 2 rounds, per second; large groups reach these
+        rates with a radio of a higher bit rate.
         """
         if self.step == "round":
             return 1.0 / max(self.rounds_hz, 20.0)
@@ -60,7 +60,7 @@ class Workload:
 
     @cached_property
     def pairs(self) -> I64:
-        """Who ranges in a step, (step, pair, 2), i < j; the steps repeat."""
+        """Pairs that range in each step, (step, pair, 2), i < j; the sequence repeats."""
         if self.step == "round":
             return self.constellation.pairs[None]
         i = np.arange(self.n)[:, None]
@@ -70,7 +70,7 @@ class Workload:
 
     @cached_property
     def _centres(self) -> F64:
-        """Spread evenly over a disc, a third of them raised in space, (node, 3) [m]."""
+        """[m] Centres of the circles, evenly on a disc, in 3D at three heights, (node, 3)."""
         k = np.arange(self.n)
         radius, angle = 3.0 * np.sqrt(k + 0.7), k * 2.4
         height = 1.5 * (k % 3) if self.dimensions == 3 else 0.0 * k
@@ -81,7 +81,7 @@ class Workload:
         return TURN * (1.0 + 0.5 * np.arange(self.n) / self.n)
 
     def _phase(self, t: F64) -> F64:
-        """Where on their circles, now faster and now slower, (time, node) [rad]."""
+        """Return the phase of the nodes on their circles, (time, node) [rad]."""
         k = np.arange(self.n)
         return self._rates * t[:, None] + k + SWAY * np.sin(SWAY_RATE * t[:, None] + k)
 
@@ -91,11 +91,11 @@ class Workload:
         return np.stack([np.cos(phase), np.sin(phase), heave], axis=-1)
 
     def pos(self, t: F64) -> F64:
-        """Positions, (time, node, 3) [m]."""
+        """Return positions, (time, node, 3) [m]."""
         return self._centres + self._on_circle(t)
 
     def accel(self, t: F64) -> F64:
-        """Accelerations, (time, node, 3) [m/s2]."""
+        """Return accelerations, (time, node, 3) [m/s2]."""
         phase, sway = self._phase(t), SWAY_RATE * t[:, None] + np.arange(self.n)
         rate = self._rates + SWAY * SWAY_RATE * np.cos(sway)
         faster = -SWAY * SWAY_RATE**2 * np.sin(sway)
@@ -106,16 +106,16 @@ class Workload:
         return accel
 
     def times(self, first: int, steps: int) -> F64:
-        """When some steps are, (time) [s]; the first of all is at dt."""
+        """Return the times of steps, (time) [s]; step 0 is at `dt`."""
         t: F64 = np.arange(first + 1, first + steps + 1, dtype=np.float64) * self.dt
         return t
 
     def distances(self, t: F64, first: int) -> F64:
-        """Measured ranges of steps, (time, pair) [m].
+        """Return the measured ranges of steps, (time, pair) [m].
 
         Args:
-            t: Their times, (time) [s].
-            first: Number of the first.
+            t: Times of the steps, (time) [s].
+            first: Index of the first step.
         """
         who = self.pairs[(first + np.arange(len(t))) % len(self.pairs)]
         pos, rows = self.pos(t), np.arange(len(t))[:, None]
@@ -125,11 +125,11 @@ class Workload:
         return measured
 
     def block(self, first: int, steps: int) -> MeasurementBlock:
-        """Measurements of some steps, in order.
+        """Return the measurements of steps in order of time.
 
         Args:
-            first: Number of the first.
-            steps: How many.
+            first: Index of the first step.
+            steps: Number of steps.
         """
         t = self.times(first, steps)
         values = np.zeros((steps, self.n, 7))

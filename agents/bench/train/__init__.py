@@ -1,4 +1,4 @@
-"""`relpos bench train`: training speed next to an environment that costs nothing."""
+"""Benchmark of training speed, against training in an environment without cost."""
 
 from __future__ import annotations
 

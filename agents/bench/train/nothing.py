@@ -1,4 +1,4 @@
-"""The peer of the environments: as many seats that see and want the same, and cost nothing."""
+"""Peer of the environments with the same agent slots and spaces, and no cost per step."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from tracking.arrays import Bool
 
 
 class Nothing(SharedAttributeVecEnv):
-    """Shows the same observations at every step; nothing ends."""
+    """Environment that returns the same observations at every step and never ends."""
 
     def __init__(self, like: SharedAttributeVecEnv, observations: F32) -> None:
-        """Take the spaces and seats of an environment.
+        """Copy spaces and agent slots of an environment.
 
         Args:
-            like: The environment.
-            observations: Of one step of it, (seat, size), absent cars included.
+            like: Environment to imitate.
+            observations: Observations of one step, (slot, size), absent cars included.
         """
         self._observations = observations
         self._rewards = np.zeros(like.num_envs, np.float32)
@@ -30,19 +30,19 @@ class Nothing(SharedAttributeVecEnv):
         super().__init__(like.num_envs, like.observation_space, like.action_space)
 
     def reset(self) -> F32:
-        """The observations."""
+        """Return the observations."""
         return self._observations
 
     def step_async(self, actions: F32) -> None:
-        """Nothing."""
+        """Ignore the actions."""
 
     def step_wait(self) -> tuple[F32, F32, Bool, list[dict[str, Any]]]:
-        """The observations again; no rewards."""
+        """Return the same observations with zero rewards."""
         return self._observations, self._rewards.copy(), self._dones, self._infos
 
     def close(self) -> None:
-        """Nothing."""
+        """Do nothing."""
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
-        """Nothing to seed."""
+        """Return the seed for every slot; nothing is random."""
         return [seed] * self.num_envs

@@ -1,4 +1,4 @@
-"""The learner without what makes ours fast."""
+"""The learner without our optimisations."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from agents.training.ppo.network import SwarmFeatures
 
 
 def make_plain(model: PPO) -> PPO:
-    """Let a learner compute the same the long way, and give it back.
+    """Remove our optimisations from a learner, and return it.
 
-    That is torch's own tangent, absent others computed and multiplied by zero, and
-    Stable-Baselines3's own optimiser.
+    It then uses tanh of torch, computes features of absent neighbours and multiplies them by zero,
+    and uses torch's Adam, as Stable-Baselines3 does.
     """
     policy = model.policy
     for module in policy.modules():

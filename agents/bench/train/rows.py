@@ -1,4 +1,4 @@
-"""The figures of `relpos bench train`."""
+"""Figures of `relpos bench train`."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ CASES: dict[str, tuple[str, ...]] = {
     "cars-nlos, 3 cars": ("cars-nlos",),
     "cars-nlos, swarm-nlos": ("cars-nlos", "swarm-nlos"),
 }
-"""What is trained in."""
+"""Training scenarios by case."""
 PEERS = ("plain learner in nothing", "our learner in nothing")
-"""What learns in an environment that costs nothing."""
+"""Peers that train in an environment without cost."""
 
 
 def bench_train(
@@ -37,18 +37,17 @@ def bench_train(
     after: int = 2,
     progress: Callable[[float], None] | None = None,
 ) -> list[Row]:
-    """Frames per second of whole training, simulation and learning together.
+    """Measure agent steps per second of training, simulation and learning together.
 
-    The peers learn in an environment that costs nothing, with the same networks, seats and batches:
-    one without what makes ours fast (`make_plain`), so with the operations of torch and the
-    optimiser of Stable-Baselines3 as they come, and ours. All learn from the observations of cars
-    that are driven, so that equally many absent cars are left out.
+    The peers train in an environment without cost, with the same networks, agent slots and batches:
+    one learner without our optimisations (`make_plain`), and ours. All train on observations of
+    driven cars, so that the share of absent cars is the same.
 
     Args:
-        updates: Of a turn.
-        threads: Of simulation and learning.
-        after: Updates before it is measured: cars that cannot drive yet push against walls and
-            each other, which the simulation pays for.
+        updates: Updates per turn.
+        threads: Threads of simulation and learning.
+        after: Updates before the timing: untrained cars push against walls and each other, which
+            slows the simulation down.
         progress: Called with the share done, 0 to 1.
     """
     torch.set_num_threads(threads)
@@ -58,7 +57,7 @@ def bench_train(
         config = replace(config, env=replace(config.env, scenarios=scenarios))
         rooms = make_rooms(config, None)
         ours = _quiet(make_model(config, rooms))
-        # Compiles what is not, and puts the cars somewhere.
+        # Compiles the kernels, and drives the cars away from their initial positions.
         run_leg(ours, replace(config, leg=after), 0)
         nothing = Nothing(rooms, rooms.reset())
         plain = _quiet(make_plain(make_model(config, nothing)))
@@ -93,7 +92,7 @@ def _quiet(model: PPO) -> PPO:
 
 
 def _turn(model: PPO, config: TrainConfig) -> Callable[[], float]:
-    """Updates in the middle of a leg; their time for a frame [us]."""
+    """Return a function that measures the time per agent step over `config.leg` updates [us]."""
     env: VecEnv = model.env
 
     def turn() -> float:

@@ -63,10 +63,10 @@ def demo_hardware(
     as_json: bool,
     **options: Any,
 ) -> None:
-    """Emulated cars through the whole path, serial bytes and all; writes report.html.
+    """Drive emulated cars through the whole stack down to serial bytes; writes report.html.
 
-    With --virtual there are no ports and processes, only their bytes: some five times faster than
-    real time, and the same every time.
+    With --virtual, the bytes are exchanged in memory, without ports and processes: about five times
+    faster than real time, and reproducible.
     """
     from agents.hardware.demo import hardware_demo
     from agents.hardware.emulate import EmulateOptions
@@ -81,7 +81,7 @@ def demo_hardware(
     if not 1 <= drives <= 1000:
         raise UsageError(f"--drives: expected 1 to 1000, got {drives}")
     check_folder(out, ["report.html"])
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # nothing is left behind
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # clean up on termination
     plan = FaultPlan() if faults is None else read_faults(faults)
     results = []
     for each in range(seed, seed + drives):

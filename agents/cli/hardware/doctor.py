@@ -39,9 +39,9 @@ def doctor(
     write: bool,
     as_json: bool,
 ) -> None:
-    """See whether ports, links and cars are as they should be; nothing moves but by --watchdog.
+    """Check ports, links and cars; no car moves unless --watchdog is given.
 
-    Ends with status 0 if all is well, else with 2 and a line for each problem.
+    Exits with status 0 if all checks pass, else with status 2 and a line for each problem.
     """
     from agents.hardware.inspection.doctor import doctor as run
 

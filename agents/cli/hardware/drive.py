@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from hardware_bridge.live.opened import OpenBridge
 
 EVERY = 10
-"""[-] Decisions from one line or record to the next."""
+"""[-] Control steps between two JSON records."""
 
 
 @click.command()
@@ -63,8 +63,8 @@ def drive(
 ) -> None:
     """Drive real cars on the estimates of their trackers. Dry run unless --arm.
 
-    On a terminal: space stops all at once, c clears the stop, a arms again, d disarms, g says that
-    cars that have fallen silent are gone, q quits; any other key stops.
+    Keys: space stops all cars immediately, c clears the stop, a arms again, d disarms, g marks
+    silent cars as gone, q quits; any other key stops.
     """
     from agents.hardware.drive import drive as run
     from agents.hardware.drive.keys import check_stop_source
@@ -77,10 +77,10 @@ def drive(
         raise UsageError(f"--wait: expected 1 to 3600, got {wait:g}")
     if arm:
         check_stop_source(stop_source)
-        # A command late is a car that stops; without the right to hurry, the default has to do.
+        # Late commands stop the cars; without permission, the default priority is used.
         with suppress(OSError, AttributeError):
             os.setpriority(os.PRIO_PROCESS, 0, -5)
-    # However it is ended from outside, cars stand and the terminal is as it was.
+    # Termination signals also stop the cars and restore the terminal.
     for name in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(name, signal.default_int_handler)
     with _Screen(as_json, stop_source) as screen:
@@ -109,7 +109,7 @@ def drive(
 
 
 class _Screen:
-    """What is shown and asked for while it lasts."""
+    """Output and keys during a drive."""
 
     def __init__(self, as_json: bool, stop_source: str) -> None:
         from agents.hardware.drive.keys import PipedKeys, TerminalKeys
@@ -139,7 +139,7 @@ class _Screen:
             self._live.stop()
 
     def attend(self, order: Any) -> None:
-        """Pass on what was pressed."""
+        """Pass the commands of pressed keys to `order`."""
         from agents.hardware.drive.keys import NO_KEYS
 
         had_them = not self._source.lost
@@ -149,7 +149,7 @@ class _Screen:
             click.echo(NO_KEYS, err=True)
 
     def show(self, bridge: OpenBridge, env: HardwareFormationEnv) -> None:
-        """After every decision."""
+        """Show the state after a control step."""
         from agents.hardware.drive.status import HEADER, car_rows, status_record
 
         notices = [text for _, text in bridge.feed.notices]
@@ -179,12 +179,12 @@ def _table(header: tuple[str, ...], rows: list[list[str]], notices: list[str], k
 
     table = Table(box=box.SIMPLE)
     for name in header:
-        # What does not fit is cut: the cars and the keys must stay in sight.
+        # Long cells are truncated: the cars and the keys must stay visible.
         table.add_column(escape(name), no_wrap=True, overflow="ellipsis")
     for row in rows:
         table.add_row(*(escape(cell) for cell in row))
     told = [Text(notice, no_wrap=True, overflow="ellipsis") for notice in notices]
-    # A terminal that is too low cuts off the end.
+    # On a small terminal the end is cut off.
     return Group(Text(keys, style="bold"), table, *told)
 
 

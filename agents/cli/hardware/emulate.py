@@ -80,7 +80,7 @@ def emulate(
     as_json: bool,
     **options: Any,
 ) -> None:
-    """Nodes and cars in a simulated world, behind serial ports, in real time."""
+    """Emulate nodes and cars of a simulated world behind serial ports, in real time."""
     from agents.hardware.emulate import EmulatedRig, EmulateOptions
     from agents.hardware.emulate import emulate as run
     from hardware_bridge.emulator.fault_plan import FaultPlan, read_faults
@@ -105,7 +105,7 @@ def emulate(
             f"ports {', '.join(rig.ports)} and swarm.toml in {rig.folder}"
         )
 
-    # A process in the background is ended so; the ports are to go then, too.
+    # SIGTERM, as sent to background processes, must also remove the ports.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     result = run(
         folder=folder,

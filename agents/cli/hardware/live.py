@@ -36,12 +36,12 @@ BROWSER = "browser"
 def live(
     config: Path, seconds: float | None, record: Path | None, view: str | None, as_json: bool
 ) -> None:
-    """Track a live swarm: nodes, relative positions, and how sure they are."""
+    """Track a live swarm: nodes, relative positions and their uncertainty."""
     from agents.hardware.live import live as run
     from hardware_bridge.config import read_config
 
     swarm = read_config(config)
-    # However it is ended from outside, the recording is closed.
+    # Termination signals also close the recording.
     for name in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(name, signal.default_int_handler)
     with ExitStack() as stack:
@@ -70,7 +70,7 @@ def live(
 
 
 def print_streams(streams: tuple[dict[str, object], ...]) -> None:
-    """What the decoders met."""
+    """Print the decoder statistics."""
     names = ["bytes", "frames", "skipped", "damaged", "strange"]
     rows = [[str(s["stream"]), *(str(s[name]) for name in names)] for s in streams]
     print_table("Streams", ["stream", *names], rows)

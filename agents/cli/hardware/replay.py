@@ -69,7 +69,7 @@ def replay(
     view: Path | None,
     as_json: bool,
 ) -> None:
-    """Track a recording again: the same bytes give the same estimates as live."""
+    """Track a recording again; the same bytes give the same estimates as live."""
     from contextlib import ExitStack
 
     from agents.hardware.live.screen import JsonLines, Lines
@@ -126,7 +126,7 @@ def replay(
 
 
 def print_replay(result: ReplayResult) -> None:
-    """Counts, the last estimates, and errors where there is truth."""
+    """Print counts, the last estimates, and errors if there is truth."""
     from agents.hardware.live.text import pair_header, pair_rows
     from agents.reports.page import metres, percent
 
@@ -157,7 +157,7 @@ def print_replay(result: ReplayResult) -> None:
 
 
 def _offset(text: str) -> float | None:
-    """Seconds, or None for auto."""
+    """Return the offset [s], or None for auto."""
     if text == "auto":
         return None
     try:

@@ -26,7 +26,7 @@ def sniff(
     raw: bool,
     as_json: bool,
 ) -> None:
-    """Show what a device at PORT says; nothing is sent but the request of a --format rplidar.
+    """Show the readings of a device at PORT; only --format rplidar sends a request to it.
 
     PORT is a path, serial:NUMBER, tcp:host:port or file:path.
     """

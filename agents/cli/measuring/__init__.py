@@ -1,1 +1,1 @@
-"""Commands that measure and compile."""
+"""Commands for benchmarks and compilation."""

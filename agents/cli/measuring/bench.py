@@ -14,7 +14,7 @@ from agents.errors import UsageError
 
 @click.group()
 def bench() -> None:
-    """Measure speed, each figure next to a peer in the same run."""
+    """Measure speed, each figure against a peer in the same run."""
 
 
 @bench.command("tracker")
@@ -22,7 +22,7 @@ def bench() -> None:
 @out_options("a picture of the time over the group's size")
 @json_option
 def bench_tracker(rounds: int, out: Path | None, as_json: bool) -> None:
-    """Measure the time of ranging rounds, messages and an hour next to filterpy and GTSAM."""
+    """Measure ranging rounds, messages and an hour of tracking against filterpy and GTSAM."""
     from agents.bench.tracker import bench_tracker as run
     from agents.output import check_folder
     from agents.reports.bench.tracker_figures import PICTURE
@@ -54,7 +54,7 @@ def _draw_growth(out: Path) -> None:
 @bench.command("radio")
 @json_option
 def bench_radio(as_json: bool) -> None:
-    """Measure the time of a message-level ranging round next to the reference session."""
+    """Measure message-level ranging rounds against the reference session."""
     from agents.bench.radio import bench_radio as run
 
     with progress_bar("radio") as report:
@@ -66,7 +66,7 @@ def bench_radio(as_json: bool) -> None:
 @click.option("--steps", default=2000, show_default=True, help="Number of calls per repetition.")
 @json_option
 def bench_policy(steps: int, as_json: bool) -> None:
-    """Measure the time of a policy's step next to plain numpy."""
+    """Measure policy inference against plain numpy."""
     from agents.bench.policy import bench_policy as run
 
     if not 1 <= steps <= 1_000_000:
@@ -80,7 +80,7 @@ def bench_policy(steps: int, as_json: bool) -> None:
 @click.option("--frames", default=5000, show_default=True, help="Number of frames per repetition.")
 @json_option
 def bench_codec(frames: int, as_json: bool) -> None:
-    """Measure frames per second of the wire format next to pymavlink."""
+    """Measure frames per second of the wire format against pymavlink."""
     from agents.bench.codec import bench_codec as run
 
     if not 1 <= frames <= 100_000:
@@ -100,7 +100,7 @@ def bench_codec(frames: int, as_json: bool) -> None:
 )
 @json_option
 def bench_train(updates: int, threads: int, after: int, as_json: bool) -> None:
-    """Measure frames per second of training next to an environment that costs nothing."""
+    """Measure agent steps per second of training against an environment without cost."""
     if not 1 <= updates <= 10_000:
         raise UsageError(f"--updates: expected 1 to 10000, got {updates}")
     if not 1 <= threads <= 64:
@@ -133,7 +133,7 @@ def bench_cold(install: bool, as_json: bool) -> None:
 @out_options("a picture of the curves and the parts")
 @json_option
 def bench_env(quick: bool, out: Path | None, as_json: bool) -> None:
-    """Measure environment steps per second next to mpe2 and bare pymunk."""
+    """Measure environment steps per second against mpe2 and bare pymunk."""
     from agents.bench.env import bench_env as run
     from agents.bench.env.effort import FULL, QUICK
     from agents.output import check_folder, write_results

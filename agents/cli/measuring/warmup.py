@@ -27,9 +27,9 @@ from agents.cli.options import json_option
 )
 @json_option
 def warmup(purpose: str, filters: tuple[str, ...], jobs: int | None, as_json: bool) -> None:
-    """Compile ahead: for containers, CI and laptops before a demo.
+    """Compile ahead of time, for containers, CI and laptops before a demo.
 
-    What is compiled is kept on the disk until the package, numba or the processor change.
+    Compiled code stays on disk until the package, numba or the processor changes.
     """
     from agents.warm_up import parts_of, warm_up
     from agents.warm_up.processes import shown_progress

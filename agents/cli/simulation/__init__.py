@@ -1,1 +1,1 @@
-"""Commands that simulate and train."""
+"""Commands for simulation and training."""

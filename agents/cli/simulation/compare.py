@@ -28,7 +28,7 @@ SIMULATED = {
     "jobs": "--jobs", "engine": "--engine",
     "address": "--address",
 }  # fmt: skip
-"""Options that real cars do not have, by parameter."""
+"""Options that are not allowed with real cars, by parameter."""
 WHY = "which has its own cars and task; they drive one after the other"
 
 
@@ -90,8 +90,8 @@ def compare(
     NAME is a controller (consensus, leader-follower, range-only) or a trained policy: its name,
     its file or its folder.
 
-    With --swarm on real cars, in real time; errors are what the cars believe. On a terminal:
-    space stops all at once, c clears the stop, q quits.
+    With --swarm, the comparison runs on real cars in real time, with estimated errors. Keys on a
+    terminal: space stops all cars immediately, c clears the stop, q quits.
     """
     from agents.output import check_folder, write_results
     from agents.reports import compare_report as report
@@ -121,7 +121,7 @@ def compare(
 def _simulated(
     names: tuple[str, ...], observations: tuple[str, ...], options: dict[str, Any], *, filmed: bool
 ) -> tuple[CompareResult, list[dict[str, Any]]]:
-    """The comparison in the simulator, and its films."""
+    """Return the comparison in the simulator, and its films."""
     from agents.comparison.compare import compare as run
     from agents.comparison.film import median_films
     from agents.warm_up import warm_up_first
@@ -147,7 +147,7 @@ def _on_cars(
     arm: bool,
     options: dict[str, Any],
 ) -> CompareResult:
-    """The comparison with real cars."""
+    """Return the comparison with real cars."""
     from agents.comparison.hardware import compare_hardware
     from agents.hardware.drive.keys import NO_KEYS, TerminalKeys, check_stop_source, key_by_key
 

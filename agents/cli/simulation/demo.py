@@ -57,7 +57,7 @@ def demo(
     as_json: bool,
     **names: Any,
 ) -> None:
-    """Cars keep a formation on estimated relative positions; writes report.html."""
+    """Simulate cars in a formation on estimated relative positions; writes report.html."""
     from agents.output import check_folder, write_results
     from agents.reports.demo_report import demo_report
     from agents.reports.gif import Gif
@@ -84,7 +84,7 @@ def demo(
     check_folder(out, ["report.html", "drive.gif"] if gif else ["report.html"])
     ours = names["filter"]
     is_usual = names["task"] in (None, TASK)
-    # Driving compiles what orientations need.
+    # The drive itself compiles the orientation kernels.
     spared = {ORIENTATION, "tasks"} if is_usual else {ORIENTATION}
 
     def parts(purpose: str, *filters: str) -> list[Part]:
@@ -92,7 +92,7 @@ def demo(
         return [part for part in every if part.name not in spared]
 
     needed = parts("env", *({ours} & set(FILTERS)))
-    # In one call: filters share parts.
+    # In one call, since filters share parts.
     later = parts("track", *sorted(FILTERS, key=lambda name: name != ours))
     missing = [
         name

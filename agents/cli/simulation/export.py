@@ -34,7 +34,7 @@ def export(
     overwrite: bool,
     as_json: bool,
 ) -> None:
-    """Write the policy that a training run ended with as files that run without torch."""
+    """Export the policy of a training run to files that run without torch."""
     try:
         from agents.training.export import export_policy, read_results
     except ImportError as error:

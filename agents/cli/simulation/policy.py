@@ -16,13 +16,13 @@ if TYPE_CHECKING:
 
 @click.group()
 def policy() -> None:
-    """Trained policies: which there are, and what their cards say."""
+    """List trained policies and show their cards."""
 
 
 @policy.command("list")
 @json_option
 def list_policies(as_json: bool) -> None:
-    """Policies that come with the package."""
+    """List the policies shipped with the package."""
     from agents.policies import load_policy, shipped_names
 
     cards = [load_policy(name).card for name in shipped_names()]
@@ -61,7 +61,7 @@ def show(wanted: str, as_json: bool) -> None:
 
 
 def _short(card: Card) -> dict[str, Any]:
-    """What a list has of a policy."""
+    """Return the record of a policy in a list."""
     layout = card.layout
     return {
         "name": card.name,
@@ -73,7 +73,7 @@ def _short(card: Card) -> dict[str, Any]:
 
 
 def _facts(card: Card) -> list[list[str]]:
-    """What a card says, a row each."""
+    """Return the entries of a card as rows of name and value."""
     rows = [
         ["observation", card.layout.describe()],
         ["numbers in it", str(card.layout.size)],
@@ -90,5 +90,5 @@ def _facts(card: Card) -> list[list[str]]:
 
 
 def _text(value: Any) -> str:
-    """A value in one line; a terminal must not obey what stands in a card."""
+    """Return a value on one line, with control characters of a card escaped for the terminal."""
     return json.dumps(value).strip('"')

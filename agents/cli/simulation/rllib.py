@@ -53,7 +53,7 @@ def rllib(
     out: Path,
     **arguments: Any,
 ) -> None:
-    """Train with RLlib's PPO, on this machine or a cluster; one JSON line an iteration.
+    """Train with RLlib's PPO, on this machine or a cluster; prints one JSON line per iteration.
 
     Writes policy.onnx with its card, for `relpos compare` and `relpos demo --policy`.
     """

@@ -20,10 +20,10 @@ from agents.training.config import TrainConfig
 @json_option
 @options(TrainConfig)
 def train(out: Path | None, resume: Path | None, as_json: bool, **given: Any) -> None:
-    """Train one policy for all cars; ends with a file that runs without torch, and a report.
+    """Train one policy for all cars; writes a file that runs without torch, and a report.
 
-    How good a policy gets depends much on the seed: --runs 2 trains two at a time and keeps the
-    better one.
+    The performance of a policy depends strongly on the seed: --runs 2 trains two policies at the
+    same time and keeps the better one.
     """
     if (out is None) == (resume is None):
         raise UsageError("--out, --resume: expected one of them, a new folder or that of a run")

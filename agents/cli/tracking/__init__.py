@@ -1,1 +1,1 @@
-"""Commands that track recordings and evaluate filters."""
+"""Commands for tracking of recordings and evaluation of filters."""

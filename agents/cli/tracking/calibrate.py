@@ -19,7 +19,7 @@ FILES = ("calibration.toml", "report.html")
 
 
 def _shared(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The arguments of every kind of calibration."""
+    """Decorate a command with the arguments shared by all calibrations."""
     for decorate in (
         json_option,
         out_options("calibration.toml and report.html", required=True),
@@ -31,7 +31,7 @@ def _shared(function: Callable[..., Any]) -> Callable[..., Any]:
 
 @click.group()
 def calibrate() -> None:
-    """Find the errors of sensors in a recorded run, for `relpos track --calibration`."""
+    """Calibrate sensors from a recorded run, for `relpos track --calibration`."""
 
 
 @calibrate.command("imu")
@@ -46,7 +46,7 @@ def calibrate() -> None:
     help="Gravity at the place of the recording [m/s2].",
 )
 def imu(log: Path, out: Path, as_json: bool, level: bool, gravity: float) -> None:
-    """Gyroscope and accelerometer offsets, from rest."""
+    """Estimate gyroscope and accelerometer offsets at rest."""
     from agents.evaluation.calibrate import calibrate_imus
     from agents.reports.calibration_report import IMU_HEADER, imu_rows
     from tracking.log import read_log
@@ -65,7 +65,7 @@ def imu(log: Path, out: Path, as_json: bool, level: bool, gravity: float) -> Non
     "--seed", default=0, show_default=True, help="Seed; the same seed gives the same result."
 )
 def mag(log: Path, out: Path, as_json: bool, seed: int) -> None:
-    """Hard and soft iron of the magnetometers, from turns on the spot."""
+    """Estimate hard and soft iron of magnetometers from rotations in place."""
     from agents.evaluation.calibrate import calibrate_magnetometers
     from agents.reports.calibration_report import MAG_HEADER, mag_rows
     from tracking.log import read_log
@@ -86,7 +86,7 @@ def mag(log: Path, out: Path, as_json: bool, seed: int) -> None:
     "--max-distance", default=8.0, show_default=True, help="Longest range that is used [m]."
 )
 def uwb(log: Path, out: Path, as_json: bool, seed: int, max_distance: float) -> None:
-    """Slope and antenna delays of the ranges, against truth."""
+    """Estimate slope and antenna delays of ranges against truth."""
     from agents.evaluation.calibrate import calibrate_ranges
     from agents.reports.calibration_report import UWB_HEADER, uwb_rows, uwb_text
     from tracking.log import read_log
@@ -102,7 +102,7 @@ def uwb(log: Path, out: Path, as_json: bool, seed: int, max_distance: float) -> 
 
 
 def _finish(result: CalibrateResult, out: Path, as_json: bool) -> bool:
-    """Write the files; True where the result was shown as JSON."""
+    """Write the files, and print JSON if requested; return `as_json`."""
     from agents.output import write_results
     from agents.reports.calibration_report import calibration_report
     from tracking.calibration import calibration_toml

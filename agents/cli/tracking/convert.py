@@ -34,7 +34,7 @@ def convert(
     restamp: bool,
     as_json: bool,
 ) -> None:
-    """Make a log folder of a bag of ROS, CSV tables, a file of arrays or a serial capture."""
+    """Convert a ROS bag, CSV tables, a file of arrays or a serial capture to a log folder."""
     from agents.convert import convert as run
 
     with progress_bar(f"reading {source}") as report:

@@ -49,7 +49,7 @@ def evaluate(
     as_json: bool,
     out: Path | None,
 ) -> None:
-    """Evaluate filters over many simulated runs: errors, consistency, lost runs, time."""
+    """Evaluate filters in many simulated runs: errors, consistency, lost runs, time."""
     from agents.evaluation.evaluate import evaluate as run
     from agents.output import check_folder, write_results
     from agents.reports import evaluate_report as report

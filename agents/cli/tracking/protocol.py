@@ -27,7 +27,7 @@ from agents.errors import UsageError
 @out_options("report.html and the pictures in it")
 @json_option
 def protocol(events: int, nodes: str, seed: int, out: Path | None, as_json: bool) -> None:
-    """Measure the ranging protocol: rate, recovery when nodes come and go, clock errors."""
+    """Measure the ranging protocol: rate, recovery after joins and leaves, clock errors."""
     from agents.output import check_folder, write_results
     from agents.protocol.experiment import protocol as run
     from agents.reports import protocol_report as report

@@ -75,7 +75,7 @@ def track(
     out: Path | None,
     as_json: bool,
 ) -> None:
-    """Track recorded runs and score them where they have truth."""
+    """Track recorded runs, and score them if they have truth."""
     from agents.evaluation.calibrate import apply_calibrations
     from agents.evaluation.track import TrackResult, estimates_csv, track_log
     from agents.output import check_folder, write_results
@@ -142,7 +142,7 @@ def track(
 
 
 def print_tracks(results: Sequence[Any]) -> None:
-    """Errors over all pairs and for each of them."""
+    """Print the errors over all pairs and of each pair."""
     from agents.evaluation.track import ERRORS, pair_name
     from agents.reports.page import metres, percent
 

@@ -1,4 +1,4 @@
-"""Real cars driven by policies and controllers: what `relpos drive` does."""
+"""Drive real cars with policies and controllers (`relpos drive`)."""
 
 from agents.hardware.drive.result import DriveResult
 from agents.hardware.drive.run import drive, drive_on

@@ -1,4 +1,4 @@
-"""Keys of the terminal while cars drive, read without waiting."""
+"""Non-blocking keyboard input of the operator while cars drive."""
 
 from __future__ import annotations
 
@@ -13,26 +13,25 @@ from collections.abc import Callable, Iterator
 from agents.errors import UsageError
 
 KEYS = {" ": "stop", "a": "arm", "d": "disarm", "c": "clear", "g": "gone", "q": "quit"}
-"""Key to order; space is the largest, and stops."""
+"""Operator command by key."""
 ALIVE = "."
-"""What a program that stops the cars through standard input says to be alive; it asks for
-nothing."""
+"""Heartbeat of a program that sends keys to standard input; it is no command."""
 PATIENCE = 1.0
-"""[s] Without a word from it, all cars are stopped."""
+"""[s] Heartbeat timeout of that program, after which all cars are stopped."""
 HELP = "space: emergency stop  c: clear  a: arm  d: disarm  g: silent are gone  q: quit"
-"""In one line of 80 letters."""
+"""Fits into a line of 80 characters."""
 NO_KEYS = "no keys, cars are stopped: another program has the terminal, fg takes it back"
-"""In one line, too."""
+"""Fits into a line of 80 characters."""
 
 
 def check_stop_source(source: str) -> None:
-    """See that a person can stop the cars.
+    """Check that a person can stop the cars.
 
     Args:
         source: ``terminal`` or ``stdin``.
 
     Raises:
-        UsageError: There is no terminal.
+        UsageError: There is no terminal in the foreground, or standard input is closed.
     """
     if source == "terminal" and (not _is_terminal() or in_background()):
         raise UsageError(
@@ -45,10 +44,10 @@ def check_stop_source(source: str) -> None:
 
 @contextlib.contextmanager
 def key_by_key() -> Iterator[None]:
-    r"""Let the terminal hand on every key at once, while this lasts; nothing without a terminal.
+    r"""Read single key presses from the terminal inside the context; no effect without a terminal.
 
-    No key stops the screen, suspends or kills the program: Ctrl-S, Ctrl-Z and Ctrl-\ stop the cars
-    like any other key.
+    Ctrl-S, Ctrl-Z and Ctrl-\ do not pause the output, suspend or kill the program: they stop the
+    cars like any other key.
     """
     if not _is_terminal():
         yield
@@ -68,10 +67,10 @@ def key_by_key() -> Iterator[None]:
 
 
 def _take_keys(*_: object) -> None:
-    """Set the terminal to single keys, as a shell that had it meanwhile has changed that."""
+    """Set the terminal to single-key mode, also after a shell has changed the mode."""
     import termios
 
-    if in_background():  # the system would halt this program, and the cars with it
+    if in_background():  # the system would suspend this program, and the cars with it
         return
     mode = termios.tcgetattr(sys.stdin)
     mode[0] &= ~(termios.IXON | termios.IXOFF)
@@ -82,23 +81,23 @@ def _take_keys(*_: object) -> None:
 
 
 def in_background() -> bool:
-    """Whether the terminal's keys go to another program, as after `kill -STOP` and `-CONT`."""
+    """Return whether keys go to another program, as after `kill -STOP` and `-CONT`."""
     try:
         return os.tcgetpgrp(sys.stdin.fileno()) != os.getpgrp()
-    except (OSError, AttributeError):  # not the terminal that rules this program, or none
+    except (OSError, AttributeError):  # not the controlling terminal, or none
         return False
 
 
 class PipedKeys:
-    """Keys from a program, a gamepad's or a switch's, whose silence stops the cars."""
+    """Keys piped from a program (gamepad, switch), whose silence stops the cars."""
 
     def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
         self._now, self._heard, self._is_open = now, now(), True
         self.lost = False
-        """Never by another program, see `TerminalKeys`."""
+        """Always False for piped keys; see `TerminalKeys.lost`."""
 
     def read_orders(self) -> list[str]:
-        """What came since the last look, in order; a stop when nothing did for `PATIENCE`."""
+        """Return the new commands in order; a stop after `PATIENCE` without input."""
         pressed = b""
         while self._is_open and select.select([sys.stdin], [], [], 0.0)[0]:
             keys = os.read(sys.stdin.fileno(), 1024)
@@ -116,17 +115,17 @@ class PipedKeys:
 
 
 class TerminalKeys:
-    """Keys of the terminal; when they begin to go to another program, the cars are stopped."""
+    """Keys of the terminal; the cars are stopped when another program takes over the terminal."""
 
     def __init__(self) -> None:
         self.lost = False
-        """Whether they go to another program."""
+        """True while another program receives the keys."""
 
     def read_orders(self) -> list[str]:
-        """What was pressed since the last look, in order; a stop alone where one is among it.
+        """Return the commands of newly pressed keys in order; only the stop if one is among them.
 
-        The descriptor itself is read: text streams keep what they have read ahead, and no `select`
-        tells of it.
+        Reads the file descriptor directly: text streams read ahead into a buffer that `select`
+        does not see.
         """
         had_them, self.lost = not self.lost, in_background()
         if self.lost:
@@ -143,11 +142,11 @@ class TerminalKeys:
 
 
 def orders_of(pressed: str) -> list[str]:
-    """What keys that were hit together mean.
+    """Return the commands of keys that were pressed together.
 
-    Whatever else is hit in a hurry stops as well. No other key pressed with a stop counts, before
-    it or after: a hand on the keyboard means none of it, and the arrow keys are letters behind an
-    escape. Nothing counts after a quit.
+    Unknown keys stop the cars. A stop cancels all other keys, earlier and later: a hand on the
+    keyboard presses keys at random, and arrow keys send letters after an escape. Keys after a
+    quit are ignored.
     """
     orders = [KEYS.get(key.lower(), "stop") for key in pressed]
     if "stop" in orders:
@@ -156,5 +155,5 @@ def orders_of(pressed: str) -> list[str]:
 
 
 def _is_terminal() -> bool:
-    """Whether there is one; a program can be started with its input closed."""
+    """Return whether standard input is a terminal; it may also be closed."""
     return sys.stdin is not None and sys.stdin.isatty()

@@ -1,4 +1,4 @@
-"""What is kept of a drive's decisions: the newest, in memory that does not grow."""
+"""Log of the latest control steps of a drive, in a ring buffer of fixed size."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ from hardware_bridge.live.env import HardwareFormationEnv
 from hardware_bridge.live.opened import OpenBridge
 
 MOST_KEPT = 6000
-"""[-] Decisions, ten minutes; of longer drives the last ones. A recording keeps all."""
+"""[-] Capacity in control steps (ten minutes); a recording holds all steps."""
 STOPPED = " stopped: "
 
 
 class DriveLog:
-    """A ring of decisions."""
+    """Ring buffer of control steps."""
 
     def __init__(
         self, title: str, bridge: OpenBridge, env: HardwareFormationEnv, cycles: int
     ) -> None:
-        """Have room for a drive.
+        """Allocate the arrays.
 
         Args:
-            title: Of the driver.
-            bridge: Of the cars.
-            env: Is driven.
-            cycles: Decisions that there may be.
+            title: Title of the driver.
+            bridge: Bridge to the cars.
+            env: Environment of the drive.
+            cycles: Largest number of control steps.
         """
         self._title, self._bridge, self._env = title, bridge, env
         self._n, self._n_late, self._began_ns = 0, 0, 0
@@ -37,11 +37,11 @@ class DriveLog:
         self._command, self._passed = np.full((2, room, n, 2), np.nan)
 
     def first(self) -> None:
-        """The drive begins."""
+        """Store the number of late steps at the start of the drive."""
         self._n_late = self._bridge.feed.n_late
 
     def add(self) -> None:
-        """A decision has passed."""
+        """Append the state after a control step."""
         group, report = self._env.group, self._bridge.feed.report
         present, task = group.believed.present[0], group.task
         k = self._n % len(self._t_ns)
@@ -58,10 +58,10 @@ class DriveLog:
             self._lag[k] = report.lag if report.lag > 0.0 else np.nan
 
     def result(self, armed: bool) -> DriveResult:
-        """All of it.
+        """Return the logged drive.
 
         Args:
-            armed: Whether the cars were.
+            armed: Whether the cars were armed.
         """
         report, room = self._bridge.feed.report, len(self._t_ns)
         order = np.arange(max(self._n - room, 0), self._n) % max(room, 1)

@@ -1,4 +1,4 @@
-"""What came of a drive with real cars."""
+"""Result of a drive with real cars."""
 
 from __future__ import annotations
 
@@ -13,52 +13,52 @@ from tracking.params.short_repr import short_repr
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveResult:
-    """One drive; arrays over (decision, ...), from when the cars were armed on.
+    """One drive; arrays (decision, ...) begin when the cars were armed.
 
-    Of drives of more than ten minutes they have the last decisions only.
+    A decision is one control step. Arrays hold at most the last ten minutes of a drive.
     """
 
     __repr__ = short_repr
 
     driver: str
-    """The controller or policy."""
+    """Title of the controller or policy."""
     armed: bool
-    """Whether the cars were; else it was a dry run."""
+    """True if the cars were armed; False for a dry run."""
     t_ns: I64
-    """Host time of the decisions, (decision) [ns], whole numbers."""
+    """[ns] Host time of the decisions, (decision)."""
     began_ns: int
-    """Host time of the first of all [ns]."""
+    """[ns] Host time of the first decision of the drive."""
     target: F64
-    """Where the others should have been, (decision, slot, other, 2) [m]."""
+    """[m] Target positions relative to each car, (decision, slot, other, 2)."""
     wanted: Bool
-    """False where the task gave no place, (decision, slot, other)."""
+    """True where the task defines a target, (decision, slot, other)."""
     error: F64
-    """Formation error that the cars believed in, mean over them, (decision) [m]."""
+    """[m] Estimated formation error, mean over the cars, (decision)."""
     command: F64
-    """What was asked for: speed [m/s] and steering [rad], (decision, slot, 2)."""
+    """Commanded speed [m/s] and steering [rad], (decision, slot, 2)."""
     passed: F64
-    """What the gate let pass, (decision, slot, 2)."""
+    """Speed [m/s] and steering [rad] after the safety gate, (decision, slot, 2)."""
     lag: F64
-    """From the last byte that a decision rests on to its command's bytes, (decision) [s]."""
+    """[s] Latency from the last input byte of a decision to its command bytes, (decision)."""
     decisions: int
-    """[-] All of them."""
+    """[-] Number of decisions of the whole drive."""
     late_decisions: int
-    """[-] That were due while the one before was still made."""
+    """[-] Decisions that were due while the previous one was still being computed."""
     missed_ticks: int
-    """[-] Of the supervisor, more than 20 ms late."""
+    """[-] Ticks of the supervisor that were more than 20 ms late."""
     recording_lost: str | None
-    """Why records are missing in the recording; None if none are, or there is none."""
+    """Reason for missing records in the recording; None if complete or not recorded."""
     stops: tuple[str, ...]
-    """Why cars were stopped for good."""
+    """Reasons of latched stops."""
 
     @property
     def seconds(self) -> float:
-        """Length [s]."""
+        """[s] Length of the drive."""
         return 1e-9 * float(self.t_ns[-1] - self.began_ns) if len(self.t_ns) else 0.0
 
     @property
     def summary(self) -> dict[str, Any]:
-        """The figures."""
+        """Figures of the drive as a JSON record."""
         lag = self.lag[np.isfinite(self.lag)]
         error = self.error[np.isfinite(self.error)]
         held = np.abs(self.passed - self.command).max(axis=(1, 2), initial=0.0) > 0.05

@@ -1,4 +1,4 @@
-"""A drive with real cars, from opened ports to cars that stand again."""
+"""Run a drive with real cars, from opening the ports to the final stop."""
 
 from __future__ import annotations
 
@@ -41,22 +41,22 @@ def drive(
     """Drive the cars of a swarm on the estimates of their trackers.
 
     Args:
-        config: A swarm.toml, or what `read_config` made of one.
+        config: Path of a swarm.toml, or the result of `read_config`.
         name: A controller of `agents.controllers.CONTROLLERS`, or a policy as for
             `agents.policies.load_policy`.
-        observation: What they see; by default what the policy was trained on, or `estimate`.
-        arm: Whether the cars may move: they are armed once all has been well for a while. Without
-            it is a dry run, and no port of a car is opened.
-        seconds: Length from then on; None ends with Ctrl-C or when the task is done.
-        wait: So long is waited for all to be well [s].
+        observation: Observation mode; by default that of the policy's training, or `estimate`.
+        arm: Whether the cars may move: they are armed after all checks have passed for a while.
+            False is a dry run, which opens no port of a car.
+        seconds: Length after arming [s]; None runs until Ctrl-C or the end of the task.
+        wait: Longest wait until all checks pass [s].
         record: File for a recording.
-        watch: Called after every decision.
-        attend: Called every hundredth of a second with what takes orders: ``arm``, ``disarm``,
-            ``stop``, ``clear``, or ``quit``, which ends the drive.
+        watch: Called after every control step.
+        attend: Called every 10 ms with a function that takes operator commands: ``arm``,
+            ``disarm``, ``stop``, ``clear``, or ``quit``, which ends the drive.
 
     Raises:
-        BridgeError: Something of the swarm cannot be used, or the cars could not be armed.
-        UsageError: No driver of that name, or not for such cars.
+        BridgeError: A part of the swarm cannot be used, or the cars could not be armed.
+        UsageError: No driver of that name, or it does not fit these cars.
     """
     swarm = config if isinstance(config, SwarmConfig) else read_config(config)
 
@@ -88,18 +88,18 @@ def drive_on(
     watch: Watch | None = None,
     attend: Callable[[Callable[[str], None]], None] | None = None,
 ) -> DriveResult:
-    """Drive the cars of a bridge, which is opened when all else is well, and closed again.
+    """Drive the cars of a bridge, which is opened after all other checks and closed at the end.
 
     Args:
-        open_bridge: Opens it.
+        open_bridge: Opens the bridge.
         n_slots: Slots of its swarm.
-        n_beams: Of the distance sensors of each car.
-        name: As for `drive`, like all that follow.
-        observation: What they see.
+        n_beams: Distance sensors of each car.
+        name: Controller or policy, as for `drive`.
+        observation: Observation mode, as for `drive`.
         arm: Whether the bridge arms the cars.
-        seconds: Length.
-        watch: Called after every decision.
-        attend: Called with what takes orders.
+        seconds: Length after arming [s], as for `drive`.
+        watch: Called after every control step.
+        attend: Called with a function that takes operator commands, as for `drive`.
 
     Raises:
         BridgeError: As `drive`.
@@ -131,7 +131,7 @@ def drive_on(
         except KeyboardInterrupt:
             pass
         except BaseException:
-            # What is wrong is not that a supervisor that has ended takes no more orders.
+            # Raise the original error, not the one of a supervisor that has already ended.
             with suppress(BridgeError):
                 bridge.feed.order("quit")
             raise
@@ -140,19 +140,19 @@ def drive_on(
 
 
 class _Orders:
-    """What people ask for while it lasts."""
+    """Operator commands during a drive."""
 
     def __init__(self, bridge: OpenBridge) -> None:
         self._bridge, self._quit = bridge, False
 
     def take(self, what: str) -> None:
-        """An order."""
+        """Pass an operator command to the start-up and to the supervisor."""
         self._quit |= what == "quit"
         self._bridge.start.heed(what)
         self._bridge.feed.order(what)
 
     def show(self, env: HardwareFormationEnv, watch: Watch | None) -> bool:
-        """After a decision; whether it is to end."""
+        """Call `watch`; return whether the operator has ended the drive."""
         if watch is not None:
             watch(self._bridge, env)
         return self._quit
@@ -161,9 +161,9 @@ class _Orders:
 def _drive(
     env: HardwareFormationEnv, driver: Driver, log: DriveLog, is_over: Callable[[], bool]
 ) -> None:
-    """Decide until the time is up, the task is done, or it is stopped."""
+    """Run control steps until the time is up, the task is done, or `is_over` returns True."""
     for space in env.observation_spaces.values():
-        driver.act(np.zeros(space.shape, np.float32))  # loads what is loaded when first used
+        driver.act(np.zeros(space.shape, np.float32))  # compiles and loads before the drive
     observations, _ = env.reset()
     log.first()
     while env.agents:

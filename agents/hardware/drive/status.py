@@ -1,4 +1,4 @@
-"""What a drive looks like while it lasts: a table of the cars."""
+"""Status of a running drive: a table of the cars, and a JSON record."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from tracking.estimate import Status
 
 HEADER = ("car", "state", "asked [m/s]", "passed [m/s]", "error [m]", "sees", "why")
 LINES = 4
-"""[-] Of notices below the table."""
+"""[-] Lines of notices below the table."""
 
 
 def car_rows(bridge: OpenBridge, env: HardwareFormationEnv) -> list[list[str]]:
-    """One row a slot, as `HEADER`."""
+    """Return one row per slot with the columns of `HEADER`."""
     report, group = bridge.feed.report, env.group
     view, config = bridge.swarm.view, bridge.config
     driven = {config.slot_of(car) for car in config.cars}
@@ -47,7 +47,7 @@ def car_rows(bridge: OpenBridge, env: HardwareFormationEnv) -> list[list[str]]:
 
 
 def status_record(bridge: OpenBridge, env: HardwareFormationEnv) -> dict[str, Any]:
-    """The state of a drive as a record."""
+    """Return the state of a drive as a JSON record."""
     report, group = bridge.feed.report, env.group
     present = group.believed.present[0]
     error = group.task.error[0, present]

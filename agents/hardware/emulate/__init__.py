@@ -1,4 +1,4 @@
-"""Nodes and cars that are not there, in a simulated world: what `relpos emulate` does."""
+"""Emulate the devices of nodes and cars in a simulated world (`relpos emulate`)."""
 
 from agents.hardware.emulate.options import EmulateOptions
 from agents.hardware.emulate.result import EmulateResult

@@ -1,4 +1,4 @@
-"""Ctrl-C, and signals that mean the same, where the work can be left and nowhere else."""
+"""Deferral of Ctrl-C and SIGTERM to points where the work can be interrupted."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from types import FrameType, TracebackType
 
 
 class Interrupts:
-    """Holds KeyboardInterrupt back but for places that allow it.
+    """Context that defers KeyboardInterrupt to blocks that allow it.
 
-    It takes over SIGINT and SIGTERM where these would raise KeyboardInterrupt; who ignores them, or
-    dies of them, goes on doing so. Only the main thread hears signals: in others it does nothing.
+    Replaces the handlers of SIGINT and SIGTERM that raise KeyboardInterrupt; other handlers stay.
+    Signals are handled in the main thread only; in other threads this context has no effect.
 
-    Laws: nothing is raised outside `allowed`; what came before is raised by the next `allowed`, and
-    what is raised by none is served by the end of the work.
+    Properties: nothing is raised outside `allowed`; an earlier signal is raised by the next
+    `allowed`, and dropped if the work ends without one.
     """
 
     def __init__(self) -> None:
@@ -43,10 +43,10 @@ class Interrupts:
 
     @contextmanager
     def allowed(self) -> Iterator[None]:
-        """Here the work can be left.
+        """Allow KeyboardInterrupt inside the context.
 
         Raises:
-            KeyboardInterrupt: A signal comes, or came since the last such place.
+            KeyboardInterrupt: A signal arrives, or arrived since the last such context.
         """
         self._allowed = True
         try:
@@ -61,6 +61,6 @@ class Interrupts:
         if not self._allowed:
             self._came = True
             return
-        # One is enough: what follows it has to be done in peace.
+        # The cleanup after the first interrupt must not be interrupted again.
         self._allowed = False
         raise KeyboardInterrupt

@@ -1,4 +1,4 @@
-"""What an emulation is made of: arguments, and what they are once they are looked up."""
+"""Options of an emulation, and the world and formats that they select."""
 
 from __future__ import annotations
 
@@ -20,55 +20,54 @@ from relpos_env.scenarios import Scenario
 from relpos_env.timing import DECISION
 
 IMU_FORMAT = "witmotion"
-"""Of the second port of nodes whose own format says nothing of motion."""
+"""Default format of the second port of nodes whose own format has no IMU samples."""
 LONGEST = 86400.0
-"""[s] Of an emulation."""
+"""[s] Longest emulation."""
 
 
 SLOW_PWM = {
     "forward": ((0.1, 1525), (3.0, 1750)),
     "reverse": ((0.1, 1475), (3.0, 1250)),
 }
-"""Cars behind PWM boards that can drive as slowly as a start asks for, both ways."""
+"""Calibration of PWM cars that can drive at the low speeds of the start-up, in both directions."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EmulateOptions:
-    """One emulation. World, nodes and faults follow from these alone."""
+    """Options of one emulation, which determine world, nodes and faults completely."""
 
     scenario: str | Path | Scenario | None = None
-    """As in `relpos_env.config.FormationConfig`; by default that of the task."""
+    """Scenario, as in `relpos_env.config.FormationConfig`; by default that of the task."""
     task: str = "ring"
-    """One of `relpos_env.tasks.TASKS`."""
+    """Task, one of `relpos_env.tasks.TASKS`."""
     task_options: Mapping[str, Any] = field(default_factory=dict)
-    """The task's own, by name."""
+    """Options of the task by name."""
     cars: int | None = None
-    """2 to 20; by default as many as the scenario has."""
+    """[-] Number of cars, 2 to 20; by default that of the scenario."""
     seed: int = 0
-    """Of the episode, as of `relpos_env.api.parallel_env.FormationEnv.reset`."""
+    """[-] Seed of the episode, as of `relpos_env.api.parallel_env.FormationEnv.reset`."""
     seconds: float = 60.0
-    """[s] From when the cars are let go; they stand for `relpos_env.timing.STAND_STILL` before."""
+    """[s] Length after the release of the cars, at `relpos_env.timing.STAND_STILL`."""
     format: str = "relpos"
-    """What the nodes speak, see `hardware_bridge.emulator.formats`."""
+    """Format of the nodes, see `hardware_bridge.emulator.formats`."""
     imu_format: str | None = None
-    """What their second ports speak; by default `IMU_FORMAT` where it takes one, else none."""
+    """Format of their second ports; by default `IMU_FORMAT` if a node needs one, else none."""
     proximity: int = 0
-    """Beams of distance sensors round each car, 0 to 32; cars with the driver ``relpos`` tell."""
+    """[-] Distance sensors per car, 0 to 32; only cars with the driver ``relpos`` report them."""
     driver: str = "relpos"
-    """Of the cars, one of `hardware_bridge.drivers.DRIVERS`."""
+    """Driver of the cars, one of `hardware_bridge.drivers.DRIVERS`."""
     driver_options: Mapping[str, Any] = field(default_factory=dict)
-    """Fields of the driver's options, the same for all cars; by default `SLOW_PWM` for ``pwm``."""
+    """Options of the driver for all cars; by default `SLOW_PWM` for ``pwm``."""
     deadman: float | None = None
-    """[s] In place of that of the cars' firmware."""
+    """[s] Command timeout that replaces that of the cars' firmware."""
     key: bytes | None = None
-    """16 bytes that sign messages of our own format; None signs none. Cars have `car_key`."""
+    """Key of 16 bytes for messages of our own format; None signs none. Cars have `car_key`."""
     operator: bool = True
-    """Emulate the operator's remote control, which asks for a velocity on top of the plan; else
-    the plan alone is to be followed."""
+    """True to emulate the operator's remote control, which adds a velocity to the plan."""
     faults: FaultPlan = field(default_factory=FaultPlan)
-    """What goes wrong."""
+    """Faults to inject."""
     nodes: NodeParams = field(default_factory=NodeParams)
-    """How far the nodes' clocks are off."""
+    """Clock errors and battery reports of the nodes."""
 
     def __post_init__(self) -> None:
         if self.driver == "pwm" and not self.driver_options:
@@ -84,9 +83,10 @@ class EmulateOptions:
 
     @property
     def car_key(self) -> bytes | None:
-        """Signs what cars of our own format hear and say: every bit is that of `key` turned over.
+        """Key of messages to and from cars of our own format: the inverted bits of `key`.
 
-        A car and its node have one id, so that with one key what one says could pass for the other.
+        A car and its node have the same id; with the same key, messages of one could pass as those
+        of the other.
         """
         if self.key is None or self.driver != "relpos":
             return None
@@ -94,11 +94,11 @@ class EmulateOptions:
 
     @property
     def cycles(self) -> int:
-        """Decisions from when the cars are let go."""
+        """Number of control steps after the release of the cars."""
         return round(self.seconds / DECISION)
 
     def parts(self) -> Parts:
-        """The world.
+        """Return the parts of the world.
 
         Raises:
             EnvError: An unknown name or a number out of range.
@@ -113,10 +113,10 @@ class EmulateOptions:
         ).resolve()
 
     def formats(self) -> tuple[WireFormat, ...]:
-        """What the ports of a node speak.
+        """Return the formats of the ports of a node.
 
         Raises:
-            BridgeError: An unknown format, or none of them says distances or motion.
+            BridgeError: An unknown format, or no format with ranges or with IMU samples.
         """
         formats = [wire_format(self.format, self.key)]
         if self.imu_format is not None:

@@ -1,4 +1,4 @@
-"""Steps at their times by a clock, or as fast as they go."""
+"""Pacing of steps by a clock, and their lateness."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from dataclasses import dataclass
 
 NS = 1_000_000_000
 GIVEN_UP = NS
-"""[ns] A delay beyond this, such as of a machine that slept, is not made up for."""
+"""[ns] Longest delay that is caught up; longer ones, as after sleep mode, shift the schedule."""
 
 
 @dataclass(slots=True)
 class Lateness:
-    """How well the steps kept to their times."""
+    """Statistics of late steps."""
 
     steps: int = 0
     late: int = 0
-    """Steps that began more than a step's length after their time."""
+    """[-] Steps that began more than one step length after their deadline."""
     worst_ns: int = 0
-    """The latest."""
+    """[ns] Largest delay."""
 
 
 class Pace:
@@ -27,19 +27,19 @@ class Pace:
     def __init__(
         self, step_ns: int, clock: Callable[[], int], sleep: Callable[[float], None]
     ) -> None:
-        """Begin with the first step due now.
+        """Set the deadline of the first step to the current time.
 
         Args:
-            step_ns: From deadline to deadline.
-            clock: Monotonic [ns].
-            sleep: Waits for so many seconds.
+            step_ns: Period of deadlines [ns].
+            clock: Monotonic clock [ns].
+            sleep: Sleeps for a number of seconds.
         """
         self._step_ns, self._clock, self._sleep = step_ns, clock, sleep
         self._due = clock()
         self.lateness = Lateness()
 
     def wait(self) -> int:
-        """Wait for the next deadline; what the clock says then."""
+        """Wait for the next deadline; return the time of the clock [ns]."""
         now = self._clock()
         while now < self._due:
             self._sleep((self._due - now) / NS)

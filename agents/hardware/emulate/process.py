@@ -1,4 +1,4 @@
-"""The emulator in its own process; the drive sees only its ports."""
+"""The emulator in its own process; a drive uses only its ports."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from agents.hardware.emulate.run import emulate
 from agents.jobs.child import end_with_parent
 
 LONGEST_START = 120.0
-"""[s] From the first byte to cars that drive."""
+"""[s] Longest start-up of emulator and drive."""
 
 
 class EmulationProcess:
-    """The emulator's process, from its first byte on until it is left; then with its figures."""
+    """Context with the process of an emulator; has its figures after the exit."""
 
     start_ns = 0
-    """[ns] Host time of the world's beginning."""
+    """[ns] Host time of the start of the world."""
     collisions = 0
-    """[-] That cars began."""
+    """[-] Collisions."""
     late_steps = 0
-    """[-] By more than 10 ms."""
+    """[-] Steps more than 10 ms late."""
 
     def __init__(self, options: EmulateOptions, place: Path) -> None:
-        """Set it up.
+        """Create the process without starting it.
 
         Args:
-            options: The emulation; it lasts for `LONGEST_START` longer than they say.
-            place: Folder of the ports, and of ``truth`` in the end.
+            options: Options of the emulation, which runs `LONGEST_START` longer.
+            place: Folder of the ports, and of the log ``truth`` written at the end.
         """
         spawn = multiprocessing.get_context("spawn")
         self._pipe, theirs = spawn.Pipe()
@@ -58,13 +58,13 @@ class EmulationProcess:
         if isinstance(said, tuple):
             self.start_ns, self.collisions, self.late_steps = said
         elif error[0] is None:
-            # What went wrong with the drive itself is the more telling.
+            # An error of the drive itself takes precedence.
             why = said if isinstance(said, Exception) else "its process was ended from outside"
             raise UsageError(f"emulator: it failed: {why}")
 
 
 def _emulate(options: EmulateOptions, place: Path, pipe: Connection) -> None:
-    """What that process does, until it is interrupted."""
+    """Emulate in the process until it is interrupted."""
     end_with_parent()
     try:
         result = emulate(

@@ -1,4 +1,4 @@
-"""What came of an emulation."""
+"""Result of an emulation."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from tracking.log import Log
 from tracking.params.short_repr import short_repr
 
 SETTLE = 10.0
-"""[s] Errors are averaged from here on, as in `agents.simulation.demo`."""
+"""[s] Start of the interval over which errors are averaged, as in `agents.simulation.demo`."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EmulateResult:
-    """One emulation."""
+    """Errors and statistics of one emulation."""
 
     __repr__ = short_repr
 
@@ -29,27 +29,27 @@ class EmulateResult:
     task: str
     seed: int
     seconds: float
-    """[s] From when the cars were let go."""
+    """[s] Length after the release of the cars."""
     t: F64
-    """When task and operator looked at the room, since the cars were let go, (decision) [s]."""
+    """[s] Times of the updates of task and operator since the release, (decision)."""
     error: F64
-    """Formation error by the truth, mean over the cars in the room, (decision) [m]."""
+    """[m] True formation error, mean over the present cars, (decision)."""
     collisions: int
-    """[-] That cars began."""
+    """[-] Collisions."""
     lateness: Lateness
-    """How well the steps kept to their times."""
+    """Statistics of late steps."""
     lines: tuple[dict[str, Any], ...]
-    """Of each line its name, frames and bytes that were sent, read and lost."""
+    """Name of each line, with its frames and bytes sent, read and lost."""
     start_ns: int
-    """[ns] Host time of the world's beginning, in which the cars stand at first."""
+    """[ns] Host time of the start of the world, in which the cars rest at first."""
     happened: tuple[Fault, ...]
-    """Faults of the script."""
+    """Injected faults of the script."""
     log: Log | None
-    """What was measured, with the truth, where it was asked for."""
+    """Measurements with the truth; None if they were not recorded."""
 
     @property
     def formation_error(self) -> float:
-        """Mean from `SETTLE` on, or of the end if it came before [m]; NaN before any."""
+        """[m] Mean error from `SETTLE` on, the last error of shorter runs, NaN without any."""
         known = self.error[np.isfinite(self.error)]
         settled = self.error[(self.t >= SETTLE) & np.isfinite(self.error)]
         if len(settled):
@@ -58,12 +58,12 @@ class EmulateResult:
 
     @property
     def frames(self) -> int:
-        """Sent by all devices."""
+        """[-] Frames sent by all devices."""
         return sum(line["frames"] for line in self.lines)
 
     @property
     def summary(self) -> dict[str, Any]:
-        """The figures, without what is not known."""
+        """Figures of the emulation as a JSON record; unknown ones are None."""
         error = self.formation_error
         return {
             "result": "emulation",
@@ -82,7 +82,7 @@ class EmulateResult:
 
 
 def line_figures(line: Line) -> dict[str, Any]:
-    """What went over a line."""
+    """Return the statistics of a line as a JSON record."""
     counts, injector = line.port.counts, line.injector
     return {
         "line": line.name,

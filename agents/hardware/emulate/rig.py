@@ -1,4 +1,4 @@
-"""An emulation that is stepped by hand: a world, its devices, and their ports in a folder."""
+"""An emulation with a step function: a world, its devices, and their ports in a folder."""
 
 from __future__ import annotations
 
@@ -33,16 +33,16 @@ from tracking.log import Log
 from tracking.measurements import MeasurementBlock
 
 STEP_NS = round(1e9 * DT)
-"""[ns] From step to step."""
+"""[ns] Length of a step."""
 SWARM_FILE = "swarm.toml"
 TRUTH_EVERY = 2
-"""[-] A log has the truth of every so-manieth step."""
+"""[-] Steps between two rows of truth in a log."""
 
 
 class EmulatedRig:
-    """World, devices and ports; a step takes no time but that of its computation.
+    """World, devices and ports, stepped without waiting for real time.
 
-    Law: same options and same bytes to the cars at the same times, same everything, bit for bit.
+    Property: equal options and equal bytes to cars at equal times give equal results, bit for bit.
     """
 
     def __init__(
@@ -53,18 +53,18 @@ class EmulatedRig:
         ports: PortBuilder | None = None,
         record: bool = False,
     ) -> None:
-        """Make everything, and write ``swarm.toml`` once all ports can be opened.
+        """Create world, devices and ports, then write ``swarm.toml``.
 
         Args:
-            options: What it is made of.
-            folder: For the ports and ``swarm.toml``; made if it is not there. None writes nothing.
-            ports: Gives ports by their names; by default pseudo terminals in the folder, or lines
-                in memory without one.
-            record: Keep measurements and truth, see `EmulatedWorld.recording`.
+            options: Options of the emulation.
+            folder: Folder for the ports and ``swarm.toml``, created if missing; None writes none.
+            ports: Creates a port by its name; by default a pseudo terminal in the folder, or a
+                line in memory without a folder.
+            record: Whether to keep measurements and truth, see `EmulatedWorld.recording`.
 
         Raises:
             EnvError: An unknown name or a number out of range.
-            BridgeError: An unknown device or option, or a port that cannot be made.
+            BridgeError: An unknown device or option, or a port that cannot be created.
         """
         self.options = options
         self._formats = options.formats()
@@ -73,7 +73,7 @@ class EmulatedRig:
         ids = self.constellation.ids
         for node in ids:
             make_firmware(options.driver, node, options.driver_options, self.options.car_key)
-        # Links must mean the same in any working directory.
+        # Symbolic links must not depend on the working directory.
         self.folder = None if folder is None else folder.resolve()
         if self.folder is not None:
             try:
@@ -84,7 +84,7 @@ class EmulatedRig:
             _check_ours(self.folder / SWARM_FILE)
         self._make_port = ports or _ports_in(self.folder)
         self.ports: dict[str, DevicePort] = {}
-        """By name."""
+        """Ports by name."""
         self._rng = np.random.default_rng([options.seed, _DEVICES])
         try:
             self.emulator = self._plug_in(ids)
@@ -97,25 +97,25 @@ class EmulatedRig:
             self._write(self.folder)
 
     def step(self, t_ns: int | None = None) -> MeasurementBlock:
-        """Go on by 10 ms of the world.
+        """Advance the world by 10 ms.
 
         Args:
-            t_ns: Now, of the host; by default 10 ms after the last step.
+            t_ns: Time of the host [ns]; by default 10 ms after the last step.
 
         Returns:
-            What was measured, faults or not; valid until the next step.
+            Measurements without the effect of faults; valid until the next step.
         """
         self._t_ns = self._t_ns + STEP_NS if t_ns is None else t_ns
         return self.emulator.step(self._t_ns)
 
     def log(self, name: str) -> Log:
-        """What was measured since the beginning, with the truth.
+        """Return all measurements with the truth.
 
         Args:
-            name: Of the log.
+            name: Name of the log.
 
         Raises:
-            BridgeError: Nothing was kept.
+            BridgeError: Measurements were not recorded.
         """
         recording, scenario = self.world.recording, self.world.parts.scenario.name
         if recording is None:
@@ -123,27 +123,27 @@ class EmulatedRig:
         return recording.to_log(name, scenario, self.constellation, truth_every=TRUTH_EVERY)
 
     def close(self) -> None:
-        """Unplug everything."""
+        """Unplug all devices."""
         self.emulator.close()
 
     def swarm_toml(self, folder: Path) -> str:
-        """The text of ``swarm.toml``.
+        """Return the text of ``swarm.toml``.
 
         Args:
-            folder: Where the ports are.
+            folder: Folder of the ports.
         """
         nodes = [(d.node, [line.name for line in d.lines]) for d in self.emulator.nodes]
         return swarm_toml(self.options, self.world.parts, self.constellation, nodes, folder)
 
     def _write(self, folder: Path) -> None:
-        """Write ``swarm.toml``, at once and whole."""
+        """Write ``swarm.toml`` atomically."""
         text = self.swarm_toml(folder)
         write_safely(folder / SWARM_FILE, text, mode=0o644 if self.options.key is None else 0o600)
-        # These devices are new: what others of the same ids said before is nothing to them.
+        # These devices are new, so the replay protection of earlier ones with these ids is reset.
         (folder / SWARM_FILE).with_suffix(".marks.json").unlink(missing_ok=True)
 
     def _plug_in(self, ids: tuple[int, ...]) -> Emulator:
-        """All devices on their lines."""
+        """Return an emulator with all devices on their lines."""
         options = self.options
         nodes = [self._node(k, ids) for k in range(len(ids))]
         cars = [self._car(node) for node in ids]
@@ -155,7 +155,7 @@ class EmulatedRig:
         return Emulator(self.world, nodes, cars, operator, options.faults)
 
     def _node(self, k: int, ids: tuple[int, ...]) -> NodeDevice:
-        """A node with its ports."""
+        """Return the k-th node with its ports."""
         options = self.options
         names = [node_port(ids[k], p) for p in range(len(self._formats))]
         lines = [self._line(name, options.faults.frames) for name in names]
@@ -167,7 +167,7 @@ class EmulatedRig:
         return NodeDevice(make(own), lines, lambda: make(other))
 
     def _car(self, node: int) -> CarDevice:
-        """A car's controller on its line."""
+        """Return the motor controller of a car with its line."""
         options, boots = self.options, boot_numbers(self._rng)
 
         def make() -> EmulatedCar:
@@ -180,16 +180,16 @@ class EmulatedRig:
         return CarDevice(node, line, make, CAR_VOLTAGE)
 
     def _line(self, name: str, faults: FaultParams) -> Line:
-        """A port and what happens on the way to it."""
+        """Return a line: a port with a fault injector."""
         self.ports[name] = port = self._make_port(name)
         return Line(name, port, FaultInjector(faults, self._rng.spawn(1)[0]))
 
 
 def _check_ours(path: Path) -> None:
-    """See that a file that is to be replaced was written by an emulation.
+    """Check that an existing file was written by an emulation and may be replaced.
 
     Raises:
-        BridgeError: It was not.
+        BridgeError: The file was not written by an emulation.
     """
     if not path.exists():
         return
@@ -199,13 +199,13 @@ def _check_ours(path: Path) -> None:
 
 
 _DEVICES = 0x0DE71CE5
-"""Sets the draws of devices apart from those of the world, which has the seed alone."""
+"""Second entry of the seed of devices; the world is seeded with the seed alone."""
 CAR_VOLTAGE = 7.6
-"""[V] Of a battery of two cells."""
+"""[V] Voltage of a two-cell battery."""
 
 
 def _ports_in(folder: Path | None) -> PortBuilder:
-    """Pseudo terminals in a folder, or lines in memory without one."""
+    """Return a builder of pseudo terminals in a folder, or of lines in memory without one."""
     if folder is None:
         return lambda name: MemoryPort()
     return lambda name: PtyPort(folder / name)

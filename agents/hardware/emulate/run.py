@@ -1,4 +1,4 @@
-"""An emulation in real time, from its first port to its last figure."""
+"""Run an emulation in real time."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from relpos_env.timing import DECISION, STAND_STILL
 from tracking.log import check_target, write_log
 
 SECOND = round(1e9 / STEP_NS)
-"""[-] Steps of a report."""
+"""[-] Steps between reports, one second."""
 LONGEST_WAIT = 3600.0
-"""[s]"""
+"""[s] Upper limit of `wait`."""
 
 
 Report = Callable[[dict[str, Any]], None]
@@ -46,23 +46,23 @@ def emulate(
 ) -> EmulateResult:
     """Run devices in a simulated world in real time, until the time is up or Ctrl-C.
 
-    Ctrl-C, or what else raises KeyboardInterrupt, ends it between two steps. From then on nothing
-    does before the log is there, whole.
+    KeyboardInterrupt ends the run between two steps. After the run, further interrupts are
+    ignored until the log is written completely.
 
     Args:
-        folder: Gets the ports, and ``swarm.toml`` once they can be opened.
-        options: What to emulate.
-        wait: The world stands until a host has sent something to a car, at most so long [s].
-        log: Where to write what was measured, with the truth; None writes nothing.
+        folder: Folder for the ports and ``swarm.toml``.
+        options: Options of the emulation.
+        wait: Longest time the world is paused until a host has sent bytes to a car [s].
+        log: Folder for the measurements with the truth; None writes no log.
         ready: Called when the ports can be opened.
         report: Called every second with a record of figures.
-        clock: Monotonic [ns].
-        sleep: Waits for so many seconds.
+        clock: Monotonic clock [ns].
+        sleep: Sleeps for a number of seconds.
         changes: Fields of `EmulateOptions` that differ from `options`.
 
     Raises:
         EnvError: An unknown name or a number out of range.
-        BridgeError: An unknown device or option, or a port that cannot be made.
+        BridgeError: An unknown device or option, or a port that cannot be created.
         LogError: `log` exists already.
     """
     chosen = replace(options or EmulateOptions(), **changes)
@@ -100,7 +100,7 @@ def emulate(
 
 
 class _Run:
-    """What is taken down of a rig as it goes."""
+    """Log of a running rig."""
 
     def __init__(self, rig: EmulatedRig, report: Report | None) -> None:
         self.rig, self._report = rig, report
@@ -110,7 +110,7 @@ class _Run:
         self._frames = 0
 
     def step(self, t_ns: int) -> None:
-        """Go on by 10 ms."""
+        """Advance the rig by 10 ms."""
         world = self.rig.world
         self.start_ns = self.start_ns or t_ns - STEP_NS
         self.rig.step(t_ns)
@@ -118,12 +118,12 @@ class _Run:
             self._rows.append((world.t - STAND_STILL, world.error))
 
     def tell(self) -> None:
-        """Report, once a second."""
+        """Report once per second of the world."""
         if self._report is not None and round(self.rig.world.t * 1e9 / STEP_NS) % SECOND == 0:
             self._report(self._second())
 
     def result(self, name: str) -> EmulateResult:
-        """What came of it."""
+        """Return the result of the run."""
         rig = self.rig
         parts, world = rig.world.parts, rig.world
         t, error = np.array(self._rows, dtype=np.float64).reshape(-1, 2).T
@@ -146,7 +146,7 @@ class _Run:
         )
 
     def _second(self) -> dict[str, Any]:
-        """A record of the last second."""
+        """Return a record of the last second."""
         world = self.rig.world
         frames = sum(line.frames for line in self.rig.emulator.lines)
         frames, self._frames = frames - self._frames, frames
@@ -166,7 +166,7 @@ class _Run:
 def _wait_for_host(
     rig: EmulatedRig, seconds: float, clock: Callable[[], int], sleep: Callable[[float], None]
 ) -> None:
-    """Let the world stand until a car was sent anything, at most for so long [s]."""
+    """Wait until a car has received bytes, at most `seconds`."""
     end = clock() + round(1e9 * seconds)
     while clock() < end and not rig.emulator.listen(clock()):
         sleep(1e-9 * STEP_NS)

@@ -1,4 +1,4 @@
-"""The swarm.toml of an emulation: what a person would write who had plugged the devices in."""
+"""The swarm.toml of an emulation, as a user would write it for such devices."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ def swarm_toml(
     nodes: Sequence[tuple[EmulatedNode, Sequence[str]]],
     folder: Path,
 ) -> str:
-    """The text of the file.
+    """Return the text of the file.
 
     Args:
-        options: What was asked for.
-        parts: What it is made of.
-        constellation: The nodes.
+        options: Options of the emulation.
+        parts: Parts of the world.
+        constellation: Constellation of the nodes.
         nodes: Every node with the names of its ports.
-        folder: Where the ports are.
+        folder: Folder of the ports.
     """
     ids = constellation.ids
     table: dict[str, Any] = {
@@ -58,7 +58,7 @@ def swarm_toml(
             "options": _options(parts.task_options),
         },
         "tracker": {"filter": parts.config.filter, "delay": parts.params.horizon.delay},
-        # What the simulation lets cars do.
+        # The speed limit of the simulation.
         "safety": {"max_speed": MAX_SPEED},
     }
     if options.operator:
@@ -73,19 +73,19 @@ WRITTEN_BY = "# Written by `relpos emulate`."
 
 
 def node_port(node: int, k: int) -> str:
-    """Name of a node's k-th port."""
+    """Return the name of the k-th port of a node."""
     return f"n{node}" if k == 0 else f"n{node}-{k + 1}"
 
 
 def car_port(node: int) -> str:
-    """Name of the port of the car that carries a node."""
+    """Return the name of the port of the car that carries a node."""
     return f"car{node}"
 
 
 def _link(
     wire: WireFormat, node: int, ids: Sequence[int], port: Path, key: bytes | None
 ) -> dict[str, Any]:
-    """One stream of a node."""
+    """Return the table of one link of a node."""
     link: dict[str, Any] = {"port": str(port), "format": wire.name}
     if not wire.names_itself:
         link["node"] = node
@@ -96,7 +96,7 @@ def _link(
 
 
 def _car(options: EmulateOptions, port: Path) -> dict[str, Any]:
-    """One car."""
+    """Return the table of one car."""
     watchdog = DEADMAN if options.deadman is None else options.deadman
     car: dict[str, Any] = {"port": str(port), "driver": options.driver}
     if watchdog <= SLOWEST_WATCHDOG:
@@ -111,14 +111,14 @@ def _with_key(table: dict[str, Any], key: bytes | None) -> dict[str, Any]:
 
 
 def _options(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Options that a file can hold: numbers, words and lists of them."""
+    """Return the options that TOML can hold: booleans, numbers, strings and lists."""
     return {
         k: v for k, v in options.items() if isinstance(v, bool | int | float | str | list | tuple)
     }
 
 
 def _lines(table: Mapping[Any, Any], path: str) -> list[str]:
-    """A table as TOML: its values, then its tables."""
+    """Return the lines of a table in TOML: its values, then its tables."""
     lines = [f"{_key(k)} = {_value(v)}" for k, v in table.items() if not isinstance(v, Mapping)]
     for key, inner in table.items():
         if isinstance(inner, Mapping):
@@ -133,14 +133,14 @@ def _lines(table: Mapping[Any, Any], path: str) -> list[str]:
 
 
 def _key(key: Any) -> str:
-    """A key, bare where TOML allows it."""
+    """Return a key in TOML, without quotes where allowed."""
     text = str(key)
     bare = text.isascii() and text.replace("-", "").replace("_", "").isalnum()
     return text if bare else _value(text)
 
 
 def _value(value: Any) -> str:
-    """A value of TOML."""
+    """Return a value in TOML."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int | float):

@@ -1,9 +1,9 @@
-"""A bridge without time: emulated cars, trackers, gate and drivers, stepped together in memory.
+"""A bridge under a virtual clock: emulated cars, trackers, gate and drivers in one process.
 
-The bytes are those of `relpos emulate` and `relpos drive`; there are no ports, no processes and no
-clock but a count of hundredths of a second, so that a drive takes as long as its computation.
+The bytes are those of `relpos emulate` and `relpos drive`, without ports, processes and real
+time: the clock counts steps of 10 ms, and a drive takes as long as its computation.
 
-Law: same options and same actions, same everything, bit for bit.
+Property: the same options and the same actions give the same results, bit for bit.
 """
 
 from __future__ import annotations
@@ -30,34 +30,34 @@ from hardware_bridge.safety.picture import Picture
 from hardware_bridge.safety.supervisor import Supervisor
 
 START_NS = 1_000_000_000_000
-"""[ns] What the clock says at first; not 0, so that nothing takes it for a time since then."""
+"""[ns] Initial time of the clock; not 0, so that it cannot pass as a time since the start."""
 LAG = 0.005
-"""[s] From the last byte that a decision rests on to its command's bytes: what a laptop takes."""
+"""[s] Latency from the last input byte of a decision to its command bytes, as on a laptop."""
 NOWHERE = Path("/virtual")
-"""Where the ports would be."""
+"""Placeholder for the folder of the ports."""
 
 
 class VirtualFeed:
-    """Emulated devices as an `OpenFeed`: a hundredth of a second is a step of everything."""
+    """Emulated devices as an `OpenFeed`, which all advance together in steps of 10 ms."""
 
     def __init__(
         self, rig: EmulatedRig, swarm: LiveSwarm, *, arm: bool = True, lag: float = LAG
     ) -> None:
-        """Connect the two.
+        """Connect devices and swarm.
 
         Args:
             rig: Devices with lines in memory.
-            swarm: Is fed.
-            arm: Whether the cars hear anything; otherwise it is a dry run.
-            lag: Time that a decision takes [s].
+            swarm: Swarm that receives the measurements.
+            arm: Whether commands are sent to the cars; False is a dry run.
+            lag: Latency of a decision [s].
         """
         self.rig, self._swarm, self._lag_ns = rig, swarm, round(1e9 * lag)
         self.t_ns = START_NS
-        """Now, by the clock of this all [ns]."""
+        """[ns] Current time of the virtual clock."""
         config = swarm.config
         self._measuring = {link.port.name: _line(rig, link.name) for link in config.links}
         self._cars: dict[int, tuple[str, MemoryPort, CarDriver]] = {}
-        """Name, port and driver of each car that may move, by slot."""
+        """Name, port and driver of each car that receives commands, by slot."""
         for car in config.cars if arm else ():
             driver = make_driver(car.driver, car.node, car.options, car.key, 1, self._now_us)
             port = _line(rig, car_port(car.node))
@@ -74,7 +74,7 @@ class VirtualFeed:
             watchdog={config.slot_of(car): car.watchdog for car in config.cars if car.watchdog},
             believed={config.slot_of(car): Believed(car, {}) for car in config.cars},
         )
-        """Gate and drivers of the cars; observers may read it, but send it nothing."""
+        """Gate and drivers of the cars, read-only for observers."""
         self._up: set[int] = set()
         self._decided: tuple[int, Picture] | None = None
         self.report: Report | None = None
@@ -83,7 +83,7 @@ class VirtualFeed:
         self.attend: Callable[[], None] | None = None
 
     def advance(self) -> int:
-        """Go on to the next decision; see `Feed`."""
+        """Advance to the next decision; see `Feed`."""
         for _ in range(DECISION_NS // STEP_NS):
             self._step()
             if self.attend is not None:
@@ -96,11 +96,11 @@ class VirtualFeed:
         return self.t_ns
 
     def decide(self, picture: Picture) -> None:
-        """Let the gate have it, when it would be ready; see `Feed`."""
+        """Pass the picture to the gate after the latency; see `Feed`."""
         self._decided = self.t_ns + self._lag_ns, picture
 
     def order(self, what: str) -> None:
-        """Pass on what a person asks for; see `Order`."""
+        """Execute an operator command; see `Order`."""
         if what == "gone":
             self._swarm.silent.dismiss()
         else:
@@ -108,11 +108,11 @@ class VirtualFeed:
         self.notices.append((self.t_ns, what))
 
     def note(self, t_ns: int, text: str) -> None:
-        """Let the user have a line."""
+        """Add a notice to the user."""
         self.notices.append((t_ns, text))
 
     def _step(self) -> None:
-        """A hundredth of a second: the world, what it said, and what it is told."""
+        """Advance by 10 ms: the world, its measurements, and the commands to the cars."""
         then = self.t_ns + STEP_NS
         if self._decided is not None and self._decided[0] <= then:
             self.t_ns, picture = self._decided
@@ -140,7 +140,7 @@ class VirtualFeed:
         return data
 
     def _act(self) -> None:
-        """Tell every car what it may do now."""
+        """Send the commands of the supervisor to all cars."""
         up = {slot for slot, (_, port, _) in self._cars.items() if port.plugged}
         for slot in sorted(up - self._up):
             self._cars[slot][1].send(self._cars[slot][2].opening())
@@ -162,7 +162,7 @@ class VirtualFeed:
 
 
 class VirtualBridge(OpenBridge):
-    """Emulated cars as an `OpenBridge`."""
+    """Emulated cars under a virtual clock as an `OpenBridge`."""
 
     def __init__(
         self,
@@ -174,16 +174,16 @@ class VirtualBridge(OpenBridge):
         record: bool = False,
         ports: Callable[[str], MemoryPort] | None = None,
     ) -> None:
-        """Plug everything in.
+        """Create the devices and connect them.
 
         Args:
-            options: What is emulated.
+            options: Options of the emulation.
             arm: Whether the cars may move.
-            wait: So long is waited for all to be well before cars are armed [s].
-            lag: Time that a decision takes [s].
-            record: Keep measurements and truth in ``rig.world.recording``.
-            ports: Gives lines by their names, for those that change or keep what goes over them; by
-                default plain ones. See `EmulatedRig.ports`.
+            wait: Longest wait until all checks pass and the cars are armed [s].
+            lag: Latency of a decision [s].
+            record: Whether to keep measurements and truth in ``rig.world.recording``.
+            ports: Creates a line by its name, for example one that alters or records its bytes; by
+                default a plain one. See `EmulatedRig.ports`.
 
         Raises:
             EnvError: An unknown name or a number out of range.
@@ -197,7 +197,7 @@ class VirtualBridge(OpenBridge):
         self.start = Start(self.feed, arm=arm, params=StartParams(wait=wait))
 
     def close(self) -> None:
-        """Unplug everything."""
+        """Unplug all devices."""
         self.rig.close()
 
 

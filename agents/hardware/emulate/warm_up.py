@@ -1,4 +1,4 @@
-"""A run before the run, so that what is compiled is loaded when time begins to count."""
+"""Warm-up run that loads compiled kernels before deadlines apply."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from relpos_env.interface.actions import MAX_SPEED
 from relpos_env.timing import DT, STAND_STILL
 
 STEPS = round((STAND_STILL + 3.0) / DT)
-"""[-] Long enough for cars to meet a wall."""
+"""[-] Number of steps, enough for cars to reach a wall."""
 
 
 def warm_up(options: EmulateOptions) -> None:
-    """Drive the cars about in memory.
+    """Drive the cars in memory.
 
     Args:
-        options: Of the run that is to come.
+        options: Options of the run to warm up for.
     """
     rig = EmulatedRig(options)
     key = options.car_key

@@ -1,7 +1,7 @@
-"""The world behind the devices: a swarm with its task and its operator, 10 ms at a time.
+"""The world of the emulated devices: a swarm with task and operator, in steps of 10 ms.
 
-Law: with the same scenario, task, seed and commands it goes as `relpos_env.core.env_core.EnvCore`
-goes, to the last bit.
+Property: the same scenario, task, seed and commands give the same states as
+`relpos_env.core.env_core.EnvCore`, bit for bit.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from tracking.arrays import F64, Bool
 from tracking.measurements import MeasurementBlock
 
 STEPS = round(DECISION / DT)
-"""[-] Steps of a decision: so often task and operator look at the room."""
+"""[-] Steps per decision, the update period of task and operator."""
 AT_REST = round(STAND_STILL / DT)
-"""[-] Steps in which the cars stand at first."""
+"""[-] Steps in which the cars rest at first."""
 
 
 class EmulatedWorld:
@@ -34,9 +34,9 @@ class EmulatedWorld:
         """Begin an episode.
 
         Args:
-            parts: What the world is made of.
-            seed: Of the episode, as of `FormationEnv.reset`.
-            record: Keep measurements and truth for `recording`.
+            parts: Parts of the world.
+            seed: Seed of the episode, as of `FormationEnv.reset`.
+            record: Whether to keep measurements and truth in `recording`.
         """
         self.parts = parts
         self._swarm = World(
@@ -46,12 +46,12 @@ class EmulatedWorld:
         self._operator = Operator(parts.config.operator, parts.n_cars, 1)
         self.recording = Recording() if record else None
         self.collisions = 0
-        """[-] That cars began since they were let go."""
+        """[-] Collisions since the release of the cars."""
         self._touched = np.zeros((1, parts.n_cars))
         self._steps = 0
-        # A car that comes in stands until the next decision, as in the simulation.
+        # A car that joins rests until the next decision, as in the simulation.
         self._driven = np.zeros(parts.n_cars, dtype=bool)
-        # The same draws in the same order as in `EnvCore.begin`.
+        # The same samples in the same order as in `EnvCore.begin`.
         rng = seeding.np_random(seed)[0].spawn(1)[0]
         seconds = STAND_STILL + DECISION * parts.config.max_cycles
         episode = draw_episode(parts.scenario, parts.n_cars, seconds, rng)
@@ -60,57 +60,54 @@ class EmulatedWorld:
 
     @property
     def swarm(self) -> World:
-        """The truth; a batch of one."""
+        """True state of the swarm, a batch of one."""
         return self._swarm
 
     @property
     def t(self) -> float:
-        """Time since it began, the time at rest included [s]."""
+        """[s] Time since the start, including the initial rest."""
         return float(self._swarm.t[0])
 
     @property
     def at_rest(self) -> bool:
-        """True while the cars are held at first."""
+        """True during the initial rest."""
         return self._steps < AT_REST
 
     @property
     def just_judged(self) -> bool:
-        """True when task and operator have just looked at the room."""
+        """True if the last step updated task and operator."""
         return self._steps >= AT_REST and (self._steps - AT_REST) % STEPS == 0
 
     @property
     def present(self) -> Bool:
-        """Who is in the room, (car)."""
+        """True for present cars, (car)."""
         present: Bool = self._swarm.state.present[0]
         return present
 
     @property
     def powered(self) -> Bool:
-        """Which trackers have power, (car)."""
+        """True for cars whose trackers have power, (car)."""
         powered: Bool = self._swarm.powered[0]
         return powered
 
     @property
     def command(self) -> F64:
-        """Velocity that the operator asks for on top of the plan, (car, 2) [m/s].
-
-        Zeros while the cars are held.
-        """
+        """[m/s] Velocity that the operator adds to the plan, (car, 2); zeros during the rest."""
         trim: F64 = self._operator.command[0] - self._task.plan[0]
         return np.where(self.present[:, None], trim, 0.0)
 
     @property
     def error(self) -> float:
-        """Formation error as the task says, mean over the cars in the room [m]."""
+        """[m] Formation error of the task, mean over the present cars; NaN without any."""
         return float(self._task.error[0, self.present].mean()) if self.present.any() else math.nan
 
     @property
     def done(self) -> bool:
-        """Whether the task is accomplished."""
+        """True if the task is accomplished."""
         return bool(self._task.done[0])
 
     def step(self, speed: F64, steering: F64) -> MeasurementBlock:
-        """Go on by 10 ms; see `hardware_bridge.emulator.emulator.World`."""
+        """Advance by 10 ms; see `hardware_bridge.emulator.emulator.World`."""
         if self._steps % STEPS == 0:
             self._driven = self.present.copy()
         block = self._swarm.step((speed * self._driven)[None], (steering * self._driven)[None])
@@ -126,18 +123,18 @@ class EmulatedWorld:
         return block
 
     def motion(self) -> tuple[F64, F64]:
-        """Speeds by the odometers [m/s] and steering angles [rad], (car)."""
+        """Return odometer speeds [m/s] and steering angles [rad], (car)."""
         speed: F64 = self._swarm.odometer[0]
         steering: F64 = self._swarm.state.steering[0]
         return speed, steering
 
     def near(self) -> F64:
-        """Distances by the cars' own sensors, (car, beam) [m]."""
+        """Return the readings of the distance sensors, (car, beam) [m]."""
         near: F64 = self._swarm.proximity[0]
         return near
 
     def _judge(self) -> None:
-        """What task and operator say of now."""
+        """Update task, operator and the count of collisions."""
         swarm = self._swarm
         self._task.update(swarm.state, swarm.t - STAND_STILL, self._touched, slice(0, 1))
         self._operator.sample(swarm.state, self._task, slice(0, 1))
@@ -147,7 +144,7 @@ class EmulatedWorld:
 
 
 def at_decisions(episode: Episode) -> Episode:
-    """The episode in which cars come and go between decisions, when the simulation lets them."""
+    """Return the episode with its events delayed to the next decision, as in the simulation."""
     events = tuple(
         replace(event, t=math.ceil((event.t - SOON) / DECISION) * DECISION)
         for event in episode.events

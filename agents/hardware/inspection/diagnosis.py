@@ -1,4 +1,4 @@
-"""From what was heard on a port to what is wrong with it, and what to do."""
+"""Problems of a port and their remedies, from the received data."""
 
 from __future__ import annotations
 
@@ -17,64 +17,64 @@ from tracking.findings import KINDS
 from tracking.findings.at_rest import find_in_samples
 
 TELLS_OF_OTHERS = "positions"
-"""The format whose lines name nodes by their ids next to names of `ids`."""
+"""Format whose lines identify nodes by node id or by a name of `ids`."""
 MOST_DAMAGED = 0.05
-"""[-] A larger share of damaged frames is a problem."""
+"""[-] Largest acceptable share of damaged frames."""
 MOST_MISSING = 0.05
-"""[-] A larger share of messages that did not arrive is a problem."""
+"""[-] Largest acceptable share of lost messages."""
 LONGEST_GAP = 1.0
-"""[s] A longer silence of a stream is a problem, unless it comes that seldom anyway."""
+"""[s] Longest acceptable gap of a stream, unless its chunks usually come that rarely."""
 USUAL_GAPS = 5.0
-"""[-] Silence that a stream may have, in mean times between its pieces."""
+"""[-] Longest acceptable gap in mean times between chunks."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NodeReport:
-    """A node, or a device that is none, as one link hears it."""
+    """A node, or an unconfigured device, as received on one link."""
 
     node: str
-    """Id of the node; of a device that is no node its own id."""
+    """Id of the node, or of the device if it is no node."""
     known: bool
-    """Whether the configuration makes a node of it."""
+    """True if the configuration assigns it to a node."""
     imu_hz: float
     ranges_hz: dict[str, float]
-    """How often [1/s] to which other node, ``2``, or between which two, ``2-3``."""
+    """[Hz] Rate of ranges by other node, ``2``, or by pair of nodes, ``2-3``."""
     positions_hz: float
-    """How often another tracker tells of it [1/s]."""
+    """[Hz] Rate of its positions or relative positions from another tracker."""
     missing_share: float
-    """Messages that did not arrive [-], by their numbers; 0 where they have none."""
+    """[-] Share of lost messages by sequence number; 0 without sequence numbers."""
     boots: int
-    """Starts that were heard; more than one means that it went off meanwhile."""
+    """[-] Number of boots seen; more than one means that it restarted while listening."""
 
 
 @dataclass(slots=True, kw_only=True)
 class LinkReport:
-    """A link or a car, listened to."""
+    """Report on a link or a car."""
 
     name: str
     port: str
     format: str
-    """What the configuration says: a format, or the driver of a car."""
+    """Configured format of a link, or driver of a car."""
     up: bool
     bytes_hz: float = 0.0
     frames_hz: float = 0.0
     damaged_share: float = 0.0
     gap_s: float = 0.0
-    """Longest silence after the first byte."""
+    """[s] Longest gap after the first byte."""
     speaks: str | None = None
-    """The format that fits best, if any does."""
+    """Detected format; None if none fits."""
     nodes: list[NodeReport] = field(default_factory=list)
     problems: list[str] = field(default_factory=list)
-    """What is wrong and what to do, one line each."""
+    """Problems with their remedies, one line each."""
 
     @property
     def ok(self) -> bool:
-        """Whether nothing needs mending."""
+        """True if there is no problem."""
         return not self.problems
 
     @property
     def record(self) -> dict[str, Any]:
-        """For JSON."""
+        """JSON record."""
         return {"kind": "link", **asdict(self), "ok": self.ok}
 
 
@@ -88,16 +88,16 @@ def diagnose_link(
     losses: int,
     nodes: Mapping[int, NodeConfig],
 ) -> LinkReport:
-    """A stream that measures.
+    """Return the report on the link of measuring devices.
 
     Args:
-        link: Its configuration.
-        hearing: What was heard.
+        link: Configuration of the link.
+        hearing: Received data.
         formats: All formats.
-        seconds: How long [s].
-        down: Why the port is not open; empty if it is.
-        losses: How often the port was lost meanwhile.
-        nodes: Those of the configuration, by id.
+        seconds: Duration of listening [s].
+        down: Reason why the port is not open; empty if it is open.
+        losses: Number of times the port was lost while listening.
+        nodes: Nodes of the configuration by id.
     """
     report = _report(link.port.name, link.port.port, link.format, hearing, seconds, down)
     voices = hearing.voices.get(link.format, {})
@@ -127,7 +127,7 @@ def diagnose_car(
     down: str,
     losses: int,
 ) -> LinkReport:
-    """The port of a car; that it says nothing is no fault, since nothing is asked of it."""
+    """Return the report on a car. A silent car is no problem, since it is not polled."""
     report = _report(car.port.name, car.port.port, car.driver, hearing, seconds, down)
     if down:
         report.problems.append(down)
@@ -141,12 +141,12 @@ def diagnose_car(
 
 
 def share_a_device(reports: list[LinkReport]) -> None:
-    """Note nodes whose samples, or whose ranges, come on two links."""
+    """Add a problem for each node whose samples or ranges arrive on two links."""
     first: dict[tuple[str, str], LinkReport] = {}
     for report in reports:
         for node in report.nodes:
             if not node.known or node.positions_hz:
-                continue  # who is told of does not speak
+                continue  # reported by another tracker, it sends nothing itself
             says = {"samples": node.imu_hz > 0.0, "ranges": bool(node.ranges_hz)}
             others = {first.setdefault((node.node, k), report).name for k, v in says.items() if v}
             for name in sorted(others - {report.name}):
@@ -191,7 +191,7 @@ def _node_of(device: str | None, link: LinkLike) -> int | None:
 
 
 def _label(ends: tuple[str | None, str], link: LinkLike) -> str:
-    """The other end, or both where the speaker is neither."""
+    """Return the other end of a range, or both ends if the reporting device is neither."""
     names = [end for end in ends if end is not None]
     nodes = [_node_of(name, link) for name in names]
     return "-".join(name if n is None else str(n) for name, n in zip(names, nodes, strict=True))
@@ -200,7 +200,7 @@ def _label(ends: tuple[str | None, str], link: LinkLike) -> str:
 def _fatal(
     link: LinkLike, hearing: Hearing, formats: Formats, report: LinkReport, down: str
 ) -> str:
-    """What makes a link useless; empty if nothing does."""
+    """Return the problem that makes a link unusable; empty if there is none."""
     if down and not hearing.n_bytes:
         return down
     if not hearing.n_bytes:
@@ -221,7 +221,7 @@ def _fatal(
 
 
 def _flaws(report: LinkReport, hearing: Hearing, seconds: float) -> list[str]:
-    """What is wrong with a stream that can be read."""
+    """Return the problems of a stream that can be decoded."""
     flaws = []
     if report.damaged_share > MOST_DAMAGED:
         flaws.append(
@@ -244,7 +244,7 @@ def _flaws(report: LinkReport, hearing: Hearing, seconds: float) -> list[str]:
 def _wrong_samples(
     link: LinkLike, voices: Mapping[str | None, Voice], nodes: Mapping[int, NodeConfig]
 ) -> list[str]:
-    """What IMUs read that they cannot at rest."""
+    """Return the problems of IMU samples that are implausible at rest."""
     problems = []
     for device, voice in voices.items():
         known = _node_of(device, link)
@@ -261,9 +261,9 @@ def _wrong_samples(
 
 
 def _wrong_rates(report: LinkReport, nodes: Mapping[int, NodeConfig], seconds: float) -> list[str]:
-    """Nodes whose samples come at another rate than the configured one."""
+    """Return the nodes whose sample rate differs from the configured one."""
     if seconds < WINDOW or report.gap_s > PAUSE:
-        return []  # too short to say, or there were none for a while
+        return []  # listened too briefly, or the stream paused
     return [
         f"node {node.node}: {node.imu_hz:.0f} inertial samples a second, configured "
         f"{nodes[int(node.node)].imu_hz:g}: set imu_hz, or orientations lag behind"
@@ -273,7 +273,7 @@ def _wrong_rates(report: LinkReport, nodes: Mapping[int, NodeConfig], seconds: f
 
 
 def _strangers(link: LinkLike, voices: Mapping[str | None, Voice]) -> list[str]:
-    """Devices that the configuration makes no node of."""
+    """Return the devices that the configuration does not assign to a node."""
     heard: dict[str | None, None] = {}
     for device, voice in voices.items():
         heard[device] = None

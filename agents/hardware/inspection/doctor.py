@@ -1,4 +1,4 @@
-"""Looking after ports, links and cars before anything drives: what `relpos doctor` does."""
+"""Inspect ports, links and cars before a drive (`relpos doctor`)."""
 
 from __future__ import annotations
 
@@ -27,23 +27,23 @@ from hardware_bridge.links.port_list import (
 from hardware_bridge.links.port_users import port_users
 
 TURN = 0.05
-"""[s] Between two looks at the clock."""
+"""[s] Longest wait for bytes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PortReport:
-    """A serial port of this computer, which was not opened."""
+    """A serial port of this computer, inspected without opening it."""
 
     info: SerialPortInfo
     may_open: bool
     users: list[str]
     """Programs that have it open."""
     remedy: str
-    """What to do if it may not be opened."""
+    """Remedy for missing permissions; empty if it may be opened."""
 
     @property
     def record(self) -> dict[str, Any]:
-        """For JSON."""
+        """JSON record."""
         return {
             "kind": "port",
             "path": self.info.path,
@@ -60,33 +60,33 @@ class PortReport:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Diagnosis:
-    """Everything that was found."""
+    """Findings on all ports, links and cars."""
 
     ports: list[PortReport]
     links: list[LinkReport] = field(default_factory=list)
-    """Links and cars of the configuration, in its order."""
+    """Links, then cars, in the order of the configuration."""
     configured: bool = False
-    """Ports that no configuration names are told and not judged."""
+    """True if a configuration was given; then only its links and cars decide `ok`."""
 
     @property
     def ok(self) -> bool:
-        """Whether nothing needs mending."""
+        """True if there is no problem."""
         if self.configured:
             return all(link.ok for link in self.links)
         return bool(self.ports) and all(not port.remedy for port in self.ports)
 
     @property
     def records(self) -> list[dict[str, Any]]:
-        """For JSON, the verdict last; rates to 0.1 Hz, other figures to three decimals."""
+        """JSON records, the verdict last; rates to 0.1 Hz, other figures to three decimals."""
         verdict = {"kind": "verdict", "ok": self.ok}
         found = [*(p.record for p in self.ports), *(each.record for each in self.links), verdict]
         return [_rounded(record) for record in found]
 
 
 def _rounded(value: Any, name: str = "") -> Any:
-    """A value as exact as a few seconds of listening make it."""
+    """Return a value rounded to the accuracy of a few seconds of listening."""
     if isinstance(value, dict):
-        # Rates by node are under the name of the rate.
+        # Dictionaries of rates by node take the rounding of their own name.
         return {k: _rounded(v, name if name.endswith("_hz") else str(k)) for k, v in value.items()}
     if isinstance(value, list):
         return [_rounded(each, name) for each in value]
@@ -103,18 +103,18 @@ def doctor(
     listing: Listing = list_serial_ports,
     now_ns: Callable[[], int] = time.monotonic_ns,
 ) -> Diagnosis:
-    """Look at the ports, and listen to those of a configuration. Nothing is ever written to one.
+    """Inspect the ports, and listen to those of a configuration, without writing to any port.
 
     Args:
-        config: Its links and cars are opened and listened to; None looks at the ports alone.
-        seconds: How long to listen [s], 0.1 to 3600.
-        formats: The formats that are tried on what is heard; by default all.
-        listing: The serial ports there are.
-        now_ns: The host's monotonic clock [ns].
+        config: Configuration whose links and cars are opened; None inspects the ports only.
+        seconds: Duration of listening [s], 0.1 to 3600.
+        formats: Formats to try on the received bytes; by default all known formats.
+        listing: Lists the serial ports.
+        now_ns: Monotonic clock of the host [ns].
 
     Raises:
         UsageError: `seconds` is out of range.
-        BridgeError: Two links have one device, or pyserial is not installed.
+        BridgeError: Two links use the same device, or pyserial is not installed.
     """
     if not 0.1 <= seconds <= 3600.0:
         raise UsageError(f"--seconds: expected 0.1 to 3600, got {seconds:g}")
@@ -166,7 +166,7 @@ def doctor(
 def listen(
     links: Links, hearings: Mapping[str, Hearing], seconds: float, now_ns: Callable[[], int]
 ) -> float:
-    """Hand the bytes of all links to their hearings for a while; how long it was [s]."""
+    """Pass the bytes of all links to their hearings; return the elapsed time [s]."""
     start = now_ns()
     end = start + round(seconds * 1e9)
     while (left := end - now_ns()) > 0:

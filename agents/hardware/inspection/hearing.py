@@ -1,4 +1,4 @@
-"""What is heard on a port: readings of its format, and which format the bytes really are."""
+"""Statistics of the readings on a port, and detection of the format of its bytes."""
 
 from __future__ import annotations
 
@@ -20,42 +20,42 @@ from hardware_bridge.readings import (
 )
 
 ENOUGH_FRAMES = 3
-"""[-] With fewer good frames a format may have been met by chance."""
+"""[-] Fewest good frames that detect a format; fewer may match by chance."""
 FITTING = 0.5
-"""[-] Share of frames that must be good, and of bytes that must belong to frames."""
+"""[-] Smallest share of good frames, and of bytes within frames, of a detected format."""
 ENOUGH_BYTES = 64
-"""[bytes] With fewer nothing can be said of the format."""
+"""[bytes] Fewest bytes that detect a format."""
 
 
 class Format(Protocol):
-    """What must be known of a format, as `hardware_bridge.decoders.DECODERS` has it."""
+    """Properties of a format, as in `hardware_bridge.decoders.DECODERS`."""
 
     @property
     def build(self) -> Callable[[bytes | None], Decoder]:
-        """A key, or None, to a decoder."""
+        """Builder of a decoder from a key or None."""
 
     @property
     def baud(self) -> int:
-        """[1/s] Of the device as it is usually set."""
+        """[1/s] Usual baud rate of the device."""
 
     @property
     def request(self) -> bytes:
-        """Sent when the port comes up."""
+        """Bytes to send when the port comes up."""
 
     @property
     def dtr(self) -> bool:
-        """The line DTR."""
+        """State of the DTR line."""
 
     @property
     def keyed(self) -> bool:
-        """Whether messages may carry a code."""
+        """True if messages may be signed."""
 
 
 Formats = Mapping[str, Format]
 
 
 def known_formats() -> Formats:
-    """All formats that can be read."""
+    """Return all formats that can be decoded."""
     from hardware_bridge.decoders import DECODERS  # type: ignore[attr-defined]
 
     formats: Formats = DECODERS
@@ -63,53 +63,53 @@ def known_formats() -> Formats:
 
 
 MOST_SAMPLES = 5000
-"""[-] Of an IMU, that are looked at."""
+"""[-] Largest number of samples kept per IMU."""
 
 
 @dataclass(slots=True)
 class Voice:
-    """One device on a port."""
+    """Statistics of one device on a port."""
 
     readings: int = 0
     imu: int = 0
     samples: list[tuple[float, ...]] = field(default_factory=list)
-    """Angular rates and specific forces of the first `MOST_SAMPLES`."""
+    """Angular rates and specific forces of the first `MOST_SAMPLES` samples."""
     ranges: dict[tuple[str | None, str], int] = field(default_factory=dict)
-    """How many between which ends; the first is None where it is the speaker."""
+    """Number of ranges by pair of ends; the first is None if it is the reporting device."""
     positions: int = 0
-    """How often another tracker told of it, alone or in a pair."""
+    """Number of its positions and relative positions from another tracker."""
     missing: int = 0
-    """Messages that its sequence numbers say were sent and did not arrive."""
+    """Number of lost messages by sequence number."""
     numbered: int = 0
-    """Messages that arrived with a sequence number."""
+    """Number of received messages with a sequence number."""
     boots: int = 0
-    """How often it started, while it was listened to."""
+    """Number of boots seen."""
     last: tuple[int | None, int] | None = None
-    """Boot and sequence number of its newest message."""
+    """Boot and sequence number of its latest message."""
 
 
 class Hearing:
-    """Takes the bytes of one port; keeps numbers and some inertial samples, no bytes."""
+    """Decoders and statistics of one port; keeps counters and some IMU samples, no bytes."""
 
     def __init__(self, formats: Formats, key: bytes | None = None) -> None:
-        """Listen with every format.
+        """Build a decoder of every format.
 
         Args:
-            formats: The formats that are tried.
-            key: For those with a code; without it they take messages without one.
+            formats: Formats to try.
+            key: Key of formats with signed messages; None accepts unsigned messages.
         """
         self.decoders: dict[str, Decoder] = {}
         for name, each in formats.items():
             try:
                 self.decoders[name] = each.build(key if each.keyed else None)
             except BridgeError:
-                continue  # a format that cannot be read without its key is not tried
+                continue  # a format that requires a key is not tried without one
         self._unchecked = {
             name: each.build(None) for name, each in formats.items() if each.keyed and key
         }
-        """Of the formats with a code, without a look at it."""
+        """Decoders of the formats with signed messages that do not verify signatures."""
         self.voices: dict[str, dict[str | None, Voice]] = {name: {} for name in self.decoders}
-        """Format to device to what it said; None is a device that does not give its name."""
+        """Statistics by format and device; None is a device that sends no id."""
         self.n_bytes = 0
         self.chunks = 0
         self.longest_gap_ns = 0
@@ -117,12 +117,12 @@ class Hearing:
 
     @staticmethod
     def get_ready(formats: Formats) -> None:
-        """Decode something with every format: what is compiled only then would count as silence."""
+        """Decode dummy bytes with every format, so that compilation does not count as a gap."""
         for decoder in Hearing(formats).decoders.values():
             decoder.feed(bytes(256))
 
     def take(self, chunk: Chunk) -> dict[str, list[Reading]]:
-        """Decode with every format; format to readings, where there are any."""
+        """Decode with every format; return the readings by format, without empty lists."""
         self.n_bytes += len(chunk.data)
         self.chunks += 1
         self.silent_until(chunk.t_ns)
@@ -140,43 +140,43 @@ class Hearing:
 
     @property
     def has_another_key(self) -> bool:
-        """Whether there are frames that are signed with another key than the one given."""
+        """True if frames are signed with another key than the given one."""
         return any(
             decoder.counts.frames > 0 and not self.frames(name)
             for name, decoder in self._unchecked.items()
         )
 
     def silent_until(self, t_ns: int) -> None:
-        """Note the silence since the last bytes, at the end too."""
+        """Update the longest gap with the time since the last bytes [ns]."""
         if self._last_ns is not None:
             self.longest_gap_ns = max(self.longest_gap_ns, t_ns - self._last_ns)
 
     def frames(self, name: str) -> int:
-        """Good frames as `name` reads them."""
+        """Return the number of good frames in a format."""
         return self.decoders[name].counts.frames if name in self.decoders else 0
 
     def damaged_share(self, name: str) -> float:
-        """Share of frames that were refused [-]; 0 if there were none at all."""
+        """Return the share of damaged frames in a format [-]; 0 without frames."""
         if name not in self.decoders:
             return 0.0
         counts = self.decoders[name].counts
         return counts.damaged / max(1, counts.frames + counts.damaged)
 
     def strange_share(self, name: str) -> float:
-        """Share of the bytes that belong to no frame [-]."""
+        """Return the share of bytes outside of frames in a format [-]."""
         if name not in self.decoders:
             return 1.0
         return min(1.0, self.decoders[name].counts.strange / max(1, self.n_bytes))
 
     def fit(self, name: str) -> float:
-        """How well the bytes are this format [-]: 0 not at all, 1 every frame and every byte."""
+        """Return the match of the bytes with a format [-]: 0 none, 1 every frame and byte."""
         if self.frames(name) < ENOUGH_FRAMES:
             return 0.0
         good = 1.0 - self.damaged_share(name), 1.0 - self.strange_share(name)
         return good[0] * good[1] if min(good) >= FITTING else 0.0
 
     def best(self, expected: str | None = None) -> str | None:
-        """The format that fits best, if one does; of equals `expected`."""
+        """Return the best-matching format, `expected` in case of a tie; None if none fits."""
         fitting = [
             (self.fit(name), name == expected, self.frames(name), name)
             for name in self.decoders
@@ -186,7 +186,7 @@ class Hearing:
 
 
 def why_nothing_fits(hearing: Hearing, baud: int, formats: Formats) -> str:
-    """What to do where there are bytes and no frames."""
+    """Return the likely reasons for bytes without frames."""
     if hearing.n_bytes < ENOUGH_BYTES:
         return f"only {hearing.n_bytes} bytes, too few to tell the format: listen longer"
     rates: dict[int, list[str]] = {}
@@ -226,12 +226,12 @@ def _count(voices: dict[str | None, Voice], reading: Reading) -> None:
 
 def _count_sequence(voice: Voice, source: Source) -> None:
     if source.sequence is None or voice.last == (source.boot, source.sequence):
-        return  # several readings of one message
+        return  # another reading of the same message
     if voice.last is None or voice.last[0] != source.boot:
         voice.boots += 1
     else:
         ahead = (source.sequence - voice.last[1]) % (1 << 32)
-        if ahead < 1 << 31:  # else it is an old one that came late
+        if ahead < 1 << 31:  # otherwise an older message that arrived late
             voice.missing += ahead - 1
     voice.last = (source.boot, source.sequence)
     voice.numbered += 1

@@ -1,4 +1,4 @@
-"""What an inspection needs of a configuration, as protocols."""
+"""Parts of a configuration that an inspection uses, as protocols."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tracking.constellation import Constellation
 
 
 class LinkLike(Protocol):
-    """Part of a link that an inspection needs."""
+    """Part of a link that an inspection uses."""
 
     @property
     def port(self) -> PortSpec:
@@ -34,7 +34,7 @@ class LinkLike(Protocol):
 
 
 class CarLike(Protocol):
-    """Part of a car that an inspection needs."""
+    """Part of a car that an inspection uses."""
 
     @property
     def port(self) -> PortSpec:
@@ -46,7 +46,7 @@ class CarLike(Protocol):
 
 
 class ConfigLike(Protocol):
-    """Part of a configuration that an inspection needs."""
+    """Part of a configuration that an inspection uses."""
 
     @property
     def constellation(self) -> Constellation:
@@ -54,7 +54,7 @@ class ConfigLike(Protocol):
 
     @property
     def links(self) -> Sequence[LinkLike]:
-        """Return the links that measure."""
+        """Return the links of measuring devices."""
 
     @property
     def cars(self) -> Sequence[CarLike]:

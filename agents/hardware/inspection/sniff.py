@@ -1,4 +1,4 @@
-"""Readings of one port as they come: what `relpos sniff` does."""
+"""Print the readings of one port as they arrive (`relpos sniff`)."""
 
 from __future__ import annotations
 
@@ -17,33 +17,33 @@ from hardware_bridge.links.ports import Chunk, PortSpec
 from hardware_bridge.readings import Reading
 
 TURN = 0.05
-"""[s] Between two looks at the clock."""
+"""[s] Longest wait for bytes before the end time is checked."""
 USUAL_BAUD = 115200
-"""[1/s]"""
+"""[1/s] Default baud rate."""
 MOST_PENDING = 2000
-"""[-] Readings of each format that are kept until it is known which one it is."""
+"""[-] Readings kept per format until the format is detected."""
 
 Show = Callable[[float, Reading], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sniffed:
-    """What was met."""
+    """Received bytes, frames and readings of a port."""
 
     seconds: float
     n_bytes: int
     format: str | None
-    """The format that was asked for, or the one that fits; None if none does."""
+    """Requested format, or the detected one; None if none fits."""
     readings: int
     frames: int
     damaged: int
     skipped: int
     strange: int
-    """Bytes between frames."""
+    """[-] Bytes outside of frames."""
 
     @property
     def record(self) -> dict[str, Any]:
-        """For JSON."""
+        """JSON record."""
         return {"kind": "counts", **{f.name: getattr(self, f.name) for f in fields(self)}}
 
 
@@ -60,22 +60,22 @@ def sniff(
     formats: Formats | None = None,
     now_ns: Callable[[], int] = time.monotonic_ns,
 ) -> Sniffed:
-    """Listen to a port; nothing is written to it but the request of a format that is named.
+    """Listen to a port; only the request of a format given by name is written to it.
 
     Args:
         port: As in `PortSpec.port`.
-        format: Name of a format; by default all are tried, and the one that fits is shown.
-        baud: [1/s] By default that of the format, else 115200.
-        seconds: How long to listen [s]; None until interrupted.
-        key: Of formats whose messages carry a code.
+        format: Name of a format; by default all are tried, and the detected one is shown.
+        baud: Baud rate [1/s]; by default that of the format, else 115200.
+        seconds: Duration [s]; None runs until interrupted.
+        key: Key of formats with signed messages.
         show: Called with each reading and its time since the start [s].
-        show_chunk: Called with the bytes themselves; what they mean is then no matter.
-        show_notice: Called when the port is lost or back.
-        formats: By default all that are known.
-        now_ns: The host's monotonic clock [ns].
+        show_chunk: Called with the time [s] and the raw bytes, which then need not fit any format.
+        show_notice: Called when the port is lost or reconnected.
+        formats: Formats to try; by default all known formats.
+        now_ns: Monotonic clock of the host [ns].
 
     Raises:
-        BridgeError: The port cannot be opened, says nothing, or nothing that can be read.
+        BridgeError: The port cannot be opened, sends nothing, or nothing that can be decoded.
         UsageError: No such format, or a number out of range.
     """
     formats = known_formats() if formats is None else formats
@@ -100,7 +100,7 @@ def sniff(
                     if show_notice is not None:
                         show_notice(notice)
         except KeyboardInterrupt:
-            pass  # the way to end it
+            pass  # the user ends the command
         listened = (now_ns() - start) / 1e9
     sniffed = _sniffed(hearing, chooser, listened)
     if show_chunk is None:
@@ -109,10 +109,10 @@ def sniff(
 
 
 def _port_spec(port: str, format: str | None, baud: int | None, formats: Formats) -> PortSpec:
-    """The port as it is to be opened.
+    """Return the settings of the port.
 
     Raises:
-        UsageError: No name of a port, or no such format.
+        UsageError: Invalid name of a port, or no such format.
     """
     if not port or "\0" in port:
         raise UsageError(f"PORT: expected the name of a port, got {port!r}")
@@ -127,7 +127,7 @@ def _port_spec(port: str, format: str | None, baud: int | None, formats: Formats
 
 
 class _Chooser:
-    """Holds readings back until it is known in which format to read the bytes."""
+    """Buffer of the readings of every format until the format is detected."""
 
     def __init__(self, hearing: Hearing, format: str | None, show: Show | None) -> None:
         self._hearing = hearing
@@ -186,7 +186,7 @@ def _check(hearing: Hearing, format: str | None, baud: int, formats: Formats, po
 
 
 def as_record(t: float, reading: Reading) -> dict[str, Any]:
-    """A reading for JSON; what the device did not say is left out."""
+    """Return a reading as a JSON record, without fields that the device did not report."""
     record: dict[str, Any] = {"kind": kind_of(reading), "t_s": round(t, 6)}
     source = reading.source
     for name in ("device", "boot", "sequence", "ticks"):
@@ -199,7 +199,7 @@ def as_record(t: float, reading: Reading) -> dict[str, Any]:
 
 
 def as_line(t: float, reading: Reading) -> str:
-    """A reading as a line of a table."""
+    """Return a reading as a line of a table."""
     record = as_record(t, reading)
     told = [
         f"{name} {_short(value)}"
@@ -210,7 +210,7 @@ def as_line(t: float, reading: Reading) -> str:
 
 
 def kind_of(reading: Reading) -> str:
-    """``range`` of a `RangeReading`, and so on."""
+    """Return the kind of a reading, such as ``range`` for a `RangeReading`."""
     return type(reading).__name__.removesuffix("Reading").lower()
 
 

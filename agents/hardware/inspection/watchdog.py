@@ -1,7 +1,7 @@
 """Measure the watchdog of each car: the time from its last command until its wheels slow down.
 
-The wheels are off the ground. Commands are sent until the telemetry reports the speed, then no
-more, and the time until the telemetry reports half that speed is the result.
+The wheels must be off the ground. Commands are sent until the telemetry reports the speed, and
+then stop. The result is the time until the telemetry reports half that speed.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from hardware_bridge.safe_file import write_safely
 from hardware_bridge.wire.key import REMOVED_KEY
 
 SPEED = 0.5
-"""[m/s] Asked of the wheels, or what the car needs at least."""
+"""[m/s] Commanded wheel speed; larger if the minimum speed of the car requires it."""
 SPIN_UP, LONGEST = 5.0, 12.0
-"""[s] In which the wheels must turn, and for which the car is listened to afterwards."""
+"""[s] Longest time until the wheels turn, and from the last command until they slow down."""
 STEP = 0.02
-"""[s] Between commands."""
+"""[s] Period of commands."""
 SECOND_NS = 1_000_000_000
 GRAIN = 0.05
-"""[s] What is measured is rounded up to multiples of it."""
+"""[s] Resolution to which results are rounded up."""
 STEADY = 0.5
 """[s] Time at speed before the last command."""
 IN_A_ROW = 3
@@ -45,18 +45,18 @@ IN_A_ROW = 3
 
 @dataclass(frozen=True, slots=True)
 class Watchdog:
-    """Of one car."""
+    """Watchdog of one car."""
 
     car: int
-    """Its node."""
+    """Id of its node."""
     seconds: float | None
-    """[s] From the last command until its wheels slow down; None if they did not, or could not."""
+    """[s] Time from the last command until the wheels slow down; None if not measured."""
     problem: str
-    """What is wrong; empty if nothing is."""
+    """Problem and remedy; empty if there is none."""
 
     @property
     def record(self) -> dict[str, Any]:
-        """As a record."""
+        """JSON record."""
         return {
             "result": "watchdog",
             "car": self.car,
@@ -71,11 +71,11 @@ def measure_watchdogs(
     """Measure all cars of a swarm, one after the other. Their wheels turn.
 
     Args:
-        config: Of the swarm.
-        tell: Called with a line before each of them.
+        config: Configuration of the swarm.
+        tell: Called with a line of text before each car.
 
     Raises:
-        BridgeError: There are no cars, or keys are those of a recording.
+        BridgeError: There are no cars, or the keys were removed, as in a recording.
     """
     if REMOVED_KEY in config.keys:
         raise BridgeError('key: "removed", expected the keys that a recording does not hold')
@@ -90,14 +90,14 @@ def measure_watchdogs(
 
 
 def with_watchdogs(path: Path, found: Iterable[Watchdog]) -> None:
-    """Write what was measured into swarm.toml.
+    """Write the measured watchdogs into swarm.toml.
 
     Args:
-        path: Of the file.
-        found: Cars without a measurement are left as they are.
+        path: Path of the file.
+        found: Watchdogs; cars without a measurement are left unchanged.
 
     Raises:
-        BridgeError: The file cannot be read or written, or has no table of such a car.
+        BridgeError: The file cannot be read or written, or has no table for a car.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -111,10 +111,10 @@ def with_watchdogs(path: Path, found: Iterable[Watchdog]) -> None:
 
 
 def _set(text: str, car: int, seconds: float) -> str:
-    """The text with the watchdog of a car.
+    """Return the text with the watchdog of a car.
 
     Raises:
-        BridgeError: No table of the car.
+        BridgeError: No table for the car.
     """
     lines = text.splitlines()
     head = re.compile(rf"\s*\[\s*cars\s*\.\s*\"?{car}\"?\s*\]")
@@ -153,16 +153,16 @@ def _measure(car: CarConfig, boot: int) -> Watchdog:
 
 
 class _Trial:
-    """One car."""
+    """Measurement of one car."""
 
     def __init__(self, car: CarConfig, driver: CarDriver, links: Links) -> None:
         self._car, self._driver, self._links = car, driver, links
         self._speeds: list[tuple[float, float]] = []
-        """When [s] its wheels turned how fast [m/s], by its own word."""
+        """Time [s] and speed [m/s] of its telemetry readings."""
         self._told_at = 0.0
 
     def run(self) -> Watchdog:
-        """Spin up, fall silent, listen."""
+        """Spin the wheels up, stop sending commands, and measure the time until they slow down."""
         name, driver = self._car.port.name, self._driver
         if not self._wait(lambda: self._links.is_up(name), 3.0):
             return self._result(None, "its port cannot be opened")
@@ -174,7 +174,7 @@ class _Trial:
             self._stop()
 
     def _measure(self, speed: float) -> Watchdog:
-        """With wheels asked for a speed [m/s]."""
+        """Measure with a commanded speed [m/s]."""
         turns = self._wait(lambda: self._speeds != [] and self._at() > 0.5 * speed, SPIN_UP, speed)
         if turns:
             self._wait(lambda: False, STEADY, speed)
@@ -198,11 +198,11 @@ class _Trial:
         return self._result(math.ceil(seconds / GRAIN) * GRAIN, "")
 
     def _at(self) -> float:
-        """[m/s] Its last word, without sign."""
+        """Return the magnitude of the last reported speed [m/s]."""
         return abs(self._speeds[-1][1])
 
     def _wait(self, is_so: Callable[[], bool], seconds: float, speed: float | None = None) -> bool:
-        """Listen until something is so, driving meanwhile if a speed [m/s] is given."""
+        """Wait for `is_so`, driving at `speed` [m/s] if given; return whether it holds in time."""
         end, due = time.monotonic() + seconds, 0.0
         while (now := time.monotonic()) < end:
             if now >= due:

@@ -1,4 +1,4 @@
-"""A live swarm that is listened to: what `relpos live` does."""
+"""Track a live swarm without driving it (`relpos live`)."""
 
 from agents.hardware.live.result import LiveResult
 from agents.hardware.live.run import live

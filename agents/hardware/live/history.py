@@ -1,4 +1,4 @@
-"""Estimates of a run, decision by decision."""
+"""History of the estimates of a run."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tracking.estimate import TeamEstimate
 
 
 class History:
-    """Grows by one estimate at a time."""
+    """List of estimates that is converted to arrays on request."""
 
     def __init__(self, group: Constellation) -> None:
         self._group = group
@@ -19,11 +19,11 @@ class History:
         self._arrays: list[tuple[F64, ...]] = []
 
     def add(self, t_ns: int, estimate: TeamEstimate) -> None:
-        """Keep a copy.
+        """Append a copy of an estimate.
 
         Args:
             t_ns: Host time of the decision [ns].
-            estimate: Of one environment, arrays over (1, ...).
+            estimate: Estimate of one environment, arrays (1, ...).
         """
         self._t_ns.append(t_ns)
         self._t.append(float(estimate.t[0]))
@@ -31,12 +31,12 @@ class History:
 
     @property
     def t_ns(self) -> I64:
-        """Of the decisions, (time) [ns]."""
+        """[ns] Host times of the decisions, (time)."""
         return np.array(self._t_ns, dtype=np.int64)
 
     @property
     def estimate(self) -> TeamEstimate:
-        """All of it, arrays over (time, ...)."""
+        """All estimates, arrays (time, ...)."""
         if not self._t:
             return TeamEstimate.empty(self._group, np.zeros(0))
         stacked = (np.stack(column) for column in zip(*self._arrays, strict=True))

@@ -1,4 +1,4 @@
-"""Watches a swarm over time, live or replayed: rates, counts, and what is to be kept."""
+"""Monitor of a live or replayed swarm: rates, counts, estimates and measurements."""
 
 from __future__ import annotations
 
@@ -12,30 +12,30 @@ from tracking.measurements import MeasurementBlock
 
 
 class Monitor:
-    """To be told after every step of the swarm."""
+    """Collects statistics of a swarm; call `after_step` after each of its steps."""
 
     def __init__(
         self, swarm: LiveSwarm, *, estimates: bool = True, measurements: bool = False
     ) -> None:
-        """Begin with nothing.
+        """Begin to monitor a swarm.
 
         Args:
-            swarm: Is watched; its tap is taken.
-            estimates: Whether all estimates are kept.
-            measurements: Whether all measurements are.
+            swarm: Swarm to monitor; its `tap` is replaced.
+            estimates: Whether to keep all estimates.
+            measurements: Whether to keep all measurements.
         """
         self.swarm = swarm
         self.rates = Rates(swarm.group.n_nodes)
         self.history = History(swarm.group)
         self.t_ns = swarm.intake.start_ns
-        """Host time of the last step [ns]."""
+        """[ns] Host time of the last step."""
         self.decisions = 0
         self._estimates, self._measurements = estimates, measurements
         self._blocks: list[MeasurementBlock] = []
         swarm.tap = self._take
 
     def after_step(self, t_ns: int) -> None:
-        """The swarm has made a step."""
+        """Record a step of the swarm at a host time [ns]."""
         self.t_ns = t_ns
         self.decisions += 1
         self.rates.close(self.swarm.intake.seconds(t_ns))
@@ -43,18 +43,18 @@ class Monitor:
             self.history.add(t_ns, self.swarm.estimate)
 
     def snapshot(self) -> Snapshot:
-        """What is known after the last step."""
+        """Return a snapshot after the last step."""
         return take_snapshot(self.swarm, self.rates.hz, self.t_ns)
 
     @property
     def block(self) -> MeasurementBlock:
-        """What was measured, as it came, if it was kept; times in seconds since the start."""
+        """Uncalibrated measurements, empty if not kept; times in seconds since the start."""
         parts = self._blocks
         return MeasurementBlock.concatenate(parts) if parts else MeasurementBlock.empty()
 
     @property
     def counts(self) -> dict[str, Any]:
-        """What came and what was refused, ready for JSON."""
+        """Numbers of measurements and of refused readings as a JSON record."""
         intake = self.swarm.intake
         return {
             "measurements": dict(self.rates.totals),
@@ -64,7 +64,7 @@ class Monitor:
 
     @property
     def streams(self) -> list[dict[str, Any]]:
-        """Of each stream what its decoder met, ready for JSON."""
+        """Decoder statistics of each stream as JSON records."""
         rows = []
         for name, stream in self.swarm.intake.streams.items():
             c = stream.decoder.counts

@@ -1,4 +1,4 @@
-"""How many samples and ranges of each node come in a second."""
+"""Rates of the samples and ranges of each node."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from tracking.arrays import F64, I64
 from tracking.measurements import Kind, MeasurementBlock
 
 WINDOW = 2.0
-"""[s] Rates are means over the last so many seconds."""
+"""[s] Averaging window of the rates."""
 
 
 class Rates:
-    """Counts of the last seconds, by node index."""
+    """Rates over the last seconds by node index."""
 
     def __init__(self, n_nodes: int) -> None:
         self._n = n_nodes
@@ -22,9 +22,9 @@ class Rates:
         self._first: float | None = None
         self._closed = 0.0
         self._recent: deque[tuple[float, float, I64]] = deque()
-        """Beginning and end of each step, and what came in it."""
+        """Start and end [s] of each step, with its counts."""
         self.totals: dict[str, int] = {kind.name.lower(): 0 for kind in _COUNTED}
-        """Measurements since the beginning, by kind."""
+        """Measurements since the start, by kind."""
 
     def take(self, block: MeasurementBlock) -> None:
         """Count the measurements of a block of one environment."""
@@ -37,9 +37,9 @@ class Rates:
             self.totals[each.name.lower()] += int(np.sum(kind == each))
 
     def close(self, t: float) -> None:
-        """What was counted since the last call came up to this time [s]."""
+        """End a step at a time [s]; it has the counts since the last call."""
         if self._first is None:
-            # How long the first of it took to come is not known.
+            # The duration of the first step is unknown.
             self._first, self._closed, self._now = t, t, self._nothing()
             return
         self._recent.append((self._closed, t, self._now))
@@ -49,10 +49,10 @@ class Rates:
 
     @property
     def hz(self) -> F64:
-        """Samples and ranges a second, (2, node) [1/s]; zeros before anything is known."""
+        """[1/s] Rates of samples and ranges, (2, node); zeros before the second step."""
         if not self._recent or self._first is None:
             return np.zeros((2, self._n))
-        # From when the first of them began, which may be a little more than the window.
+        # Time since the start of the oldest step, which may exceed the window slightly.
         elapsed = self._recent[-1][1] - self._recent[0][0]
         total = np.sum([counts for _, _, counts in self._recent], axis=0)
         hz: F64 = total / max(elapsed, 1e-3)

@@ -1,4 +1,4 @@
-"""What came of listening to a live swarm."""
+"""Result of tracking a live swarm."""
 
 from __future__ import annotations
 
@@ -12,37 +12,37 @@ from tracking.params.short_repr import short_repr
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LiveResult:
-    """One run."""
+    """Estimates and statistics of one run."""
 
     __repr__ = short_repr
 
     name: str
-    """Of the swarm."""
+    """Name of the swarm."""
     start_ns: int
-    """[ns] Host time that is 0 s of the estimates."""
+    """[ns] Host time of 0 s in the estimates."""
     seconds: float
-    """[s] Until the last decision."""
+    """[s] Time from the start to the last decision."""
     decisions: int
     late_decisions: int
-    """[-] That were due while the one before was still made."""
+    """[-] Decisions that were due while the previous one was still being computed."""
     t_ns: I64
-    """Host time of the decisions that were kept, (decision) [ns]."""
+    """[ns] Host time of the kept decisions, (decision)."""
     estimate: TeamEstimate
-    """At each of them, as old as the horizon; arrays over (decision, ...)."""
+    """Estimates of the kept decisions, delayed by the horizon; arrays (decision, ...)."""
     counts: dict[str, Any] = field(default_factory=dict)
     """Measurements by kind, refused readings by reason, measurements later than the horizon."""
     streams: tuple[dict[str, Any], ...] = ()
-    """Of each stream what its decoder met."""
+    """Decoder statistics of each stream."""
     notices: tuple[tuple[float, str], ...] = ()
-    """Time [s] and what the user was told."""
+    """Notices to the user: time [s] and text."""
     recording: str | None = None
-    """The file."""
+    """File of the recording; None if not recorded."""
     recording_lost: str | None = None
-    """Why records are missing in it; None if it has them all."""
+    """Reason for missing records in the recording; None if complete or not recorded."""
 
     @property
     def summary(self) -> dict[str, Any]:
-        """The figures, ready for JSON."""
+        """Figures of the run as a JSON record."""
         return {
             "result": "live",
             "name": self.name,

@@ -1,4 +1,4 @@
-"""Listening to a live swarm, from opened ports to closed ones."""
+"""Track a live swarm, from opening to closing its ports."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hardware_bridge.live.bridge import Bridge
 from hardware_bridge.live.feed import LiveFeed
 
 Watch = Callable[[Monitor, list[tuple[float, str]]], bool | None]
-"""Takes what is known and the notices since the last call, time [s] and text; False ends it."""
+"""Callback with the monitor and the new notices, time [s] and text; False ends the run."""
 
 
 def live(
@@ -28,15 +28,15 @@ def live(
     """Track a live swarm without driving it.
 
     Args:
-        config: A swarm.toml, or what `read_config` made of one.
-        seconds: Length; None ends with Ctrl-C.
+        config: Path of a swarm.toml, or the result of `read_config`.
+        seconds: Length [s]; None runs until Ctrl-C.
         record: File for a recording.
         watch: Called after every decision.
         keep: Whether the result has the estimates of all decisions.
 
     Raises:
-        BridgeError: Something of the swarm cannot be used.
-        UsageError: A length that makes no sense.
+        BridgeError: A part of the swarm cannot be used.
+        UsageError: The length is out of range.
     """
     if seconds is not None and not 0.0 < seconds < float("inf"):
         raise UsageError(f"seconds: expected a number above 0, got {seconds:g}")
@@ -61,7 +61,7 @@ def live(
         streams=tuple(monitor.streams),
         notices=tuple(notices),
         recording=None if record is None else str(record),
-        # Only known for sure once it is closed.
+        # Final only after the recorder was closed.
         recording_lost=None if recorder is None else recorder.lost,
     )
 
@@ -73,7 +73,7 @@ def _listen(
     watch: Watch | None,
     notices: list[tuple[float, str]],
 ) -> None:
-    """Decide until the time is up or it is stopped."""
+    """Run decisions until the time is up or `watch` returns False."""
     intake = bridge.swarm.intake
     while seconds is None or intake.seconds(monitor.t_ns) < seconds:
         t_ns = bridge.feed.advance()
@@ -86,7 +86,7 @@ def _listen(
 
 
 def _drain(feed: LiveFeed, monitor: Monitor) -> list[tuple[float, str]]:
-    """The notices since the last call, times in seconds since the start."""
+    """Return the notices since the last call, times in seconds since the start."""
     notices = [(monitor.swarm.intake.seconds(t_ns), text) for t_ns, text in feed.notices]
     feed.notices.clear()
     return notices

@@ -1,4 +1,4 @@
-"""What `relpos live` and `relpos replay` show while they run."""
+"""Output of `relpos live` and `relpos replay` during the run."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 MOST_NOTICES = 4
-"""The table shows the last so many."""
+"""[-] Number of notices shown above the tables."""
 EVERY = 2
-"""The table is drawn at every so-manieth decision."""
+"""[-] Decisions per update of the tables."""
 SECOND = 1.0
 
 Notices = list[tuple[float, str]]
 
 
 class Screen(Protocol):
-    """To be shown everything, decision by decision; a context that is left at the end."""
+    """Output of every decision; a context that is left at the end of the run."""
 
     def __enter__(self) -> Screen: ...
 
@@ -37,11 +37,11 @@ class Screen(Protocol):
     ) -> None: ...
 
     def show(self, monitor: Monitor, notices: Notices) -> None:
-        """What is known now, and the notices since the last call."""
+        """Show the state of the monitor and the notices since the last call."""
 
 
 class JsonLines:
-    """A record for each notice, and for each pair at each decision."""
+    """JSON records of each notice, and of each pair at each decision."""
 
     def __enter__(self) -> JsonLines:
         return self
@@ -56,7 +56,7 @@ class JsonLines:
 
 
 class Lines:
-    """A line a second, and one for each notice."""
+    """One line of text per second and per notice."""
 
     def __init__(self) -> None:
         self._next = SECOND
@@ -78,10 +78,10 @@ class Lines:
 
 
 class LiveTable:
-    """Tables of nodes and pairs on a terminal, drawn again and again in place."""
+    """Tables of nodes and pairs on a terminal, updated in place."""
 
     def __init__(self, title: str) -> None:
-        """Draw nothing yet; the title stands in the first line."""
+        """Prepare tables with a title in the first line."""
         from rich.live import Live
 
         self._title = title
@@ -101,7 +101,7 @@ class LiveTable:
         self._live.__exit__(kind, error, trace)
 
     def show(self, monitor: Monitor, notices: Notices) -> None:
-        """Draw it."""
+        """Draw the tables."""
         from rich.console import Group
         from rich.text import Text
 
@@ -127,12 +127,12 @@ class LiveTable:
 
 
 def table(header: list[str], rows: list[list[str]], *, status: bool = False) -> Table:
-    """A table for a terminal.
+    """Return a table for a terminal.
 
     Args:
         header: Names of the columns.
-        rows: Cells.
-        status: Whether the last column is one, which is coloured.
+        rows: Cells of the rows.
+        status: Whether the last column is a status, which is coloured.
     """
     from rich import box
     from rich.markup import escape

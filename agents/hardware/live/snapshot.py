@@ -1,4 +1,4 @@
-"""What is known of a swarm at one moment: nodes and pairs as rows, for tables, JSON and views."""
+"""Snapshot of a swarm: rows of nodes and pairs for tables, JSON and views."""
 
 from __future__ import annotations
 
@@ -16,80 +16,80 @@ _NOTHING = (Status.ABSENT, Status.STARTING)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NodeRow:
-    """One node."""
+    """State of one node."""
 
     node: int
-    """Its id."""
+    """Id of the node."""
     heard_ago: float | None
-    """[s] None before it was ever heard."""
+    """[s] Time since its last message; None before the first one."""
     imu_hz: float
-    """[1/s] Samples of its IMU."""
+    """[1/s] Rate of its IMU samples."""
     range_hz: float
-    """[1/s] Ranges with it at one end."""
+    """[1/s] Rate of its ranges, to and from other nodes."""
     voltage: float | None
-    """[V] None where it does not say."""
+    """[V] Battery voltage; None if not reported."""
     heading: float | None
-    """[rad] Counter-clockwise from the x axis of the world; None where it is not known."""
+    """[rad] Heading, counter-clockwise from the x axis of the world; None if unknown."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairRow:
-    """Where the second node is, seen from the first; carried to this moment."""
+    """Position of the second node relative to the first, predicted to the time of the snapshot."""
 
     node_i: int
     node_j: int
     status: str
-    """A `Status` in small letters; without an estimate the figures are None."""
+    """`Status` in lower case; without an estimate, all other values are None."""
     pos_w: tuple[float, float, float] | None
-    """[m] In the axes of the world."""
+    """[m] Relative position in the axes of the world."""
     cov_w: tuple[float, float, float] | None
-    """[m2] Of its plane: xx, yy, xy."""
+    """[m2] Horizontal covariance in the axes of the world: xx, yy, xy."""
     forward: float | None
-    """[m] Ahead of the first node, level; None where its heading is not known."""
+    """[m] Horizontal offset along the heading of the first node; None if its heading is unknown."""
     left: float | None
-    """[m] To its left, level."""
+    """[m] Horizontal offset to the left of the first node; None if its heading is unknown."""
     up: float | None
-    """[m] Above it; None in a plane."""
+    """[m] Height above the first node; None in two dimensions."""
     distance: float | None
-    """[m]"""
+    """[m] Estimated distance."""
     std: float | None
-    """[m] Largest standard deviation of the position in any direction."""
+    """[m] Standard deviation of the position in the least certain direction."""
     age: float | None
-    """[s] Since the last accepted range."""
+    """[s] Time since the last accepted range."""
     nlos_prob: float | None
-    """[-] Probability that it was not line of sight."""
+    """[-] NLOS probability."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Snapshot:
-    """All of it."""
+    """All nodes and pairs at one time."""
 
     t_ns: int
-    """Host time [ns]."""
+    """[ns] Host time."""
     t: float
-    """[s] Since the run began."""
+    """[s] Time since the start of the run."""
     nodes: tuple[NodeRow, ...]
     pairs: tuple[PairRow, ...]
 
     @property
     def n_ok(self) -> int:
-        """Pairs whose estimate can be used."""
+        """[-] Number of pairs with the status ``ok``."""
         return sum(pair.status == "ok" for pair in self.pairs)
 
     @property
     def pair_records(self) -> list[dict[str, Any]]:
-        """The pairs, ready for JSON."""
+        """Pairs as JSON records."""
         head = {"result": "pair", "t": round(self.t, 6)}
         return [head | asdict(pair) for pair in self.pairs]
 
 
 def take_snapshot(swarm: LiveSwarm, hz: F64, t_ns: int) -> Snapshot:
-    """What is known now.
+    """Return a snapshot of a swarm.
 
     Args:
-        swarm: Right after its step.
-        hz: Samples and ranges a second, (2, node) [1/s].
-        t_ns: Host time of that step [ns].
+        swarm: Swarm right after a step.
+        hz: Rates of samples and ranges, (2, node) [1/s].
+        t_ns: Host time of the step [ns].
     """
     group, intake = swarm.group, swarm.intake
     headings = _headings(swarm)
@@ -111,7 +111,7 @@ def take_snapshot(swarm: LiveSwarm, hz: F64, t_ns: int) -> Snapshot:
 
 
 def _headings(swarm: LiveSwarm) -> list[float | None]:
-    """Of all nodes: of moving ones now, by their gyroscopes too; of the others as they stand."""
+    """Return headings [rad]: gyro-predicted ones of the slots, estimated ones of other nodes."""
     view, e = swarm.view, swarm.estimate
     headings: list[float | None] = []
     for k in range(swarm.group.n_nodes):

@@ -1,4 +1,4 @@
-"""What is known of a swarm as text: rows of tables, and a line a second."""
+"""Snapshots as text: rows of tables, and one-line summaries."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ PAIR_HEADER = ("pair", "forward", "left", "distance", "sigma", "age", "NLOS", "s
 
 
 def node_rows(snapshot: Snapshot) -> list[list[str]]:
-    """A row a node, as `NODE_HEADER`."""
+    """Return one row per node with the columns of `NODE_HEADER`."""
     return [
         [
             str(n.node),
@@ -25,7 +25,7 @@ def node_rows(snapshot: Snapshot) -> list[list[str]]:
 
 
 def pair_header(snapshot: Snapshot) -> list[str]:
-    """`PAIR_HEADER`, with the height where there is one."""
+    """Return `PAIR_HEADER`, with a column for the height in three dimensions."""
     names = list(PAIR_HEADER)
     if any(pair.up is not None for pair in snapshot.pairs):
         names.insert(3, "up")
@@ -33,7 +33,7 @@ def pair_header(snapshot: Snapshot) -> list[str]:
 
 
 def pair_rows(snapshot: Snapshot) -> list[list[str]]:
-    """A row a pair, as `pair_header`."""
+    """Return one row per pair with the columns of `pair_header`."""
     high = "up" in pair_header(snapshot)
     return [
         [
@@ -52,7 +52,7 @@ def pair_rows(snapshot: Snapshot) -> list[list[str]]:
 
 
 def line(snapshot: Snapshot) -> str:
-    """All in one line."""
+    """Return a one-line summary of a snapshot."""
     pairs = ", ".join(
         f"{p.node_i}-{p.node_j} {p.status}"
         if p.distance is None

@@ -1,4 +1,4 @@
-"""Recordings tracked again: what `relpos replay` does."""
+"""Track recordings again (`relpos replay`)."""
 
 from agents.hardware.replay.result import ReplayResult
 from agents.hardware.replay.run import replay

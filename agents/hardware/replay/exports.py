@@ -1,4 +1,4 @@
-"""A replayed run in the formats of others: a log folder, MCAP with ROS 2 messages, TUM text."""
+"""Exports of a replay: a log folder, MCAP with ROS 2 messages, TUM text."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ EXPORTS = ("log", "mcap", "tum")
 
 
 def export_replay(result: ReplayResult, out: Path | str, formats: tuple[str, ...]) -> list[Path]:
-    """Write all of them into a new folder, or nothing.
+    """Write a replay in several formats into a new folder; an error leaves no partial export.
 
-    ``log/`` and ``run.mcap`` have the measurements as they came, ``calibration.toml`` what
-    corrects them; ``run.mcap`` and ``tum/`` the estimates. Times of the log are seconds since the
+    ``log/`` and ``run.mcap`` hold the uncalibrated measurements, ``calibration.toml`` their
+    calibration, ``run.mcap`` and ``tum/`` the estimates. Times of the log are seconds since the
     start of the recording, the others UTC.
 
     Args:
-        result: Of a replay that kept its estimates and measurements.
-        out: New or empty.
-        formats: Of `EXPORTS`.
+        result: Replay that kept its estimates and measurements.
+        out: Folder, new or empty.
+        formats: Formats of `EXPORTS`.
 
     Returns:
-        What was written.
+        Paths of the written files and folders.
 
     Raises:
-        BridgeError: The folder is taken or cannot be written, or the run does not make one of
-            the formats.
+        BridgeError: The folder is not empty or cannot be written, or a format does not support
+            the run.
         UsageError: No such format.
     """
     check_formats(formats)
@@ -64,10 +64,10 @@ def export_replay(result: ReplayResult, out: Path | str, formats: tuple[str, ...
 
 
 def check_formats(formats: tuple[str, ...]) -> None:
-    """See that there are such formats, before any work is done for them.
+    """Check the names of formats.
 
     Raises:
-        UsageError: There is one that is none.
+        UsageError: A format is unknown.
     """
     for name in formats:
         if name not in EXPORTS:

@@ -1,4 +1,4 @@
-"""What came of replaying a recording."""
+"""Result of replaying a recording."""
 
 from __future__ import annotations
 
@@ -21,65 +21,65 @@ from tracking.params.short_repr import short_repr
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scored:
-    """A replay against the truth."""
+    """Errors of a replay against the ground truth."""
 
     __repr__ = short_repr
 
     score: Score
     offset: float
-    """[s] Added to times of the truth."""
+    """[s] Offset added to times of the truth."""
     truth_ij_w: F64
-    """True relative positions at the times of the estimates, (decision, pair, 3) [m]."""
+    """[m] True relative positions at the times of the estimates, (decision, pair, 3)."""
     has_truth: Bool
-    """(decision, pair)"""
+    """True where the truth is known, (decision, pair)."""
     errors: F64
-    """Distance of the estimate from it after the constant yaw of `score`, (decision, pair) [m]."""
+    """[m] Position errors after the constant yaw of `score` is removed, (decision, pair)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplayResult:
-    """One replay."""
+    """Estimates and statistics of one replay."""
 
     __repr__ = short_repr
 
     recording: Recording
-    """Torn or damaged ones are used as far as they go."""
+    """Recording; the readable part of a truncated or damaged one."""
     config: SwarmConfig
-    """The recorded one."""
+    """Recorded configuration."""
     calibration: Calibration | None
-    """The recorded one, by which measurements were corrected."""
+    """Recorded calibration, which was applied to the measurements."""
     decisions: int
-    """How many there were."""
+    """[-] Number of decisions."""
     t_ns: I64
-    """Host time of the decisions, (decision) [ns]."""
+    """[ns] Host time of the decisions, (decision)."""
     estimate: TeamEstimate
-    """At each of them, as old as the horizon; arrays over (decision, ...)."""
+    """Estimates of the decisions, delayed by the horizon; arrays (decision, ...)."""
     block: MeasurementBlock
-    """What was measured, as it came, without calibration, if it was asked for."""
+    """Uncalibrated measurements; empty if they were not kept."""
     last: Snapshot
-    """What is known at the end."""
+    """Snapshot after the last decision."""
     counts: dict[str, Any]
     """Measurements by kind, refused readings by reason, measurements later than the horizon."""
     streams: tuple[dict[str, Any], ...]
-    """Of each stream what its decoder met."""
+    """Decoder statistics of each stream."""
     notices: tuple[tuple[float, str], ...]
-    """Time [s] and what the user was told then."""
+    """Notices to the user: time [s] and text."""
     lost: tuple[tuple[float, int, str], ...]
-    """Where the recorder had to drop records: time [s], how many, why."""
+    """Records that the recorder dropped: time [s], number, reason."""
     stopped: bool
-    """Whether the replay was ended before the recording did."""
+    """True if the replay was stopped before the end of the recording."""
     realtime_factor: float
-    """[-] Recorded time over the time that the replay took."""
+    """[-] Recorded time divided by the duration of the replay."""
     scored: Scored | None = None
 
     @property
     def seconds(self) -> float:
-        """From the start to the last decision [s]."""
+        """[s] Time from the start to the last decision."""
         return self.last.t
 
     @property
     def flaws(self) -> list[str]:
-        """Why this is not all that happened, in words."""
+        """Reasons why the replay is incomplete, as text."""
         r = self.recording
         flaws = [f"the replay was stopped after {self.seconds:.1f} s"] if self.stopped else []
         if r.torn:
@@ -92,7 +92,7 @@ class ReplayResult:
 
     @property
     def summary(self) -> dict[str, Any]:
-        """The figures, ready for JSON."""
+        """Figures of the replay as a JSON record."""
         r, s = self.recording, self.scored
         figures: dict[str, Any] = {
             "result": "replay",

@@ -1,4 +1,4 @@
-"""Replaying a recording: the same bytes through the same software give the same estimates."""
+"""Replay a recording: the same bytes through the same software give the same estimates."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from hardware_bridge.recording import Kind, Recording, read_recording
 from tracking.log import Log, read_log
 
 SLOWEST, FASTEST = 1e-3, 1e6
-"""[-] Of real time."""
+"""[-] Limits of the replay speed, in multiples of real time."""
 
 
 def replay(
@@ -35,28 +35,28 @@ def replay(
     clock: Callable[[], int] = time.monotonic_ns,
     sleep: Callable[[float], None] = time.sleep,
 ) -> ReplayResult:
-    """Track a recording as it was tracked live, as far as it goes.
+    """Track a recording as it was tracked live, up to its readable end.
 
     Args:
-        recording: A file, or what `read_recording` made of one.
-        speed: Times as fast as it happened; None is as fast as possible.
-        filter: In place of the recorded one.
-        keys: The swarm.toml that it was made with, for the keys of signed messages, which a
-            recording does not hold; None does not check signatures.
+        recording: A file, or the result of `read_recording`.
+        speed: Replay speed in multiples of real time; None is as fast as possible.
+        filter: Filter that replaces the recorded one.
+        keys: Original swarm.toml for the keys of signed messages, which a recording does not
+            hold; None does not check signatures.
         truth: A log with the truth, or its folder.
-        truth_offset: Added to its times gives those of the recording, whose start is 0 [s]; None
-            finds it, see `agents.hardware.replay.truth.find_offset`.
-        skip: Times until so many seconds after the first range are not scored.
-        keep: Whether the result has all estimates and measurements; a truth needs them.
-        watch: Called after every decision; False ends it.
-        clock: Monotonic [ns].
-        sleep: Waits for so many seconds.
+        truth_offset: Offset from times of the truth to times of the recording, which start at 0
+            [s]; None estimates it, see `agents.hardware.replay.truth.find_offset`.
+        skip: Time after the first range that is not scored [s].
+        keep: Whether the result has all estimates and measurements; always True with `truth`.
+        watch: Called after every decision; ends the replay by returning False.
+        clock: Monotonic clock [ns].
+        sleep: Sleeps for a number of seconds.
 
     Raises:
-        BridgeError: Not a recording, one whose header is damaged, or without any decision.
+        BridgeError: Not a recording, one with a damaged header, or without any decision.
         ConfigError: No such filter.
         LogError: The truth cannot be read.
-        UsageError: A number that makes no sense, or a truth that does not fit.
+        UsageError: A number is out of range, or the truth does not fit the recording.
     """
     if speed is not None and not SLOWEST <= speed <= FASTEST:
         raise UsageError(f"speed: expected {SLOWEST:g} to {FASTEST:g}, got {speed:g}")
@@ -103,7 +103,7 @@ def replay(
 def _run(
     feed: ReplayFeed, monitor: Monitor, watch: Watch | None
 ) -> tuple[list[tuple[float, str]], bool]:
-    """Go through all decisions; the notices, times in seconds since the start; ended before?"""
+    """Run all decisions; return notices (time since the start [s], text) and if it was stopped."""
     intake = feed.swarm.intake
     notices: list[tuple[float, str]] = []
     try:
@@ -121,7 +121,7 @@ def _run(
 
 
 def _lost(recording: Recording) -> tuple[tuple[float, int, str], ...]:
-    """What the recorder said it had to drop."""
+    """Return the dropped records by the events of the recorder: time [s], number, reason."""
     lost = []
     for record in recording:
         event = recording.event(record) if record.kind == Kind.EVENT else {}
@@ -134,7 +134,7 @@ def _lost(recording: Recording) -> tuple[tuple[float, int, str], ...]:
 
 
 class _Pace:
-    """Waits until a decision is due, in so many times real time."""
+    """Wait until a decision is due at a multiple of real time."""
 
     def __init__(
         self,
@@ -150,7 +150,7 @@ class _Pace:
     def __call__(self, t_ns: int) -> None:
         now = self._clock()
         if self._begun is None:
-            # What is loaded before the first decision is not to be made up for.
+            # The loading time before the first decision is not caught up.
             self._begun = now - round((t_ns - self._start_ns) / self._speed)
         wait = self._begun + round((t_ns - self._start_ns) / self._speed) - now
         if wait > 0:

@@ -1,8 +1,7 @@
-"""A log with truth next to a recording: whose times are how far apart, and how large errors are.
+"""Time offset between a recording and a log with ground truth, and errors of the replay.
 
-True distances between nodes, taken at the times of the recorded ranges, agree with them best where
-the clocks agree. The offset is found by that alone, so any log will do in which the nodes move:
-an emulation's, or that of a motion-capture room.
+The offset minimises the difference between recorded ranges and true distances at their times. Any
+log works in which the nodes move, such as that of an emulation or of a motion-capture system.
 """
 
 from __future__ import annotations
@@ -22,20 +21,20 @@ from tracking.measurements import Kind, MeasurementBlock
 from tracking.metrics.score import errors_after, score
 
 MOST_RANGES = 3000
-"""[-] So many of a recording are compared; more make the offset no better worth its time."""
+"""[-] Approximate number of ranges compared; more improve the offset too little for their cost."""
 COARSE = 0.05
-"""[s] Between offsets that are tried first."""
+"""[s] Step of the first search."""
 FINEST = 1e-4
-"""[s] The offset is found to so much."""
+"""[s] Step of the last search."""
 LEAST_SHARE = 0.5
-"""[-] Of the ranges that can at most fall into the time of the truth, so many must."""
+"""[-] Smallest share of ranges within the truth, relative to the largest possible number."""
 LEAST_RANGES = 50
 CLIP = 1.0
-"""[m] Larger differences count as this: ranges around corners are wrong wherever they fall."""
+"""[m] Upper limit of a difference, since NLOS ranges are wrong at any offset."""
 ASIDE = 1.0
-"""[s] So far to both sides of the best offset the agreement must be clearly worse."""
+"""[s] Distance to both sides of the best offset at which the fit must be clearly worse."""
 FLAT = 0.8
-"""[-] Mean difference at the best offset over those, at most."""
+"""[-] Largest ratio of the mean difference at the best offset to that at both sides."""
 
 
 def score_replay(
@@ -49,14 +48,14 @@ def score_replay(
     """Score the estimates of a replay.
 
     Args:
-        estimate: Arrays over (decision, ...).
+        estimate: Estimates, arrays (decision, ...).
         block: Measurements of the recording.
-        log: With truth, of the same nodes.
-        offset: Added to its times gives those of the recording [s]; None finds it.
-        skip: Times until so many seconds after the first range are not scored.
+        log: Log with the truth of the same nodes.
+        offset: Offset from times of the log to times of the recording [s]; None estimates it.
+        skip: Time after the first range that is not scored [s].
 
     Raises:
-        UsageError: The log has no truth of these nodes, or no offset fits best.
+        UsageError: The log has no truth of these nodes, or no offset is clearly best.
     """
     group = estimate.constellation
     truth = truth_of(log, group)
@@ -78,10 +77,10 @@ def score_replay(
 
 
 def truth_of(log: Log, group: Constellation) -> Truth:
-    """The truth of a log for the nodes of a group, which are the same by their ids.
+    """Return the truth of a log for the nodes of a group, matched by node id.
 
     Raises:
-        UsageError: There is none.
+        UsageError: The log has no truth of two nodes of the group.
     """
     ids = np.array([group.index_of.get(node, -1) for node in log.constellation.ids])
     node = ids[log.truth.node] if len(log.truth.t) else log.truth.node
@@ -92,15 +91,15 @@ def truth_of(log: Log, group: Constellation) -> Truth:
 
 
 def find_offset(truth: Truth, block: MeasurementBlock, group: Constellation) -> float:
-    """What added to the times of a truth makes it agree best with measured ranges [s].
+    """Return the offset from times of the truth to times of the measured ranges [s].
 
     Args:
-        truth: Of the nodes of the group.
-        block: Of one environment.
-        group: The nodes.
+        truth: Truth of the nodes of the group.
+        block: Measurements; environment 0 is used.
+        group: Constellation of the nodes.
 
     Raises:
-        UsageError: No offset fits clearly best: too few ranges, or nodes that hardly move.
+        UsageError: No offset is clearly best: too few ranges, or nodes that hardly move.
     """
     block = block.env(0)
     ranges = np.nonzero(block.kind[0] == Kind.RANGE)[0]
@@ -125,7 +124,7 @@ def find_offset(truth: Truth, block: MeasurementBlock, group: Constellation) -> 
     tried = np.arange(lowest, highest, COARSE)
     costs = np.array([cost(offset) for offset in tried])
     best, step = float(tried[np.argmin(costs)]), COARSE
-    # The same ranges at all three, so that it is the time that makes the difference.
+    # All three means are over the same ranges, so that they differ only by the offset.
     here, *aside = (_differences(truth, group, t - best - shift, i, j, distance)
                     for shift in (0.0, -ASIDE, ASIDE))  # fmt: skip
     known = here[1] & aside[0][1] & aside[1][1]
@@ -143,7 +142,7 @@ def find_offset(truth: Truth, block: MeasurementBlock, group: Constellation) -> 
 def _differences(
     truth: Truth, group: Constellation, t: F64, i: F64, j: F64, distance: F64
 ) -> tuple[F64, Bool]:
-    """Between true and measured distances, (range) [m], and where the truth is known."""
+    """Return absolute range errors against the truth (range) [m], and where the truth is known."""
     pos, known = truth.positions(group, t)
     rows = np.arange(len(t))
     along = np.linalg.norm(pos[rows, j] - pos[rows, i], axis=-1)

@@ -1,4 +1,4 @@
-"""A swarm drawn by Rerun: what `--view` shows."""
+"""Rerun view of a swarm (`--view`)."""
 
 from agents.hardware.view.viewer import Viewer, open_viewer
 

@@ -1,17 +1,17 @@
-"""Where on the screen what is drawn."""
+"""Layout of the view."""
 
 from __future__ import annotations
 
 from typing import Any
 
 TIME = "time"
-"""The timeline, seconds since the run began."""
+"""Name of the timeline [s] since the start of the run."""
 HEIGHT = 6.0
-"""[m] Above the origin, from where the plan is seen at first; north is up."""
+"""[m] Initial height of the camera above the origin; the y axis points up on the screen."""
 
 
 def layout() -> Any:
-    """The plan on the left, figures over time on the right, notices below."""
+    """Return the blueprint: plan and notices on the left, time series on the right."""
     import rerun.blueprint as rrb
 
     plots = [

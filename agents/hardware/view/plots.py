@@ -1,4 +1,4 @@
-"""Figures of pairs and nodes over time."""
+"""Time series of pairs and nodes."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ COLOURS = (
     (31, 119, 180), (255, 127, 14), (44, 160, 44), (214, 39, 40), (148, 103, 189), (140, 86, 75),
     (227, 119, 194), (127, 127, 127), (188, 189, 34), (23, 190, 207),
 )  # fmt: skip
-"""Of curves, the same in all plots; they come round again."""
+"""RGB colours of curves, the same in all plots, used cyclically."""
 
 
 def style_plots(rr: ModuleType, stream: Any, snapshot: Snapshot) -> None:
-    """Name the curves and give them colours."""
+    """Set names and colours of the curves."""
     for k, pair in enumerate(snapshot.pairs):
         name, colour = f"{pair.node_i}-{pair.node_j}", COLOURS[k % len(COLOURS)]
         for kind in (*OF_PAIRS, "error"):
@@ -33,7 +33,7 @@ def style_plots(rr: ModuleType, stream: Any, snapshot: Snapshot) -> None:
 
 
 def log_numbers(rr: ModuleType, stream: Any, snapshot: Snapshot) -> None:
-    """Log one moment, whose time is set; a pair without an estimate leaves a gap."""
+    """Log a snapshot at the current time of the stream; NaN for pairs without an estimate."""
     for pair in snapshot.pairs:
         name = f"{pair.node_i}-{pair.node_j}"
         for kind, value in zip(OF_PAIRS, (pair.distance, pair.std, pair.nlos_prob), strict=True):
@@ -46,7 +46,7 @@ def log_numbers(rr: ModuleType, stream: Any, snapshot: Snapshot) -> None:
 def log_errors(
     rr: ModuleType, stream: Any, timeline: str, estimate: TeamEstimate, errors: F64, known: Bool
 ) -> None:
-    """Log the errors of a whole run; arguments as of `Viewer.show_errors`."""
+    """Log the errors of a whole run; arguments as for `Viewer.show_errors`."""
     group = estimate.constellation
     for p in range(group.n_pairs):
         rows = known[:, p] & estimate.ok[:, p]

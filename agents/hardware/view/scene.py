@@ -1,7 +1,7 @@
-"""Nodes in the axes of the world round one of them, how sure each is, and the links between.
+"""Plan of the nodes in the axes of the world, with error ellipses and links.
 
-Relative positions leave one place open: the first node that most others are known from is at the
-origin. The ellipse of a node is that of its position relative to it, three standard deviations.
+Relative positions leave the translation free: the origin is the first node with the most usable
+pairs. Ellipses show the position relative to the origin at three standard deviations.
 """
 
 from __future__ import annotations
@@ -17,23 +17,23 @@ from tracking.arrays import F64
 
 SIGMAS = 3.0
 ARROW = 0.4
-"""[m] Length of a heading."""
+"""[m] Length of a heading arrow."""
 CORNERS = 48
-"""Of an ellipse."""
+"""[-] Corners of an ellipse."""
 SIGHT = (60, 180, 90)
 BLOCKED = (240, 150, 30)
 LOST = (220, 60, 60)
 VAGUE = (130, 130, 130)
-"""Not known enough to be used."""
+"""Colour of links without a usable estimate, and of ellipses."""
 NODE = (70, 130, 230)
 SILENT = (130, 130, 130)
 SILENT_AFTER = 1.0
-"""[s]"""
+"""[s] Time without a message after which a node is drawn as silent."""
 _USABLE = ("ok", "lost", "doubtful", "ambiguous")
 
 
 def log_scene(rr: ModuleType, stream: Any, snapshot: Snapshot) -> None:
-    """Log one moment, whose time is set."""
+    """Log a snapshot at the current time of the stream."""
     places, ellipses = place(snapshot)
     heard = {n.node: n.heard_ago is not None and n.heard_ago < SILENT_AFTER for n in snapshot.nodes}
     ids = [node for node in heard if node in places]
@@ -65,7 +65,7 @@ def log_scene(rr: ModuleType, stream: Any, snapshot: Snapshot) -> None:
 
 
 def place(snapshot: Snapshot) -> tuple[dict[int, F64], dict[int, F64]]:
-    """Places and ellipses by node id, (3) and (corner, 3) [m]; of those that are known."""
+    """Return known positions (3) [m] and error ellipses (corner, 3) [m] by node id."""
     known = [p for p in snapshot.pairs if p.pos_w is not None and p.status in _USABLE]
     counts = {n.node: sum(n.node in (p.node_i, p.node_j) for p in known) for n in snapshot.nodes}
     if not known:
@@ -83,10 +83,10 @@ def place(snapshot: Snapshot) -> tuple[dict[int, F64], dict[int, F64]]:
 
 
 def ellipse(cov_w: tuple[float, float, float]) -> F64:
-    """A closed line of `SIGMAS` standard deviations round 0, (corner, 3) [m].
+    """Return the error ellipse of `SIGMAS` standard deviations around 0, (corner, 3) [m].
 
     Args:
-        cov_w: xx, yy, xy [m2].
+        cov_w: Elements xx, yy, xy of the covariance [m2].
     """
     xx, yy, xy = cov_w
     values, axes = np.linalg.eigh(np.array([[xx, xy], [xy, yy]]))
@@ -98,9 +98,9 @@ def ellipse(cov_w: tuple[float, float, float]) -> F64:
 
 
 def link_colour(pair: PairRow) -> tuple[int, int, int]:
-    """Red without ranges, grey before it can be used, else from green to orange.
+    """Return red for a lost or doubtful pair, grey for other unusable ones, else green to orange.
 
-    Orange is where there is no line of sight, as far as that is known.
+    The colour changes from green to orange with the NLOS probability.
     """
     if pair.status in ("lost", "doubtful"):
         return LOST

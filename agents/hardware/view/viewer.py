@@ -1,4 +1,4 @@
-"""A view of a swarm in Rerun, in the browser or in a file."""
+"""Rerun view of a swarm, in the browser or in a file."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from tracking.estimate import TeamEstimate
 
 APPLICATION = "relpos"
 MEMORY = "512MiB"
-"""Of what was shown, so that a browser that comes later sees it too; the earliest is dropped."""
+"""Limit of the data kept for browsers that connect later; the oldest data is dropped."""
 
 
 class Viewer:
-    """An open view; a context."""
+    """Open view, usable as a context."""
 
     def __init__(
         self, rr: ModuleType, stream: Any, url: str | None, file: Path | None = None
@@ -30,14 +30,14 @@ class Viewer:
         self._rr, self._stream, self._file = rr, stream, file
         self._styled = False
         self.url = url
-        """Where a browser finds it; None for a file."""
+        """Address of the view for a browser; None for a file."""
 
     def show(self, snapshot: Snapshot, notices: list[tuple[float, str]] | None = None) -> None:
-        """Draw what is known at one moment.
+        """Draw a snapshot.
 
         Args:
-            snapshot: Of the swarm.
-            notices: Time [s] and text of what happened since the last.
+            snapshot: Snapshot of the swarm.
+            notices: Time [s] and text of the notices since the last snapshot.
         """
         rr, stream = self._rr, self._stream
         with self._writing():
@@ -52,31 +52,31 @@ class Viewer:
             log_numbers(rr, stream, snapshot)
 
     def show_errors(self, estimate: TeamEstimate, errors: F64, known: Bool) -> None:
-        """Draw how wrong a whole run was.
+        """Draw the errors of a whole run.
 
         Args:
-            estimate: Arrays over (time, ...).
-            errors: Distances from the truth, (time, pair) [m].
-            known: Where there is one, (time, pair).
+            estimate: Estimates, arrays (time, ...).
+            errors: Position errors against the truth, (time, pair) [m].
+            known: True where the truth is known, (time, pair).
         """
         log_errors(self._rr, self._stream, TIME, estimate, errors, known)
 
     def close(self) -> None:
-        """Write what waits and end it."""
+        """Flush buffered data and close the view."""
         with self._writing():
             self._stream.flush()
             self._stream.disconnect()
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
-        """What Rerun cannot write is an error that names the file, which is removed.
+        """Convert errors of Rerun inside the context, and remove the file.
 
         Raises:
             UsageError: The disk is full, or the file cannot be written.
         """
         try:
             yield
-        except Exception as error:  # of whatever kind Rerun raises
+        except Exception as error:  # Rerun raises different types
             if self._file is not None:
                 self._file.unlink(missing_ok=True)
             raise UsageError(f"--view: cannot be written: {error}") from error
@@ -92,20 +92,20 @@ class Viewer:
     ) -> None:
         self.close()
         if error is not None and not self._styled and self._file is not None:
-            self._file.unlink(missing_ok=True)  # nothing came that could be shown
+            self._file.unlink(missing_ok=True)  # nothing was drawn
 
 
 def open_viewer(name: str, file: Path | None = None, *, browse: bool = True) -> Viewer:
-    """A view in the browser, or one that is written to a file for later.
+    """Open a view in the browser, or one that is written to a file.
 
     Args:
-        name: Of the swarm.
-        file: New; ends in ``.rrd``. None serves the view on this machine.
-        browse: Whether a browser is opened.
+        name: Name of the swarm.
+        file: New file with the suffix ``.rrd``; None serves the view on this machine.
+        browse: Whether to open a browser.
 
     Raises:
-        UsageError: Rerun is not installed, the file is there already or cannot be written, or a
-            port of the view is taken.
+        UsageError: Rerun is not installed, the file exists or cannot be written, or a network port
+            of the view is in use.
     """
     try:
         import rerun as rr
