@@ -174,8 +174,15 @@ class Constellation:
 
     @cached_property
     def antenna_offset_b(self) -> F64:
-        """Antenna positions in their node's body frame, (antenna, 3) [m]."""
-        return np.array([a.offset_b for a in self.all_antennas], dtype=np.float64)
+        """Antenna positions in their node's body frame, (antenna, 3) [m].
+
+        In the plane, nodes have no height; that of their mount is added to z.
+        """
+        offset = np.array([a.offset_b for a in self.all_antennas], dtype=np.float64)
+        if self.dimensions == 2:
+            height = np.array([node.mount.height for node in self.nodes])
+            offset[:, 2] += height[self.antenna_node]
+        return offset
 
     def antenna_index(self, node_id: int, antenna_id: int | None) -> int:
         """Array index of a node's antenna.

@@ -1,4 +1,4 @@
-"""Where on its vehicle a tracker sits, relative to the axle that cannot slip sideways."""
+"""Mount of a tracker on its vehicle: relative to the axle that cannot slip sideways, and height."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ KEYS = {
     "aside_m": "aside",
     "wheelbase_m": "wheelbase",
     "slip_s2_per_m": "slip",
+    "height_m": "height",
 }
 """Of a table ``[nodes.ID.mount]`` in meta.toml or swarm.toml, and the fields that they are."""
 
@@ -32,6 +33,10 @@ class Mount:
     slip: float | None = None
     """[s2/m] How fast that axle drifts outwards in a curve, per squared speed and yaw rate: the
     inverse of its cornering stiffness per load [1/rad] times gravity. 0 where tyres do not slip."""
+    height: float = 0.0
+    """[m] Height above the plane that a planar group moves in, of static nodes as well: ranges
+    between nodes of different heights are longer than distances in the plane. In space heights are
+    estimated, and this is not used."""
 
     def check(self, where: str) -> None:
         """See that the numbers make sense.

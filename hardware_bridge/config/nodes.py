@@ -25,6 +25,7 @@ class _Mount:
     aside_m: float = 0.0
     wheelbase_m: float | None = None
     slip_s2_per_m: float | None = None
+    height_m: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -35,9 +35,10 @@ def draw_car(car: CarParams, what: Randomisation, rng: np.random.Generator) -> C
 
 
 def draw_mounts(n: int, what: Randomisation, rng: np.random.Generator) -> F64:
-    """Where trackers sit, ahead and left of the centre of mass, (car, 2) [m]."""
+    """Draw where trackers sit: ahead and left of the centre of mass, and higher, (car, 3) [m]."""
     low, high = np.transpose([what.mount_ahead, what.mount_aside])
-    return rng.uniform(low, high, (n, 2))
+    in_plane = rng.uniform(low, high, (n, 2))
+    return np.column_stack([in_plane, rng.uniform(*what.mount_height, n)])
 
 
 def draw_imu(imu: ImuSimParams, what: Randomisation, rng: np.random.Generator) -> ImuSimParams:

@@ -53,7 +53,7 @@ class Episode:
     """By rising time."""
     car: CarParams
     mounts: F64
-    """Where trackers sit, ahead and left of the centre of mass, (car, 2) [m]."""
+    """Where trackers sit: ahead and left of the centre of mass, and higher, (car, 3) [m]."""
     imu: ImuSimParams
     mag: MagSimParams
     odometer: OdometerSimParams

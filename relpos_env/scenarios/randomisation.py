@@ -67,6 +67,9 @@ class Randomisation:
     """[m] How far the tracker of each car is ahead of its centre of mass."""
     mount_aside: Interval = NONE
     """[m] How far it is left of it."""
+    mount_height: Interval = NONE
+    """[m] How much higher its antenna is than `RadioSimParams.antenna_height`; the tracker is not
+    told."""
 
     leave_rate: Interval = NONE
     """[1/min] How often one of the cars is taken out of the room. Two always stay."""
@@ -105,6 +108,7 @@ _LIMITS: dict[str, Interval] = {
     "antenna_delay": (0.0, 10.0),
     "mount_ahead": (-1.0, 1.0),
     "mount_aside": (-1.0, 1.0),
+    "mount_height": (-1.0, 1.0),
     "leave_rate": (0.0, 60.0),
     "absence": (0.1, 3600.0),
     "power_off_rate": (0.0, 60.0),

@@ -43,7 +43,7 @@ class Sensors(NamedTuple):
     mast: Array
     """Height of the antenna over the tracker [m], (env)."""
     mount: Array
-    """Tracker ahead and left of the centre of mass [m], (env, car, 2)."""
+    """Tracker ahead and left of the centre of mass, and its antenna above `mast` [m], (env, car, 3)."""
     odometer: Array
     """ODOMETER, (env)."""
     odometer_seed: Array
@@ -85,7 +85,7 @@ def make_sensors(n_envs: int, n_cars: int, n_waves: int) -> Sensors:
         waves=np.zeros((e, n_waves, N_WAVE)),
         hard_iron=np.zeros((e, n, 3)),
         mast=np.zeros(e),
-        mount=np.zeros((e, n, 2)),
+        mount=np.zeros((e, n, 3)),
         odometer=np.zeros(e, dtype=ODOMETER),
         odometer_seed=np.zeros(e, dtype=np.uint64),
         proximity=np.zeros(e, dtype=PROXIMITY),

@@ -220,7 +220,7 @@ def place_antenna(sensors, scenes, at, heading, roll, pitch, e, n):
 
     The angles are pairs of cosine and sine, `at` is where the tracker is [m].
     """
-    before, now, h = scenes.pos0, scenes.pos1, sensors.mast[e]
+    before, now, h = scenes.pos0, scenes.pos1, sensors.mast[e] + sensors.mount[e, n, 2]
     for a in range(3):
         before[e, n, a] = now[e, n, a]
     c, s = heading

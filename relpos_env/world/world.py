@@ -163,7 +163,7 @@ class World:
         start_sensors(self._sensors, env, episode, rng)
         self.t[env] = 0.0
         self._scene.pos1[env, :, :2] = b.body[env, :, :2]
-        self._scene.pos1[env, :, 2] = self._sensors.mast[env]
+        self._scene.pos1[env, :, 2] = self._sensors.mast[env] + self._sensors.mount[env, :, 2]
         group.life = episode.events
         group.obstacles, group.car, group.size = episode.obstacles, episode.car, self.scenario.room
         group.begin(b, self._solver, env)

@@ -76,3 +76,15 @@ def test_its_accelerometer_feels_the_way_round_the_middle(runs, node):
 def test_without_randomisation_it_is_in_the_middle():
     episode = draw_episode(recordable("cars-los"), 3, 10.0, np.random.default_rng(0))
     np.testing.assert_array_equal(episode.mounts, 0.0)
+
+
+def test_antennas_at_drawn_heights_measure_the_slant():
+    """Ranges are longer between different heights; equal heights change them by the roll only."""
+    ranges = []
+    for heights in ((0.0, 0.0), (0.8, 0.8), (0.0, 0.8)):
+        drawn = Randomisation(mount_height=heights)
+        log = record(replace(recordable("cars-los"), randomisation=drawn), seconds=20.0, seed=4)
+        ranges.append(log.block.values[0, log.block.kind[0] == Kind.RANGE, 0])
+    level, raised, apart = ranges
+    assert abs(np.mean(raised - level)) < 0.01
+    assert np.mean(apart - level) > 0.015

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.exact_motion import ExactGroup
 from tests.second_world.record import record
 from tests.second_world.world import draw
 from tracking.constellation import Constellation, NodeConfig
@@ -13,6 +14,7 @@ from tracking.filters.joint import JointEkf
 from tracking.filters.joint.params import JointParams
 from tracking.filters.params import FilterParams
 from tracking.log import read_log, write_log
+from tracking.measurements import Kind
 from tracking.mount import Mount
 from tracking.tracker import Tracker, TrackerParams
 from tracking.vehicles import VEHICLES
@@ -102,3 +104,38 @@ def test_an_unknown_mount_without_states_is_noise(run):
         estimate = Tracker(who, params).run(run.block, np.array([39.0])).take(0)
         variance.append(np.trace(estimate.cov[0], axis1=-2, axis2=-1).mean())
     assert variance[0] > 1.05 * variance[1]
+
+
+HEIGHTS = (0.1, 0.9, 0.4)
+
+
+@pytest.mark.parametrize("filter", ["joint", "ekf-mds"])
+def test_given_heights_make_ranges_distances_in_the_plane(filter):
+    """Ranges over different heights: known, errors are those of one height; unknown, they grow."""
+    drive = ExactGroup("car", range(3), seconds=12.0)
+    t = np.arange(6.0, 11.8, 0.1)
+    block, ranges = drive.block, drive.block.kind[0] == Kind.RANGE
+    height, values = np.array(HEIGHTS), block.values.copy()
+    up = height[block.j[0, ranges]] - height[block.i[0, ranges]]
+    values[0, ranges, 0] = np.hypot(values[0, ranges, 0], up)
+    slanted, who = replace(block, values=values), drive.constellation
+    nodes = tuple(
+        replace(n, mount=Mount(height=h)) for n, h in zip(who.nodes, HEIGHTS, strict=True)
+    )
+
+    def shape_error(constellation, measured):
+        pos = Tracker(constellation, filter=filter).run(measured, t).take(0).pos_ij_w
+        off = np.linalg.norm(pos, axis=-1) - np.linalg.norm(drive.pairs(t), axis=-1)
+        return np.sqrt(np.mean(off**2))
+
+    level = shape_error(who, block)
+    assert shape_error(replace(who, nodes=nodes), slanted) < level + 0.01
+    assert shape_error(who, slanted) > 2.0 * level
+
+
+def test_in_space_a_height_changes_nothing():
+    nodes = tuple(
+        NodeConfig(id=k, vehicle="drone", mount=Mount(height=h)) for k, h in enumerate(HEIGHTS)
+    )
+    offset = Constellation(nodes=nodes, dimensions=3).antenna_offset_b
+    np.testing.assert_array_equal(offset, 0.0)
