@@ -1,6 +1,7 @@
 """Scenarios: rooms, obstacles, cars or people, sensors, and the randomisation of episodes.
 
-Scenarios with cars are the files in `files/`; see `docs/reference/scenarios.md`.
+Scenarios with cars are the files in `files/`; a new one needs a file there. See
+`docs/reference/scenarios.md`.
 """
 
 from __future__ import annotations

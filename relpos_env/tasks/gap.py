@@ -18,7 +18,7 @@ from relpos_env.tasks.options import half_room, points, positive
 from tracking.arrays import F64, I64, Bool
 
 APPROACH = 0.6
-"""[m] Distance from the wall to the waypoints before and behind the gap."""
+"""[m] Distance from the wall to the waypoints before and behind the gap: straight passage."""
 
 
 class Gap(Task):
@@ -105,7 +105,7 @@ class Gap(Task):
         self._lay(env, pos, queue, for_queue[far_first], self._way[:-1])
 
     def change(self, env: int, pos: F64, cars: I64, before: Bool, t: float) -> None:
-        """Queue new cars behind the last; the others get a new end of their path only."""
+        """Queue new cars behind the last; the paths of the others change at their end only."""
         travelled = self._limits[0] * t
         stay, new = cars[before[cars]], cars[~before[cars]]
         # New cars count as if they were at the arrival point, so the others keep their slots.

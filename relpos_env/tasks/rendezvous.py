@@ -74,7 +74,7 @@ class Rendezvous(Task):
         self._place[env] = goals[0]
 
     def change(self, env: int, pos: F64, cars: I64, before: Bool, t: float) -> None:
-        """Restart the time at the meeting point, which stays the same."""
+        """Restart the time within the radius; the meeting point stays the same."""
         self._since[env] = np.inf
 
     def compute(self, state: Truth, t: F64, collided: F64, start: int, stop: int) -> int:

@@ -25,7 +25,7 @@ SHARE = 0.28
 
 
 class Ring(Task):
-    """Evenly spaced slots that move counter-clockwise on a loop round the room's middle."""
+    """Evenly spaced slots that move counter-clockwise on a loop round the room; never ends."""
 
     def __init__(
         self,

@@ -64,7 +64,7 @@ def space_of(fields: tuple[Field, ...], history: int = 1) -> spaces.Box:
 
 
 def index_table(fields: tuple[Field, ...]) -> list[dict[str, Any]]:
-    """Return index range, name, unit, bounds and meaning of every field."""
+    """Return index range, name, unit, bounds and meaning of every field, for docs and cards."""
     rows, first = [], 0
     for f in fields:
         rows.append(
