@@ -1,4 +1,4 @@
-"""Classical controllers on the observations that policies get. Adding one: a file and a line."""
+"""Classical controllers on observations of policies. A new one needs a file and a line here."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ CONTROLLERS: dict[str, ControllerBuilder] = {
 
 
 def controller_builder(name: str | ControllerBuilder) -> ControllerBuilder:
-    """Look a controller up.
+    """Return the builder of a controller.
 
     Args:
         name: One of `CONTROLLERS`, ``package.module:Name``, a name among the entry points
-            ``relpos_env.controllers``, or a builder itself.
+            ``relpos_env.controllers``, or a builder.
 
     Raises:
-        EnvError: No controller of that name.
+        EnvError: There is no controller of this name.
     """
     return look_up(CONTROLLERS, name, "controller", group="relpos_env.controllers")
 

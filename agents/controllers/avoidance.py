@@ -1,18 +1,18 @@
-"""Collision avoidance from estimates: a barrier on how fast a car may close in.
+"""Collision avoidance from estimates: control barrier functions on the closing speed.
 
-With the distance d to another car in direction n, and the distance D that is kept, cars may
-approach no faster than the room that is left,
+With the distance d to another car in direction n, and the minimum distance D, the closing speed
+is limited to
 
     (v_i - v_j) . n  <=  b (d - D),
 
-so that d - D decays at the rate b at most and stays positive [1]. Both give way: each changes its
-own velocity by half of what is too much, as in [2],
+so that d - D decays at most at the rate b and stays positive [1]. Both cars give way: each changes
+its own velocity by half of the excess, as in [2],
 
     v . n  <=  (v_i . n + v_j . n + b (d - D)) / 2.
 
-Where the estimate tells a covariance, D grows with the standard deviation along n. Velocities
-wanted are pushed back by what they are beyond the bounds; since a car does not move where it wants
-at once, the speed along its heading is bounded by the same rule.
+With a covariance, D grows with the standard deviation along n. The excess over the bounds is
+subtracted from requested velocities. A car cannot change its direction of motion at once, so the
+speed along its heading has the same bounds.
 
 References:
     [1] Wang, Ames, Egerstedt, Safety barrier certificates for collisions-free multirobot systems,
@@ -33,31 +33,31 @@ from agents.controllers.clearance import ClearanceParams
 from tracking.arrays import F64
 
 ABEAM = 0.1
-"""[-] Who is off the bow by an angle whose cosine is less is neither approached nor left."""
+"""[-] Cosine of the bearing below which a car is abeam and does not bound the speed."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AvoidanceParams:
-    """How near cars may come."""
+    """Parameters of the distances between cars."""
 
     keep: float = 0.55
-    """[m] D, between centres. Two cars of 0.42 m by 0.20 m touch below 0.47 m at most."""
+    """[m] Minimum distance D between centres. Cars of 0.42 m by 0.20 m touch at 0.47 m at most."""
     keep_per_std: float = 0.5
-    """[-] D grows by so many standard deviations of the distance."""
+    """[-] Increase of D in standard deviations of the distance."""
     most_doubt: float = 0.3
-    """[m] By so much at most, or a car that is unsure would never move."""
+    """[m] Upper limit of this increase, so that a car with uncertain estimates can move."""
     rate: float = 2.0
-    """[1/s] b. Larger comes nearer before it brakes; 2.5 m/s2 of brake stop 1.25 m/s in 0.3 m."""
+    """[1/s] Rate b. Larger brakes later; a deceleration of 2.5 m/s2 stops 1.25 m/s in 0.3 m."""
     retreat: float = 0.4
-    """[m/s] A car too near backs off at most so fast."""
+    """[m/s] Maximum speed away from a car that is too near."""
     sweeps: int = 2
-    """[-] The bounds of all others are applied so often, each time those still broken."""
+    """[-] Number of passes over the bounds, each with those still violated."""
     clearance: ClearanceParams = field(default_factory=ClearanceParams)
-    """How near to what stands, where there are sensors for it."""
+    """Clearance from obstacles, for cars with distance sensors."""
 
 
 def closing_bounds(sight: Sight, params: AvoidanceParams) -> Bounds:
-    """How fast each car may go towards each other one."""
+    """Return the largest velocity of each car towards each other car."""
     distance = length(sight.pos)
     inverse = 1.0 / np.maximum(distance, TINY)
     toward = sight.pos[0] * inverse, sight.pos[1] * inverse
@@ -75,7 +75,7 @@ def closing_bounds(sight: Sight, params: AvoidanceParams) -> Bounds:
 
 
 def pushed_back(velocity: Plane, bounds: Bounds, params: AvoidanceParams) -> Plane:
-    """Velocities without what is beyond the bounds, (...) [m/s]."""
+    """Return velocities without their excess over the bounds, (...) [m/s]."""
     x, y = velocity
     to_x, to_y = bounds.toward
     for _ in range(params.sweeps):
@@ -85,9 +85,9 @@ def pushed_back(velocity: Plane, bounds: Bounds, params: AvoidanceParams) -> Pla
 
 
 def bounded_speed(speed: F64, bounds: Bounds, params: AvoidanceParams) -> F64:
-    """Speeds along the heading within the bounds, (...) [m/s].
+    """Return speeds along the heading within the bounds, (...) [m/s].
 
-    Who is between others that are too near stands.
+    The speed is 0 where the bounds ahead and behind contradict each other.
     """
     ahead = bounds.toward[0]
     share = bounds.closing / np.where(np.abs(ahead) > ABEAM, ahead, 1.0)

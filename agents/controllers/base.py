@@ -1,4 +1,4 @@
-"""What controllers see: the stretches of observations as arrays, for any number of cars at once."""
+"""Input of controllers: fields of observations as arrays, for any number of cars at once."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from tracking.arrays import F64, Bool
 from tracking.params.short_repr import short_repr
 
 TINY = 1e-9
-"""Divisions by what may be zero are by this at least."""
+"""Lower limit of divisors that may be zero."""
 
 Plane = tuple[F64, F64]
-"""Vectors in the frame of the car: components forward and to the left, of the same shape."""
+"""Vectors in the body frame: components forward and left, of the same shape."""
 
 
 @dataclass(frozen=True, slots=True)
 class Certainty:
-    """How sure positions are, each (..., other)."""
+    """Uncertainty of positions, each (..., other)."""
 
     __repr__ = short_repr
 
@@ -30,33 +30,33 @@ class Certainty:
     left: F64
     """Standard deviation to the left [m]."""
     mixed: F64
-    """Correlation of the two [-]."""
+    """Correlation of the two components [-]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sight:
-    """What cars see; leading axes are those of the observations.
+    """Perceived state of cars; leading axes are those of the observations.
 
-    Where the observation has ranges in place of positions, `pos` is the range in the direction of
-    the other's place: good where the formation is nearly right.
+    For observations with ranges instead of positions, `pos` is the range in the direction of the
+    target, which is accurate near the target formation.
     """
 
     __repr__ = short_repr
 
     ok: Bool
-    """Whose position can be used, (..., other)."""
+    """True where the position is usable, (..., other)."""
     pos: Plane
-    """Where the others are, (..., other) [m]."""
+    """Positions of the others relative to the car, (..., other) [m]."""
     vel: Plane | None
-    """Their velocities relative to the car, (..., other) [m/s]."""
+    """Velocities of the others relative to the car, (..., other) [m/s]."""
     certainty: Certainty | None
-    """None where the observation does not tell; then positions are taken for certain."""
+    """Uncertainty of `pos`; None if not observed, then positions count as exact."""
     placed: Bool
-    """To whom the task gives a place, (..., other)."""
+    """True where the task sets a target, (..., other)."""
     target: Plane
-    """Where they should be, (..., other) [m]."""
+    """Target positions of the others, (..., other) [m]."""
     command: Plane
-    """Velocity asked by the operator, (...) [m/s]."""
+    """Velocity commanded by the operator, (...) [m/s]."""
     heading: Plane
     """Cosine and sine of the own heading, zeros if unknown, (...)."""
     speed: F64
@@ -64,28 +64,28 @@ class Sight:
     steering: F64
     """Own steering angle, (...) [rad]."""
     age: F64 | None
-    """Since the range of each pair, (..., other) [s]; of ranges only."""
+    """Age of the range of each pair, (..., other) [s]; None without ranges."""
     gap: F64 | None
-    """Received less first-path power of that range, (..., other) [dB]; of ranges only."""
+    """Total minus first-path power of the range, (..., other) [dB]; None without ranges."""
     near: F64 | None = None
-    """What the distance sensors read, (..., beam) [m]; None without them."""
+    """Readings of the distance sensors, (..., ray) [m]; None without them."""
 
     @property
     def used(self) -> Bool:
-        """Known others with a place; where no car has one, as at a rendezvous, all known."""
+        """True for known others with a target; for all known if no car has one (rendezvous)."""
         return self.ok & (self.placed | ~self.placed.any(axis=-1, keepdims=True))
 
 
 class Reader:
-    """Observations of one mode, taken apart by the names of their fields."""
+    """Parser of observations of one mode, by the names of their fields."""
 
     def __init__(self, fields: tuple[Field, ...], controller: str, modes: tuple[str, ...]) -> None:
-        """Say what is read.
+        """Check the fields.
 
         Args:
-            fields: Stretches of one observation.
-            controller: Who reads, for the message.
-            modes: Names of the observations that it can read.
+            fields: Fields of one observation.
+            controller: Name of the controller in errors.
+            modes: Names of the supported observation modes.
 
         Raises:
             UsageError: The fields are those of another mode.
@@ -98,10 +98,10 @@ class Reader:
         self._where, self._size = split_fields(fields), total_size(fields)
 
     def read(self, observations: F32) -> Sight:
-        """The newest observation in each.
+        """Parse the newest of the stacked observations.
 
         Args:
-            observations: (..., history * size), the newest first.
+            observations: Observations, (..., history * size), the newest first.
 
         Raises:
             UsageError: The length is not a multiple of the fields' size.
@@ -124,7 +124,7 @@ class Reader:
             pos, vel = _plane(o, where["pos"]), _plane(o, where["vel"])
             if "std" in where:
                 first, last = where["std"].start, where["std"].stop
-                # Observations in the space, though not from the tracker, may have any numbers.
+                # Samples of the observation space may have values that trackers never report.
                 certainty = Certainty(
                     np.abs(o[..., first:last:3]),
                     np.abs(o[..., first + 1 : last : 3]),
@@ -134,7 +134,7 @@ class Reader:
             age, gap, vel = o[..., where["age"]], o[..., where["gap"]], None
             share = np.maximum(o[..., where["range"]], 0.0) / np.maximum(length(target), TINY)
             pos = share * target[0], share * target[1]
-            # No place, no direction.
+            # Without a target there is no direction.
             ok = ok & (o[..., where["wanted"]] > 0.5) & (length(target) > TINY)
         return Sight(
             ok=ok,
@@ -154,15 +154,15 @@ class Reader:
 
 
 def split_fields(fields: tuple[Field, ...]) -> dict[str, slice]:
-    """Where each named stretch of an observation stands."""
+    """Return the slice of each field of an observation, by name."""
     ends = np.cumsum([f.size for f in fields])
     return {f.name: slice(int(e) - f.size, int(e)) for f, e in zip(fields, ends, strict=True)}
 
 
 def mode_of(fields: tuple[Field, ...]) -> str:
-    """Name of the observation mode with these fields, or the fields' names if there is none.
+    """Return the name of the observation mode with these fields, or the fields' names if none.
 
-    `estimate` and `truth` have the same fields, and are `estimate` here.
+    `estimate` and `truth` have the same fields; both return `estimate`.
     """
     names = [f.name for f in fields]
     others = next((f.size for f in fields if f.name == "mask"), 0)
@@ -174,13 +174,13 @@ def mode_of(fields: tuple[Field, ...]) -> str:
 
 
 def length(vector: Plane) -> F64:
-    """Lengths of vectors."""
+    """Return the lengths of vectors."""
     lengths: F64 = np.sqrt(vector[0] * vector[0] + vector[1] * vector[1])
     return lengths
 
 
 def shortened(vector: Plane, limit: float) -> Plane:
-    """Vectors made no longer than a limit."""
+    """Return vectors scaled down to at most a maximum length."""
     share = limit / np.maximum(length(vector), limit)
     return share * vector[0], share * vector[1]
 

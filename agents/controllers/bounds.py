@@ -1,4 +1,4 @@
-"""How fast cars may go towards what they must not touch."""
+"""Bounds of the velocity towards cars and obstacles."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from tracking.params.short_repr import short_repr
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """Largest velocity towards each of several things, each (..., thing)."""
+    """Largest velocity towards each of several objects, each (..., object)."""
 
     __repr__ = short_repr
 
     toward: Plane
-    """Direction of the thing, of length 1."""
+    """Unit vector towards the object."""
     closing: F64
-    """[m/s] Own velocity in that direction at most; infinite where there is nothing."""
+    """[m/s] Maximum own velocity in the direction `toward`; infinite without an object."""
 
 
 def joined(one: Bounds, other: Bounds) -> Bounds:
-    """The bounds of both."""
+    """Return the bounds of both."""
     parts = zip((*one.toward, one.closing), (*other.toward, other.closing), strict=True)
     x, y, closing = (np.concatenate(pair, axis=-1) for pair in parts)
     return Bounds((x, y), closing)

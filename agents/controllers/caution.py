@@ -1,8 +1,8 @@
-"""Estimates that are unsure count less, in the directions in which they are.
+"""Weighting of errors by their uncertainty, per direction.
 
-An error e with covariance P counts as ``(1 + P / s^2)^-1 e``: fully if certain, half where the
-standard deviation is s. That is the posterior mean of the true error for a prior of standard
-deviation s, ridge regression on one measurement.
+An error e with covariance P is weighted as ``(1 + P / s^2)^-1 e``: fully if certain, by one half
+where the standard deviation is s. This is the posterior mean of the true error for a prior of
+standard deviation s, or ridge regression on one measurement.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from tracking.arrays import F64
 
 
 def shrunk(error: Plane, certainty: Certainty | None, trusted_std: float) -> Plane:
-    """Errors by how sure they are, (..., other) [m]; never longer than they were.
+    """Return errors weighted by their uncertainty, (..., other) [m]; never longer than before.
 
     Args:
-        error: (..., other) [m]
-        certainty: None leaves them alone.
-        trusted_std: s [m].
+        error: Position errors, (..., other) [m].
+        certainty: Uncertainty of the positions; None returns the errors unchanged.
+        trusted_std: Standard deviation s that is weighted by one half [m].
     """
     if certainty is None:
         return error
@@ -30,7 +30,7 @@ def shrunk(error: Plane, certainty: Certainty | None, trusted_std: float) -> Pla
 
 
 def spread(direction: Plane, certainty: Certainty) -> F64:
-    """Standard deviation in a direction of length 1, (..., other) [m]."""
+    """Return the standard deviation along a unit vector, (..., other) [m]."""
     x, y = direction[0] * certainty.ahead, direction[1] * certainty.left
     spread: F64 = np.sqrt(np.maximum(x * x + y * y + 2.0 * certainty.mixed * x * y, 0.0))
     return spread

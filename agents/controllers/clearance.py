@@ -1,21 +1,21 @@
-"""Keeping clear of what distance sensors see: the barrier of `avoidance`, for things that stand.
+"""Clearance from obstacles by distance sensors: the barrier of `avoidance` for static points.
 
-**Where to.** With the distance d from the body to the nearest point of a thing, in direction n, and
-the distance D that is kept,
+**Velocity.** With the distance d from the body to the nearest point of an obstacle, in direction n,
+and the minimum distance D,
 
-    v . n  <=  b (d - D):
+    v . n  <=  b (d - D).
 
-velocities wanted are pushed back by what is beyond, so that what is left of them runs along a wall.
-A thing is a beam that reads less than its neighbours.
+The excess is subtracted from requested velocities; the remainder is parallel to the wall. The bound
+applies to rays with a local minimum of the distance.
 
-**How fast.** A car is no disc, and turns as it goes: of all points those count that its body, wider
-by the margin, will meet on the arc of its wheels, after the way s. Then
+**Speed.** The body is not a disc, and it turns as it moves. With the path length s at which the
+body, enlarged by a margin, first meets a point on the arc of its wheels,
 
     |speed|  <=  b s.
 
-**Which way.** Of some arcs the one is taken that is nearest to the one wanted, counted with what it
-lacks of the way that the speed wanted needs. So a car that drives at a wall turns off along it [1],
-and one that can turn nowhere backs out with its wheels turned the other way.
+**Arc.** The arc with the least cost is selected from several candidates. The cost is the deviation
+from the requested steering angle plus a penalty for missing path length. A car that drives at a
+wall turns off along it [1]; one without a free arc backs out with opposite steering.
 
 References:
     [1] Simmons, The curvature-velocity method for local obstacle avoidance, ICRA 1996.
@@ -36,42 +36,42 @@ from relpos_env.interface.observations.base import F32
 from tracking.arrays import F64
 
 REAR = 0.156
-"""[m] From the middle of the car to its rear axle, round a point next to which it turns."""
+"""[m] Distance from the middle of the car to its rear axle, in line with the centre of turning."""
 ROLLING = 0.05
-"""[m/s] A car faster than this is in gear."""
+"""[m/s] Minimum speed at which a car counts as moving forwards or backwards."""
 WAYS = np.array([0.03, 0.06, 0.1, 0.15, 0.21, 0.28, 0.36, 0.46, 0.58, 0.72, 0.9])
-"""[m] At which it is looked what the body meets."""
+"""[m] Path lengths at which the body is checked for contacts."""
 BEFORE = np.append(0.0, WAYS[:-1])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClearanceParams:
-    """How near cars come to what stands."""
+    """Parameters of the distances from obstacles."""
 
     keep: float = 0.06
-    """[m] D, from the body. Readings are wrong by 2 cm, and commands act late."""
+    """[m] Minimum distance D from the body. Readings err by 2 cm, and commands are delayed."""
     margin: float = 0.05
-    """[m] Added to the body on all sides where it is looked what it meets."""
+    """[m] Margin on all sides of the body in the check for contacts along arcs."""
     per_gap: float = 0.1
-    """[m/rad] Both grow with the angle between beams that no beam sees: there is more to miss."""
+    """[m/rad] Increase of `keep` and `margin` per angle between sensor cones, a blind sector."""
     rate: float = 2.0
-    """[1/s] b. Larger comes nearer before it brakes."""
+    """[1/s] Rate b. Larger brakes later."""
     retreat: float = 0.2
-    """[m/s] Who is too near backs off at most so fast."""
+    """[m/s] Maximum speed away from an obstacle that is too near."""
     detour: float = 1.5
-    """[rad] To stand in place of going as fast as wanted counts like so much of steering."""
+    """[rad] Cost of an arc on which the car cannot move, as a steering angle."""
     choices: int = 7
-    """[-] Steering angles that are looked at, in either gear."""
+    """[-] Number of candidate steering angles, forwards and backwards each."""
     turn_back: float = 1.0
-    """[rad] To change the gear counts like so much of steering."""
+    """[rad] Cost of reversing the direction of travel, as a steering angle."""
     go_on: float = 0.3
-    """[rad] To go on in another gear than is wanted counts like so much."""
+    """[rad] Cost of continuing against the requested direction of travel, as a steering angle."""
     wants: float = 0.15
-    """[m/s] Who wants to go slower does not change the gear."""
+    """[m/s] Minimum requested speed at which the direction of travel may be reversed."""
 
 
 def standing_bounds(around: Surroundings, params: ClearanceParams) -> Bounds:
-    """How fast each car may go towards the nearest points of what stands; infinite for others."""
+    """Return the largest velocity towards the nearest points of obstacles; infinite for others."""
     distance, toward = around.to_body
     before, behind = np.roll(distance, 1, axis=-1), np.roll(distance, -1, axis=-1)
     nearest = (distance <= before) & (distance <= behind)
@@ -82,20 +82,20 @@ def standing_bounds(around: Surroundings, params: ClearanceParams) -> Bounds:
 
 
 def clear_way(around: Surroundings, curvature: F64, gear: F64, params: ClearanceParams) -> F64:
-    """Way that the body can go along arcs before it meets a point, (...) [m]; infinite if none.
+    """Return the path length on arcs before the body meets a point, (...) [m]; infinite if none.
 
-    A point that is within the margin from the start counts if the body comes nearer to it.
+    A point that is within the margin at the start counts if the body comes nearer to it.
 
     Args:
-        around: (..., beam), or with axes of size 1 that fit the arcs.
-        curvature: Of the arcs, positive to the left, (...) [1/m].
+        around: Points, (..., ray), or with axes of size 1 that broadcast to the arcs.
+        curvature: Curvature of the arcs, positive to the left, (...) [1/m].
         gear: 1 forwards, -1 backwards, (...).
-        params: The margin.
+        params: Parameters with the margin.
     """
     way = WAYS[:, None] * gear[..., None, None]
     turn = way * curvature[..., None, None]
     c, s = np.cos(turn), np.sin(turn)
-    # Where the middle of the car has gone, in its frame at the start: round the rear axle's centre.
+    # Displacement of the car's middle in its initial body frame; the rear axle follows the arc.
     half = 0.5 * turn
     chord = way * np.sinc(half / np.pi)
     x = chord * np.cos(half) + REAR * (c - 1.0)
@@ -106,7 +106,7 @@ def clear_way(around: Surroundings, curvature: F64, gear: F64, params: Clearance
     margin = params.margin + _unseen(around, params)
     meets = there < np.minimum(margin, here - 1e-3)
     met = meets.any(axis=-1)
-    # The way before the first at which something is met.
+    # The last checked path length before the first contact.
     clear: F64 = np.where(met.any(axis=-1), BEFORE[met.argmax(axis=-1)], np.inf)
     return clear
 
@@ -114,14 +114,14 @@ def clear_way(around: Surroundings, curvature: F64, gear: F64, params: Clearance
 def clear_arc(
     around: Surroundings, sight: Sight, actions: F32, wheelbase: float, params: ClearanceParams
 ) -> None:
-    """Replace actions by such as meet nothing, in place.
+    """Replace actions by the collision-free arcs of least cost, in place.
 
     Args:
-        around: What stands.
-        sight: Own motion is used.
-        actions: (..., 2), see `agents.driver.Driver`.
-        wheelbase: [m]
-        params: How near.
+        around: Points on obstacles.
+        sight: Perceived state; the own motion is used.
+        actions: Actions, (..., 2), see `agents.driver.Driver`.
+        wheelbase: Wheelbase [m].
+        params: Distances and costs.
     """
     speed, angle = actions[..., 0] * MAX_SPEED, actions[..., 1] * MAX_STEERING
     fastest = np.abs(speed)
@@ -135,7 +135,7 @@ def clear_arc(
     ways = clear_way(wide, np.tan(choices) / wheelbase, gears, params)
     needed = fastest[..., None] / params.rate
     lacks = np.maximum(needed - ways, 0.0) / np.maximum(needed, TINY)
-    # Backwards the wheels turn the bow to where it should go if they are turned the other way.
+    # In reverse, opposite steering turns the bow in the requested direction.
     side = np.where(angle >= 0.0, -MAX_STEERING, MAX_STEERING)
     off = np.abs(choices - np.where(same, angle[..., None], side[..., None]))
     rolling = sight.speed * gear < -ROLLING
@@ -149,13 +149,13 @@ def clear_arc(
 
 
 def _unseen(around: Surroundings, params: ClearanceParams) -> float:
-    """What distances grow by for the gaps between beams [m]."""
+    """Return the increase of distances for the angles between sensor cones [m]."""
     beams: int = around.ahead.shape[-1]
     return params.per_gap * max(2.0 * pi / beams - 2.0 * HALF_CONE, 0.0)
 
 
 def _outside(x: F64, y: F64) -> F64:
-    """Distance of points from the body, in its frame [m]."""
+    """Return the distance of points in the body frame from the body [m]."""
     dx = np.maximum(np.abs(x) - HALF_LENGTH, 0.0)
     dy = np.maximum(np.abs(y) - HALF_WIDTH, 0.0)
     distance: F64 = np.sqrt(dx * dx + dy * dy)

@@ -1,4 +1,4 @@
-"""From a correction of the commanded velocity to actions: what all controllers share."""
+"""Base of all controllers: actions from a correction of the commanded velocity."""
 
 from __future__ import annotations
 
@@ -22,52 +22,52 @@ from relpos_env.interface.observations.base import F32
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CorrectingParams:
-    """How hard cars pull, and what holds them back."""
+    """Gains and limits of the correction."""
 
     gain_ahead: float = 1.5
     """[1/s] Velocity per error along the car."""
     gain_left: float = 1.2
-    """[1/s] Velocity per error across it."""
+    """[1/s] Velocity per error across the car."""
     max_correction: float = 0.9
     """[m/s] Largest correction of the commanded velocity."""
     trusted_std: float = 0.3
-    """[m] s: what is as unsure as this counts half, for positions in each direction."""
+    """[m] Standard deviation s at which a position error is weighted by one half, per direction."""
     steering: SteeringParams = field(default_factory=SteeringParams)
-    """The car, and how it pursues."""
+    """Parameters of the car and of path pursuit."""
     avoidance: AvoidanceParams = field(default_factory=AvoidanceParams)
-    """How near cars may come."""
+    """Parameters of collision avoidance."""
 
 
 P = TypeVar("P", bound=CorrectingParams)
 
 
 class Correcting(ABC, Generic[P]):
-    """A `agents.driver.Driver` that follows the command with a correction."""
+    """An `agents.driver.Driver` that follows the command with a correction."""
 
     name: ClassVar[str]
-    """For messages."""
+    """Name in errors."""
     observations: ClassVar[tuple[str, ...]]
-    """Modes that it can read."""
+    """Supported observation modes."""
 
     def __init__(self, fields: tuple[Field, ...], params: P) -> None:
-        """Say what is read.
+        """Check the fields.
 
         Args:
-            fields: Stretches of an observation.
-            params: How hard cars pull.
+            fields: Fields of an observation.
+            params: Gains and limits.
 
         Raises:
-            UsageError: The observation is of a mode that it cannot read.
+            UsageError: The observation mode is not supported.
         """
         self._reader = Reader(fields, self.name, self.observations)
         self.params = params
 
     @abstractmethod
     def correction(self, sight: Sight) -> Plane:
-        """What is added to the commanded velocity, (...) [m/s]."""
+        """Return the velocity that is added to the command, (...) [m/s]."""
 
     def act(self, observations: F32) -> F32:
-        """Actions, (..., 2), see `agents.driver.Driver`."""
+        """Return the actions, (..., 2), see `agents.driver.Driver`."""
         p, sight = self.params, self._reader.read(observations)
         return corrected(sight, self.correction(sight), p.max_correction, p.steering, p.avoidance)
 
@@ -79,14 +79,14 @@ def corrected(
     steering: SteeringParams,
     avoidance: AvoidanceParams,
 ) -> F32:
-    """Actions of cars that follow the command, corrected to keep their distance, (..., 2).
+    """Return the actions for a corrected command with collision avoidance, (..., 2).
 
     Args:
-        sight: What they see.
-        correction: (...) [m/s]
+        sight: Perceived state.
+        correction: Correction of the commanded velocity, (...) [m/s].
         most: Largest correction [m/s].
-        steering: The car, and how it pursues.
-        avoidance: How near cars may come.
+        steering: Parameters of the car and of path pursuit.
+        avoidance: Parameters of collision avoidance.
     """
     x, y = shortened(correction, most)
     bounds, around = closing_bounds(sight, avoidance), surroundings(sight)
@@ -97,7 +97,7 @@ def corrected(
     actions = search(sight, drive(sight, wanted, bounds, steering, avoidance))
     if around is not None:
         clear_arc(around, sight, actions, steering.wheelbase, avoidance.clearance)
-        # Another arc than was wanted may lead to other cars.
+        # The new arc may lead to other cars.
         speed = bounded_speed(MAX_SPEED * actions[..., 0].astype(np.float64), bounds, avoidance)
         actions[..., 0] = np.clip(speed / MAX_SPEED, -1.0, 1.0)
     return actions

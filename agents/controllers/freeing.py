@@ -1,10 +1,10 @@
-"""What is not seen: without distance sensors a car finds walls and boxes with its bumper.
+"""Recovery of cars blocked by obstacles, which cannot be perceived without distance sensors.
 
-A car that the operator sends somewhere, that does not move though it wants to, and whose wheels are
-already turned as they should be, is taken for blocked; one that has just started still has its
-wheels straight. It backs out with its wheels as they are, which turns the bow from what is in the
-way, until it has reached some speed; the speed and the lock of its wheels tell it that it is
-backing out. Then it tries again, from elsewhere and with another heading.
+A car counts as blocked if it has a command, is at rest despite a requested speed, and its wheels
+have the requested angle; the wheels of a car that has just started are still straight. It backs out
+with its wheels at full lock on the same side, which turns the bow away from the obstacle, until it
+reaches a given speed. Its speed and its steering angle identify the manoeuvre, which needs no
+memory. It then tries again from another pose.
 """
 
 from __future__ import annotations
@@ -19,25 +19,25 @@ from relpos_env.interface.actions import MAX_STEERING
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FreeingParams:
-    """How a car backs out."""
+    """Parameters of the recovery of blocked cars."""
 
     speed: float = 1.0
-    """[m/s] Backing out ends at 0.7 of this. Larger gets farther away; 0 never backs out."""
+    """[m/s] Commanded speed; backing out ends at 0.7 of it. Larger moves farther; 0 disables."""
     sent: float = 0.5
-    """[m/s] Commands faster than this send a car somewhere."""
+    """[m/s] Minimum command of the operator for a recovery."""
     still: float = 0.02
-    """[m/s] Slower is standing. Larger finds obstacles sooner, and some where there are none."""
+    """[m/s] Speed below which a car is at rest. Larger detects more obstacles, also false ones."""
     wants: float = 0.15
-    """[m/s] Less is no attempt to move."""
+    """[m/s] Minimum requested speed that counts as an attempt to move."""
 
 
 def back_out(sight: Sight, else_do: Plane, params: FreeingParams) -> Plane:
-    """Speed [m/s] and steering angle [rad] of cars, each (...).
+    """Return speed [m/s] and steering angle [rad] with the recovery of blocked cars, each (...).
 
     Args:
-        sight: Own motion and command are used.
+        sight: Perceived state; own motion and command are used.
         else_do: Speed and steering angle of cars that are not blocked.
-        params: How.
+        params: Parameters of the recovery.
     """
     speed, angle = else_do
     gear, side = np.sign(speed), np.sign(angle)

@@ -1,21 +1,21 @@
-"""Range-only: each car goes down the gradient of the squared errors of distances.
+"""Range-only control: each car descends the gradient of the squared distance errors.
 
     u_i = command + K / n sum_j w_j (d_ij - d_ij*) n_ij,   d_ij n_ij = p_j - p_i
 
 with the distance d and the direction n of each other car: the gradient of
-``sum_j (d_ij - d_ij*)^2 / 2`` with respect to p_i [1], with the operator's command fed forward.
-Distances say nothing of a rotation of the whole formation, nor of its mirror image:
-both stay as they come about, and only the command, which turns with the plan, speaks against them.
+``sum_j (d_ij - d_ij*)^2 / 2`` with respect to p_i [1], with the operator's command as feedforward.
+Distances do not depend on a rotation or reflection of the whole formation, so neither is corrected;
+only the command, which turns with the plan, counteracts them.
 
-From estimates and the truth, d and n are those of the positions. In the mode `ranges` there is no
-direction: n is that of the other's *place*, which the heading turns into the frame of the car. That
-is right to first order where the formation is nearly right (and does hold its orientation as far as
-single pairs can), and wrong by the bearing error elsewhere. Rates of ranges in a history are not
-used: which rate is wanted is not told.
+In modes with positions, d and n are those of the positions. The mode `ranges` has no direction: n
+is that of the other's *target* in the body frame. It is correct to first order near the target
+formation (where it also keeps the orientation, as far as single pairs can), and wrong by the
+bearing error elsewhere. Range rates from stacked observations are not used, since there is no
+target rate.
 
-The weight w = 1 / (1 + (sigma / s)^2) falls with the standard deviation of the distance: that of
-the estimate along n, or of a range by its age and by the power gap that obstacles leave. Without a
-covariance it is 1.
+The weight w = 1 / (1 + (sigma / s)^2) decreases with the standard deviation of the distance: that
+of the estimate along n, or that of a range by its age and its power difference, which indicates
+NLOS. In modes with positions but without a covariance, w is 1.
 
 References:
     [1] Krick, Broucke, Francis, Stabilisation of infinitesimally rigid formations of multi-robot
@@ -37,38 +37,38 @@ from tracking.arrays import F64
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RangeOnlyParams(CorrectingParams):
-    """How hard cars pull."""
+    """Parameters of the range-only controller."""
 
     range_std: float = 0.1
-    """[m] Of a range in sight, new."""
+    """[m] Standard deviation of a new LOS range."""
     nlos_gap: float = 6.0
-    """[dB] Power gap from which a range is taken for one behind an obstacle."""
+    """[dB] Power difference above which a range counts as NLOS."""
     nlos_std: float = 0.3
-    """[m] Of such a range."""
+    """[m] Standard deviation of a new NLOS range."""
     drift: float = 0.3
-    """[m/s] A range is as unsure as this times its age."""
+    """[m/s] Increase of a range's standard deviation with its age."""
     doubt: float = 1.0
-    """[-] Of ranges: a distance is also as unsure as this times its error, since then the other is
-    not in the direction of its place. Without it cars drive each other away."""
+    """[-] Increase of a range's standard deviation with its error, since the other car is then not
+    in the direction of its target. With 0 cars drive each other away."""
 
 
 class RangeOnly(Correcting[RangeOnlyParams]):
-    """Formation by distances."""
+    """Controller by distances."""
 
     name = "range-only"
     observations = ("estimate", "estimate_cov", "ranges", "truth")
 
     def __init__(self, fields: tuple[Field, ...], params: RangeOnlyParams | None = None) -> None:
-        """See `Correcting`; by default the parameters are those of their class."""
+        """Check the fields, see `Correcting`; None uses the default parameters."""
         super().__init__(fields, params or RangeOnlyParams())
 
     def correction(self, sight: Sight) -> Plane:
-        """See the head of this file."""
+        """Return the correction, see the module's docstring."""
         return correction(sight, self.params)
 
 
 def correction(sight: Sight, params: RangeOnlyParams) -> Plane:
-    """Velocity that brings the distances to what they should be, (...) [m/s]."""
+    """Return the velocity that brings the distances to their targets, (...) [m/s]."""
     used = sight.used
     distance = length(sight.pos)
     inverse = 1.0 / np.maximum(distance, TINY)
@@ -83,13 +83,13 @@ def correction(sight: Sight, params: RangeOnlyParams) -> Plane:
 
 
 def _std(sight: Sight, toward: Plane, params: RangeOnlyParams) -> F64:
-    """Standard deviations of the distances, (..., other) [m]."""
+    """Return the standard deviations of the distances, (..., other) [m]."""
     if sight.certainty is not None:
         return spread(toward, sight.certainty)
     if sight.age is None or sight.gap is None:
         return np.zeros_like(toward[0])
     base = np.where(sight.gap > params.nlos_gap, params.nlos_std, params.range_std)
-    # The direction is that of the place: the farther off the distance is, the less it holds.
+    # The direction is that of the target: the larger the distance error, the less it holds.
     doubt = params.doubt * np.abs(length(sight.pos) - length(sight.target))
     std: F64 = base + params.drift * sight.age + doubt
     return std

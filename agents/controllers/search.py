@@ -1,4 +1,4 @@
-"""Trackers find each other by motion: without a command, a car that knows no other drives about."""
+"""Excitation manoeuvre of cars without estimates or command: trackers need motion to converge."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from relpos_env.interface.actions import MAX_SPEED
 from relpos_env.interface.observations.base import F32
 
 SENT = 0.3
-"""[m/s] Who is sent faster than this moves enough."""
+"""[m/s] Commands from this speed on need no excitation manoeuvre."""
 SPEED = 0.6
-"""[m/s] Of the search."""
+"""[m/s] Speed of the excitation manoeuvre."""
 ARC = pi / 4
-"""[rad] Turned by so much, a searching car changes its gear; an even part of a full turn."""
+"""[rad] Heading change per stroke, forwards and backwards; an even fraction of a full turn."""
 
 
 def search(sight: Sight, actions: F32) -> F32:
-    """Actions with those replaced of cars that search, in place, (..., 2).
+    """Replace the actions of cars without estimates and command, in place, (..., 2).
 
-    They turn in little room, always the same way round, and know by their heading which gear is
-    due. A car that does not know its heading follows the command, and so does one that sees ranges:
-    it would hear of others without a search.
+    The cars alternate between forward and backward arcs in little space, always turning left; the
+    heading selects the direction of travel. Cars without a known heading, or with observations of
+    ranges, which arrive without excitation, keep their actions.
     """
     if sight.age is not None:
         return actions

@@ -1,14 +1,14 @@
-"""Places aside of the car: within its turning circle, where no arc leads.
+"""Three-point turns to points inside the turning circle, which no arc reaches.
 
-A car reaches a point at distance d and angle e off the bow on an arc of radius ``d / (2 sin e)``,
-so with the least radius R only if
+A car reaches a point at distance d and bearing e on an arc of radius ``d / (2 sin e)``, so with the
+minimum radius R only if
 
     |sin e| <= d / 2R.
 
-Else it first goes the other way with its wheels turned from the point. That turns the bow towards a
-point ahead, or the stern towards one behind, and makes d larger, until an arc leads there: the
-first stroke of a three-point turn, each stroke no longer than it must be. It is done only by cars
-that the operator does not send anywhere: for those that are on the way, turning on is faster.
+Otherwise it first drives in the opposite direction with its wheels turned away from the point. This
+turns the bow to a point ahead, or the stern to one behind, and increases d until an arc reaches the
+point: the first stroke of a three-point turn, no longer than necessary. Only cars without a command
+shunt; with a command it is faster to keep turning.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from tracking.arrays import F64
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ShuntingParams:
-    """When cars shunt."""
+    """Parameters of three-point turns."""
 
     below: float = 0.45
-    """[m/s] Velocity wanted: faster is farther than the turning circle. 0 never shunts."""
+    """[m/s] Requested velocity below which the target is in the turning circle. 0 disables."""
     unsent: float = 0.3
-    """[m/s] Commands below this are none."""
+    """[m/s] Commands below this count as none."""
     horizon: float = 1.4
-    """[s] d per velocity wanted: the inverse of the gain."""
+    """[s] Distance d per requested velocity: the inverse of the gain."""
     speed: float = 0.25
-    """[m/s] Of the stroke."""
+    """[m/s] Speed of the stroke."""
     until: float = 0.5
-    """[-] Under way the stroke goes on until sin e is this share of what would do."""
+    """[-] A stroke under way ends when sin e is this fraction of its limit d / 2R."""
 
 
 def shunt(
@@ -47,19 +47,19 @@ def shunt(
     wheelbase: float,
     params: ShuntingParams,
 ) -> Plane:
-    """Speed [m/s] and steering angle [rad] of cars, each (...).
+    """Return speed [m/s] and steering angle [rad] with three-point turns, each (...).
 
     Args:
-        sight: Own motion and command are used.
-        speed: Wanted, (...) [m/s].
-        direction: Wanted, cosine and sine off the bow, (...).
-        else_do: Speed and steering angle of cars that need not shunt.
-        wheelbase: [m]
-        params: When.
+        sight: Perceived state; own motion and command are used.
+        speed: Requested speed, (...) [m/s].
+        direction: Cosine and sine of the requested bearing, (...).
+        else_do: Speed and steering angle of cars that need no three-point turn.
+        wheelbase: Wheelbase [m].
+        params: Parameters of three-point turns.
     """
     c, s = direction
     rolling = np.where(np.abs(sight.speed) < 0.05, 0.0, np.sign(sight.speed))
-    # Who has begun a stroke does not change his mind for a point that is abeam.
+    # Hysteresis: a stroke under way keeps its direction for a point that is abeam.
     gear = np.where(c > 0.2 * rolling, -1.0, 1.0)
     enough = (0.5 * params.horizon * tan(MAX_STEERING) / wheelbase) * speed
     enough = np.where(rolling == gear, params.until, 1.0) * enough

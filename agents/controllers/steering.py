@@ -1,14 +1,14 @@
-"""From the velocity that is wanted to speed and steering of a car that cannot move sideways.
+"""Speed and steering of a nonholonomic car from a requested velocity.
 
-The car steers along the circle through a point at distance L in the wanted direction, which is at
-the angle e off the bow (pure pursuit [1]),
+The car steers along the circle through a point at distance L in the requested direction, at the
+bearing e (pure pursuit [1]),
 
     curvature = 2 sin(e) / L,   steering = atan(wheelbase curvature),
 
-so that e decays with the time constant L / 2v; with L in proportion to v it is the same at all
-speeds, and with the delay it makes up the lookahead of the plan. What lies behind is pursued
-backwards, as if rear were front. Commands act late: e is counted from the heading which the car
-will have when they do, by its own speed and steering angle.
+so that e decays with the time constant L / 2v. With L in proportion to v the time constant is the
+same at all speeds; the lookahead of the plan compensates it and the delay. Points behind the car
+are pursued in reverse. Commands are delayed, so e is relative to the heading predicted for the time
+when they act, from the car's own speed and steering angle.
 
 References:
     [1] Coulter, Implementation of the pure pursuit path tracking algorithm, CMU-RI-TR-92-01.
@@ -30,37 +30,37 @@ from relpos_env.interface.actions import MAX_SPEED, MAX_STEERING
 from relpos_env.interface.observations.base import F32
 
 REVERSE_FROM, FORWARD_AGAIN = cos(radians(120.0)), cos(radians(100.0))
-"""Cosines of the angle off the bow beyond which a car goes backwards: one that rolls forwards, and
-one that rolls backwards already."""
+"""Cosines of the bearing beyond which a car drives backwards: for a car that does not yet, and for
+one that already does."""
 ROLLING = 0.05
-"""[m/s] A car faster than this is in gear."""
+"""[m/s] Minimum speed at which a car counts as moving."""
 MOST_TURN = 0.5
-"""[rad] A car turns by so much at most before a command acts."""
+"""[rad] Upper limit of the predicted rotation before a command acts."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SteeringParams:
-    """The car, and how it pursues."""
+    """Parameters of the car and of path pursuit."""
 
     wheelbase: float = 0.30
-    """[m]"""
+    """[m] Wheelbase."""
     reach: float = 0.6
-    """[s] L / v. Shorter turns faster, and swings sooner."""
+    """[s] Lookahead distance L divided by v. Smaller turns faster, and oscillates sooner."""
     least_reach: float = 0.3
-    """[m] L at least."""
+    """[m] Minimum lookahead distance L."""
     delay: float = 0.1
-    """[s] Until a command acts: half a decision, and the lags of servo and tyres."""
+    """[s] Delay of commands: half a control period, and the lags of servo and tyres."""
     start: float = 0.12
-    """[m/s] A car that stands stays while less than this is wanted. Larger rests sooner, with a
+    """[m/s] Minimum requested velocity for a car at rest to start. Larger rests sooner, with a
     larger error."""
     stop: float = 0.05
-    """[m/s] A car that rolls stops when less than this is wanted."""
+    """[m/s] Requested velocity below which a moving car stops."""
     slowest: float = 0.25
-    """[-] Share of the speed that is left, however far off the bow."""
+    """[-] Minimum speed factor at large bearings."""
     shunting: ShuntingParams = field(default_factory=ShuntingParams)
-    """Places aside of the car."""
+    """Parameters of three-point turns."""
     freeing: FreeingParams = field(default_factory=FreeingParams)
-    """What was not seen."""
+    """Parameters of the recovery of blocked cars."""
 
 
 def drive(
@@ -70,14 +70,14 @@ def drive(
     params: SteeringParams,
     avoidance: AvoidanceParams,
 ) -> F32:
-    """Actions of cars that want velocities, (..., 2).
+    """Return the actions for requested velocities, (..., 2).
 
     Args:
-        sight: Own motion is used.
-        velocity: Wanted, (...) [m/s].
-        bounds: What the speed is held within.
-        params: The car.
-        avoidance: What the bounds are from.
+        sight: Perceived state; own motion and command are used.
+        velocity: Requested velocity, (...) [m/s].
+        bounds: Bounds of the speed.
+        params: Parameters of the car and of path pursuit.
+        avoidance: Parameters that the bounds were computed with.
     """
     speed = length(velocity)
     stands = speed < np.where(np.abs(sight.speed) < ROLLING, params.start, params.stop)
@@ -85,7 +85,7 @@ def drive(
     direction = _turned(sight, (velocity[0] * inverse, velocity[1] * inverse), params)
     c, s = direction
     back = c < np.where(sight.speed < -ROLLING, FORWARD_AGAIN, REVERSE_FROM)
-    # To go backwards along a circle the wheels point to the side on which its middle is.
+    # In reverse, the wheels also point to the side of the circle's centre.
     c = np.where(back, -c, c)
     bend = np.where(c > 0.0, s, np.sign(s))
     rolls = np.where(back, -speed, speed) * np.maximum(c, params.slowest)
@@ -103,10 +103,10 @@ def drive(
 
 
 def _turned(sight: Sight, direction: Plane, params: SteeringParams) -> Plane:
-    """Directions in the frame that the car will have when commands act."""
+    """Return directions in the body frame predicted for the time when commands act."""
     turn = (params.delay / params.wheelbase) * sight.speed * sight.steering
     turn = np.minimum(np.maximum(turn, -MOST_TURN), MOST_TURN)
-    # By atan(turn), which is as good for small angles and has the exact symmetry of sides.
+    # Rotation by atan(turn): equal for small angles, and exactly symmetric in left and right.
     share = 1.0 / np.sqrt(1.0 + turn * turn)
     c, s = direction
     return share * (c + turn * s), share * (s - turn * c)

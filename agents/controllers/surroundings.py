@@ -1,14 +1,14 @@
-"""What the distance sensors tell: points on walls, boxes and cars that no other source reports.
+"""Points on walls, boxes and cars from distance sensors.
 
-A beam is a cone, and its reading does not say where in it the nearest surface is. Where the
-neighbour on one side reads less, the surface slants towards that side, and so does the point: for a
+A sensor has a cone, and its reading does not contain the direction of the nearest surface in it. If
+the neighbour on one side reads less, the surface is slanted, and the point is on that side: for a
 flat wall, whose distance is h / cos(a) in a direction a off its normal, the difference of the
-neighbours at the angles +-b gives a by
+neighbours at the angles +-b determines a by
 
     (r_right - r_left) / r  =  2 tan(a) tan(b),
 
-held within the cone. Points near another car whose position is known belong to that car, which is
-avoided as such.
+limited to the cone. Points near a car with a known position are left out: that car is avoided by
+its estimate.
 """
 
 from __future__ import annotations
@@ -24,33 +24,33 @@ from tracking.arrays import F64
 from tracking.params.short_repr import short_repr
 
 HALF_LENGTH, HALF_WIDTH = 0.21, 0.10
-"""[m] Of a car."""
+"""[m] Half length and half width of a car."""
 HALF_CONE = radians(13.5)
-"""[rad] Of a beam."""
+"""[rad] Half angle of a sensor's cone."""
 BELONGS = 0.45
-"""[m] Points so near to the middle of a known car are of its body, its estimate in error."""
+"""[m] Distance from the estimated middle of a car within which points belong to its body."""
 REACH = 0.9 * FARTHEST
-"""[m] What is farther is in no car's way."""
+"""[m] Readings above this are ignored."""
 ENOUGH = 6
-"""[-] With fewer beams the neighbours of one say nothing of it."""
+"""[-] Minimum number of sensors for the slant from neighbouring readings."""
 NOTHING = 1e3
-"""[m] Where points stand that there are not."""
+"""[m] Coordinates of missing points."""
 
 
 @dataclass(frozen=True, slots=True)
 class Surroundings:
-    """Points that are in the way, `NOTHING` away where there is none, each (..., beam)."""
+    """Points on obstacles, at `NOTHING` where there is none, each (..., ray)."""
 
     __repr__ = short_repr
 
     ahead: F64
-    """[m] From the middle of the car."""
+    """[m] Forward distance from the middle of the car."""
     left: F64
-    """[m]"""
+    """[m] Distance to the left of the middle of the car."""
 
     @property
     def to_body(self) -> tuple[F64, Plane]:
-        """Distances [m] from the body of the car, and directions of length 1; (..., beam)."""
+        """Distances [m] from the body of the car, and unit vectors to the points; (..., ray)."""
         x = self.ahead - np.clip(self.ahead, -HALF_LENGTH, HALF_LENGTH)
         y = self.left - np.clip(self.left, -HALF_WIDTH, HALF_WIDTH)
         distance = np.sqrt(x * x + y * y)
@@ -59,7 +59,7 @@ class Surroundings:
 
 
 def surroundings(sight: Sight) -> Surroundings | None:
-    """What the beams of cars see; None without beams."""
+    """Return the points measured by the distance sensors of cars; None without sensors."""
     if sight.near is None:
         return None
     near, n = sight.near, sight.near.shape[-1]

@@ -1,7 +1,7 @@
-"""Trained policies: what they see, how they lie on disk, and how they are run.
+"""Trained policies: observation layout, files, and inference.
 
-A policy is two files, ``name.onnx`` and its card ``name.json``. Nothing here unpickles, and
-running one needs neither torch nor Stable-Baselines3.
+A policy is two files, ``name.onnx`` and its model card ``name.json``. Nothing is unpickled, and
+inference needs neither torch nor Stable-Baselines3.
 """
 
 from __future__ import annotations

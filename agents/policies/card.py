@@ -1,8 +1,7 @@
-"""The card of a policy: what it sees, what its actions mean, where it comes from, what it reached.
+"""Model card of a policy: observation layout, meaning of actions, training, and results.
 
-A card is strict: a key that is missing or unknown, a value of a wrong type and a layout that is
-not that of this version are refused, so that a policy never runs on numbers that mean something
-else.
+Parsing is strict: missing or unknown keys, values of a wrong type and layouts of other versions
+are refused, so that a policy never runs on observations with another meaning.
 """
 
 from __future__ import annotations
@@ -21,9 +20,9 @@ from relpos_env.interface.actions import MAX_SPEED, MAX_STEERING
 from relpos_env.timing import DECISION
 
 FORMAT = 1
-"""The version of the card that is written and read."""
+"""Version of the card's format."""
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
-"""What a policy may be called."""
+"""Permitted names of policies."""
 NAME_TEXT = "a name of letters, digits, '.', '-' and '_', 64 at most, a letter or digit first"
 HASH = re.compile(r"[0-9a-f]{64}")
 KEYS = (
@@ -39,32 +38,32 @@ INDEX_KEYS: dict[str, type] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Card:
-    """What is known of a policy in addition to its network."""
+    """Metadata of a policy's network."""
 
     name: str
-    """Letters, digits, dots, hyphens and underscores, 64 at most."""
+    """Name: letters, digits, dots, hyphens and underscores, 64 at most."""
     layout: Layout
-    """Of the observations that the network takes."""
+    """Layout of the network's observations."""
     onnx_sha256: str = ""
-    """SHA-256 of the file with the network, in hexadecimal; filled in where it is written."""
+    """SHA-256 of the network's file, in hexadecimal; set by `write_policy`."""
     actions: str = "continuous"
-    """The kind of actions; there is no other yet."""
+    """Action mode; only `continuous` is supported."""
     max_speed: float = MAX_SPEED
-    """[m/s] What an action of 1 asks for."""
+    """[m/s] Speed of an action of 1."""
     max_steering: float = MAX_STEERING
-    """[rad] What an action of 1 asks for; left is +."""
+    """[rad] Steering angle of an action of 1; left is positive."""
     decision: float = DECISION
-    """[s] From one action to the next."""
+    """[s] Control period."""
     training: dict[str, Any]
-    """Command, configuration, seed, frames, versions: what the trainer writes."""
+    """Record of the trainer: command, configuration, seed, frames, versions."""
     results: tuple[dict[str, Any], ...] = ()
     """Records of evaluations."""
 
     def to_json(self) -> str:
-        """The text of the card's file.
+        """Return the text of the card's file.
 
         Raises:
-            PolicyError: Something in it is no JSON, or not what a card may hold.
+            PolicyError: A value is not JSON, or not permitted in a card.
         """
         record = {
             "format": FORMAT,
@@ -99,14 +98,14 @@ class Card:
         """Read a card.
 
         Args:
-            text: Of its file.
-            where: What it is called in errors.
+            text: Text of the file.
+            where: Name of the card in errors.
 
         Raises:
-            PolicyError: It is no card, of another version, or of a layout that is not this one's.
+            PolicyError: The text is not a card, or its version or layout is another.
         """
         card = Reader(parse_json(text, where), where)
-        # The version comes first: the keys of others are not known.
+        # The version is checked first: the keys of other versions are not known.
         card.has("format")
         version = card.whole("format")
         if version != FORMAT:
@@ -128,17 +127,17 @@ class Card:
 
 
 def check_name(name: str, option: str) -> None:
-    """See that a policy may be called so, before any work is done for it.
+    """Check the name of a policy, before any work is done for it.
 
     Raises:
-        UsageError: It may not; the option is named.
+        UsageError: The name is not permitted; names the option.
     """
     if not NAME.fullmatch(name):
         raise UsageError(f"{option}: expected {NAME_TEXT}, for the policy; got {name!a}")
 
 
 def _layout(part: Reader) -> Layout:
-    """The layout, if this version has the same."""
+    """Return the layout, checked to equal that of this version."""
     index = part.mappings("index")
     for k, row in enumerate(index):
         reader = Reader(row, f"{part.path('index')}[{k}]", inside=True)

@@ -1,4 +1,4 @@
-"""Why a policy is refused."""
+"""Errors of policies."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ class PolicyError(UsageError):
     """A policy that cannot be used; the message is ``file: reason``."""
 
     def __init__(self, where: str | Path, reason: str) -> None:
-        """Say which and why.
+        """Build the message.
 
         Args:
-            where: The file, or the name of the policy.
-            reason: What was expected and what came.
+            where: File, or name of the policy.
+            reason: Expected and actual value.
         """
-        # Names of files may hold anything; what is printed must not.
+        # File names may contain control characters, which must not be printed.
         shown = str(where).encode("unicode_escape", "replace").decode("ascii")
         super().__init__(f"{shown}: {reason}")
         self.where = str(where)
         self.reason = reason
 
     def __reduce__(self) -> tuple[type[PolicyError], tuple[str, str]]:
-        """For other processes: made again from both arguments, not from the message."""
+        """Support pickling: rebuild from both arguments, not from the message."""
         return PolicyError, (self.where, self.reason)

@@ -1,4 +1,4 @@
-"""Where the two files of a policy are, and reading them without trusting what they are."""
+"""Search for the two files of a policy, and safe reading of untrusted files."""
 
 from __future__ import annotations
 
@@ -9,29 +9,29 @@ from pathlib import Path
 from agents.policies.errors import PolicyError
 
 SHIPPED = Path(__file__).with_name("shipped")
-"""Policies that come with the package; what is in the folder is known by its name."""
+"""Folder of the package's policies, which are found by name."""
 PICKLES = (".zip", ".pkl", ".pickle", ".pt", ".pth", ".ckpt", ".joblib", ".npy", ".npz")
-"""Files of trainers, in which there may be code that runs when they are loaded."""
+"""Suffixes of trainers' files, which may execute code when they are loaded."""
 UNSAFE = "may execute code when it is loaded and is not opened; use `relpos export`"
 MOST_NETWORK = 50 << 20
-"""[byte] A network is no larger."""
+"""[byte] Maximum size of a network."""
 MOST_CARD = 1 << 20
-"""[byte] A card is no larger."""
+"""[byte] Maximum size of a card."""
 
 
 def shipped_names() -> list[str]:
-    """Names of the policies that come with the package."""
+    """Return the names of the policies of the package."""
     return sorted(path.stem for path in SHIPPED.glob("*.onnx"))
 
 
 def find_policy(wanted: str | Path) -> tuple[Path, Path]:
-    """Network and card of a policy.
+    """Return the paths of the network and the card of a policy.
 
     Args:
-        wanted: One of the two, a folder with one policy, or the name of one that is shipped.
+        wanted: One of the two files, a folder with one policy, or the name of a shipped policy.
 
     Raises:
-        PolicyError: There is none, or something that is not opened.
+        PolicyError: There is no such policy, or a file of another type.
     """
     if str(wanted) in shipped_names():
         return _pair(SHIPPED / f"{wanted}.onnx")
@@ -55,13 +55,13 @@ def find_policy(wanted: str | Path) -> tuple[Path, Path]:
 
 
 def read_bounded(path: Path, most: int) -> bytes:
-    """The bytes of an ordinary file.
+    """Return the content of a regular file.
 
     Raises:
-        PolicyError: It is none, cannot be read, or has more than so many.
+        PolicyError: Not a regular file, not readable, or larger than `most` bytes.
     """
     try:
-        # A pipe would wait for a writer.
+        # Without O_NONBLOCK, opening a pipe would wait for a writer.
         number = os.open(
             path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
         )

@@ -1,11 +1,11 @@
-"""What a network may be made of, seen before any library opens it.
+"""Validation of an ONNX network before any library opens it.
 
-ONNX files can name other files in which numbers lie, which the runtime then reads (measured: from
-the working folder even where the model is given as bytes), and operators of other domains, loops
-and functions. A policy needs nothing of that: it is a plain row of standard operators, and
-whatever else there is, known or not, is refused.
+ONNX files can refer to external data files, which the runtime then reads (measured: from the
+working folder even if the model is given as bytes), and contain operators of other domains, loops
+and functions. A policy needs only a plain sequence of standard operators; all other content, known
+or unknown, is refused.
 
-Fields are numbered as in the schema [1].
+Field numbers are those of the schema [1].
 
 References:
     [1] https://github.com/onnx/onnx/blob/main/onnx/onnx.proto
@@ -28,30 +28,29 @@ OPERATORS = {
     "Softmax", "Softplus", "Split", "Sqrt", "Squeeze", "Sub", "Sum", "Tanh", "Transpose",
     "Unsqueeze", "Where",
 }  # fmt: skip
-"""What a network that maps numbers to numbers is made of: nothing that loops, draws by chance or
-remembers."""
+"""Permitted operators: none with loops, random numbers or state."""
 DOMAINS = ("", "ai.onnx")
 MOST_FIELDS = 200_000
-"""[-] Parts of a file that are looked at; a policy has a few hundred."""
+"""[-] Maximum number of fields of a file; a policy has a few hundred."""
 
 
 @dataclass(frozen=True, slots=True)
 class Schema:
-    """The fields of a message that may be there."""
+    """Permitted fields of a message."""
 
     name: str
     parts: dict[int, Schema] = field(default_factory=dict)
-    """Fields that are messages and are looked into."""
+    """Fields that are messages and are checked recursively."""
     plain: tuple[int, ...] = ()
-    """Fields that may hold anything."""
+    """Fields with arbitrary content."""
     refused: dict[int, str] = field(default_factory=dict)
-    """Fields that must not be there, and what they are."""
+    """Refused fields, with their meaning."""
     zero: dict[int, str] = field(default_factory=dict)
-    """Numbers that must be 0, and what they say else."""
+    """Fields that must be 0, with the meaning of other values."""
     domain: int | None = None
-    """The text that names a domain."""
+    """Field with the name of a domain."""
     operator: int | None = None
-    """The text that names an operator."""
+    """Field with the name of an operator."""
 
 
 TENSOR = Schema(
@@ -98,14 +97,14 @@ MODEL = Schema(
 
 
 def check_graph(data: bytes, where: str) -> None:
-    """See that a file is a plain ONNX network of standard operators, complete in itself.
+    """Check that a file is a self-contained ONNX network of standard operators.
 
     Args:
-        data: The bytes of the file.
-        where: What it is called in errors.
+        data: Content of the file.
+        where: Name of the file in errors.
 
     Raises:
-        PolicyError: It is not.
+        PolicyError: The file is not such a network.
     """
     if data[:1] == b"\x80" or data[:2] == b"PK":
         kind = "a pickle" if data[:1] == b"\x80" else "a zip archive"
@@ -136,7 +135,7 @@ def _check(message: memoryview, schema: Schema, budget: Budget, where: str) -> N
 
 
 def _check_name(value: int | memoryview, is_domain: bool, where: str) -> None:
-    """A domain or an operator, if it is a known one."""
+    """Check that the name of a domain or an operator is permitted."""
     if not isinstance(value, memoryview):
         raise WireError("a name that is a number")
     try:

@@ -1,8 +1,7 @@
-"""What a policy sees: a mode, slots for cars, and how many observations in one.
+"""Layout of a policy's observations: mode, number of cars, and number of stacked observations.
 
-Two layouts whose digests are equal have the same numbers in the same places, so a policy for one
-runs on the other. A policy for more cars than an environment has sees the missing ones as cars
-that are absent.
+Two layouts with equal digests have the same numbers at the same indices, so a policy for one runs
+on the other. A policy for more cars than an environment has observes the missing ones as absent.
 """
 
 from __future__ import annotations
@@ -24,27 +23,27 @@ from relpos_env.registry import name_of
 from tracking.arrays import I64
 
 MOST_HISTORY = 64
-"""[-] Observations in one at most, as in an environment."""
+"""[-] Maximum number of stacked observations, as in an environment."""
 TOLD_ROWS = 3
-"""[-] So many differences are told in a message."""
+"""[-] Maximum number of differences in a message."""
 
 
 @dataclass(frozen=True)
 class Layout:
-    """The layout of an observation.
+    """Layout of an observation.
 
     Raises:
-        EnvError: No such mode, or a number out of range.
+        EnvError: Unknown mode, or a number out of range.
     """
 
     observation: str
     """One of `relpos_env.interface.observations.OBSERVATIONS`."""
     n_cars: int
-    """[-] Slots for cars, the own one included."""
+    """[-] Maximum number of cars, the own one included."""
     history: int = 1
-    """[-] So many observations in one, the newest first."""
+    """[-] Number of stacked observations, the newest first."""
     proximity: int = 0
-    """[-] Beams that measure distances round the car."""
+    """[-] Number of distance sensors per car."""
 
     def __post_init__(self) -> None:
         whole_number("n_cars", self.n_cars, 2, MOST_CARS)
@@ -54,52 +53,52 @@ class Layout:
 
     @classmethod
     def of(cls, parts: Parts) -> Layout:
-        """What the cars of an environment see."""
+        """Return the layout of an environment's observations."""
         config = parts.config
         name = name_of(config.observation)
         return cls(name, parts.n_cars, config.history, config.proximity)
 
     @cached_property
     def fields(self) -> tuple[Field, ...]:
-        """The stretches of one of the observations."""
+        """Fields of one observation."""
         return observation_mode(self.observation, self.n_cars, self.proximity).fields
 
     @property
     def one(self) -> int:
-        """Numbers in one of the observations."""
+        """Length of one observation."""
         return total_size(self.fields)
 
     @property
     def size(self) -> int:
-        """Numbers in all of them."""
+        """Length of all stacked observations."""
         return self.history * self.one
 
     @cached_property
     def index(self) -> list[dict[str, Any]]:
-        """Where every stretch stands, with units and limits, see `index_table`."""
+        """Index range, unit and limits of every field, see `index_table`."""
         return index_table(self.fields)
 
     @cached_property
     def digest(self) -> str:
         """SHA-256 over names, sizes, units, limits and the history, in hexadecimal.
 
-        The name of the mode has no part in it: ``estimate`` and ``truth`` are the same.
+        The digest does not depend on the mode's name: ``estimate`` and ``truth`` are equal.
         """
         rows = [[f.name, f.size, f.unit, f.limit, f.signed] for f in self.fields]
         text = json.dumps([rows, self.history], separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()
 
     def describe(self) -> str:
-        """In words, for messages."""
+        """Return a description for messages."""
         times = "" if self.history == 1 else f", {self.history} in one"
         beams = "" if self.proximity == 0 else f" with {self.proximity} beams"
         return f"observation {self.observation!r} of {self.n_cars} cars{beams}{times}"
 
     def differences(self, index: list[dict[str, Any]]) -> list[str]:
-        """How a table of stretches differs from this layout's, one sentence each.
+        """Return the differences of another table of fields from this layout's, one per row.
 
         Args:
-            index: As `index`; what the stretches mean is not compared.
+            index: Table as `index`; the meaning of fields is not compared.
         """
         told = []
         for k in range(max(len(index), len(self.index))):
@@ -112,10 +111,10 @@ class Layout:
         return told
 
     def refusal(self, other: Layout) -> str | None:
-        """Why a policy with this layout cannot drive cars that see another; None if it can.
+        """Return the reason why a policy of this layout cannot run on another; None if it can.
 
         Args:
-            other: Of an environment. It may have fewer cars.
+            other: Layout of an environment, which may have fewer cars.
         """
         expected = f"expected {self.describe()}, got {other.describe()}"
         if other.n_cars > self.n_cars:
@@ -130,16 +129,16 @@ class Layout:
         return None
 
     def padding_from(self, other: Layout) -> I64:
-        """Where every number of this layout stands in one of fewer cars, (size).
+        """Return the index of every number of this layout in one of fewer cars, (size).
 
-        The others come in the order of their numbers in both, so the cars that there are have the
-        first places; -1 in the places of the rest.
+        The other cars are in the order of their indices in both layouts, so existing cars come
+        first; the index is -1 for missing cars.
 
         Args:
-            other: The same but for the number of cars.
+            other: Layout that differs in the number of cars only.
 
         Raises:
-            ValueError: It is not.
+            ValueError: The layout differs otherwise, or has more cars.
         """
         reason = self.refusal(other)
         if reason is not None:
@@ -156,7 +155,7 @@ class Layout:
         return where
 
     def alone(self) -> F32:
-        """What a car sees that is the only one, and of which nothing else is known, (size)."""
+        """Return the observation of a lone car with no estimates, (size)."""
         view = make_view(1, self.n_cars, self.proximity)
         view.present[0, 0] = True
         out = np.zeros((1, self.n_cars, self.one), dtype=np.float32)
@@ -165,6 +164,6 @@ class Layout:
 
 
 def _row(row: dict[str, Any]) -> str:
-    """A stretch in words."""
+    """Return the description of a field."""
     limits = f"{row['low']:g} to {row['high']:g}"
     return f"{row['name']} at {row['first']} to {row['last']} in {row['unit']} from {limits}"

@@ -1,4 +1,4 @@
-"""Observations of few cars as a policy for more cars wants them."""
+"""Padding of observations for policies with more cars than the environment."""
 
 from __future__ import annotations
 
@@ -10,32 +10,32 @@ from relpos_env.interface.observations.base import F32
 
 
 class Padding:
-    """Writes observations as if the cars that are missing were absent.
+    """Padding of observations, with missing cars as absent ones.
 
-    Law: an environment with more slots than cars gives what this makes of the same environment
-    with as many slots as cars.
+    Invariant: padded observations equal those of the same environment with the larger maximum
+    number of cars.
     """
 
     def __init__(self, wanted: Layout, given: Layout) -> None:
-        """Find the places.
+        """Compute the indices.
 
         Args:
-            wanted: What the policy sees.
-            given: What the cars see; the same but for the number of cars, which is not larger.
+            wanted: Layout of the policy.
+            given: Layout of the observations, equal except for at most as many cars.
         """
         where = wanted.padding_from(given)
         self._size = wanted.size
-        self._places = np.flatnonzero(where >= 0)  # in the order in which they are given
+        self._places = np.flatnonzero(where >= 0)  # sorted below by the order in `given`
         self._places = self._places[np.argsort(where[self._places])]
         absent = np.where(where < 0, wanted.alone(), np.float32(0.0))
-        # Of most modes nothing but zeros, and that is quicker.
+        # All zero in most modes, which is faster.
         self._absent = absent.reshape(wanted.history, -1) if absent.any() else None
 
     def __call__(self, observations: F32) -> F32:
-        """The observations padded, (..., wanted size).
+        """Return the padded observations, (..., wanted size).
 
         Args:
-            observations: (..., given size). Those of absent cars, which are zeros, stay zeros.
+            observations: Observations, (..., given size). Zeros of absent cars stay zeros.
         """
         lead = observations.shape[:-1]
         padded: F32 = np.zeros((*lead, self._size), dtype=np.float32)
@@ -47,27 +47,27 @@ class Padding:
 
 
 class PaddedDriver:
-    """A driver for more cars than there are."""
+    """Driver for more cars than the environment has."""
 
     def __init__(self, driver: Driver, wanted: Layout, given: Layout) -> None:
-        """Put the padding in front.
+        """Combine the driver with the padding.
 
         Args:
-            driver: Drives cars that see `wanted`.
-            wanted: Its layout.
-            given: What the cars see; see `Padding`.
+            driver: Driver for observations of `wanted`.
+            wanted: Layout of the driver.
+            given: Layout of the observations; see `Padding`.
         """
         self._driver, self._given = driver, given.size
         self._pad = Padding(wanted, given)
 
     def act(self, observations: F32) -> F32:
-        """Actions, (..., 2); see `Driver`.
+        """Return the actions, (..., 2); see `Driver`.
 
         Args:
-            observations: (..., size) of the smaller layout.
+            observations: Observations of the smaller layout, (..., size).
 
         Raises:
-            ValueError: They have another size.
+            ValueError: The observations have another size.
         """
         observations = np.asarray(observations, dtype=np.float32)
         if observations.shape[-1:] != (self._given,):

@@ -1,4 +1,4 @@
-"""Runs of networks that take too long are ended: a small file can ask for any amount of work."""
+"""Time limit of network runs, since a small file can request any amount of work."""
 
 from __future__ import annotations
 
@@ -10,33 +10,33 @@ from contextlib import contextmanager
 from typing import Protocol
 
 LOOK_EVERY = 0.1
-"""[s]"""
+"""[s] Interval of the checks."""
 
 
 class Run(Protocol):
-    """What onnxruntime's `RunOptions` has for it: looked at between two operators."""
+    """Part of onnxruntime's `RunOptions`; the flag is checked between two operators."""
 
     terminate: bool
 
 
 class Patience:
-    """Of one process. A thread, begun with the first run, looks at the run that lasts."""
+    """Time limit of runs in one process, checked by a thread that starts with the first run."""
 
     def __init__(self, seconds: float) -> None:
-        """Set the time.
+        """Set the time limit.
 
         Args:
-            seconds: That a run may take [s].
+            seconds: Time limit of a run [s].
         """
         self.seconds = seconds
         self._runs: dict[int, tuple[float, Run]] = {}
-        """By thread: when it has to be over, and the run to end."""
+        """Deadline and run, by thread."""
         self._watched_by = 0
-        """Process that has the thread: a fork has none of its parent's."""
+        """Process of the watching thread: a forked process has no threads of its parent."""
 
     @contextmanager
     def over(self, run: Run) -> Iterator[None]:
-        """End the run if it lasts too long."""
+        """Terminate the run at the time limit."""
         if self._watched_by != os.getpid():
             self._watched_by, self._runs = os.getpid(), {}
             threading.Thread(target=self._watch, name="patience", daemon=True).start()

@@ -1,8 +1,8 @@
-"""The wire format of protocol buffers, read as far as it takes to see what a file is made of.
+"""Parser of the protocol buffers wire format, as far as needed to validate a file.
 
-A message is a row of fields, each a tag (number * 8 + wire type) and a value [1]. Every field that
-is there is given, also repeated ones, of which other readers take the last or join them: a reader
-that looks at all of them cannot be deceived.
+A message is a sequence of fields, each a tag (number * 8 + wire type) and a value [1]. All fields
+are returned, including duplicates, of which other parsers take the last or merge them: a file
+cannot show one value to this check and another to onnxruntime.
 
 References:
     [1] Protocol Buffers documentation, Encoding, https://protobuf.dev/programming-guides/encoding
@@ -13,37 +13,37 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 VARINT, FIXED64, BYTES, FIXED32 = 0, 1, 2, 5
-"""Wire types; the two of the old groups are refused."""
+"""Wire types; the two deprecated group types are refused."""
 
 
 class WireError(Exception):
-    """Not a row of fields."""
+    """The bytes are not a valid sequence of fields."""
 
 
 class Budget:
-    """So many fields may be read of a file, however they are nested."""
+    """Limit of the number of fields in a file, over all levels of nesting."""
 
     def __init__(self, fields: int) -> None:
         self.left = fields
 
     def spend(self) -> None:
-        """Read one more."""
+        """Count one field."""
         self.left -= 1
         if self.left < 0:
             raise WireError("too many parts")
 
 
 def fields(message: memoryview, budget: Budget) -> Iterator[tuple[int, int, int | memoryview]]:
-    """Number, wire type and value of every field of a message, in order.
+    """Yield number, wire type and value of every field of a message, in order.
 
-    The value is an int of a varint, else the bytes.
+    The value is an int for a varint, else the bytes.
 
     Args:
-        message: Its bytes.
-        budget: What may still be read.
+        message: Bytes of the message.
+        budget: Remaining number of fields.
 
     Raises:
-        WireError: It is no message, or has too many fields.
+        WireError: The bytes are not a message, or there are too many fields.
     """
     at = 0
     while at < len(message):
@@ -69,7 +69,7 @@ def fields(message: memoryview, budget: Budget) -> Iterator[tuple[int, int, int 
 
 
 def _varint(message: memoryview, at: int, most: int) -> tuple[int, int]:
-    """A number of seven bits a byte, the lowest first, and where it ends."""
+    """Return a number of seven bits per byte, the lowest first, and its end."""
     value = 0
     for k in range(most):
         if at + k >= len(message):

@@ -1,4 +1,4 @@
-"""JSON of other origin: finite numbers, no key twice, every type checked and named."""
+"""Strict parsing of untrusted JSON: finite numbers, unique keys, checked types."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from agents.policies.errors import PolicyError
 
 
 def parse_json(text: str | bytes, where: str) -> dict[str, Any]:
-    """The object that a text holds.
+    """Return the object of a JSON text.
 
     Raises:
-        PolicyError: It is no JSON, holds a number that is not finite, or a key twice.
+        PolicyError: Invalid JSON, a number that is not finite, or a duplicate key.
     """
     try:
         if isinstance(text, bytes):
@@ -31,38 +31,38 @@ def parse_json(text: str | bytes, where: str) -> dict[str, Any]:
 
 
 class Reader:
-    """Takes values out of an object and says where one is wrong."""
+    """Typed access to the values of an object; errors name the file and the key."""
 
     def __init__(self, values: dict[str, Any], where: str, *, inside: bool = False) -> None:
-        """Read from an object.
+        """Store the object and its path.
 
         Args:
-            values: The object.
-            where: The file; or, with `inside`, file and place, separated by a colon and a space.
-            inside: Whether it is a part of another.
+            values: Object.
+            where: File; or, with `inside`, file and key, separated by a colon and a space.
+            inside: True if the object is part of another.
         """
         self._values = values
         self._file, _, self._place = where.rpartition(": ") if inside else (where, "", "")
 
     def path(self, key: str) -> str:
-        """File and place of a value."""
+        """Return file and key of a value."""
         return f"{self._file}: {self._name(key)}"
 
     def error(self, key: str, reason: str) -> PolicyError:
-        """The error that names a value."""
+        """Return an error that names a value."""
         return PolicyError(self._file, f"{self._name(key)}: {reason}")
 
     def refuse(self, key: str, reason: str) -> NoReturn:
-        """Raise it."""
+        """Raise an error that names a value."""
         raise self.error(key, reason)
 
     def has(self, key: str) -> None:
-        """See that a key is there."""
+        """Check that a key exists."""
         if key not in self._values:
             self.refuse(key, "is missing")
 
     def keys(self, expected: tuple[str, ...]) -> None:
-        """See that exactly these keys are there."""
+        """Check that exactly these keys exist."""
         for key in expected:
             self.has(key)
         for key in self._values:
@@ -70,15 +70,15 @@ class Reader:
                 self.refuse(f"{key[:60]!a}", f"unknown, expected {', '.join(expected)}")
 
     def text(self, key: str) -> str:
-        """A string."""
+        """Return a string."""
         return self._of(key, str, "a string")  # type: ignore[no-any-return]
 
     def whole(self, key: str) -> int:
-        """A whole number."""
+        """Return an integer."""
         return self._of(key, int, "a whole number")  # type: ignore[no-any-return]
 
     def number(self, key: str) -> float:
-        """A number; whole ones too."""
+        """Return a number, as float; integers are permitted."""
         value = self._of(key, int | float, "a number")
         try:
             return float(value)
@@ -86,25 +86,25 @@ class Reader:
             self.refuse(key, "expected a number, got one that is too large")
 
     def positive(self, key: str) -> float:
-        """A number above 0."""
+        """Return a number above 0."""
         value = self.number(key)
         if not value > 0.0:
             self.refuse(key, f"expected a number above 0, got {value:g}")
         return value
 
     def matching(self, key: str, pattern: re.Pattern[str], expected: str) -> str:
-        """A string of a certain form."""
+        """Return a string that matches a pattern."""
         value = self.text(key)
         if not pattern.fullmatch(value):
             self.refuse(key, f"expected {expected}, got {value[:80]!a}")
         return value
 
     def mapping(self, key: str) -> dict[str, Any]:
-        """An object."""
+        """Return an object."""
         return self._of(key, dict, "an object")  # type: ignore[no-any-return]
 
     def mappings(self, key: str) -> list[dict[str, Any]]:
-        """A list of objects."""
+        """Return a list of objects."""
         values = self._of(key, list, "a list")
         for k, value in enumerate(values):
             if not isinstance(value, dict):
@@ -114,12 +114,12 @@ class Reader:
     def part(
         self, key: str, keys: tuple[str, ...], default: Mapping[str, Any] | None = None
     ) -> Reader:
-        """An object with exactly these keys.
+        """Return a reader of an object with exactly these keys.
 
         Args:
-            key: Of the object.
-            keys: In it.
-            default: Values of those that older files do not have.
+            key: Key of the object.
+            keys: Keys in the object.
+            default: Values of keys that older files do not have.
         """
         reader = Reader({**(default or {}), **self.mapping(key)}, self.path(key), inside=True)
         reader.keys(keys)
@@ -127,7 +127,7 @@ class Reader:
 
     def _of(self, key: str, kind: Any, expected: str) -> Any:
         value = self._values[key]
-        # A bool is an int to Python, but not to the reader of a card.
+        # In Python a bool is an int, in a card it is not.
         if isinstance(value, bool) or not isinstance(value, kind):
             self.refuse(key, f"expected {expected}, got {_kind(value)}")
         return value
@@ -151,7 +151,7 @@ def _finite(text: str) -> float:
 
 
 def _kind(value: Any) -> str:
-    """What it is, as JSON calls it, and the value where that is short."""
+    """Return the JSON type of a value, or a scalar value, shortened."""
     names = {dict: "an object", list: "a list", type(None): "null"}
     name = names.get(type(value))
     if name is not None:

@@ -1,4 +1,4 @@
-"""A trained policy, loaded from its two files and run."""
+"""Trained policies: loading from two files, validation, and inference."""
 
 from __future__ import annotations
 
@@ -24,31 +24,31 @@ TINY = 1e-9
 
 
 class TrainedPolicy:
-    """A `Driver` of cars that see what its card says; `driver` fits it to those that see less."""
+    """A `Driver` for the layout of its card; `driver` adapts it to layouts of fewer cars."""
 
     def __init__(self, network: Network, card: Card) -> None:
-        """Put the two together; `load_policy` does that with files.
+        """Combine network and card; `load_policy` does this with files.
 
         Args:
-            network: Checked and tried.
-            card: Of this network.
+            network: Network, validated by `check_policy`.
+            card: Card of the network.
         """
         self.card, self._network = card, network
         self._size = card.layout.size
 
     @property
     def layout(self) -> Layout:
-        """Of the observations that it takes."""
+        """Layout of the observations."""
         return self.card.layout
 
     def act(self, observations: F32) -> F32:
-        """Actions of the cars that see the observations, (..., 2), -1 to 1.
+        """Return the actions for observations, (..., 2), -1 to 1.
 
         Args:
-            observations: (..., size) as `layout` says.
+            observations: Observations as in `layout`, (..., size).
 
         Raises:
-            PolicyError: They have another size, or the actions are not finite.
+            PolicyError: The observations have another size, or actions are out of range.
         """
         rows = np.asarray(observations, dtype=np.float32)
         lead = rows.shape[:-1]
@@ -66,15 +66,15 @@ class TrainedPolicy:
         return actions.reshape(*lead, 2)
 
     def driver(self, layout: Layout, *, decision: float = DECISION) -> Driver:
-        """What drives cars of an environment.
+        """Return a driver for the cars of an environment.
 
         Args:
-            layout: What they see: the same numbers, or those of fewer cars; positions may be
-                estimates for a policy trained on the truth, and the other way round.
-            decision: From one action to the next [s].
+            layout: Layout of the environment: the same, or of fewer cars; a policy trained on the
+                true state also runs on estimates, and vice versa.
+            decision: Control period [s].
 
         Raises:
-            PolicyError: It is not made for such cars; says what differs.
+            PolicyError: The policy does not fit the environment; names the difference.
         """
         reason = self.layout.refusal(layout)
         if reason is None and abs(decision - self.card.decision) > TINY:
@@ -87,15 +87,14 @@ class TrainedPolicy:
 
 
 def load_policy(wanted: str | Path) -> TrainedPolicy:
-    """Load a policy; nothing is unpickled, and everything is checked before it runs.
+    """Load a policy without unpickling, and validate it before it runs.
 
     Args:
-        wanted: ``name.onnx``, ``name.json``, a folder with one policy, or the name of one that
-            comes with the package.
+        wanted: ``name.onnx``, ``name.json``, a folder with one policy, or the name of a policy of
+            the package.
 
     Raises:
-        PolicyError: It is missing, damaged, foreign, or made for something else; says which file
-            and why.
+        PolicyError: The policy is missing, damaged, or incompatible; names the file and the reason.
     """
     network_file, card_file = find_policy(wanted)
     card = Card.from_json(read_bounded(card_file, MOST_CARD), str(card_file))
@@ -104,15 +103,15 @@ def load_policy(wanted: str | Path) -> TrainedPolicy:
 
 
 def check_policy(data: bytes, card: Card, where: str) -> Network:
-    """The network of a card, if the two belong together and can drive these cars.
+    """Return the network of a card, checked to belong to it and to fit the cars.
 
     Args:
-        data: Bytes of the network's file.
-        card: Its card.
-        where: What the network is called in errors.
+        data: Content of the network's file.
+        card: Card of the network.
+        where: Name of the network in errors.
 
     Raises:
-        PolicyError: They do not.
+        PolicyError: The network does not belong to the card, or does not fit the cars.
     """
     found = hashlib.sha256(data).hexdigest()
     if found != card.onnx_sha256:

@@ -1,4 +1,4 @@
-"""A network is tried before it drives anything: finite, within limits, one row as good as many."""
+"""Smoke test of a network: actions are finite, within limits, and independent of the batch."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from relpos_env.interface.observations import space_of
 from relpos_env.interface.observations.base import F32
 
 DRAWS = 32
-"""[-] Observations drawn from the whole space, and from its corners, each."""
+"""[-] Number of observations sampled from the whole space, and from its corners."""
 SLACK = 1e-6
-"""[-] Actions may be beyond 1 by the last bit."""
+"""[-] Tolerance of the limits of actions, for rounding."""
 SAME = 1e-4
-"""[-] Actions of a row in a batch and of the row alone may differ by the order of sums."""
+"""[-] Tolerance between actions of a row alone and in a batch, for the order of summation."""
 
 
 def try_network(network: Network, layout: Layout, where: str) -> None:
     """Run a network on extreme observations.
 
     Args:
-        network: To try.
-        layout: Of its observations.
-        where: What it is called in errors.
+        network: Network to test.
+        layout: Layout of its observations.
+        where: Name of the network in errors.
 
     Raises:
-        PolicyError: It fails, or its actions are no numbers from -1 to 1, or those of a car depend
-            on who else is in the batch.
+        PolicyError: The network fails, actions are not finite or not from -1 to 1, or actions of
+            a car depend on the batch.
     """
     observations = extremes(layout)
     actions = network(observations)
@@ -52,7 +52,7 @@ def try_network(network: Network, layout: Layout, where: str) -> None:
 
 
 def extremes(layout: Layout) -> F32:
-    """Nothing, the limits, random corners of the space, and anything in it, (row, size)."""
+    """Return zeros, the limits, and random corners and points of the space, (row, size)."""
     space = space_of(layout.fields, layout.history)
     rng = np.random.default_rng(0)
     corners = rng.random((DRAWS, layout.size)) < 0.5

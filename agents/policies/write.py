@@ -1,4 +1,4 @@
-"""A policy on disk: both of its files or none."""
+"""Writing of a policy: both files or none."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from agents.policies.trained import check_policy
 
 
 def write_policy(folder: Path, name: str, onnx_bytes: bytes, card: Card) -> Card:
-    """Write ``name.onnx`` and ``name.json``; files of these names are replaced.
+    """Write ``name.onnx`` and ``name.json``; existing files are replaced.
 
-    What would be refused when it is loaded is not written.
+    A policy that could not be loaded is not written.
 
     Args:
-        folder: Made if there is none.
-        name: Of the policy, also on the card.
-        onnx_bytes: The network, normalisation and limits inside.
-        card: Gets the name and the hash of the network.
+        folder: Folder, created if missing.
+        name: Name of the policy, also on the card.
+        onnx_bytes: Network, including normalisation and limits.
+        card: Card; its name and hash of the network are set.
 
     Returns:
-        The card as it was written.
+        The written card.
 
     Raises:
-        PolicyError: The two would be refused.
+        PolicyError: The policy could not be loaded.
         UsageError: The folder cannot be written to.
     """
     card = replace(card, name=name, onnx_sha256=hashlib.sha256(onnx_bytes).hexdigest())

@@ -1,1 +1,1 @@
-"""Training with RLlib on the same environment, for clusters; needs `relpos-env[rllib]`."""
+"""Training with RLlib on clusters, with the same environment; needs `relpos-env[rllib]`."""

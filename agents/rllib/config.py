@@ -1,4 +1,4 @@
-"""What a training with RLlib is made of."""
+"""Configuration of a training with RLlib."""
 
 from __future__ import annotations
 
@@ -20,42 +20,42 @@ RANGES: dict[str, tuple[int, int]] = {
     "width": (1, 4096),
     "seed": (0, 2**31 - 1),
 }
-"""Whole numbers and what they may be."""
+"""Minimum and maximum of the integer fields."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RllibConfig:
-    """PPO [1] with one network for all cars.
+    """Configuration of PPO [1] with one network for all cars.
 
     References:
         [1] Schulman et al., Proximal policy optimization algorithms, arXiv 1707.06347 (2017).
     """
 
     arguments: Mapping[str, Any] = field(default_factory=dict)
-    """Of the environment, see `relpos_env.config.FormationConfig`."""
+    """Arguments of the environment, see `relpos_env.config.FormationConfig`."""
     iterations: int = 100
-    """[-] Times that episodes are sampled and learnt from."""
+    """[-] Number of iterations of sampling and learning."""
     workers: int = 2
-    """[-] Env runners, a core each; with 0 this process samples too."""
+    """[-] Number of env runners with one core each; with 0 this process samples."""
     envs: int = 4
-    """[-] Environments of each env runner."""
+    """[-] Number of environments per env runner."""
     steps: int = 4000
-    """[-] Decisions of environments, each of all its cars, in an iteration."""
+    """[-] Environment steps per iteration, each with all cars of an environment."""
     width: int = 64
-    """[-] Units of a layer."""
+    """[-] Number of units per layer."""
     seed: int = 0
-    """Of weights and episodes. Workers finish in any order, so results vary with it and beyond."""
+    """Seed of weights and episodes. Equal seeds give different results: workers are not in sync."""
     learning_rate: float = 3e-4
     gamma: float = 0.99
-    """[-] Discount of a decision, 0.1 s."""
+    """[-] Discount factor per step of 0.1 s."""
     trace: float = 0.95
-    """[-] lambda of the generalised advantage estimate."""
+    """[-] lambda of generalised advantage estimation."""
     clip: float = 0.2
-    """[-] How far a probability may go in an iteration, as a ratio."""
+    """[-] Clip parameter of PPO: limit of the change of probability ratios in an iteration."""
     epochs: int = 10
-    """[-] Times that the samples of an iteration are gone through."""
+    """[-] Number of passes over the samples of an iteration."""
     minibatch: int = 512
-    """[-] Samples, of one car each, in a step of the learner."""
+    """[-] Samples per gradient step, of one car each."""
 
     def __post_init__(self) -> None:
         for name, (least, most) in RANGES.items():
@@ -65,10 +65,10 @@ class RllibConfig:
 
     @property
     def layout(self) -> Layout:
-        """Of the observations.
+        """Layout of the observations.
 
         Raises:
-            EnvError: The arguments of the environment do not fit.
+            EnvError: The arguments of the environment are invalid.
         """
         parts = configure(dict(self.arguments))
         if parts.config.actions != "continuous":
@@ -77,7 +77,7 @@ class RllibConfig:
 
     @property
     def record(self) -> dict[str, Any]:
-        """All of it, ready for JSON; of a scenario its file or name."""
+        """Configuration for JSON, with the file or name of the scenario."""
         told = dict(self.arguments)
         scenario = told.get("scenario")
         if isinstance(scenario, Scenario):

@@ -1,8 +1,8 @@
-"""The environment as RLlib takes it: cars that join, leave and return in mid-episode.
+"""RLlib environment with cars that join, leave and return in mid-episode.
 
-RLlib's own wrapper of PettingZoo environments takes the agents of the first moment for those of
-the whole episode, and fails when one joins or leaves. Here an agent is asked for an action only
-after a step that shows it an observation, which is what RLlib makes of the keys of a dict.
+RLlib's wrapper of PettingZoo environments assumes that the initial agents stay for the whole
+episode, and fails when one joins or leaves. In this environment an agent acts only after a step
+with its observation, which is RLlib's meaning of the keys of the dicts.
 """
 
 from __future__ import annotations
@@ -20,24 +20,23 @@ from relpos_env.api.parallel_env import FormationEnv
 from relpos_env.timing import DECISION
 
 ALL = "__all__"
-"""RLlib's word for the whole episode."""
+"""RLlib's key of the whole episode."""
 OWN_SEEDS = 1 << 63
-"""Seeds of training are from here on, far from those of comparisons."""
+"""Smallest training seed, which keeps them distinct from the seeds of comparisons."""
 
 
 class FormationMultiAgentEnv(MultiAgentEnv):  # type: ignore[misc]
     """`relpos_env.api.parallel_env.FormationEnv` for RLlib; spaces and numbers are the same.
 
-    | a car | in the dicts of a step |
+    | car | dicts of a step |
     |---|---|
-    | is in the room | as in the PettingZoo form |
-    | joins | from that step on |
-    | goes, and will return | not there while it is away, so nothing is learnt from it; its reward \
-of an absence is 0 |
-    | leaves for good | truncated in that step, not there any more |
-    | at the end of the episode | all agents, those that are away with zeros |
+    | present | as in the PettingZoo environment |
+    | joins | included from this step on |
+    | temporarily absent | left out, so that absences are not learnt from; the reward is 0 |
+    | leaves for good | truncated in this step, then left out |
+    | end of the episode | all agents, absent ones with zeros |
 
-    Law: a key that is there has the value of the PettingZoo form, bit for bit.
+    Invariant: the value of every key equals that of the PettingZoo environment, bit for bit.
     """
 
     def __init__(self, arguments: Mapping[str, Any] | None = None) -> None:
@@ -47,7 +46,7 @@ of an absence is 0 |
             arguments: Fields of `relpos_env.config.FormationConfig`.
 
         Raises:
-            EnvError: An unknown name or a number out of range; the argument is named.
+            EnvError: Unknown name or a number out of range; names the argument.
         """
         self.env = FormationEnv(**(arguments or {}))
         self.possible_agents = list(self.env.possible_agents)
@@ -71,13 +70,13 @@ of an absence is 0 |
         """Drive for 0.1 s.
 
         Args:
-            action_dict: Of every agent that was shown an observation in the step before.
+            action_dict: Action of every agent with an observation in the previous step.
 
         Raises:
             EnvError: As `FormationEnv.step`.
         """
         env = self.env
-        # What a car that is away does has no effect, but the environment wants to hear something.
+        # Actions of absent cars have no effect, but the environment requires them.
         nothing = {a: self._idle(a) for a in env.agents if a not in self._shown}
         found, rewards, terminated, truncated, infos = env.step({**action_dict, **nothing})
         over = not env.agents
@@ -97,26 +96,26 @@ of an absence is 0 |
         self.env.close()
 
     def _idle(self, agent: str) -> Any:
-        """Some action of its space."""
+        """Return a zero action."""
         space = self.action_spaces[agent]
         return np.zeros(space.shape, dtype=space.dtype)
 
 
 class SeededEnv(FormationMultiAgentEnv):
-    """The environment with seeds of its own, for env runners.
+    """Environment of env runners, with distinct seeds.
 
     RLlib gives environment i of runner w the seed s + w + i, so runners would share episodes, and
-    the seeds of many runners would reach those of comparisons.
+    the seeds of many runners would overlap with those of comparisons.
     """
 
     def __init__(self, context: Any) -> None:
         """Build an environment of one runner.
 
         Args:
-            context: RLlib's `EnvContext`: ``arguments`` as above and ``seed``.
+            context: RLlib's `EnvContext` with ``arguments`` (see the base class) and ``seed``.
         """
         super().__init__(context["arguments"])
-        # A runner that was lost and made again goes on with other episodes.
+        # A recreated runner continues with other episodes.
         again = os.getpid() if context.recreated_worker or _made_again() else 0
         self._place = context["seed"], context.worker_index or 0, again
         self._begun = False
@@ -124,7 +123,7 @@ class SeededEnv(FormationMultiAgentEnv):
 
     @property
     def formation_error(self) -> float:
-        """[m] Of the episode so far, mean over cars and the time from `SETTLE` on; NaN before."""
+        """[m] Mean formation error over cars and the time after `SETTLE`; NaN before."""
         return float(np.mean(self._errors)) if self._errors else float("nan")
 
     def reset(
@@ -133,8 +132,8 @@ class SeededEnv(FormationMultiAgentEnv):
         """Begin an episode.
 
         Args:
-            seed: Tells the environments of a runner apart. What it says later is not heard: RLlib
-                may say the same again, and means the same episodes by it.
+            seed: Distinguishes the environments of a runner in the first reset. Later seeds are
+                ignored, since RLlib may repeat a seed and would repeat its episodes.
             options: Not used.
         """
         own = None
@@ -160,7 +159,7 @@ def _only(values: Mapping[str, Any], agents: list[str]) -> dict[str, Any]:
 
 
 def _made_again() -> bool:
-    """Whether this process stands in for an actor that was lost."""
+    """Return whether this process replaces a lost actor."""
     if not ray.is_initialized():
         return False
     context = ray.get_runtime_context()

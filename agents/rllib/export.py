@@ -1,4 +1,4 @@
-"""What RLlib has trained as a policy that runs without RLlib and torch."""
+"""Export of a trained RLlib module to a policy that runs without RLlib and torch."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from agents.policies.write import write_policy
 from agents.rllib.module import LIMIT, N_ACTIONS, CarModule
 
 OPSET, IR = 17, 8
-"""Versions of ONNX that every onnxruntime of ours reads."""
+"""Versions of ONNX that all supported onnxruntime versions read."""
 
 
 def export_module(
@@ -26,17 +26,17 @@ def export_module(
     """Write the actor as ``name.onnx`` and its card as ``name.json``.
 
     Args:
-        module: Trained, or not.
-        layout: Of its observations.
-        folder: Where to.
-        name: Of the policy.
-        training: For the card: where it comes from.
+        module: Module, trained or not.
+        layout: Layout of its observations.
+        folder: Output folder.
+        name: Name of the policy.
+        training: Record of the training for the card.
 
     Returns:
-        The file with the network.
+        Path of the network's file.
 
     Raises:
-        PolicyError: What was trained is no policy, say since its weights are not finite.
+        PolicyError: The module is not a valid policy, for example with weights that are not finite.
         UsageError: The folder cannot be written to.
     """
     card = Card(name=name, layout=layout, training=dict(training))
@@ -45,13 +45,13 @@ def export_module(
 
 
 def to_onnx(module: CarModule, size: int) -> bytes:
-    """The actor as a graph: `observations` (batch, size) to `actions` (batch, 2).
+    """Return the actor as an ONNX graph from `observations` (batch, size) to `actions` (batch, 2).
 
-    Actions are the most likely ones within their limits, as RLlib's connector cuts them.
+    Actions are the mean of the distribution, clipped as by RLlib's connector.
 
     Args:
-        module: Whose actor.
-        size: Numbers in an observation.
+        module: Module with the actor.
+        size: Length of an observation.
     """
     constants: dict[str, Any] = {
         "gain": _array(module.gain),

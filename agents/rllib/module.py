@@ -1,7 +1,6 @@
-"""The network that all cars share, as RLlib trains it: actor and critic, two layers each.
+"""RLlib module of the network that all cars share: actor and critic, two hidden layers each.
 
-Observations are scaled by fixed lengths and times inside the network, so what is exported needs no
-statistics next to it.
+The network scales observations by fixed factors, so the exported policy needs no statistics.
 """
 
 from __future__ import annotations
@@ -20,39 +19,39 @@ from agents.policies.layout import Layout
 from relpos_env.interface.observations.base import F32
 
 SCALES = {"pos": 2.0, "target": 2.0, "range": 2.0, "std": 0.3, "gap": 10.0}
-"""Field to the value that becomes 1, in the field's unit; 1 for those not named."""
+"""Scale by field, in the field's unit: the value that becomes 1; the default is 1."""
 LIMIT = 5.0
-"""[-] Scaled numbers are cut at this."""
+"""[-] Limit of scaled observations."""
 FIRST_LOG_STD = -0.7
-"""[-] Logarithm of the standard deviation of first actions, which are shares of the largest."""
+"""[-] Initial log standard deviation of actions, which are fractions of the largest."""
 N_ACTIONS = 2
 
 
 def gain_of(layout: Layout) -> F32:
-    """What every number of an observation is multiplied by, (size)."""
+    """Return the scale factor of every number of an observation, (size)."""
     one = [np.full(f.size, 1.0 / SCALES.get(f.name, 1.0)) for f in layout.fields]
     return np.tile(np.concatenate(one), layout.history).astype(np.float32)
 
 
 class CarModule(TorchRLModule, ValueFunctionAPI):  # type: ignore[misc]
-    """Mean and spread of a car's action, and the value of what it sees.
+    """Actor with mean and log standard deviation of actions, and critic.
 
-    `model_config` has ``gain``, a number for each of the observation, and ``width``, units of a
-    layer.
+    `model_config` has ``gain``, the scale factors of observations, and ``width``, the number of
+    units per layer.
     """
 
     def setup(self) -> None:
-        """Lay the layers out."""
+        """Create the layers."""
         gain = torch.tensor(self.model_config["gain"], dtype=torch.float32)
         self.register_buffer("gain", gain, persistent=False)
         width = self.model_config["width"]
-        # First actions are near zero: cars that stand learn sooner than cars that hit walls.
+        # Initial actions are near zero: cars at rest learn faster than cars that hit walls.
         self.actor = _layers(len(gain), width, N_ACTIONS, first=0.01)
         self.critic = _layers(len(gain), width, 1)
         self.log_std = nn.Parameter(torch.full((N_ACTIONS,), FIRST_LOG_STD))
 
     def mean(self, observations: Tensor) -> Tensor:
-        """The most likely actions, (batch, 2), not cut."""
+        """Return the mean actions, (batch, 2), not clipped."""
         actions: Tensor = self.actor(self._scaled(observations))
         return actions
 
@@ -62,7 +61,7 @@ class CarModule(TorchRLModule, ValueFunctionAPI):  # type: ignore[misc]
         return {Columns.ACTION_DIST_INPUTS: torch.cat([mean, spread], dim=-1)}
 
     def compute_values(self, batch: Mapping[str, Any], embeddings: Any = None) -> Tensor:
-        """What return to expect, (batch)."""
+        """Return the expected return, (batch)."""
         values: Tensor = self.critic(self._scaled(batch[Columns.OBS]))
         return values.squeeze(-1)
 
@@ -72,7 +71,7 @@ class CarModule(TorchRLModule, ValueFunctionAPI):  # type: ignore[misc]
 
 
 def _layers(size: int, width: int, out: int, first: float = 1.0) -> nn.Sequential:
-    """Two layers and what comes out, which is small at first by a factor."""
+    """Return two hidden layers and an output layer with weights scaled by `first`."""
     last = nn.Linear(width, out)
     with torch.no_grad():
         last.weight.mul_(first)

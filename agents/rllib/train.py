@@ -1,4 +1,4 @@
-"""Training with RLlib: what `relpos rllib` does, as a function."""
+"""Training with RLlib: the function behind `relpos rllib`."""
 
 from __future__ import annotations
 
@@ -30,33 +30,33 @@ from agents.rllib.export import export_module
 from agents.rllib.module import CarModule, gain_of
 
 MODULE = "car"
-"""What RLlib calls the network that all cars share."""
+"""RLlib's ID of the network that all cars share."""
 POLICY, CHECKPOINT, LOG = "policy", "checkpoint", "training.jsonl"
-"""In the folder of a run: name of the policy, RLlib's own checkpoint, a record an iteration."""
+"""Files of a run: policy, RLlib checkpoint, and log with one record per iteration."""
 SAVE_EVERY = 20
-"""[-] Iterations after which files are written, and at the end."""
+"""[-] Number of iterations between writes; files are also written at the end."""
 EPISODES = 100
-"""[-] Figures of episodes are means over so many of the last."""
+"""[-] Number of last episodes in the mean of episode metrics."""
 PACKAGES = ("relpos-env", "ray", "torch", "gymnasium", "numpy", "numba")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RllibResult:
-    """A training."""
+    """Result of a training."""
 
     policy: Path
-    """The file with the network; the card is next to it."""
+    """File of the network; the card is next to it."""
     checkpoint: Path
-    """RLlib's own, a folder."""
+    """Folder of the RLlib checkpoint."""
     records: list[dict[str, Any]]
-    """By iteration."""
+    """Records by iteration."""
 
 
 class FormationCallback(RLlibCallback):  # type: ignore[misc]
-    """Tells what the return does not: how well the cars kept formation."""
+    """Callback that logs the formation error of episodes."""
 
     def on_episode_end(self, *, env: Any, env_index: int, metrics_logger: Any, **_: Any) -> None:
-        """Log the error of the episode [m]."""
+        """Log the formation error of the episode [m]."""
         error = env.envs[env_index].unwrapped.formation_error
         if np.isfinite(error):
             metrics_logger.log_value("formation_error", error, window=EPISODES)
@@ -72,19 +72,19 @@ def rllib_train(
     """Train, then write policy, checkpoint and log.
 
     Args:
-        config: Of the run.
-        folder: New or empty.
-        address: Of a running cluster; None starts one with a core for each worker on this machine
-            and ends it afterwards.
-        progress: Called with the record of every iteration.
+        config: Configuration of the run.
+        folder: New or empty folder.
+        address: Address of a running cluster; None starts one on this machine with one core per
+            worker and stops it afterwards.
+        progress: Function that is called with the record of every iteration.
 
     Raises:
         UsageError: No ray, no cluster, or a folder that cannot be written to.
-        EnvError: An environment that cannot be.
+        EnvError: The arguments of the environment are invalid.
     """
     check_new(folder)
     check_folder(folder, [LOG])
-    # It warns of its own former ways.
+    # RLlib warns of its own deprecated interfaces.
     logging.getLogger("ray.rllib").setLevel(logging.ERROR)
     layout = config.layout
     records: list[dict[str, Any]] = []
@@ -107,7 +107,7 @@ def _save(
     folder: Path,
     records: list[dict[str, Any]],
 ) -> Path:
-    """Write what there is so far over what there was; gives the file of the policy."""
+    """Overwrite log, checkpoint and policy; return the file of the policy."""
     lines = "".join(json.dumps(r, allow_nan=False) + "\n" for r in records)
     write_results(folder, {LOG: lines})
     _save_checkpoint(algorithm, folder)
@@ -125,10 +125,10 @@ def _save(
 
 
 def _save_checkpoint(algorithm: Any, folder: Path) -> None:
-    """Replace RLlib's checkpoint; whenever that is cut short, a whole one is left in the folder.
+    """Replace the RLlib checkpoint; after an interruption, the folder has a complete one.
 
     Raises:
-        UsageError: It cannot be written.
+        UsageError: The checkpoint cannot be written.
     """
     place = (folder / CHECKPOINT).resolve()
     fresh, former = (place.with_name(f"{CHECKPOINT}.{end}") for end in ("new", "old"))
@@ -145,10 +145,10 @@ def _save_checkpoint(algorithm: Any, folder: Path) -> None:
 
 
 def ppo_config(config: RllibConfig) -> PPOConfig:
-    """The same in RLlib's words, for those who want to go on from there.
+    """Return the configuration for RLlib, also as a base for other settings.
 
     Raises:
-        EnvError: An environment that cannot be.
+        EnvError: The arguments of the environment are invalid.
     """
     model = {"gain": gain_of(config.layout).tolist(), "width": config.width}
     spec = RLModuleSpec(module_class=CarModule, model_config=model)
@@ -175,7 +175,7 @@ def ppo_config(config: RllibConfig) -> PPOConfig:
             gamma=config.gamma,
             lambda_=config.trace,
             clip_param=config.clip,
-            # Returns are not scaled, so neither is how far a value may go.
+            # Returns are not scaled, so value updates are not clipped.
             vf_clip_param=float("inf"),
             vf_loss_coeff=0.5,
             use_kl_loss=False,
@@ -194,7 +194,7 @@ def ppo_config(config: RllibConfig) -> PPOConfig:
 
 
 def _one_for_all(agent: str, episode: Any, **_: Any) -> str:
-    """Every car is driven by the same network."""
+    """Return the same network for every car."""
     return MODULE
 
 
@@ -208,7 +208,7 @@ def _algorithm(config: RllibConfig) -> Iterator[Any]:
 
 
 def _record(found: dict[str, Any], seconds: float) -> dict[str, Any]:
-    """One iteration, ready for JSON; None for what no episode has shown yet."""
+    """Return the record of an iteration for JSON; None for metrics without episodes."""
     runners = found["env_runners"]
     steps = float(runners["num_env_steps_sampled"])
     return {
@@ -222,12 +222,12 @@ def _record(found: dict[str, Any], seconds: float) -> dict[str, Any]:
 
 
 def _number(value: Any) -> float | None:
-    """A finite number, or None."""
+    """Return a finite number, or None."""
     return None if value is None or not np.isfinite(value) else float(value)
 
 
 def _version(package: str) -> str | None:
-    """Of an installed package."""
+    """Return the version of a package; None if it is not installed."""
     try:
         return version(package)
     except PackageNotFoundError:

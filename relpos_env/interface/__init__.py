@@ -1,1 +1,1 @@
-"""The contract a policy sees: views, observations, actions. The same in simulation and on cars."""
+"""Interface of policies in simulation and on hardware: views, observations, actions, infos."""

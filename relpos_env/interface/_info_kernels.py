@@ -1,4 +1,4 @@
-"""The figures of cars that infos tell."""
+"""Compiled values of the infos of cars."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from tracking.kernels.jit import kernel
 
 @kernel
 def write_figures(error, tracking, ok, present, contacts, rewards, weights, done, figures):
-    """Write the figures of all cars of all environments.
+    """Write the info values of all cars of all environments.
 
     Args:
         error: Formation errors, (env, car) [m].
-        tracking: Errors of estimates, (env, car) [m]; NaN where there is none.
-        ok: Where an estimate can be used, (env, car, other).
-        present: (env, car)
-        contacts: Begun in the step, (env, car).
-        rewards: Terms, (env, car, term).
-        weights: (term)
-        done: The task is accomplished, (env).
+        tracking: Errors of estimates, (env, car) [m]; NaN where there is no estimate.
+        ok: True where an estimate is usable, (env, car, other).
+        present: True where the car is present, (env, car).
+        contacts: Number of contacts begun in the step, (env, car).
+        rewards: Reward terms, unweighted, (env, car, term).
+        weights: Reward weights, (term).
+        done: True where the task is done, (env).
         figures: `relpos_env.interface.infos.Figures`, written.
     """
     for e in range(error.shape[0]):

@@ -1,4 +1,4 @@
-"""Views written as observation vectors, each in the frame of its car: x forward, y left."""
+"""Compiled observation vectors of a view, in the body frame of each car: x forward, y left."""
 
 from __future__ import annotations
 
@@ -8,30 +8,30 @@ from relpos_env.interface.beams import FARTHEST
 from tracking.kernels.jit import kernel, small_kernel
 
 FAR, FAST = 20.0, 10.0
-"""[m], [m/s] Positions and velocities are cut at these."""
+"""[m], [m/s] Limits of positions and velocities."""
 OLD = 10.0
-"""[s] Ages are cut at this."""
+"""[s] Limit of ages."""
 LOUD = 40.0
-"""[dB] Power gaps are cut at this."""
+"""[dB] Limit of power differences."""
 N_STATUS = 6
 
 
 @small_kernel
 def put(out, e, a, k, value, limit):
-    """Write one number, cut to its limit."""
+    """Write one number, clipped to its limit."""
     out[e, a, k] = min(max(value, -limit), limit)
 
 
 @small_kernel
 def put_turned(out, e, a, k, x, y, c, s, limit):
-    """Write a vector of the world in the frame of the car."""
+    """Rotate a vector from the world frame to the car's body frame and write it."""
     put(out, e, a, k, c * x + s * y, limit)
     put(out, e, a, k + 1, c * y - s * x, limit)
 
 
 @small_kernel
 def put_own(view, out, e, a, k, c, s):
-    """What every mode ends with: command, heading, own motion (6 numbers), and every beam."""
+    """Write the last fields of every mode: command, heading, own motion (6 numbers), ranges."""
     put_turned(out, e, a, k, view.command[e, a, 0], view.command[e, a, 1], c, s, FAST)
     known = 1.0 if view.oriented[e, a] else 0.0
     put(out, e, a, k + 2, known * c, 1.0)
@@ -44,7 +44,7 @@ def put_own(view, out, e, a, k, c, s):
 
 @small_kernel
 def put_wishes(view, out, e, a, k, c, s):
-    """Where the others should be: mask and positions (3 numbers for each)."""
+    """Write the targets of the other cars: mask and positions (3 numbers each)."""
     n = view.ok.shape[1]
     for b in range(n):
         if b == a:
@@ -62,11 +62,11 @@ def put_wishes(view, out, e, a, k, c, s):
 
 @kernel
 def observe_relative(view, with_cov, out):
-    """Relative positions and velocities; with_cov: and how sure they are.
+    """Write relative positions and velocities, with their uncertainty if `with_cov`.
 
     Args:
         view: AgentView.
-        with_cov: Whether covariance, age, NLOS probability and status follow.
+        with_cov: True to add covariance, age, NLOS probability and status.
         out: Observations, (env, car, size), written; zeros for absent cars.
     """
     n = view.ok.shape[1]
@@ -98,7 +98,7 @@ def observe_relative(view, with_cov, out):
 
 @small_kernel
 def put_certainty(view, out, e, a, k, c, s):
-    """Standard deviations ahead and to the left, correlation; age, sight and status."""
+    """Write std forward and left, their correlation, age, NLOS probability and status."""
     n = view.ok.shape[1]
     for b in range(n):
         if b == a:
@@ -123,7 +123,7 @@ def put_certainty(view, out, e, a, k, c, s):
 
 @kernel
 def observe_ranges(view, out):
-    """The last range of every pair as it came, its age and its power gap.
+    """Write the last raw range of every pair, its age and its power difference.
 
     Args:
         view: AgentView.

@@ -1,4 +1,4 @@
-"""From estimates, or from the truth, to what every car sees of every other."""
+"""Compiled views of the other cars, from estimates or from the true state."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ RANGE = 5
 
 @kernel
 def see_estimate(motion, rest, pair_i, pair_j, powered, turns, view):
-    """Write what the trackers tell, carried to now at constant velocity.
+    """Write the estimates of the trackers, predicted to `view.now` at constant velocity.
 
     Args:
         motion: Position, velocity, covariance of every pair, (env, pair, ...), and orientation of
             every node, (env, node, 4).
-        rest: Whether that is known, (env, node); age, NLOS probability and status, (env, pair);
-            and the time of all that, (env) [s].
-        pair_i: (pair)
-        pair_j: (pair), larger; nodes behind the cars ride on none and are left out.
-        powered: (env, car)
-        turns: How far every car has turned since, (env, car) [rad].
+        rest: True where the orientation is known, (env, node); age, NLOS probability and status,
+            (env, pair); and the time of the estimates, (env) [s].
+        pair_i: Smaller node index of the pair, (pair).
+        pair_j: Larger node index, (pair); nodes with indices above the cars' are skipped.
+        powered: True where the car's tracker runs, (env, car).
+        turns: Rotation of every car since the estimate, (env, car) [rad].
         view: AgentView, written.
     """
     pos, vel, cov, q = motion
@@ -57,14 +57,14 @@ def see_estimate(motion, rest, pair_i, pair_j, powered, turns, view):
 
 @small_kernel
 def carried(cov, e, p, r, k, dt):
-    """An entry of the position's covariance after dt at constant velocity [m2]."""
+    """Return an entry of the position covariance predicted by dt at constant velocity [m2]."""
     mixed = cov[e, p, r, 3 + k] + cov[e, p, 3 + r, k]
     return cov[e, p, r, k] + dt * (mixed + dt * cov[e, p, 3 + r, 3 + k])
 
 
 @kernel
 def see_truth(pos, vel, heading, view):
-    """Write the truth; arguments as for `views.reveal`."""
+    """Write the true state; arguments as for `views.reveal`."""
     for e in range(pos.shape[0]):
         for a in range(pos.shape[1]):
             here = view.present[e, a]
@@ -84,7 +84,7 @@ def see_truth(pos, vel, heading, view):
 
 @kernel
 def note_ranges(t, kind, i, j, values, has_power, valid, view):
-    """Keep the last range of every pair of cars; arguments as in `MeasurementBlock`."""
+    """Store the last range of every pair of cars; arguments as in `MeasurementBlock`."""
     n_cars = view.heard.shape[1]
     for e in range(t.shape[0]):
         for k in range(t.shape[1]):
@@ -100,7 +100,7 @@ def note_ranges(t, kind, i, j, values, has_power, valid, view):
 
 @kernel
 def forget_all(view, e):
-    """Begin an environment again: no node has received anything."""
+    """Clear the ranges of an environment."""
     for a in range(view.heard.shape[1]):
         for b in range(view.heard.shape[1]):
             view.heard[e, a, b] = -np.inf

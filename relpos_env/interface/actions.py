@@ -1,4 +1,4 @@
-"""What a policy tells a car to do. Adding a kind: a class here and a line in `ACTIONS`."""
+"""Actions of policies. A new action mode needs a class here and a line in `ACTIONS`."""
 
 from __future__ import annotations
 
@@ -15,61 +15,61 @@ from tracking.arrays import F64
 from tracking.params.short_repr import short_repr
 
 MAX_SPEED = 2.0
-"""[m/s] Asked of a car at most."""
+"""[m/s] Largest commanded speed."""
 MAX_STEERING = 0.42
-"""[rad]"""
+"""[rad] Largest commanded steering angle."""
 
 
 @dataclass(frozen=True, slots=True)
 class DriveCommand:
-    """Commands to every car of a group, (car)."""
+    """Drive commands of every car of a group, (car)."""
 
     __repr__ = short_repr
 
     t: float
-    """Time of the decision [s]."""
+    """Time of the command [s]."""
     speed: F64
-    """Forward speed wanted [m/s]; negative is backwards."""
+    """Commanded forward speed [m/s]; negative is backwards."""
     steering: F64
-    """Steering angle wanted [rad]; positive turns left."""
+    """Commanded steering angle [rad]; positive turns left."""
 
 
 class ActionMode(Protocol):
-    """Actions of cars to commands."""
+    """Mapping of actions to drive commands."""
 
     def space(self) -> spaces.Space[Any]:
-        """The action space of one car."""
+        """Return the action space of one car."""
 
     @property
     def shape(self) -> tuple[int, ...]:
         """Shape of the action of one car."""
 
     def decode(self, actions: Any, where: str) -> tuple[F64, F64]:
-        """Speed [m/s] and steering [rad] that actions ask for.
+        """Return the speed [m/s] and steering [rad] of actions.
 
         Args:
-            actions: (..., *shape)
-            where: What they are called in errors.
+            actions: Actions, (..., *shape).
+            where: Name of the actions in errors.
 
         Raises:
-            EnvError: Not finite, or not in the space and not of those that are clipped.
+            EnvError: An action is not finite, or outside a space that does not clip.
         """
 
 
 class ContinuousActions:
-    """Two numbers in [-1, 1]: speed and steering as shares of their largest values.
+    """Two numbers in [-1, 1]: speed and steering as fractions of their largest values.
 
-    Left is positive. Numbers beyond are clipped.
+    Left is positive. Numbers outside the interval are clipped.
     """
 
     shape = (2,)
 
     def space(self) -> spaces.Box:
-        """The action space of one car."""
+        """Return the action space of one car."""
         return spaces.Box(-1.0, 1.0, shape=self.shape, dtype=np.float32)
 
     def decode(self, actions: Any, where: str) -> tuple[F64, F64]:
-        """Speed and steering; see `ActionMode`."""
+        """Return speed and steering; see `ActionMode`."""
         try:
             actions = np.asarray(actions, dtype=np.float64)
         except (TypeError, ValueError) as error:
@@ -83,9 +83,9 @@ class ContinuousActions:
 
 
 class DiscreteActions:
-    """Fifteen choices: backwards, stop or forwards, and five steering angles from right to left.
+    """Fifteen actions: backwards, stop or forwards, and five steering angles from right to left.
 
-    Number ``5 g + s``: speed -0.5, 0 or 1 m/s for g = 0, 1, 2; steering -0.42 rad to 0.42 rad for
+    Action ``5 g + s``: speed -0.5, 0 or 1 m/s for g = 0, 1, 2; steering -0.42 rad to 0.42 rad for
     s = 0 to 4.
     """
 
@@ -94,11 +94,11 @@ class DiscreteActions:
     angles = MAX_STEERING * np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
 
     def space(self) -> spaces.Discrete:
-        """The action space of one car."""
+        """Return the action space of one car."""
         return spaces.Discrete(len(self.speeds) * len(self.angles))
 
     def decode(self, actions: Any, where: str) -> tuple[F64, F64]:
-        """Speed and steering; see `ActionMode`."""
+        """Return speed and steering; see `ActionMode`."""
         actions = np.asarray(actions)
         n = len(self.speeds) * len(self.angles)
         if not np.issubdtype(actions.dtype, np.integer) or actions.min() < 0 or actions.max() >= n:
@@ -115,13 +115,13 @@ ACTIONS: dict[str, Callable[[], ActionMode]] = {
 
 
 def action_mode(name: str | Callable[[], ActionMode]) -> ActionMode:
-    """Look a kind of actions up.
+    """Build an action mode from its name or builder.
 
     Args:
         name: One of `ACTIONS`, ``package.module:Name``, a name among the entry points
-            ``relpos_env.actions``, or a builder itself.
+            ``relpos_env.actions``, or a builder.
 
     Raises:
-        EnvError: None of that name.
+        EnvError: There is no action mode of this name.
     """
     return look_up(ACTIONS, name, "actions", group="relpos_env.actions")()

@@ -1,7 +1,6 @@
-"""A group of cars as a PettingZoo environment, moved by a simulation or by motors.
+"""PettingZoo environment of a group of cars, in simulation or on hardware.
 
-What PettingZoo promises, agents that come and go, spaces and dicts, is here; what happens in a
-step is the business of a `Group`.
+The environment handles agents, spaces and dicts of the PettingZoo API; a `Group` runs the steps.
 """
 
 from __future__ import annotations
@@ -24,54 +23,54 @@ from relpos_env.interface.seeding import episode_rng
 from tracking.arrays import F64, Bool
 
 PRESENT = Field("present", 1, "-", "1 while the car is in the room", 1.0, signed=False)
-"""Ends the observations of agents that are fixed."""
+"""Last field of observations with fixed agents."""
 
 
 class Group(Protocol):
-    """Cars in arrays over (env, car, ...), of which there is one environment here."""
+    """Cars in arrays over (env, car, ...), here with one environment."""
 
     @property
     def observations(self) -> F32:
-        """(env, car, size); zeros for absent cars."""
+        """Observations, (env, car, size); zeros for absent cars."""
 
     @property
     def rewards(self) -> F64:
-        """(env, car); 0 for absent cars."""
+        """Rewards, (env, car); 0 for absent cars."""
 
     @property
     def active(self) -> Bool:
-        """Cars that take part, (env, car): present, or away and to return."""
+        """True for cars that are present or temporarily absent, (env, car)."""
 
     @property
     def left(self) -> Bool:
-        """Cars that left for good in the last step, (env, car)."""
+        """True for cars that left for good in the last step, (env, car)."""
 
     @property
     def terminated(self) -> Bool:
-        """Whether the episode came to its end, (env)."""
+        """True where the episode has terminated, (env)."""
 
     @property
     def truncated(self) -> Bool:
-        """Whether its time is up, (env)."""
+        """True where the time limit is reached, (env)."""
 
     def infos(self) -> Columns:
-        """Figures of cars, see `relpos_env.interface.infos`."""
+        """Return the info values of cars, see `relpos_env.interface.infos`."""
 
     def seed(self, env: int, rng: np.random.Generator) -> None:
-        """Let the episodes of an environment come from a generator, from the next one on."""
+        """Set the generator of an environment's episodes, from the next episode on."""
 
     def step(self, speed: F64, steering: F64) -> None:
-        """Drive for one decision; speed [m/s] and steering [rad], each (env, car)."""
+        """Drive for one control period; speed [m/s] and steering [rad], each (env, car)."""
 
 
 class BaseFormationParallelEnv(ParallelEnv, ABC):  # type: ignore[misc]
-    """An agent is a car.
+    """Environment with one agent per car.
 
-    One that joins in mid-episode becomes an agent in that step; one that leaves for good is
-    truncated, with the last observation that it had; one that is away and will return stays an
-    agent, sees zeros, gets no reward, and what it does has no effect (``info["present"]`` is
-    False). With fixed agents every slot is an agent for the whole episode: where no car is, it
-    sees zeros, and observations end with the field `PRESENT`.
+    A car that joins in mid-episode becomes an agent in that step. A car that leaves for good is
+    truncated with its last observation. A temporarily absent car stays an agent with zero
+    observations, no reward and ignored actions (``info["present"]`` is False). With fixed agents
+    every possible agent stays for the whole episode: observations of absent cars are zero, and
+    observations end with the field `PRESENT`.
     """
 
     metadata = {  # noqa: RUF012
@@ -91,19 +90,19 @@ class BaseFormationParallelEnv(ParallelEnv, ABC):  # type: ignore[misc]
         history: int = 1,
         fixed_agents: bool = False,
     ) -> None:
-        """Give a group its face.
+        """Create the agents and their spaces.
 
         Args:
-            group: One environment of cars.
-            fields: Stretches of one observation.
-            actions: What an action says.
-            n_cars: Slots for cars.
-            history: So many observations in one.
-            fixed_agents: Agents neither come nor go.
+            group: Group of cars with one environment.
+            fields: Fields of one observation.
+            actions: Action mode.
+            n_cars: Maximum number of cars.
+            history: Number of stacked observations.
+            fixed_agents: True to keep the same agents for the whole episode.
         """
         self._group, self._actions, self._fixed = group, actions, fixed_agents
         self.fields = (*fields, PRESENT) if fixed_agents else fields
-        """Names, sizes and units of the stretches of an observation."""
+        """Fields of an observation, with names, sizes and units."""
         self.possible_agents = [f"car_{k}" for k in range(n_cars)]
         self.agents: list[str] = []
         self._numbers = {agent: k for k, agent in enumerate(self.possible_agents)}
@@ -121,37 +120,37 @@ class BaseFormationParallelEnv(ParallelEnv, ABC):  # type: ignore[misc]
 
     @property
     def np_random(self) -> np.random.Generator:
-        """The generator that episodes come from."""
+        """Generator of the episodes."""
         if self._rng is None:
             self._rng = episode_rng(None)
             self._group.seed(0, self._rng)
         return self._rng
 
     def observation_space(self, agent: str) -> spaces.Box:
-        """Observation space of one car, the same object at each call."""
+        """Return the observation space of one car, the same object at each call."""
         return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> spaces.Space[Any]:
-        """Action space of one car, the same object at each call."""
+        """Return the action space of one car, the same object at each call."""
         return self.action_spaces[agent]
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Begin an episode; in a simulation, a seed makes this and all after it repeatable.
+        """Begin an episode; in simulation, a seed makes this and all later episodes repeatable.
 
         Args:
-            seed: None goes on with the generator of the episode before.
-            options: What is wanted of the episode; see the class of the environment.
+            seed: Seed; None continues with the generator of the previous episode.
+            options: Options of the episode; see the class of the environment.
 
         Raises:
-            EnvError: An unknown option, or one that cannot be fulfilled.
+            EnvError: An option is unknown or invalid.
         """
         if seed is not None or self._rng is None:
             self._rng = episode_rng(seed)
             self._group.seed(0, self._rng)
-        self._begun = False  # until all wishes are fulfilled
-        # The checkers of PettingZoo pass an option of that name.
+        self._begun = False  # until all options are applied
+        # The PettingZoo test suite passes an option named "options".
         self._begin({name: what for name, what in (options or {}).items() if name != "options"})
         self._begun = True
         active = self._group.active[0]
@@ -164,7 +163,7 @@ class BaseFormationParallelEnv(ParallelEnv, ABC):  # type: ignore[misc]
         """Drive for 0.1 s.
 
         Args:
-            actions: Of every agent.
+            actions: Action of every agent.
 
         Raises:
             EnvError: An action is missing, has a wrong shape, is not finite or not in its space,
@@ -203,15 +202,15 @@ class BaseFormationParallelEnv(ParallelEnv, ABC):  # type: ignore[misc]
         """Begin an episode of the group."""
 
     def _infos(self, agents: list[str]) -> dict[str, Any]:
-        """Infos of agents, in addition to their observations."""
+        """Return the infos of agents."""
         cars = [self._numbers[agent] for agent in agents]
         return dict(zip(agents, car_infos(self._group.infos(), 0, cars), strict=True))
 
     def _show(self) -> None:
-        """After every reset and step."""
+        """Hook that is called after every reset and step."""
 
     def _observations(self) -> F32:
-        """A copy for the caller, (car, size)."""
+        """Return a copy of the observations, (car, size)."""
         observations = self._group.observations[0]
         if not self._fixed:
             own: F32 = observations.copy()
@@ -221,7 +220,7 @@ class BaseFormationParallelEnv(ParallelEnv, ABC):  # type: ignore[misc]
         return rows
 
     def _decode(self, actions: dict[str, Any]) -> tuple[F64, F64]:
-        """Commands of all cars; those of absent cars are zero."""
+        """Return the commands of all cars; 0 for absent cars."""
         n, mode, agents = len(self.possible_agents), self._actions, self.agents
         if len(actions) != len(agents):
             for agent in actions:
@@ -239,7 +238,7 @@ class BaseFormationParallelEnv(ParallelEnv, ABC):  # type: ignore[misc]
             raise EnvError(f"actions: none for {error.args[0]}") from error
         except (ValueError, EnvError):
             pass
-        # Something is wrong with one of them: say with which.
+        # Some action is invalid: decode them one by one to name its agent in the error.
         for agent in self.agents:
             action = actions[agent]
             if np.shape(action) != mode.shape:

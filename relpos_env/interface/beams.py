@@ -1,7 +1,7 @@
-"""Where the beams of a car's distance sensors stand, for who measures and for who reads them.
+"""Geometry of a car's distance sensors, for simulation and observations.
 
-Evenly round the car, the first straight ahead, counter-clockwise. A beam starts where the ray from
-the middle of the car leaves its body, so that 0 is a touch.
+The rays are evenly spaced round the car, counter-clockwise from straight ahead. A ray from the
+middle of the car is measured from the edge of the body, so a reading of 0 is a contact.
 """
 
 from __future__ import annotations
@@ -13,25 +13,25 @@ import numpy as np
 from tracking.arrays import F64
 
 MOST_BEAMS = 32
-"""[-] Round a car."""
+"""[-] Maximum number of distance sensors per car."""
 FARTHEST = 3.0
-"""[m] No beam reaches farther, and observations have room for no more."""
+"""[m] Maximum range of distance sensors, and limit of their observations."""
 
 
 def beam_directions(n_beams: int) -> F64:
-    """Where beams point in the frame of the car, forward and left, (beam, 2)."""
+    """Return the ray directions in the body frame, forward and left, (ray, 2)."""
     angles = 2.0 * pi * np.arange(n_beams) / max(n_beams, 1)
     directions: F64 = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     return directions
 
 
 def beam_starts(directions: F64, half_length: float, half_width: float) -> F64:
-    """From the middle of a car to where its beams start, (beam) [m].
+    """Return the distances from the middle of a car to the edge of its body, (ray) [m].
 
     Args:
-        directions: (beam, 2)
-        half_length: Of the car [m].
-        half_width: Of the car [m].
+        directions: Unit vectors of the rays, (ray, 2).
+        half_length: Half length of the car [m].
+        half_width: Half width of the car [m].
     """
     along, across = np.abs(directions).T
     starts: F64 = np.minimum(

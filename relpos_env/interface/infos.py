@@ -1,18 +1,18 @@
-"""What `info` says: the same keys in every form of the environment, flat, at every step.
+"""Keys of `info`: the same in every environment class, flat, at every step.
 
-| key | of a car | of a team |
+| key | value of a car | value of a team |
 |---|---|---|
-| ``formation_error`` | of the others from their places, mean [m]; inf while absent | mean |
-| ``tracking_error`` | distance of estimates from the truth, mean [m]; inf where none is | mean |
-| ``tracked`` | others whose estimate can be used | mean |
-| ``collisions`` | contacts begun in the step; not on hardware, which counts none | sum |
-| ``present`` | in the room | of each car |
-| ``active`` | takes part: in the room, or away and to return | of each car |
-| ``is_success`` | the task is accomplished | the same |
-| ``reward_<term>`` | what the term adds to the reward | mean |
+| ``formation_error`` | mean distance of others from their targets [m]; inf while absent | mean |
+| ``tracking_error`` | mean error of the estimates [m]; inf without estimates | mean |
+| ``tracked`` | number of others with a usable estimate | mean |
+| ``collisions`` | number of contacts begun in the step; not on hardware | sum |
+| ``present`` | True if in the room | per car |
+| ``active`` | True if in the room or temporarily absent | per car |
+| ``is_success`` | True if the task is done | the same |
+| ``reward_<term>`` | weighted reward term | mean |
 
-Errors that there are not are infinite: equal to themselves, as the checkers of Gymnasium and
-PettingZoo expect of two equal runs, and no perfect score.
+Missing errors are infinite: unlike NaN, inf equals itself, which the checkers of Gymnasium and
+PettingZoo need to compare two runs; 0 would be a perfect score.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from numpy.typing import NDArray
 from tracking.arrays import F64, I64, Bool
 
 Columns = dict[str, NDArray[Any]]
-"""By key, arrays over (env, car) or (env)."""
+"""Arrays over (env, car) or (env), by key."""
 
 
 class Figures(NamedTuple):
-    """Of cars, arrays over (env, car)."""
+    """Info values of cars, arrays over (env, car)."""
 
     formation_error: F64
     tracking_error: F64
@@ -38,11 +38,11 @@ class Figures(NamedTuple):
     collisions: I64
     is_success: Bool
     parts: F64
-    """Of the reward, (env, car, term)."""
+    """Weighted reward terms, (env, car, term)."""
 
 
 def make_figures(n_envs: int, n_cars: int, n_terms: int) -> Figures:
-    """Room for them."""
+    """Allocate the info values."""
     shape = n_envs, n_cars
     return Figures(
         np.zeros(shape),
@@ -57,14 +57,14 @@ def make_figures(n_envs: int, n_cars: int, n_terms: int) -> Figures:
 def car_columns(
     figures: Figures, terms: Sequence[str], present: Bool, active: Bool, *, counted: bool = True
 ) -> Columns:
-    """The figures of cars by their keys; they share memory.
+    """Return the info values of cars by key, as views of the arrays.
 
     Args:
-        figures: As `write_figures` leaves them.
-        terms: Of the task.
-        present: (env, car)
-        active: (env, car)
-        counted: Whether anybody counts collisions.
+        figures: Values written by `write_figures`.
+        terms: Names of the task's reward terms.
+        present: True where the car is present, (env, car).
+        active: True where the car is present or temporarily absent, (env, car).
+        counted: True if collisions are counted.
     """
     columns: Columns = {
         "formation_error": figures.formation_error,
@@ -81,13 +81,13 @@ def car_columns(
 
 
 def car_infos(columns: Columns, env: int, cars: Iterable[int]) -> list[dict[str, Any]]:
-    """The info of each of some cars of an environment, in plain numbers."""
+    """Return the infos of some cars of an environment, as Python numbers."""
     rows = {key: column[env].tolist() for key, column in columns.items()}
     return [{key: row[k] for key, row in rows.items()} for k in cars]
 
 
 def team_columns(columns: Columns) -> Columns:
-    """The figures of teams, (env), and of their cars, (env, car)."""
+    """Return the info values of teams, (env), and of their cars, (env, car)."""
     present, active = columns["present"], columns["active"]
     n_present, n_active = (np.maximum(a.sum(axis=1), 1) for a in (present, active))
     team: Columns = {}
@@ -110,18 +110,18 @@ def team_columns(columns: Columns) -> Columns:
 
 
 def team_info(team: Columns, env: int) -> dict[str, Any]:
-    """The info of one team: plain numbers, and arrays over its cars."""
+    """Return the info of one team: Python numbers, and arrays over its cars."""
     return {
         key: column[env].item() if column.ndim == 1 else column[env] for key, column in team.items()
     }
 
 
 def vector_infos(team: Columns, envs: Bool | None = None) -> dict[str, Any]:
-    """Infos as vector environments have them: each key with a mask of where it is.
+    """Return the infos of a vector environment: each key with a mask of its environments.
 
     Args:
-        team: Of all environments.
-        envs: Of which they are wanted, (env); the others have zeros. None are all.
+        team: Info values of all environments.
+        envs: Mask of the selected environments, (env); the others have zeros. None selects all.
     """
     infos: dict[str, Any] = {}
     for key, column in team.items():
@@ -134,7 +134,7 @@ def vector_infos(team: Columns, envs: Bool | None = None) -> dict[str, Any]:
 
 
 def _mean_of_known(column: F64) -> F64:
-    """Mean of what is finite in each row, infinite where nothing is, (env)."""
+    """Return the mean of the finite values of each row, infinite if there are none, (env)."""
     known = np.isfinite(column)
     n = known.sum(axis=1)
     total = np.where(known, column, 0.0).sum(axis=1)

@@ -1,8 +1,8 @@
-"""From measurements to what every car sees, wherever they come from: simulation or hardware.
+"""Processing of measurements, simulated or real, into the view of every car.
 
     block -> Horizon -> Tracker -> TeamEstimate -> AgentView
 
-The tracker's estimate is as old as the horizon's delay and is carried to the present: positions
+The tracker's estimate is as old as the horizon's delay and is predicted to the present: positions
 at constant velocity, headings by the gyroscopes.
 """
 
@@ -25,17 +25,16 @@ from tracking.measurements import MeasurementBlock
 from tracking.tracker import Tracker, TrackerParams
 
 OK_WITHIN = 1.0
-"""[m] The accuracy within which a pair is ok to those who act: the shipped policies learned so."""
+"""[m] Accuracy required for the status ok in views: that of the shipped policies' training."""
 FOR_POLICIES = FilterParams(joint=JointParams(accuracy=OK_WITHIN))
-"""What the filters of a simulated or real swarm believe."""
+"""Filter parameters of simulated and real swarms."""
 
 
 class Perception:
-    """Trackers of groups of cars, and what these see by them.
+    """Trackers of groups of cars, and the resulting views.
 
-    Before a `step` its caller fills the block with what was measured since the last, `powered`,
-    and of the view what is the car's own or comes from elsewhere: `now`, `present`, `speed`,
-    `steering`, `near`.
+    Before a `step` the caller writes the new measurements to the block, and updates `powered` and
+    the view's `now`, `present`, `speed`, `steering` and `near`.
     """
 
     def __init__(
@@ -49,16 +48,16 @@ class Perception:
         room: int,
         n_beams: int = 0,
     ) -> None:
-        """Make trackers that have heard nothing.
+        """Create trackers in their initial state.
 
         Args:
-            constellation: The nodes; the first of them ride on the cars, in the cars' order.
-            params: What the trackers believe.
-            block: Filled again by the caller before every step, in its own memory.
-            powered: Which cars' trackers run, (env, car), likewise.
+            constellation: Nodes; the first ones are on the cars, in the cars' order.
+            params: Parameters of the trackers.
+            block: Measurements, updated in place by the caller before every step.
+            powered: True where the car's tracker runs, (env, car), updated in place as well.
             filter: One of `tracking.filters.FILTERS`.
-            room: Measurements that wait at a time, at most.
-            n_beams: Of each car's distance sensors.
+            room: Capacity of the horizon in measurements.
+            n_beams: Number of distance sensors per car.
         """
         n_envs, n_cars = powered.shape
         self.constellation = constellation
@@ -67,17 +66,17 @@ class Perception:
         self.horizon.reserve(room)
         self.view: AgentView = make_view(n_envs, n_cars, n_beams)
         self.estimate = TeamEstimate.empty(constellation, np.zeros(n_envs))
-        """The tracker's last estimate, as old as the horizon, overwritten by the next."""
+        """Last estimate of the tracker, delayed by the horizon, overwritten by the next."""
         self._room = room
         self.rebind(block, powered)
 
     def part(self, envs: slice, block: MeasurementBlock, powered: Bool) -> Perception:
-        """Some of the groups; shares their memory.
+        """Return the part for some environments; it shares memory with the whole.
 
         Args:
-            envs: Which.
-            block: As in the constructor, of these.
-            powered: As in the constructor, of these.
+            envs: Environments.
+            block: As in the constructor, of these environments.
+            powered: As in the constructor, of these environments.
         """
         part = copy.copy(self)
         part.tracker, part.horizon = self.tracker.part(envs), self.horizon.part(envs)
@@ -90,16 +89,16 @@ class Perception:
 
     @property
     def n_late(self) -> I64:
-        """Measurements that came later than the horizon waits, (env)."""
+        """Number of measurements that arrived too late for the horizon, (env)."""
         return self.horizon.n_late
 
     @property
     def n_waiting(self) -> I64:
-        """Measurements that wait in the horizon, (env)."""
+        """Number of measurements in the horizon, (env)."""
         return self.horizon.state.n_waiting
 
     def share(self, target: F64, wanted: Bool, command: F64) -> None:
-        """Let the view have what the task and the operator want, in their own memory.
+        """Use arrays of the task and the operator in the view, without a copy.
 
         Args:
             target: As in `AgentView`.
@@ -110,18 +109,18 @@ class Perception:
         self.rebind(self._block, self._powered)
 
     def reset(self, env: int) -> None:
-        """Forget everything of one environment."""
+        """Reset tracker, horizon and ranges of one environment."""
         self.tracker.reset(env)
         self.horizon.reset(env)
         forget_all(self.view, env)
 
     def make_room(self, room: int) -> None:
-        """Let more measurements wait at a time; to be followed by `rebind`."""
+        """Increase the capacity of the horizon; call `rebind` afterwards."""
         self.horizon.reserve(room)
         self._room = room
 
     def step(self) -> None:
-        """Take the block in, let the trackers catch up, and see."""
+        """Process the block: update the horizon, the trackers and the view."""
         self._wait()
         self.estimate.t[:] = self.horizon.state.released
         self._orient()
@@ -131,7 +130,7 @@ class Perception:
         self._note()
 
     def rebind(self, block: MeasurementBlock, powered: Bool) -> None:
-        """Put together what the kernels take: arrays that stay where they are.
+        """Bind the kernels to their arrays.
 
         Args:
             block: As in the constructor.
@@ -142,7 +141,7 @@ class Perception:
         due = MeasurementBlock.empty(len(view.now), self._room)
         self._wait = self.horizon.bind(block, view.now, due)
         self._orient, self._follow = self.tracker.bind(due, self.estimate)
-        # Not every node rides on a car; those that do come first.
+        # The nodes on cars come first; there may be others.
         turns = np.zeros((len(view.now), self.constellation.n_nodes))
         self._turn = self.horizon.bind_turns(self.constellation, turns)
         self._see = bind_view(view, self.estimate, powered, turns)
@@ -152,6 +151,6 @@ class Perception:
         )  # fmt: skip
 
     def __getstate__(self) -> dict[str, object]:
-        """What is put together by `rebind` stays behind; the owner calls it again."""
+        """Return the state without the bound kernels; the owner must call `rebind` again."""
         bound = ("_wait", "_orient", "_follow", "_turn", "_see", "_note")
         return {k: v for k, v in self.__dict__.items() if k not in bound}

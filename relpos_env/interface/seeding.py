@@ -1,7 +1,7 @@
-"""The one rule by which a seed leads to episodes.
+"""Seeding of episodes, common to all environment classes.
 
-The episodes of an environment come one after the other from ``episode_rng(seed)``. In a batch,
-environment k has the seed ``seed + k``. So the same seed gives the same episodes in every form.
+The episodes of an environment are sampled in sequence from ``episode_rng(seed)``. In a batch,
+environment k has the seed ``seed + k``. The same seed gives the same episodes in every class.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from relpos_env.errors import EnvError
 
 
 def episode_rng(seed: int | None) -> np.random.Generator:
-    """The generator of all episodes of an environment; None is a seed by chance.
+    """Return the generator of all episodes of an environment; None is a random seed.
 
     Raises:
-        EnvError: The seed is no whole number of at least 0.
+        EnvError: The seed is not an integer of at least 0.
     """
     if seed is not None:
         is_number = isinstance(seed, int | np.integer) and not isinstance(seed, bool)
@@ -29,14 +29,14 @@ def episode_rng(seed: int | None) -> np.random.Generator:
 
 
 def seeds_of_batch(seed: int | Sequence[int | None] | None, n_envs: int) -> list[int | None]:
-    """The seed of each environment of a batch.
+    """Return the seed of each environment of a batch.
 
     Args:
-        seed: Of the first environment, the others count on; or one for each.
-        n_envs: How many there are.
+        seed: Seed of the first environment, incremented for the others; or one for each.
+        n_envs: Number of environments.
 
     Raises:
-        EnvError: Not as many seeds as environments.
+        EnvError: The number of seeds is not the number of environments.
     """
     if seed is None:
         return [None] * n_envs

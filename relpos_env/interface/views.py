@@ -1,4 +1,4 @@
-"""What cars may know at one instant, from simulation or hardware."""
+"""Information available to cars at one instant, from simulation or hardware."""
 
 from __future__ import annotations
 
@@ -15,61 +15,61 @@ from tracking.kernels.jit import bind
 
 
 class AgentView(NamedTuple):
-    """Arrays over (env, car, ...) and, of the others, over (env, car, other, ...).
+    """Arrays over (env, car, ...) and, for the other cars, over (env, car, other, ...).
 
-    Relative quantities are in the plane of the world frame; the observation modes turn them into
-    the frame of each car. A car is no other of its own: its entries are zero, its masks False.
+    Relative quantities are in the plane of the world frame; the observation modes rotate them to
+    the body frame of each car. Diagonal entries (other = car) are zero, their masks False.
     """
 
     pos: F64
     """Position of the other relative to the car, (env, car, other, 2) [m]."""
     vel: F64
-    """Its velocity relative to the car, (env, car, other, 2) [m/s]."""
+    """Velocity of the other relative to the car, (env, car, other, 2) [m/s]."""
     cov: F64
-    """Covariance of that position: xx, yy, xy, (env, car, other, 3) [m2]; 0 for the truth."""
+    """Covariance of `pos`: xx, yy, xy, (env, car, other, 3) [m2]; 0 for the true state."""
     ok: Bool
-    """True where position and velocity can be used."""
+    """True where position and velocity are usable, (env, car, other)."""
     status: I64
-    """A `tracking.Status`; what a car without power knows of anyone is absent."""
+    """`tracking.Status`, (env, car, other); absent for a car without power."""
     age: F64
-    """Time since the last range of the pair [s]."""
+    """Time since the last range of the pair, (env, car, other) [s]."""
     nlos: F64
-    """Probability that the last range was not line of sight [-]."""
+    """Probability that the last range was NLOS, (env, car, other) [-]."""
     heading: F64
-    """Heading by the car's own tracker, (env, car) [rad]."""
+    """Heading from the car's own tracker, (env, car) [rad]."""
     oriented: Bool
     """True where the heading is known, (env, car)."""
     distance: F64
-    """Last range of the pair as it came [m]; 0 before the first."""
+    """Last raw range of the pair, (env, car, other) [m]; 0 before the first."""
     heard: F64
-    """When that was, (env, car, other) [s]; -inf before the first."""
+    """Time of the last range, (env, car, other) [s]; -inf before the first."""
     gap: F64
-    """Received less first-path power of that range [dB]."""
+    """Total minus first-path received power of the last range, (env, car, other) [dB]."""
     target: F64
-    """Where the other should be relative to the car, (env, car, other, 2) [m]."""
+    """Target position of the other relative to the car, (env, car, other, 2) [m]."""
     wanted: Bool
-    """False where the task gives it no place."""
+    """True where the task sets a target, (env, car, other)."""
     command: F64
-    """Velocity that the operator asks for, (env, car, 2) [m/s]."""
+    """Velocity commanded by the operator, (env, car, 2) [m/s]."""
     speed: F64
-    """Forward speed by the car's own odometer, (env, car) [m/s]."""
+    """Forward speed from the car's own odometer, (env, car) [m/s]."""
     steering: F64
-    """Steering angle by its own servo, (env, car) [rad]."""
+    """Steering angle of the car's own servo, (env, car) [rad]."""
     near: F64
-    """Distance by the car's own sensors to what is nearest, straight ahead, then counter-clockwise,
-    (env, car, beam) [m]; of walls, boxes and cars alike."""
+    """Readings of the car's distance sensors (walls, boxes and cars), the first straight ahead,
+    then counter-clockwise, (env, car, ray) [m]."""
     present: Bool
     """True while the car is in the room, (env, car)."""
     now: F64
-    """(env) [s]"""
+    """Time of the view, (env) [s]."""
 
     def part(self, envs: slice) -> AgentView:
-        """Some of the environments; shares their memory."""
+        """Return the part for some environments; it shares memory with the whole."""
         return AgentView._make(array[envs] for array in self)
 
 
 def make_view(n_envs: int, n_cars: int, n_beams: int = 0) -> AgentView:
-    """A view in which nothing is known, and no beam meets anything."""
+    """Return a view without estimates, with distance sensors at their maximum range."""
     own, other = (n_envs, n_cars), (n_envs, n_cars, n_cars)
     return AgentView(
         pos=np.zeros((*other, 2)),
@@ -98,13 +98,13 @@ def make_view(n_envs: int, n_cars: int, n_beams: int = 0) -> AgentView:
 def bind_view(
     view: AgentView, estimate: TeamEstimate, powered: Bool, turns: F64
 ) -> Callable[[], None]:
-    """What writes into a view what trackers tell, carried to `view.now` at constant velocity.
+    """Return a function that writes estimates, predicted to `view.now`, into a view.
 
     Args:
-        view: Written at every call: everything of the others but ranges and targets, and headings.
-        estimate: Of the same environments, at one time each; filled before every call.
-        powered: Which cars' trackers run, (env, car).
-        turns: How far every car has turned since then, by its own gyroscope, (env, car) [rad].
+        view: Written at every call: relative quantities except ranges and targets, and headings.
+        estimate: Estimates of the same environments, updated before every call.
+        powered: True where the car's tracker runs, (env, car).
+        turns: Rotation of every car since the estimate, by its gyroscope, (env, car) [rad].
     """
     i, j = (np.ascontiguousarray(column) for column in estimate.constellation.pairs.T)
     e = estimate
@@ -114,12 +114,12 @@ def bind_view(
 
 
 def reveal(view: AgentView, pos_w: F64, vel_w: F64, heading: F64) -> None:
-    """Write the truth in place of what trackers tell, for modes that need it.
+    """Write the true state in place of estimates, for modes that need it.
 
     Args:
-        view: Written, as by `update_view`.
-        pos_w: (env, car, 2) [m]
-        vel_w: (env, car, 2) [m/s]
-        heading: (env, car) [rad]
+        view: Written, as by `bind_view`.
+        pos_w: Positions, (env, car, 2) [m].
+        vel_w: Velocities, (env, car, 2) [m/s].
+        heading: Headings, (env, car) [rad].
     """
     see_truth(pos_w, vel_w, heading, view)

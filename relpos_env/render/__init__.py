@@ -1,4 +1,4 @@
-"""Pictures of cars in a room and of what one of them believes, from plain arrays.
+"""Images of cars in a room and of the estimates of one car, from plain arrays.
 
     Snapshot -> Renderer.draw -> (height, width, 3) uint8, or a window
 

@@ -1,4 +1,4 @@
-"""The drawing library, imported when the first picture is wanted and not before."""
+"""Lazy import of the drawing library."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from relpos_env.errors import EnvError
 
 
 def load_pygame() -> ModuleType:
-    """The module ``pygame``.
+    """Return the module ``pygame``.
 
     Raises:
-        EnvError: It is not installed.
+        EnvError: pygame is not installed.
     """
-    os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # its greeting on standard output
+    os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # no banner on standard output
     try:
         return importlib.import_module("pygame")
     except ImportError as error:

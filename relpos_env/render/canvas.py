@@ -1,4 +1,4 @@
-"""A patch of the picture, drawn several times larger and smoothed on the way back."""
+"""Canvas: a region of the image, drawn at a higher resolution and downsampled."""
 
 from __future__ import annotations
 
@@ -23,19 +23,18 @@ DASH_DOT = (7.0, 3.0, 1.5, 3.0)
 
 
 class Canvas:
-    """Draws in pixels of the whole picture, on the part of it that is ``region``.
+    """Drawing surface for a region of the image, in pixels of the whole image.
 
-    The patch is ``fine`` times larger inside, which is what smooths the edges. Nothing of it
-    needs a window.
+    The surface is ``fine`` times larger than the region, for antialiasing. It needs no window.
     """
 
     def __init__(self, region: Rect, fine: int, unit: float) -> None:
-        """Make an empty patch.
+        """Create an empty canvas.
 
         Args:
-            region: The part of the picture that it covers.
-            fine: Pixels inside for a pixel of the picture.
-            unit: Pixels for one unit of line widths and dashes.
+            region: Region of the image.
+            fine: Oversampling factor along each axis.
+            unit: Pixels per unit of line widths and dashes.
         """
         self._pg = load_pygame()
         self.region, self.unit = region, unit
@@ -45,21 +44,21 @@ class Canvas:
         self._small: pygame.Surface = self._pg.Surface((region.width, region.height), 0, 32)
 
     def fill(self, colour: Colour) -> None:
-        """Paint all of it."""
+        """Fill the canvas."""
         self._surface.fill(colour)
 
     def copy_from(self, other: Canvas) -> None:
-        """Begin with what another canvas of the same region shows."""
+        """Copy another canvas of the same region."""
         self._surface.blit(other._surface, (0, 0))
 
     def paste(self, picture: pygame.Surface) -> None:
-        """Put the smoothed patch into the picture."""
+        """Copy the downsampled canvas to the image."""
         size = (self.region.width, self.region.height)
         self._pg.transform.smoothscale(self._surface, size, self._small)
         picture.blit(self._small, (self.region.left, self.region.top))
 
     def polygon(self, points: F64, colour: Colour, alpha: int = 255) -> None:
-        """Fill a polygon, (point, 2), with a share of 255 of opacity."""
+        """Fill a polygon, (point, 2), with an opacity of 0 to 255."""
         inner = self._inner(points)
         if alpha >= 255:
             self._pg.draw.polygon(self._surface, colour, inner)
@@ -88,11 +87,11 @@ class Canvas:
         """Draw straight lines from point to point, (point, 2).
 
         Args:
-            points: Corners.
-            colour: Of the line.
-            width: In units.
-            pattern: Units of stroke, gap, stroke, ...; none for a whole line.
-            closed: Back to the first point at the end.
+            points: Corners [pixels].
+            colour: Colour of the line.
+            width: Width [units].
+            pattern: Lengths of stroke, gap, stroke, ... [units]; empty for a solid line.
+            closed: True to close the line at the first point.
         """
         inner = self._inner(points)
         if closed:
@@ -103,7 +102,7 @@ class Canvas:
             line = self._pg.draw.line
         else:
             strokes = list(zip(inner, inner[1:], strict=False))
-            # Steps show on long lines only; the smooth ones cost several times as much.
+            # Aliasing is visible on long lines only; antialiased lines are several times slower.
             line = self._pg.draw.aaline
         wide = max(1, round(width * scale))
         for start, end in strokes:

@@ -1,4 +1,4 @@
-"""What an environment shows while it runs: snapshots of it, and the errors of the last while."""
+"""Rendering of a running environment: snapshots, and the errors of the recent past."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from relpos_env.render.snapshot import LINE_OF_SIGHT, NO_LINE_OF_SIGHT, NO_RANGE
 from relpos_env.timing import DECISION
 
 HISTORY = 20.0
-"""[s] Errors are shown so far back."""
+"""[s] Time window of the displayed errors."""
 SILENT = 0.5
-"""[s] A pair without a range for so long counts as not connected."""
+"""[s] A pair without a range for longer is drawn as not connected."""
 
 
 def check_render_mode(mode: str | None) -> None:
-    """Refuse modes that there are not, and those that cannot draw.
+    """Check a render mode.
 
     Raises:
-        EnvError: Neither None nor one of `RENDER_MODES`; or pygame is not installed.
+        EnvError: Neither None nor one of `RENDER_MODES`, or pygame is not installed.
     """
     if mode is not None and mode not in RENDER_MODES:
         raise EnvError(f"render_mode: expected None, {' or '.join(RENDER_MODES)}, got {mode!r}")
@@ -33,7 +33,7 @@ def check_render_mode(mode: str | None) -> None:
 
 
 class Film:
-    """Pictures of one environment of a batch, as its first car sees it."""
+    """Images of one environment of a batch, with the estimates of its first present car."""
 
     def __init__(self, mode: str | None, fps: float, *, env: int = 0) -> None:
         self._mode, self._fps, self._env = mode, fps, env
@@ -41,11 +41,11 @@ class Film:
         self._errors: deque[tuple[float, float, float]] = deque(maxlen=round(HISTORY / DECISION))
 
     def forget(self) -> None:
-        """Begin a new episode."""
+        """Clear the errors, for a new episode."""
         self._errors.clear()
 
     def add(self, formation: EnvCore) -> None:
-        """Note the errors of now and, if there is a window, show it."""
+        """Record the current errors and, in mode ``human``, draw."""
         env = self._env
         present = formation.state.present[env]
         formed = float(np.mean(formation.task.error[env], where=present)) if present.any() else 0.0
@@ -57,16 +57,16 @@ class Film:
             self._draw(formation)
 
     def picture(self, formation: EnvCore) -> Any:
-        """A picture of now, uint8 (height, width, 3); None for a window or no mode."""
+        """Return an image, uint8 (height, width, 3); None in mode ``human`` or without a mode."""
         return self._draw(formation) if self._mode == "rgb_array" else None
 
     def close(self) -> None:
-        """Release the window; it opens again when there is something to show."""
+        """Close the window; the next drawing opens it again."""
         if self._renderer is not None:
             self._renderer.close()
 
     def __getstate__(self) -> dict[str, Any]:
-        """Everything but the drawing surfaces, which are made again."""
+        """Return the state without the renderer, which is created again when needed."""
         return {**self.__dict__, "_renderer": None}
 
     def _draw(self, formation: EnvCore) -> Any:
@@ -75,7 +75,7 @@ class Film:
         return self._renderer.draw(self.snapshot(formation))
 
     def snapshot(self, formation: EnvCore) -> Snapshot:
-        """Everything that a picture of now shows."""
+        """Return a snapshot of the current state."""
         env, swarm, view = self._env, formation.loop.swarm, formation.loop.view
         state, task = swarm.state.take(env), formation.task
         present = state.present
@@ -111,7 +111,7 @@ class Film:
         )
 
     def _links(self, formation: EnvCore) -> np.ndarray:
-        """Pairs of cars and whether they see and hear each other, (pair, 3)."""
+        """Return the pairs of cars and the kinds of their links, (pair, 3)."""
         env, swarm, view = self._env, formation.loop.swarm, formation.loop.view
         i, j = swarm.constellation.pairs.T
         sight = swarm.line_of_sight(env)[i, j]

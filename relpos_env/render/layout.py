@@ -1,4 +1,4 @@
-"""Where things are on the picture, and where points of the room come to lie on it."""
+"""Layout of the image, and transformation from the room to pixels."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ import numpy as np
 from tracking.arrays import F64
 
 _HEIGHT = 720
-"""[pixels] Of the shorter side of a picture where a unit of lines and letters is one pixel."""
+"""[pixels] Shorter side of an image in which a unit of lines and letters is one pixel."""
 _SMALLEST_UNIT = 0.62
-"""[pixels] Letters are no longer read below it."""
+"""[pixels] Minimum unit, for legible letters."""
 _NO_PANEL = (400, 300)
-"""[pixels] A smaller picture shows the room alone."""
+"""[pixels] Smaller images show the room only."""
 _MARGIN, _WALL = 14.0, 5.0
 _PANEL_RIGHT, _PANEL_BELOW = 262.0, 226.0
 _FOOT = 26.0
-"""[units] Below the floor, for the scale bar."""
+"""[units] Height of the scale bar's strip below the floor."""
 
 
 @dataclass(frozen=True, slots=True)
 class Rect:
-    """A part of the picture [pixels]."""
+    """A rectangle of the image [pixels]."""
 
     left: int
     top: int
@@ -31,43 +31,43 @@ class Rect:
 
     @property
     def right(self) -> int:
-        """First column that is no longer in it."""
+        """First column to the right of the rectangle."""
         return self.left + self.width
 
     @property
     def bottom(self) -> int:
-        """First row that is no longer in it."""
+        """First row below the rectangle."""
         return self.top + self.height
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Layout:
-    """The parts of a picture of one room."""
+    """Regions of the image of one room."""
 
     size: tuple[int, int]
     """[pixels] Width, height."""
     room: tuple[float, float]
-    """[m]"""
+    """[m] Width along x, depth along y."""
     unit: float
-    """[pixels] Of widths and letters."""
+    """[pixels] Unit of line widths and letters."""
     floor: Rect
-    """Everything that belongs to the room, walls and scale bar too."""
+    """Region of the room, with walls and scale bar."""
     centre: tuple[float, float]
-    """[pixels] Of the room."""
+    """[pixels] Centre of the room."""
     scale: float
-    """[pixels/m]"""
+    """[pixels/m] Scale of the room."""
     head: Rect
-    """Title and time."""
+    """Region of title and time."""
     legend: Rect
     plot: Rect
     card: Rect
-    """What holds title, legend and plot."""
+    """Region of title, legend and plot."""
     panel: bool
-    """There is a card; a small picture shows the room alone."""
+    """True if the image has a card; small images show the room only."""
 
     @classmethod
     def fit(cls, size: tuple[int, int], room: tuple[float, float]) -> Layout:
-        """The layout that shows the room largest, with the panel at the right or below it."""
+        """Return the layout with the largest room: with the panel right of it or below it."""
         unit = max(_SMALLEST_UNIT, min(size) / _HEIGHT)
         m = round(_MARGIN * unit)
         panel = size[0] >= _NO_PANEL[0] and size[1] >= _NO_PANEL[1]
@@ -98,19 +98,19 @@ class Layout:
         )
 
     def pixels(self, points: F64) -> F64:
-        """Points of the room on the picture, (..., 2) from [m] to [pixels]."""
+        """Transform points of the room, (..., 2), from [m] to [pixels]."""
         placed: F64 = points * (self.scale, -self.scale) + self.centre
         return placed
 
     def shape(self, outline: F64, x: float, y: float, heading: float) -> F64:
-        """An outline in the axes of a thing at a pose, (point, 2) from [m] to [pixels]."""
+        """Transform an outline in body axes at a pose, (point, 2), from [m] to [pixels]."""
         c, s = self.scale * np.cos(heading), self.scale * np.sin(heading)
         placed: F64 = outline @ np.array([[c, -s], [-s, -c]]) + self.pixels(np.array([x, y]))
         return placed
 
 
 def size_for(room: tuple[float, float]) -> tuple[int, int]:
-    """A picture 720 pixels high that the room fills, between 720 and 1440 wide; even numbers."""
+    """Return the size that fits a room: 720 pixels high, 720 to 1440 pixels wide, even numbers."""
     free = _HEIGHT - 2 * _MARGIN - _FOOT - 2 * _WALL
     width = room[0] / room[1] * free + 4 * _MARGIN + 2 * _WALL + _PANEL_RIGHT
     return 2 * round(0.5 * min(max(width, 720.0), 1440.0)), _HEIGHT

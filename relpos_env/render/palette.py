@@ -1,8 +1,8 @@
-"""Colours: of cars, told apart by colour-blind eyes too, and of everything else.
+"""Colours of cars, suitable for colour-blind readers, and of all other parts.
 
-The first six are Okabe and Ito's [1] without black and yellow, which vanish on outlines and on
-a light floor; the rest are darker tones of Tol's [2]. With more cars they come again: every car
-has its number, too.
+The first six car colours are from Okabe and Ito [1] without black and yellow, which have little
+contrast to outlines and to a light floor; the others are darker tones from Tol [2]. With more cars
+the colours repeat; every car also has its number.
 
 References:
     [1] Okabe, Ito, Color Universal Design, 2008, https://jfly.uni-koeln.de/color/
@@ -56,11 +56,11 @@ TRACKING_ERROR: Colour = (214, 72, 60)
 
 
 def car_colour(car: int) -> Colour:
-    """Colour of a car and of its ghost."""
+    """Return the colour of a car and of its estimate."""
     return CARS[car % len(CARS)]
 
 
 def mix(colour: Colour, other: Colour, share: float) -> Colour:
-    """A colour with a share of another in it, in [0, 1]."""
+    """Return a mix of two colours; `share` of the other colour in [0, 1]."""
     r, g, b = (round((1.0 - share) * p + share * q) for p, q in zip(colour, other, strict=True))
     return r, g, b

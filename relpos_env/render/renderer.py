@@ -1,4 +1,4 @@
-"""Pictures of snapshots, as arrays or in a window."""
+"""Renderer of snapshots, to arrays or to a window."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 
 RENDER_MODES = ("rgb_array", "human")
 SMALLEST = (240, 180)
-"""[pixels]"""
+"""[pixels] Minimum width and height."""
 
 
 class Renderer:
-    """Draws snapshots.
+    """Renderer of snapshots.
 
-    Law: the same snapshot gives the same picture, whatever was drawn before.
+    Invariant: an image depends on its snapshot only, not on earlier images.
     """
 
     def __init__(
@@ -36,16 +36,16 @@ class Renderer:
         fps: float = 10.0,
         fine: int = 2,
     ) -> None:
-        """Prepare; nothing opens before the first picture.
+        """Check the arguments; a window opens with the first image.
 
         Args:
-            mode: ``rgb_array`` gives arrays and never touches a screen; ``human`` shows a window.
-            size: Width, height [pixels]; None takes what suits the first room drawn.
-            fps: Pictures a second at most in the mode ``human``, which waits for them.
-            fine: Pixels drawn for one shown, along each axis; more is smoother and slower.
+            mode: ``rgb_array`` returns arrays and needs no screen; ``human`` shows a window.
+            size: Width, height [pixels]; None selects a size that fits the first room.
+            fps: Maximum frame rate in mode ``human`` [1/s]; `draw` waits accordingly.
+            fine: Oversampling factor along each axis; larger is smoother and slower.
 
         Raises:
-            EnvError: An argument out of range, or no pygame.
+            EnvError: An argument is out of range, or pygame is not installed.
         """
         if mode not in RENDER_MODES:
             raise EnvError(f"mode: expected one of {', '.join(RENDER_MODES)}, got {mode!r}")
@@ -65,14 +65,14 @@ class Renderer:
 
     @property
     def dismissed(self) -> bool:
-        """The user has closed the window; it stays closed until `close`."""
+        """True if the user has closed the window; it stays closed until `close`."""
         return self._dismissed
 
     def draw(self, snapshot: Snapshot) -> NDArray[np.uint8] | None:
-        """Draw one instant.
+        """Draw one snapshot.
 
         Returns:
-            Red, green, blue, (height, width, 3), a new array; None in the mode ``human``.
+            Red, green, blue, (height, width, 3), a new array; None in mode ``human``.
         """
         if self._scene is None:
             self._scene = Scene(self._asked or size_for(snapshot.room), self._fine)
@@ -85,7 +85,7 @@ class Renderer:
         return flat.reshape(height, width, 3).copy()
 
     def close(self) -> None:
-        """Close the window and forget the size; the next picture begins again."""
+        """Close the window and reset the size; the next image starts again."""
         if self._window is not None:
             self._pg.display.quit()
         self._window, self._scene, self._clock = None, None, None
@@ -114,14 +114,14 @@ class Renderer:
 def save_snapshot(
     snapshot: Snapshot, path: str | Path, *, size: tuple[int, int] | None = None, fine: int = 4
 ) -> None:
-    """Save a picture for a page or a paper; the ending of the path says in which format.
+    """Save an image of a snapshot, in the format of the path's suffix.
 
     Args:
-        snapshot: What it shows.
-        path: Of the file, ``.png`` or what else pygame writes.
-        size: Width, height [pixels]; None takes what suits the room. Everything grows with it,
-            so (1920, 1440) is (960, 720) at twice the resolution.
-        fine: As of `Renderer`.
+        snapshot: Snapshot to draw.
+        path: Path of the file, ``.png`` or another format of pygame.
+        size: Width, height [pixels]; None selects a size that fits the room. All parts scale with
+            the size, so (1920, 1440) is (960, 720) at twice the resolution.
+        fine: As for `Renderer`.
     """
     pygame = load_pygame()
     scene = Scene(size or size_for(snapshot.room), fine)

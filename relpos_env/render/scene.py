@@ -1,4 +1,4 @@
-"""One picture, put together: what stays is drawn once, what moves every time."""
+"""Composition of the image: static parts are cached, moving parts drawn every time."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class Scene:
-    """Draws snapshots on one surface in memory."""
+    """Drawing of snapshots on one surface in memory."""
 
     def __init__(self, size: tuple[int, int], fine: int) -> None:
         self._pg = load_pygame()
@@ -36,7 +36,7 @@ class Scene:
         self._still: tuple[object, ...] | None = None
 
     def draw(self, snapshot: Snapshot) -> pygame.Surface:
-        """The picture of a snapshot; the surface is used again by the next."""
+        """Draw a snapshot; the returned surface is overwritten by the next call."""
         self._keep_still(snapshot)
         layout, picture = self._layout, self._picture
         picture.blit(self._base, (0, 0))
@@ -62,7 +62,7 @@ class Scene:
         return picture
 
     def _keep_still(self, snapshot: Snapshot) -> None:
-        """Draw again what stays, where it is not the same as before."""
+        """Draw the static parts again if they have changed."""
         fixed = snapshot.boxes[~np.asarray(snapshot.movable)]
         names = entries(snapshot)
         still = (snapshot.room, fixed.tobytes(), names)
@@ -82,7 +82,7 @@ class Scene:
             self._lay_card(layout, names)
 
     def _lay_card(self, layout: Layout, names: tuple[str, ...]) -> None:
-        """The card with the legend on it, and a canvas for the plot."""
+        """Draw the card with the legend, and create the canvas of the plot."""
         inset = round(3 * layout.unit)
         plot = layout.plot
         self._plot = Canvas(

@@ -1,4 +1,4 @@
-"""What one picture shows, as plain arrays."""
+"""Content of one image, as plain arrays."""
 
 from __future__ import annotations
 
@@ -37,17 +37,17 @@ _SHAPES: dict[str, tuple[int | str, ...]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Snapshot:
-    """One instant of a room with cars, and what the tracker of one car believes.
+    """One instant of a room with cars, and the estimates of one car's tracker.
 
-    World frame: origin in the centre of the room, x to the right, y up. Cars are slots
-    0 .. n - 1; those that are not ``present`` are not drawn, nor anything about them.
+    World frame: origin in the centre of the room, x to the right, y up. Cars have the indices
+    0 .. n - 1; cars that are not ``present`` are not drawn.
 
     Raises:
-        EnvError: A field has the wrong shape or points to a car that is none; it is named.
+        EnvError: A field has the wrong shape or an invalid car index; names the field.
     """
 
     t: float
-    """[s]"""
+    """[s] Time."""
     room: tuple[float, float]
     """[m] Width along x, depth along y."""
     boxes: F64
@@ -56,46 +56,45 @@ class Snapshot:
     movable: Bool
     """True for boxes that cars can push, (box)."""
     pose: F64
-    """The truth: x, y, heading, (car, 3) [m, m, rad]."""
+    """True x, y, heading, (car, 3) [m, m, rad]."""
     steering: F64
     """Angle of the front wheels, (car) [rad]."""
     present: Bool
-    """The car is in the room, (car)."""
+    """True for cars in the room, (car)."""
     powered: Bool
-    """Its tracker has power, (car)."""
+    """True for cars whose tracker has power, (car)."""
     car_size: tuple[float, float]
     """[m] Length, width."""
     viewer: int
-    """The car whose estimate is drawn."""
+    """Index of the car whose estimates are drawn."""
     estimate: F64
-    """Where the viewer believes the others to be, relative to itself, on the axes that it takes
-    for the world's, (car, 2) [m]. The viewer's own row is not used."""
+    """Estimated positions of the others relative to the viewer, in the viewer's estimate of the
+    world frame, (car, 2) [m]. The viewer's own row is not used."""
     estimate_cov: F64
-    """Covariance of that, (car, 2, 2) [m2]."""
+    """Covariance of `estimate`, (car, 2, 2) [m2]."""
     estimate_ok: Bool
-    """The viewer may use it, (car)."""
+    """True where the estimate is usable, (car)."""
     estimate_status: I64
-    """A `tracking.estimate.Status`, (car). Nothing is drawn of ABSENT and STARTING."""
+    """`tracking.estimate.Status`, (car). ABSENT and STARTING are not drawn."""
     estimate_heading: F64 | None = None
-    """Headings as the viewer believes, (car) [rad]. With them, ghosts are turned like cars, and
-    the estimate is turned by the error of the viewer's own heading."""
+    """Estimated headings, (car) [rad]. If given, estimates are drawn with their headings, and
+    rotated by the error of the viewer's own heading."""
     links: I64
-    """Cars i and j and the kind of their link, (pair, 3): 0 line of sight, 1 none, 2 no range
-    lately."""
+    """Cars i and j and the kind of their link, (pair, 3): 0 LOS, 1 NLOS, 2 no recent range."""
     target: F64
-    """Wanted positions relative to the viewer, world frame, (car, 2) [m]."""
+    """Target positions relative to the viewer, world frame, (car, 2) [m]."""
     has_target: Bool
-    """A position is wanted, (car)."""
+    """True for cars with a target, (car)."""
     goal: F64 | None = None
-    """Places in the room that a plan gives the cars, (car, 2) [m]."""
+    """Goal positions in the room, (car, 2) [m]."""
     path: F64 | None = None
-    """A way through the room that a plan follows, (point, 2) [m]."""
+    """Path of the plan through the room, (point, 2) [m]."""
     history_t: F64
     """Times of the errors of the recent past, ascending, (time) [s]."""
     formation_error: F64
-    """Distance from the wanted formation, (time) [m]; gaps where it is not finite."""
+    """Formation error, (time) [m]; non-finite values are gaps."""
     tracking_error: F64
-    """Distance of the estimate from the truth, (time) [m]; gaps where it is not finite."""
+    """Error of the estimates, (time) [m]; non-finite values are gaps."""
     title: str = ""
 
     def __post_init__(self) -> None:
@@ -122,5 +121,5 @@ class Snapshot:
 
     @property
     def n_cars(self) -> int:
-        """Number of slots, of cars present or not."""
+        """Number of cars, present or not."""
         return len(self.pose)

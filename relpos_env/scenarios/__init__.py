@@ -1,6 +1,7 @@
-"""Scenarios: rooms, obstacles, who moves, the sensors, and what changes from episode to episode.
+"""Scenarios: rooms, obstacles, cars or people, sensors, and the randomisation of episodes.
 
-Those with cars are the files in `files/`; adding one: a file there. `docs/reference/scenarios.md`.
+Scenarios with cars are the files in `files/`; a new one needs a file there. See
+`docs/reference/scenarios.md`.
 """
 
 from __future__ import annotations
@@ -24,30 +25,29 @@ from relpos_env.scenarios.rooms.obstacle import Obstacle
 Entry = TypeVar("Entry")
 
 SCENARIOS: Mapping[str, Scenario] = SHIPPED
-"""With cars: for environments and recordings; read from their files when first used."""
+"""Scenarios with cars, for environments and recordings; each file is read at its first use."""
 
 PEOPLE: dict[str, HumanScenario] = {
     "human": HUMAN,
     "human-mocap": HUMAN_MOCAP,
 }
-"""With a person: for recordings only."""
+"""Scenarios with a person, for recordings only."""
 
 RECORDABLE: Mapping[str, Scenario | HumanScenario] = ChainMap(
-    # Looked up in this order, listed in the other one; nothing is written to it.
+    # ChainMap looks up in this order and iterates in reverse order; it is never written to.
     cast(MutableMapping[str, Scenario | HumanScenario], PEOPLE),
     cast(MutableMapping[str, Scenario | HumanScenario], SCENARIOS),
 )
 
 
 def scenario(name: str | Path | Scenario) -> Scenario:
-    """Look a scenario with cars up, or read it from a file.
+    """Return a scenario with cars, by name or from a file.
 
     Args:
-        name: One of `SCENARIOS`, the path of a file that ends in `.toml`, or a scenario itself.
+        name: One of `SCENARIOS`, the path of a file that ends in `.toml`, or a scenario.
 
     Raises:
-        EnvError: No scenario of that name, or one with a person, who cannot be driven; or
-            something is wrong with the file.
+        EnvError: Unknown name, a scenario with a person, which has no cars, or an invalid file.
     """
     if isinstance(name, Scenario):
         return name
@@ -62,13 +62,13 @@ def scenario(name: str | Path | Scenario) -> Scenario:
 
 
 def recordable(name: str) -> Scenario | HumanScenario:
-    """Look any scenario up, or read one with cars from a file.
+    """Return any scenario by name, or one with cars from a file.
 
     Args:
         name: One of `RECORDABLE`, or the path of a file that ends in `.toml`.
 
     Raises:
-        EnvError: No scenario of that name, or something is wrong with the file.
+        EnvError: Unknown name, or an invalid file.
     """
     return load_scenario(name) if is_path(name) else _known(RECORDABLE, name)
 

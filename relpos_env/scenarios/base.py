@@ -1,4 +1,4 @@
-"""What a scenario is: everything about a world but its seed."""
+"""Scenario: the complete description of a world except its seed."""
 
 from __future__ import annotations
 
@@ -30,41 +30,41 @@ Furnish = Callable[[Any, np.random.Generator], None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scenario:
-    """A room with obstacles, cars and sensors, and what of it changes from episode to episode."""
+    """A room with obstacles, cars and sensors, and the randomisation of its episodes."""
 
     name: str
     room: tuple[float, float]
-    """[m] Along x and along y; the origin is the centre."""
+    """[m] Size along x and y; the origin is the centre."""
     obstacles: tuple[Obstacle, ...] = ()
-    """What stands in it in every episode."""
+    """Obstacles of every episode."""
     gap: Gap | None = None
-    """Where a wall leaves a gap to drive through; its wall is among the obstacles.
-    `with_gap` puts both in."""
+    """Gap in a wall to drive through; the wall is one of the obstacles.
+    `with_gap` sets both."""
     n_cars: int = 3
     n_cars_range: tuple[int, int] = (2, 20)
-    """[-] Fewest and most cars that the room is made for."""
+    """[-] Permitted minimum and maximum number of cars."""
     ring: tuple[float, float]
     """[m] Half axes of the loop on which the cars start and drive round the centre."""
     layout: Layout = "ring"
-    """Where the cars start: `ring`, evenly on the loop; `line`, on a straight line next to the
-    centre, at x = ring[0]; `scattered`, anywhere, facing anywhere."""
+    """Initial positions of the cars: `ring`, evenly on the loop; `line`, on a straight line next
+    to the centre, at x = ring[0]; `scattered`, random positions and headings."""
     start_area: Area | None = None
-    """[m] x from, y from, x to, y to: where scattered and joining cars start; None is
-    everywhere."""
+    """[m] Minimum x, minimum y, maximum x, maximum y of initial positions of scattered and joining
+    cars; None is the whole room."""
     in_line: bool = field(default=False, repr=False, metadata={"in_file": False})
-    """To be passed only, and the same as `layout="line"`; always False when read."""
+    """Constructor argument equivalent to `layout="line"`; always False when read."""
     car: CarParams = field(default_factory=CarParams)
     imu: ImuSimParams = field(default_factory=ImuSimParams)
     mag: MagSimParams = field(default_factory=MagSimParams)
     odometer: OdometerSimParams = field(default_factory=OdometerSimParams)
     proximity: ProximitySimParams = field(default_factory=ProximitySimParams)
-    """Distance sensors, of environments that ask for beams."""
+    """Distance sensors, used by environments with `proximity`."""
     radio: RadioSimParams = field(default_factory=RadioSimParams)
     furnish: Furnish | None = field(default=None, repr=False, metadata={"in_file": False})
-    """Puts further bodies, shapes, joints and collision handlers into the space of an episode,
-    drawing from the generator; needs ``physics="pymunk"``. In a file ``package.module:name``."""
+    """Function that adds bodies, shapes, joints and collision handlers to the space, sampled from
+    the generator; needs ``physics="pymunk"``. In a file ``package.module:name``."""
     randomisation: Randomisation = field(default_factory=Randomisation)
-    """What is drawn again for every episode; nothing by default."""
+    """Randomisation of every episode; none by default."""
 
     def __post_init__(self) -> None:
         if self.in_line:
@@ -74,20 +74,20 @@ class Scenario:
 
     @property
     def most_cars(self) -> int:
-        """So many cars can be there at a time."""
+        """Maximum number of cars present at a time."""
         drawn = self.randomisation.n_cars
         return self.n_cars if drawn is None else drawn[1]
 
     @property
     def max_boxes(self) -> int:
-        """So many obstacles an episode can have."""
+        """Maximum number of obstacles of an episode."""
         return len(self.obstacles) + self.randomisation.obstacles[1]
 
     def with_cars(self, n_cars: int) -> Scenario:
-        """The same with slots for so many cars: all are there, or fewer where it is drawn.
+        """Return a copy with another number of cars, or another maximum if it is sampled.
 
         Raises:
-            EnvError: They do not fit.
+            EnvError: The cars do not fit.
         """
         drawn = self.randomisation.n_cars
         if drawn is None:
@@ -104,14 +104,14 @@ class Scenario:
         )
 
     def start(self, rng: np.random.Generator, n_cars: int | None = None) -> F64:
-        """Starting poses among the obstacles of the scenario, (car, 3) [m, m, rad].
+        """Sample initial poses among the obstacles of the scenario, (car, 3) [m, m, rad].
 
         Args:
-            rng: For the disorder.
-            n_cars: By default that of the scenario.
+            rng: Generator of the poses.
+            n_cars: Number of cars; by default that of the scenario.
 
         Raises:
-            EnvError: Fewer than so many scattered cars found a place.
+            EnvError: The scattered cars do not fit.
         """
         n = self.n_cars if n_cars is None else n_cars
         if self.layout == "ring":
@@ -121,10 +121,10 @@ class Scenario:
         return self.scattered(Floor(self.room, self.car, boxes_of(self.obstacles)), n, rng)
 
     def scattered(self, floor: Floor, n: int, rng: np.random.Generator) -> F64:
-        """Random poses on a floor, (car, 3) [m, m, rad].
+        """Sample random poses on a floor, (car, 3) [m, m, rad].
 
         Raises:
-            EnvError: Fewer than so many found a place.
+            EnvError: The cars do not fit.
         """
         for _ in range(20):
             poses = floor.scatter(n, self.start_area, np.zeros((0, 2)), rng)
@@ -135,7 +135,7 @@ class Scenario:
         )
 
     def with_gap(self, gap: Gap | None) -> Scenario:
-        """The same with another gap and its wall in place of the present ones, or with none.
+        """Return a copy with another gap and its wall, or without a gap.
 
         Raises:
             EnvError: The gap is wider than the wall, too narrow for a car, or blocked.
@@ -146,15 +146,15 @@ class Scenario:
         return replace(self, gap=gap, obstacles=rest + new)
 
     def at_level(self, number: int) -> Scenario:
-        """The same with the randomisation of a level of the curriculum.
+        """Return a copy with the randomisation of a curriculum level.
 
-        The number of cars is drawn from what both the level and the room allow.
+        The number of cars is sampled from the numbers that both the level and the room allow.
 
         Args:
-            number: 0, nothing, to 4, see `relpos_env.scenarios.levels.LEVELS`.
+            number: 0 (none) to 4, see `relpos_env.scenarios.levels.LEVELS`.
 
         Raises:
-            EnvError: No level of that number.
+            EnvError: There is no level of this number.
         """
         wanted = level(number)
         if wanted.n_cars is not None:

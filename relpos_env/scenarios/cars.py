@@ -1,4 +1,4 @@
-"""The scenarios of the paper's room, which the evaluation changes in many ways."""
+"""Scenarios of the paper's room, the basis of the variants in the evaluation."""
 
 from relpos_env.scenarios.catalogue import shipped
 

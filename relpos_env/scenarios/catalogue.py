@@ -1,4 +1,4 @@
-"""Scenario files: those that come with the package, by name, and those of users, by path."""
+"""Scenario files: those of the package by name, and those of users by path."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from tracking.ranging.frames.airtime import PHYS, Phy
 FILES = Path(__file__).parent / "files"
 SUFFIX = ".toml"
 DEEPEST = 8
-"""[-] Files that may extend each other in a row."""
+"""[-] Maximum depth of files that extend each other."""
 
 
 class Catalogue(Mapping[str, Scenario]):
-    """The scenarios that come with the package; a file is read when it is first asked for."""
+    """Scenarios of the package; each file is read at its first use."""
 
     def __init__(self) -> None:
         self._names = sorted(path.stem for path in FILES.glob(f"*{SUFFIX}"))
@@ -48,7 +48,7 @@ class Catalogue(Mapping[str, Scenario]):
 
 
 def is_path(name_or_path: str | Path) -> bool:
-    """Whether it is a file rather than a name."""
+    """Return whether a scenario is given by the path of a file instead of a name."""
     return isinstance(name_or_path, Path) or name_or_path.endswith(SUFFIX)
 
 
@@ -56,32 +56,32 @@ def load_scenario(path: str | Path) -> Scenario:
     """Read a scenario from a TOML file, see `docs/reference/scenarios.md`.
 
     Raises:
-        EnvError: No such file, no TOML, or something in it that is unknown or cannot be; names
-            the file and the key.
+        EnvError: No such file, invalid TOML, or an unknown key or invalid value; names the file
+            and the key.
     """
     return _load(Path(path), 0)
 
 
 @cache
 def shipped(name: str) -> Scenario:
-    """A scenario of the package."""
+    """Return a scenario of the package."""
     return load_scenario(FILES / f"{name}{SUFFIX}")
 
 
 def scenario_from(
     table: Mapping[str, Any], *, file: str, name: str, folder: Path | None = None, depth: int = 0
 ) -> Scenario:
-    """A scenario from the content of a file.
+    """Return the scenario of a parsed file.
 
     Args:
-        table: What TOML gave.
-        file: For messages.
-        name: Of the scenario, unless the file says one.
-        folder: The folder in which `extends = "other.toml"` is looked for; None is here.
-        depth: How many files extend this one.
+        table: Parsed TOML.
+        file: Name of the file in errors.
+        name: Default name of the scenario.
+        folder: Folder of files named in the table; None is the working directory.
+        depth: Number of files that extend this one, directly or indirectly.
 
     Raises:
-        EnvError: Names the file and the key.
+        EnvError: Invalid content; names the file and the key.
     """
     where, rest = Where(file, raises=EnvError), dict(table)
     inherited: list[Gap | None] = []
@@ -94,7 +94,7 @@ def scenario_from(
         else:
             raise EnvError(f"expected files that extend each other at most {DEEPEST} deep")
         inherited.append(base.gap)
-        return base.with_gap(None)  # its wall would stand in the way of another room
+        return base.with_gap(None)  # its wall need not fit another room
 
     rest.setdefault("name", name)
     furnish, plan = rest.pop("furnish", None), rest.pop("floor_plan", None)
@@ -119,21 +119,21 @@ def scenario_from(
 
 
 def _within(folder: Path | None, wanted: str, key: str) -> Path:
-    """A file that a scenario names: in its own folder or below, since scenarios are shared.
+    """Return the path of a file that a scenario names; only its own folder is permitted.
 
     Args:
-        folder: The folder of the scenario.
-        wanted: What it says.
-        key: Begins the messages of errors.
+        folder: Folder of the scenario; files may be below it.
+        wanted: Path in the scenario.
+        key: Prefix of error messages.
 
     Raises:
-        EnvError: It is elsewhere, or no name of a file.
+        EnvError: The path is outside of the folder (scenarios are shared), or invalid.
     """
     folder = folder or Path()
     path = folder / wanted
     try:
         inside = path.resolve().is_relative_to(folder.resolve())
-    except (ValueError, RuntimeError, OSError):  # a zero in it, a loop of links
+    except (ValueError, RuntimeError, OSError):  # a null byte, a loop of symbolic links
         inside = False
     if not inside or path.is_dir():
         raise EnvError(f"{key}expected a file in the folder of the scenario, got {wanted!r}")
@@ -149,7 +149,7 @@ def _load(path: Path, depth: int) -> Scenario:
     except OSError as error:
         reason = error.strerror or type(error).__name__
         raise EnvError(f"scenario: cannot read {str(path)!r}: {reason}") from error
-    except (ValueError, RecursionError) as error:  # of TOML, of UTF-8, and of endless brackets
+    except (ValueError, RecursionError) as error:  # invalid TOML or UTF-8, or nested too deeply
         raise EnvError(f"{path.name}: expected TOML: {error}") from error
     return scenario_from(table, file=path.name, name=path.stem, folder=path.parent, depth=depth)
 

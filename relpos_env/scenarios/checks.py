@@ -1,4 +1,4 @@
-"""Scenarios that cannot be: every one is an error that names the argument and what is allowed."""
+"""Validation of scenarios; errors name the argument and the permitted values."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ if TYPE_CHECKING:
     from relpos_env.scenarios.base import Scenario
 
 MOST_CARS = 20
-"""[-] The tables of the radio's messages and the trackers' groups are tried up to so many."""
+"""[-] Maximum number of cars for which radio messages and trackers are tested."""
 LARGEST_ROOM = 100.0
-"""[m] Along a side; the radio reaches no farther."""
+"""[m] Maximum side of a room: the range of the radio."""
 MOST_OBSTACLES = 200
 
 
 def check_scenario(s: Scenario) -> None:
-    """Refuse a scenario that cannot be.
+    """Check a scenario.
 
     Raises:
-        EnvError: Names the argument and what is allowed.
+        EnvError: Invalid scenario; names the argument and the permitted values.
     """
     for name, params in (
         ("car", s.car), ("imu", s.imu), ("mag", s.mag), ("odometer", s.odometer),
@@ -95,13 +95,13 @@ def _check_numbers(s: Scenario) -> None:
 
 
 def _wanted(s: Scenario) -> list[tuple[str, int]]:
-    """All numbers of cars that may start, by their arguments."""
+    """Return the possible initial numbers of cars with the names of their arguments."""
     drawn = s.randomisation.n_cars or ()
     return [("n_cars", s.n_cars), *(("randomisation.n_cars", n) for n in drawn)]
 
 
 def most_that_start(s: Scenario) -> int:
-    """How many cars find a place at the start."""
+    """Return the maximum number of cars that fit at the start."""
     if s.layout != "scattered":
         return most_cars(s.layout, s.ring, s.car)
     floor = Floor(s.room, s.car, boxes_of(s.obstacles))
@@ -127,7 +127,7 @@ def _check_gap(gap: Gap, s: Scenario) -> None:
     gap.wall(s.room)
     boxes = boxes_of(s.obstacles)
     for k in (1.0, -1.0):
-        # A finger's breadth of wall just next to the opening.
+        # A thin slice of the wall just next to the opening.
         beside = _slice(gap, k * (0.5 * gap.width + 0.005), 0.002)
         if not overlap(beside, boxes).any():
             raise EnvError("gap: expected walls at both its sides, see Scenario.with_gap")
@@ -137,7 +137,7 @@ def _check_gap(gap: Gap, s: Scenario) -> None:
 
 
 def _slice(gap: Gap, aside: float, width: float) -> F64:
-    """A part of the wall's line, as a box (1, 6)."""
+    """Return a part of the wall's line as a box, (1, 6)."""
     along = gap.direction + 0.5 * math.pi
     return boxes_of(
         (

@@ -1,4 +1,4 @@
-"""Parameters of an episode: what the scenario says, times factors that are drawn."""
+"""Parameters of an episode: those of the scenario times sampled factors."""
 
 from __future__ import annotations
 
@@ -16,33 +16,33 @@ from relpos_env.world.car import CarParams
 from tracking.arrays import F64
 
 MOST_LOST = 0.9
-"""[1] Share of messages lost, at most."""
+"""[1] Upper limit of the message loss rate."""
 LARGEST_CLOCK_OFFSET = 20e-6
-"""[1] What crystals may be off by (IEEE 802.15.4)."""
+"""[1] Maximum crystal frequency error (IEEE 802.15.4)."""
 
 
 def factor(interval: Interval, rng: np.random.Generator) -> float:
-    """A factor, log-uniform; exactly the bound where both are the same."""
+    """Sample a log-uniform factor; exactly the bound if both bounds are equal."""
     low, high = interval
     share = rng.random()
     return low if low == high else math.exp((1.0 - share) * math.log(low) + share * math.log(high))
 
 
 def draw_car(car: CarParams, what: Randomisation, rng: np.random.Generator) -> CarParams:
-    """Grip and mass."""
+    """Sample the tyre friction and mass of the cars."""
     grip, load = factor(what.friction, rng), factor(what.mass, rng)
     return replace(car, friction=grip * car.friction, mass=load * car.mass)
 
 
 def draw_mounts(n: int, what: Randomisation, rng: np.random.Generator) -> F64:
-    """Draw where trackers sit: ahead and left of the centre of mass, and higher, (car, 3) [m]."""
+    """Sample tracker positions, forward and left of the centre of mass, and antenna height offsets, (car, 3) [m]."""
     low, high = np.transpose([what.mount_ahead, what.mount_aside])
     in_plane = rng.uniform(low, high, (n, 2))
     return np.column_stack([in_plane, rng.uniform(*what.mount_height, n)])
 
 
 def draw_imu(imu: ImuSimParams, what: Randomisation, rng: np.random.Generator) -> ImuSimParams:
-    """Noise, biases and vibration."""
+    """Sample the noise, biases and vibration of the IMUs."""
     noise, bias = factor(what.imu_noise, rng), factor(what.imu_bias, rng)
     shake = factor(what.imu_vibration, rng)
     return replace(
@@ -59,7 +59,7 @@ def draw_imu(imu: ImuSimParams, what: Randomisation, rng: np.random.Generator) -
 
 
 def draw_mag(mag: MagSimParams, what: Randomisation, rng: np.random.Generator) -> MagSimParams:
-    """The building and what calibration left."""
+    """Sample the magnetic disturbance of the building and the residual hard-iron offset."""
     bent, hard = factor(what.mag_disturbance, rng), factor(what.mag_hard_iron, rng)
     return replace(mag, disturbance=bent * mag.disturbance, hard_iron=hard * mag.hard_iron)
 
@@ -67,7 +67,7 @@ def draw_mag(mag: MagSimParams, what: Randomisation, rng: np.random.Generator) -
 def draw_odometer(
     odometer: OdometerSimParams, what: Randomisation, rng: np.random.Generator
 ) -> OdometerSimParams:
-    """How far wheel radii are off."""
+    """Sample the std of the wheel radius error."""
     scale = factor(what.odometer_scale, rng)
     return replace(odometer, scale_std=min(scale * odometer.scale_std, 1.0))
 
@@ -75,7 +75,7 @@ def draw_odometer(
 def draw_radio(
     radio: RadioSimParams, what: Randomisation, rng: np.random.Generator
 ) -> RadioSimParams:
-    """Losses, errors of ranges, clocks and what calibration left of antenna delays."""
+    """Sample message loss, range errors, clock offsets and residual antenna delays."""
     loss, hidden = factor(what.radio_loss, rng), factor(what.radio_loss_nlos, rng)
     noise, excess = factor(what.range_noise, rng), factor(what.range_excess, rng)
     clocks = factor(what.clock_offset, rng)
@@ -99,5 +99,5 @@ def draw_radio(
 
 
 def _at_most(most: float, value: float, by: float) -> float:
-    """A value times a factor, but not brought beyond a limit by it."""
+    """Return a value times a factor, limited to the larger of `most` and the value."""
     return min(by * value, max(value, most))

@@ -1,4 +1,4 @@
-"""One episode: a scenario with everything that is drawn for it."""
+"""Sampling of an episode from a scenario."""
 
 from __future__ import annotations
 
@@ -32,28 +32,28 @@ from tracking.params.short_repr import short_repr
 
 KINDS = ("number", "clutter", "car", "imu", "mag", "odometer", "radio", "leaving", "power", "joins",
          "mounts")  # fmt: skip
-"""What has a generator of its own. New kinds go to the end, so that the others stay."""
+"""Sampled quantities, each with its generator. New ones go to the end, to keep the others."""
 DOORS = 8
-"""[-] Places that cars join at, one after the other."""
+"""[-] Number of poses for joining cars, used in turn."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Episode:
-    """What one episode of one environment is made of."""
+    """Sampled parameters of one episode of one environment."""
 
     __repr__ = short_repr
 
     obstacles: tuple[Obstacle, ...]
-    """Those of the scenario, then the drawn ones."""
+    """Obstacles of the scenario, then the sampled ones."""
     start: F64
-    """x, y, heading, (car, 3) [m, m, rad]; 0 for cars that are absent at the start."""
+    """Initial x, y, heading, (car, 3) [m, m, rad]; 0 for cars that are absent at the start."""
     present: Bool
-    """Who is in the room at the start, (car): the first ones."""
+    """True for cars that are present at the start, (car): the first ones."""
     events: tuple[LifeEvent, ...]
-    """By rising time."""
+    """Events by rising time."""
     car: CarParams
     mounts: F64
-    """Where trackers sit: ahead and left of the centre of mass, and higher, (car, 3) [m]."""
+    """Tracker positions, forward and left of the centre of mass, and antenna height offsets, (car, 3) [m]."""
     imu: ImuSimParams
     mag: MagSimParams
     odometer: OdometerSimParams
@@ -64,21 +64,20 @@ class Episode:
 def draw_episode(
     scenario: Scenario, n_slots: int, seconds: float, rng: np.random.Generator
 ) -> Episode:
-    """Draw an episode.
+    """Sample an episode.
 
-    Laws: same scenario and generator, same episode; without randomisation it is the scenario,
-    with the poses of `Scenario.start(rng)`; switching one kind of randomisation on changes the
-    draws of no other kind.
+    Invariants: equal scenario and generator give equal episodes; without randomisation the
+    episode is the scenario with the poses of `Scenario.start(rng)`; enabling one kind of
+    randomisation does not change the samples of another.
 
     Args:
-        scenario: What to draw from.
-        n_slots: Cars that there may be. Those that are absent at the start can join later; the
-            number of cars is drawn up to it.
-        seconds: Length of the episode, the time at rest included.
-        rng: Starting poses are drawn from it, everything else from children of it.
+        scenario: Scenario to sample from.
+        n_slots: Maximum number of cars at the start; cars that are absent then can join later.
+        seconds: Length of the episode, with the time at rest [s].
+        rng: Generator of the initial poses; its children generate everything else.
 
     Raises:
-        EnvError: Fewer slots than cars or more than 20, or a room too full.
+        EnvError: `n_slots` or `seconds` is out of range, or the cars do not fit.
     """
     if not 2 <= n_slots <= MOST_CARS:
         raise EnvError(f"n_slots: expected 2 to {MOST_CARS}, got {n_slots}")
@@ -118,7 +117,7 @@ def draw_episode(
 
 
 def _number(s: Scenario, n_slots: int, rng: np.random.Generator) -> int:
-    """Cars at the start."""
+    """Sample the number of cars at the start."""
     low, high = s.randomisation.n_cars or (s.n_cars, s.n_cars)
     if low > n_slots:
         raise EnvError(
@@ -128,7 +127,7 @@ def _number(s: Scenario, n_slots: int, rng: np.random.Generator) -> int:
 
 
 def _places_to_join(s: Scenario, floor: Floor, taken: F64, rng: np.random.Generator) -> list[Pose]:
-    """Free poses, away from those at the start as long as there are such."""
+    """Sample free poses for joining cars, if possible away from the initial poses."""
     poses = floor.scatter(DOORS, s.start_area, taken[:, :2], rng)
     if not len(poses):
         poses = floor.scatter(DOORS, s.start_area, np.zeros((0, 2)), rng)

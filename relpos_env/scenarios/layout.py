@@ -1,4 +1,4 @@
-"""Where the cars of a scenario stand at first: on a loop, on a line, or anywhere."""
+"""Initial poses of the cars of a scenario: on a loop, on a line, or scattered."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ Layout = Literal["ring", "line", "scattered"]
 LAYOUTS = ("ring", "line", "scattered")
 
 DISORDER = 0.1
-"""[spacings, rad] Places on the loop and headings are off by up to so much."""
+"""[spacings, rad] Maximum random offset of positions on the loop and of headings."""
 TRIES = 100
-"""[-] Of finding places on the loop for cars that nearly fill it."""
+"""[-] Maximum number of attempts to sample poses on a crowded loop."""
 
 
 def ring_poses(n: int, ring: tuple[float, float], car: CarParams, rng: np.random.Generator) -> F64:
-    """Evenly on a loop in its direction with some disorder, (car, 3) [m, m, rad].
+    """Sample evenly spaced poses along a loop with random offsets, (car, 3) [m, m, rad].
 
     Args:
         n: Number of cars.
         ring: Half axes of the loop [m].
-        car: Their size.
-        rng: For the disorder.
+        car: Parameters with the size of the cars.
+        rng: Generator of phase and offsets.
     """
     spacing = 2.0 * np.pi / n
     for _ in range(TRIES):
@@ -41,9 +41,9 @@ def ring_poses(n: int, ring: tuple[float, float], car: CarParams, rng: np.random
 
 
 def line_poses(n: int, ring: tuple[float, float], rng: np.random.Generator) -> F64:
-    """Evenly on a straight line next to the centre, (car, 3) [m, m, rad].
+    """Sample evenly spaced poses on a line next to the centre, (car, 3) [m, m, rad].
 
-    The line is `x = ring[0]` and as long as the loop; only the headings are in disorder.
+    The line is `x = ring[0]` with the length of the loop along y; only the headings are random.
     """
     a, b = ring
     y = (np.arange(n) - 0.5 * (n - 1)) * 2.0 * b / n
@@ -52,14 +52,14 @@ def line_poses(n: int, ring: tuple[float, float], rng: np.random.Generator) -> F
 
 
 def on_loop(ring: tuple[float, float], phase: F64) -> F64:
-    """Poses on a loop along it, counter-clockwise, (phase, 3) [m, m, rad]."""
+    """Return poses along a loop, counter-clockwise, (phase, 3) [m, m, rad]."""
     a, b = ring
     heading = np.arctan2(b * np.cos(phase), -a * np.sin(phase))
     return np.stack([a * np.cos(phase), b * np.sin(phase), heading], axis=1)
 
 
 def track(layout: Layout, ring: tuple[float, float]) -> F64:
-    """Poses all along the loop or line that cars start on, (pose, 3); none if scattered."""
+    """Return dense poses along the loop or line of initial poses, (pose, 3); none if scattered."""
     a, b = ring
     n = max(64, int(2.0 * math.pi * max(ring) / 0.2))
     if layout == "ring":
@@ -71,11 +71,11 @@ def track(layout: Layout, ring: tuple[float, float]) -> F64:
 
 
 def most_cars(layout: Layout, ring: tuple[float, float], car: CarParams) -> int:
-    """How many cars a loop or a line has room for."""
+    """Return the maximum number of cars on a loop or a line."""
     if layout == "line":
         return int(2.0 * ring[1] / (1.2 * car.length))
     most = int(np.pi * sum(ring) / (1.5 * car.length))
-    # Even phases are not even distances on a long loop, so cars can touch where it bends.
+    # Even phases are not even distances on an elongated loop, so cars can touch at its bends.
     while most >= 2 and not _fit_on_loop(min(most, 100), ring, car):
         most = min(most, 100) - 1
     return most
@@ -88,13 +88,13 @@ def _fit_on_loop(n: int, ring: tuple[float, float], car: CarParams) -> bool:
 
 
 def clear_of_each_other(poses: F64, car: CarParams, margin: float = SKIN) -> bool:
-    """Whether no two cars overlap that are larger by a margin [m] all round, poses (car, 3)."""
+    """Return whether no two cars, enlarged by a margin [m] on every side, overlap."""
     boxes = car_boxes(poses, car, margin)
     return int(overlap(boxes, boxes).sum()) == len(poses)
 
 
 def first_in_the_way(poses: F64, car: CarParams, room: tuple[float, float], boxes: F64) -> int:
-    """Index of the first box that some car would stand in; -1 for a wall, -2 for none."""
+    """Return the index of the first box that overlaps a car; -1 for a wall, -2 for none."""
     taken = car_boxes(poses, car, 2.0 * SKIN)
     if beyond_walls(taken, room).any():
         return -1

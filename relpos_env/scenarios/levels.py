@@ -1,7 +1,7 @@
-"""A curriculum: the same scenario with more and more drawn again for every episode.
+"""Curriculum levels: randomisation of a scenario in increasing strength.
 
-The noise of a level spans that of real devices of one type at level 1 and of cheap, badly
-calibrated ones at level 4. Later levels have all of the earlier ones.
+The noise spans that of real devices of one type at level 1, and that of cheap, badly calibrated
+devices at level 4. Each level includes the randomisation of the levels below.
 """
 
 from __future__ import annotations
@@ -65,15 +65,15 @@ _HARD = replace(
 )
 
 LEVELS: tuple[Randomisation, ...] = (_EXACT, _NOISE, _ROOMS, _LIFE, _HARD)
-"""Nothing; noise; obstacles, tyres and loads; cars that come and go; all that and calibration
-errors, far stronger."""
+"""Cumulative levels: none; noise; obstacles, friction and mass; cars that leave and join; much
+wider ranges and calibration errors."""
 
 
 def level(number: int) -> Randomisation:
-    """Look a level up.
+    """Return the randomisation of a level.
 
     Raises:
-        EnvError: No level of that number.
+        EnvError: There is no level of this number.
     """
     if not 0 <= number < len(LEVELS):
         raise EnvError(f"level: expected 0 to {len(LEVELS) - 1}, got {number}")

@@ -1,9 +1,9 @@
-"""The life of a group: cars that are taken away and come back, trackers that lose power.
+"""Sampling of events of a group: cars that leave and join, trackers that lose power.
 
-Both are Poisson processes. What happens is decided in the order of time: who is present, who has
-power, who is gone. Laws: two cars are always present; a car leaves only when present and joins
-only when absent; a tracker loses power only while its car is present and it has some, and gets
-it back unless the car leaves before. A car joins with its tracker on.
+Both are Poisson processes, evaluated in the order of time. Invariants: two cars are always
+present; a car leaves only while present and joins only while absent; a tracker loses power only
+while powered and its car is present, and regains it unless the car leaves before. A car joins
+with its tracker on.
 """
 
 from __future__ import annotations
@@ -24,25 +24,25 @@ Happening = Literal["join", "leave", "power-off", "power-on"]
 Pose = tuple[float, float, float]
 
 LEAST = 2
-"""[-] So many cars are always present."""
+"""[-] Minimum number of present cars."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LifeEvent:
-    """Something that happens to one car."""
+    """Event of one car."""
 
     __repr__ = short_repr
 
     t: float
-    """[s] Since the start of the episode, the time at rest included."""
+    """[s] Time since the start of the episode, with the time at rest."""
     car: int
-    """Its slot."""
+    """Index of the car."""
     what: Happening
-    """`join`: comes in at `pose`, at rest and with power; `leave`: is taken out; `power-off`
-    and `power-on`: its tracker, while the car goes on driving."""
+    """`join`: the car appears at `pose`, at rest and powered; `leave`: the car is removed;
+    `power-off`, `power-on`: power of the tracker, while the car drives on."""
     pose: Pose | None = None
-    """x, y, heading [m, m, rad] of a car that joins, free of walls and obstacles as they stood
-    at the start; other cars may be there."""
+    """x, y, heading [m, m, rad] of a car that joins, clear of walls and of obstacles at their
+    initial positions; other cars may be there."""
 
     def __post_init__(self) -> None:
         if (self.what == "join") != (self.pose is not None):
@@ -51,7 +51,7 @@ class LifeEvent:
 
 @dataclass(frozen=True, slots=True)
 class _Draw:
-    """One point of a process: when, a number in [0, 1) that chooses the car, and for how long."""
+    """Point of a process: time, a number in [0, 1) that selects the car, and duration."""
 
     t: float
     choice: float
@@ -66,16 +66,15 @@ def draw_life(
     leaving: np.random.Generator,
     power: np.random.Generator,
 ) -> tuple[LifeEvent, ...]:
-    """Everything that happens in an episode, by rising time.
+    """Sample the events of an episode, by rising time.
 
     Args:
         what: Rates and durations.
-        present: Who is there at the start, (car); not changed.
-        seconds: Length of the episode. Nothing happens while the cars stand at first.
-        poses: Where cars join, one after the other and round again; without any, cars do not
-            leave either.
-        leaving: For cars that leave and join.
-        power: For trackers without power.
+        present: True for cars that are present at the start, (car); not changed.
+        seconds: Length of the episode [s]. There are no events in the initial time at rest.
+        poses: Poses of joining cars, used in turn; without any, cars do not leave.
+        leaving: Generator for cars that leave and join.
+        power: Generator for power losses.
     """
     rates = what.leave_rate if poses else (0.0, 0.0)
     group = _Group(present.copy())
@@ -112,12 +111,12 @@ def draw_life(
 
 
 class _Group:
-    """Who is present and whose tracker has power."""
+    """Presence and tracker power of the cars."""
 
     def __init__(self, present: Bool) -> None:
         self.present, self.powered = present, np.ones(len(present), dtype=bool)
         self.outages = np.zeros(len(present), dtype=np.int64)
-        """Changes of power of each car, so that what ended already does not end again, (car)."""
+        """Counter per car that invalidates a pending power-on if the car has left, (car)."""
 
     def join(self, choice: float) -> int:
         car = _pick(~self.present, choice)
@@ -125,7 +124,7 @@ class _Group:
         return car
 
     def happen(self, kind: str, choice: float, car: int) -> int | None:
-        """The car that it happens to; None where it cannot."""
+        """Apply an event and return its car; None if the event is not possible."""
         if kind == "leave":
             if self.present.sum() <= LEAST:
                 return None
@@ -153,7 +152,7 @@ def _pick(among: Bool, choice: float) -> int:
 def _process(
     rate: Interval, lasts: Interval, seconds: float, rng: np.random.Generator
 ) -> list[_Draw]:
-    """Points at a rate per minute that is drawn once."""
+    """Sample the points of a Poisson process, with a rate per minute sampled once."""
     if rate[1] == 0.0:
         return []
     per_second = rng.uniform(*rate) / 60.0

@@ -1,7 +1,7 @@
-"""What the parameters of cars, sensors and radios may be: beyond it nothing is computed.
+"""Permitted ranges of the parameters of cars, sensors and radios.
 
-Wide on purpose: they keep out slips (a percentage for a share, degrees for radians, a negative
-deviation, a number that is none), not experiments.
+The ranges are wide: they catch mistakes (percent for a fraction, degrees for radians, a negative
+deviation, NaN) and allow experiments.
 """
 
 from __future__ import annotations
@@ -88,18 +88,18 @@ LIMITS: dict[type, dict[str, Range]] = {
         **dict.fromkeys(("detect", "sense", "turnaround", "processing"), (0.0, 1.0)),
     },
 }
-"""Least and most of each number; those not named are deviations, 0 to 10,000."""
+"""Minimum and maximum by parameter; unnamed ones are deviations, 0 to 10,000."""
 
 
 def check_params(path: str, params: Any) -> None:
-    """Refuse parameters out of range, those within them too.
+    """Check the range of parameters, nested ones included.
 
     Args:
-        path: Of the parameters, for the message: `radio.channel`.
-        params: A frozen dataclass of numbers, tuples and further ones.
+        path: Path of the parameters in errors, such as `radio.channel`.
+        params: Frozen dataclass of numbers, tuples and dataclasses.
 
     Raises:
-        EnvError: Names the field and what is allowed.
+        EnvError: Out of range; names the field and the permitted range.
     """
     limits = LIMITS.get(type(params))
     for f in fields(params):

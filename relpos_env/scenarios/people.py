@@ -1,8 +1,8 @@
-"""People with six trackers who exercise in the room of the paper, 3 m x 5 m.
+"""Scenarios of a person with six trackers who exercises in the room of the paper, 3 m x 5 m.
 
 From Armani and Holz, ICRA 2024, section III: trackers on right upper arm, right wrist, right
-hip, left wrist, right knee and left knee; walking, jumping jacks, squats. No policy drives a
-person, so these scenarios can be recorded and tracked but not be an environment.
+hip, left wrist, right knee and left knee; walking, jumping jacks, squats. A person has no
+actions, so these scenarios can be recorded and tracked but not be an environment.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from relpos_env.sensors.radio.params import RadioSimParams
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HumanScenario:
-    """A person in a room, and the sensors that the person wears."""
+    """A person in a room, with wearable sensors."""
 
     name: str
     room: tuple[float, float] = (3.0, 5.0)
-    """[m] Along x and along y; the origin is the centre."""
+    """[m] Size along x and y; the origin is the centre."""
     motion: Literal["procedural", "recorded"] = "procedural"
-    """From a moving skeleton, or from motion capture."""
+    """Motion from an animated skeleton, or from motion capture."""
     exercises: tuple[str, ...] = ("walking", "jumping-jacks", "squats")
-    """Names in `relpos_env.people.exercises.EXERCISES`, gone through again and again; recorded
-    motion has its own."""
+    """Names in `relpos_env.people.exercises.EXERCISES`, repeated in turn; not used for recorded
+    motion."""
     imu: ImuSimParams = field(default=HUMAN_IMU)
     mag: MagSimParams = field(default_factory=MagSimParams)
     radio: RadioSimParams = field(default_factory=lambda: RadioSimParams(channel=BODY))

@@ -1,7 +1,7 @@
-"""What is drawn again for every episode. Nothing is, unless said.
+"""Randomisation of episodes; by default nothing is random.
 
-An interval `(low, high)` is drawn from uniformly; a factor log-uniformly, so that half and
-double are as likely, and multiplies what the scenario says.
+Values are uniform in their interval `(low, high)`. Factors are log-uniform, so that half and
+double are equally likely, and multiply the value of the scenario.
 """
 
 from __future__ import annotations
@@ -19,66 +19,65 @@ _FACTORS = (0.01, 100.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Randomisation:
-    """What is drawn for an episode, each from an interval of its own."""
+    """Intervals of the values that are sampled for every episode."""
 
     n_cars: tuple[int, int] | None = None
-    """[-] Fewest and most cars at the start; None is the scenario's number."""
+    """[-] Minimum and maximum number of cars at the start; None is the scenario's number."""
 
     obstacles: tuple[int, int] = (0, 0)
-    """[-] Number of further obstacles. Those that would leave cars no way are left out."""
+    """[-] Number of additional obstacles. Obstacles that would block cars are left out."""
     obstacle_size: Interval = (0.2, 0.6)
-    """[m] Each side of them."""
+    """[m] Length of each side of additional obstacles."""
     movable_share: float = 0.0
-    """[1] Share of them that cars can push."""
+    """[1] Share of additional obstacles that cars can push."""
 
     imu_noise: Interval = SAME
     """[1] Factor on the white noise of gyroscopes and accelerometers."""
     imu_bias: Interval = SAME
-    """[1] Factor on what calibration left of their biases, and on how these drift."""
+    """[1] Factor on the residual biases of gyroscopes and accelerometers, and on their drift."""
     imu_vibration: Interval = SAME
-    """[1] Factor on what a driving car shakes."""
+    """[1] Factor on the vibration of a driving car."""
     mag_disturbance: Interval = SAME
-    """[1] Factor on how the building bends the magnetic field."""
+    """[1] Factor on the distortion of the magnetic field by the building."""
     mag_hard_iron: Interval = SAME
-    """[1] Factor on the offset that calibration left."""
+    """[1] Factor on the residual hard-iron offset."""
     odometer_scale: Interval = SAME
     """[1] Factor on the error of the wheel radius."""
 
     radio_loss: Interval = SAME
-    """[1] Factor on the share of messages lost in sight."""
+    """[1] Factor on the message loss rate in line of sight."""
     radio_loss_nlos: Interval = SAME
-    """[1] Factor on the share of messages lost behind an obstacle."""
+    """[1] Factor on the message loss rate in NLOS."""
     range_noise: Interval = SAME
-    """[1] Factor on the errors of ranges in sight: stamps and multipath, fast and slow."""
+    """[1] Factor on the LOS range errors: timestamp noise, and fast and slow multipath."""
     range_excess: Interval = SAME
-    """[1] Factor on the largest excess of a range behind an obstacle."""
+    """[1] Factor on the largest NLOS bias of a range."""
     clock_offset: Interval = SAME
-    """[1] Factor on how differently the clocks run."""
+    """[1] Factor on the frequency offsets of the clocks."""
     antenna_delay: Interval = NONE
-    """[m] Added to the standard deviation of what each antenna adds to its ranges, which
-    calibration should have taken away."""
+    """[m] Added to the std of the residual range bias of each antenna after calibration."""
 
     friction: Interval = SAME
-    """[1] Factor on the grip of tyres, the same for all cars."""
+    """[1] Factor on the friction of tyres, the same for all cars."""
     mass: Interval = SAME
     """[1] Factor on the mass of all cars."""
 
     mount_ahead: Interval = NONE
-    """[m] How far the tracker of each car is ahead of its centre of mass."""
+    """[m] Distance of each car's tracker forward of the centre of mass."""
     mount_aside: Interval = NONE
-    """[m] How far it is left of it."""
+    """[m] Distance of each car's tracker left of the centre of mass."""
     mount_height: Interval = NONE
     """[m] How much higher its antenna is than `RadioSimParams.antenna_height`; the tracker is not
     told."""
 
     leave_rate: Interval = NONE
-    """[1/min] How often one of the cars is taken out of the room. Two always stay."""
+    """[1/min] Rate at which cars leave the room. Two cars always stay."""
     absence: Interval = (5.0, 20.0)
-    """[s] Until it comes back, or another one that is not in the room comes in its place."""
+    """[s] Time until a car joins again, either the same or another absent one."""
     power_off_rate: Interval = NONE
-    """[1/min] How often the tracker of one of the cars loses power while the car drives on."""
+    """[1/min] Rate at which trackers lose power while their cars drive on."""
     power_off_time: Interval = (2.0, 10.0)
-    """[s] Until it has power again."""
+    """[s] Duration of a power loss."""
 
     def __post_init__(self) -> None:
         for name, low, high in self._intervals():
@@ -92,11 +91,11 @@ class Randomisation:
 
     @property
     def has_life(self) -> bool:
-        """Whether cars leave and join."""
+        """True if cars leave and join."""
         return self.leave_rate[1] > 0.0
 
     def _intervals(self) -> list[tuple[str, float, float]]:
-        """Name, low and high of every interval."""
+        """Return name, low and high of every interval."""
         values = ((f.name, getattr(self, f.name)) for f in fields(self))
         return [(name, *value) for name, value in values if isinstance(value, tuple)]
 

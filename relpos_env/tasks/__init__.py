@@ -1,4 +1,4 @@
-"""Tasks: what a formation should be, and what is asked of each car."""
+"""Tasks: targets, reference velocities, reward terms and termination of a group of cars."""
 
 from __future__ import annotations
 
@@ -27,19 +27,19 @@ TASKS: dict[str, TaskBuilder] = {
     "rendezvous": Rendezvous,
     "follow": follow,
 }
-"""Name to builder ``(n_cars, n_envs, room, **options) -> Task``. Adding one: a file, a line
+"""Name to builder ``(n_cars, n_envs, room, **options) -> Task``. A new task needs a file, a line
 here, and its weights in `DEFAULT_WEIGHTS`."""
 
 
 def task_builder(name: str | TaskBuilder) -> TaskBuilder:
-    """Look a task up.
+    """Return the builder of a task.
 
     Args:
         name: One of `TASKS`, ``package.module:Name``, a name among the entry points
-            ``relpos_env.tasks``, or a builder itself.
+            ``relpos_env.tasks``, or a builder.
 
     Raises:
-        EnvError: No task of that name.
+        EnvError: There is no task of this name.
     """
     return look_up(TASKS, name, "task", group="relpos_env.tasks")
 
@@ -47,17 +47,17 @@ def task_builder(name: str | TaskBuilder) -> TaskBuilder:
 def make_task(
     name: str | TaskBuilder, n_cars: int, n_envs: int, room: tuple[float, float], /, **options: Any
 ) -> Task:
-    """Look a task up and build it.
+    """Build a task from its name or builder.
 
     Args:
         name: See `task_builder`.
-        n_cars: Slots for cars, 2 to 20.
-        n_envs: Environments.
+        n_cars: Maximum number of cars, 2 to 20.
+        n_envs: Number of environments.
         room: Width along x and depth along y [m]; the origin is the middle.
-        options: The task's own, by name.
+        options: Options of the task, by name.
 
     Raises:
-        EnvError: No task of that name, no option of that name, or an option out of range.
+        EnvError: Unknown task, unknown option, or an option out of range.
     """
     build = task_builder(name)
     known = [p for p in inspect.signature(build).parameters if p not in _ALWAYS]

@@ -1,8 +1,8 @@
-"""What a task is: wanted relative positions and velocities over time, reward terms, an end.
+"""Base class of tasks: relative targets and reference velocities over time, reward terms, an end.
 
-All environments of a batch do the same task, each with cars of its own; a task says how a car
-gets a place (`begin`, `change`, rare, numpy) and how things follow from the time (`compute`,
-every step, one compiled call). What has to be known of the step before is done in `update`.
+All environments of a batch have the same task, each with its own cars. A task assigns slots to
+cars (`begin`, `change`: rare, numpy) and computes its arrays from the time (`compute`: every
+step, one compiled call). Quantities that depend on the previous step are computed in `update`.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from relpos_env.tasks.options import car_count
 from tracking.arrays import F64, I64, Bool
 
 COMMON_TERMS = ("collision", "effort", "nearness")
-"""Reward terms of every task after its first two, `formation` and one of its own."""
+"""Reward terms of every task after its first two, `formation` and a task-specific term."""
 
 NO_BOXES: F64 = np.zeros((0, 6))
 
 
 class Truth(Protocol):
-    """What a task reads of the world, arrays over (env, car)."""
+    """State of the world as read by tasks, arrays over (env, car)."""
 
     @property
     def pos_w(self) -> F64:
@@ -41,7 +41,7 @@ class Truth(Protocol):
 
     @property
     def clearance(self) -> F64:
-        """Distance to what is nearest to the car's body, (env, car) [m]; infinite if not known."""
+        """Distance from the car's body to the nearest object, (env, car) [m]; inf if unknown."""
 
     @property
     def present(self) -> Bool:
@@ -49,20 +49,20 @@ class Truth(Protocol):
 
 
 class Task(ABC):
-    """What is asked of the cars of a batch of rooms. Absent cars have zeros everywhere.
+    """Targets, rewards and end of a batch of environments. Arrays are 0 for absent cars.
 
-    Law: an environment of a batch has the same numbers as alone, bit for bit.
+    Invariant: the results of an environment do not depend on the batch, bit for bit.
     """
 
     default_weights: Mapping[str, float] = MappingProxyType({})
-    """Weights of reward terms that are not 1; tasks of ours have theirs in `DEFAULT_WEIGHTS`."""
+    """Weights of reward terms that are not 1; those of built-in tasks are `DEFAULT_WEIGHTS`."""
 
     def __init__(self, n_cars: int, n_envs: int, terms: tuple[str, ...]) -> None:
-        """Make the arrays.
+        """Allocate the arrays.
 
         Args:
-            n_cars: Slots for cars, 2 to 20.
-            n_envs: Environments.
+            n_cars: Maximum number of cars, 2 to 20.
+            n_envs: Number of environments.
             terms: Names of the reward terms.
 
         Raises:
@@ -73,31 +73,31 @@ class Task(ABC):
             raise EnvError(f"n_envs: expected at least 1, got {n_envs}")
         self.n_cars, self.n_envs, self.terms = n_cars, n_envs, terms
         self.target: F64 = np.zeros((n_envs, n_cars, n_cars, 2))
-        """Wanted position of each other car relative to each car, (env, car, other, 2) [m]."""
+        """Target position of each other car relative to each car, (env, car, other, 2) [m]."""
         self.has_target: Bool = np.zeros((n_envs, n_cars, n_cars), dtype=bool)
-        """False where the task gives no place, (env, car, other)."""
+        """False where the task sets no target, (env, car, other)."""
         self.plan: F64 = np.zeros((n_envs, n_cars, 2))
-        """Velocity that the plan wants; of time alone, never of the truth, (env, car, 2) [m/s]."""
+        """Reference velocity, independent of the true state, (env, car, 2) [m/s]."""
         self.goal_w: F64 = np.zeros((n_envs, n_cars, 2))
-        """Where in the room the plan wants the car; not for policies, (env, car, 2) [m]."""
+        """Goal position in the room; not for policies, (env, car, 2) [m]."""
         self.error: F64 = np.zeros((n_envs, n_cars))
-        """Distance of the present others from their places, mean, (env, car) [m]."""
+        """Mean distance of the other present cars from their targets, (env, car) [m]."""
         self.rewards: F64 = np.zeros((n_envs, n_cars, len(terms)))
-        """(env, car, term) [-]"""
+        """Reward terms, unweighted, (env, car, term) [-]."""
         self.done: Bool = np.zeros(n_envs, dtype=bool)
-        """True where the task is accomplished, (env)."""
+        """True where the task is done, (env)."""
         self._seated: Bool = np.zeros((n_envs, n_cars), dtype=bool)
         self._boxes: list[F64] = [NO_BOXES] * n_envs
-        """What stood in each room at the start."""
+        """Boxes in each room at the start of the episode."""
 
     def reset(self, state: Truth, envs: slice, boxes: F64 | None = None) -> None:
-        """Begin an episode from where the cars stand; `update` with t = 0 then fills the arrays.
+        """Begin an episode at the cars' positions; `update` with t = 0 then fills the arrays.
 
         Args:
-            state: The truth, of all environments.
-            envs: Which begin, contiguous.
-            boxes: What stands in the rooms: centre, half width and depth [m], cosine, sine,
-                (env, box, 6), of all environments; None where they are not known.
+            state: True state of all environments.
+            envs: Environments to reset, contiguous.
+            boxes: Boxes in the rooms: centre, half width and depth [m], cosine, sine,
+                (env, box, 6), of all environments; None if they are unknown.
         """
         start, stop = self._range(envs)
         for env in range(start, stop):
@@ -110,13 +110,13 @@ class Task(ABC):
                 self.begin(env, np.zeros((self.n_cars, 2)), np.arange(self.n_cars))
 
     def update(self, state: Truth, t: F64, collided: F64, envs: slice) -> None:
-        """Write all arrays for now; where cars came or went, give out new places before.
+        """Write all arrays for time t, after new assignments where cars joined or left.
 
         Args:
-            state: The truth, of all environments.
-            t: Since the start of the episode, (env) [s].
-            collided: Contacts begun in the step, (env, car).
-            envs: Which to update, contiguous.
+            state: True state of all environments.
+            t: Time since the start of the episode, (env) [s].
+            collided: Number of contacts begun in the step, (env, car).
+            envs: Environments to update, contiguous.
         """
         start, stop = self._range(envs)
         if not self.compute(state, t, collided, start, stop):
@@ -132,46 +132,46 @@ class Task(ABC):
         self.compute(state, t, collided, start, stop)
 
     def set_goals(self, env: int, goals: F64, cars: I64) -> None:
-        """Let the cars of an episode that has just begun go where they are wanted.
+        """Set goal positions at the start of an episode.
 
         Args:
             env: Environment.
-            goals: In the room, (car, 2) [m], or (1, 2) for all.
-            cars: Indices of those that are present.
+            goals: Goal positions in the room, (car, 2) [m], or (1, 2) for all.
+            cars: Indices of the present cars.
 
         Raises:
-            EnvError: The task takes none, or not these.
+            EnvError: The task accepts no goals, or these are invalid.
         """
         raise EnvError("goals: expected none, the task has places of its own")
 
     @abstractmethod
     def begin(self, env: int, pos: F64, cars: I64) -> None:
-        """Give out places at the start of an episode.
+        """Assign slots at the start of an episode.
 
         Args:
             env: Environment.
-            pos: Where all cars stand, (car, 2) [m].
-            cars: Indices of those that are present, or of all if none is.
+            pos: Positions of all cars, (car, 2) [m].
+            cars: Indices of the present cars, or of all if none is present.
         """
 
     @abstractmethod
     def change(self, env: int, pos: F64, cars: I64, before: Bool, t: float) -> None:
-        """Give out places again, since cars came or went.
+        """Assign slots again after cars joined or left.
 
         Args:
             env: Environment.
-            pos: Where all cars stand, (car, 2) [m].
-            cars: Indices of those that are present, at least one.
-            before: Who was, (car).
-            t: Since the start of the episode [s].
+            pos: Positions of all cars, (car, 2) [m].
+            cars: Indices of the present cars, at least one.
+            before: True for cars that were present at the last assignment, (car).
+            t: Time since the start of the episode [s].
         """
 
     @abstractmethod
     def compute(self, state: Truth, t: F64, collided: F64, start: int, stop: int) -> int:
-        """Write all arrays of environments whose cars have places; return how many have not."""
+        """Write the arrays of environments with valid assignments; return the number of others."""
 
     def _seat(self, env: int, present: Bool) -> None:
-        """Note who is in the room; tasks without places overwrite `has_target` with False."""
+        """Record the present cars; tasks without targets overwrite `has_target` with False."""
         self._seated[env] = present
         both = present[:, None] & present[None, :]
         np.fill_diagonal(both, False)

@@ -1,4 +1,4 @@
-"""Follow a leader."""
+"""Task `follow`: a formation led along a course."""
 
 from __future__ import annotations
 
@@ -27,33 +27,32 @@ def follow(
     told: str = "all",
     lookahead: float = 0.3,
 ) -> MovingFormation:
-    """A leader is led along a course; the others keep their places in the frame of its heading.
+    """Build a formation in a frame that moves and turns with the course of a leader.
 
-    The heading is that of the course, not what the leader makes of it: targets come from the
-    plan and do not give away the truth. The leader is car 0 or, while that is absent, the
-    first car that is present.
+    The frame has the heading of the course, not the leader's own, so targets do not depend on
+    the true state. The leader is the first car that is present.
 
     Args:
-        n_cars: Slots for cars, 2 to 20.
-        n_envs: Environments.
+        n_cars: Maximum number of cars, 2 to 20.
+        n_envs: Number of environments.
         room: Width along x and depth along y [m].
-        shape: One of `SHAPES`, or places (x ahead, y left) [m], one a car; the first is the
+        shape: One of `SHAPES`, or slots (x ahead, y left) [m], one per car; the first is the
             leader's.
-        spacing: Of neighbours [m]; by default 1 m, or less where the room asks for it.
-        speed: Of the leader [m/s].
-        path: Its course, one of `CURVES`, or points [m]; their corners are rounded.
-        closed: A course of points goes round.
-        told: Who is given the plan: `all`, or the `leader` alone.
-        lookahead: The plan is the velocity of so much later [s].
+        spacing: Distance between neighbours [m]; by default 1 m, or less in small rooms.
+        speed: Speed of the leader [m/s].
+        path: Course of the leader, one of `CURVES`, or points [m] with rounded corners.
+        closed: True if a course of points is a closed loop.
+        told: Cars that receive the reference velocity: `all`, or the `leader` alone.
+        lookahead: Lead time of the reference velocity [s].
 
     Raises:
-        EnvError: An option is out of range, or there is no room.
+        EnvError: An option is out of range, or the formation does not fit in the room.
     """
     if told not in TOLD:
         raise EnvError(f"told: expected one of {', '.join(TOLD)}, got {told!r}")
     formation = Formation(shape, n_cars, spacing, led=True)
     half = half_room(room, MARGIN)
-    # A little less than half of the room is for the followers, since the leader has to turn.
+    # The followers may take a little less than half of the room, since the leader has to turn.
     extent = formation.fit(0.46 * half, None)
     motion = Motion(
         curve=make_curve(path, closed, half, extent),

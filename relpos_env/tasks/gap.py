@@ -1,4 +1,4 @@
-"""Go through a gap in a wall, one after the other, and take places behind it."""
+"""Task `gap`: pass a gap in a wall in single file and form up behind it."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from relpos_env.tasks.options import half_room, points, positive
 from tracking.arrays import F64, I64, Bool
 
 APPROACH = 0.6
-"""[m] From the wall to the waypoints before and behind the gap: straight through with a car."""
+"""[m] Distance from the wall to the waypoints before and behind the gap: straight passage."""
 
 
 class Gap(Task):
-    """Cars go along the waypoints one behind the other, from where they stand to a formation.
+    """Cars drive along waypoints in single file from their initial positions to a formation.
 
-    The nearest to the first waypoint leaves first and gets the place furthest from where the
-    cars arrive. Cars that stand behind the wall already go to their places at once.
+    The car nearest to the first waypoint leaves first and gets the slot furthest from the last
+    waypoint before the formation. Cars behind the wall drive to their slots at once.
     """
 
     def __init__(
@@ -41,25 +41,25 @@ class Gap(Task):
         speed: float = 0.6,
         headway: float = 1.0,
     ) -> None:
-        """Plan the way.
+        """Plan the path.
 
         Args:
-            n_cars: Slots for cars, 2 to 20.
-            n_envs: Environments.
+            n_cars: Maximum number of cars, 2 to 20.
+            n_envs: Number of environments.
             room: Width along x and depth along y [m].
-            gap: To be passed along x; environments take that of their scenario. By default 1 m
-                wide, in the middle.
-            waypoints: From before the wall, x below the wall's, through the gap and round what
-                obstacles there are, to the middle of the formation at the end [m]; by default
-                straight through the gap to the middle of the room behind.
-            shape: At the end, one of `SHAPES`, or places (x ahead, y left) [m], one a car.
-            spacing: Of neighbours at the end [m]; by default 1 m, or less where the room asks
-                for it.
-            speed: Along the way [m/s].
-            headway: Distance along the way from car to car [m].
+            gap: Gap that is passed along x; environments pass the gap of their scenario. By
+                default 1 m wide, in the middle.
+            waypoints: Points from before the wall (smaller x) through the gap and round
+                obstacles to the middle of the final formation [m]; by default straight through
+                the gap to the middle of the room behind.
+            shape: Final formation, one of `SHAPES`, or slots (x ahead, y left) [m], one per car.
+            spacing: Final distance between neighbours [m]; by default 1 m, or less in small
+                rooms.
+            speed: Speed along the path [m/s].
+            headway: Distance between successive cars along the path [m].
 
         Raises:
-            EnvError: An option is out of range, or there is no room.
+            EnvError: An option is out of range, or the formation does not fit in the room.
         """
         super().__init__(n_cars, n_envs, ("formation", "progress", *COMMON_TERMS, "time"))
         gap = Opening(width=1.0) if gap is None else gap
@@ -93,7 +93,7 @@ class Gap(Task):
         self._lag = np.zeros((n_envs, n_cars))
 
     def begin(self, env: int, pos: F64, cars: I64) -> None:
-        """The nearest to the gap leave first, one a headway; those behind the wall at once."""
+        """Start cars by distance from the gap, one per headway; those behind the wall at once."""
         queue = self._queue(pos, cars)
         self._lag[env] = 0.0
         self._lag[env, queue] = self._headway * np.arange(len(queue))
@@ -105,10 +105,10 @@ class Gap(Task):
         self._lay(env, pos, queue, for_queue[far_first], self._way[:-1])
 
     def change(self, env: int, pos: F64, cars: I64, before: Bool, t: float) -> None:
-        """Newcomers queue behind the last; the others keep their way but for the last leg."""
+        """Queue new cars behind the last; the paths of the others change at their end only."""
         travelled = self._limits[0] * t
         stay, new = cars[before[cars]], cars[~before[cars]]
-        # Newcomers count as if they stood where the cars arrive, so others keep their places.
+        # New cars count as if they were at the arrival point, so the others keep their slots.
         ends = np.concatenate(
             [self._route[env, stay, -1, :2], np.tile(self._way[-2], (len(new), 1))]
         )
@@ -128,7 +128,7 @@ class Gap(Task):
             self._lay(env, pos, group, given, way)
 
     def compute(self, state: Truth, t: F64, collided: F64, start: int, stop: int) -> int:
-        """One compiled call."""
+        """Run `update_gap`."""
         n_changed: int = update_gap(
             start,
             stop,
@@ -152,14 +152,14 @@ class Gap(Task):
         return n_changed
 
     def _queue(self, pos: F64, cars: I64) -> I64:
-        """Those before the wall, the nearest to the first waypoint first."""
+        """Return the cars before the wall by distance from the first waypoint."""
         queue = cars[pos[cars, 0] < self._wall_x]
         away = np.linalg.norm(pos[queue] - self._way[0], axis=1)
         found: I64 = queue[np.argsort(away, kind="stable")]
         return found
 
     def _share(self, pos: F64, places: F64) -> tuple[F64, F64]:
-        """Places for cars that are behind the wall, nearest in sum of squares, and the rest."""
+        """Return slots for cars behind the wall (least sum of squared distances), and the rest."""
         taken: list[int] = []
         if len(pos):
             cost = np.sum((pos[:, None] - places[None, :]) ** 2, axis=-1)
@@ -168,7 +168,7 @@ class Gap(Task):
         return places[taken], places[rest]
 
     def _lay(self, env: int, pos: F64, cars: I64, places: F64, way: F64) -> None:
-        """Routes from where cars stand along a way to their places."""
+        """Write the routes of cars from their positions along a path to their slots."""
         n = self._route.shape[2]
         for car, place in zip(cars, places, strict=True):
             route = np.concatenate([pos[car][None], way, np.tile(place, (n - 1 - len(way), 1))])
@@ -177,9 +177,9 @@ class Gap(Task):
             self._route[env, car, 1:, 2] = np.cumsum(legs)
 
     def _end_at(self, env: int, car: int, place: F64) -> None:
-        """Give a car on its way another place at the end."""
+        """Replace the end of a car's route."""
         route = self._route[env, car]
-        # The route of a car that joined behind the wall is one leg and repetitions of its end.
+        # The route of a car that joined behind the wall is one segment, its end repeated.
         last = np.flatnonzero(route[1:, 2] > route[:-1, 2])
         leg = int(last[-1]) if len(last) else 0
         route[leg + 1 :, :2] = place

@@ -1,4 +1,4 @@
-"""Keep a formation, standing."""
+"""Task `hold`: keep a stationary formation."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ def hold(
     spacing: float | None = None,
     heading: float = 0.0,
 ) -> MovingFormation:
-    """A formation that stands where the group stood at the start, or as near as the room allows.
+    """Build a stationary formation as near as possible to the group's initial mean position.
 
-    No place is nearer to an obstacle than 0.3 m, where that can be.
+    All slots are at least 0.3 m from obstacles, where the room allows it.
 
     Args:
-        n_cars: Slots for cars, 2 to 20.
-        n_envs: Environments.
+        n_cars: Maximum number of cars, 2 to 20.
+        n_envs: Number of environments.
         room: Width along x and depth along y [m].
-        shape: One of `SHAPES`, or places (x ahead, y left) [m], one a car.
-        spacing: Of neighbours [m]; by default 1 m, or less where the room asks for it.
-        heading: Of the formation [rad].
+        shape: One of `SHAPES`, or slots (x ahead, y left) [m], one per car.
+        spacing: Distance between neighbours [m]; by default 1 m, or less in small rooms.
+        heading: Heading of the formation [rad].
 
     Raises:
         EnvError: An option is out of range, or the formation does not fit in the room.

@@ -1,4 +1,4 @@
-"""A formation in a frame that may stay, move along a curve and turn: what four tasks share."""
+"""Formation in a frame that stays, moves along a curve or turns: base of several tasks."""
 
 from __future__ import annotations
 
@@ -20,43 +20,43 @@ from tracking.params.short_repr import short_repr
 ERROR_SCALE = 0.5
 """[m] Formation error over which half of the formation term falls off to exp(-1)."""
 PLACE_SCALE = 1.0
-"""[m] Distance of the group's middle from its goals' at which the place term is exp(-1)."""
+"""[m] Distance between the means of positions and goals at which the place term is exp(-1)."""
 TOLERANCE = 0.4
-"""[m] As near to its place at the end a car has arrived: about its length."""
+"""[m] Distance from its final slot within which a car has arrived: about a car's length."""
 MARGIN = 0.3
-"""[m] From the walls of the room to the places nearest to them."""
+"""[m] Minimum distance of slots from the walls of the room."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stand:
-    """A frame stands where the group did, or near it where no place is in an obstacle."""
+    """Placement of a stationary frame: at the group's mean position, or near it if obstructed."""
 
     half: tuple[float, float]
-    """[m] So far from the room's middle at most."""
+    """[m] Maximum distance from the room's middle along x and y."""
     room: tuple[float, float]
-    """[m] Half the width and depth of the room."""
+    """[m] Half width and half depth of the room."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Motion:
-    """How the frame of a formation moves."""
+    """Motion of the frame of a formation."""
 
     __repr__ = short_repr
 
     curve: Curve
-    """What its origin follows."""
+    """Path of the frame's origin."""
     speed: float = 0.0
-    """[m/s] Along the curve."""
+    """[m/s] Speed along the curve."""
     rate: float = 0.0
-    """[rad/s] Of turning, besides what the curve asks for."""
+    """[rad/s] Turning rate, added to that of the curve."""
     turning: bool = False
-    """The frame's x axis points along the curve."""
+    """True if the frame's x axis points along the curve."""
     heading: float = 0.0
-    """[rad] Of the frame at the start, if it does not turn with the curve."""
+    """[rad] Initial heading of a frame that does not turn with the curve."""
     lookahead: float = 0.0
-    """[s] The plan is the velocity of the goal so much later, which covers the cars' lag."""
+    """[s] Lead time of the reference velocity, which compensates the lag of the cars."""
     stand: Stand | None = None
-    """Where the frame may stand; None for one that is put by its curve alone."""
+    """Placement of a stationary frame; None for a frame on a curve."""
 
     def __post_init__(self) -> None:
         if self.stand is not None and self.curve.length > 0.0:
@@ -64,7 +64,7 @@ class Motion:
 
 
 class MovingFormation(Task):
-    """Cars with places in a moving frame."""
+    """Formation with slots fixed in a moving frame."""
 
     def __init__(
         self,
@@ -76,15 +76,15 @@ class MovingFormation(Task):
         led: bool = False,
         all_told: bool = True,
     ) -> None:
-        """Put the parts together.
+        """Combine a formation and a motion.
 
         Args:
-            n_cars: Slots for cars.
-            n_envs: Environments.
-            formation: Places in the frame.
-            motion: Of the frame.
-            led: The first present car has the first place.
-            all_told: The plan is for all; else for the first present car alone.
+            n_cars: Maximum number of cars.
+            n_envs: Number of environments.
+            formation: Slots in the frame.
+            motion: Motion of the frame.
+            led: True if the first present car has the first slot.
+            all_told: True if all cars receive the reference velocity; else the first present one.
         """
         self._stand, self._ways = motion.stand, None
         terms: tuple[str, ...]
@@ -111,7 +111,7 @@ class MovingFormation(Task):
         self._now = np.zeros(7)
 
     def begin(self, env: int, pos: F64, cars: I64) -> None:
-        """Put the frame where the group stands, and give out places."""
+        """Place the frame at the group's position and assign slots."""
         motion = self._motion
         middle = pos[cars].mean(axis=0)
         anchor, arc = np.zeros(2), 0.0
@@ -126,7 +126,7 @@ class MovingFormation(Task):
         self._give(env, pos, cars, 0.0)
 
     def set_goals(self, env: int, goals: F64, cars: I64) -> None:
-        """Let each present car stand at its goal, until cars come or go."""
+        """Use the goals as slots of the present cars until cars join or leave."""
         if self._stand is None:
             raise EnvError("goals: expected none, the task has a way of its own")
         if len(goals) != len(cars):
@@ -139,9 +139,9 @@ class MovingFormation(Task):
         self._places[env, cars, :2] = (goals - anchor) @ np.array([[c, -s], [s, c]])
 
     def change(self, env: int, pos: F64, cars: I64, before: Bool, t: float) -> None:
-        """Give out places for those who are present now; the frame goes on as it did.
+        """Assign slots to the present cars; the motion of the frame continues.
 
-        One that stands makes way where the places of so many would be in an obstacle.
+        A stationary frame moves if slots for this number of cars would be in an obstacle.
         """
         if self._stand is not None:
             wanted = self._frame[env, :2]
@@ -149,9 +149,9 @@ class MovingFormation(Task):
         self._give(env, pos, cars, t)
 
     def update(self, state: Truth, t: F64, collided: F64, envs: slice) -> None:
-        """Write all arrays for now; cars that gather are paid for coming nearer since before.
+        """Write all arrays for time t, with the `progress` term of a stationary formation.
 
-        Not in `compute`, which is called twice where cars come or go.
+        The term is not computed in `compute`, which runs twice when cars join or leave.
         """
         super().update(state, t, collided, envs)
         if self._ways is not None:
@@ -161,7 +161,7 @@ class MovingFormation(Task):
             progress[start:stop] = self._ways.progress[start:stop]
 
     def compute(self, state: Truth, t: F64, collided: F64, start: int, stop: int) -> int:
-        """One compiled call."""
+        """Run `update_frame`."""
         n_changed: int = update_frame(
             start,
             stop,
@@ -188,7 +188,7 @@ class MovingFormation(Task):
         return n_changed
 
     def _free_anchor(self, stand: Stand, env: int, wanted: F64, n: int) -> F64:
-        """Where a formation of n cars can stand, nearest to where it is wanted, (2) [m]."""
+        """Return the feasible anchor of a formation of n cars nearest to `wanted`, (2) [m]."""
         c, s = np.cos(self._motion.heading), np.sin(self._motion.heading)
         places = self._formation.places(n) @ np.array([[c, s], [-s, c]])
         return free_anchor(wanted, np.array(stand.half), places, self._boxes[env])
@@ -196,7 +196,7 @@ class MovingFormation(Task):
     def _give(self, env: int, pos: F64, cars: I64, t: float) -> None:
         frame_now(env, t, self._frame, self._motion.curve.pieces, self._constants, self._now)
         x, y, c, s = self._now[:4]
-        # Where the cars stand, in the frame.
+        # Positions of the cars in the frame.
         own = (pos[cars] - [x, y]) @ np.array([[c, -s], [s, c]])
         places = self._formation.places(len(cars))
         if self._led:

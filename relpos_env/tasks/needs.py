@@ -1,4 +1,4 @@
-"""What tasks need of the scenarios that they are done in."""
+"""Requirements of tasks on scenarios."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ DEFAULT_SCENARIO: Mapping[str, str] = {
     "rendezvous": "hall",
     "follow": "hall",
 }
-"""Task to the scenario it is done in unless another is asked for."""
+"""Task to its default scenario."""
 
 
 def needs_of(task: object, scenario: Scenario) -> dict[str, Any]:
-    """Options of a task that follow from the scenario.
+    """Return the options of a task that follow from the scenario.
 
     Raises:
-        EnvError: The scenario lacks what the task needs.
+        EnvError: The scenario does not meet the requirements of the task.
     """
     if task == "ring":
         return {"half_axes": scenario.ring}

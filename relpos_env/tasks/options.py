@@ -11,37 +11,37 @@ from tracking.arrays import F64
 
 
 def positive(name: str, value: float) -> float:
-    """The value, if it is finite and more than 0.
+    """Return the value, checked to be finite and more than 0.
 
     Raises:
-        EnvError: It is not.
+        EnvError: The value is out of range.
     """
     return _number(name, value, "a finite number more than 0", low=0.0, strict=True)
 
 
 def not_negative(name: str, value: float) -> float:
-    """The value, if it is finite and at least 0.
+    """Return the value, checked to be finite and at least 0.
 
     Raises:
-        EnvError: It is not.
+        EnvError: The value is out of range.
     """
     return _number(name, value, "a finite number of at least 0", low=0.0, strict=False)
 
 
 def finite(name: str, value: float) -> float:
-    """The value, if it is a finite number.
+    """Return the value, checked to be finite.
 
     Raises:
-        EnvError: It is not.
+        EnvError: The value is not a finite number.
     """
     return _number(name, value, "a finite number", low=-np.inf, strict=False)
 
 
 def flag(name: str, value: bool) -> bool:
-    """The value, if it is True or False.
+    """Return the value, checked to be True or False.
 
     Raises:
-        EnvError: It is not.
+        EnvError: The value is not a bool.
     """
     if not isinstance(value, bool):
         raise EnvError(f"{name}: expected True or False, got {value!r}")
@@ -49,10 +49,10 @@ def flag(name: str, value: bool) -> bool:
 
 
 def car_count(n_cars: int) -> int:
-    """The number of slots for cars, 2 to 20.
+    """Return the maximum number of cars, checked to be 2 to 20.
 
     Raises:
-        EnvError: It is not.
+        EnvError: The number is out of range.
     """
     if not 2 <= n_cars <= 20:
         raise EnvError(f"n_cars: expected 2 to 20, got {n_cars}")
@@ -60,10 +60,10 @@ def car_count(n_cars: int) -> int:
 
 
 def half_room(room: Sequence[float], margin: float) -> F64:
-    """Half axes of the room less a margin to the walls, (2) [m].
+    """Return the half axes of the room less a margin to the walls, (2) [m].
 
     Raises:
-        EnvError: The room is no pair of lengths, or not larger than the margins.
+        EnvError: The room is not a pair of lengths, or not larger than the margins.
     """
     size = points("room", [room], 1)[0]
     if size.min() <= 2.0 * margin:
@@ -73,10 +73,10 @@ def half_room(room: Sequence[float], margin: float) -> F64:
 
 
 def points(name: str, value: Sequence[Sequence[float]] | F64, at_least: int) -> F64:
-    """Points in the plane as an array, (point, 2) [m].
+    """Return points in the plane as an array, (point, 2) [m].
 
     Raises:
-        EnvError: They are not finite, too few, or no points.
+        EnvError: The value is not a list of finite points, or has too few.
     """
     try:
         array = np.array(value, dtype=np.float64)

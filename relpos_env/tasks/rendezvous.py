@@ -1,4 +1,4 @@
-"""Meet, without given places."""
+"""Task `rendezvous`: meet, without relative targets."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from relpos_env.tasks.options import half_room, not_negative, points, positive
 from tracking.arrays import F64, I64, Bool
 
 ROOM_OF_CAR = 0.35
-"""[m] A disc of this radius times the root of the number of cars has room for all."""
+"""[m] Radius of a disc that holds n cars, divided by the square root of n."""
 
 
 class Rendezvous(Task):
-    """All cars come within a radius round the middle of the group, and stay.
+    """All cars drive to within a radius of the group's mean position and stay there.
 
-    There are no targets and no planned velocities: the cars find each other by their own
-    estimates. An operator can only bring the group as a whole to the place.
+    There are no targets and no reference velocities: the cars meet by their own estimates. An
+    operator can only bring the group as a whole to the meeting point.
     """
 
     def __init__(
@@ -34,20 +34,20 @@ class Rendezvous(Task):
         stay: float = 2.0,
         place: Sequence[float] | None = None,
     ) -> None:
-        """Say where.
+        """Check the options.
 
         Args:
-            n_cars: Slots for cars, 2 to 20.
-            n_envs: Environments.
+            n_cars: Maximum number of cars, 2 to 20.
+            n_envs: Number of environments.
             room: Width along x and depth along y [m].
-            radius: Within which all must be [m]; by default `ROOM_OF_CAR` times the root of
-                the number of cars.
-            stay: How long all must be within it [s].
-            place: Where in the room [m]; by default the middle of the group at the start, or
-                as near as the radius allows.
+            radius: Radius within which all cars must be [m]; by default `ROOM_OF_CAR` times the
+                square root of the number of cars.
+            stay: Time for which all cars must stay within the radius [s].
+            place: Meeting point in the room [m]; by default the group's mean position at the
+                start, or as near to it as the radius allows.
 
         Raises:
-            EnvError: An option is out of range, or there is no room.
+            EnvError: An option is out of range, or the radius does not fit in the room.
         """
         super().__init__(n_cars, n_envs, ("formation", "progress", *COMMON_TERMS, "time"))
         r = ROOM_OF_CAR * np.sqrt(n_cars) if radius is None else positive("radius", radius)
@@ -62,23 +62,23 @@ class Rendezvous(Task):
         self._place, self._since = np.zeros((n_envs, 2)), np.full(n_envs, np.inf)
 
     def begin(self, env: int, pos: F64, cars: I64) -> None:
-        """Choose the place."""
+        """Choose the meeting point."""
         middle = np.clip(pos[cars].mean(axis=0), -self._room, self._room)
         self._place[env] = middle if self._fixed is None else self._fixed
         self._since[env] = np.inf
 
     def set_goals(self, env: int, goals: F64, cars: I64) -> None:
-        """Let the cars meet at a place in the room."""
+        """Set the meeting point."""
         if len(goals) != 1 or np.any(np.abs(goals[0]) > self._half):
             raise EnvError(f"goals: expected one point in the room, got {goals.tolist()}")
         self._place[env] = goals[0]
 
     def change(self, env: int, pos: F64, cars: I64, before: Bool, t: float) -> None:
-        """A newcomer has to come too; the place stays."""
+        """Restart the time within the radius; the meeting point stays the same."""
         self._since[env] = np.inf
 
     def compute(self, state: Truth, t: F64, collided: F64, start: int, stop: int) -> int:
-        """One compiled call."""
+        """Run `update_meeting`."""
         n_changed: int = update_meeting(
             start,
             stop,

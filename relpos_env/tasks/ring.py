@@ -1,6 +1,6 @@
-"""A ring that turns: cars keep even places on a loop and go round together.
+"""Task `ring`: evenly spaced cars drive round a loop.
 
-The loop is a circle, or two half circles and straight sides between them. All accelerate
+The loop is a circle, or two half circles and straight sides between them. All cars accelerate
 differently, so the group's rotation stays observable to their trackers.
 """
 
@@ -21,11 +21,11 @@ from relpos_env.tasks.options import half_room, not_negative, positive
 from tracking.arrays import F64, I64, Bool
 
 SHARE = 0.28
-"""[-] Radius of the ring over the smaller side of the room."""
+"""[-] Radius of the ring divided by the smaller side of the room."""
 
 
 class Ring(Task):
-    """Even places on a loop round the room's middle, going counter-clockwise; never ends."""
+    """Evenly spaced slots that move counter-clockwise on a loop round the room; never ends."""
 
     def __init__(
         self,
@@ -37,19 +37,19 @@ class Ring(Task):
         speed: float = 1.0,
         lookahead: float = 0.3,
     ) -> None:
-        """Lay the loop.
+        """Build the loop.
 
         Args:
-            n_cars: Slots for cars, 2 to 20.
-            n_envs: Environments.
+            n_cars: Maximum number of cars, 2 to 20.
+            n_envs: Number of environments.
             room: Width along x and depth along y [m].
-            half_axes: Half width and half depth of the loop [m]; its ends are half circles of
-                the smaller. By default a circle, `SHARE` of the smaller side of the room.
-            speed: Of each car [m/s].
-            lookahead: The plan is the velocity of so much later [s].
+            half_axes: Half width and half depth of the loop [m]; the smaller is the radius of
+                its bends. By default a circle, `SHARE` of the smaller side of the room.
+            speed: Speed of each car [m/s].
+            lookahead: Lead time of the reference velocity [s].
 
         Raises:
-            EnvError: An option is out of range, or the cars have no room on the ring.
+            EnvError: An option is out of range, or the cars do not fit on the ring.
         """
         super().__init__(n_cars, n_envs, ("formation", "velocity", *COMMON_TERMS))
         half = half_room(room, 0.0)
@@ -69,15 +69,15 @@ class Ring(Task):
         self._arc = np.zeros((n_envs, n_cars))
 
     def begin(self, env: int, pos: F64, cars: I64) -> None:
-        """Put the places where the cars stand."""
+        """Place the slots nearest to the cars."""
         self._give(env, pos, cars, 0.0)
 
     def change(self, env: int, pos: F64, cars: I64, before: Bool, t: float) -> None:
-        """Even places for those who are present now, nearest to where they are."""
+        """Assign evenly spaced slots to the present cars, nearest to their positions."""
         self._give(env, pos, cars, t)
 
     def compute(self, state: Truth, t: F64, collided: F64, start: int, stop: int) -> int:
-        """One compiled call."""
+        """Run `update_ring`."""
         n_changed: int = update_ring(
             start, stop, state.pos_w, state.vel_w, state.accel_w, state.clearance,
             state.present, t, collided,
@@ -93,7 +93,7 @@ class Ring(Task):
 
 
 def loop(a: float, b: float) -> Curve:
-    """A closed curve of these half axes [m], counter-clockwise."""
+    """Return a closed curve of these half axes [m], counter-clockwise."""
     radius = min(a, b)
     if a == b:
         angle = np.linspace(0.0, 2.0 * np.pi, 1 + int(np.ceil(200.0 * np.pi * radius)))
@@ -104,10 +104,10 @@ def loop(a: float, b: float) -> Curve:
 
 
 def _half_axes(value: Sequence[float] | None, half: F64) -> tuple[float, float]:
-    """The half axes asked for, if they fit into the room.
+    """Return the half axes of the loop, checked to fit in the room.
 
     Raises:
-        EnvError: They do not, or are not two lengths.
+        EnvError: The half axes do not fit, or are not two lengths.
     """
     if value is None:
         radius = 2.0 * SHARE * float(half.min())

@@ -1,4 +1,4 @@
-"""Move in formation along a path."""
+"""Task `travel`: move in formation along a path."""
 
 from __future__ import annotations
 
@@ -25,32 +25,32 @@ def travel(
     heading: float = 0.0,
     lookahead: float = 0.3,
 ) -> MovingFormation:
-    """A formation whose middle follows a path; it begins at the point nearest to the group.
+    """Build a formation whose middle follows a path.
 
-    An open path begins at its first point and ends at its last.
+    A closed path begins at the point nearest to the group, an open one at its first point.
 
     Args:
-        n_cars: Slots for cars, 2 to 20.
-        n_envs: Environments.
+        n_cars: Maximum number of cars, 2 to 20.
+        n_envs: Number of environments.
         room: Width along x and depth along y [m].
-        shape: One of `SHAPES`, or places (x ahead, y left) [m], one a car.
-        spacing: Of neighbours [m]; by default 1 m, or less where the room asks for it.
-        speed: Of the middle [m/s].
-        path: One of `CURVES`, or points [m]; their corners are rounded.
-        closed: A path of points goes round.
-        turning: The formation turns with the path; else it keeps its heading.
-        heading: Of a formation that keeps it [rad].
-        lookahead: The plan is the velocity of so much later [s].
+        shape: One of `SHAPES`, or slots (x ahead, y left) [m], one per car.
+        spacing: Distance between neighbours [m]; by default 1 m, or less in small rooms.
+        speed: Speed of the middle [m/s].
+        path: One of `CURVES`, or points [m] with rounded corners.
+        closed: True if a path of points is a closed loop.
+        turning: True if the formation turns with the path; else it keeps its heading.
+        heading: Heading of a formation that does not turn [rad].
+        lookahead: Lead time of the reference velocity [s].
 
     Raises:
-        EnvError: An option is out of range, or there is no room.
+        EnvError: An option is out of range, or the formation does not fit in the room.
     """
     heading, closed, turning = (
         finite("heading", heading), flag("closed", closed), flag("turning", turning)
     )  # fmt: skip
     formation = Formation(shape, n_cars, spacing)
     half = half_room(room, MARGIN)
-    # At most half of the room is for the formation, the rest for the path.
+    # The formation may take half of the room; the rest is for the path.
     extent = formation.fit(0.5 * half, None if turning else heading)
     motion = Motion(
         curve=make_curve(path, closed, half, extent),

@@ -1,4 +1,4 @@
-"""How much each reward term counts; the reward is the sum of weight times term."""
+"""Weights of the reward terms; the reward is the sum of weight times term."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tracking.arrays import F64
 
 _CARE = {"collision": 1.0, "effort": 0.05, "nearness": 0.5}
 _MOVING = {"formation": 1.0, "velocity": 0.2, **_CARE}
-# Every step costs more than a perfect one earns, so that being through is best.
+# The time penalty exceeds the largest reward of a step, so finishing early is optimal.
 _ENDING = {"formation": 0.5, "progress": 1.0, **_CARE, "time": 1.5}
 
 DEFAULT_WEIGHTS: Mapping[str, Mapping[str, float]] = MappingProxyType(
@@ -33,19 +33,19 @@ DEFAULT_WEIGHTS: Mapping[str, Mapping[str, float]] = MappingProxyType(
         "rendezvous": _ENDING,
     }
 )
-"""Task to term to weight [-]; `time` counts only where the task has an end."""
+"""Task to term to weight [-]; `time` is ignored for tasks without an end."""
 
 
 def reward_weights(name: object, task: Task, override: Mapping[str, float] | None = None) -> F64:
-    """Weights in the order of a task's terms, (term).
+    """Return the weights in the order of a task's terms, (term).
 
     Args:
-        name: By which the task was looked up.
-        task: Of a task of ours `DEFAULT_WEIGHTS` count, of others `Task.default_weights`.
-        override: Weights by name that differ from these.
+        name: Name or builder of the task.
+        task: Built-in tasks use `DEFAULT_WEIGHTS`, others `Task.default_weights`.
+        override: Weights by term that replace the defaults.
 
     Raises:
-        EnvError: No term of that name, or a weight that is not finite.
+        EnvError: Unknown term, or a weight that is not finite.
     """
     ours = DEFAULT_WEIGHTS.get(name) if isinstance(name, str) else None
     chosen = {**dict.fromkeys(task.terms, 1.0), **(ours or task.default_weights)}

@@ -1,4 +1,4 @@
-"""Observation modes. Adding one: a file next to `relative.py` and a line in `OBSERVATIONS`."""
+"""Observation modes. A new mode needs a file next to `relative.py` and a line in `OBSERVATIONS`."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ OBSERVATIONS: dict[str, ModeBuilder] = {
     "ranges": Ranges,
     "truth": partial(RelativePositions, needs_truth=True, with_cov=False),
 }
-"""Name to builder ``(n_cars, beams of each car) -> ObservationMode``."""
+"""Name to builder ``(n_cars, distance sensors per car) -> ObservationMode``."""
 
 
 def observation_mode(name: str | ModeBuilder, n_cars: int, proximity: int = 0) -> ObservationMode:
-    """Look a mode up.
+    """Build an observation mode from its name or builder.
 
     Args:
         name: One of `OBSERVATIONS`, ``package.module:Name``, a name among the entry points
-            ``relpos_env.observations``, or a builder itself.
-        n_cars: Slots for cars.
-        proximity: Beams that measure distances round each car.
+            ``relpos_env.observations``, or a builder.
+        n_cars: Maximum number of cars.
+        proximity: Number of distance sensors per car.
 
     Raises:
-        EnvError: No mode of that name.
+        EnvError: There is no mode of this name.
     """
     build = look_up(OBSERVATIONS, name, "observation", group="relpos_env.observations")
     return build(n_cars, proximity)

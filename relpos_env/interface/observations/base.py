@@ -1,4 +1,4 @@
-"""What an observation mode is: a view to vectors, with names and units for each number."""
+"""Protocol of observation modes: map a view to vectors with named fields and units."""
 
 from __future__ import annotations
 
@@ -17,46 +17,46 @@ F32 = NDArray[np.float32]
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """One named stretch of an observation vector."""
+    """One named field of an observation vector."""
 
     name: str
     size: int
     unit: str
     meaning: str
     limit: float
-    """Values are cut at +- this, so that an observation is always inside its space."""
+    """Values are clipped to +- this limit, so that an observation is always in its space."""
     signed: bool = True
-    """False if they are never below 0."""
+    """False if values are never below 0."""
     per_other: bool = False
-    """Whether it is cut into equal pieces, one for each of the others in order."""
+    """True if the field consists of equal parts, one per other car in order."""
 
 
 class ObservationMode(Protocol):
-    """Views to one vector a car. The others come in the order of their numbers, oneself left out.
+    """Mapping of a view to one vector per car, with the other cars in the order of their index.
 
-    Law: a vector is inside `space_of(fields)`, and its layout is `fields` in order.
+    Invariant: a vector is in `space_of(fields)`, and its layout is `fields` in order.
     """
 
     needs_truth: bool
-    """True if the view must be made from the true positions."""
+    """True if the view must hold the true state."""
     fields: tuple[Field, ...]
-    """The stretches of the vector, in order."""
+    """Fields of the vector, in order."""
 
     def bind(self, view: AgentView, out: F32) -> Callable[[], None]:
-        """What writes observations from a view that is filled again before every call.
+        """Return a function that writes the observations of the current view.
 
         Args:
-            view: Of all cars.
-            out: (env, car, size), written; zeros for absent cars.
+            view: View of all cars, updated before every call.
+            out: Observations, (env, car, size), written; zeros for absent cars.
         """
 
 
 def space_of(fields: tuple[Field, ...], history: int = 1) -> spaces.Box:
-    """The observation space of one car.
+    """Return the observation space of one car.
 
     Args:
-        fields: Its stretches.
-        history: So many vectors, the newest first.
+        fields: Fields of one vector.
+        history: Number of stacked vectors, the newest first.
     """
     high = np.concatenate([np.full(f.size, f.limit) for f in fields]).astype(np.float32)
     low = np.concatenate([np.full(f.size, -f.limit * f.signed) for f in fields]).astype(np.float32)
@@ -64,7 +64,7 @@ def space_of(fields: tuple[Field, ...], history: int = 1) -> spaces.Box:
 
 
 def index_table(fields: tuple[Field, ...]) -> list[dict[str, Any]]:
-    """Where every stretch stands, for documents and cards: first, last, name, unit, meaning."""
+    """Return index range, name, unit, bounds and meaning of every field, for docs and cards."""
     rows, first = [], 0
     for f in fields:
         rows.append(
@@ -83,5 +83,5 @@ def index_table(fields: tuple[Field, ...]) -> list[dict[str, Any]]:
 
 
 def total_size(fields: tuple[Field, ...]) -> int:
-    """Length of the vector."""
+    """Return the length of the vector."""
     return sum(f.size for f in fields)

@@ -1,4 +1,4 @@
-"""The raw ranges, for policies that do without a tracker."""
+"""Observation mode of raw ranges, for policies without a tracker."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tracking.kernels.jit import bind
 
 
 class Ranges:
-    """The last range of every pair; zeros where there was none for ten seconds."""
+    """Last range of every pair; zeros where it is older than ten seconds."""
 
     needs_truth = False
 
@@ -38,5 +38,5 @@ class Ranges:
         )
 
     def bind(self, view: AgentView, out: F32) -> Callable[[], None]:
-        """What writes observations of every car, (env, car, size)."""
+        """Return a function that writes the observations of every car, (env, car, size)."""
         return bind(observe_ranges, view, out)

@@ -1,4 +1,4 @@
-"""Relative positions of the other cars, where they should be, and the car's own motion."""
+"""Observation modes of relative positions, relative targets and the car's own motion."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tracking.kernels.jit import bind
 
 
 class RelativePositions:
-    """Zeros where the mask is 0."""
+    """Relative positions and velocities; zeros where the mask is 0."""
 
     def __init__(self, n_cars: int, n_beams: int = 0, *, needs_truth: bool, with_cov: bool) -> None:
         self.needs_truth, self._with_cov = needs_truth, with_cov
@@ -68,5 +68,5 @@ class RelativePositions:
         )
 
     def bind(self, view: AgentView, out: F32) -> Callable[[], None]:
-        """What writes observations of every car, (env, car, size)."""
+        """Return a function that writes the observations of every car, (env, car, size)."""
         return bind(observe_relative, view, self._with_cov, out)

@@ -1,4 +1,4 @@
-"""The stretches that every mode has: what is wanted, and the car's own motion."""
+"""Observation fields of every mode: targets, command and the car's own motion."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from relpos_env.interface.observations.base import Field
 
 
 def wish_fields(n_others: int) -> tuple[Field, ...]:
-    """Where the others should be."""
+    """Return the fields of the relative targets of the other cars."""
     return (
         Field(
             "wanted",
@@ -31,7 +31,7 @@ def wish_fields(n_others: int) -> tuple[Field, ...]:
 
 
 def own_fields(n_beams: int) -> tuple[Field, ...]:
-    """What the operator asks, and what the car knows of itself and what stands round it."""
+    """Return the fields of the command, the car's own motion and its distance sensors."""
     near = Field(
         "near",
         n_beams,

@@ -1,1 +1,1 @@
-"""Parts of a picture."""
+"""Parts of an image."""

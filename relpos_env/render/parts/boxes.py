@@ -1,4 +1,4 @@
-"""Obstacles: fixed ones hatched like a section in a drawing, movable ones like crates."""
+"""Obstacles: fixed ones are drawn hatched, movable ones as crates."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from relpos_env.render.parts.floor import rectangle
 from tracking.arrays import F64
 
 _HATCH = 9.0
-"""[units] From line to line."""
+"""[units] Distance between lines."""
 
 
 def draw_box(canvas: Canvas, layout: Layout, box: F64, *, movable: bool) -> None:
@@ -38,13 +38,13 @@ def draw_box(canvas: Canvas, layout: Layout, box: F64, *, movable: bool) -> None
 
 
 def hatching(half_width: float, half_depth: float, spacing: float) -> list[F64]:
-    """Diagonal strokes that fill a rectangle round the origin, each (2, 2).
+    """Return diagonal strokes that fill a rectangle round the origin, each (2, 2).
 
-    Law: every end lies on the border, and all strokes rise at 45 degrees.
+    Invariant: every end lies on the border, and all strokes rise at 45 degrees.
     """
     step = spacing * np.sqrt(2.0)
     strokes = []
-    # Lines y = x + offset; in the rectangle x runs where both x and x + offset are inside.
+    # Lines y = x + offset, clipped to the x for which (x, x + offset) is in the rectangle.
     for offset in np.arange(-half_width - half_depth + step, half_width + half_depth, step):
         x0 = max(-half_width, -half_depth - offset)
         x1 = min(half_width, half_depth - offset)

@@ -1,6 +1,6 @@
-"""The outline of a car and its parts, seen from above, for a car of length and width 1.
+"""Outline of a car and its parts in top view, for a car of length and width 1.
 
-x forward, y left, origin in the middle. Real sizes come by scaling both axes.
+x forward, y left, origin in the middle. Both axes are scaled to the size of the car.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from tracking.arrays import F64
 
 
 def _rounded(corners: list[tuple[float, float]], radii: tuple[float, float]) -> F64:
-    """A convex outline with its corners cut by quadratic arcs, (point, 2).
+    """Return a convex outline with its corners rounded by quadratic arcs, (point, 2).
 
-    ``radii`` are the lengths cut from the sides, as shares of length and of width.
+    ``radii`` are the lengths cut from the sides, relative to length and width.
     """
     ring = np.array(corners)
     points = []

@@ -1,4 +1,4 @@
-"""Cars as they are: body, windows, wheels, number, and what their trackers lack."""
+"""Cars at their true poses: body, windows, wheels, number, and sign of a power loss."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     import pygame
 
 _ROOM_FOR_NUMBER = 12.0
-"""[units] Cars narrower than this have their number next to them."""
+"""[units] Minimum width of cars with their number on the roof."""
 
 
 def draw_cars(canvas: Canvas, layout: Layout, snapshot: Snapshot) -> None:
-    """All cars that are present."""
+    """Draw all present cars."""
     cars = np.flatnonzero(snapshot.present).tolist()
     for car in cars:
         colour = palette.car_colour(car)
@@ -45,7 +45,7 @@ def draw_cars(canvas: Canvas, layout: Layout, snapshot: Snapshot) -> None:
 
 
 def draw_viewer(canvas: Canvas, layout: Layout, snapshot: Snapshot) -> None:
-    """What tells the viewer from the others, under its car."""
+    """Draw the mark of the viewer, below its car."""
     if snapshot.present[snapshot.viewer]:
         centre = layout.pixels(snapshot.pose[snapshot.viewer, :2])
         radius = max(0.64 * snapshot.car_size[0] * layout.scale, 11.0 * layout.unit)
@@ -53,7 +53,7 @@ def draw_viewer(canvas: Canvas, layout: Layout, snapshot: Snapshot) -> None:
 
 
 def draw_halo(canvas: Canvas, centre: F64, radius: float, colour: Colour) -> None:
-    """The ring of light round the car whose estimate is drawn [pixels]."""
+    """Draw the halo of the car whose estimates are shown [pixels]."""
     canvas.circle(centre, radius, palette.mix(colour, palette.FLOOR, 0.86))
     canvas.circle(centre, radius, palette.mix(colour, palette.FLOOR, 0.15), 1.4)
 
@@ -66,7 +66,7 @@ def draw_car(
     size: tuple[float, float],
     colour: Colour,
 ) -> None:
-    """One car at x, y, heading [m, m, rad], its front wheels turned [rad]."""
+    """Draw a car at x, y, heading [m, m, rad] with the steering angle of its wheels [rad]."""
     x, y, heading = pose.tolist()
 
     def place(outline: F64) -> F64:
@@ -94,7 +94,7 @@ def draw_car(
 
 
 def draw_crossed_antenna(canvas: Canvas, at: F64) -> None:
-    """The sign for a tracker without power, about 14 units wide, round a point [pixels]."""
+    """Draw the sign of a tracker without power, about 17 units wide, at a point [pixels]."""
     u = canvas.unit
     canvas.circle(at, 8.5 * u, palette.FLOOR)
     canvas.circle(at, 8.5 * u, palette.CROSSED, 1.3)
@@ -110,7 +110,7 @@ def draw_crossed_antenna(canvas: Canvas, at: F64) -> None:
 def write_numbers(
     picture: pygame.Surface, layout: Layout, snapshot: Snapshot, letters: Lettering
 ) -> None:
-    """The number of every car, on its roof or, where that is too small, above it."""
+    """Write the number of every car on its roof, or above a car whose roof is too small."""
     width = snapshot.car_size[1] * layout.scale
     inside = width >= _ROOM_FOR_NUMBER * layout.unit
     size = min(0.62 * width, 18.0 * layout.unit) if inside else 10.0 * layout.unit

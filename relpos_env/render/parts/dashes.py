@@ -1,4 +1,4 @@
-"""Lines cut into dashes."""
+"""Dashed lines."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ Point = tuple[float, float]
 
 
 def dashed(points: Sequence[Point], pattern: Sequence[float]) -> list[tuple[Point, Point]]:
-    """The strokes of a line, the pattern running on round its corners.
+    """Return the strokes of a dashed line; the pattern continues round its corners.
 
     Args:
         points: Corners of the line.

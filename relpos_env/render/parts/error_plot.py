@@ -1,4 +1,4 @@
-"""The errors of the last seconds, as a small plot."""
+"""Plot of the errors of the last seconds."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ if TYPE_CHECKING:
     import pygame
 
 WINDOW = 20.0
-"""[s] That the plot goes back."""
+"""[s] Time window of the plot."""
 _TOPS = (0.05, 0.1, 0.2, 0.4, 0.5, 1.0, 2.0, 4.0, 5.0, 10.0, 20.0, 50.0, 100.0)
-"""[m] Ends of the error axis; each divides into two round halves."""
+"""[m] Possible upper limits of the error axis; half of each is a round number."""
 
 
 def error_axis(snapshot: Snapshot) -> float:
-    """End of the error axis: the first round number above all errors shown [m]."""
+    """Return the upper limit of the error axis: a round number above all displayed errors [m]."""
     shown = snapshot.history_t >= snapshot.t - WINDOW
     errors = np.concatenate([snapshot.formation_error[shown], snapshot.tracking_error[shown]])
     errors = errors[np.isfinite(errors)]
@@ -32,7 +32,7 @@ def error_axis(snapshot: Snapshot) -> float:
 
 
 def axes_of(layout: Layout) -> Rect:
-    """What the axes of the plot enclose [pixels]."""
+    """Return the area of the plot's axes [pixels]."""
     u, plot = layout.unit, layout.plot
     return Rect(
         plot.left + round(46 * u),
@@ -43,7 +43,7 @@ def axes_of(layout: Layout) -> Rect:
 
 
 def draw_errors(canvas: Canvas, layout: Layout, snapshot: Snapshot) -> None:
-    """Axes and curves."""
+    """Draw axes and curves."""
     box, u = axes_of(layout), layout.unit
     for k in range(3):
         level = box.bottom - 0.5 * k * box.height
@@ -68,7 +68,7 @@ def draw_errors(canvas: Canvas, layout: Layout, snapshot: Snapshot) -> None:
 def write_errors(
     picture: pygame.Surface, layout: Layout, snapshot: Snapshot, letters: Lettering
 ) -> None:
-    """Labels of the axes and of the curves."""
+    """Write the labels of the axes and of the curves."""
     box, u, faint = axes_of(layout), layout.unit, palette.FAINT_INK
     top = error_axis(snapshot)
     for k in range(3):
@@ -91,7 +91,7 @@ def write_errors(
 
 
 def stretches(shown: Bool) -> list[slice]:
-    """Where a mask is true without a gap, runs of two and more, as slices."""
+    """Return the runs of two or more True values of a mask, as slices."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(shown, dtype=np.int8), [0]])))
     runs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
     return [slice(first, end) for first, end in runs if end - first > 1]

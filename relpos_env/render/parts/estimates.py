@@ -1,4 +1,4 @@
-"""What the viewer believes: ghosts of the other cars and how sure it is of each."""
+"""Estimates of the viewer: outlines of the other cars and their uncertainty."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from tracking.arrays import F64
 from tracking.estimate import Status
 
 SIGMAS = 2.0
-"""[-] Standard deviations that an ellipse reaches."""
+"""[-] Size of ellipses in standard deviations."""
 PATTERNS: dict[int, Sequence[float]] = {
     Status.OK: SOLID,
     Status.AMBIGUOUS: DASHED,
     Status.DOUBTFUL: DASH_DOT,
     Status.LOST: DOTTED,
 }
-"""Line styles of ghosts; a status that is not here has a position that says nothing."""
+"""Line style by status; a status without an entry has no meaningful position."""
 _CIRCLE = np.stack(
     [np.cos(np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)),
      np.sin(np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False))]
@@ -31,14 +31,14 @@ _CIRCLE = np.stack(
 
 
 def ellipse(cov: F64, sigmas: float = SIGMAS, most: float = np.inf) -> F64:
-    """Outline of a covariance, (2, 2) [m2], round the origin, (point, 2) [m].
+    """Return the ellipse of a covariance, (2, 2) [m2], round the origin, (point, 2) [m].
 
-    Law: for every point x of an outline that no axis cuts short, x' cov^-1 x = sigmas**2.
+    Invariant: x' cov^-1 x = sigmas**2 for every point x, unless an axis is limited.
 
     Args:
-        cov: Symmetric; eigenvalues below 0 count as 0.
-        sigmas: Standard deviations that it reaches.
-        most: Longest half axis that is drawn [m].
+        cov: Symmetric covariance; negative eigenvalues count as 0.
+        sigmas: Size in standard deviations.
+        most: Limit of the half axes [m].
     """
     values, vectors = np.linalg.eigh(cov)
     axes = np.minimum(sigmas * np.sqrt(np.maximum(values, 0.0)), most)
@@ -47,23 +47,23 @@ def ellipse(cov: F64, sigmas: float = SIGMAS, most: float = np.inf) -> F64:
 
 
 def placed_estimate(snapshot: Snapshot) -> tuple[F64, F64, float]:
-    """The estimate in the room: positions (car, 2) [m], covariances, turn of its axes [rad].
+    """Return the estimate in the room: positions (car, 2) [m], covariances, rotation [rad].
 
-    The viewer takes its own heading for the axes: where it errs, all it believes is turned
-    round it. Without ``estimate_heading`` the axes count as true.
+    An error of the viewer's own heading rotates its estimates about the viewer. Without
+    ``estimate_heading`` the rotation is 0.
     """
     turn = 0.0
     if snapshot.estimate_heading is not None:
         turn = float(snapshot.pose[snapshot.viewer, 2] - snapshot.estimate_heading[snapshot.viewer])
     c, s = np.cos(turn), np.sin(turn)
     rotation = np.array([[c, -s], [s, c]])
-    with np.errstate(invalid="ignore"):  # of what is not finite nothing is drawn
+    with np.errstate(invalid="ignore"):  # non-finite estimates are not drawn
         pos = snapshot.pose[snapshot.viewer, :2] + snapshot.estimate @ rotation.T
         return pos, rotation @ snapshot.estimate_cov @ rotation.T, turn
 
 
 def draw_ghosts(canvas: Canvas, layout: Layout, snapshot: Snapshot) -> None:
-    """The ghost of every car the viewer has an idea of, with an ellipse of two sigmas."""
+    """Draw the estimate of every car with a meaningful position, with a 2 sigma ellipse."""
     if not snapshot.present[snapshot.viewer]:
         return
     pos, cov, turn = placed_estimate(snapshot)
@@ -95,7 +95,7 @@ def draw_ghosts(canvas: Canvas, layout: Layout, snapshot: Snapshot) -> None:
 def draw_ellipse(
     canvas: Canvas, outline: F64, colour: Colour, pattern: Sequence[float], *, ok: bool
 ) -> None:
-    """An ellipse of two sigmas [pixels], filled where the estimate can be used."""
+    """Draw a 2 sigma ellipse [pixels], filled if the estimate is usable."""
     if ok:
         canvas.polygon(outline, colour, 30)
     edge = palette.mix(colour, palette.FLOOR, 0.45)
@@ -105,7 +105,7 @@ def draw_ellipse(
 def draw_ghost(
     canvas: Canvas, outline: F64, colour: Colour, pattern: Sequence[float], *, ok: bool
 ) -> None:
-    """A ghost [pixels], filled where the estimate can be used."""
+    """Draw the outline of an estimated car [pixels], filled if the estimate is usable."""
     if ok:
         canvas.polygon(outline, colour, 70)
     canvas.lines(outline, palette.mix(colour, palette.FLOOR, 0.1), 1.5, pattern, closed=True)

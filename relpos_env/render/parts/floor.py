@@ -1,4 +1,4 @@
-"""The room: floor, metre grid, walls and scale bar."""
+"""Room: floor, metre grid, walls and scale bar."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ if TYPE_CHECKING:
     import pygame
 
 _WALL = 5.0
-"""[units]"""
+"""[units] Thickness of the walls."""
 
 
 def rectangle(width: float, depth: float) -> F64:
-    """Corners of a rectangle round the origin, (4, 2)."""
+    """Return the corners of a rectangle round the origin, (4, 2)."""
     half = 0.5 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * [width, depth]
     return np.asarray(half, dtype=np.float64)
 
 
 def draw_floor(canvas: Canvas, layout: Layout) -> None:
-    """Floor with a line every metre, and walls round it."""
+    """Draw the floor with a line every metre, the walls and the scale bar."""
     w, d = layout.room
     wall = 2.0 * _WALL * layout.unit / layout.scale
     walls = layout.pixels(rectangle(w + wall, d + wall))
@@ -46,7 +46,7 @@ def draw_floor(canvas: Canvas, layout: Layout) -> None:
 
 
 def write_scale(picture: pygame.Surface, layout: Layout, letters: Lettering) -> None:
-    """The length of the scale bar next to it, and the size of the room."""
+    """Write the length of the scale bar next to it, and the size of the room."""
     bar, unit = _bar(layout), layout.unit
     at = (float(bar[1, 0]) + 9.0 * unit, float(bar[1, 1]))
     letters.write(picture, f"{_length(layout):g} m", at, 12 * unit, palette.INK)
@@ -57,7 +57,7 @@ def write_scale(picture: pygame.Surface, layout: Layout, letters: Lettering) -> 
 
 
 def _length(layout: Layout) -> float:
-    """A metre, or a round number of metres in a room where that is short [m]."""
+    """Return the length of the scale bar: a round number that suits the scale [m]."""
     for length in (0.1, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0):
         if length * layout.scale >= 40.0 * layout.unit:
             return length if length >= 1.0 or max(layout.room) < 1.5 else 1.0

@@ -1,4 +1,4 @@
-"""What the cars are asked for: places relative to the viewer, and the plan in the room."""
+"""Targets of the cars: positions relative to the viewer, and the plan in the room."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from relpos_env.render.snapshot import Snapshot
 from tracking.arrays import F64
 
 PLACE_RADIUS = 0.45
-"""[car lengths] Of the circle that stands for a place: a car that is there looks out of it."""
+"""[car lengths] Radius of a target's circle, which a car at the target extends beyond."""
 
 
 def draw_formation(canvas: Canvas, layout: Layout, snapshot: Snapshot) -> None:
-    """Hollow circles at the wanted places, joined by a pale band round the formation."""
+    """Draw circles at the relative targets, joined by a pale outline of the formation."""
     viewer = snapshot.viewer
     wanted = np.asarray(snapshot.has_target) & snapshot.present
     wanted[viewer] = False
@@ -35,13 +35,13 @@ def draw_formation(canvas: Canvas, layout: Layout, snapshot: Snapshot) -> None:
 
 
 def draw_place(canvas: Canvas, centre: F64, radius: float, colour: Colour) -> None:
-    """One wanted place: a hollow circle [pixels]."""
+    """Draw a relative target: a hollow circle [pixels]."""
     radius = max(radius, 4.5 * canvas.unit)
     canvas.circle(centre, radius, colour, 1.6)
 
 
 def draw_plan(canvas: Canvas, layout: Layout, snapshot: Snapshot) -> None:
-    """The plan's path as a dashed line, its places for the cars as crosses."""
+    """Draw the path of the plan as a dashed line, and the goals of the cars as crosses."""
     if snapshot.path is not None and len(snapshot.path) > 1:
         canvas.lines(layout.pixels(snapshot.path), palette.PLAN, 1.4, DASHED)
     if snapshot.goal is None:
@@ -52,7 +52,7 @@ def draw_plan(canvas: Canvas, layout: Layout, snapshot: Snapshot) -> None:
 
 
 def draw_cross(canvas: Canvas, centre: F64, half: float, colour: Colour) -> None:
-    """A place of the plan: a diagonal cross [pixels]."""
+    """Draw a goal of the plan: a diagonal cross [pixels]."""
     for turn in (1.0, -1.0):
         arm = half * np.array([1.0, turn])
         canvas.lines(np.array([centre - arm, centre + arm]), colour, 1.8)

@@ -1,4 +1,4 @@
-"""What the signs mean."""
+"""Legend of the image."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ if TYPE_CHECKING:
     import pygame
 
 _ROW, _SIGN = 21.0, 46.0
-"""[units] Height of an entry, width of its sign."""
+"""[units] Height of an entry, width of its symbol."""
 _SAMPLE = palette.mix(palette.WALL, palette.CARS[0], 0.35)
-"""Colour of the cars in the legend, which stand for cars of every colour."""
+"""Colour of the cars in the legend, which represent cars of every colour."""
 _LENGTH = 27.0
-"""[units] Of the cars in the legend."""
+"""[units] Length of the cars in the legend."""
 
 
 def entries(snapshot: Snapshot) -> tuple[str, ...]:
-    """What the legend of a snapshot explains, in order."""
+    """Return the entries of a snapshot's legend, in order."""
     size = np.asarray(snapshot.boxes)[:, 2:4].min(axis=1) > 0.0
     names = ["car", "viewer", "estimate", "ambiguous", "doubtful", "lost"]
     names += ["sight", "no sight", "no range", "place"]
@@ -46,7 +46,7 @@ def entries(snapshot: Snapshot) -> tuple[str, ...]:
 
 
 def draw_legend(canvas: Canvas, layout: Layout, names: tuple[str, ...]) -> None:
-    """The signs, one below the other."""
+    """Draw the symbols of the entries."""
     for name, at in zip(names, _places(layout, len(names)), strict=True):
         _SIGNS[name](canvas, layout, at)
 
@@ -54,7 +54,7 @@ def draw_legend(canvas: Canvas, layout: Layout, names: tuple[str, ...]) -> None:
 def write_legend(
     picture: pygame.Surface, layout: Layout, names: tuple[str, ...], letters: Lettering
 ) -> None:
-    """The words next to the signs."""
+    """Write the text of the entries next to their symbols."""
     u = layout.unit
     for name, at in zip(names, _places(layout, len(names)), strict=True):
         where = (float(at[0]) + 0.5 * _SIGN * u, float(at[1]))
@@ -62,7 +62,7 @@ def write_legend(
 
 
 def _places(layout: Layout, n: int) -> F64:
-    """Centres of the signs, (entry, 2) [pixels]: one column if the height is enough, or two."""
+    """Return the centres of the symbols, (entry, 2) [pixels], in one column or two if needed."""
     u, box = layout.unit, layout.legend
     room = box.height - 12.0 * u
     n_columns = 1 if n * 15.0 * u <= room else 2
@@ -74,7 +74,7 @@ def _places(layout: Layout, n: int) -> F64:
 
 
 def _in_units(layout: Layout, at: F64, length: float) -> tuple[Layout, tuple[float, float]]:
-    """A room of one metre a unit round a sign, and the size of a car in it."""
+    """Return a layout round a symbol with one metre per unit, and the size of a car in it."""
     return replace(layout, centre=(at[0], at[1]), scale=layout.unit), (length, 0.48 * length)
 
 

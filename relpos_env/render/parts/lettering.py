@@ -1,4 +1,4 @@
-"""Text on the picture."""
+"""Text on the image."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ if TYPE_CHECKING:
     import pygame
 
 _KEPT = 512
-"""Texts that are kept drawn; then all are forgotten, since most were times long past."""
+"""Size of the cache of rendered texts; a full cache is cleared, as most texts are past times."""
 
 
 def _font_file(name: str) -> str | None:
-    """A font of matplotlib's, which is the same on every machine; found without importing it."""
+    """Return a font file of matplotlib, equal on every machine, without importing matplotlib."""
     spec = find_spec("matplotlib")
     for folder in (spec.submodule_search_locations or []) if spec else []:
         path = Path(folder) / "mpl-data" / "fonts" / "ttf" / name
@@ -27,7 +27,7 @@ def _font_file(name: str) -> str | None:
 
 
 class Lettering:
-    """Writes on surfaces in one typeface, in pixels of the picture."""
+    """Text on surfaces in one typeface, in pixels of the image."""
 
     def __init__(self) -> None:
         self._pg = load_pygame()
@@ -52,15 +52,15 @@ class Lettering:
         """Write one line.
 
         Args:
-            picture: What is written on.
-            text: The line.
-            at: Where its anchor comes to lie [pixels].
+            picture: Surface to write on.
+            text: Text of the line.
+            at: Position of the anchor [pixels].
             size: Height of the font [pixels].
-            colour: Of the letters.
-            bold: In bold letters.
-            anchor: The point of the text that is held, as shares of its width and height.
-            most: Shorten the text to this width [pixels].
-            rim: Colour of a thin rim round the letters, to be read on anything.
+            colour: Colour of the letters.
+            bold: True for bold letters.
+            anchor: Reference point of the text, as fractions of its width and height.
+            most: Maximum width; longer text is shortened [pixels].
+            rim: Colour of a thin rim round the letters, for contrast on any background.
         """
         drawn = self._drawn(text, max(8, round(size)), colour, bold)
         while most is not None and drawn.get_width() > most and len(text) > 2:
@@ -75,7 +75,7 @@ class Lettering:
         picture.blit(drawn, (x, y))
 
     def width(self, text: str, size: float, *, bold: bool = False) -> int:
-        """Width of one line [pixels]."""
+        """Return the width of one line [pixels]."""
         return int(self._font(max(8, round(size)), bold).size(text)[0])
 
     def _drawn(self, text: str, size: int, colour: Colour, bold: bool) -> pygame.Surface:

@@ -1,4 +1,4 @@
-"""Links between the cars: who hears whom, and whether they see each other."""
+"""Radio links between the cars: line of sight, NLOS, or no recent range."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ STYLES: dict[int, Style] = {
 
 
 def draw_links(canvas: Canvas, layout: Layout, snapshot: Snapshot) -> None:
-    """A line for every pair of which both cars are present."""
+    """Draw a line for every pair of present cars."""
     pixels = layout.pixels(snapshot.pose[:, :2])
-    # Among many links those of the viewer stand out, since it is the viewer's estimate they make.
+    # With many links, those of other cars fade, since the viewer's estimates are shown.
     fade = min(max(0.01 * (len(snapshot.links) - 10), 0.0), 0.7)
     for i, j, kind in snapshot.links.tolist():
         if snapshot.present[i] and snapshot.present[j] and kind in STYLES:

@@ -1,8 +1,8 @@
-"""Further obstacles, placed so that cars still fit and can pass.
+"""Sampling of additional obstacles that leave enough space for cars to fit and pass.
 
-An obstacle is left out where none of its tries keeps all of this: it stands in the room, on
-nothing else, off the loop or line that cars start and drive on and away from the gap; it cuts no
-free floor in two; and enough floor is left for a car in every slot.
+An obstacle is in the room, overlaps no other, is clear of the loop or line of the cars and of the
+gap, does not divide the free floor, and leaves enough floor for the maximum number of cars. It
+is left out if no sampled position meets all conditions.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ if TYPE_CHECKING:
     from relpos_env.scenarios.base import Scenario
 
 TRIES = 30
-"""[-] Places tried for every obstacle."""
+"""[-] Maximum number of positions sampled per obstacle."""
 BEFORE_GAP = 1.0
-"""[m] To keep clear around the opening of a gap, so that a car can line up with it."""
+"""[m] Clearance around the opening of a gap, so that a car can line up with it."""
 
 
 def draw_clutter(
     scenario: Scenario, floor: Floor, n_slots: int, rng: np.random.Generator
 ) -> tuple[Obstacle, ...]:
-    """Draw the further obstacles of an episode and put them on the floor.
+    """Sample the additional obstacles of an episode and add them to the floor.
 
     Args:
-        scenario: Where, and how many of what size.
-        floor: Of the room with its fixed obstacles; the new ones are added to it.
-        n_slots: Cars that must still fit.
-        rng: For everything.
+        scenario: Scenario with the room, and the number and size of obstacles.
+        floor: Floor of the room with its fixed obstacles; the new ones are added.
+        n_slots: Number of cars that must still fit.
+        rng: Generator of the obstacles.
     """
     what = scenario.randomisation
     placed: list[Obstacle] = []
@@ -56,7 +56,7 @@ def draw_clutter(
 
 
 def _stands_well(scenario: Scenario, placed: tuple[Obstacle, ...], row: F64) -> bool:
-    """In the room, on nothing else, off the start and off the gap."""
+    """Return whether a box is in the room and clear of obstacles, initial poses and the gap."""
     others = boxes_of(scenario.obstacles + placed)
     if beyond_walls(row, scenario.room)[0] or overlap(row, others).any():
         return False
@@ -70,7 +70,7 @@ def _stands_well(scenario: Scenario, placed: tuple[Obstacle, ...], row: F64) -> 
 
 
 def _leaves_ways(scenario: Scenario, floor: Floor, n_slots: int, box: F64) -> bool:
-    """No floor cut in two, and enough of it."""
+    """Return whether a box leaves the floor connected and large enough."""
     before, _, _ = floor.patches(floor.clearance)
     after, _, size = floor.patches(floor.with_box(box), scenario.start_area)
     return after <= before and floor.room_for(size) >= n_slots

@@ -1,7 +1,7 @@
-"""The free floor of a room on a grid: where cars fit whatever their heading, and can pass.
+"""Free floor of a room on a grid: positions where cars fit at any heading.
 
-A cell is free if its centre is farther than `berth` from walls and boxes. Cells that touch are
-connected, so cars can get from any free cell of a patch to any other one.
+A cell is free if its centre is at least `berth` from walls and boxes. Adjacent free cells form
+patches, in which cars can drive from any cell to any other.
 """
 
 from __future__ import annotations
@@ -16,70 +16,70 @@ from relpos_env.world.car import CarParams
 from tracking.arrays import F64, Bool
 
 CELL = 0.1
-"""[m] Side of a cell, larger in rooms of more than `MOST_CELLS`."""
+"""[m] Side of a cell, larger in rooms that would have more than `MOST_CELLS`."""
 MOST_CELLS = 10_000
 MARGIN = 0.1
-"""[m] Room to leave between a car and what stands next to it, on every side."""
+"""[m] Clearance of a car on every side."""
 FLOOR_PER_CAR = 1.9
-"""[spacing^2] Free floor that each car needs to find a random place: discs thrown at random jam
-when they cover 0.547 of the floor (Feder, J. Theor. Biol. 87, 1980); these cover 0.41."""
+"""[spacing^2] Free floor per car for random placement: random sequential addition of discs jams
+at a coverage of 0.547 (Feder, J. Theor. Biol. 87, 1980); here it is 0.41."""
 
 Area = tuple[float, float, float, float]
-"""x from, y from, x to, y to [m]."""
+"""Minimum x, minimum y, maximum x, maximum y [m]."""
 
 
 def berth(car: CarParams) -> float:
-    """Half the width that a car needs to stand, turn and pass [m]."""
+    """Return half the width that a car needs to rotate and pass [m]."""
     return 0.5 * math.hypot(car.length, car.width) + MARGIN
 
 
 def spacing(car: CarParams) -> float:
-    """Least distance between the centres of two cars that stand in any heading [m]."""
+    """Return the minimum distance between the centres of two cars at any heading [m]."""
     return math.hypot(car.length, car.width) + MARGIN
 
 
 class Floor:
-    """The floor of a room with boxes on it."""
+    """Floor of a room with boxes."""
 
     def __init__(self, room: tuple[float, float], car: CarParams, boxes: F64) -> None:
-        """Measure the room out.
+        """Compute the grid and its clearance.
 
         Args:
-            room: Along x and y [m].
-            car: That is to fit.
-            boxes: What stands in it, (box, 6).
+            room: Size along x and y [m].
+            car: Parameters with the size of the cars.
+            boxes: Boxes in the room, (box, 6).
         """
         self.cell = max(CELL, math.sqrt(room[0] * room[1] / MOST_CELLS))
-        # Between the centres of two coarse cells less is free than at them.
+        # Between the centres of two coarse cells the clearance is smaller than at them.
         self._berth = berth(car) + 0.5 * (self.cell - CELL)
         self._spacing = spacing(car)
         x, y = (self._axis(side) for side in room)
         self.centres: F64 = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
-        """Of the cells, (i, j, 2) [m]."""
+        """Centres of the cells, (i, j, 2) [m]."""
         walls = 0.5 * np.array(room) - np.abs(self.centres)
         self.clearance: F64 = walls.min(axis=-1)
-        """From the centre of a cell to the next wall or box, (i, j) [m]."""
+        """Distance of each cell's centre from the nearest wall or box, (i, j) [m]."""
         for box in boxes:
             self.add(box)
 
     def add(self, box: F64) -> None:
-        """Put another box down, (6)."""
+        """Add a box, (6)."""
         self.clearance = self.with_box(box)
 
     def with_box(self, box: F64) -> F64:
-        """What `clearance` would be with another box."""
+        """Return `clearance` with another box, without adding it."""
         return np.minimum(self.clearance, distance(self.centres, box))
 
     def patches(self, clearance: F64, area: Area | None = None) -> tuple[int, Bool, float]:
-        """The free floor in connected patches.
+        """Divide the free floor into connected patches.
 
         Args:
-            clearance: Of every cell, (i, j) [m].
-            area: Only the floor in it counts for size; None is all.
+            clearance: Clearance of every cell, (i, j) [m].
+            area: Area in which the size of patches is measured; None is the whole room.
 
         Returns:
-            Number of patches of the whole floor; the cells in the area of the one with most
-            floor there, (i, j); and their size [m2].
+            Number of patches of the whole floor; mask of the cells in the area of the largest
+            patch there, (i, j); and their size [m2].
         """
         labels, n = ndimage.label(clearance >= self._berth)
         inside = np.ones(labels.shape, dtype=bool) if area is None else self._within(area)
@@ -89,20 +89,20 @@ class Floor:
         return n, largest, float(largest.sum()) * self.cell**2
 
     def room_for(self, size: float) -> int:
-        """Cars that find random places on so much free floor [m2]."""
+        """Return the number of cars that fit at random on a free floor of a size [m2]."""
         return int(size / (FLOOR_PER_CAR * self._spacing**2))
 
     def scatter(self, n: int, area: Area | None, taken: F64, rng: np.random.Generator) -> F64:
-        """Random poses apart from each other, from walls, boxes and places already taken.
+        """Sample random poses clear of each other, of walls, boxes and given positions.
 
         Args:
-            n: How many are wanted.
-            area: In which; None is the whole room.
-            taken: (place, 2) [m].
-            rng: For places and headings.
+            n: Number of poses.
+            area: Area of the poses; None is the whole room.
+            taken: Positions to keep clear of, (position, 2) [m].
+            rng: Generator of positions and headings.
 
         Returns:
-            x, y, heading, (pose, 3) [m, m, rad]; fewer than `n` where no more fit.
+            x, y, heading, (pose, 3) [m, m, rad]; fewer than `n` if no more fit.
         """
         _, free, _ = self.patches(self.clearance, area)
         cells = self.centres[free]

@@ -1,4 +1,4 @@
-"""Floor plans: walls from a table of their ends."""
+"""Floor plans: walls from a table of their end points."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from relpos_env.errors import EnvError
 from relpos_env.scenarios.rooms.obstacle import Obstacle
 
 COLUMNS = ("x1", "y1", "x2", "y2", "thickness")
-"""[m] Ends of the middle line of a wall, from the centre of the room."""
+"""[m] End points of the centre line of a wall, from the centre of the room, and thickness."""
 
 
 def read_floor_plan(path: str | Path) -> tuple[Obstacle, ...]:
-    """Read walls from a CSV file with a line for each.
+    """Read walls from a CSV file with one wall per line.
 
     Args:
-        path: Its first line names `COLUMNS`.
+        path: CSV file whose first line is `COLUMNS`.
 
     Returns:
-        Walls, as boxes that cannot be pushed.
+        Walls, as boxes that are not movable.
 
     Raises:
-        EnvError: No such file, or a line that is no wall; names the file and the line.
+        EnvError: No such file, or an invalid line; names the file and the line.
     """
     path = Path(path)
     if path.exists() and not path.is_file():
@@ -46,10 +46,10 @@ def read_floor_plan(path: str | Path) -> tuple[Obstacle, ...]:
 
 
 def _wall(row: list[str]) -> Obstacle:
-    """A line of the table.
+    """Return the wall of a line of the table.
 
     Raises:
-        EnvError: It is no wall.
+        EnvError: The line is invalid.
     """
     try:
         x1, y1, x2, y2, thickness = map(float, row)

@@ -11,18 +11,18 @@ from relpos_env.scenarios.rooms.obstacle import THINNEST, Obstacle
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gap:
-    """Where the gap is, and the wall at both its sides."""
+    """Gap in a wall across the room."""
 
     width: float
-    """[m] Clear between the two ends of the wall."""
+    """[m] Clear width between the two parts of the wall."""
     x: float = 0.0
-    """[m] Middle of the gap."""
+    """[m] x of the middle of the gap."""
     y: float = 0.0
-    """[m]"""
+    """[m] y of the middle of the gap."""
     direction: float = 0.0
-    """[rad] In which the cars are to pass; the wall stands across it."""
+    """[rad] Direction of passage, perpendicular to the wall."""
     thickness: float = 0.15
-    """[m] Of the wall."""
+    """[m] Thickness of the wall."""
 
     def __post_init__(self) -> None:
         if not 0.05 <= self.width <= 100.0:
@@ -34,13 +34,13 @@ class Gap:
             raise EnvError(f"thickness: expected {THINNEST:g} to 10 m, got {self.thickness}")
 
     def wall(self, room: tuple[float, float]) -> tuple[Obstacle, ...]:
-        """Two pieces of wall from the ends of the gap to the walls of the room.
+        """Return the two parts of the wall from the gap to the walls of the room.
 
         Args:
-            room: Along x and y, the origin is its centre [m].
+            room: Size along x and y [m]; the origin is its centre.
 
         Raises:
-            EnvError: The gap lies outside of the room or leaves nothing of the wall.
+            EnvError: The middle of the gap is outside of the room, or a part would be too short.
         """
         if abs(self.x) >= 0.5 * room[0] or abs(self.y) >= 0.5 * room[1]:
             raise EnvError(
@@ -71,7 +71,7 @@ class Gap:
 
 
 def _to_wall(x: float, y: float, c: float, s: float, room: tuple[float, float]) -> float:
-    """How far it is from a point in the room to its walls in a direction [m]."""
+    """Return the distance from a point in the room to its walls in a direction (c, s) [m]."""
     ways = []
     for at, step, side in ((x, c, room[0]), (y, s, room[1])):
         if abs(step) > 1e-9:

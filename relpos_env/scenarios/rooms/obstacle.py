@@ -1,4 +1,4 @@
-"""A box on the floor: what cars drive round or push, and what hides them from each other."""
+"""Obstacles: boxes on the floor that block cars and the line of sight."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from relpos_env.errors import EnvError
 from tracking.arrays import F64
 
 FARTHEST = 200.0
-"""[m] Nothing stands farther from the middle of a room, nor is longer."""
+"""[m] Maximum coordinates and sides of obstacles."""
 THINNEST = 0.01
-"""[m] Side of a box: thinner ones are driven through between two steps."""
+"""[m] Minimum side of a box: cars could pass through thinner ones between two steps."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,17 +20,17 @@ class Obstacle:
     """A box on the floor, higher than the antennas."""
 
     x: float
-    """[m] Centre."""
+    """[m] x of the centre."""
     y: float
-    """[m]"""
+    """[m] y of the centre."""
     width: float
-    """[m] Along x before turning."""
+    """[m] Side along x before rotation."""
     height: float
-    """[m] Along y before turning."""
+    """[m] Side along y before rotation."""
     angle: float = 0.0
-    """[rad]"""
+    """[rad] Rotation, counter-clockwise."""
     movable: bool = False
-    """Cars can push it; otherwise it stands like a wall."""
+    """True if cars can push the box."""
 
     def __post_init__(self) -> None:
         for name in ("x", "y"):
@@ -45,7 +45,7 @@ class Obstacle:
             raise EnvError(f"angle: expected a finite angle in radians, got {self.angle}")
 
     def corners(self) -> F64:
-        """Corners in order, (4, 2) [m]."""
+        """Return the corners in order, (4, 2) [m]."""
         c, s = np.cos(self.angle), np.sin(self.angle)
         half = 0.5 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * [self.width, self.height]
         corners: F64 = half @ np.array([[c, s], [-s, c]]) + [self.x, self.y]
@@ -53,7 +53,7 @@ class Obstacle:
 
 
 def boxes_of(obstacles: tuple[Obstacle, ...]) -> F64:
-    """Obstacles as numbers, (box, 6): centre x y, half width and depth [m], cosine and sine."""
+    """Return boxes, (box, 6): centre x y, half width and depth [m], cosine and sine."""
     rows = [
         (o.x, o.y, 0.5 * o.width, 0.5 * o.height, np.cos(o.angle), np.sin(o.angle))
         for o in obstacles

@@ -1,4 +1,4 @@
-"""Which boxes overlap, by the separating axis theorem, and how far points are from boxes.
+"""Overlap of boxes by the separating axis theorem, and distances of points from boxes.
 
 A box is a row of six: centre x y, half width, half depth [m], cosine and sine of its angle.
 """
@@ -11,16 +11,16 @@ from relpos_env.world.car import CarParams
 from tracking.arrays import F64, Bool
 
 SKIN = 0.03
-"""[m] Cars are taken as larger all round: the rounded corners of their bodies and of walls."""
+"""[m] Margin on every side of a car: the rounded corners of bodies and of walls."""
 
 
 def car_boxes(poses: F64, car: CarParams, margin: float = SKIN) -> F64:
-    """The floor that cars take, (car, 6).
+    """Return the boxes of cars, (car, 6).
 
     Args:
         poses: x, y, heading, (car, 3) [m, m, rad].
-        car: Their size.
-        margin: Added on every side [m].
+        car: Parameters with the size of the cars.
+        margin: Margin added on every side [m].
     """
     half = np.array([0.5 * car.length + margin, 0.5 * car.width + margin])
     turn = np.stack([np.cos(poses[:, 2]), np.sin(poses[:, 2])], axis=1)
@@ -28,9 +28,9 @@ def car_boxes(poses: F64, car: CarParams, margin: float = SKIN) -> F64:
 
 
 def overlap(a: F64, b: F64) -> Bool:
-    """Which of the boxes (n, 6) overlap which of the boxes (m, 6), (n, m).
+    """Return whether each of the boxes (n, 6) overlaps each of the boxes (m, 6), (n, m).
 
-    Two convex bodies are apart exactly if their shadows on one of their normals are; touching
+    Two boxes are separate if and only if their projections on one of their normals are; touching
     boxes do not overlap.
     """
     apart = np.zeros((len(a), len(b)), dtype=bool)
@@ -47,7 +47,7 @@ def overlap(a: F64, b: F64) -> Bool:
 
 
 def beyond_walls(boxes: F64, room: tuple[float, float]) -> Bool:
-    """Which boxes reach out of a room whose centre is the origin, (box)."""
+    """Return whether boxes extend beyond a room centred at the origin, (box)."""
     c, s = np.abs(boxes[:, 4]), np.abs(boxes[:, 5])
     x = np.abs(boxes[:, 0]) + boxes[:, 2] * c + boxes[:, 3] * s
     y = np.abs(boxes[:, 1]) + boxes[:, 2] * s + boxes[:, 3] * c
@@ -56,7 +56,7 @@ def beyond_walls(boxes: F64, room: tuple[float, float]) -> Bool:
 
 
 def distance(points: F64, box: F64) -> F64:
-    """How far points (..., 2) are from a box (6), 0 inside, (...) [m]."""
+    """Return the distances of points (..., 2) from a box (6), 0 inside, (...) [m]."""
     offset = points - box[:2]
     along = np.abs(box[4] * offset[..., 0] + box[5] * offset[..., 1]) - box[2]
     across = np.abs(-box[5] * offset[..., 0] + box[4] * offset[..., 1]) - box[3]

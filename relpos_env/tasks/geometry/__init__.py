@@ -1,1 +1,1 @@
-"""Shapes, curves, paths, and the assignment of places."""
+"""Shapes, curves, shortest paths, and the assignment of slots."""

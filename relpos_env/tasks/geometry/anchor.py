@@ -1,4 +1,4 @@
-"""Where a formation can stand: no car is asked for a place that an obstacle takes."""
+"""Collision-free placement of a stationary formation among obstacles."""
 
 from __future__ import annotations
 
@@ -8,29 +8,29 @@ from relpos_env.scenarios.rooms.overlap import distance
 from tracking.arrays import F64
 
 CLEAR = 0.3
-"""[m] From a place to the obstacles nearest to it: as from walls, see `moving.MARGIN`."""
+"""[m] Minimum distance of slots from obstacles; equal to `moving.MARGIN`, that from walls."""
 STEP = 0.1
-"""[m] Between the points that are tried."""
+"""[m] Grid spacing of the candidate anchors."""
 
 
 def free_anchor(wanted: F64, half: F64, places: F64, boxes: F64) -> F64:
-    """The point nearest to where a formation is wanted from which all its places are clear.
+    """Return the anchor nearest to a requested one with all slots at least `CLEAR` from boxes.
 
-    Where there is none, the one whose places are clearest.
+    If there is none, return the candidate with the largest clearance.
 
     Args:
-        wanted: Where its middle would be, (2) [m].
-        half: How far from the room's middle it may be, along x and y, (2) [m].
-        places: From its middle, turned as it will stand, (place, 2) [m].
-        boxes: What stands in the room, (box, 6); those of no size are not there.
+        wanted: Requested middle of the formation, (2) [m].
+        half: Maximum distance from the room's middle along x and y, (2) [m].
+        places: Slots relative to the middle, in the world's axes, (slot, 2) [m].
+        boxes: Boxes in the room, (box, 6); boxes of zero size are ignored.
 
     Returns:
-        (2) [m]
+        Anchor, (2) [m].
     """
     boxes = boxes[boxes[:, 2] > 0.0]
     wanted = np.clip(wanted, -half, half)
     if _clearance(wanted[None], places, boxes)[0] >= CLEAR:
-        return wanted  # as nearly always in large rooms, where there is much to try
+        return wanted  # the usual case in large rooms, where the search is slow
     axes = [np.linspace(-h, h, 2 * int(np.ceil(h / STEP)) + 1) for h in half]
     tried = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
     clear = _clearance(tried, places, boxes)
@@ -42,7 +42,7 @@ def free_anchor(wanted: F64, half: F64, places: F64, boxes: F64) -> F64:
 
 
 def _clearance(anchors: F64, places: F64, boxes: F64) -> F64:
-    """How far the place nearest to a box is from it, (anchor) [m]; infinite without boxes."""
+    """Return the smallest distance of slots from boxes, (anchor) [m]; infinite without boxes."""
     clear = np.full(len(anchors), np.inf)
     for box in boxes:
         clear = np.minimum(clear, distance(anchors[:, None] + places, box).min(axis=1))

@@ -1,7 +1,7 @@
-"""Who gets which place: paths that do not cross needlessly.
+"""Assignment of slots to cars.
 
-The places go to cars so that the sum of squared distances is least (Hungarian method). Straight
-paths to places chosen so do not cross, and the choice stays when all places are shifted
+The assignment minimises the sum of squared distances (Hungarian method). Straight paths to the
+assigned slots then do not cross, and the assignment does not change when all slots are shifted
 together [1].
 
 References:
@@ -18,14 +18,14 @@ from tracking.arrays import F64, I64
 
 
 def assign(pos: F64, places: F64) -> I64:
-    """Index of the place for each car.
+    """Return the index of the slot of each car.
 
     Args:
-        pos: Where the cars stand, (car, 2) [m].
-        places: As many places, (place, 2) [m], in the same frame up to a shift.
+        pos: Positions of the cars, (car, 2) [m].
+        places: Slots, as many as cars, (slot, 2) [m], in the same frame up to a shift.
 
     Returns:
-        (car)
+        Index of the slot, (car).
     """
     a, b = pos - pos.mean(axis=0), places - places.mean(axis=0)
     cost = np.sum((a[:, None] - b[None, :]) ** 2, axis=-1)
@@ -34,14 +34,14 @@ def assign(pos: F64, places: F64) -> I64:
 
 
 def assign_round(arc: F64, length: float) -> F64:
-    """Even places on a closed curve, in the order in which the cars stand along it.
+    """Return evenly spaced slots on a closed curve, in the order of the cars along it.
 
     Args:
-        arc: Where the cars stand, (car) [m].
-        length: Of the curve [m].
+        arc: Arc lengths of the cars, (car) [m].
+        length: Length of the curve [m].
 
     Returns:
-        Arc of each car's place, (car) [m], put so that the places are nearest to the cars.
+        Arc length of each car's slot, (car) [m]; the common offset is a circular mean.
     """
     order = np.argsort(np.argsort(np.mod(arc, length), kind="stable"), kind="stable")
     slots = length / len(arc) * order

@@ -1,4 +1,4 @@
-"""Curves to drive along: piecewise cubics over the arc length, from a name or from points."""
+"""Curves as piecewise cubics over the arc length, from a name or from points."""
 
 from __future__ import annotations
 
@@ -15,45 +15,44 @@ from tracking.arrays import F64
 from tracking.params.short_repr import short_repr
 
 KNOT = 0.1
-"""[m] Distance of the knots of the cubics."""
+"""[m] Knot spacing of the cubics."""
 CORNER_RADIUS = 0.7
-"""[m] Of rounded corners, where the legs are long enough: the tightest turn of the car."""
+"""[m] Radius of rounded corners on long segments: the smallest turning radius of the car."""
 TIGHTEST = 0.65
-"""[m] A named curve that would have to turn more tightly than about that has no room."""
+"""[m] Minimum half axis of a loop or radius of an eight; smaller curves raise an error."""
 BEND = 0.6
-"""[-] Radius of a loop's corners over its smaller half axis, but for small ones."""
+"""[-] Corner radius of a loop divided by its smaller half axis; small loops use more."""
 EASE = 0.2
-"""[m] Corners begin and end over about so much arc, since cars cannot turn their wheels at once."""
+"""[m] Std of the Gaussian that smooths corners along the arc, for a finite steering rate."""
 _STEP = 0.01
 
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """A curve whose speed is 1 m per metre of arc, to about a hundredth."""
+    """A curve parametrised by arc length, accurate to about 1 %."""
 
     __repr__ = short_repr
 
     pieces: F64
-    """Coefficients of x and y on equal pieces of arc, falling powers, (segment, 2, 4)."""
+    """Coefficients of x and y on segments of equal arc, falling powers, (segment, 2, 4)."""
     length: float
-    """[m]; 0 for a single point"""
+    """[m] Length; 0 for a single point."""
     closed: bool
 
     @classmethod
     def point(cls) -> Curve:
-        """The origin, for a formation that stays where it is."""
+        """Return the origin, for a stationary formation."""
         return cls(np.zeros((1, 2, 4)), 0.0, True)
 
     @classmethod
     def through(cls, trace: F64, closed: bool, *, eased: bool = True) -> Curve:
-        """The curve along a dense trace.
+        """Return the curve along a dense trace.
 
         Args:
-            trace: Points some centimetres apart, (point, 2) [m]; of a closed one, the last is
-                the first.
-            closed: Whether it goes round.
-            eased: Whether corners are made to begin and end over `EASE`; what is round already
-                would only become smaller.
+            trace: Points some centimetres apart, (point, 2) [m]; the last point of a closed
+                trace equals the first.
+            closed: True for a closed curve.
+            eased: True to smooth corners over `EASE`; a circle would only shrink.
         """
         if eased:
             trace = _eased(trace, closed)
@@ -64,12 +63,12 @@ class Curve:
         if closed:
             at[-1] = at[0]
         spline = CubicSpline(knots, at, bc_type="periodic" if closed else "natural")
-        # scipy has (power, segment, axis).
+        # The scipy layout is (power, segment, axis).
         pieces = np.ascontiguousarray(np.transpose(spline.c, (1, 2, 0)))
         return cls(pieces, float(arc[-1]), closed)
 
     def at(self, s: F64) -> F64:
-        """Points at arcs, (arc, 2) [m]."""
+        """Return the points at given arc lengths, (arc, 2) [m]."""
         s = np.mod(s, self.length) if self.closed else np.clip(s, 0.0, self.length)
         knot = self.length / len(self.pieces)
         k = np.minimum((s / knot).astype(np.int64), len(self.pieces) - 1)
@@ -78,7 +77,7 @@ class Curve:
         return found
 
     def nearest(self, pos: F64) -> F64:
-        """Arcs of the points nearest to positions (..., 2) [m], to a few centimetres, (...) [m]."""
+        """Return the arc lengths of the points nearest to (..., 2) [m], to 1.5 cm, (...) [m]."""
         s = np.arange(0.0, self.length, 0.03)
         away = self.at(s) - pos[..., None, :]
         found: F64 = s[np.argmin((away * away).sum(axis=-1), axis=-1)]
@@ -86,13 +85,13 @@ class Curve:
 
 
 def _arc(trace: F64) -> F64:
-    """Arc from the first point to every point, (point) [m]."""
+    """Return the arc length from the first point to every point, (point) [m]."""
     legs = np.linalg.norm(np.diff(trace, axis=0), axis=1)
     return np.concatenate([[0.0], np.cumsum(legs)])
 
 
 def _eased(trace: F64, closed: bool) -> F64:
-    """The trace with curvature that does not jump: a moving Gaussian mean along the arc."""
+    """Return the trace with continuous curvature: a moving Gaussian mean along the arc."""
     arc = _arc(trace)
     n = max(8, int(np.ceil(arc[-1] / _STEP)))
     step = arc[-1] / n
@@ -104,7 +103,7 @@ def _eased(trace: F64, closed: bool) -> F64:
     if closed:
         before, after = even[-m - 1 : -1], even[1 : m + 1]
     else:
-        # Mirrored through its ends, so that they stay where they are.
+        # Point reflection through the ends keeps the ends fixed.
         before, after = 2.0 * even[0] - even[m:0:-1], 2.0 * even[-1] - even[-2 : -m - 2 : -1]
     wide = np.concatenate([before, even, after])
     eased = [np.convolve(wide[:, k], weight / weight.sum(), mode="valid") for k in range(2)]
@@ -112,14 +111,14 @@ def _eased(trace: F64, closed: bool) -> F64:
 
 
 def loop(half: F64) -> F64:
-    """A rectangle with round corners, counter-clockwise: straight legs and bends in turn."""
+    """Return a rectangle with rounded corners, counter-clockwise."""
     a, b = half
     radius = min(max(BEND * min(a, b), CORNER_RADIUS), a, b)
     return rounded(np.array([[a, -b], [a, b], [-a, b], [-a, -b]]), True, radius)
 
 
 def eight(half: F64) -> F64:
-    """Two circles that touch, gone round in opposite directions, along the longer half axis."""
+    """Return a figure of eight: two touching circles along the longer half axis."""
     lengthwise = half[0] >= half[1]
     radius = min(0.5 * half.max(), half.min())
     u = np.linspace(0.0, 2.0 * np.pi, int(2.0 * np.pi * radius / _STEP))
@@ -129,11 +128,11 @@ def eight(half: F64) -> F64:
 
 
 CURVES = {"loop": loop, "eight": eight}
-"""Name to ``(half axes (2) [m]) -> closed trace``. Adding one: a function and a line here."""
+"""Name to ``(half axes (2) [m]) -> closed trace``. A new curve needs a function and a line here."""
 
 
 def rounded(corners: F64, closed: bool, radius: float = CORNER_RADIUS) -> F64:
-    """A dense trace along straight legs with circular arcs for corners, (point, 2) [m].
+    """Return a dense trace of straight segments with circular corners, (point, 2) [m].
 
     Raises:
         EnvError: Two corners coincide, or the path turns back on itself.
@@ -151,7 +150,7 @@ def rounded(corners: F64, closed: bool, radius: float = CORNER_RADIUS) -> F64:
         turn = np.arctan2(before[0] * after[1] - before[1] * after[0], before @ after)
         if abs(turn) > np.radians(170.0):
             raise EnvError(f"path: turns back on itself at point {k}, expected at most 170 degrees")
-        # Where the arc touches the legs, measured from the corner: at most in their middle.
+        # Distance from the corner to the tangent points, at most half a segment.
         touch = min(radius * np.tan(0.5 * abs(turn)), 0.5 * lengths[k - 1], 0.5 * lengths[k])
         if abs(turn) < 1e-6:
             trace.append(corners[k])
@@ -170,16 +169,16 @@ def rounded(corners: F64, closed: bool, radius: float = CORNER_RADIUS) -> F64:
 def make_curve(
     path: str | Sequence[Sequence[float]] | F64, closed: bool, half: F64, extent: F64
 ) -> Curve:
-    """The curve of a `path` option.
+    """Return the curve of a `path` option.
 
     Args:
         path: One of `CURVES`, as large as the room allows, or points [m].
-        closed: Whether a path of points goes round; named ones do.
+        closed: True if a path of points is closed; named paths always are.
         half: Half axes of the room less a margin, (2) [m].
-        extent: What the formation needs round the curve's point, (2) [m].
+        extent: Half extent of the formation about the curve's point, (2) [m].
 
     Raises:
-        EnvError: Unknown name, bad points, or no room for it.
+        EnvError: Unknown name, invalid points, or the path does not fit in the room.
     """
     free = half - extent
     if isinstance(path, str):

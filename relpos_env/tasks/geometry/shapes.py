@@ -1,4 +1,4 @@
-"""Shapes of formations: places for any number of cars, x ahead, y to the left."""
+"""Shapes of formations: slots for any number of cars, x ahead, y to the left."""
 
 from __future__ import annotations
 
@@ -12,27 +12,27 @@ from relpos_env.tasks.options import car_count, points, positive
 from tracking.arrays import F64
 
 MAX_SPACING = 1.0
-"""[m] Spacing of neighbours where the room allows it and the user says nothing."""
+"""[m] Default distance between neighbours, reduced in small rooms."""
 MIN_SPACING = 0.5
-"""[m] A little more than the length of a car."""
+"""[m] Smallest default distance between neighbours: a little more than the length of a car."""
 SHARE = 0.75
-"""[-] Of the space there is, a formation of open spacing takes so much, if it can."""
+"""[-] Share of the free space that a formation with default spacing takes at most, if possible."""
 
 
 def line(n: int) -> F64:
-    """Side by side, from left to right, (place, 2)."""
+    """Return slots side by side, from left to right, (slot, 2)."""
     return np.stack([np.zeros(n), 0.5 * (n - 1) - np.arange(n)], axis=1)
 
 
 def v(n: int) -> F64:
-    """A wedge: one ahead, the others back and out by 45 degrees, left and right in turn."""
+    """Return a wedge: one slot ahead, the others 45 degrees back, alternately left and right."""
     row, side = (np.arange(n) + 1) // 2, np.where(np.arange(n) % 2 == 1, 1.0, -1.0)
     places: F64 = np.sqrt(0.5) * np.stack([-row, side * row], axis=1)
     return places
 
 
 def triangle(n: int) -> F64:
-    """One ahead, two behind, three behind those, on a lattice of equal triangles."""
+    """Return rows of 1, 2, 3, ... slots from front to back on a triangular lattice."""
     places: list[tuple[float, float]] = []
     row = 0
     while len(places) < n:
@@ -43,7 +43,7 @@ def triangle(n: int) -> F64:
 
 
 def ring(n: int) -> F64:
-    """A regular polygon, counter-clockwise, the first ahead."""
+    """Return a regular polygon, counter-clockwise, the first slot ahead."""
     if n == 1:
         return np.zeros((1, 2))
     angle = 2.0 * np.pi * np.arange(n) / n
@@ -52,12 +52,12 @@ def ring(n: int) -> F64:
 
 
 SHAPES: dict[str, Callable[[int], F64]] = {"triangle": triangle, "line": line, "v": v, "ring": ring}
-"""Name to ``(number of cars) -> places, (place, 2)``, neighbours a distance of about 1 apart.
-Adding one: a function and a line here."""
+"""Name to ``(number of cars) -> slots, (slot, 2)``, neighbours a distance of about 1 apart.
+A new shape needs a function and a line here."""
 
 
 class Formation:
-    """A shape of a size: places for any number of present cars."""
+    """A shape with its spacing: slots for any number of present cars."""
 
     def __init__(
         self,
@@ -70,14 +70,14 @@ class Formation:
         """Choose a shape.
 
         Args:
-            shape: One of `SHAPES`, or places (x ahead, y left) [m], one a car.
-            n_cars: Most cars there can be.
-            spacing: Of neighbours [m]; None for what fits, see `fit`. Places given one by one
-                are taken as they are.
-            led: Places count from the first, in place of from their mean.
+            shape: One of `SHAPES`, or slots (x ahead, y left) [m], one per car.
+            n_cars: Maximum number of cars.
+            spacing: Distance between neighbours [m]; None to choose it by `fit`. Ignored for
+                explicit slots.
+            led: True if slots are relative to the first one, else to their mean.
 
         Raises:
-            EnvError: `shape` or `spacing` is not as above.
+            EnvError: `shape` or `spacing` is invalid.
         """
         self._led, self._n_cars = led, car_count(n_cars)
         self._given: F64 | None = None
@@ -92,17 +92,17 @@ class Formation:
             self._given, self._spacing = given, 1.0
 
     def places(self, n: int) -> F64:
-        """Places for so many cars, (place, 2) [m], from their mean or from the first."""
+        """Return the slots for n cars, (slot, 2) [m], relative to their mean or the first."""
         raw = self._given[:n] if self._given is not None else self._make(n)
         middle = raw[0] if self._led else raw.mean(axis=0)
         places: F64 = (raw - middle) * (MAX_SPACING if self._spacing is None else self._spacing)
         return places
 
     def extent(self, heading: float | None) -> F64:
-        """Furthest that any number of cars reaches along x and y from the origin, (2) [m].
+        """Return the largest half extent along x and y for any number of cars, (2) [m].
 
         Args:
-            heading: Direction of the formation [rad]; None if it turns.
+            heading: Heading of the formation [rad]; None if it turns.
         """
         extent = np.zeros(2)
         for n in range(1, self._n_cars + 1):
@@ -116,17 +116,17 @@ class Formation:
         return extent
 
     def fit(self, half: F64, heading: float | None) -> F64:
-        """Choose the spacing if it is open, and hold the formation against the space there is.
+        """Choose the spacing if it is None, and check that the formation fits.
 
         Args:
-            half: Half the space along x and y [m].
+            half: Half of the free space along x and y [m].
             heading: As for `extent`.
 
         Returns:
-            Extent, as of `extent`.
+            Half extent, as from `extent`.
 
         Raises:
-            EnvError: The formation needs more than there is.
+            EnvError: The formation exceeds the free space.
         """
         extent = self.extent(heading)
         share = SHARE * float(np.min(half / np.maximum(extent, 1e-9)))

@@ -1,8 +1,7 @@
-"""How far cars come along the shortest ways to their places, round what stands in the room.
+"""Progress of cars along the shortest paths to their slots, round the boxes of the room.
 
-What a car gains by coming nearer it loses by going away again: it is the change of a potential, by
-which nothing is to be had in circles [1]. It is not discounted, as that theorem asks. To a learner
-who discounts by gamma it is a price of 1 - gamma times the way in every step, besides.
+The progress is the decrease of a potential, so closed loops earn nothing [1]. Unlike in [1] the
+potential is not discounted: with a discount gamma, a step also costs 1 - gamma times the path.
 
 References:
     [1] Ng, Harada and Russell, Policy invariance under reward transformations, ICML (1999).
@@ -17,15 +16,15 @@ from tracking.arrays import F64, I64, Bool
 
 
 class Ways:
-    """Ways in the rooms of a batch, as they are at the beginning of each episode."""
+    """Shortest paths in a batch of rooms, from the boxes at the start of each episode."""
 
     def __init__(self, n_cars: int, n_envs: int, half_room: tuple[float, float]) -> None:
-        """Make the arrays.
+        """Allocate the arrays.
 
         Args:
-            n_cars: Slots for cars.
-            n_envs: Environments.
-            half_room: Half the width and depth of the room [m].
+            n_cars: Maximum number of cars.
+            n_envs: Number of environments.
+            half_room: Half width and half depth of the room [m].
         """
         self._half = half_room
         self._boxes: F64 = np.zeros((n_envs, 0, 6))
@@ -34,10 +33,10 @@ class Ways:
         self._last: F64 = np.zeros((n_envs, n_cars))
         self._make_room(0)
         self.progress: F64 = np.zeros((n_envs, n_cars))
-        """How much nearer each car came between the last two calls of `follow`, (env, car) [m]."""
+        """Decrease of each path length between the last two calls of `follow`, (env, car) [m]."""
 
     def lay(self, env: int, boxes: F64) -> None:
-        """Find the ways in one room, in which no car has a goal yet.
+        """Compute the paths of one room and clear the goals of its cars.
 
         Args:
             env: Environment.
@@ -55,22 +54,22 @@ class Ways:
     def follow(self, pos: F64, present: Bool, goal: F64, start: int, stop: int) -> None:
         """Write `progress` of the environments from start to stop.
 
-        It is 0 where the goal is another than before, and where no way leads to it; where there is
-        none for a while, what came of that while comes after it.
+        Progress is 0 for a new goal, and while no path leads to the goal; the first step with a
+        path again includes the progress of the interval without.
 
         Args:
-            pos: (env, car, 2) [m].
-            present: (env, car).
-            goal: (env, car, 2) [m].
+            pos: Positions, (env, car, 2) [m].
+            present: True where the car is present, (env, car).
+            goal: Goal positions, (env, car, 2) [m].
             start: First environment.
-            stop: One behind the last.
+            stop: One past the last environment.
         """
         ways = (self._n_corners, self._corner, self._between)
         memory = (self._before, self._onward, self._last)
         follow_ways(start, stop, pos, present, goal, self._boxes, ways, memory, self.progress)
 
     def _make_room(self, n_boxes: int) -> None:
-        """For so many boxes; what is known of other rooms stays."""
+        """Enlarge the arrays for more boxes, keeping the paths of all rooms."""
         n_envs, n_cars = self._last.shape
         more, n = n_boxes - self._boxes.shape[1], 4 * n_boxes
         self._boxes = np.pad(self._boxes, ((0, 0), (0, more), (0, 0)))

@@ -7,12 +7,12 @@ from tracking.kernels.jit import small_kernel
 
 @small_kernel
 def curve_point(curve, length, s):
-    """Where a curve is at an arc, and its first and second derivatives by the arc.
+    """Return the point of a curve at an arc length, and its first and second derivatives.
 
     Args:
         curve: Coefficients of x and y, falling powers, (segment, 2, 4).
-        length: Of the curve [m], more than 0.
-        s: Arc from its beginning [m], 0 to length.
+        length: Length of the curve [m], more than 0.
+        s: Arc length from the beginning [m], 0 to length.
 
     Returns:
         x, y [m], x', y' [-], x'', y'' [1/m].

@@ -1,11 +1,11 @@
-"""Places in a frame that moves along a curve and turns, compiled.
+"""Compiled update of formation slots in a frame that moves along a curve and turns.
 
 The goal of a car and its velocity are
 
     g = a + c(s) + R(psi) o,   s = s0 + v t,   psi = psi0 + w t (+ the curve's direction)
-    g' = v c'(s) + psi' J R(psi) o,   J a quarter turn to the left
+    g' = v c'(s) + psi' J R(psi) o,   J a rotation by 90 degrees to the left
 
-with its place o, the anchor a, and the curve c: a piecewise cubic over its arc length.
+with its slot o, the anchor a, and the curve c: a piecewise cubic over its arc length.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ from tracking.kernels.jit import kernel, small_kernel
 
 @small_kernel
 def frame_state(env, t, frame, curve, motion):
-    """Origin, cosine and sine of the direction, velocity and turning rate of the frame.
+    """Return origin, cosine and sine of the heading, velocity and turning rate of the frame.
 
     Args:
         env: Environment.
-        t: [s]
-        frame: Anchor x, y [m], arc at the start [m], direction at the start [rad], (env, 4).
+        t: Time since the start of the episode [s].
+        frame: Anchor x, y [m], initial arc length [m], initial heading [rad], (env, 4).
         curve: Coefficients of x and y, falling powers, (segment, 2, 4).
         motion: Speed [m/s], rate [rad/s], length of the curve [m], 1 if closed, 1 if the frame
             turns with the curve.
@@ -60,7 +60,7 @@ def frame_state(env, t, frame, curve, motion):
 
 @kernel
 def frame_now(env, t, frame, curve, motion, out):
-    """`frame_state` of one environment into out (7)."""
+    """Write `frame_state` of one environment into out (7)."""
     state = frame_state(env, t, frame, curve, motion)
     for k in range(7):
         out[k] = state[k]
@@ -71,35 +71,35 @@ def update_frame(
     start, stop, pos, vel, accel, clear, present, t, collided, seated, frame, places, curve, motion,
     limits, target, plan, goal, error, rewards, done,
 ):  # fmt: skip
-    """Goals, plan, error, rewards and ending of the environments from start to stop.
+    """Write goals, plan, error, rewards and end of the environments from start to stop.
 
     Args:
         start: First environment.
-        stop: One behind the last.
-        pos: (env, car, 2) [m].
-        vel: (env, car, 2) [m/s].
-        accel: (env, car, 2) [m/s2].
-        clear: Way to what is nearest, (env, car) [m].
-        present: (env, car).
-        t: (env) [s].
-        collided: (env, car).
-        seated: Who has a place, (env, car).
+        stop: One past the last environment.
+        pos: Positions, (env, car, 2) [m].
+        vel: Velocities, (env, car, 2) [m/s].
+        accel: Accelerations, (env, car, 2) [m/s2].
+        clear: Clearance to the nearest object, (env, car) [m].
+        present: True where the car is present, (env, car).
+        t: Time since the start of the episode, (env) [s].
+        collided: Number of contacts begun in the step, (env, car).
+        seated: True where a slot is assigned, (env, car).
         frame: As in `frame_state`.
-        places: Place x, y in the frame [m], and 1 for a car that is told the plan, else 0,
+        places: Slot x, y in the frame [m], and 1 for a car that receives the plan, else 0,
             (env, car, 3).
         curve: As in `frame_state`.
         motion: As in `frame_state`.
-        limits: Lookahead of the plan [s], tolerance at the end [m], scale of the error [m], and
-            of the place of the group [m], 0 for a formation that is led by its velocity.
-        target: (env, car, other, 2) [m], written.
-        plan: (env, car, 2) [m/s], written.
-        goal: (env, car, 2) [m], written.
-        error: (env, car) [m], written.
-        rewards: (env, car, term), written.
-        done: (env), written.
+        limits: Lookahead of the plan [s], tolerance at the end [m], scale of the error [m],
+            scale of the place term [m], 0 for a formation with a velocity term instead.
+        target: Relative targets, (env, car, other, 2) [m], written.
+        plan: Reference velocities, (env, car, 2) [m/s], written.
+        goal: Goal positions, (env, car, 2) [m], written.
+        error: Formation error, (env, car) [m], written.
+        rewards: Reward terms, (env, car, term), written.
+        done: True where the task is done, (env), written.
 
     Returns:
-        How many environments have other cars than were given places; those are left alone.
+        Number of environments whose assignment is out of date; these are not written.
     """
     lookahead, tolerance, error_scale, place_scale = limits
     ends = motion[2] > 0.0 and motion[3] == 0.0
@@ -109,7 +109,7 @@ def update_frame(
             n_changed += 1
             continue
         x, y, c, s, _, _, _ = frame_state(env, t[env], frame, curve, motion)
-        # The plan is that of a little later, which covers the cars' lag.
+        # The plan is ahead by the lookahead, which compensates the lag of the cars.
         ahead = frame_state(env, t[env] + lookahead, frame, curve, motion)
         _, _, c_a, s_a, v_x, v_y, turn = ahead
         for k in range(present.shape[1]):
@@ -123,7 +123,7 @@ def update_frame(
             wanted_x = v_x - turn * (s_a * o_x + c_a * o_y)
             wanted_y = v_y + turn * (c_a * o_x - s_a * o_y)
             plan[env, k, 0], plan[env, k, 1] = told * wanted_x, told * wanted_y
-            # Who is not told is paid for going along all the same.
+            # Cars without the plan have the velocity term too.
             velocity_term(env, k, vel, wanted_x, wanted_y, rewards)
         if place_scale > 0.0:
             place_term(env, pos, present, goal, place_scale, rewards)

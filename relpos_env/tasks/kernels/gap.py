@@ -1,7 +1,7 @@
-"""Cars one behind the other along routes of their own, compiled.
+"""Compiled update of cars in single file along individual routes.
 
-Each car has a polyline from where it stood to its place at the end, and waits until the cars
-before it are under way: its goal is the point of the polyline at max(0, v t - lag).
+The route of a car is a polyline from its initial position to its final slot. The car waits for
+those ahead of it: its goal is the point of the polyline at max(0, v t - lag).
 """
 
 from __future__ import annotations
@@ -27,31 +27,31 @@ def update_gap(
     start, stop, pos, accel, clear, present, t, collided, seated, route, lag, limits, target, plan,
     goal, error, rewards, done,
 ):  # fmt: skip
-    """Goals, plan, error, rewards and ending of the environments from start to stop.
+    """Write goals, plan, error, rewards and end of the environments from start to stop.
 
     Args:
         start: First environment.
-        stop: One behind the last.
-        pos: (env, car, 2) [m].
-        accel: (env, car, 2) [m/s2].
-        clear: Way to what is nearest, (env, car) [m].
-        present: (env, car).
-        t: (env) [s].
-        collided: (env, car).
-        seated: Who has a route, (env, car).
-        route: x, y and arc from the route's start, (env, car, point, 3) [m]; the last point
-            repeated where a route has fewer.
-        lag: Arc by which a car is later than one that leaves at once, (env, car) [m].
+        stop: One past the last environment.
+        pos: Positions, (env, car, 2) [m].
+        accel: Accelerations, (env, car, 2) [m/s2].
+        clear: Clearance to the nearest object, (env, car) [m].
+        present: True where the car is present, (env, car).
+        t: Time since the start of the episode, (env) [s].
+        collided: Number of contacts begun in the step, (env, car).
+        seated: True where the car has a route, (env, car).
+        route: x, y and arc length from the start, (env, car, point, 3) [m]; shorter routes
+            repeat their last point.
+        lag: Arc length by which a car starts late, (env, car) [m].
         limits: Speed [m/s], tolerance at the end [m], scale of the error [m].
-        target: (env, car, other, 2) [m], written.
-        plan: (env, car, 2) [m/s], written.
-        goal: (env, car, 2) [m], written.
-        error: (env, car) [m], written.
-        rewards: (env, car, term), written.
-        done: (env), written.
+        target: Relative targets, (env, car, other, 2) [m], written.
+        plan: Reference velocities, (env, car, 2) [m/s], written.
+        goal: Goal positions, (env, car, 2) [m], written.
+        error: Formation error, (env, car) [m], written.
+        rewards: Reward terms, (env, car, term), written.
+        done: True where the task is done, (env), written.
 
     Returns:
-        How many environments have other cars than were given routes; those are left alone.
+        Number of environments whose assignment is out of date; these are not written.
     """
     speed, tolerance, error_scale = limits
     last = route.shape[2] - 1

@@ -1,7 +1,7 @@
-"""Ways round what stands in a room, and how far cars come along them, compiled.
+"""Compiled shortest paths round boxes, and the progress of cars along them.
 
-A shortest way round boxes bends at their corners only, so it is one through the graph of the
-corners that see each other [1]; here corners stand out by what a car needs to drive round them.
+A shortest path round boxes bends at their corners only, so it is a path in the visibility graph of
+the corners [1]. Corners are offset from the boxes by the space that a car needs.
 
 References:
     [1] Lozano-Perez and Wesley, Commun. ACM 22(10) (1979), 560-570.
@@ -15,22 +15,22 @@ from relpos_env.sensors.radio._occlusion_kernels import crosses_box
 from tracking.kernels.jit import kernel, small_kernel
 
 BERTH = 0.12
-"""[m] A way comes no nearer to a box or a wall, along their sides: half the width of a car, and a
-little. Cars may."""
+"""[m] Minimum distance of paths from boxes and walls along their sides: a little more than half
+the width of a car. Cars may come nearer."""
 CORNER = 0.13
-"""[m] Corners of boxes are passed so far out, along both sides: hardly further, so that a way does
-not become another where it is seen past a corner."""
+"""[m] Offset of path corners from the boxes along both sides. Little more than `BERTH`, so that the
+path length hardly jumps when the goal becomes visible past a corner."""
 HAIR = 1e-9
-"""[m] Who stands as near to a box as a line may pass does not cross it."""
+"""[m] Tolerance that keeps a line that starts at the permitted distance from crossing the box."""
 
 
 @small_kernel
 def crosses(x_a, y_a, x_b, y_b, boxes):
-    """True if the line from a to b comes nearer than `BERTH` to a box, or than a or b is to it."""
+    """True if the line from a to b comes nearer to a box than `BERTH` and than both a and b."""
     for k in range(boxes.shape[0]):
         if boxes[k, 2] == 0.0:
             continue
-        # Who stands at a box may leave it: with a smaller berth there, not all at once with none.
+        # A car close to a box may leave it: the berth shrinks to the distance of the car.
         berth = min(gap(x_a, y_a, boxes[k]), gap(x_b, y_b, boxes[k]), BERTH)
         if crosses_box(x_a, y_a, x_b, y_b, boxes[k], max(berth, 0.0) - HAIR):
             return True
@@ -39,24 +39,24 @@ def crosses(x_a, y_a, x_b, y_b, boxes):
 
 @small_kernel
 def gap(x, y, box):
-    """How far a point is from a box, along that of its sides where it is further [m]."""
+    """Return the signed Chebyshev distance of a point from a box, in the box's axes [m]."""
     d_x, d_y, c, s = x - box[0], y - box[1], box[4], box[5]
     return max(abs(c * d_x + s * d_y) - box[2], abs(c * d_y - s * d_x) - box[3])
 
 
 @kernel
 def lay_ways(boxes, half_x, half_y, corner, between):
-    """Corners at which a car can be, and the shortest ways between them.
+    """Compute the reachable corners and the shortest paths between them.
 
     Args:
         boxes: Centre, half width and depth [m], cosine, sine, (box, 6).
-        half_x: Half the width of the room [m].
-        half_y: Half its depth [m].
-        corner: (corner, 2) [m], written.
-        between: (corner, corner) [m], written; infinite where there is no way.
+        half_x: Half width of the room [m].
+        half_y: Half depth of the room [m].
+        corner: Corners, (corner, 2) [m], written.
+        between: Path lengths, (corner, corner) [m], written; infinite where there is no path.
 
     Returns:
-        How many corners there are.
+        Number of corners.
     """
     n = 0
     for k in range(boxes.shape[0]):
@@ -87,7 +87,7 @@ def lay_ways(boxes, half_x, half_y, corner, between):
 
 @small_kernel
 def is_taken(x, y, boxes):
-    """True if a point is nearer than `BERTH` to a box, along its sides."""
+    """True if the distance of a point from a box, see `gap`, is less than `BERTH`."""
     n_near = 0
     for k in range(boxes.shape[0]):
         n_near += boxes[k, 2] > 0.0 and gap(x, y, boxes[k]) < BERTH
@@ -96,20 +96,20 @@ def is_taken(x, y, boxes):
 
 @kernel
 def follow_ways(start, stop, pos, present, goal, boxes, graph, memory, progress):
-    """How much nearer every car has come to its goal, along the shortest way there.
+    """Compute the decrease of every car's shortest path to its goal.
 
     Args:
         start: First environment.
-        stop: One behind the last.
-        pos: (env, car, 2) [m].
-        present: (env, car).
-        goal: (env, car, 2) [m].
-        boxes: (env, box, 6).
-        graph: How many corners, (env); corners, (env, corner, 2) [m]; ways between them,
-            (env, corner, corner) [m].
-        memory: Goals before, (env, car, 2) [m], NaN for none; ways to them from each corner,
-            (env, car, corner) [m], and from the car, (env, car) [m]; updated.
-        progress: (env, car) [m], written; 0 of a car whose goal is new or cannot be reached.
+        stop: One past the last environment.
+        pos: Positions, (env, car, 2) [m].
+        present: True where the car is present, (env, car).
+        goal: Goal positions, (env, car, 2) [m].
+        boxes: Boxes as in `lay_ways`, (env, box, 6).
+        graph: Number of corners, (env); corners, (env, corner, 2) [m]; path lengths between
+            them, (env, corner, corner) [m].
+        memory: Previous goals, (env, car, 2) [m], NaN for none; path lengths to them from each
+            corner, (env, car, corner) [m], and from the car, (env, car) [m]; updated.
+        progress: Progress, (env, car) [m], written; 0 if the goal is new or unreachable.
     """
     n_corners, corner, between = graph
     before, onward, last = memory
@@ -135,8 +135,7 @@ def follow_ways(start, stop, pos, present, goal, boxes, graph, memory, progress)
                     if whole < way and not crosses(x, y, u, v, here):
                         way = whole
             if way == math.inf:
-                # From a niche that no way leads out of it is as far as it was before; a car that
-                # begins in one has no way yet.
+                # Without a path the last length is kept; a new goal without one stays new.
                 if is_new:
                     before[e, k, 0] = math.nan
                 continue
@@ -147,7 +146,7 @@ def follow_ways(start, stop, pos, present, goal, boxes, graph, memory, progress)
 
 @small_kernel
 def ways_to(x, y, boxes, n, corner, between, onward):
-    """Shortest ways from each of n corners to a point, into onward (corner) [m]."""
+    """Write the shortest path lengths from n corners to a point into onward (corner) [m]."""
     for i in range(n):
         onward[i] = math.inf
     for j in range(n):

@@ -1,4 +1,4 @@
-"""A meeting without given places, compiled."""
+"""Compiled update of the `rendezvous` task."""
 
 from __future__ import annotations
 
@@ -16,31 +16,31 @@ def update_meeting(
     start, stop, pos, vel, accel, clear, present, t, collided, seated, place, since, limits, goal,
     error, rewards, done,
 ):  # fmt: skip
-    """Goals, error, rewards and ending of the environments from start to stop.
+    """Write goals, error, rewards and end of the environments from start to stop.
 
     The plan and the targets stay 0.
 
     Args:
         start: First environment.
-        stop: One behind the last.
-        pos: (env, car, 2) [m].
-        vel: (env, car, 2) [m/s].
-        accel: (env, car, 2) [m/s2].
-        clear: Way to what is nearest, (env, car) [m].
-        present: (env, car).
-        t: (env) [s].
-        collided: (env, car).
-        seated: Who counted before, (env, car).
-        place: Where to meet, (env, 2) [m].
-        since: When all had come together, infinite while they have not, (env) [s], updated.
-        limits: Radius [m], how long to stay [s], scale of the error [m].
-        goal: (env, car, 2) [m], written.
-        error: Distance from the middle of the group beyond the radius, (env, car) [m], written.
-        rewards: (env, car, term), written.
-        done: (env), written.
+        stop: One past the last environment.
+        pos: Positions, (env, car, 2) [m].
+        vel: Velocities, (env, car, 2) [m/s].
+        accel: Accelerations, (env, car, 2) [m/s2].
+        clear: Clearance to the nearest object, (env, car) [m].
+        present: True where the car is present, (env, car).
+        t: Time since the start of the episode, (env) [s].
+        collided: Number of contacts begun in the step, (env, car).
+        seated: Cars present at the last assignment, (env, car).
+        place: Meeting point, (env, 2) [m].
+        since: Time since which all are within the radius, else infinite, (env) [s], updated.
+        limits: Radius [m], time to stay [s], scale of the error [m].
+        goal: Goal positions, (env, car, 2) [m], written.
+        error: Distance from the group's mean position beyond the radius, (env, car) [m], written.
+        rewards: Reward terms, (env, car, term), written.
+        done: True where the task is done, (env), written.
 
     Returns:
-        How many environments have other cars than before; those are left alone.
+        Number of environments whose set of cars has changed; these are not written.
     """
     radius, stay, error_scale = limits
     n = present.shape[1]

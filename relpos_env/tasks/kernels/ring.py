@@ -1,7 +1,7 @@
-"""Places on a closed curve that all go round it, compiled.
+"""Compiled update of slots that move along a closed curve.
 
 The goal of a car and its velocity are ``g = c(s)``, ``g' = v c'(s)`` with ``s = s0 + v t``: the
-curve c over its arc length, and an arc s0 of its own for every car.
+curve c over its arc length, and the initial arc length s0 of the car.
 """
 
 from __future__ import annotations
@@ -24,31 +24,31 @@ def update_ring(
     start, stop, pos, vel, accel, clear, present, t, collided, seated, arc, curve, motion, target,
     plan, goal, error, rewards,
 ):  # fmt: skip
-    """Goals, plan, error and rewards of the environments from start to stop.
+    """Write goals, plan, error and rewards of the environments from start to stop.
 
     Args:
         start: First environment.
-        stop: One behind the last.
-        pos: (env, car, 2) [m].
-        vel: (env, car, 2) [m/s].
-        accel: (env, car, 2) [m/s2].
-        clear: Way to what is nearest, (env, car) [m].
-        present: (env, car).
-        t: (env) [s].
-        collided: (env, car).
-        seated: Who has a place, (env, car).
-        arc: Of each car's place at t = 0, (env, car) [m].
+        stop: One past the last environment.
+        pos: Positions, (env, car, 2) [m].
+        vel: Velocities, (env, car, 2) [m/s].
+        accel: Accelerations, (env, car, 2) [m/s2].
+        clear: Clearance to the nearest object, (env, car) [m].
+        present: True where the car is present, (env, car).
+        t: Time since the start of the episode, (env) [s].
+        collided: Number of contacts begun in the step, (env, car).
+        seated: True where a slot is assigned, (env, car).
+        arc: Arc length of each car's slot at t = 0, (env, car) [m].
         curve: Coefficients of x and y, falling powers, (segment, 2, 4).
         motion: Length of the curve [m], speed [m/s], lookahead of the plan [s], scale of the
             error [m].
-        target: (env, car, other, 2) [m], written.
-        plan: (env, car, 2) [m/s], written.
-        goal: (env, car, 2) [m], written.
-        error: (env, car) [m], written.
-        rewards: (env, car, term), written.
+        target: Relative targets, (env, car, other, 2) [m], written.
+        plan: Reference velocities, (env, car, 2) [m/s], written.
+        goal: Goal positions, (env, car, 2) [m], written.
+        error: Formation error, (env, car) [m], written.
+        rewards: Reward terms, (env, car, term), written.
 
     Returns:
-        How many environments have other cars than were given places; those are left alone.
+        Number of environments whose assignment is out of date; these are not written.
     """
     length, speed, lookahead, error_scale = motion
     n_changed = 0
@@ -64,7 +64,7 @@ def update_ring(
             s = arc[env, k] + speed * t[env]
             x, y, _, _, _, _ = curve_point(curve, length, s - length * math.floor(s / length))
             goal[env, k, 0], goal[env, k, 1] = x, y
-            # The plan is that of a little later, which covers the cars' lag.
+            # The plan is ahead by the lookahead, which compensates the lag of the cars.
             s += speed * lookahead
             point = curve_point(curve, length, s - length * math.floor(s / length))
             plan[env, k, 0], plan[env, k, 1] = speed * point[2], speed * point[3]

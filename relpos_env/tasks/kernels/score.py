@@ -1,4 +1,4 @@
-"""What all tasks have in common, compiled: targets from goals, formation error, reward terms."""
+"""Compiled parts common to all tasks: targets from goals, formation error, reward terms."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ import math
 from tracking.kernels.jit import small_kernel
 
 HARD_ACCEL = 5.0
-"""[m/s2] Acceleration whose effort is 1; harder counts no more."""
+"""[m/s2] Acceleration at which the effort term saturates at -1."""
 TIME = 5
-"""Number of the term that tasks with an end have."""
+"""Index of the time term of tasks with an end."""
 NEAR = 0.15
-"""[m] Way to what is nearest below which nearness counts."""
+"""[m] Clearance below which the nearness term is not 0."""
 FAR = 4.0
-"""[-] Half of the formation term falls off over so many times the scale: there is something to be
-had by coming nearer even where a car is metres from its place."""
+"""[-] Scale ratio of the two halves of the formation term: the wide half still has a gradient
+metres away from the slot."""
 VELOCITY_SCALE = 0.5
-"""[m/s] Difference from the planned velocity at which the velocity term is exp(-1)."""
+"""[m/s] Deviation from the reference velocity at which the velocity term is exp(-1)."""
 
 
 @small_kernel
 def changed(env, present, seated):
-    """True if other cars are in the room than the places were given to."""
+    """True if the set of present cars differs from the set that slots were assigned to."""
     n_other = 0
     for k in range(present.shape[1]):
         n_other += present[env, k] != seated[env, k]
@@ -30,13 +30,13 @@ def changed(env, present, seated):
 
 @small_kernel
 def targets_from_goals(env, present, goal, target):
-    """Wanted relative positions of one environment, antisymmetric to the last bit.
+    """Write the relative targets of one environment, antisymmetric to the last bit.
 
     Args:
         env: Environment.
-        present: (env, car).
-        goal: Place of each car in the room, (env, car, 2) [m].
-        target: (env, car, other, 2) [m], written; 0 where either is absent.
+        present: True where the car is present, (env, car).
+        goal: Goal positions in the room, (env, car, 2) [m].
+        target: Relative targets, (env, car, other, 2) [m], written; 0 where either is absent.
     """
     n = present.shape[1]
     for i in range(n):
@@ -51,7 +51,7 @@ def targets_from_goals(env, present, goal, target):
 
 @small_kernel
 def formation_error(env, pos, present, target, error):
-    """Distance of the present others from where they should be, mean, into error (env, car) [m]."""
+    """Write the mean distance of other present cars from their targets, error (env, car) [m]."""
     n = present.shape[1]
     others = -1
     for i in range(n):
@@ -74,7 +74,7 @@ def formation_error(env, pos, present, target, error):
 
 @small_kernel
 def all_within(env, pos, present, goal, tolerance):
-    """True if a car is present, and all that are stand within a distance [m] of their goals."""
+    """True if a car is present and all present cars are within a tolerance [m] of their goals."""
     anybody = False
     for k in range(present.shape[1]):
         if present[env, k]:
@@ -87,14 +87,14 @@ def all_within(env, pos, present, goal, tolerance):
 
 @small_kernel
 def velocity_term(env, k, vel, wanted_x, wanted_y, rewards):
-    """The second reward term of cars that follow a plan, of one car and its velocity there."""
+    """Write the second reward term of a car with a reference velocity [m/s]."""
     off = math.hypot(vel[env, k, 0] - wanted_x, vel[env, k, 1] - wanted_y)
     rewards[env, k, 1] = math.exp(-off / VELOCITY_SCALE)
 
 
 @small_kernel
 def place_term(env, pos, present, goal, scale, rewards):
-    """The second reward term of a group that is to stand somewhere, the same for all its cars."""
+    """Write the second reward term of a stationary formation, equal for all cars of the group."""
     x, y, n = 0.0, 0.0, 0
     for k in range(present.shape[1]):
         if present[env, k]:
@@ -108,18 +108,18 @@ def place_term(env, pos, present, goal, scale, rewards):
 
 @small_kernel
 def common_terms(env, accel, clear, present, collided, error, error_scale, rewards):
-    """The reward terms that all tasks have; the second, the task's own, must be there before.
+    """Write the common reward terms; the task-specific second term must be written before.
 
     Args:
         env: Environment.
-        accel: (env, car, 2) [m/s2].
-        clear: Way to what is nearest, (env, car) [m].
-        present: (env, car).
-        collided: Contacts begun, (env, car).
-        error: (env, car) [m].
+        accel: Accelerations, (env, car, 2) [m/s2].
+        clear: Clearance to the nearest object, (env, car) [m].
+        present: True where the car is present, (env, car).
+        collided: Number of contacts begun in the step, (env, car).
+        error: Formation error, (env, car) [m].
         error_scale: Error over which half of the formation term falls off to exp(-1) [m].
-        rewards: (env, car, term), written: formation, (own), collision, effort, nearness; all
-            terms of an absent car are 0.
+        rewards: Reward terms, (env, car, term), written: formation, (task-specific), collision,
+            effort, nearness; all terms of an absent car are 0.
     """
     n_terms = rewards.shape[2]
     for k in range(present.shape[1]):
@@ -138,13 +138,13 @@ def common_terms(env, accel, clear, present, collided, error, error_scale, rewar
 
 @small_kernel
 def time_term(env, present, done, rewards):
-    """The last reward term of tasks with an end: what a step costs until all is done.
+    """Write the last reward term of tasks with an end: -1 per step until the task is done.
 
     Args:
         env: Environment.
-        present: (env, car).
-        done: Whether this environment is through.
-        rewards: (env, car, term), written.
+        present: True where the car is present, (env, car).
+        done: True if the task of this environment is done.
+        rewards: Reward terms, (env, car, term), written.
     """
     for k in range(present.shape[1]):
         if present[env, k]:
