@@ -35,7 +35,7 @@ def draw_car(car: CarParams, what: Randomisation, rng: np.random.Generator) -> C
 
 
 def draw_mounts(n: int, what: Randomisation, rng: np.random.Generator) -> F64:
-    """Sample tracker positions, forward and left of the centre of mass, and antenna height offsets, (car, 3) [m]."""
+    """Sample tracker positions, forward, left and up, (car, 3) [m]; see `Randomisation`."""
     low, high = np.transpose([what.mount_ahead, what.mount_aside])
     in_plane = rng.uniform(low, high, (n, 2))
     return np.column_stack([in_plane, rng.uniform(*what.mount_height, n)])

@@ -53,7 +53,7 @@ class Episode:
     """Events by rising time."""
     car: CarParams
     mounts: F64
-    """Tracker positions, forward and left of the centre of mass, and antenna height offsets, (car, 3) [m]."""
+    """Tracker positions, forward, left and up, (car, 3) [m]; see `Randomisation`."""
     imu: ImuSimParams
     mag: MagSimParams
     odometer: OdometerSimParams

@@ -43,7 +43,7 @@ class Sensors(NamedTuple):
     mast: Array
     """Height of the antenna over the tracker [m], (env)."""
     mount: Array
-    """Tracker ahead and left of the centre of mass, and its antenna above `mast` [m], (env, car, 3)."""
+    """Tracker forward and left of the centre of mass, antenna above `mast`, (env, car, 3) [m]."""
     odometer: Array
     """ODOMETER, (env)."""
     odometer_seed: Array
