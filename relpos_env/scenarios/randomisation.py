@@ -67,8 +67,8 @@ class Randomisation:
     mount_aside: Interval = NONE
     """[m] Distance of each car's tracker left of the centre of mass."""
     mount_height: Interval = NONE
-    """[m] How much higher its antenna is than `RadioSimParams.antenna_height`; the tracker is not
-    told."""
+    """[m] Height of each car's antenna above `RadioSimParams.antenna_height`, unknown to the
+    tracker."""
 
     leave_rate: Interval = NONE
     """[1/min] Rate at which cars leave the room. Two cars always stay."""
