@@ -189,6 +189,10 @@ class Tracker:
         """Mean NIS over all accepted ranges, (env) [-]."""
         return self._filter.mean_nis()
 
+    def range_noise(self) -> F64 | None:
+        """White noise of ranges that `joint` has learned, (env) [m]; None of other filters."""
+        return self._filter.range_noise() if isinstance(self._filter, JointEkf) else None
+
     def n_rejected(self) -> F64:
         """Ranges refused as outliers, (env)."""
         return self._filter.n_rejected()

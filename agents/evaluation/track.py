@@ -17,7 +17,7 @@ from tracking.constellation import Constellation
 from tracking.errors import ConfigError
 from tracking.estimate import Status, TeamEstimate
 from tracking.filters import DEFAULT_FILTER
-from tracking.findings import Finding, examine, find_refused, find_unplaced, refuse_errors
+from tracking.findings import Finding, examine, find_in_estimates, refuse_errors
 from tracking.late_data.horizon import HorizonParams
 from tracking.log import Log, read_log
 from tracking.measurements import MeasurementBlock
@@ -61,6 +61,9 @@ class TrackResult:
     """Ranges that the gate refused."""
     skip: float
     """[s] Time after the first range that is not scored."""
+    range_noise: float | None
+    """[m] White noise of the ranges, given by the log or learned; None for other filters than
+    `joint` and for a smoothed log."""
     realtime_factor: float
     """[-] Duration of the log over the time that tracking took."""
     bound: Bound | None = None
@@ -92,6 +95,7 @@ class TrackResult:
             "pair_rmse": pair_rmse,
             "nees": _number(s.nees),
             "nis": _number(self.nis),
+            "range_noise_m": _number(self.range_noise),
             "realtime_factor": _number(self.realtime_factor),
             "coverage": s.coverage,
             "ok_share": s.ok_share,
@@ -146,8 +150,7 @@ def track_log(
         log, findings = examine(log)
         refuse_errors(findings)
     constellation, block = log.constellation, log.block
-    if log.range_noise is not None:
-        params = with_range_noise(params or TrackerParams(), log.range_noise)
+    params = params_for(log, params or TrackerParams())
     tracker = Tracker(constellation, params, filter=filter)
     first, last = log.t_range
     # From whole multiples, so that large times stay on the grid.
@@ -161,12 +164,14 @@ def track_log(
         if filter != DEFAULT_FILTER:
             raise ConfigError(f"smooth: expected filter '{DEFAULT_FILTER}', got '{filter}'")
         estimate, nis, n_rejected = smooth_whole(constellation, block, t_out, params, progress)
+        noise = None
     else:
         estimate = _in_parts(tracker, block, t_out, smooth is not None, progress)
         nis, n_rejected = float(tracker.mean_nis()[0]), int(tracker.n_rejected()[0])
+        noise = tracker.range_noise()
     elapsed = time.perf_counter() - started
 
-    found = (*findings, *find_unplaced(log, estimate), *find_refused(log, n_rejected))
+    found = (*findings, *find_in_estimates(log, estimate, n_rejected))
     truth, has_truth = log.truth.pairs(constellation, t_out)
     at_truth = np.isin(t_out, t_truth)
     on_grid = np.isin(t_out, grid)
@@ -182,20 +187,27 @@ def track_log(
         nis=nis,
         n_rejected=n_rejected,
         skip=skip,
+        range_noise=None if noise is None else float(noise[0]),
         realtime_factor=log.duration / max(elapsed, 1e-9),
         bound=bound,
         findings=found,
     )
 
 
-def with_range_noise(params: TrackerParams, noise: float) -> TrackerParams:
-    """Return parameters whose `joint` assumes a white noise of ranges [m] and does not learn it."""
+def params_for(log: Log, params: TrackerParams) -> TrackerParams:
+    """Return parameters whose `joint` takes the range noise and the accuracy that a log gives.
+
+    A noise that is given is not learned; an accuracy of the parameters goes first.
+    """
     joint = params.filter.joint
-    joint = replace(
-        joint,
-        range_error=replace(joint.range_error, white_std=noise),
-        noise_learning=replace(joint.noise_learning, learns=False),
-    )
+    if log.range_noise is not None:
+        joint = replace(
+            joint,
+            range_error=replace(joint.range_error, white_std=log.range_noise),
+            noise_learning=replace(joint.noise_learning, learns=False),
+        )
+    if joint.accuracy is None:
+        joint = replace(joint, accuracy=log.accuracy)
     return replace(params, filter=replace(params.filter, joint=joint))
 
 

@@ -21,6 +21,7 @@ from relpos_env.tasks import TASKS, make_task
 from tracking.constellation import Constellation
 from tracking.errors import ConfigError
 from tracking.filters import FILTERS, filter_builder
+from tracking.log.meta import LEAST_ACCURACY, MOST_ACCURACY
 from tracking.params.tables import TableReader, Where
 
 SECTIONS = (
@@ -173,6 +174,10 @@ def _check(config: SwarmConfig, where: Where, with_files: bool) -> None:
         raise where.key("tracker").error(str(error)) from error
     if not 0.0 <= config.tracker.delay <= 1.0:
         raise where.key("tracker").key("delay").error("expected 0 to 1 s")
+    accuracy = config.tracker.accuracy
+    if accuracy is not None and not LEAST_ACCURACY <= accuracy <= MOST_ACCURACY:
+        message = f"expected {LEAST_ACCURACY:g} to {MOST_ACCURACY:g} m, got {accuracy:g}"
+        raise where.key("tracker").key("accuracy").error(message)
     _check_keys(config, where)
     _check_source(config, where)
     fence, group = config.safety.fence, config.constellation

@@ -80,6 +80,9 @@ class TrackerConfig:
     """One of `tracking.filters.FILTERS`."""
     delay: float = 0.1
     """[s] Measurements wait so long for later ones that were taken before them."""
+    accuracy: float | None = None
+    """[m] Expected error up to which a pair is ok, 0.01 to 10; left out, 0.3 with a car and 0.5
+    without."""
     positions: ReadyParams = ReadyParams()
     """What is believed of ready positions."""
 

@@ -6,6 +6,7 @@ Pure: what a live drive saw is what its recording gives, to the last bit.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -156,7 +157,11 @@ class LiveSwarm:
             return ReadyPerception(
                 group, tracker.positions, told, self._block, self._powered, n_beams
             )
-        params = TrackerParams(filter=FOR_POLICIES, horizon=HorizonParams(delay=tracker.delay))
+        believed = FOR_POLICIES
+        if tracker.accuracy is not None:
+            joint = replace(believed.joint, accuracy=tracker.accuracy)
+            believed = replace(believed, joint=joint)
+        params = TrackerParams(filter=believed, horizon=HorizonParams(delay=tracker.delay))
         return Perception(
             group,
             params,

@@ -11,7 +11,7 @@ from tests.second_world.record import record
 from tests.second_world.world import draw
 from tracking.constellation import NodeConfig
 from tracking.errors import LogError
-from tracking.findings import KINDS, Finding, examine, find_refused, refuse_errors
+from tracking.findings import KINDS, Finding, examine, refuse_errors
 from tracking.findings.at_rest import correct_at_rest, find_in_samples, rest_of
 from tracking.findings.gyroscope import find_gyroscope
 from tracking.measurements import Kind
@@ -281,4 +281,3 @@ def test_ranges_that_the_filter_refuses_are_named(drive):
     refused = track_log(with_samples(drive, Kind.RANGE, scatter), findings=())
     assert [f.name for f in refused.findings] == ["ranges-refused"]
     assert track_log(drive, findings=()).findings == ()
-    assert find_refused(drive, 0) == []

@@ -7,7 +7,7 @@ import pytest
 
 from tests.exact_motion import ExactGroup
 from tracking import Status, Tracker
-from tracking.findings import find_unplaced, find_unused
+from tracking.findings import find_in_estimates, find_unused
 from tracking.log import Log
 from tracking.measurements import Kind
 from tracking.metrics.integrity import wrong_while_ok
@@ -58,7 +58,7 @@ def test_what_was_never_placed_is_told_with_what_it_lacks():
     block = block.take(~few)
     log = Log(name="one-pair", constellation=group.constellation, block=block)
     estimate = Tracker(group.constellation).run(block, np.arange(0.5, 7.9, 0.1)).take(0)
-    (found,) = find_unplaced(log, estimate)
+    (found,) = find_in_estimates(log, estimate, 0)
     assert found.nodes == (13,)
     assert "node 13 was never placed" in found.text
     assert "with 1 nodes" in found.text
@@ -71,3 +71,23 @@ def test_without_any_imu_the_notes_say_what_cannot_be_known():
     log = Log(name="no-imu", constellation=group.constellation, block=block)
     assert [f.name for f in find_unused(log)] == ["no-imu"]
     assert find_unused(replace(log, block=group.block)) == []
+
+
+@pytest.mark.parametrize("across", [0.0, 1.5])
+def test_a_row_of_nodes_at_rest_is_its_own_mirror_image(across):
+    """Four people who stand in a row, or with one of them beside it."""
+    rng, nodes = (
+        np.random.default_rng(2),
+        tuple(NodeConfig(id=k, vehicle="human") for k in range(4)),
+    )
+    where = np.array([[0.0, 0.0], [1.0, 0.01], [2.0, across], [3.5, -0.01]])
+    who = Constellation(nodes=nodes, dimensions=2)
+    rows = [(0.01 * k, *pair) for k in range(1500) for pair in who.pairs[k % 6][None]]
+    t, i, j = np.array(rows).T
+    i, j = i.astype(int), j.astype(int)
+    ranges = np.linalg.norm(where[j] - where[i], axis=1) + 0.03 * rng.standard_normal(len(t))
+    block = MeasurementBlock.of_kind(Kind.RANGE, t, i, ranges[:, None], j=j)
+    log = Log(name="row", constellation=who, block=block)
+    estimate = Tracker(who).run(block, np.arange(1.0, 14.9, 0.1)).take(0)
+    found = [f.name for f in find_in_estimates(log, estimate, 0)]
+    assert found == (["degenerate-layout"] if across == 0.0 else [])

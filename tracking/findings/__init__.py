@@ -10,7 +10,7 @@ from tracking.findings.imu_against_ranges import find_suspects, find_wrong_axes
 from tracking.findings.ranges import find_range_errors
 from tracking.findings.stamps import find_bad_stamps
 from tracking.findings.trials import Progress
-from tracking.findings.use import find_refused, find_unplaced, find_unused
+from tracking.findings.use import find_in_estimates, find_unused
 from tracking.log.folder import Log
 
 
@@ -47,5 +47,5 @@ def _part(progress: Progress, first: float, last: float) -> Progress:
 
 
 __all__ = [
-    "KINDS", "Finding", "examine", "find_refused", "find_unplaced", "find_unused", "refuse_errors",
+    "KINDS", "Finding", "examine", "find_in_estimates", "find_unused", "refuse_errors",
 ]  # fmt: skip

@@ -106,6 +106,11 @@ KINDS: dict[str, Kind] = {
         "the filter refused many ranges as outliers: they are worse than it assumes",
         "look for reflections and calibration; estimates of such a recording are not to be used",
     ),
+    "degenerate-layout": Kind(
+        "note",
+        "a layout near a line (in space: a plane) is its own mirror image, so its side stays open",
+        "place a node off the line, or drive until the group leaves it",
+    ),
     "never-placed": Kind("note", "a node was never placed", "range it with more of the others"),
 }
 """By name. `docs/reference/findings.md` shows it."""

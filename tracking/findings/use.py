@@ -11,6 +11,10 @@ from tracking.findings.finding import Finding, names
 from tracking.log.folder import Log
 from tracking.measurements import Kind
 
+MOST_AMBIGUOUS = 0.5
+"""[-] Share of the time that may be ambiguous without a reason being looked for."""
+FLAT = 0.1
+"""[-] Extent across a layout over that along it, below which it is called a line or a plane."""
 MOST_REFUSED = 0.2
 """[-] Share of ranges; recordings that are tracked have up to 0.02, one that is lost has 0.5."""
 
@@ -42,6 +46,18 @@ def find_unused(log: Log) -> list[Finding]:
             text = f"{names(ids)}: no magnetometer readings, so the IMU is not used"
             found.append(Finding("no-magnetometer", ids, text))
     return found
+
+
+def find_in_estimates(log: Log, estimate: TeamEstimate, n_refused: int) -> list[Finding]:
+    """Find what estimates of a recording lack, and why.
+
+    Args:
+        log: The recording.
+        estimate: Its estimates, arrays over (time, pair).
+        n_refused: Ranges that the filter refused as outliers.
+    """
+    found = [*find_unplaced(log, estimate), *find_degenerate(log, estimate)]
+    return [*found, *find_refused(log, n_refused)]
 
 
 def find_unplaced(log: Log, estimate: TeamEstimate) -> list[Finding]:
@@ -77,6 +93,37 @@ def find_unplaced(log: Log, estimate: TeamEstimate) -> list[Finding]:
         )
         found.append(Finding("never-placed", (constellation.ids[n],), text))
     return found
+
+
+def find_degenerate(log: Log, estimate: TeamEstimate) -> list[Finding]:
+    """Find a layout that stays ambiguous because it is near a line, or in space near a plane.
+
+    Args:
+        log: The recording.
+        estimate: Its estimates, arrays over (time, pair).
+    """
+    constellation = log.constellation
+    d, pairs = constellation.dimensions, constellation.pairs
+    placed = estimate.status >= Status.AMBIGUOUS
+    rows = np.flatnonzero(placed.all(axis=1) & (estimate.status == Status.AMBIGUOUS).any(axis=1))
+    if len(rows) <= MOST_AMBIGUOUS * len(placed):
+        return []
+    to_first = np.flatnonzero(pairs[:, 0] == 0)
+    pos = np.concatenate(
+        [np.zeros((len(rows), 1, 3)), estimate.pos_ij_w[rows][:, to_first]], axis=1
+    )[..., :d]
+    extent = np.linalg.svd(pos - pos.mean(axis=1, keepdims=True), compute_uv=False)
+    extent /= np.sqrt(constellation.n_nodes)
+    least, most = np.median(extent[:, -1]), np.median(extent[:, 0])
+    if least > FLAT * most:
+        return []
+    shape = "a line" if d == 2 else "a plane"
+    text = (
+        f"for {len(rows) / len(placed):.0%} of the time the nodes stay near {shape} ({least:.2f} m "
+        f"across, {most:.2f} m along, standard deviations): it is its own mirror image, so pairs "
+        "are ambiguous until the group leaves it"
+    )
+    return [Finding("degenerate-layout", (), text)]
 
 
 def find_refused(log: Log, n_refused: int) -> list[Finding]:

@@ -39,6 +39,8 @@ class Log:
     range_noise: float | None = None
     """[m] Standard deviation of the white noise of its ranges, where it is known; `joint` then
     does not learn it."""
+    accuracy: float | None = None
+    """[m] Expected error up to which a pair is ok; None takes that of its vehicles."""
     skipped: dict[str, int] = field(default_factory=dict)
     """Bad measurements left out while reading, per file."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +20,8 @@ MOST_DIGITS = 18
 """Of an id."""
 LEAST_NOISE, MOST_NOISE = 1e-3, 10.0
 """[m] White noise of ranges beyond is a mistake of units."""
+LEAST_ACCURACY, MOST_ACCURACY = 0.01, 10.0
+"""[m] Accuracies that can be asked for."""
 MAX_OFFSET = 100.0
 """[m] An antenna farther from its body's origin is a mistake of units."""
 
@@ -33,6 +36,8 @@ class Meta:
     constellation: Constellation
     range_noise: float | None = None
     """[m] As of `Log.range_noise`."""
+    accuracy: float | None = None
+    """[m] As of `Log.accuracy`."""
 
 
 def read_meta(path: Path) -> Meta:
@@ -73,19 +78,53 @@ def read_meta(path: Path) -> Meta:
         source=_text("source", raw.get("source", "")),
         licence=_text("licence", raw.get("licence", "")),
         constellation=constellation,
-        range_noise=_noise(raw.get("range_noise_m")),
+        range_noise=_within("range_noise_m", raw, LEAST_NOISE, MOST_NOISE),
+        accuracy=_within("accuracy_m", raw, LEAST_ACCURACY, MOST_ACCURACY),
     )
 
 
-def _noise(value: Any) -> float | None:
+def write_range_noise(folder: Path | str, noise: float) -> None:
+    """Write `range_noise_m` to the meta.toml of a log, the rest of the file as it was.
+
+    Args:
+        folder: Log folder.
+        noise: White noise of its ranges [m]; rounded to 0.1 mm.
+
+    Raises:
+        LogError: The file cannot be read or written; it is then as it was.
+    """
+    path = Path(folder) / "meta.toml"
+    line = f"range_noise_m = {round(noise, 4)!r}"
+    read_meta(path)
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+        head, rest = _split_tables(text)
+        kept = [row for row in head if not re.match(r"\s*range_noise_m\s*=", row)]
+        while kept and not kept[-1].strip():
+            kept.pop()
+        scratch = path.with_name(f".{path.name}.new")
+        scratch.write_text("\n".join([*kept, line, "", *rest]) + "\n", encoding="utf-8")
+        read_meta(scratch)
+        scratch.replace(path)
+    except OSError as error:
+        raise LogError(f"{path}: cannot be written to ({error.strerror})") from error
+
+
+def _split_tables(text: str) -> tuple[list[str], list[str]]:
+    """Lines before the first table of a TOML text, and from it on."""
+    lines = text.splitlines()
+    first = next((k for k, row in enumerate(lines) if row.lstrip().startswith("[")), len(lines))
+    return lines[:first], lines[first:]
+
+
+def _within(key: str, raw: dict[str, Any], least: float, most: float) -> float | None:
+    value = raw.get(key)
     if value is None:
         return None
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise LogError(f"meta.toml, range_noise_m: expected a number, found {value!r}")
-    if not LEAST_NOISE <= value <= MOST_NOISE:
-        raise LogError(
-            f"meta.toml, range_noise_m: expected {LEAST_NOISE:g} to {MOST_NOISE:g}, found {value!r}"
-        )
+        raise LogError(f"meta.toml, {key}: expected a number, found {value!r}")
+    if not least <= value <= most:
+        raise LogError(f"meta.toml, {key}: expected {least:g} to {most:g}, found {value!r}")
     return float(value)
 
 

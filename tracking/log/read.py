@@ -69,6 +69,7 @@ def read_log(folder: Path | str) -> Log:
         truth=_read_truth(folder, constellation, skipped),
         nlos=nlos,
         range_noise=meta.range_noise,
+        accuracy=meta.accuracy,
         skipped={name: n for name, n in skipped.items() if n},
     )
 

@@ -87,6 +87,8 @@ def _meta(log: Log) -> str:
     ]
     if log.range_noise is not None:
         lines.append(f"range_noise_m = {float(log.range_noise)!r}")
+    if log.accuracy is not None:
+        lines.append(f"accuracy_m = {float(log.accuracy)!r}")
     for node in c.nodes:
         lines += ["", f"[nodes.{node.id}]", f'kind = "{node.kind}"', f'vehicle = "{node.vehicle}"']
         if node.initial_heading is not None:

@@ -51,6 +51,12 @@ if TYPE_CHECKING:
     "car, 0.5 without; joint only.",
 )
 @click.option(
+    "--write-noise",
+    is_flag=True,
+    help="Write the learned noise of ranges to each LOG's meta.toml (range_noise_m), where later "
+    "runs take it as given; joint without --smooth only.",
+)
+@click.option(
     "--no-checks",
     is_flag=True,
     help="Skip the checks of sensors, clocks and ranges.",
@@ -70,6 +76,7 @@ def track(
     smooth: Literal["lag", "all"] | None,
     bound: bool,
     accuracy: float | None,
+    write_noise: bool,
     no_checks: bool,
     skip: float,
     out: Path | None,
@@ -77,28 +84,26 @@ def track(
 ) -> None:
     """Track recorded runs, and score them if they have truth."""
     from agents.evaluation.calibrate import apply_calibrations
-    from agents.evaluation.track import TrackResult, estimates_csv, track_log
-    from agents.output import check_folder, write_results
-    from agents.reports.track_report import track_report
+    from agents.evaluation.track import TrackResult, track_log
+    from agents.output import check_folder
     from agents.warm_up import warm_up_first
     from tracking.filters import DEFAULT_FILTER, filter_builder
     from tracking.filters.joint.params import JointParams
     from tracking.filters.params import FilterParams
     from tracking.findings import refuse_errors
-    from tracking.log import read_log
+    from tracking.log import read_log, write_range_noise
     from tracking.metrics.bound import recorded_bound
     from tracking.tracker import TrackerParams
 
-    if not 0.0 <= skip < float("inf"):
-        raise UsageError(f"--skip: expected 0 or more seconds, got {skip:g}")
-    if accuracy is not None and not 0.01 <= accuracy <= 10.0:
-        raise UsageError(f"--accuracy: expected 0.01 to 10 m, got {accuracy:g}")
+    _check_numbers(skip, accuracy)
     params = TrackerParams(filter=FilterParams(joint=JointParams(accuracy=accuracy)))
     names = tuple(dict.fromkeys(filters)) or (DEFAULT_FILTER,)
     for name in names:
         filter_builder(name)
     if smooth and names != ("joint",):
         raise UsageError(f"--smooth: expected filter joint alone, not {', '.join(names)}")
+    if write_noise and (smooth or DEFAULT_FILTER not in names):
+        raise UsageError("--write-noise: expected filter joint without --smooth")
     if out is not None:
         check_folder(out, ["report.html"])
     read = [apply_calibrations(read_log(path), calibrations) for path in logs]
@@ -127,18 +132,37 @@ def track(
     told = {f"{r.log.name}, {f.severity}: {f.text}": None for r in results for f in r.findings}
     click.echo("\n".join(told), err=True, nl=bool(told))
     if out is not None:
-        many = len(results) > 1
-        files = {"report.html": track_report(results)}
-        for k, r in enumerate(results):
-            folder = f"{k + 1:02d}-{_file_name(r.log.name)}-{r.filter}/" if many else ""
-            files[f"{folder}estimates.csv"] = estimates_csv(r.estimate)
-        write_results(out, files)
+        _write(out, results)
+    if write_noise:
+        learned = [r.range_noise for r in results if r.range_noise is not None]
+        for path, noise in zip(logs, learned, strict=True):
+            write_range_noise(path, noise)
     if as_json:
         emit_json(r.summary for r in results)
         return
     print_tracks(results)
     if out is not None:
         click.echo(f"\nwritten: {out / 'report.html'} and estimates.csv")
+
+
+def _check_numbers(skip: float, accuracy: float | None) -> None:
+    if not 0.0 <= skip < float("inf"):
+        raise UsageError(f"--skip: expected 0 or more seconds, got {skip:g}")
+    if accuracy is not None and not 0.01 <= accuracy <= 10.0:
+        raise UsageError(f"--accuracy: expected 0.01 to 10 m, got {accuracy:g}")
+
+
+def _write(out: Path, results: Sequence[Any]) -> None:
+    from agents.evaluation.track import estimates_csv
+    from agents.output import write_results
+    from agents.reports.track_report import track_report
+
+    many = len(results) > 1
+    files = {"report.html": track_report(results)}
+    for k, r in enumerate(results):
+        folder = f"{k + 1:02d}-{_file_name(r.log.name)}-{r.filter}/" if many else ""
+        files[f"{folder}estimates.csv"] = estimates_csv(r.estimate)
+    write_results(out, files)
 
 
 def print_tracks(results: Sequence[Any]) -> None:

@@ -100,6 +100,11 @@ class JointEkf(BatchedFilter):
         run_to_end(partial(run_events, *arguments), arguments)
         return read_clones(clones, estimate, self._state.x.shape[2])
 
+    def range_noise(self) -> F64:
+        """Standard deviation of the white noise of ranges, given or learned so far, (env) [m]."""
+        std: F64 = np.sqrt(self._state.group["white_var"][:, 0])
+        return std
+
     def fit_sums(self) -> F64:
         """How well ranges fitted so far, (env, 4).
 
