@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tests.exact_motion import ExactGroup
-from tracking import Status, Tracker
+from tracking import Constellation, NodeConfig, Status, Tracker
 from tracking.findings import find_in_estimates, find_unused
 from tracking.log import Log
-from tracking.measurements import Kind
+from tracking.measurements import Kind, MeasurementBlock
 from tracking.metrics.integrity import wrong_while_ok
 
 
@@ -76,10 +76,8 @@ def test_without_any_imu_the_notes_say_what_cannot_be_known():
 @pytest.mark.parametrize("across", [0.0, 1.5])
 def test_a_row_of_nodes_at_rest_is_its_own_mirror_image(across):
     """Four people who stand in a row, or with one of them beside it."""
-    rng, nodes = (
-        np.random.default_rng(2),
-        tuple(NodeConfig(id=k, vehicle="human") for k in range(4)),
-    )
+    rng = np.random.default_rng(2)
+    nodes = tuple(NodeConfig(id=k, vehicle="human") for k in range(4))
     where = np.array([[0.0, 0.0], [1.0, 0.01], [2.0, across], [3.5, -0.01]])
     who = Constellation(nodes=nodes, dimensions=2)
     rows = [(0.01 * k, *pair) for k in range(1500) for pair in who.pairs[k % 6][None]]
