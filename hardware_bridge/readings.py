@@ -18,18 +18,18 @@ class DeviceClock(NamedTuple):
     """A counter of a device."""
 
     hz: float
-    """Ticks per second, nominal."""
+    """[1/s] Nominal tick rate."""
     modulus: int
     """[ticks] The counter wraps to 0 at this value."""
 
 
 MICROSECONDS_32 = DeviceClock(1e6, 1 << 32)
-"""Wraps after 71.6 min."""
+"""Counter that wraps after 71.6 min."""
 MILLISECONDS_32 = DeviceClock(1e3, 1 << 32)
 MICROSECONDS_64 = DeviceClock(1e6, 1 << 64)
-"""Never wraps."""
+"""Counter that never wraps."""
 RADIO_40 = DeviceClock(128 * 499.2e6, 1 << 40)
-"""Time stamps of DW1000 and DW3000; wraps every 17.2 s."""
+"""Counter of time stamps of DW1000 and DW3000; wraps every 17.2 s."""
 
 
 class Source(NamedTuple):
@@ -93,7 +93,7 @@ class MotionReading(NamedTuple):
 
     source: Source
     speed: float
-    """[m/s] Forward, by its wheels or its motor."""
+    """[m/s] Forward speed, by the wheels or the motor."""
     steering: float | None = None
     """[rad] Steering angle of the front wheels, left is positive."""
 

@@ -154,7 +154,7 @@ class DeviceTime:
             return arrival
         self._suspect = None
         if x > self._x and abs(self._line.at(x) - arrival) <= self._step:
-            # The first one was returned as its arrival: no later one is mapped before it.
+            # The suspect stamp was mapped to its arrival: no later one may be mapped before it.
             self._mapped = max(self._accept(unwrapped, x, arrival), suspect[1])
             return self._mapped
         self.steps += 1

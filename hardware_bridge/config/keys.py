@@ -9,7 +9,7 @@ from tracking.constellation import Constellation
 from tracking.params.tables import Where
 
 MOST_ID = 65534
-"""The largest id of our own wire is that of the host."""
+"""[-] Largest id of a node; the largest id of our wire format, 65535, is the host."""
 
 
 def tables_of(raw: Mapping[str, Any], name: str, where: Where) -> list[tuple[str, dict[str, Any]]]:

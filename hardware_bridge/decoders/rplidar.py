@@ -43,7 +43,7 @@ REQUEST = bytes.fromhex("a5f0029402c1 a520")
 
 
 class RplidarDecoder:
-    """The decoder of one port."""
+    """Decoder of one port."""
 
     def __init__(self) -> None:
         self.counts = Counts()

@@ -267,7 +267,7 @@ class Intake:
             values = (reading.distance, powers[0], powers[1])  # type: ignore[assignment]
         self.events.add_range(self.seconds(t_ns), (near, far), antennas, values)
         if stream.name.startswith("links."):
-            self.heard_ns[near] = self.heard_ns[far] = arrival_ns  # it answered
+            self.heard_ns[near] = self.heard_ns[far] = arrival_ns  # the far node answered
         return True
 
     def _note_fault(self, stream: Stream, node: int, fault: int, arrival_ns: int) -> None:
