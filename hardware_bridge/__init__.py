@@ -1,30 +1,30 @@
-"""Streams of real nodes into the tracker, and policies onto real cars.
+"""Connection of the tracker and of policies to real nodes and cars.
 
     nodes -> links -> decoders -> identity, clocks, plausibility -> live -> policy
-    cars  <- links <- drivers  <- safety (a process of its own)  <-
+    cars  <- links <- drivers  <- safety (separate process)      <-
 
 `config`
-    swarm.toml: who is in the group, where bytes come from, what may be done.
+    swarm.toml: the nodes of the group, the ports and the permitted actions.
 `links`
-    Serial ports and TCP: bytes with the time at which they came.
+    Serial ports and TCP connections: bytes with the time of arrival.
 `decoders`, `readings`, `wire`
-    Bytes of devices to what they said, in SI units; the format of our own nodes, and its C header.
+    Bytes of devices to readings in SI units; our own wire format and its C header.
 `identity`, `clocks`, `plausibility`
-    Who said it, when, and whether it can be.
+    The device that sent a reading, the host time of its measurement, and plausibility checks.
 `ingest`, `external_tracker`
-    Readings to measurements of nodes; positions from another tracker.
+    Readings to measurements of nodes; positions from an external tracker.
 `live`
-    Trackers of a swarm, the environment on real cars, the start of a drive.
+    Trackers of a swarm, the environment on real cars, the start-up of a drive.
 `drivers`
-    Speed and steering to bytes of motor controllers.
+    Speed and steering to bytes for motor controllers.
 `safety`
-    The gate that every command passes, and the process that holds the cars.
+    The gate that checks every command, and the process that owns the ports of the cars.
 `recording`, `exports`
-    Every byte on disk, and runs in the formats of others.
+    Recordings of every byte, and runs in the formats of other programs.
 `emulator`
-    The other end: nodes and cars behind ports, and what goes wrong with them.
+    Emulated nodes and cars behind ports, and their faults.
 
-Host time is nanoseconds of a monotonic clock and always an argument; only what owns a port or a
-process reads one. Errors that a user can mend are `errors.BridgeError`.
-docs/explanation/architecture.md has the picture.
+Host time is nanoseconds of a monotonic clock and always an argument; only owners of a port or a
+process read the clock. Errors that a user can correct are `errors.BridgeError`.
+docs/explanation/architecture.md has a diagram.
 """

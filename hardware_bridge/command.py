@@ -1,4 +1,4 @@
-"""The entry point of `relpos`, outside of `agents`, whose name other distributions use too."""
+"""Entry point of `relpos`, outside of `agents` because other distributions use that name too."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Other distributions (such as openai-agents) install a package of that name too, 
 
 
 def main() -> None:
-    """Run the command line; exit with 2 where another package `agents` hides it."""
+    """Run the command line; exit with 2 if another package `agents` shadows it."""
     try:
         command_line = import_module("agents.cli.main")
     except ModuleNotFoundError as error:

@@ -1,4 +1,4 @@
-"""What came of bytes: how many frames, and how much that was none."""
+"""Decoder statistics: numbers of valid, skipped and damaged frames."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 @dataclass(slots=True)
 class Counts:
-    """What a decoder met since it was made."""
+    """Counts of a decoder since its creation."""
 
     n_bytes: int = 0
     frames: int = 0
-    """Frames that were whole and right."""
+    """Frames that were complete and valid."""
     skipped: int = 0
-    """Frames or lines that were whole and say nothing to us: prompts, other messages."""
+    """Frames or lines that were complete but carry no reading: prompts, other messages."""
     damaged: int = 0
-    """Frames or lines that were refused: check sum, length, a number that cannot be."""
+    """Frames or lines that were refused: check sum, length, an impossible number."""
     strange: int = 0
-    """Bytes between frames that belong to none."""
+    """Bytes outside of any frame."""

@@ -1,5 +1,5 @@
-"""What is wrong in a way the user can mend; a damaged byte is none: it is counted and skipped."""
+"""Errors that the user can correct; damaged bytes raise none, they are counted and skipped."""
 
 
 class BridgeError(Exception):
-    """A port, a configuration or a recording that cannot be used: names it and what to do."""
+    """A port, configuration or recording is unusable; the message names it and a remedy."""

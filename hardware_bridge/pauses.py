@@ -1,4 +1,4 @@
-"""Garbage collection that delays no command."""
+"""Short pauses of garbage collection, so that it delays no command."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from contextlib import contextmanager
 
 @contextmanager
 def short_pauses() -> Iterator[None]:
-    """Leave what is there now out of the collections to come.
+    """Exclude all existing objects from garbage collection within the context.
 
-    Modules and compiled kernels are a hundred thousand objects. A collection that looks through all
-    of them is rare and takes 30 to 100 ms: two ticks of the supervisor, or a decision.
+    Modules and compiled kernels are a hundred thousand objects. A full collection over all of them
+    is rare and takes 30 to 100 ms: two ticks of the supervisor, or one control period.
     """
     outermost = gc.get_freeze_count() == 0
     gc.collect()

@@ -1,8 +1,8 @@
-"""What a damaged text lets through and cannot be: refused before it reaches the tracker.
+"""Plausibility checks that refuse impossible values before they reach the tracker.
 
-Text formats without a check sum take a damaged digit for another number. A range far from the last
-ones of its pair, an acceleration beyond the scale of the sensor: such numbers are refused here, by
-what is possible at all. What is possible but unlikely is the tracker's to judge, which knows more.
+A damaged digit in a text format without a check sum yields another valid number. Physically
+impossible values are refused here, such as a range far from the last ones of its pair or an
+acceleration beyond the scale of the sensor. Possible but unlikely values are left to the tracker.
 """
 
 from __future__ import annotations
@@ -21,32 +21,32 @@ Place: TypeAlias = tuple[float, ...]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlausibilityParams:
-    """Of `Plausibility`."""
+    """Parameters of `Plausibility`."""
 
     nearest: float = 0.005
-    """[m] Ranges below are no ranges: 0.00 is how some devices say that they have none."""
+    """[m] Smallest accepted range; some devices report a missing range as 0.00."""
     farthest: float = 300.0
-    """[m] More than the radios reach."""
+    """[m] Largest accepted range, beyond the reach of the radios."""
     closing_speed: float = 6.0
-    """[m/s] Of two nodes towards or away from each other: twice the top speed of a car."""
+    """[m/s] Largest relative speed of two nodes: twice the top speed of a car."""
     jump: float = 1.0
-    """[m] What noise and a wall that comes between add at once. Smaller refuses good ranges, larger
-    leaves more to the tracker."""
+    """[m] Largest sudden change of a range by noise and the onset of NLOS together. A smaller value
+    refuses good ranges, a larger one leaves more outliers to the tracker."""
     agreeing: int = 3
-    """[-] Refused ranges in a row that agree with each other are believed: the node was carried
-    away while it was silent."""
+    """[-] Number of consecutive outliers that agree with each other at which they are accepted, as
+    after a node was carried away while silent."""
     agreeing_within: float = 5.0
-    """[s] From each to the next."""
+    """[s] Longest interval between two consecutive outliers that agree."""
     gyr_scale: float = math.radians(2000.0)
-    """[rad/s] Largest rate that the sensor can say."""
+    """[rad/s] Largest rate that the gyroscope can measure."""
     acc_scale: float = 16.0 * 9.80665
-    """[m/s2] Largest acceleration."""
+    """[m/s2] Largest acceleration that the accelerometer can measure."""
     mag_scale: float = 5000.0
-    """[uT] Largest field."""
+    """[uT] Largest field that the magnetometer can measure."""
     rounding: float = 0.01
-    """[-] Scales are exceeded by so much through rounding and calibration."""
+    """[-] Fraction by which rounding and calibration may exceed a scale."""
     norm: float = 0.05
-    """[-] How far the length of a quaternion may be from 1."""
+    """[-] Largest deviation of the norm of a quaternion from 1."""
 
     def __post_init__(self) -> None:
         for each in fields(self):
@@ -56,26 +56,26 @@ class PlausibilityParams:
 
 @dataclass(slots=True)
 class _Course:
-    """Ranges of one pair of nodes, or places of one node or pair."""
+    """Last accepted and refused range of one pair of nodes, or position of one node or pair."""
 
     place: Place
     t_ns: int
     agreeing: int = 0
-    """Refused ones in a row that agree; the last of them follows."""
+    """Number of consecutive refused values that agree; `other` is the last of them."""
     other: Place = ()
     other_ns: int = 0
 
 
 class Plausibility:
-    """Refuses readings that cannot be, and counts them by reason.
+    """Filter that refuses implausible readings and counts them by reason.
 
-    Laws: what moves within the limits is never refused; after a real jump no more than
-    ``agreeing`` - 1 good ranges in a row are; what is refused changes no later answer about
-    ranges that agree with the ones accepted.
+    Invariants: values that change within the limits are never refused; after a real jump at most
+    ``agreeing`` - 1 good ranges in a row are refused; a refused value does not affect later
+    answers about ranges that agree with the accepted ones.
     """
 
     refused: Counter[str]
-    """By reason: ``not a number``, ``too near``, ``too far``, ``jump``, ``rate``,
+    """Refused readings by reason: ``not a number``, ``too near``, ``too far``, ``jump``, ``rate``,
     ``acceleration``, ``field``, ``attitude``."""
 
     def __init__(self, params: PlausibilityParams | None = None) -> None:
@@ -84,31 +84,31 @@ class Plausibility:
         self.refused = Counter()
 
     def allows_range(self, i: int, j: int, distance: float, t_ns: int) -> bool:
-        """Whether a range can be.
+        """Return whether a range is plausible; refused ranges are counted.
 
         Args:
-            i: One node; the order of the two says nothing.
-            j: The other.
-            distance: [m]
-            t_ns: When it was measured, by the host's monotonic clock [ns].
+            i: One node; the order of `i` and `j` has no meaning.
+            j: The other node.
+            distance: The range [m].
+            t_ns: Time of the measurement, by the host's monotonic clock [ns].
         """
         reason = self._wrong_range((min(i, j), max(i, j)), distance, t_ns)
         return self._count(reason)
 
     def allows_place(self, who: tuple[int, ...], pos: Vector, t_ns: int) -> bool:
-        """Whether a node, or one relative to another, can be there.
+        """Return whether a position of a node, or of one relative to another, is plausible.
 
         Args:
-            who: The node, or both.
-            pos: [m]
-            t_ns: As in `allows_range`.
+            who: The node, or both nodes of a pair.
+            pos: The position [m].
+            t_ns: Time of the measurement, by the host's monotonic clock [ns].
         """
         if not all(math.isfinite(each) for each in pos):
             return self._count("not a number")
         return self._count(self._jump(("place", *who), pos, t_ns))
 
     def allows_imu(self, reading: ImuReading) -> bool:
-        """Whether a sample is within the scales of its sensors."""
+        """Return whether a sample is within the scales of its sensors."""
         p = self._params
         return self._count(
             _wrong("rate", reading.gyr, p.gyr_scale * (1.0 + p.rounding))
@@ -117,14 +117,14 @@ class Plausibility:
         )
 
     def allows_state(self, reading: StateReading) -> bool:
-        """Whether an orientation is one, and the acceleration within the scale."""
+        """Return whether the quaternion is normalised and the acceleration within the scale."""
         p = self._params
         length = math.hypot(*reading.q_wb)
         if not math.isfinite(length):
             return self._count("not a number")
         if abs(length - 1.0) > p.norm:
             return self._count("attitude")
-        # Gravity was taken off: it may add to the sensor's scale.
+        # Gravity has been subtracted, which may add to the sensor's scale.
         return self._count(
             _wrong("acceleration", reading.accel_w, (p.acc_scale + 10.0) * (1.0 + p.rounding))
         )
@@ -164,7 +164,7 @@ class Plausibility:
         return None
 
     def _can_follow(self, change: float, passed_ns: int) -> bool:
-        """Whether a place may change by this [m] within this time [ns]."""
+        """Return whether a position may change by `change` [m] within `passed_ns` [ns]."""
         p = self._params
         return change <= p.jump + p.closing_speed * abs(passed_ns) / NS
 

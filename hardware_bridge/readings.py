@@ -1,8 +1,8 @@
-"""What devices say, in SI units, before anything is known of who they are in the group.
+"""Readings of devices in SI units, not yet assigned to nodes of the group.
 
-Decoders make readings of bytes, the emulator makes bytes of readings. A reading holds what the
-device itself said: its own name for itself and others, its own clock. Names become nodes and
-clocks become the host's in `hardware_bridge.ingest.intake`.
+Decoders convert bytes to readings, the emulator converts readings to bytes. A reading holds the
+device's own names for itself and others and the time of its own clock.
+`hardware_bridge.ingest.intake` converts names to nodes and times to the host's clock.
 """
 
 from __future__ import annotations
@@ -18,40 +18,40 @@ class DeviceClock(NamedTuple):
     """A counter of a device."""
 
     hz: float
-    """Ticks per second, nominal."""
+    """[1/s] Nominal tick rate."""
     modulus: int
-    """The counter goes back to 0 here."""
+    """[ticks] The counter wraps to 0 at this value."""
 
 
 MICROSECONDS_32 = DeviceClock(1e6, 1 << 32)
-"""Wraps after 71.6 min."""
+"""Counter that wraps after 71.6 min."""
 MILLISECONDS_32 = DeviceClock(1e3, 1 << 32)
 MICROSECONDS_64 = DeviceClock(1e6, 1 << 64)
-"""Never wraps."""
+"""Counter that never wraps."""
 RADIO_40 = DeviceClock(128 * 499.2e6, 1 << 40)
-"""Time stamps of DW1000 and DW3000; wraps every 17.2 s."""
+"""Counter of time stamps of DW1000 and DW3000; wraps every 17.2 s."""
 
 
 class Source(NamedTuple):
-    """Who said it, and when by its own clock; None is what the format does not tell."""
+    """Sender of a reading and time by its own clock; None if the format does not include it."""
 
     device: str | None = None
-    """Its own id, as its format writes ids: decimal digits, or capital hex digits."""
+    """Id of the device as its format writes ids: decimal digits, or capital hex digits."""
     boot: int | None = None
     """A number that differs from one start of the device to the next."""
     sequence: int | None = None
-    """Counts the messages of a boot, without gaps, modulo 2^32."""
+    """Number of the message since boot, without gaps, modulo 2^32."""
     ticks: int | None = None
-    """When it was measured, by `clock`."""
+    """[ticks] Time of the measurement by `clock`."""
     clock: DeviceClock | None = None
 
 
 UNNAMED = Source()
-"""Of formats that tell nothing."""
+"""Source of readings in formats without id and time."""
 
 
 class ImuReading(NamedTuple):
-    """A sample of an inertial sensor, and of the magnetometer where it has one."""
+    """A sample of an inertial sensor, and of its magnetometer if it has one."""
 
     source: Source
     gyr: Vector
@@ -59,17 +59,17 @@ class ImuReading(NamedTuple):
     acc: Vector
     """[m/s2] Specific force, +9.8 on z at rest."""
     mag: Vector | None = None
-    """[uT]"""
+    """[uT] Magnetic field, body frame."""
 
 
 class StateReading(NamedTuple):
-    """What a node sends that filters its orientation itself."""
+    """Output of a node that runs an attitude filter itself."""
 
     source: Source
     q_wb: tuple[float, float, float, float]
     """w x y z, body to world."""
     accel_w: Vector
-    """[m/s2] Without gravity."""
+    """[m/s2] Acceleration without gravity, world frame."""
 
 
 class RangeReading(NamedTuple):
@@ -79,57 +79,57 @@ class RangeReading(NamedTuple):
     to: str
     """The other device, written like `Source.device`."""
     distance: float
-    """[m]"""
+    """[m] Measured range."""
     rx_power: float | None = None
-    """[dBm]"""
+    """[dBm] Receive power."""
     fp_power: float | None = None
-    """[dBm] Of the first path."""
+    """[dBm] Power of the first path."""
     nearer: str | None = None
-    """The end that is not `to`, where it is not the one that says it."""
+    """The end opposite to `to`, if it is not the device that reports the range."""
 
 
 class MotionReading(NamedTuple):
-    """What a car says of its own motion."""
+    """Speed and steering as measured by a car."""
 
     source: Source
     speed: float
-    """[m/s] Forward, by its wheels or its motor."""
+    """[m/s] Forward speed, by the wheels or the motor."""
     steering: float | None = None
-    """[rad] Of the front wheels, left is positive."""
+    """[rad] Steering angle of the front wheels, left is positive."""
 
 
 class NearReading(NamedTuple):
-    """What a distance sensor on a car measured."""
+    """A measurement of a distance sensor on a car."""
 
     source: Source
     bearing: float
-    """[rad] From the car's middle, 0 ahead, left is positive."""
+    """[rad] Direction from the car's centre, 0 is ahead, left is positive."""
     distance: float | None
-    """[m] From the car's body to what is nearest in that direction; None where nothing is."""
+    """[m] From the car's body to the nearest object in that direction; None if there is none."""
 
 
 class ScanReading(NamedTuple):
-    """What a scanner of its own port measured, from where it is on the car."""
+    """A measurement of a scanner with a port of its own, relative to its mounting position."""
 
     source: Source
     bearing: float
-    """[rad] From the scanner's front, left is positive."""
+    """[rad] Direction from the scanner's front, left is positive."""
     distance: float | None
-    """[m] From the scanner; None where nothing was measured."""
+    """[m] Distance from the scanner; None if nothing was measured."""
 
 
 class StatusReading(NamedTuple):
-    """How a device does."""
+    """Battery voltage and fault code of a device."""
 
     source: Source
     voltage: float | None = None
-    """[V]"""
+    """[V] Supply voltage."""
     fault: int = 0
-    """0 is none; else what its maker says."""
+    """0 is no fault; other codes are defined by the manufacturer."""
 
 
 class AckReading(NamedTuple):
-    """A device took a command."""
+    """Acknowledgement of a command by a device."""
 
     source: Source
     command: int
@@ -137,69 +137,69 @@ class AckReading(NamedTuple):
 
 
 class HeartbeatReading(NamedTuple):
-    """A device is alive."""
+    """Sign of life of a device."""
 
     source: Source
 
 
 class OperatorReading(NamedTuple):
-    """A person with a remote control trims a car: a velocity on top of what the plan asks for."""
+    """A velocity trim for a car by an operator, added to the planned velocity."""
 
     source: Source
     to: str
     """The car's node."""
     velocity: tuple[float, float]
-    """[m/s] World frame, x and y."""
+    """[m/s] Velocity x, y in the world frame."""
 
 
 class DriveReading(NamedTuple):
-    """A command to a car, as the car reads it."""
+    """A command to a car, as the car receives it."""
 
     source: Source
     to: str
     speed: float
-    """[m/s] Forward."""
+    """[m/s] Forward speed."""
     steering: float
-    """[rad] Left is positive."""
+    """[rad] Steering angle, left is positive."""
     brake: bool
-    """Stand still, whatever speed and steering say."""
+    """True if the car shall stop, regardless of speed and steering."""
 
 
 class PairReading(NamedTuple):
-    """Where one node is relative to another, by a tracker that is not ours; world frame."""
+    """Relative position of two nodes by an external tracker; world frame."""
 
     source: Source
     i: str
     """One node, written like `Source.device`."""
     j: str
-    """The other."""
+    """The other node."""
     pos: Vector
-    """[m] p_j - p_i."""
+    """[m] Relative position p_j - p_i."""
     vel: Vector | None = None
-    """[m/s] v_j - v_i."""
+    """[m/s] Relative velocity v_j - v_i."""
     cov: tuple[float, ...] | None = None
-    """Of the position, 3 x 3 [m2], or of position and velocity, 6 x 6; row by row."""
+    """Covariance of the position, 3 x 3 [m2], or of position and velocity, 6 x 6; row by row."""
     status: Status = Status.OK
     nlos: float = 0.0
-    """[-] Probability that it rests on what was not in sight."""
+    """[-] Probability that the estimate is based on NLOS measurements."""
 
 
 class PoseReading(NamedTuple):
-    """Where a node is, where it points and how it moves, as far as a tracker tells; world frame."""
+    """Position, attitude and motion of a node as far as a tracker reports them; world frame."""
 
     source: Source
     node: str
     """Written like `Source.device`."""
     pos: Vector | None = None
-    """[m] From any origin that is the same for all nodes."""
+    """[m] Position from any origin that is the same for all nodes."""
     vel: Vector | None = None
-    """[m/s]"""
+    """[m/s] Velocity."""
     cov: tuple[float, ...] | None = None
-    """As of `PairReading`."""
+    """Covariance of the position, 3 x 3 [m2], or of position and velocity, 6 x 6; row by row."""
     q_wb: tuple[float, float, float, float] | None = None
     """w x y z, body to world."""
     speed: float | None = None
-    """[m/s] Forward."""
+    """[m/s] Forward speed."""
 
 
 Reading: TypeAlias = (

@@ -1,4 +1,4 @@
-"""Writing a small file so that it is whole or as it was, even where power fails."""
+"""Atomic replacement of a small file: complete or unchanged, even after a power failure."""
 
 from __future__ import annotations
 
@@ -8,24 +8,24 @@ from pathlib import Path
 
 
 def write_safely(path: Path, text: str, mode: int = 0o644) -> None:
-    """Replace a file by a text.
+    """Replace the content of a file atomically.
 
     Args:
-        path: The file; made if it is not there.
-        text: All that it shall hold.
+        path: The file; created if missing.
+        text: New content of the file.
         mode: Permissions of the file.
 
     Raises:
-        OSError: It cannot be written; then it is as it was.
+        OSError: The file cannot be written and is unchanged.
     """
-    # A name of its own: of two who write at once, each writes a whole file.
+    # Unique name: two concurrent writers each write a complete file.
     descriptor, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".new", dir=path.parent)
     try:
         with os.fdopen(descriptor, "w", encoding="utf-8") as stream:
             os.fchmod(stream.fileno(), mode)
             stream.write(text)
             stream.flush()
-            # Without this the name may be on the disk before the text.
+            # Without fsync the new name may reach the disk before the text.
             os.fsync(stream.fileno())
         Path(name).replace(path)
     except BaseException:

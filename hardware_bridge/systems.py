@@ -1,4 +1,4 @@
-"""On which systems what works; docs/explanation/safety.md has the table."""
+"""Checks of the operating system; docs/explanation/safety.md lists the features per system."""
 
 from __future__ import annotations
 
@@ -8,26 +8,26 @@ from hardware_bridge.errors import BridgeError
 
 
 def expect_linux(what: str) -> None:
-    """Refuse another system in a sentence.
+    """Raise an error on any system but Linux.
 
     Args:
-        what: Needs Linux.
+        what: The feature that needs Linux, named in the message.
 
     Raises:
-        BridgeError: This is none.
+        BridgeError: The system is not Linux.
     """
     if sys.platform != "linux":
         raise BridgeError(f"{what} needs Linux, not {sys.platform}; see docs/explanation/safety.md")
 
 
 def expect_posix(what: str) -> None:
-    """Refuse Windows in a sentence.
+    """Raise an error on Windows.
 
     Args:
-        what: Needs what POSIX systems have.
+        what: The feature that needs a POSIX system, named in the message.
 
     Raises:
-        BridgeError: This is Windows.
+        BridgeError: The system is Windows.
     """
     if sys.platform == "win32":
         raise BridgeError(f"{what} needs Linux or macOS; see docs/explanation/safety.md")

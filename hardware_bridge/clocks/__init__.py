@@ -1,4 +1,4 @@
-"""Clocks of devices to the one clock of the host."""
+"""Conversion of device clocks to the clock of the host."""
 
 from hardware_bridge.clocks.device_time import DeviceTime
 from hardware_bridge.clocks.even_time import EvenTime

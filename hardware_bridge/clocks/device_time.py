@@ -1,4 +1,4 @@
-"""Stamps of a device's counter to host time: unwrapped, fitted, slewed, steps recognised."""
+"""Conversion of device stamps to host time: unwrapping, fitting, slewing, detection of steps."""
 
 from __future__ import annotations
 
@@ -9,44 +9,43 @@ from hardware_bridge.clocks.params import NS, ClockParams
 from hardware_bridge.readings import DeviceClock
 
 SHORTEST_PERIOD = 4.0
-"""[s] Of a counter: rare delays of seconds must not look like a wrap."""
+"""[s] Smallest period of a counter: rare delays of seconds must not look like a wrap."""
 
 ENOUGH = 20
-"""Stamps that make a fit, however long they take."""
+"""[-] Number of stamps needed for a settled fit, regardless of their time span."""
 
 MILLION = 1_000_000
 
 
 class DeviceTime:
-    """The times of one device's measurements, by its own counter.
+    """Host times of one device's measurements by the stamps of its counter.
 
-    Laws:
+    Invariants:
         The counter is unwrapped exactly, across silences of any number of wraps, as long as drift
-        times silence stays below half a period (32 bit microseconds: months; 40 bit radio
-        ticks: 10 hours).
-        A mapped time is never after the arrival. A stamp newer than all before is not mapped
-        before any of them; one that comes late or again is put where it belongs.
-        Equal input, equal output, to the last bit.
-        Memory is bounded; a stamp costs the same however long the stream is.
+        times silence stays below half a period (32 bit microseconds: months; 40 bit radio ticks: 10
+        hours).
+        A mapped time is never after the arrival. A new stamp is not mapped before any earlier one;
+        late or repeated stamps are mapped to their own time.
+        Equal input gives equal output, to the last bit.
+        Memory is bounded; the cost of a stamp does not depend on the length of the stream.
 
-    What cannot be known is the least delay of the link: mapped times are late by it, all of them
-    by the same.
+    The least delay of the link is unobservable: all mapped times are late by this constant.
     """
 
     steps: int
-    """How often the device's clock was set or began again, as far as its stamps tell."""
+    """Number of times the device's clock was set or restarted, as detected from its stamps."""
     strays: int
-    """Stamps that agreed with nothing before and nothing after; mapped to their arrival."""
+    """Number of stamps that agreed with none before or after; mapped to their arrival."""
 
     def __init__(self, clock: DeviceClock, params: ClockParams | None = None) -> None:
-        """Begin without knowing anything.
+        """Create a mapping without stamps.
 
         Args:
             clock: The counter.
-            params: What is believed of it.
+            params: Limits of the clock and the link.
 
         Raises:
-            ValueError: The counter wraps within four seconds, or does not count.
+            ValueError: The counter wraps within four seconds, or has no positive rate.
         """
         params = ClockParams() if params is None else params
         if not (clock.hz > 0.0 and clock.modulus > SHORTEST_PERIOD * clock.hz):
@@ -73,20 +72,20 @@ class DeviceTime:
 
     @property
     def ticks(self) -> int:
-        """The newest stamp, unwrapped: counted from the 0 before the first one of this start."""
+        """Newest stamp, unwrapped, counted from the last 0 before the first stamp of this start."""
         return self._ticks
 
     @property
     def drift(self) -> float:
-        """[-] The host's seconds in one of the device, less 1; positive if the device is slow."""
+        """[-] Host seconds per device second, minus 1; positive if the device is slow."""
         return self._line.slope / (1 << SHIFT)
 
     def restart(self) -> None:
-        """The device started again: its counter too. What is known of its rate stays."""
+        """Handle a restart of the device and its counter; keep the rate."""
         self._begun = False
 
     def map(self, ticks: int | None, arrival_ns: int) -> int:
-        """Host time at which something was measured; see `StreamTime.map`."""
+        """Return the host time of a measurement; see `StreamTime.map`."""
         if ticks is None:
             return arrival_ns
         before = arrival_ns if self._arrival is None else self._arrival
@@ -98,7 +97,7 @@ class DeviceTime:
         return min(mapped, arrival_ns)
 
     def _follow(self, ticks: int, arrival: int, before: int) -> int:
-        """Map a stamp after others, the newest of which came at `before`."""
+        """Map a stamp that follows others, the newest of which arrived at `before`."""
         unwrapped = self._unwrap(ticks, arrival)
         x = unwrapped * self._num // self._den
         old, ahead, silence = self._x - x, self._line.at(x) - arrival, arrival - before
@@ -126,18 +125,18 @@ class DeviceTime:
         return x >= self._settled_at and self._fitted >= ENOUGH
 
     def _unwrap(self, ticks: int, arrival: int) -> int:
-        """The count nearest to what the line expects at this arrival."""
+        """Return the unwrapped count nearest to the one the line predicts for this arrival."""
         expected = self._line.inverse(arrival) * self._den // self._num
         half = self._modulus // 2
         return ticks + (expected - ticks + half) // self._modulus * self._modulus
 
     def _begin(self, ticks: int, arrival: int) -> int:
-        """Know nothing but this stamp, and the rate."""
+        """Restart from this stamp alone; keep the rate."""
         self._begun = True
         return self._learn(ticks, ticks * self._num // self._den, arrival)
 
     def _learn(self, unwrapped: int, x: int, arrival: int) -> int:
-        """Fit again from this stamp on."""
+        """Restart the fit at this stamp."""
         self._acquit()
         self._late_since = None
         self._line.start(x, arrival)
@@ -146,7 +145,7 @@ class DeviceTime:
         return arrival
 
     def _doubt(self, unwrapped: int, x: int, arrival: int) -> int:
-        """A stamp that cannot be: a second one in a row that agrees with it proves it."""
+        """Handle an implausible stamp: a second one in a row that agrees confirms it."""
         suspect, self._suspect = self._suspect, (unwrapped, arrival)
         if suspect is None:
             return arrival
@@ -155,27 +154,27 @@ class DeviceTime:
             return arrival
         self._suspect = None
         if x > self._x and abs(self._line.at(x) - arrival) <= self._step:
-            # The first one was returned as its arrival: no later one is mapped before it.
+            # The suspect stamp was mapped to its arrival: no later one may be mapped before it.
             self._mapped = max(self._accept(unwrapped, x, arrival), suspect[1])
             return self._mapped
         self.steps += 1
         return self._begin(unwrapped % self._modulus, arrival)
 
     def _acquit(self) -> None:
-        """The stamp after a suspect one is as expected: the suspect was damaged."""
+        """Count a suspect stamp as a stray, since the stamp after it is as expected."""
         if self._suspect is not None:
             self.strays += 1
             self._suspect = None
 
     def _agree(self, suspect: tuple[int, int], ticks: int, arrival: int) -> bool:
-        """Whether as much time passed on the device as on the host, modulo the period."""
+        """Return whether device and host measured the same interval, modulo the period."""
         passed = (arrival - suspect[1]) * self._den // self._num
         half = self._modulus // 2
         excess = (ticks - suspect[0] - passed + half) % self._modulus - half
         return abs(excess) * self._num < self._step * self._den
 
     def _accept(self, unwrapped: int, x: int, arrival: int) -> int:
-        """Fit a newer stamp, and move towards the fit as fast as is allowed."""
+        """Add a newer stamp to the fit and slew towards the fit at the allowed rate."""
         self._line.add(x, arrival)
         self._fitted += 1
         target = self._line.at(x)

@@ -1,16 +1,16 @@
-"""The line below all arrivals: how a device's clock runs against the host's.
+"""Lower envelope of arrivals: offset and rate of a device's clock relative to the host's.
 
 A message that was stamped x by the device arrives at
 
     y = a + (1 + s) x + d,   d >= 0
 
 with offset a, rate error s and a delay d that is often small, sometimes large, never negative.
-The line is the one below all points of a window with the least sum of distances to them: the
-edge, above the middle of the window, of their lower convex hull [1]. Of each bucket of time only
+Of all lines below the points of a window the one with the least sum of distances to them is used:
+the edge, above the middle of the window, of their lower convex hull [1]. In each time bucket only
 the point nearest to the line is kept, a minimum filter as in [2].
 
-Everything is integers: nanoseconds, and the slope in units of 2^-40. The same input gives the same
-bits everywhere, after weeks as in the first second.
+All numbers are integers: nanoseconds, and the slope in units of 2^-40. Equal input gives equal bits
+on every machine and after any run time.
 
 References:
     [1] Zhang, Liu, Xia, Clock Synchronization Algorithms for Network Measurements, INFOCOM 2002.
@@ -29,10 +29,10 @@ Point = tuple[int, int]
 
 
 class LowerEnvelope:
-    """A sliding window of points (device time, arrival) [ns] and the line below them."""
+    """Sliding window of points (device time, arrival) [ns] and the line below them."""
 
     slope: int
-    """[2^-40] The host's seconds in one of the device, less 1."""
+    """[2^-40] Host seconds per device second, minus 1."""
 
     def __init__(self, params: ClockParams) -> None:
         self._window = round(params.window * NS)
@@ -45,21 +45,21 @@ class LowerEnvelope:
         self._best: Point = (0, 0)
 
     def start(self, x: int, y: int) -> None:
-        """Forget all points but this one; the slope stays."""
+        """Discard all points except this one; keep the slope."""
         self._kept.clear()
         self._best = self._x0, self._y0 = x, y
 
     def at(self, x: int) -> int:
-        """Arrival [ns] of the least delayed message that was stamped x [ns]."""
+        """Return the arrival [ns] of a least delayed message stamped x [ns]."""
         dx = x - self._x0
         return self._y0 + dx + (dx * self.slope >> SHIFT)
 
     def inverse(self, y: int) -> int:
-        """The stamp [ns] of the least delayed message that arrives at y [ns]."""
+        """Return the stamp [ns] of a least delayed message that arrives at y [ns]."""
         return self._x0 + ((y - self._y0) << SHIFT) // ((1 << SHIFT) + self.slope)
 
     def add(self, x: int, y: int) -> None:
-        """Take a point that is newer than all others; the line stays below it."""
+        """Add a point newer than all others; the line stays below it."""
         if x // self._bucket != self._best[0] // self._bucket:
             self._kept.append(self._best)
             while self._kept[0][0] < x - self._window:
@@ -74,7 +74,7 @@ class LowerEnvelope:
         self._y0 -= max(0, self.at(x) - y)
 
     def _fit(self) -> None:
-        """The best line below the kept points, which are at most window / bucket + 1."""
+        """Fit the best line below the kept points, at most window / bucket + 1."""
         self._x0 = self._kept[-1][0]
         if len(self._kept) > 1:
             left, right = self._middle_edge()
@@ -85,7 +85,7 @@ class LowerEnvelope:
         self._y0 = min(y - self.at(x) for x, y in self._kept)
 
     def _middle_edge(self) -> tuple[Point, Point]:
-        """The edge of the lower hull above the middle of the window."""
+        """Return the edge of the lower hull above the middle of the window."""
         hull: list[Point] = []
         for point in self._kept:
             while len(hull) > 1 and _is_above(hull[-1], hull[-2], point):
@@ -99,6 +99,6 @@ class LowerEnvelope:
 
 
 def _is_above(point: Point, left: Point, right: Point) -> bool:
-    """Whether a point is on or above the line from left to right."""
+    """Return whether a point is on or above the line from left to right."""
     dx, dy = right[0] - left[0], right[1] - left[1]
     return (point[1] - left[1]) * dx >= (point[0] - left[0]) * dy

@@ -1,43 +1,43 @@
-"""Times of samples that come at a steady rate and tell none.
+"""Times of samples with a constant rate and without stamps.
 
-Their arrival alone is a bad time: a hub that hands them on in bunches, or a message that held up
-the line, makes gaps in which nothing was lost, and to fill such gaps integrates a turn twice.
-The samples themselves were taken one period after the other; so a late one is put where it was due.
-Only when all of a while come late by as much, samples were lost.
+Arrival times alone are inaccurate: a hub that forwards samples in bunches, or a message that
+blocked the line, causes gaps without a lost sample, and filling such gaps integrates a rotation
+twice. Samples are taken one period apart, so a late one is mapped to its due time. Only if all
+samples of a while are late by at least most of a period, samples were lost.
 """
 
 from __future__ import annotations
 
 WHILE = 20
-"""[-] Samples after which it is judged whether some were lost."""
+"""[-] Number of late samples in a row after which losses are assessed."""
 MOST = 0.06
-"""[s] Later than this no sample is put back: the trackers wait no longer than their horizon."""
+"""[s] Later samples are not moved back: the trackers wait no longer than their horizon."""
 SURE = 0.75
-"""[-] Of a period: all late by so much is one lost."""
+"""[-] Lateness of all samples, as a fraction of a period, that counts as a lost sample."""
 STEP = 0.4
-"""[-] Of a period: moved at once where a device is slower than it says, without a gap."""
+"""[-] Largest step, as a fraction of a period, for a device slower than its nominal rate."""
 
 
 class EvenTime:
-    """The times of one node's samples; a `StreamTime`.
+    """Times of one node's samples; a `StreamTime`.
 
-    Laws: never after the arrival, and never before the sample before; without losses no two are
-    further apart than 1.4 periods, whatever arrives up to `MOST` late; over any long time as much
-    passes as at the host.
+    Invariants: times are never after the arrival, and never before that of the previous sample;
+    without losses consecutive times are at most 1.4 periods apart if no sample is later than
+    `MOST`; over any long time as much time passes as at the host.
     """
 
     def __init__(self, rate: float) -> None:
-        """Begin without a sample.
+        """Create a mapping without samples.
 
         Args:
-            rate: Of the samples, as the configuration has it [1/s].
+            rate: Nominal sample rate as configured [1/s].
         """
         self._period = round(1e9 / rate)
         self._last: int | None = None
         self._n, self._least = 0, 0
 
     def map(self, ticks: int | None, arrival_ns: int) -> int:
-        """When a sample was taken, by the host [ns]; see `StreamTime.map`."""
+        """Return the host time of a sample [ns]; see `StreamTime.map`."""
         period = self._period
         due = arrival_ns if self._last is None else self._last + period
         late = arrival_ns - due
@@ -57,5 +57,5 @@ class EvenTime:
         return self._last
 
     def restart(self) -> None:
-        """The device started again."""
+        """Handle a restart of the device."""
         self._last, self._n = None, 0

@@ -1,4 +1,4 @@
-"""What is believed of the clocks of devices and of the way their bytes take."""
+"""Parameters of the clocks of devices and the delays of links."""
 
 from __future__ import annotations
 
@@ -10,32 +10,32 @@ NS = 1_000_000_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClockParams:
-    """Of `DeviceTime`."""
+    """Parameters of `DeviceTime`."""
 
     window: float = 40.0
-    """[s] How far back the fit looks. Longer averages better, shorter follows a quartz that warms
-    up: at 0.5 ppm/s the ends of 40 s bend by 0.1 ms."""
+    """[s] Length of the fit's window. A longer one averages better, a shorter one follows a quartz
+    that warms up: at 0.5 ppm/s the ends of 40 s deviate by 0.1 ms."""
     bucket: float = 0.5
-    """[s] The least delayed stamp of this long is kept; window / bucket is the memory."""
+    """[s] The least delayed stamp of each bucket is kept; window / bucket is the memory."""
     drift: float = 250e-6
-    """[-] Largest rate error that is believed, device against host. Quartzes of both ends are
-    within 100e-6 each."""
+    """[-] Largest rate error between device and host. Quartzes of both ends are within 100e-6
+    each."""
     slew: float = 2e-3
-    """[-] Times of measurements run this much faster or slower than the device while they move to
-    a new fit: the error of dt that an integration of an IMU sees."""
+    """[-] Largest rate difference between mapped times and the device's clock while they approach a
+    new fit: the error of dt in an integration of IMU samples."""
     haste: float = 10.0
-    """[s] Errors above slew * haste shrink with this time constant instead."""
+    """[s] Errors above slew * haste decay with this time constant instead."""
     settling: float = 2.0
-    """[s] At the start, and after a silence longer than the window, the slew is 0.5; for
-    twenty stamps at least."""
+    """[s] Duration after the start, or after a silence longer than the window, in which the slew is
+    0.5; for at least twenty stamps."""
     stray: float = 0.02
-    """[s] A stamp this much ahead of a settled fit needs a second one that agrees: a damaged
-    number in a text, or a port that was congested all the time before."""
+    """[s] Limit ahead of a settled fit above which a stamp needs a second one that agrees: it is a
+    damaged number in a text, or the port was congested until then."""
     step: float = 0.5
-    """[s] Ahead by more, or older than the newest by more: the device's clock was set or began
-    again, once a second stamp agrees."""
+    """[s] Limit ahead of the fit, or behind the newest stamp, above which the device's clock counts
+    as set or restarted once a second stamp agrees."""
     patience: float = 5.0
-    """[s] Later than `step` for this long: the device's clock stood still."""
+    """[s] Stamps later than `step` for this long mean that the device's clock halted."""
 
     def __post_init__(self) -> None:
         for field in fields(self):

@@ -1,4 +1,4 @@
-"""What maps the stamps of one stream to the host's clock."""
+"""Protocol of the conversion of a stream's stamps to the host's clock."""
 
 from __future__ import annotations
 
@@ -6,30 +6,30 @@ from typing import Protocol
 
 
 class StreamTime(Protocol):
-    """The times of one device's measurements."""
+    """Host times of one device's measurements."""
 
     def map(self, ticks: int | None, arrival_ns: int) -> int:
-        """Host time at which something was measured.
+        """Return the host time of a measurement.
 
         Args:
-            ticks: The device's stamp; None where the message has none.
-            arrival_ns: When its bytes came, by the host's monotonic clock [ns]; never earlier
-                than that of the call before.
+            ticks: The device's stamp; None if the message has none.
+            arrival_ns: Arrival of its bytes, by the host's monotonic clock [ns]; never earlier than
+                that of the previous call.
 
         Returns:
             Host time [ns], never after the arrival.
         """
 
     def restart(self) -> None:
-        """The device started again: its counter too."""
+        """Handle a restart of the device and its counter."""
 
 
 class HostTime:
-    """Of formats without time: measured when it came."""
+    """Times of formats without stamps: measured on arrival."""
 
     def map(self, ticks: int | None, arrival_ns: int) -> int:
-        """The arrival."""
+        """Return the arrival."""
         return arrival_ns
 
     def restart(self) -> None:
-        """Changes nothing."""
+        """Do nothing."""

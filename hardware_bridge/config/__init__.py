@@ -1,4 +1,4 @@
-"""swarm.toml: who is in the group, where the bytes come from, what may be done."""
+"""swarm.toml: the nodes of the group, the ports and the permitted actions."""
 
 from hardware_bridge.config.read import parse_config, read_config
 from hardware_bridge.config.swarm import CarConfig, LinkConfig, SwarmConfig, TaskConfig

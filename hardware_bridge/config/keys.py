@@ -1,4 +1,4 @@
-"""Tables and ids of swarm.toml, checked."""
+"""Checked access to tables and ids of swarm.toml."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from tracking.constellation import Constellation
 from tracking.params.tables import Where
 
 MOST_ID = 65534
-"""The largest id of our own wire is that of the host."""
+"""[-] Largest id of a node; the largest id of our wire format, 65535, is the host."""
 
 
 def tables_of(raw: Mapping[str, Any], name: str, where: Where) -> list[tuple[str, dict[str, Any]]]:
-    """The tables of a table of tables."""
+    """Return the tables of a table of tables."""
     section = raw.get(name, {})
     if not isinstance(section, dict):
         raise where.key(name).error(f"expected tables [{name}.X]")
@@ -24,7 +24,7 @@ def tables_of(raw: Mapping[str, Any], name: str, where: Where) -> list[tuple[str
 
 
 def without(table: Any, name: str, where: Where) -> tuple[Any, dict[str, Any]]:
-    """A table without one of its tables, and that one."""
+    """Return a table without one of its inner tables, and this inner table."""
     if not isinstance(table, dict):
         return table, {}
     inner = table.get(name, {})
@@ -34,14 +34,14 @@ def without(table: Any, name: str, where: Where) -> tuple[Any, dict[str, Any]]:
 
 
 def node_id(text: str, where: Where) -> int:
-    """The id that a key is."""
+    """Return the id that a key represents."""
     if not (text.isascii() and text.isdigit() and int(text) <= MOST_ID):
         raise where.error(f"expected an id from 0 to {MOST_ID}")
     return int(text)
 
 
 def check_node(node: Any, group: Constellation, where: Where) -> None:
-    """Refuse what is no id of the group."""
+    """Raise an error if a value is not the id of a node of the group."""
     if isinstance(node, bool) or not isinstance(node, int) or node not in group.index_of:
         ids = ", ".join(map(str, group.ids))
         raise where.error(f"expected a node of this file ({ids}), got {node!r}")

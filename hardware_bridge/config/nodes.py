@@ -1,4 +1,4 @@
-"""``[nodes.ID]`` and ``[antennas.ID]``: who is in the group."""
+"""``[nodes.ID]`` and ``[antennas.ID]``: the nodes and antennas of the group."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from tracking.mount import KEYS, Mount
 from tracking.params.tables import TableReader, Where
 
 FARTHEST = 10.0
-"""[m] From a node to its antenna."""
+"""[m] Largest offset of an antenna from its node along an axis."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Mount:
-    """Its fields are the keys of `tracking.mount.KEYS`."""
+    """Table with the keys of `tracking.mount.KEYS`."""
 
     ahead_m: float | None = None
     aside_m: float = 0.0
@@ -49,12 +49,12 @@ class _Antenna:
 def read_constellation(
     raw: Mapping[str, Any], dimensions: int, heading: Literal["magnetic", "initial"], where: Where
 ) -> Constellation:
-    """The nodes, those that move first.
+    """Read the nodes, moving ones first.
 
     Args:
-        raw: The whole file.
+        raw: The complete file.
         dimensions: 2 or 3.
-        heading: As in `Constellation`.
+        heading: Heading reference, see `Constellation`.
         where: The file, for messages.
     """
     nodes, antennas = [], []
@@ -98,7 +98,7 @@ def read_constellation(
     try:
         return Constellation(
             nodes=tuple(nodes),
-            dimensions=dimensions,  # type: ignore[arg-type]  # which it checks
+            dimensions=dimensions,  # type: ignore[arg-type]  # checked by Constellation
             heading=heading,
             antennas=tuple(antennas),
         )

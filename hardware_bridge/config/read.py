@@ -1,4 +1,4 @@
-"""Reading swarm.toml: what cannot be is an error that names the file and the key."""
+"""Reading of swarm.toml; invalid values are errors that name the file and the key."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ SECTIONS = (
 )  # fmt: skip
 MOST_SLOTS = 20
 LARGEST_ROOM = 1000.0
-"""[m]"""
+"""[m] Largest side of the room."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,8 +51,8 @@ def read_config(path: Path | str) -> SwarmConfig:
     """Read a swarm.toml.
 
     Raises:
-        BridgeError: It cannot be read, or a key is unknown, missing or makes no sense; the file
-            and the key are named.
+        BridgeError: The file cannot be read, or a key is unknown, missing or invalid; the message
+            names the file and the key.
     """
     path = Path(path)
     try:
@@ -66,17 +66,17 @@ def read_config(path: Path | str) -> SwarmConfig:
 
 
 def parse_config(text: str, *, file: str, folder: Path, with_files: bool = True) -> SwarmConfig:
-    """The configuration that a text is.
+    """Return the configuration in a text.
 
     Args:
-        text: Of a swarm.toml.
-        file: Its name, for messages.
-        folder: The folder that relative paths in it start from.
-        with_files: Whether the files that it names must be there, and modules of others may be
-            imported that it names; not so of what a recording holds.
+        text: Content of a swarm.toml.
+        file: Name of the file, for messages.
+        folder: Base folder of relative paths.
+        with_files: True if named files must exist and named third-party modules may be imported;
+            False for the configuration in a recording.
 
     Raises:
-        BridgeError: As for `read_config`.
+        BridgeError: The configuration is invalid, as for `read_config`.
     """
     try:
         raw = tomllib.loads(text)
@@ -111,7 +111,7 @@ def parse_config(text: str, *, file: str, folder: Path, with_files: bool = True)
 def _calibration(
     raw: Mapping[str, Any], where: Where, folder: Path, with_files: bool
 ) -> tuple[tuple[Path, ...] | None, bool]:
-    """The files, and whether ranges are good without."""
+    """Return the calibration files and whether uncalibrated ranges are allowed."""
     if "calibration" not in raw:
         return None, False
     at = where.key("calibration")
@@ -149,7 +149,7 @@ def _task(
 
 
 def _check(config: SwarmConfig, where: Where, with_files: bool) -> None:
-    """What no section can see alone."""
+    """Check conditions that involve several sections."""
     n = config.n_slots
     if not 2 <= n <= MOST_SLOTS:
         raise where.key("nodes").error(f"expected 2 to {MOST_SLOTS} that move, got {n}")
@@ -189,10 +189,10 @@ def _check(config: SwarmConfig, where: Where, with_files: bool) -> None:
 
 
 def _check_keys(config: SwarmConfig, where: Where) -> None:
-    """Refuse one key for a node and a car.
+    """Refuse a key shared by a node and a car.
 
-    A controller and the node on its car have one id: with one key, what one said passes for the
-    other when it is sent again on the other's line.
+    A controller and the node on its car have one id: with a shared key a message of one would be
+    accepted from the other when replayed on the other's line.
     """
     links = {link.key: link.port.name for link in config.links if link.key is not None}
     for car in config.cars:
@@ -202,7 +202,7 @@ def _check_keys(config: SwarmConfig, where: Where) -> None:
 
 
 def _check_source(config: SwarmConfig, where: Where) -> None:
-    """Positions come from links of that format, and only where they are asked for."""
+    """Check that the source of positions fits the links, and that initial headings are given."""
     formats = {link.format for link in config.links}
     ready = config.tracker.source == "positions"
     group = config.constellation

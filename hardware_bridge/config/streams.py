@@ -1,4 +1,4 @@
-"""``[links.NAME]`` and ``[cars.ID]``: where bytes come from and go to."""
+"""``[links.NAME]`` and ``[cars.ID]``: ports of the nodes and cars."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tracking.constellation import Constellation
 from tracking.params.tables import TableReader, Where
 
 SLOWEST_WATCHDOG = 2.0
-"""[s]"""
+"""[s] Longest accepted watchdog time."""
 MOST_CELLS = 14
 
 
@@ -46,7 +46,7 @@ class _Car:
 def read_links(
     raw: Mapping[str, Any], group: Constellation, where: Where, folder: Path
 ) -> Iterator[LinkConfig]:
-    """Read the streams that measure; relative paths start from a folder."""
+    """Read the links with measurements; relative paths start from `folder`."""
     from hardware_bridge.decoders import DECODERS
 
     for key, table in tables_of(raw, "links", where):
@@ -93,7 +93,7 @@ def read_links(
 def _check_scanner(
     link: _Link, ids: Mapping[str, int], raw: Mapping[str, Any], group: Constellation, where: Where
 ) -> None:
-    """Refuse a scanner that nothing would come of, or that cannot be where it is said to be."""
+    """Refuse a scanner that serves no purpose or has an impossible mounting position."""
     at, mount = where.key("scanner"), link.scanner
     for name, most in (("length", 5.0), ("width", 5.0)):
         if not 0.01 <= getattr(mount, name) <= most:
@@ -119,7 +119,7 @@ def _check_scanner(
 def read_cars(
     raw: Mapping[str, Any], group: Constellation, where: Where, folder: Path
 ) -> list[CarConfig]:
-    """Read the cars, in the order of their nodes; relative paths start from a folder."""
+    """Read the cars, in the order of their nodes; relative paths start from `folder`."""
     from hardware_bridge.drivers import driver_entry, driver_options
 
     cars = []
@@ -167,7 +167,7 @@ def _baud(given: int | None, usual: int, where: Where) -> int:
 
 
 def _placed(port: str, folder: Path, where: Where) -> str:
-    """A port; the path of a file starts from the folder of the configuration."""
+    """Return a port; the path of a file starts from the folder of the configuration."""
     if not port or "\0" in port:
         raise where.key("port").error(f"expected the name of a port, got {port!r}")
     if not port.startswith("file:"):

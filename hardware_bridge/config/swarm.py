@@ -1,4 +1,4 @@
-"""What swarm.toml says, checked."""
+"""Checked content of swarm.toml."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from tracking.filters import DEFAULT_FILTER
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinkConfig:
-    """A stream that measures."""
+    """A link with measurements."""
 
     name: str
     port: PortSpec
     format: str
-    """One of `hardware_bridge.decoders.DECODERS`."""
+    """Format, a key of `hardware_bridge.decoders.DECODERS`."""
     node: int | None = None
-    """Who speaks, where the format does not say."""
+    """Sender, for formats that do not name it."""
     ids: Mapping[str, int] = field(default_factory=dict)
-    """Device id, as `Source.device` has it, to node."""
+    """Node by device id as in `Source.device`."""
     key: bytes | None = None
-    """Of the MAC, 16 bytes; None takes messages without one."""
+    """Key of the MAC, 16 bytes; None accepts messages without one."""
     scanner: ScannerMount | None = None
-    """Where it is on its car, if the stream is a scanner's."""
+    """Mounting position of the scanner on its car, if the link is a scanner's."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,53 +38,53 @@ class CarConfig:
     """A car that can be driven."""
 
     node: int
-    """The node it carries."""
+    """Node that is mounted on the car."""
     port: PortSpec
     driver: str
-    """One of `hardware_bridge.drivers.DRIVERS`."""
+    """Driver, a key of `hardware_bridge.drivers.DRIVERS`."""
     options: Mapping[str, Any] = field(default_factory=dict)
-    """The driver's own."""
+    """Options of the driver."""
     key: bytes | None = None
-    """As for links."""
+    """Key of the MAC, 16 bytes; None for messages without one."""
     watchdog: float | None = None
-    """[s] After which it stops by itself when it hears nothing, as `relpos doctor --watchdog`
-    measures it; None where it was not measured, which is refused for cars that move."""
+    """[s] Time without messages after which the car stops by itself, as measured by `relpos doctor
+    --watchdog`; None if not measured, which is refused for cars that move."""
     cells: int = 0
-    """In a row in its battery, for its voltage to be looked at; 0 where it is not."""
+    """[-] Number of battery cells in series, to check the voltage; 0 disables the check."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TaskConfig:
-    """What is asked of the cars."""
+    """Task of the cars."""
 
     name: str = "hold"
-    """One of `relpos_env.tasks.TASKS`."""
+    """Task, a key of `relpos_env.tasks.TASKS`."""
     room: tuple[float, float] = (6.0, 6.0)
-    """[m] Width and depth of the floor that the task may use, round where the group starts."""
+    """[m] Width and depth of the floor that the task may use, around the start of the group."""
     command: Literal["plan", "link"] = "plan"
-    """Where the velocity comes from that cars are asked for: the plan alone, or the messages of
-    an operator on a link, who sees the room."""
+    """Source of the commanded velocity: the plan alone, or the messages of an operator on a link,
+    who sees the room."""
     proximity: int = 0
-    """Beams of the distance sensors round each car, for policies that see them; 0 for none."""
+    """[-] Number of distance sensors around each car, for policies that observe them."""
     options: Mapping[str, Any] = field(default_factory=dict)
-    """The task's own."""
+    """Options of the task."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrackerConfig:
-    """How the group is tracked."""
+    """Settings of the tracker."""
 
     source: Literal["measurements", "positions"] = "measurements"
-    """Whether our tracker makes positions of measurements, or they come ready from another."""
+    """Source of positions: our tracker from measurements, or an external tracker."""
     filter: str = DEFAULT_FILTER
-    """One of `tracking.filters.FILTERS`."""
+    """Filter, a key of `tracking.filters.FILTERS`."""
     delay: float = 0.1
-    """[s] Measurements wait so long for later ones that were taken before them."""
+    """[s] Time that measurements are held back for earlier ones that arrive later."""
     accuracy: float | None = None
     """[m] Expected error up to which a pair is ok, 0.01 to 10; left out, 0.3 with a car and 0.5
     without."""
     positions: ReadyParams = ReadyParams()
-    """What is believed of ready positions."""
+    """Parameters of external positions."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,32 +93,32 @@ class SwarmConfig:
 
     name: str
     constellation: Constellation
-    """Moving nodes first: each is a slot of the environment, car or not."""
+    """Nodes, moving ones first: each moving node is a slot of the environment, car or not."""
     links: tuple[LinkConfig, ...]
     cars: tuple[CarConfig, ...]
-    """In the order of their nodes."""
+    """Cars in the order of their nodes."""
     calibration: tuple[Path, ...] | None
-    """Files; None if nothing was said of it, which is refused for cars that move."""
+    """Calibration files; None if not configured, which is refused for cars that move."""
     task: TaskConfig
     tracker: TrackerConfig
     safety: SafetyParams
     text: str
-    """The file itself, for recordings."""
+    """Content of the file, for recordings."""
     uncalibrated_ranges: bool = False
-    """Whether ranges are good as they come, where the files hold nothing about them."""
+    """True if ranges without calibration in the files may be used as received."""
     marks: Path | None = None
-    """Keeps which signed messages are old, where any are signed; None keeps nothing."""
+    """File with the replay protection state of signed messages; None keeps no state."""
 
     @property
     def keys(self) -> list[bytes | None]:
-        """Of all links and cars."""
+        """Keys of all links and cars."""
         return [link.key for link in self.links] + [car.key for car in self.cars]
 
     @property
     def n_slots(self) -> int:
-        """Moving nodes."""
+        """Number of moving nodes."""
         return int((~self.constellation.is_static).sum())
 
     def slot_of(self, car: CarConfig) -> int:
-        """Slot of a car."""
+        """Return the slot of a car."""
         return self.constellation.index_of[car.node]

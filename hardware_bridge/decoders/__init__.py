@@ -1,6 +1,6 @@
 """Decoders: bytes of devices to readings.
 
-To add one: its file, and a line in `DECODERS`; docs/reference/decoders.md says what it must give.
+To add one: a file and a line in `DECODERS`; see docs/reference/decoders.md for the contract.
 """
 
 from __future__ import annotations
@@ -35,30 +35,30 @@ from hardware_bridge.readings import (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DecoderEntry:
-    """A format that can be read, and what is known of it beforehand."""
+    """A supported format and its fixed properties."""
 
     device: str
-    """Who speaks it, for people."""
+    """Devices that use the format, for display."""
     build: Callable[[bytes | None], Decoder]
-    """A key, or None, to the decoder of one port."""
+    """Function from a key, or None, to the decoder of one port."""
     tells: tuple[type, ...]
-    """The readings that may come."""
+    """Types of readings that the decoder may return."""
     baud: int = 115200
-    """[1/s] Of the device as it is usually set."""
+    """[baud] Usual setting of the device."""
     names_itself: bool = False
-    """Every reading says who speaks; else the configuration of the port does."""
+    """True if every reading names its sender; else the configuration of the port does."""
     tells_of_others: bool = False
-    """Readings name the nodes that they are about, and who speaks does not matter."""
+    """True if readings name the nodes that they describe; their sender has no meaning."""
     has_time: bool = False
-    """Readings carry the device's clock; else they are stamped on arrival."""
+    """True if readings carry the device's clock; else they are stamped on arrival."""
     keyed: bool = False
-    """Messages carry a code that only holders of the key can make."""
+    """True if messages carry an authentication code made with a key."""
     checked: bool = False
-    """Frames carry a check sum; else a damaged digit can pass."""
+    """True if frames carry a check sum; else a damaged digit can pass."""
     request: bytes = b""
-    """See `hardware_bridge.links.ports.PortSpec`."""
+    """Bytes sent to the device on opening, see `hardware_bridge.links.ports.PortSpec`."""
     dtr: bool = True
-    """The line DTR; off for a device whose motor it stops."""
+    """State of the line DTR; False for a device whose motor it stops."""
 
 
 DECODERS: dict[str, DecoderEntry] = {
@@ -126,18 +126,18 @@ DECODERS: dict[str, DecoderEntry] = {
         has_time=True,
     ),
 }
-"""Name of the format, as in a configuration, to what is known of it."""
+"""Entries by name of the format as in a configuration."""
 
 
 def make_decoder(name: str, key: bytes | None = None) -> Decoder:
-    """The decoder of one port.
+    """Return a new decoder for one port.
 
     Args:
         name: A key of `DECODERS`.
-        key: Of formats whose messages carry a code made with one.
+        key: Key of the authentication code, for formats that have one.
 
     Raises:
-        BridgeError: No such format, or a key for a format that has none.
+        BridgeError: The format is unknown, or a key is given for a format without one.
     """
     entry = DECODERS.get(name)
     if entry is None:

@@ -1,4 +1,4 @@
-"""What a decoder is: bytes in any pieces to readings."""
+"""Protocols of decoders (bytes in any pieces to readings) and encoders."""
 
 from __future__ import annotations
 
@@ -8,28 +8,28 @@ from hardware_bridge.counts import Counts
 from hardware_bridge.readings import Reading
 
 MOST_WAITING = 4096
-"""[bytes] A decoder keeps no more than this of a frame that does not end."""
+"""[bytes] Largest number of bytes that a decoder keeps of an incomplete frame."""
 
 
 class Decoder(Protocol):
-    """Pure: no clock, no port, and it never raises, whatever the bytes are.
+    """Decoder of one port. It uses no clock and no port and never raises, whatever the bytes.
 
-    Laws: any cut of the same bytes gives the same readings; what is damaged is counted and
-    skipped, and the next good frame is read; no more than `MOST_WAITING` bytes are kept.
+    Invariants: the readings do not depend on how the bytes are split; damaged frames are counted
+    and skipped, and the next good frame is read; at most `MOST_WAITING` bytes are kept.
     """
 
     counts: Counts
 
     @property
     def waiting(self) -> int:
-        """Bytes kept of a frame that is not complete."""
+        """Number of bytes kept of an incomplete frame."""
 
     def feed(self, data: bytes) -> list[Reading]:
-        """Take bytes as they come and return what they complete, in order."""
+        """Process received bytes and return the readings that they complete, in order."""
 
 
 class Encoder(Protocol):
-    """The device's end: readings to the bytes that it would send."""
+    """The device side: readings to the bytes that the device would send."""
 
     def encode(self, readings: list[Reading]) -> bytes:
-        """Bytes of one moment of one device; what the format cannot say is left out."""
+        """Return the bytes of one device at one instant; unsupported readings are left out."""

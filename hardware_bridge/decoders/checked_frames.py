@@ -1,10 +1,9 @@
-"""Binary frames: they begin with a fixed byte, tell their length, end with the sum of their bytes.
+"""Binary frames with a fixed first byte, a length field and the sum of their bytes at the end.
 
-What looks like the beginning of a frame may be a byte in the middle of one, and the length that
-follows may be noise. So every possible beginning is followed at the same time, and of all frames
-whose sum is right the one that ends first is taken. A false beginning then holds up nothing: the
-good frame behind it is complete first. Which bytes are taken depends on the bytes alone, not on how
-they were cut.
+An apparent first byte may lie in the middle of a frame, and the length that follows may be noise.
+Therefore every possible beginning is tracked in parallel, and among frames with a correct sum the
+one that ends first is accepted. A false beginning delays nothing: the good frame behind it is
+complete first. The accepted bytes do not depend on how the stream was split.
 """
 
 from __future__ import annotations
@@ -18,15 +17,15 @@ from hardware_bridge.readings import Reading
 
 
 class CheckedFrames:
-    """The decoder of such a format.
+    """Decoder of such a format.
 
     Args:
         start: The first byte of every frame.
-        head: So many bytes tell how long a frame is.
-        length: Those bytes to the length of the frame with its check sum, 0 where no frame begins
-            so. It is at least `head` + 1, and at most `MOST_WAITING`.
-        read: A frame whose sum is right to readings; empty for one that says nothing to us. It may
-            raise `Damaged`, and nothing else.
+        head: Number of bytes needed to determine the length of a frame.
+        length: Function from these bytes to the length of the frame including its check sum, 0 if
+            no frame begins with them. At least `head` + 1, at most `MOST_WAITING`.
+        read: Function from a frame with a correct sum to readings; empty if the frame carries none.
+            It may raise `Damaged`, and nothing else.
     """
 
     def __init__(
@@ -40,21 +39,21 @@ class CheckedFrames:
         self._start, self._head, self._length, self._read = start, head, length, read
         self._kept = bytearray()
         self._from = 0
-        """Place of the first kept byte in the stream, as all places below."""
+        """Stream position of the first kept byte; all positions below are in the stream, too."""
         self._seen = 0
-        """No frame that is not open begins before this."""
+        """No frame except those in `_open` begins before this position."""
         self._open: list[tuple[int, int]] = []
-        """A heap of (end, beginning) of frames that may be."""
+        """Heap of (end, beginning) of candidate frames."""
         self._refused: list[int] = []
-        """Beginnings whose sum was wrong, as long as an open frame may hold them."""
+        """Beginnings of frames with a wrong sum, as long as a candidate frame may contain them."""
 
     @property
     def waiting(self) -> int:
-        """Bytes of frames that may be and are not complete."""
+        """Number of bytes kept of incomplete candidate frames."""
         return len(self._kept)
 
     def feed(self, data: bytes) -> list[Reading]:
-        """Take bytes as they come and return what they complete, in order."""
+        """Process received bytes and return the readings that they complete, in order."""
         self.counts.n_bytes += len(data)
         self._kept += data
         self._find()
@@ -70,7 +69,7 @@ class CheckedFrames:
         return readings
 
     def _find(self) -> None:
-        """Open every frame that may begin in the bytes that were not looked at."""
+        """Add every candidate frame that begins in the bytes not searched yet."""
         while True:
             at = self._kept.find(self._start, self._seen - self._from)
             if at < 0:
@@ -85,7 +84,7 @@ class CheckedFrames:
             self._seen += 1
 
     def _take(self, frame: bytes, begin: int, end: int) -> list[Reading]:
-        """What a frame with the right sum says; what overlaps it was none."""
+        """Return the readings of a frame with a correct sum; drop candidates that overlap it."""
         self._release(begin)
         del self._kept[: end - begin]
         self._from = end
@@ -104,7 +103,7 @@ class CheckedFrames:
         return readings
 
     def _release(self, to: int) -> None:
-        """Drop bytes before a place: they belong to no frame."""
+        """Drop the bytes before a position: they belong to no frame."""
         self.counts.strange += to - self._from
         self.counts.damaged += sum(begin < to for begin in self._refused)
         self._refused = [begin for begin in self._refused if begin >= to]

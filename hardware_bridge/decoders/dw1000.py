@@ -1,8 +1,8 @@
-r"""The lines of DW1000 boards with the thotro library, such as Makerfabs ESP32-UWB [1].
+r"""Lines of DW1000 boards with the thotro library, such as Makerfabs ESP32-UWB [1].
 
-``from: <HEX short address>\t Range: <metres> m\t RX power: <dBm> dBm``. The line does not say who
-prints it or when. Some tags also repeat the ranges once a second, to 0.1 m, as
-``{"links":[{"A":"1783","R":"1.2"}]}``: these are read as long as no line of the first form came.
+``from: <HEX short address>\t Range: <metres> m\t RX power: <dBm> dBm``. The line contains neither
+sender nor time. Some tags also repeat the ranges once a second, to 0.1 m, as
+``{"links":[{"A":"1783","R":"1.2"}]}``: these are read until a line of the first form arrives.
 
 References:
     [1] github.com/thotro/arduino-dw1000, github.com/Makerfabs/Makerfabs-ESP32-UWB.
@@ -28,18 +28,18 @@ MOST_LINKS = 64
 
 
 class RangeLines:
-    """Reads the lines of one board."""
+    """Reader of the lines of one board."""
 
     def __init__(self) -> None:
         self._has_lines = False
 
     def read_line(self, line: str) -> list[Reading]:
-        """A line to its ranges; what is neither form is a message for people.
+        """Return the ranges of a line; a line of neither form is a message for people.
 
         Raises:
-            Damaged: It began as a range and is none.
+            Damaged: The line begins as a range and is invalid.
         """
-        # The last mark: the end of the line before may be lost.
+        # Search the last mark: the end of the previous line may be lost.
         if (at := line.rfind(MARK)) >= 0:
             self._has_lines = True
             return [range_of(line[at:])]
@@ -50,7 +50,7 @@ class RangeLines:
 
 
 def range_of(text: str) -> RangeReading:
-    """The range of a line that begins with its mark."""
+    """Return the range of a line that begins with `MARK`."""
     match = RANGE_LINE.fullmatch(text.rstrip())
     if match is None:
         raise Damaged
@@ -63,7 +63,7 @@ def range_of(text: str) -> RangeReading:
 
 
 def links_of(text: str) -> list[Reading]:
-    """The ranges of a line of links; a link that was never measured says 0.0."""
+    """Return the ranges of a line of links; 0.0 marks a link without a measurement."""
     try:
         links = json.loads(text)["links"]
     except (ValueError, RecursionError):
@@ -84,5 +84,5 @@ def links_of(text: str) -> list[Reading]:
 
 
 def dw1000_decoder() -> Lines:
-    """The decoder of one port."""
+    """Return a decoder for one port."""
     return Lines(RangeLines().read_line)

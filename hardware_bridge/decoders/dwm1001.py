@@ -1,12 +1,12 @@
-"""The ``lec`` stream of the shell of DWM1001 modules with the maker's firmware (PANS) [1].
+"""``lec`` stream of the shell of DWM1001 modules with the manufacturer's firmware (PANS) [1].
 
 ``DIST,<n>,AN<i>,<id>,<x>,<y>,<z>,<metres>,...[,POS,<x>,<y>,<z>,<quality>]``: distances to anchors
-and where these are. Only the distances are read. A distance of 0.00 is a known fault of the
-firmware: it was not measured.
+and the positions of these. Only the distances are read. A distance of 0.00 is a known firmware
+fault and means that nothing was measured.
 
-At high rates characters get lost and lines run into each other. So all that the line says twice
-must agree: the number of anchors with the anchors, their indices with their order; and an anchor
-comes once.
+At high rates characters get lost and lines run into each other. Therefore redundant parts of the
+line must agree: the number of anchors with the anchors, their indices with their order; and each
+anchor may occur only once.
 
 References:
     [1] Decawave, DWM1001 firmware API guide 2.2.
@@ -31,13 +31,13 @@ POSITION = re.compile(rf"(,POS,{METRES},{METRES},{METRES},(100|[0-9]{{1,2}}))?")
 
 
 def read_line(line: str) -> list[Reading]:
-    """A line to its ranges; lines without distances say nothing to us.
+    """Return the ranges of a line; lines without distances have none.
 
     Raises:
-        Damaged: It began with distances and contradicts itself.
+        Damaged: The line begins with distances and contradicts itself.
     """
     line = line.replace(PROMPT, "").rstrip()
-    # The last mark: the end of the line before may be lost.
+    # Search the last mark: the end of the previous line may be lost.
     at = line.rfind(MARK)
     if at < 0:
         return []
@@ -62,5 +62,5 @@ def read_line(line: str) -> list[Reading]:
 
 
 def dwm1001_decoder() -> Lines:
-    """The decoder of one port."""
+    """Return a decoder for one port."""
     return Lines(read_line)

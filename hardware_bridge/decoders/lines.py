@@ -1,4 +1,4 @@
-"""Text that comes in lines: where they end, what is no text, and when to give one up."""
+"""Text in lines: line ends, invalid characters and the limit of length."""
 
 from __future__ import annotations
 
@@ -11,30 +11,30 @@ from hardware_bridge.decoders.plausible import Damaged
 from hardware_bridge.readings import Reading
 
 MOST_LINE = 1024
-"""[bytes] Twice the longest line of the formats that are known."""
+"""[bytes] Longest accepted line: twice the longest line of the known formats."""
 LINE_END = re.compile(rb"[\r\n]")
 NO_TEXT = re.compile(rb"[^\t -~]")
 
 LineReader: TypeAlias = Callable[[str], list[Reading]]
-"""A line, without its end, to readings; empty for a line that says nothing to us.
+"""Function from a line, without its end, to readings; empty if the line carries none.
 
 It may raise `Damaged`, and nothing else.
 """
 
 
 class Lines:
-    """The decoder of a format in lines, made of the function that reads one.
+    """Decoder of a line-based format, given the function that reads one line.
 
-    Either of carriage return and line feed ends a line. Since that is all that is waited for, the
-    line after a damaged one is read.
+    Carriage return or line feed ends a line. Nothing else is awaited, so the line after a damaged
+    one is read.
     """
 
     def __init__(self, read: LineReader, most: int = MOST_LINE) -> None:
-        """Begin with nothing read.
+        """Create a decoder without bytes.
 
         Args:
-            read: A line to readings.
-            most: Longer lines are given up [bytes].
+            read: Function from a line to readings.
+            most: Longest accepted line [bytes].
         """
         self.counts = Counts()
         self._read, self._most = read, most
@@ -43,11 +43,11 @@ class Lines:
 
     @property
     def waiting(self) -> int:
-        """Bytes of the line that has not ended."""
+        """Number of bytes of the incomplete line."""
         return len(self._line)
 
     def feed(self, data: bytes) -> list[Reading]:
-        """Take bytes as they come and return what they complete, in order."""
+        """Process received bytes and return the readings that they complete, in order."""
         self.counts.n_bytes += len(data)
         readings: list[Reading] = []
         *ended, rest = LINE_END.split(data)

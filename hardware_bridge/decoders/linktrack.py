@@ -1,15 +1,15 @@
 """Nooploop LinkTrack, distributed ranging (mode DR): Node_Frame3 and Node_Frame2 [1].
 
-Little-endian, ``55 <function> <u16 length> ... <sum>``. Other functions with a right sum are
-skipped; other products of the maker begin with 0x57 and are passed over.
+Little-endian, ``55 <function> <u16 length> ... <sum>``. Other functions with a correct sum are
+skipped; other products of the manufacturer begin with 0x57 and are ignored.
 
-Node_Frame2 holds the sensor's own readings and an orientation that the node filtered itself. Only
-the readings are given on: the tracker filters the orientation of all nodes in the same way, from
-readings whose errors it knows, and both together would count the same motion twice.
+Node_Frame2 holds an IMU sample and an orientation filtered by the node. Only the sample is passed
+on: the tracker filters the orientation of all nodes in the same way, from samples with known
+errors, and using both would count the same motion twice.
 
-Ids are counted separately for each role. A node of mode DR is its bare number; in the modes with
-anchors the letter of the role goes before it, as the maker's own program writes it: anchor 0 is
-A0, tag 1 is T1.
+Ids are counted separately for each role. A node of mode DR is named by its number; in the modes
+with anchors the letter of the role precedes it, as in the manufacturer's software: anchor 0 is A0,
+tag 1 is T1.
 
 References:
     [1] Nooploop, nlink_unpack, github.com/nooploop-dev/nlink_unpack.
@@ -36,10 +36,10 @@ START = 0x55
 NODE_FRAME_2, NODE_FRAME_3 = 0x04, 0x05
 FUNCTIONS = frozenset((0x00, 0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x08, 0x09))
 MOST_OTHER = 1024
-"""[bytes] The longest frame of another function that is waited for; Anchor_Frame0 has 896."""
+"""[bytes] Longest accepted frame of another function; Anchor_Frame0 has 896."""
 
 FARTHEST = 1000.0
-"""[m] Models with amplifiers reach farther than plain modules."""
+"""[m] Largest range: models with amplifiers reach farther than plain modules."""
 
 HEAD_3 = struct.Struct("<2xH2BI4x4xHB")
 NEIGHBOUR_3 = struct.Struct("<2B3s2B")
@@ -48,16 +48,16 @@ NEIGHBOUR_2 = struct.Struct("<2B3s2B4x2x")
 LAYOUTS = {NODE_FRAME_2: (HEAD_2, NEIGHBOUR_2), NODE_FRAME_3: (HEAD_3, NEIGHBOUR_3)}
 
 ROLES = {0: "", 1: "A", 2: "T", 3: "C"}
-"""Node, anchor, tag, console."""
+"""Letters of the roles node, anchor, tag and console."""
 
 
 def name_of(role: int, number: int) -> str:
-    """What a device is called."""
+    """Return the name of a device."""
     return f"{ROLES[role]}{number}" if role in ROLES else f"R{role}-{number}"
 
 
 def frame_length(head: bytes) -> int:
-    """Length by the first four bytes; 0 where it does not fit the function."""
+    """Return the length given by the first four bytes; 0 if it does not fit the function."""
     function, length = head[1], head[2] | head[3] << 8
     if function in LAYOUTS:
         fixed, each = (part.size for part in LAYOUTS[function])
@@ -67,7 +67,7 @@ def frame_length(head: bytes) -> int:
 
 
 def read_frame(frame: bytes) -> list[Reading]:
-    """A frame with the right sum to readings."""
+    """Return the readings of a frame with a correct sum."""
     function = frame[1]
     if function not in LAYOUTS:
         return []
@@ -91,7 +91,7 @@ def read_frame(frame: bytes) -> list[Reading]:
 
 
 def imu_of(source: Source, numbers: tuple[float, ...]) -> list[Reading]:
-    """Gyroscope [rad/s] and accelerometer [m/s2]; nothing of boards that have none."""
+    """Return gyroscope [rad/s] and accelerometer [m/s2]; nothing for boards without an IMU."""
     if not any(numbers):
         return []
     gyr: Vector = (numbers[0], numbers[1], numbers[2])
@@ -106,7 +106,7 @@ def imu_of(source: Source, numbers: tuple[float, ...]) -> list[Reading]:
 def range_of(
     source: Source, role: int, number: int, millimetres: bytes, first_path: int, total: int
 ) -> list[Reading]:
-    """The range to one neighbour; none where it was not measured."""
+    """Return the range to one neighbour; nothing if it was not measured."""
     measured = distance(int.from_bytes(millimetres, "little", signed=True) / 1000.0, FARTHEST)
     if measured is None:
         return []
@@ -122,5 +122,5 @@ def range_of(
 
 
 def linktrack_decoder() -> CheckedFrames:
-    """The decoder of one port."""
+    """Return a decoder for one port."""
     return CheckedFrames(START, 4, frame_length, read_frame)

@@ -1,7 +1,7 @@
-"""What a number of a device can be at all: the only check that formats without check sum have.
+"""Limits of reported numbers: the only check of formats without a check sum.
 
-A digit that was damaged into another digit passes every parser. What is left to do here is to
-refuse what no radio measures; what is possible but wrong is left to the gates of the tracker.
+A digit damaged into another digit passes every parser. Values that no radio measures are refused
+here; values that are possible but wrong are left to the gates of the tracker.
 """
 
 from __future__ import annotations
@@ -9,32 +9,32 @@ from __future__ import annotations
 import re
 
 NEAREST = 0.001
-"""[m] The formats print millimetres or less; 0 is what firmware says when it has no range."""
+"""[m] Smallest range: formats print millimetres or coarser, and 0 means no range."""
 FARTHEST = 300.0
-"""[m] Beyond what UWB radios of these modules reach in the open."""
+"""[m] Largest range, beyond the line-of-sight reach of these UWB modules."""
 WEAKEST = -140.0
-"""[dBm] Below the noise of the receivers."""
+"""[dBm] Smallest power, below the noise of the receivers."""
 STRONGEST = 0.0
-"""[dBm] The transmitters stay under -14 dBm."""
+"""[dBm] Largest power; the transmitters stay below -14 dBm."""
 MOST_RATE = 100.0
-"""[rad/s] A gyroscope of 2000 deg/s ends at 35."""
+"""[rad/s] Largest rate; a gyroscope of 2000 deg/s saturates at 35."""
 MOST_ACCEL = 1000.0
-"""[m/s2] An accelerometer of 16 g ends at 157."""
+"""[m/s2] Largest acceleration; an accelerometer of 16 g saturates at 157."""
 
 DECIMAL = re.compile(r"-?[0-9]{1,12}\.[0-9]{1,12}")
 NOT_FINITE = frozenset(("nan", "-nan", "inf", "-inf", "ovf", "-ovf"))
-"""What C and Arduino libraries print for numbers that are none."""
+"""Non-finite numbers as C and Arduino libraries print them."""
 
 
 class Damaged(Exception):
-    """A frame or line that cannot be right; decoders catch it and count."""
+    """A frame or line is invalid; decoders catch and count this."""
 
 
 def decimal(text: str) -> float | None:
-    """A printed number with a decimal point; None where it says that it is none.
+    """Return the value of a printed decimal number; None if it is not finite.
 
     Raises:
-        Damaged: It is not a number.
+        Damaged: The text is not a decimal number.
     """
     if DECIMAL.fullmatch(text):
         return float(text)
@@ -44,12 +44,12 @@ def decimal(text: str) -> float | None:
 
 
 def distance(value: float | None, farthest: float = FARTHEST) -> float | None:
-    """The distance [m], or None where nothing was measured: not a number, 0 or less.
+    """Return the distance [m]; None if nothing was measured: not a number, 0 or less.
 
     Raises:
-        Damaged: It is more than `farthest` [m].
+        Damaged: The distance is above `farthest` [m].
     """
-    if value is None or not value >= NEAREST:  # also what is not a number
+    if value is None or not value >= NEAREST:  # also true for NaN
         return None
     if value > farthest:
         raise Damaged
@@ -57,10 +57,10 @@ def distance(value: float | None, farthest: float = FARTHEST) -> float | None:
 
 
 def power(value: float | None) -> float | None:
-    """The power [dBm], None where it is not a number.
+    """Return the power [dBm]; None if it is not a number.
 
     Raises:
-        Damaged: Nothing is received so weakly or so strongly.
+        Damaged: The power is outside of the possible range.
     """
     if value is None or value != value:
         return None

@@ -1,12 +1,12 @@
-"""Positions of any other tracker, a JSON object a line; docs/how-to/positions.md has the format.
+"""Positions of an external tracker, one JSON object per line; see docs/how-to/positions.md.
 
     {"time": 81250000, "i": 1, "j": 2, "pos": [1.2, -0.4, 0.0], "vel": [0.1, 0.0, 0.0], "cov": 0.02}
     {"time": 81250000, "node": 1, "pos": [3.1, 0.2, 0.1], "q": [1, 0, 0, 0], "speed": 0.8}
 
 World frame: x east, y magnetic north, z up; metres, seconds, radians; `time` counts microseconds.
-Null, or a NaN among the numbers, is what was not measured. Keys that are not known say nothing to
-us, and neither do objects without nodes. There is no check sum: what cannot be is refused here,
-and positions that jump by `hardware_bridge.plausibility`.
+Null, or a NaN among the numbers, means not measured. Unknown keys and objects without nodes are
+ignored. There is no check sum: impossible values are refused here, and positions that jump in
+`hardware_bridge.plausibility`.
 """
 
 from __future__ import annotations
@@ -29,24 +29,24 @@ from hardware_bridge.readings import (
 from tracking.estimate import Status
 
 MOST_LINE = 2048
-"""[bytes] A line with a covariance of 36 numbers in full has 1200."""
+"""[bytes] Longest line; one with a full covariance of 36 numbers has 1200."""
 MOST_PLACE = 1e4
-"""[m] From the origin of the world, and from node to node."""
+"""[m] Largest distance from the world's origin, and between nodes."""
 MOST_SPEED = 100.0
-"""[m/s]"""
+"""[m/s] Largest speed."""
 MOST_VARIANCE = 1e6
-"""[m2]"""
+"""[m2] Largest variance."""
 MOST_NAME = 32
-"""[-] Characters of a node's name."""
+"""[-] Largest number of characters of a node's name."""
 UNIT = 0.05
-"""[-] How far the length of a quaternion may be from 1."""
+"""[-] Largest deviation of the norm of a quaternion from 1."""
 
 
 def read_line(line: str) -> list[Reading]:
-    """A line to its reading.
+    """Return the readings of a line.
 
     Raises:
-        Damaged: It is no object, or what it says cannot be.
+        Damaged: The line is not an object, or has an impossible value.
     """
     first, last = line.find("{"), line.rfind("{")
     if first < 0:
@@ -54,7 +54,7 @@ def read_line(line: str) -> list[Reading]:
     try:
         said = parse(line[first:])
     except Damaged:
-        # The end of the line before may be lost: then this one begins further on.
+        # The end of the previous line may be lost, then the object begins at the last brace.
         if first == last:
             raise
         said = parse(line[last:])
@@ -64,7 +64,7 @@ def read_line(line: str) -> list[Reading]:
 
 
 def pair_of(said: dict[str, Any]) -> list[Reading]:
-    """What is said of a pair."""
+    """Return the reading of an object about a pair."""
     i, j = name_of(said["i"]), name_of(said["j"])
     if i == j:
         raise Damaged
@@ -79,7 +79,7 @@ def pair_of(said: dict[str, Any]) -> list[Reading]:
 
 
 def pose_of(said: dict[str, Any]) -> list[Reading]:
-    """What is said of a node."""
+    """Return the reading of an object about a node."""
     node, source = name_of(said["node"]), source_of(said)
     pos, vel, cov = motion_of(said)
     q, speed = attitude_of(said), number(said.get("speed"), MOST_SPEED)
@@ -92,7 +92,7 @@ Motion = tuple[Vector | None, Vector | None, tuple[float, ...] | None]
 
 
 def motion_of(said: dict[str, Any]) -> Motion:
-    """Position, velocity and covariance, as far as they were measured."""
+    """Return position, velocity and covariance, None where not measured."""
     pos = vector(said.get("pos"), MOST_PLACE)
     vel = vector(said.get("vel"), MOST_SPEED)
     n = len(said["pos"]) if pos is not None else 3
@@ -105,7 +105,7 @@ def motion_of(said: dict[str, Any]) -> Motion:
 
 
 def source_of(said: dict[str, Any]) -> Source:
-    """The time that the line tells."""
+    """Return the source with the time of the line."""
     time = said.get("time")
     if time is None:
         return UNNAMED
@@ -117,7 +117,7 @@ def source_of(said: dict[str, Any]) -> Source:
 
 
 def name_of(value: Any) -> str:
-    """The name of a node: a number or a text."""
+    """Return the name of a node given as a number or a text."""
     if type(value) is int and 0 <= value < 10**9:
         return str(value)
     if type(value) is str and 0 < len(value) <= MOST_NAME and value.isprintable():
@@ -126,7 +126,7 @@ def name_of(value: Any) -> str:
 
 
 def status_of(value: Any) -> Status:
-    """A status by its name or its number."""
+    """Return a status given by its name or number."""
     if value is None:
         return Status.OK
     try:
@@ -136,14 +136,14 @@ def status_of(value: Any) -> Status:
 
 
 def whole(value: Any) -> int:
-    """An integer that is no bool."""
+    """Return the value if it is an integer and not a bool."""
     if type(value) is not int:
         raise Damaged
     return value
 
 
 def number(value: Any, most: float) -> float | None:
-    """A number, or None where it was not measured."""
+    """Return the number, or None if it was not measured."""
     if value is None or (type(value) is float and math.isnan(value)):
         return None
     if type(value) not in (int, float) or not -most <= value <= most:
@@ -152,7 +152,7 @@ def number(value: Any, most: float) -> float | None:
 
 
 def vector(value: Any, most: float) -> Vector | None:
-    """Two or three numbers, z is 0 if there are two; None where one of them was not measured."""
+    """Return two or three numbers, with z = 0 if there are two; None if one was not measured."""
     if value is None:
         return None
     if type(value) is not list or len(value) not in (2, 3):
@@ -165,7 +165,7 @@ def vector(value: Any, most: float) -> Vector | None:
 
 
 def attitude_of(said: dict[str, Any]) -> tuple[float, float, float, float] | None:
-    """The orientation, by a quaternion or by the angle from east, counter-clockwise."""
+    """Return the orientation, from a quaternion or from the yaw from east, counter-clockwise."""
     value, yaw = said.get("q"), number(said.get("yaw"), 1e6)
     if value is None:
         return None if yaw is None else (math.cos(yaw / 2.0), 0.0, 0.0, math.sin(yaw / 2.0))
@@ -182,10 +182,10 @@ def attitude_of(said: dict[str, Any]) -> tuple[float, float, float, float] | Non
 
 
 def covariance(value: Any, n: int) -> tuple[float, ...] | None:
-    """Of n axes, or of position and velocity: a standard deviation, or n or 2n rows.
+    """Return the covariance of n axes or of position and velocity from a std, or n or 2n rows.
 
     Returns:
-        3 x 3 or 6 x 6; across the plane, where n is 2, with the larger variance of the two.
+        3 x 3 or 6 x 6; if n is 2, the variance of z is the larger one of x and y.
     """
     if value is None:
         return None
@@ -206,13 +206,13 @@ def covariance(value: Any, n: int) -> tuple[float, ...] | None:
 
 
 def spread(rows: list[list[float]], n: int) -> tuple[float, ...]:
-    """A covariance of n axes as one of three."""
+    """Expand a covariance of n axes to three axes."""
     check_definite(rows)
     blocks = len(rows) // n
     full = [[0.0] * (3 * blocks) for _ in range(3 * blocks)]
     for r, row in enumerate(rows):
         for c, each in enumerate(row):
-            # The mean with its mirror image: what is printed is rounded.
+            # Symmetrise: printed numbers are rounded.
             full[r // n * 3 + r % n][c // n * 3 + c % n] = 0.5 * (each + rows[c][r])
     if n == 2:
         for b in range(blocks):
@@ -221,7 +221,7 @@ def spread(rows: list[list[float]], n: int) -> tuple[float, ...]:
 
 
 def check_definite(rows: list[list[float]]) -> None:
-    """Refuse what is not symmetric and positive definite, by Cholesky's decomposition."""
+    """Raise `Damaged` if not symmetric and positive definite, by Cholesky decomposition."""
     size = len(rows)
     low = [[0.0] * size for _ in range(size)]
     largest = max(abs(each) for row in rows for each in row)
@@ -240,5 +240,5 @@ def check_definite(rows: list[list[float]]) -> None:
 
 
 def positions_decoder() -> Lines:
-    """The decoder of one port."""
+    """Return a decoder for one port."""
     return Lines(read_line, MOST_LINE)

@@ -1,4 +1,4 @@
-"""Our own nodes and cars: see docs/reference/wire-format.md."""
+"""Decoder of our own nodes and cars, see docs/reference/wire-format.md."""
 
 from __future__ import annotations
 
@@ -13,34 +13,34 @@ from hardware_bridge.wire.key import REMOVED_KEY
 
 
 class RelposDecoder:
-    """Frames to readings, each with device, boot, sequence and time of its frame.
+    """Decoder of frames to readings with device, boot, sequence and time of their frame.
 
-    With a key, frames without a MAC or with a wrong one are damaged. That a frame with a right MAC
-    was not seen before is for the receiver to check, by boot and sequence.
+    With a key, frames without a MAC or with a wrong one count as damaged. The receiver must detect
+    replayed frames with a correct MAC, by boot and sequence.
     """
 
     def __init__(self, key: bytes | None = None) -> None:
-        """Take the key.
+        """Create a decoder.
 
         Args:
-            key: 16 bytes; None and `REMOVED_KEY`: MACs are not checked.
+            key: 16 bytes; with None or `REMOVED_KEY` MACs are not checked.
 
         Raises:
-            ValueError: It is not so long.
+            ValueError: The key does not have 16 bytes.
         """
         self.counts = Counts()
         self._codec = Codec(None if key == REMOVED_KEY else key)
         self._batch = Batch()
         self._kept = b""
-        self._lost = False  # in a frame that was too long, up to the next zero
+        self._lost = False  # within a frame that was too long, until the next zero
 
     @property
     def waiting(self) -> int:
-        """Bytes kept of a frame that is not complete."""
+        """Number of bytes kept of an incomplete frame."""
         return len(self._kept)
 
     def feed(self, data: bytes) -> list[Reading]:
-        """Take bytes as they come and return what they complete, in order."""
+        """Process received bytes and return the readings that they complete, in order."""
         self.counts.n_bytes += len(data)
         if self._lost:
             zero = data.find(0)

@@ -1,13 +1,13 @@
-"""Slamtec RPLidar and those that speak like it, standard scan: five bytes a sample [1].
+"""Slamtec RPLidar and compatible scanners, standard scan: five bytes per sample [1].
 
     quality << 2 | not start << 1 | start, angle << 1 | 1, angle >> 7, distance low, distance high
 
-The angle counts 1/64 degree, clockwise from the scanner's front; the distance counts quarters of
-a millimetre, and 0 is a direction in which nothing was measured, which tells nothing.
+The angle is in 1/64 degree, clockwise from the scanner's front; the distance is in quarters of a
+millimetre, and 0 is a direction without a measurement, which carries no information.
 
-There is no check sum. So samples are believed once `LOCK` of them follow each other: the two bits
-contradict each other, the third is set, and the angle goes on as that of something that turns. A
-scanner corrects each angle for its parallax, so neighbours may also go back a little.
+There is no check sum. Therefore samples are accepted once `LOCK` of them follow each other: the two
+start bits differ, the third bit is set, and the angle advances as in a rotation. A scanner corrects
+each angle for its parallax, so neighbours may also go back a little.
 
 References:
     [1] Slamtec, RPLIDAR Interface Protocol and Application Notes, v2.2, section 4, "SCAN" and
@@ -24,44 +24,44 @@ from hardware_bridge.readings import Reading, ScanReading, Source
 
 SAMPLE = struct.Struct("<BHH")
 ANGLE_UNIT = pi / 180.0 / 64.0
-"""[rad]"""
+"""[rad] Unit of the angle."""
 TURN = 360 * 64
-"""[1/64 deg]"""
+"""[1/64 deg] One revolution."""
 DISTANCE_UNIT = 0.00025
-"""[m]"""
+"""[m] Unit of the distance."""
 LOCK = 8
-"""[-] So many samples in a row make sure where samples begin."""
+"""[-] Number of consecutive samples that fixes the sample boundaries."""
 FARTHEST_STEP, FARTHEST_BACK = 20 * 64, 10 * 64
-"""[1/64 deg] Between two samples with the turn, of which a slow scanner that turns fast makes 5,
-and against it, by the parallax of a near point."""
+"""[1/64 deg] Largest steps between two samples: forward (a slow scanner that turns fast makes 5
+deg) and backward, by the parallax of a near point."""
 LEAST_TURN = 32
-"""[1/64 deg] Over `LOCK` samples; the densest scanner makes 0.8 deg."""
+"""[1/64 deg] Smallest rotation over `LOCK` samples; the densest scanner makes 0.8 deg."""
 WATCH = 8 * LOCK
-"""[-] Samples over which the turn is checked once locked: parallax may take some of it back."""
+"""[-] Samples over which the rotation is checked once locked: parallax may reverse a part."""
 REQUEST = bytes.fromhex("a5f0029402c1 a520")
-"""Turn the motor, where the adapter has a line for that, and scan; others ignore the first."""
+"""Start the motor, if the adapter controls it, and scan; other adapters ignore the first part."""
 
 
 class RplidarDecoder:
-    """The decoder of one port."""
+    """Decoder of one port."""
 
     def __init__(self) -> None:
         self.counts = Counts()
         self._kept = bytearray()
         self._run: list[Reading | None] = []
-        """Of samples that follow each other and are not believed yet; None without a distance."""
+        """Readings of consecutive samples not accepted yet; None for one without a distance."""
         self._n_run = 0
-        """Samples in a row, `LOCK` where they are believed."""
+        """Number of consecutive samples, `LOCK` once they are accepted."""
         self._angle = self._turned = self._watched = 0
-        """Of the last sample; since the first of those that are looked at [1/64 deg]; how many."""
+        """Last angle, rotation over the samples under check [1/64 deg], number of these samples."""
 
     @property
     def waiting(self) -> int:
-        """Bytes of samples that are not believed yet."""
+        """Number of bytes of samples that are not accepted yet."""
         return len(self._kept)
 
     def feed(self, data: bytes) -> list[Reading]:
-        """Take bytes as they come and return what they complete, in order."""
+        """Process received bytes and return the readings that they complete, in order."""
         self.counts.n_bytes += len(data)
         kept, source = self._kept, Source()
         kept += data
@@ -81,7 +81,7 @@ class RplidarDecoder:
                 begin = at
                 self._release(readings)
             elif self._n_run:
-                # A believed sample is done with; of others any byte may begin the first.
+                # An accepted sample is consumed; otherwise any byte may begin the first sample.
                 at = begin if self._n_run == LOCK else begin + 1
                 self.counts.strange += at - begin
                 begin = at
@@ -98,7 +98,7 @@ class RplidarDecoder:
         return 0 if self._n_run == LOCK else self._n_run
 
     def _follows(self, head: int, angle: int) -> bool:
-        """Take a sample into the run, if it can be one and be the next."""
+        """Add a sample to the run if it is valid and can follow the previous one."""
         if (head ^ head >> 1) & angle & 1 == 0 or angle >> 1 >= TURN:
             return False
         angle >>= 1

@@ -1,6 +1,6 @@
 """JSON lines of uwb-core and uwb-apps, the open firmware of DWM1001 boards [1].
 
-The forms that say a range, of the years 2019 to 2021:
+Forms with a range, of the years 2019 to 2021:
 
     {"utime": 1, "uid": 39068, "ouid": 4660, "raz": [4.56], "rssi": [-88.5]}
     {"utime": 1, "uid": 39068, "ouid": [4660, 17], "rng": [4.56, 1.20]}
@@ -8,16 +8,15 @@ The forms that say a range, of the years 2019 to 2021:
     {"utime": 1, "twr": {"rng": "1.071", "uid": "d22d"}, "uid": "55a6", "diag": {"rssi": "-79.5"}}
     {"utime": 1, "tof": 1101004815, "range": 1036004551}
 
-Ids are numbers, or texts in hex; here they are always four capital hex digits. Numbers may be
-texts; an integer where metres belong is the bit pattern of a float32, null is what was not
-measured. The last form names no node: its range goes to "", for two boards that know only each
-other.
+Ids are numbers or texts in hex; here they are always four capital hex digits. Numbers may be texts;
+an integer in place of metres is the bit pattern of a float32, null means not measured. The last
+form names no node: its range goes to "", for two boards that know only each other.
 
-A board also prints ranges that others measured and sent it, so `uid` is an end of the range and
-not who speaks: it becomes `RangeReading.nearer`, and the port's configuration says whose the clock
-is. `utime` counts microseconds in 32 bits, but the time of the network, in 64 bits of the radio's
-ticks, where the firmware was built to keep that (``UWB_WCS_ENABLED``, rng_encode.c); soon after the
-network's start it is past 32 bits and told apart by that.
+A board also prints ranges that others measured and sent to it, so `uid` is an end of the range and
+not the sender: it becomes `RangeReading.nearer`, and the port's configuration names the owner of
+the clock. `utime` counts microseconds in 32 bits, or the network's time in radio ticks in 64 bits
+if the firmware was built with it (``UWB_WCS_ENABLED``, rng_encode.c). The latter exceeds 32 bits
+soon after the network's start, which distinguishes the two.
 
 References:
     [1] github.com/Decawave/uwb-core, github.com/Decawave/uwb-apps.
@@ -44,19 +43,19 @@ from hardware_bridge.readings import (
 
 RADIO_64 = DeviceClock(RADIO_40.hz, 1 << 64)
 LEAST_RADIO = 10**10
-"""Ten digits past 32 bits are microseconds with a damaged digit, or the network's first 0.16 s."""
+"""Ten digits past 32 bits are damaged microseconds, or the network's first 0.16 s."""
 MARK = '{"utime"'
 HEX_ID = re.compile(r"[0-9a-fA-F]{1,4}")
 DIGITS = re.compile(r"[0-9]{1,10}")
 
 
 def read_line(line: str) -> list[Reading]:
-    """A line to its ranges; objects without any, banners and prompts say nothing to us.
+    """Return the ranges of a line; objects without ranges, banners and prompts have none.
 
     Raises:
-        Damaged: It is no object, or what it says cannot be.
+        Damaged: The text is not an object, or has an impossible value.
     """
-    # A prompt may stand before it, or a line whose end was lost.
+    # A prompt, or a line whose end was lost, may precede the object.
     at = max(line.rfind(MARK), line.find("{"))
     if at < 0:
         return []
@@ -68,7 +67,7 @@ def read_line(line: str) -> list[Reading]:
 
 
 def parse(text: str) -> dict[str, Any]:
-    """The object of a text that begins with a brace; one key twice is two lines in one."""
+    """Return the object of a text that begins with a brace; a repeated key means merged lines."""
     try:
         said: dict[str, Any] = json.loads(text, object_pairs_hook=without_doubles)
     except (ValueError, RecursionError):
@@ -77,7 +76,7 @@ def parse(text: str) -> dict[str, Any]:
 
 
 def without_doubles(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """The object of these pairs."""
+    """Return the object of these pairs; raise `Damaged` on a repeated key."""
     said = dict(pairs)
     if len(said) != len(pairs):
         raise Damaged
@@ -85,7 +84,7 @@ def without_doubles(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def source_of(said: dict[str, Any]) -> Source:
-    """The time that the line tells."""
+    """Return the source with the time of the line."""
     ticks = said.get("utime")
     if ticks is None:
         return UNNAMED
@@ -99,11 +98,11 @@ def source_of(said: dict[str, Any]) -> Source:
 
 
 Range = tuple[str | None, str, float, float | None]
-"""Who, or None; to whom; [m]; [dBm]."""
+"""Nearer end or None, other end, distance [m], power [dBm]."""
 
 
 def ranges_of(said: dict[str, Any]) -> list[Range]:
-    """The ranges of an object, in whichever form."""
+    """Return the ranges of an object of any form."""
     own = id_of(said["uid"]) if "uid" in said else None
     if "nrng" in said:
         return many(own, part(said, "nrng").get("uid"), part(said, "nrng").get("rng"))
@@ -122,7 +121,7 @@ def ranges_of(said: dict[str, Any]) -> list[Range]:
 
 
 def one(own: str | None, to: Any, metres: Any, dbm: Any) -> list[Range]:
-    """A range to one other, with the power where it is told."""
+    """Return the range to one other device, with the power if it is given."""
     other = id_of(to)
     if other == own:
         raise Damaged
@@ -132,7 +131,7 @@ def one(own: str | None, to: Any, metres: Any, dbm: Any) -> list[Range]:
 
 
 def many(own: str | None, to: Any, metres: Any) -> list[Range]:
-    """Ranges to several others; without their names nothing can be made of them."""
+    """Return the ranges to several other devices; nothing if these are not named."""
     if to is None and isinstance(metres, list):
         return []
     if not isinstance(to, list) or not isinstance(metres, list) or len(to) != len(metres):
@@ -147,7 +146,7 @@ def many(own: str | None, to: Any, metres: Any) -> list[Range]:
 
 
 def part(said: dict[str, Any], key: str) -> dict[str, Any]:
-    """An object within the object."""
+    """Return an object within the object."""
     inner = said[key]
     if not isinstance(inner, dict):
         raise Damaged
@@ -155,7 +154,7 @@ def part(said: dict[str, Any], key: str) -> dict[str, Any]:
 
 
 def first(value: Any) -> Any:
-    """Range or power of a list that goes on with angles or further antennas."""
+    """Return the first value of a list that also holds angles or further antennas."""
     if not isinstance(value, list):
         return value
     if not 1 <= len(value) <= 3:
@@ -164,16 +163,16 @@ def first(value: Any) -> Any:
 
 
 def id_of(value: Any) -> str:
-    """An id as four capital hex digits."""
+    """Return an id as four capital hex digits."""
     if isinstance(value, str) and HEX_ID.fullmatch(value):
         value = int(value, 16)
-    if type(value) is not int or not 0 < value < 0xFFFF:  # all ones is everybody
+    if type(value) is not int or not 0 < value < 0xFFFF:  # 0xFFFF is broadcast
         raise Damaged
     return f"{value:04X}"
 
 
 def number(value: Any) -> float | None:
-    """A number however it is written; None where nothing was measured."""
+    """Return a number in any notation; None if nothing was measured."""
     if value is None or isinstance(value, float):
         return value
     if isinstance(value, str):
@@ -187,5 +186,5 @@ def number(value: Any) -> float | None:
 
 
 def uwb_core_decoder() -> Lines:
-    """The decoder of one port."""
+    """Return a decoder for one port."""
     return Lines(read_line)

@@ -1,12 +1,12 @@
 """WitMotion inertial sensors, the standard protocol: ``55 TT d0..d7 SUM`` [1].
 
 One burst holds a frame per quantity, in the order of their types. Accelerometer and gyroscope of a
-burst become one reading, with the magnetometer where the sensor is set to send it. Time, angle and
-quaternion are skipped: the tracker filters orientation itself.
+burst become one reading, with the magnetometer if the sensor is configured to send it. Time, angle
+and quaternion are skipped: the tracker filters orientation itself.
 
-The magnetometer comes after the gyroscope, and whether it will come is known from the burst
-before: while it does, a reading waits for it; while it does not, the gyroscope completes the
-reading. Of the first burst nothing is known, it waits for the next frame of either kind.
+The magnetometer follows the gyroscope, and the previous burst tells whether to expect it: if so, a
+reading waits for it; if not, the gyroscope completes the reading. A reading of the first burst
+waits for the next frame of either kind.
 
 References:
     [1] WitMotion, WT901 datasheet v20-0702, section 5.1; the unit of the magnetometer from the
@@ -27,29 +27,29 @@ TYPES = range(0x50, 0x60)
 FRAME = struct.Struct("<2B4hB")
 
 ACC_UNIT = 16.0 * 9.80665 / 32768.0
-"""[m/s2]"""
+"""[m/s2] Unit of the accelerometer."""
 GYR_UNIT = 2000.0 * pi / 180.0 / 32768.0
-"""[rad/s]"""
+"""[rad/s] Unit of the gyroscope."""
 MAG_UNIT = 0.1
-"""[uT] A milligauss. Models differ; a calibration takes up the scale."""
+"""[uT] Unit of the magnetometer, one milligauss. Models differ; calibration absorbs the scale."""
 
 
 def frame_length(head: bytes) -> int:
-    """All frames are as long."""
+    """Return the length of a frame, equal for all types; 0 for an unknown type."""
     return FRAME.size if head[1] in TYPES else 0
 
 
 class Bursts:
-    """Joins the frames of a burst."""
+    """Combination of the frames of a burst to readings."""
 
     def __init__(self) -> None:
         self._acc: Vector | None = None
         self._imu: ImuReading | None = None
-        """A reading that waits for its magnetometer."""
+        """Reading that waits for its magnetometer sample."""
         self._mag_comes: bool | None = None
 
     def read_frame(self, frame: bytes) -> list[Reading]:
-        """A frame with the right sum to the readings that it completes."""
+        """Return the readings that a frame with a correct sum completes."""
         kind, x, y, z = FRAME.unpack(frame)[1:5]
         if kind in (TIME, ACC):
             readings = self._finish(None)
@@ -62,7 +62,7 @@ class Bursts:
             if self._mag_comes is False:
                 return self._finish(None)
             return []
-        # A gyroscope that follows later belongs to another burst.
+        # A gyroscope frame that follows later belongs to another burst.
         self._acc = None
         if kind != MAG:
             return []
@@ -78,5 +78,5 @@ class Bursts:
 
 
 def witmotion_decoder() -> CheckedFrames:
-    """The decoder of one port."""
+    """Return a decoder for one port."""
     return CheckedFrames(START, 2, frame_length, Bursts().read_frame)

@@ -1,4 +1,4 @@
-"""Measurements of a live run as a log folder, which `relpos track` reads."""
+"""Export of the measurements of a live run as a log folder for `relpos track`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tracking.log.read import MAX_ACC, MAX_DISTANCE, MAX_GYR, MAX_MAG
 from tracking.measurements import Kind, MeasurementBlock
 
 N_COLUMNS = 7
-"""Columns of values that a log has a place for; the eighth is made again by the tracker."""
+"""Number of value columns of a log; the tracker computes the eighth again."""
 _LIMITS = {
     Kind.MAG: np.array([MAX_MAG] * 3),
     Kind.IMU: np.array([MAX_GYR] * 3 + [MAX_ACC] * 3),
@@ -33,24 +33,24 @@ def export_log(
     name: str,
     source: str = "",
 ) -> dict[str, int]:
-    """Write measurements as a log, and read it back to see that it is one.
+    """Write measurements as a log, and read it back to verify it.
 
-    A log holds what can be: a range that is not above 0 and at most 300 m, a value beyond any
-    sensor, an inertial sample of a static node are left out, as `read_log` would.
+    Invalid events are left out, as `read_log` would: ranges not above 0 or above 300 m, values
+    beyond the scale of any sensor, and inertial samples of static nodes.
 
     Args:
-        folder: New or empty.
-        block: Of one environment, in any order.
-        constellation: Who took part.
-        name: Of the run.
-        source: Where it comes from.
+        folder: New or empty folder.
+        block: Measurements of one environment, in any order.
+        constellation: Nodes of the run.
+        name: Name of the run.
+        source: Origin of the run.
 
     Returns:
-        Events left out, by kind, such as ``{"RANGE": 3}``.
+        Number of events left out, by kind, such as ``{"RANGE": 3}``.
 
     Raises:
-        BridgeError: The folder is taken, or the run makes no log: it has no range, or a magnetic
-            heading without a magnetometer.
+        BridgeError: The folder is not empty, or the run makes no valid log: it has no range, or a
+            magnetic heading without a magnetometer.
     """
     if block.n_envs != 1:
         raise BridgeError(f"block: expected one environment, got {block.n_envs}")
@@ -78,7 +78,7 @@ def export_log(
 
 
 def _fits(block: MeasurementBlock, constellation: Constellation) -> Bool:
-    """Events that a log has a place for, (event)."""
+    """Return the mask of events that a log can hold, (event)."""
     kind, values, i, j = block.kind[0], block.values[0], block.i[0], block.j[0]
     good = np.isin(kind, (Kind.JOIN, Kind.LEAVE))
     static = constellation.is_static

@@ -1,4 +1,4 @@
-"""A run as an MCAP file with messages of ROS 2, for Foxglove, PlotJuggler, rosbag2 and others."""
+"""Export of a run as an MCAP file with ROS 2 messages, for Foxglove, PlotJuggler, rosbag2."""
 
 from __future__ import annotations
 
@@ -30,20 +30,20 @@ def export_mcap(
     """Write measurements and estimates, in order of time.
 
     Args:
-        path: A new file.
-        block: Of one environment, in any order.
-        constellation: Who took part.
-        estimate: Arrays over (time, ...).
+        path: File to create.
+        block: Measurements of one environment, in any order.
+        constellation: Nodes of the run.
+        estimate: Estimates, arrays over (time, ...).
         reference: Id of the node at the origin of the frame ``map``; default: the first.
-        offset_ns: [ns] Added to every time, `Header.wall_ns` for UTC.
-        notes: Written as metadata ``relpos``.
+        offset_ns: Offset added to every time [ns], `Header.wall_ns` for UTC.
+        notes: Metadata to write as ``relpos``.
 
     Returns:
-        Messages in the file.
+        Number of messages in the file.
 
     Raises:
-        BridgeError: The file exists or cannot be written, no such node, a time that ROS cannot
-            say, or the libraries of MCAP are not installed.
+        BridgeError: The file exists or cannot be written, the node is unknown, a time is outside of
+            the range of ROS, or the MCAP libraries are not installed.
     """
     try:
         from mcap_ros2.writer import Writer

@@ -1,8 +1,8 @@
-"""Definitions of the ROS 2 messages of an MCAP file, which carries them with it.
+"""Definitions of the ROS 2 messages of an MCAP file, which are stored in the file.
 
-Fields as in ``common_interfaces``, ``geometry2`` and ``rcl_interfaces`` of ROS 2. For a range
-between two radios there is no standard message: ``sensor_msgs/Range`` is a cone of sound or light
-from one sensor and names no other end, so `UwbRange` is our own.
+Fields are as in ``common_interfaces``, ``geometry2`` and ``rcl_interfaces`` of ROS 2. There is no
+standard message for a range between two radios: ``sensor_msgs/Range`` is a cone of sound or light
+from one sensor without another end, so `UwbRange` is our own.
 """
 
 from __future__ import annotations
@@ -69,10 +69,10 @@ _FIELDS = {
 
 
 def definition(name: str) -> str:
-    """A message's definition with those of all it is made of, as MCAP and rosbag2 write them.
+    """Return the definition of a message and its parts in the format of MCAP and rosbag2.
 
     Args:
-        name: With the part in the middle, ``sensor_msgs/msg/Imu``.
+        name: Name with the part in the middle, ``sensor_msgs/msg/Imu``.
     """
     first = name.replace("/msg/", "/")
     order = [first]

@@ -1,9 +1,9 @@
-"""Estimates as messages of ROS 2.
+"""Estimates as ROS 2 messages.
 
-For every pair a ``nav_msgs/Odometry``: pose of node j in the body frame of node i with its
-covariance, and their difference of velocities in the axes of j. For viewers a tree of frames:
-``map``, with the axes of the world, has the reference node at its origin and all others around.
-A node whose orientation was not measured has a frame along the axes of the world.
+Every pair is a ``nav_msgs/Odometry``: pose of node j in the body frame of node i with its
+covariance, and the velocity difference in the axes of j. For viewers there is a tree of frames:
+``map``, with the axes of the world, has the reference node at its origin and all others around. A
+node without a measured orientation has a frame along the axes of the world.
 """
 
 from __future__ import annotations
@@ -23,23 +23,23 @@ from tracking.geometry import quat_conjugate, quat_multiply, quat_to_matrix
 
 MAP = "map"
 ANY_ANGLE = math.pi**2 / 3.0
-"""[rad2] Variance of an angle of which nothing is known; the tracker gives none of its own."""
+"""[rad2] Variance of an unknown angle (uniform); the tracker estimates none."""
 ANY_RATE = 1e6
-"""[rad2/s2] For angular rates, which are no part of an estimate."""
+"""[rad2/s2] Variance of angular rates, which are not part of an estimate."""
 _NOTHING = (Status.ABSENT, Status.STARTING)
 _NONE = (0.0, 0.0, 0.0)
 
 
 def estimate_messages(estimate: TeamEstimate, reference: int, offset_ns: int) -> Iterator[Message]:
-    """Messages in order of time.
+    """Yield messages in order of time.
 
     Args:
-        estimate: Arrays over (time, ...).
+        estimate: Estimates, arrays over (time, ...).
         reference: Id of the node at the origin of ``map``.
-        offset_ns: [ns] Added to every time.
+        offset_ns: Offset added to every time [ns].
 
     Raises:
-        BridgeError: A time that ROS cannot say.
+        BridgeError: A time is outside of the range of ROS.
     """
     constellation = estimate.constellation
     ids = constellation.ids
@@ -82,7 +82,7 @@ def estimate_messages(estimate: TeamEstimate, reference: int, offset_ns: int) ->
 def _tree(
     estimate: TeamEstimate, reference: int, k: int, t_ns: int, q_wb: F64, has: np.ndarray
 ) -> Iterator[Message]:
-    """Frames of one instant, if the reference has an estimate of any other node."""
+    """Yield the frames of one instant, if any other node is estimated relative to the reference."""
     constellation = estimate.constellation
     transforms = []
     for j, node in enumerate(constellation.ids):
@@ -105,7 +105,7 @@ def _tree(
 
 
 def _covariance(linear: F64, angular: float) -> list[float]:
-    """6 x 6, row by row: the linear part, and one variance for the angular part."""
+    """Return a 6 x 6 matrix, row by row: linear part, and one variance for the angular part."""
     cov = np.diag([0.0, 0.0, 0.0, angular, angular, angular])
     cov[:3, :3] = linear
     return [float(v) for v in cov.ravel()]

@@ -1,4 +1,4 @@
-"""Measurements as messages of ROS 2, topics and signs as REP 145 has them."""
+"""Measurements as ROS 2 messages, with topics and signs of REP 145."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from tracking.measurements import Kind, MeasurementBlock
 
 RANGES = "/uwb/ranges"
 TESLA = 1e-6
-"""[T/uT]"""
+"""[T/uT] Unit of magnetic fields."""
 _UNKNOWN = [0.0] * 9
-"""A covariance of zeros is one that was not given."""
+"""Covariance that is not given: zeros."""
 _ABSENT = [-1.0, *_UNKNOWN[1:]]
-"""What belongs to this covariance was not measured."""
+"""Covariance of a quantity that was not measured."""
 _NONE = (0.0, 0.0, 0.0)
 _IDENTITY = (1.0, 0.0, 0.0, 0.0)
 
@@ -28,10 +28,10 @@ _IDENTITY = (1.0, 0.0, 0.0, 0.0)
 def measurement_messages(
     block: MeasurementBlock, constellation: Constellation, offset_ns: int
 ) -> Iterator[Message]:
-    """Messages in order of time, for a block of one environment; JOIN and LEAVE have none.
+    """Yield messages in order of time from one environment; JOIN and LEAVE have none.
 
     Raises:
-        BridgeError: A time that ROS cannot say.
+        BridgeError: A time is outside of the range of ROS.
     """
     block = block.env(0).sorted()
     stamps = stamps_ns(block.t, offset_ns)
@@ -44,7 +44,7 @@ def measurement_messages(
             content |= _imu(gyr=values[:3], acc=values[3:6])
             yield Message(t_ns, f"/{frame(node)}/imu/data_raw", IMU, content)
         elif kind == Kind.STATE:
-            # The specific force again, from which the node took gravity.
+            # Restore the specific force: the node has subtracted gravity.
             acc = rotate(quat_conjugate(values[:4]), values[4:7] + [0.0, 0.0, GRAVITY])
             content |= _imu(acc=acc, q_wb=values[:4])
             yield Message(t_ns, f"/{frame(node)}/imu/data", IMU, content)

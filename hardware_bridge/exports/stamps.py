@@ -1,4 +1,4 @@
-"""Times of a run as whole nanoseconds."""
+"""Conversion of the times of a run to integer nanoseconds."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from hardware_bridge.errors import BridgeError
 from tracking.arrays import F64
 
 LAST_NS = (2**31 - 1) * 1_000_000_000
-"""[ns] Time stamps of ROS 2 hold seconds in 32 bits with a sign."""
+"""[ns] Largest time stamp of ROS 2, with signed seconds in 32 bits."""
 
 
 def stamps_ns(t: F64, offset_ns: int) -> list[int]:
-    """Times (...) [s] plus an offset, as a flat list of nanoseconds.
+    """Return times (...) [s] plus an offset as a flat list of nanoseconds.
 
     Raises:
-        BridgeError: One is not finite, before 0, or after 2038.
+        BridgeError: A time is not finite, before 0, or after 2038.
     """
     flat = np.ravel(t)
     if not np.isfinite(flat).all():
         raise BridgeError("t: expected finite times")
-    # Whole seconds apart, so that a product with 1e9 loses nothing.
+    # Whole seconds are separated, so that the product with 1e9 is exact.
     whole = np.floor(flat)
     parts = np.rint((flat - whole) * 1e9)
     stamps = [

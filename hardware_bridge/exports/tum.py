@@ -1,8 +1,8 @@
 """Estimates as trajectories in the text format of the TUM RGB-D benchmark.
 
-One line a time, ``timestamp tx ty tz qx qy qz qw``: position of a node relative to the reference
-node in the axes of the world, and orientation of its body in the world (Sturm et al., A benchmark
-for the evaluation of RGB-D SLAM systems, IROS 2012).
+Lines are ``timestamp tx ty tz qx qy qz qw``: position of a node relative to the reference node in
+the axes of the world, and orientation of its body in the world (Sturm et al., A benchmark for the
+evaluation of RGB-D SLAM systems, IROS 2012).
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ def export_tum(
     """Write ``node_ID.txt`` for every node but the reference that has an estimate.
 
     Args:
-        folder: New or empty.
-        estimate: Arrays over (time, ...).
+        folder: New or empty folder.
+        estimate: Estimates, arrays over (time, ...).
         reference: Id of the node that stays at the origin; default: the first.
-        offset_ns: [ns] Added to every time, `Header.wall_ns` for UTC.
+        offset_ns: Offset added to every time [ns], `Header.wall_ns` for UTC.
 
     Raises:
-        BridgeError: The folder is taken, no such node, or there is no estimate to write.
+        BridgeError: The folder is not empty, the node is unknown, or there is no estimate.
     """
     constellation = estimate.constellation
     reference = constellation.ids[0] if reference is None else reference
@@ -56,10 +56,10 @@ def export_tum(
 
 
 def tum_text(estimate: TeamEstimate, node: int, *, reference: int, offset_ns: int = 0) -> str:
-    """Trajectory of one node relative to another, both by id.
+    """Return the trajectory of one node relative to another, both by id.
 
-    The format has no place for a status, so only estimates with status OK are written. A node
-    whose orientation was not measured stands along the axes of the world.
+    The format has no field for a status, so only estimates with status OK are written. A node
+    without a measured orientation is aligned with the axes of the world.
     """
     constellation = estimate.constellation
     i, j = (constellation.index_of[name] for name in (reference, node))
@@ -78,10 +78,10 @@ def tum_text(estimate: TeamEstimate, node: int, *, reference: int, offset_ns: in
 
 
 def check_reference(constellation: Constellation, reference: int) -> None:
-    """See that there is such a node.
+    """Check that the reference is a node.
 
     Raises:
-        BridgeError: There is none.
+        BridgeError: There is no such node.
     """
     if reference not in constellation.ids:
         raise BridgeError(

@@ -1,4 +1,4 @@
-"""Targets of exports: there whole or not at all, and never in place of something."""
+"""Targets of exports: created completely or not at all, and never overwritten."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from hardware_bridge.errors import BridgeError
 
 @contextmanager
 def whole_file(path: Path | str) -> Iterator[Path]:
-    """A name next to the target to write a file to, which is moved there if all went well.
+    """Yield a path next to the target for a file that is moved there on success.
 
     Raises:
-        BridgeError: The target exists, or it cannot be written.
+        BridgeError: The target exists, or cannot be written.
     """
     path = Path(path)
     with _errors(path):
@@ -32,10 +32,10 @@ def whole_file(path: Path | str) -> Iterator[Path]:
 
 @contextmanager
 def whole_folder(path: Path | str) -> Iterator[Path]:
-    """An empty folder next to the target, which is moved there if all went well.
+    """Yield an empty folder next to the target that is moved there on success.
 
     Raises:
-        BridgeError: The target exists and is not an empty folder, or it cannot be written.
+        BridgeError: The target exists and is not an empty folder, or cannot be written.
     """
     path = Path(path)
     with _errors(path):
@@ -54,7 +54,7 @@ def whole_folder(path: Path | str) -> Iterator[Path]:
 
 @contextmanager
 def _errors(path: Path) -> Iterator[None]:
-    """What the system refuses as an error that names the target."""
+    """Convert errors of the system to errors that name the target."""
     try:
         yield
     except OSError as error:

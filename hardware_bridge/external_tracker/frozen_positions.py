@@ -1,8 +1,8 @@
-"""Places that stay the same to the last bit while the car drives: another tracker that hangs.
+"""Detection of frozen positions: identical to the last bit while the car drives.
 
-A tracker of positions that writes its last lines for ever, with or without new stamps, would have
-cars believe for ever that they are where they were. Each line is plausible by itself. Measured
-places of what moves differ, if only by noise.
+An external tracker that repeats its last lines forever, with or without new stamps, would keep the
+estimates of cars at their last positions. Each line is plausible by itself. Measured positions of
+moving objects differ, if only by noise.
 """
 
 from __future__ import annotations
@@ -10,16 +10,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 LONG = 0.25
-"""[s] The same for so long, of something that drives."""
+"""[s] Duration of identical positions of a driving node that counts as frozen."""
 FEWEST = 5
-"""[-] And as many lines."""
+"""[-] Smallest number of identical lines that counts as frozen."""
 DRIVES = 0.2
-"""[m/s] What is faster must change its place within `LONG` in any tracker's digits."""
+"""[m/s] Above this speed a position must change within `LONG` at any tracker's resolution."""
 
 
 @dataclass(slots=True)
 class _Held:
-    """What was told last."""
+    """Last reported values."""
 
     values: tuple[float, ...]
     since_ns: int
@@ -27,29 +27,29 @@ class _Held:
 
 
 class StuckPlaces:
-    """Tells places that hang from others, pair by pair and node by node.
+    """Detector of frozen positions, pair by pair and node by node.
 
-    Laws: a place that differs from the one before is always taken; of places that never differ
-    none is taken once the node, or one of the pair, has driven for `LONG` and `FEWEST` lines, and
-    none after that, driving or not.
+    Invariants: a position that differs from the previous one is always accepted; identical
+    positions are refused once the node, or one of the pair, has driven for `LONG` and `FEWEST`
+    lines, and from then on, driving or not.
     """
 
     def __init__(self) -> None:
-        """Begin with nothing told."""
+        """Create a detector without reports."""
         self._held: dict[tuple[int, ...], _Held] = {}
         self.stuck: set[tuple[int, ...]] = set()
-        """Of what the last place was refused."""
+        """Nodes and pairs whose last position was refused."""
 
     def refuses(
         self, nodes: tuple[int, ...], values: tuple[float, ...], drives: bool, t_ns: int
     ) -> bool:
-        """Whether a place is not to be believed.
+        """Return whether a position is refused.
 
         Args:
-            nodes: Whose, by index; one, or a pair.
-            values: All that was told of it.
-            drives: Whether one of them moves, by its wheels or by what it was let do.
-            t_ns: When it came, by the host's clock [ns].
+            nodes: Indices of the node or the pair.
+            values: All reported values.
+            drives: True if one of them moves, by its wheels or by its permitted commands.
+            t_ns: Arrival, by the host's clock [ns].
         """
         held = self._held.get(nodes)
         if held is None or held.values != values:

@@ -1,4 +1,4 @@
-"""What is believed of positions that come ready from another tracker."""
+"""Parameters of positions from an external tracker."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from hardware_bridge.errors import BridgeError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReadyParams:
-    """``[tracker.positions]``; see `external_tracker.perception.ReadyPerception`."""
+    """Keys of ``[tracker.positions]``; see `external_tracker.perception.ReadyPerception`."""
 
     std: float = 0.02
-    """[m] Of each axis of a position that comes without a covariance. Larger makes velocities
-    smoother and later, and lets the gate keep cars further apart."""
+    """[m] Standard deviation per axis of positions without a covariance. Larger values make
+    velocities smoother and later, and the gate keeps cars further apart."""
     vel_std: float = 0.1
-    """[m/s] Of each axis of a velocity that comes without one."""
+    """[m/s] Standard deviation per axis of velocities without a covariance."""
     accel_psd: float = 1.5
-    """[m/s2/sqrt(Hz)] Acceleration noise of a node whose velocity does not come. Larger follows
-    turns, smaller is smoother; as `unaided_accel_psd` of the joint filter."""
+    """[m/s2/sqrt(Hz)] Acceleration noise density of nodes without reported velocity. A larger value
+    follows manoeuvres, a smaller one is smoother; as `unaided_accel_psd` of the joint filter."""
     top_speed: float = 3.0
-    """[m/s] Standard deviation of a velocity before a second position."""
+    """[m/s] Standard deviation of the velocity before the second position."""
     stale: float = 0.5
-    """[s] What is older is dead reckoning: a pair is lost, a heading unknown."""
+    """[s] Age at which estimates become dead reckoning: a pair is lost, a heading unknown."""
 
     def __post_init__(self) -> None:
         for each in fields(self):

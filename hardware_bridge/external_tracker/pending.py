@@ -1,4 +1,4 @@
-"""What another tracker told and was not taken over yet."""
+"""Reports of the external tracker that were not processed yet."""
 
 from __future__ import annotations
 
@@ -14,42 +14,42 @@ from tracking.params.short_repr import short_repr
 
 @dataclass(frozen=True, slots=True)
 class ToldPlace:
-    """Where a pair or a node was said to be; world frame."""
+    """Reported position of a pair or a node; world frame."""
 
     __repr__ = short_repr
 
     t: float
-    """[s]"""
+    """[s] Time of the report."""
     pos: Vector
-    """[m]"""
+    """[m] Position."""
     vel: Vector | None
-    """[m/s]"""
+    """[m/s] Velocity."""
     cov: F64 | None
-    """(3, 3) of the position [m2], or (6, 6) of both."""
+    """Covariance of the position, (3, 3) [m2], or of position and velocity, (6, 6)."""
     status: Status
     nlos: float
 
 
 @dataclass(frozen=True, slots=True)
 class ToldHeading:
-    """Where a node was said to point."""
+    """Reported orientation of a node."""
 
     t: float
-    """[s]"""
+    """[s] Time of the report."""
     q_wb: tuple[float, float, float, float]
 
 
 class Told:
-    """Lists in the order in which it was told."""
+    """Lists of reports in order of arrival."""
 
     def __init__(self) -> None:
         self.pairs: list[tuple[int, int, ToldPlace]] = []
-        """Indices of the nodes, i < j."""
+        """Indices of the nodes, i < j, and the report."""
         self.nodes: list[tuple[int, ToldPlace]] = []
         self.headings: list[tuple[int, ToldHeading]] = []
 
     def add_pair(self, t: float, nodes: tuple[int, ...], reading: PairReading) -> None:
-        """Note where a pair is; nodes by their indices, in the order of the reading."""
+        """Add a position of a pair; nodes by their indices, in the order of the reading."""
         i, j = nodes
         pos, vel = reading.pos, reading.vel
         if i > j:
@@ -59,7 +59,7 @@ class Told:
         self.pairs.append((i, j, ToldPlace(t, pos, vel, cov, reading.status, reading.nlos)))
 
     def add_pose(self, t: float, node: int, reading: PoseReading) -> None:
-        """Note where a node is and where it points."""
+        """Add position and orientation of a node."""
         if reading.pos is not None:
             cov = _square(reading.cov)
             place = ToldPlace(t, reading.pos, reading.vel, cov, Status.OK, 0.0)
@@ -68,7 +68,7 @@ class Told:
             self.headings.append((node, ToldHeading(t, reading.q_wb)))
 
     def clear(self) -> None:
-        """Forget all."""
+        """Discard all reports."""
         self.pairs.clear()
         self.nodes.clear()
         self.headings.clear()

@@ -1,9 +1,9 @@
-"""What cars see by a tracker that is not ours, in the place of `Perception`.
+"""Perception of the cars by an external tracker, in place of `Perception`.
 
     lines -> Tracks, Headings -> TeamEstimate -> AgentView
 
-The last that was told of every pair and every node is carried to now and put into a
-`TeamEstimate`, from which the very code writes the view that does so for our own tracker.
+The last report of every pair and every node is extrapolated to the current time and written to a
+`TeamEstimate`, from which the same code as for our own tracker writes the view.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from tracking.measurements import Kind, MeasurementBlock
 
 
 class ReadyPerception:
-    """One group; used like `relpos_env.interface.perception.Perception`.
+    """Perception of one group; used like `relpos_env.interface.perception.Perception`.
 
-    Of a pair that was told itself and by the places of both its nodes, the newer is taken. Status
-    is as told, usually OK, while it is younger than `ReadyParams.stale`, then LOST; ABSENT before
-    the first time and once a node has left. Static nodes may be told once. The estimate is for
-    now.
+    A pair that is reported directly and by the positions of both nodes uses the newer report. The
+    status is as reported, usually OK, until it is older than `ReadyParams.stale`, then LOST; ABSENT
+    before the first report and after a node has left. Static nodes may be reported once. Estimates
+    are for the current time.
     """
 
     def __init__(
@@ -41,15 +41,15 @@ class ReadyPerception:
         powered: Bool,
         n_beams: int = 0,
     ) -> None:
-        """Begin with nothing told.
+        """Create a perception without reports.
 
         Args:
-            constellation: The nodes; the first of them ride on the cars, in the cars' order.
-            params: What is believed of the other tracker.
-            told: Filled by the caller before every step, emptied by it.
+            constellation: The nodes; the first ones are on the cars, in the cars' order.
+            params: Parameters of the external tracker.
+            told: Reports, filled by the caller before every step and emptied by it.
             block: Measurements, of which departures and ranges are used.
-            powered: Which cars are there, (1, car), likewise.
-            n_beams: Of each car's distance sensors.
+            powered: True for present cars, (1, car); written by the caller before every step.
+            n_beams: Number of distance sensors of each car.
         """
         group, n_cars = constellation, powered.shape[1]
         self.constellation, self._params, self._told = group, params, told
@@ -61,17 +61,17 @@ class ReadyPerception:
         self._headings = Headings(group.n_nodes)
         self.view: AgentView = make_view(1, n_cars, n_beams)
         self.estimate = TeamEstimate.empty(group, np.zeros(1))
-        """What is believed now, overwritten by every step."""
+        """Current estimates, overwritten by every step."""
         self._turns: F64 = np.zeros((1, group.n_nodes))
         self.rebind(block, powered)
 
     def share(self, target: F64, wanted: Bool, command: F64) -> None:
-        """Let the view have what the task wants; see `Perception.share`."""
+        """Bind the arrays of the task to the view; see `Perception.share`."""
         self.view = self.view._replace(target=target, wanted=wanted, command=command)
         self.rebind(self._block, self._powered)
 
     def reset(self, env: int = 0) -> None:
-        """Forget everything."""
+        """Discard all reports and estimates."""
         everyone = np.arange(self.constellation.n_nodes)
         self._nodes.forget(everyone)
         self._pairs.forget(np.arange(self.constellation.n_pairs))
@@ -82,19 +82,19 @@ class ReadyPerception:
 
     @property
     def n_late(self) -> I64:
-        """Nothing waits for what is late, (1)."""
+        """Number of late measurements, (1): always 0."""
         return np.zeros(1, dtype=np.int64)
 
     @property
     def n_waiting(self) -> I64:
-        """Nothing waits, (1)."""
+        """Number of queued measurements, (1): always 0."""
         return np.zeros(1, dtype=np.int64)
 
     def make_room(self, room: int) -> None:
-        """Nothing waits."""
+        """Do nothing: measurements are not queued."""
 
     def rebind(self, block: MeasurementBlock, powered: Bool) -> None:
-        """Put together what the kernels take; see `Perception.rebind`."""
+        """Bind the arguments of the kernels; see `Perception.rebind`."""
         self._block, self._powered = block, powered
         self._see = bind_view(self.view, self.estimate, powered, self._turns)
         self._note = bind(
@@ -103,7 +103,7 @@ class ReadyPerception:
         )  # fmt: skip
 
     def step(self) -> None:
-        """Take over what was told, and see."""
+        """Process the reports and update the view."""
         now = float(self.view.now[0])
         self._let_go()
         index = self.constellation.pair_index
@@ -117,12 +117,12 @@ class ReadyPerception:
         self._note_distances()
 
     def _tracks(self, ends: F64) -> Tracks:
-        """Of which so many ends move each, (track): 0 stands still."""
+        """Create one filter per track with 0, 1 or 2 moving ends, (track)."""
         p, root = self._params, np.sqrt(ends)
         return Tracks(len(ends), root * p.accel_psd, root * p.top_speed, p.std, p.vel_std)
 
     def _let_go(self) -> None:
-        """Nodes that have left are forgotten, but those that stand where they stood."""
+        """Discard nodes that have left, except static ones."""
         block = self._block
         leaves = block.valid[0] & (block.kind[0] == Kind.LEAVE)
         for node in block.i[0, leaves].tolist():
@@ -137,7 +137,7 @@ class ReadyPerception:
         still = self.constellation.is_static
         x, P = pairs.at(now)  # noqa: N806
         place, place_cov = self._nodes.at(now)
-        # Where both ends were told; the age of what stands still is no age.
+        # Times at which both ends are known; positions of static nodes do not age.
         since = np.where(still & np.isfinite(self._nodes.t), now, self._nodes.t)
         by_nodes = np.minimum(since[i], since[j])
         other = by_nodes > pairs.t
@@ -160,13 +160,13 @@ class ReadyPerception:
         self._turns[0] = self._headings.turns(now)
 
     def _status(self, told: I64, known: Bool) -> I64:
-        """As told, until it is stale; (pair)."""
+        """Return the reported status, LOST if too old, ABSENT if unknown, (pair)."""
         old = (self.estimate.age[0] > self._params.stale) & (told >= Status.OK)
         status = np.where(old, Status.LOST, told)
         return np.where(known, status, Status.ABSENT)
 
     def _note_distances(self) -> None:
-        """A position is a distance too, for readers of ranges."""
+        """Store positions as ranges, too, for readers of ranges."""
         e, view, n = self.estimate, self.view, self.view.heard.shape[1]
         cars = (self._i < n) & (self._j < n) & (e.status[0] != Status.ABSENT)
         i, j = self._i[cars], self._j[cars]

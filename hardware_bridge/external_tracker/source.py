@@ -1,4 +1,4 @@
-"""What another tracker tells: about whom, when it was so, and whether it is believed."""
+"""Reports of the external tracker: their nodes, times and acceptance."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from tracking.estimate import Status
 
 NS = 1e-9
 OF_STREAM = -1
-"""In place of a node: one clock stamps all."""
+"""Key in place of a node: one clock stamps all lines."""
 
 
 class OtherTracker:
-    """Lines about pairs and nodes, from whichever links."""
+    """Reader of lines about pairs and nodes, from any links."""
 
     def __init__(
         self,
@@ -30,29 +30,29 @@ class OtherTracker:
         refused: Counter[str],
         notices: list[tuple[int, str]],
     ) -> None:
-        """Begin with nothing told.
+        """Create a reader without reports.
 
         Args:
-            start_ns: Host time that is 0 s of what is told [ns].
-            ids: Of the nodes, by index.
-            naming: Finds them.
-            plausibility: What can be.
-            refused: What was not used is counted here.
-            notices: What the user should read is added here.
+            start_ns: Host time of 0 s in the reports [ns].
+            ids: Ids of the nodes, by index.
+            naming: Mapping of names to nodes.
+            plausibility: Plausibility checks.
+            refused: Counter of refused lines.
+            notices: List that notices to the user are added to.
         """
         self._start_ns, self._ids = start_ns, ids
         self._naming, self._plausibility = naming, plausibility
         self._refused, self._notices = refused, notices
         self._stuck = StuckPlaces()
         self.told = Told()
-        """What was believed and not taken over yet."""
+        """Accepted reports that were not processed yet."""
         self.driving: frozenset[int] = frozenset()
-        """Who drives, by what cars say or were let do, by index; written by the caller."""
+        """Indices of driving nodes, by wheels or permitted commands; written by the caller."""
 
     def take(
         self, stream: Stream, reading: PairReading | PoseReading, arrival_ns: int
     ) -> tuple[int, ...]:
-        """Take a line; indices of the nodes whose places are known by it."""
+        """Process a line; return the indices of the nodes whose positions it reports."""
         names = (reading.i, reading.j) if isinstance(reading, PairReading) else (reading.node,)
         found = [
             self._naming.index(stream, name, arrival_ns, named=True, mixed=True) for name in names
@@ -74,7 +74,7 @@ class OtherTracker:
     def _believes(
         self, reading: PairReading | PoseReading, nodes: tuple[int, ...], t_ns: int, arrival_ns: int
     ) -> bool:
-        """Whether a place can be, and its tracker does not hang."""
+        """Return whether a position is plausible and its tracker is not frozen."""
         assert reading.pos is not None
         if not self._plausibility.allows_place(nodes, reading.pos, t_ns):
             return False

@@ -1,6 +1,6 @@
-"""Positions at constant velocity, many at a time: a Kalman filter for each.
+"""Bank of Kalman filters for positions, model of constant velocity.
 
-The velocity changes by white noise of density q = accel_psd**2 along every axis [1],
+The velocity is driven by white noise of density q = accel_psd**2 along every axis [1],
 
     p' = v,  v' = w,  E[w(t) w(s)] = q delta(t - s),
 
@@ -8,9 +8,8 @@ so over a time dt
 
     F = [1 dt; 0 1],  Q = q [dt**3/3 dt**2/2; dt**2/2 dt].
 
-A filter, and not differences through a fixed low-pass: it weighs each position by its own
-covariance, takes lines at any intervals, and says how well it knows the velocity, which the
-safety gate asks for.
+Unlike differences through a fixed low-pass, the filter weighs each position by its covariance,
+accepts irregular intervals, and estimates the velocity covariance that the safety gate needs.
 
 References:
     [1] Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking and Navigation,
@@ -31,27 +30,27 @@ EYE = np.eye(3)
 class Tracks:
     """The filters, arrays over (track, ...).
 
-    Laws: a position with a velocity is taken as it is, since it comes out of a filter already;
-    positions alone are measurements. What is older than the last of its track changes nothing.
+    Invariants: a position with a velocity replaces the state, since it is the output of a filter;
+    positions alone are measurements. Reports older than the last of their track are ignored.
     """
 
     def __init__(self, n: int, psd: F64, first_vel_std: F64, std: float, vel_std: float) -> None:
-        """Make tracks of which nothing was told.
+        """Create tracks without reports.
 
         Args:
-            n: How many.
-            psd: Acceleration noise of each, (track) [m/s2/sqrt(Hz)].
-            first_vel_std: Standard deviation of the velocity before the second position,
-                (track) [m/s].
-            std: Of positions without a covariance [m].
-            vel_std: Of velocities without one [m/s].
+            n: Number of tracks.
+            psd: Acceleration noise density of each, (track) [m/s2/sqrt(Hz)].
+            first_vel_std: Standard deviation of the velocity before the second position, (track)
+                [m/s].
+            std: Standard deviation of positions without a covariance [m].
+            vel_std: Standard deviation of velocities without a covariance [m/s].
         """
         self._q, self._first_var = psd**2, first_vel_std**2
         self._var, self._vel_var = std * std * EYE, vel_std * vel_std * EYE
         self.x: F64 = np.zeros((n, 6))
-        """Position [m] and velocity [m/s] at `t`."""
+        """State at `t`, position [m] and velocity [m/s], (track, 6)."""
         self.P: F64 = np.zeros((n, 6, 6))
-        """Its covariance."""
+        """Covariance of the state, (track, 6, 6)."""
         self.t: F64 = np.full(n, -np.inf)
         """Time of the last report of each [s]; -inf before the first."""
         self.status: I64 = np.full(n, Status.ABSENT, dtype=np.int64)
@@ -60,16 +59,16 @@ class Tracks:
         """NLOS probability of the last report [-]."""
 
     def forget(self, tracks: int | I64) -> None:
-        """As if nothing had been told of these."""
+        """Discard the reports of these tracks."""
         self.t[tracks] = -np.inf
         self.status[tracks] = Status.ABSENT
         self.nlos[tracks] = 0.0
 
     def take(self, told: list[tuple[int, ToldPlace]]) -> None:
-        """Take over what was told; tracks by their numbers, in the order of telling."""
+        """Process reports, with the indices of their tracks, in the order of arrival."""
         waiting = told
         while waiting:
-            # One of each track at a time, and all tracks at once.
+            # Each round takes one report per track and processes all tracks at once.
             now: dict[int, ToldPlace] = {}
             later = []
             for k, place in waiting:
@@ -81,11 +80,7 @@ class Tracks:
             waiting = later
 
     def at(self, now: float) -> tuple[F64, F64]:
-        """All of them carried to a time, those of which nothing was told without meaning.
-
-        Returns:
-            Position and velocity, (track, 6), and covariance, (track, 6, 6).
-        """
+        """Predict states (track, 6) and covariances (track, 6, 6); undefined before a report."""
         dt = np.where(np.isfinite(self.t), now - self.t, 0.0)
         return self._carried(np.arange(len(self.t)), np.maximum(dt, 0.0))
 
@@ -95,7 +90,9 @@ class Tracks:
         k = np.fromiter(told, dtype=np.int64)
         t = np.array([p.t for p in told.values()])
         z = np.array([p.pos for p in told.values()])
-        R = np.array([self._var if p.cov is None else p.cov[:3, :3] for p in told.values()])  # noqa: N806
+        R = np.array(  # noqa: N806
+            [self._var if p.cov is None else p.cov[:3, :3] for p in told.values()]
+        )
         new = ~np.isfinite(self.t[k])
         whole = np.array([p.vel is not None for p in told.values()])
         self._begin(k[new & ~whole], z[new & ~whole], R[new & ~whole])
@@ -128,7 +125,7 @@ class Tracks:
         self.x[k] = x + (K @ (z - x[:, :3])[..., None])[..., 0]
         left = np.broadcast_to(np.eye(6), P.shape).copy()
         left[:, :, :3] -= K
-        # In Joseph's form, which stays positive definite.
+        # Joseph form, keeps P positive definite.
         self.P[k] = left @ P @ left.swapaxes(1, 2) + K @ R @ K.swapaxes(1, 2)
 
     def _carried(self, k: I64, dt: F64) -> tuple[F64, F64]:

@@ -1,4 +1,4 @@
-"""Who is speaking: each message taken once, restarts seen, two devices with one id told apart."""
+"""Identity of senders: duplicates, restarts and two devices with the same id."""
 
 from hardware_bridge.identity.identities import Identities
 from hardware_bridge.identity.verdict import IdentityParams, Mark, Verdict

@@ -1,4 +1,4 @@
-"""Starts of one node: which one runs, and what is a message of another."""
+"""Starts of one node: the current boot, and messages of other boots."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from hardware_bridge.identity.verdict import NS, IdentityParams, Mark, Verdict
 from hardware_bridge.identity.window import Place, SequenceWindow
 
 MOST_BOOTS = 64
-"""That are remembered of one node. One that was forgotten would be taken for a new one."""
+"""[-] Number of boots remembered of one node. A forgotten one would count as new."""
 
 OF_PLACE = {
     Place.AHEAD: Verdict.FRESH,
@@ -20,22 +20,22 @@ OF_PLACE = {
 
 
 class RisingBoots:
-    """Boots that are authenticated and rise: what is lower was recorded."""
+    """Authenticated boot numbers, which rise: messages of a lower one are replays."""
 
     mark: Mark | None
 
     def __init__(self, mark: Mark | None = None) -> None:
-        """Begin.
+        """Create a check.
 
         Args:
-            mark: What was accepted last before the host was restarted; nothing up to it is
-                accepted again.
+            mark: Last message accepted before a restart of the host; nothing up to it is accepted
+                again.
         """
         self.mark = mark
         self._window = SequenceWindow(0 if mark is None else mark[1], endless=False, before=False)
 
     def check(self, boot: int | None, sequence: int | None) -> Verdict:
-        """Find out what a message is, and remember it; never TWIN."""
+        """Classify a message and store its number; never TWIN."""
         if boot is None or sequence is None:
             return Verdict.REPLAY
         if self.mark is None or boot > self.mark[0]:
@@ -55,16 +55,16 @@ class RisingBoots:
 
 @dataclass(slots=True)
 class _Boot:
-    """A start of a device, as far as it was heard."""
+    """State of one boot of a device."""
 
     window: SequenceWindow | None
     link: str
     over_ns: int = 0
-    """When the next one began."""
+    """[ns] Time at which the next boot began."""
     stragglers: int = 0
 
     def place(self, sequence: int | None) -> Place:
-        """Where a message is, which is then taken."""
+        """Return the place of a message in the window and store its number."""
         if sequence is None or self.window is None:
             return Place.AHEAD
         place = self.window.place(sequence)
@@ -73,20 +73,20 @@ class _Boot:
 
 
 class ClaimedBoots:
-    """Boots that anybody could claim: another one is a restart while the old one is silent."""
+    """Boot numbers without authentication: a new one is a restart if the old one is silent."""
 
     twins: str = ""
-    """Why the last message was found to be a TWIN."""
+    """Reason why the last message was classified as TWIN."""
 
     def __init__(self, params: IdentityParams) -> None:
         self._params = params
         self._boot: int | None = None
         self._heard: dict[int, _Boot] = {}
-        """The current boot and the ones before, oldest first."""
+        """Current and previous boots, oldest first."""
         self._restarts: deque[int] = deque()
 
     def check(self, link: str, boot: int, sequence: int | None, t_ns: int) -> Verdict:
-        """Find out what a message is, and remember it."""
+        """Classify a message and store its number."""
         if boot not in self._heard:
             return self._begin(link, boot, sequence, t_ns)
         heard = self._heard[boot]
@@ -106,7 +106,7 @@ class ClaimedBoots:
         return Verdict.STALE
 
     def _begin(self, link: str, boot: int, sequence: int | None, t_ns: int) -> Verdict:
-        """The first message of a boot."""
+        """Classify the first message of a boot."""
         first = self._boot is None
         if self._boot is not None:
             self._heard[self._boot].over_ns = t_ns
@@ -126,13 +126,13 @@ class ClaimedBoots:
         return Verdict.FRESH if first else Verdict.REBOOT
 
     def _where(self, link: str) -> str:
-        """What an operator has to know of two devices, one of them heard on this link."""
+        """Return the notice about two devices, one of which sends on this link."""
         assert self._boot is not None
         return two_devices(self._heard[self._boot].link, link)
 
 
 def two_devices(link: str, other: str) -> str:
-    """In words: where the two devices are."""
+    """Return a text with the links of the two devices."""
     if link == other:
         return f"is two devices, both on link {link}"
     return "is two devices, on links " + " and ".join(sorted((link, other)))

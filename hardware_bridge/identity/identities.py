@@ -1,4 +1,4 @@
-"""The nodes of a swarm, and whose messages are taken."""
+"""Identities of the nodes of a swarm, and acceptance of their messages."""
 
 from __future__ import annotations
 
@@ -12,45 +12,45 @@ from hardware_bridge.identity.window import MODULUS
 from hardware_bridge.readings import Source
 
 MOST_NOTICES = 256
-"""That wait for the operator; what is more is dropped."""
+"""[-] Largest number of pending notices; further ones are dropped."""
 MANY_OLD = 200
-"""Messages refused in a row of which the operator is told."""
+"""[-] Number of messages refused in a row that is reported to the operator."""
 
 
 @dataclass(slots=True)
 class _Node:
-    """One node, as far as it was heard."""
+    """State of one node."""
 
     boots: ClaimedBoots
     unbooted: Unbooted
     quarantined: bool = False
     refused: int = 0
-    """Messages in a row."""
+    """Number of messages refused in a row."""
 
 
 class Identities:
-    """Every message once, and of one device only.
+    """Filter that accepts every message once, and from one device per node only.
 
-    Laws: a message (node, boot, sequence) of the last `boots.MOST_BOOTS` boots is accepted once at
-    most; a new one of the current boot that is less than `window.WIDTH` numbers late is
-    accepted; a restart is seen with its first message, and restarts alone never quarantine unless
-    there are more than eight in ten seconds; two devices with one id that both go on speaking are
-    found out, and both refused until `release`. Authenticated: no message is ever accepted again,
-    whatever is sent how often in which order, and nothing is quarantined. Memory is bounded,
-    whatever comes.
+    Invariants: a message (node, boot, sequence) of the last `boots.MOST_BOOTS` boots is accepted at
+    most once; a new one of the current boot that is less than `window.WIDTH` numbers late is
+    accepted; a restart is detected with its first message, and restarts alone cause a quarantine
+    only if there are more than eight in ten seconds; two devices with one id that both keep sending
+    are detected, and both refused until `release`. Authenticated: no message is ever accepted
+    twice, for any repetition and order, and nothing is quarantined. Memory is bounded for any
+    input.
     """
 
     notices: list[tuple[int, str]]
-    """Time [ns] and what an operator should read; taking them clears the list."""
+    """Time [ns] and text of notices to the operator; the reader clears the list."""
 
     def __init__(self, authenticated: bool = False, params: IdentityParams | None = None) -> None:
-        """Begin with no node known.
+        """Create a filter without known nodes.
 
         Args:
-            authenticated: Every message that comes here passed the check of its MAC, and boots
-                rise. Messages without boot or number are then refused as replays: streams of
-                other formats go to an object of their own.
-            params: What is believed of links and devices.
+            authenticated: True if every message has passed the check of its MAC, and boots rise.
+                Messages without boot or number are then refused as replays: streams of other
+                formats need an object of their own.
+            params: Parameters of links and devices.
         """
         self._authenticated = authenticated
         self._params = IdentityParams() if params is None else params
@@ -65,13 +65,13 @@ class Identities:
         return tuple(sorted(k for k, node in self._nodes.items() if node.quarantined))
 
     def check(self, link: str, source: Source, t_ns: int, node: int) -> Verdict:
-        """Find out what a message is, once for all readings that it holds, and remember it.
+        """Classify a message, once for all readings that it holds, and store its number.
 
         Args:
-            link: Where it came from, `PortSpec.name`.
-            source: What it says of itself.
-            t_ns: When it came, by the host's monotonic clock [ns].
-            node: The node that `source.device` is, one of the configuration.
+            link: Name of its link, `PortSpec.name`.
+            source: Its source.
+            t_ns: Arrival, by the host's monotonic clock [ns].
+            node: Node id of `source.device`, one of the configuration.
         """
         if self._authenticated:
             return self._check_rising(link, source, t_ns, node)
@@ -100,24 +100,24 @@ class Identities:
         return verdict
 
     def release(self, node: int, t_ns: int) -> None:
-        """Believe a node again, as if it had never been heard; authenticated: changes nothing."""
+        """Accept a node again and discard its state; no effect if authenticated."""
         if self._nodes.pop(node, None) is not None:
             self._noticed = {key: t for key, t in self._noticed.items() if key[0] != node}
             self._note(t_ns, node, "release", "is released")
 
     def high_water(self, ahead: int = 0) -> dict[int, Mark]:
-        """What to keep across a restart of the host, by node; authenticated only.
+        """Return the marks to keep across a restart of the host, by node; authenticated only.
 
         Args:
-            ahead: So many more messages count as seen, of each node. Marks that are saved every
-                minute, with more messages ahead than come in a minute, leave no gap for a replay
-                after a crash; a node whose boot goes on is then refused until it is past it.
+            ahead: Number of further messages of each node that count as received. Marks saved every
+                minute, with more messages ahead than arrive in a minute, leave no gap for a replay
+                after a crash; a node whose boot continues is then refused up to its mark.
         """
         marks = {node: boots.mark for node, boots in self._rising.items()}
         return {k: (m[0], min(m[1] + ahead, MODULUS - 1)) for k, m in marks.items() if m}
 
     def restore(self, marks: Mapping[int, Mark]) -> None:
-        """Accept nothing up to these marks of `high_water`; lower ones change nothing."""
+        """Refuse everything up to these marks of `high_water`; lower ones have no effect."""
         for node, mark in marks.items():
             known = self._rising.get(node)
             if known is None or known.mark is None or known.mark < mark:
@@ -140,7 +140,7 @@ class Identities:
         return verdict
 
     def _note(self, t_ns: int, node: int, kind: str, text: str) -> None:
-        """Tell the operator, of each kind not too often."""
+        """Add a notice to the operator, with a minimum interval for each kind."""
         before = self._noticed.get((node, kind))
         if before is not None and t_ns - before < self._params.again * NS:
             return

@@ -1,4 +1,4 @@
-"""Formats that do not tell one start of a device from the next."""
+"""Identity checks for formats without boot numbers."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ _Key = TypeVar("_Key")
 _Value = TypeVar("_Value")
 
 MOST_DEVICES = 16
-"""Names and links that are remembered of one node."""
+"""[-] Number of names and links that are remembered of one node."""
 
 
 @dataclass(slots=True)
 class _Heard:
-    """Where a device that names itself was heard."""
+    """Last link of a device that names itself."""
 
     link: str
     t_ns: int
@@ -27,26 +27,26 @@ class _Heard:
 
 @dataclass(slots=True)
 class _Numbers:
-    """The numbers of one stream."""
+    """Sequence numbers of one stream."""
 
     window: SequenceWindow
     accepted_ns: int
     refused: int = 0
-    """Rising numbers in a row."""
+    """Number of refused, rising numbers in a row."""
     last: int = 0
-    """Of the refused ones."""
+    """Last refused number."""
 
 
 class Unbooted:
-    """The messages of one node that carry no boot.
+    """Checks of the messages of one node that carry no boot number.
 
-    A device that names itself is in one place; where no device is named the port's configuration
-    says whose the messages are, and a node may have several such ports. Two devices on one link
-    cannot be told apart here.
+    A device that names itself sends on one link; unnamed messages are assigned by the configuration
+    of their port, and a node may have several such ports. Two devices on one link cannot be
+    distinguished here.
     """
 
     twins: str = ""
-    """Why the last message was found to be a TWIN."""
+    """Reason why the last message was classified as TWIN."""
 
     def __init__(self, params: IdentityParams) -> None:
         self._params = params
@@ -54,7 +54,7 @@ class Unbooted:
         self._numbers: dict[tuple[str | None, str], _Numbers] = {}
 
     def check(self, link: str, device: str | None, sequence: int | None, t_ns: int) -> Verdict:
-        """Find out what a message is, and remember it."""
+        """Classify a message and store its number."""
         if device is not None and self._is_elsewhere(link, device, t_ns):
             return Verdict.TWIN
         if sequence is None:
@@ -76,7 +76,7 @@ class Unbooted:
         return verdict
 
     def _is_elsewhere(self, link: str, device: str, t_ns: int) -> bool:
-        """Whether a device is heard here and there by turns."""
+        """Return whether a device alternates between this link and another."""
         heard = self._heard.get(device)
         if heard is None:
             _make_room(self._heard)
@@ -95,7 +95,7 @@ class Unbooted:
         return False
 
     def _began_anew(self, numbers: _Numbers, sequence: int, t_ns: int) -> bool:
-        """Whether a refused number is one of a row that only a new start explains."""
+        """Return whether a refused number belongs to a sequence that only a restart explains."""
         rising = 0 < (sequence - numbers.last) % MODULUS < self._params.refused
         numbers.refused = numbers.refused + 1 if rising else 1
         numbers.last = sequence
@@ -104,6 +104,6 @@ class Unbooted:
 
 
 def _make_room(remembered: dict[_Key, _Value]) -> None:
-    """Forget the oldest where there are too many."""
+    """Remove the oldest entry if there are too many."""
     if len(remembered) >= MOST_DEVICES:
         del remembered[next(iter(remembered))]

@@ -1,4 +1,4 @@
-"""What a message is found to be, and what is believed of the ways it may take."""
+"""Classes of messages, and parameters of links and devices."""
 
 from __future__ import annotations
 
@@ -10,31 +10,31 @@ NS = 1_000_000_000
 """[1/s] Nanoseconds in a second."""
 
 Mark: TypeAlias = tuple[int, int]
-"""Boot, and the highest sequence number that was accepted of it."""
+"""Boot, and its highest accepted sequence number."""
 
 
 class Verdict(Enum):
-    """What a message is."""
+    """Class of a message."""
 
     FRESH = "fresh"
     LATE = "late"
-    """Out of order, and new."""
+    """New, but out of order."""
     REBOOT = "reboot"
-    """The first of a new start of its device, whose counters began again."""
+    """First message after a restart of its device, whose counters restarted, too."""
     UNNUMBERED = "unnumbered"
-    """Its format has no numbers."""
+    """The format has no numbers."""
     DUPLICATE = "duplicate"
-    """Accepted before, or too old to know."""
+    """Accepted already, or too old to decide."""
     STALE = "stale"
-    """New, and of a start that is over: the clock it was stamped by is gone."""
+    """New, but of a previous boot: the clock of its stamp no longer exists."""
     TWIN = "twin"
-    """Two devices say they are this node."""
+    """Two devices use the id of this node."""
     REPLAY = "replay"
-    """Recorded and sent again, or not to be told from that."""
+    """Recorded and sent again, or indistinguishable from a replay."""
 
     @property
     def accepted(self) -> bool:
-        """Whether its readings are to be used."""
+        """True if the readings are to be used."""
         return self in _ACCEPTED
 
 
@@ -43,28 +43,28 @@ _ACCEPTED = frozenset({Verdict.FRESH, Verdict.LATE, Verdict.REBOOT, Verdict.UNNU
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class IdentityParams:
-    """Of `Identities`."""
+    """Parameters of `Identities`."""
 
     stragglers: int = 3
-    """[-] So many new messages of the old start may follow the first of the next one, over a
-    slower way; they are stale. More are a second device."""
+    """[-] Largest number of new messages of the old boot after the first of the next one, over a
+    slower path; they are stale. More of them are a second device."""
     straggle: float = 0.2
-    """[s] And for so long."""
+    """[s] Longest time after a restart in which such messages may arrive."""
     restarts: int = 8
-    """[-] More restarts within `restart` are devices that take turns, or one that is broken."""
+    """[-] More restarts within `restart` are alternating devices or a broken one."""
     restart: float = 10.0
-    """[s]"""
+    """[s] Interval in which restarts are counted."""
     changes: int = 3
-    """[-] Without boots: as many changes of link, each within `change`, are two devices."""
+    """[-] Without boots: this number of link changes, each within `change`, is two devices."""
     change: float = 1.0
-    """[s] A device that is plugged into another port is silent for longer."""
+    """[s] Longest time between such changes; moving a device to another port takes longer."""
     refused: int = 8
-    """[-] Without boots: so many refused numbers in a row, rising, are a device that began
-    again, once nothing was accepted for `quiet`."""
+    """[-] Without boots: this number of rising refused numbers in a row is a restart, once nothing
+    was accepted for `quiet`."""
     quiet: float = 2.0
-    """[s]"""
+    """[s] Shortest time without accepted messages before such a restart."""
     again: float = 10.0
-    """[s] The same notice about the same node is not given again within this."""
+    """[s] Shortest interval between equal notices about a node."""
 
     def __post_init__(self) -> None:
         for each in fields(self):

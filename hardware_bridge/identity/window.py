@@ -1,7 +1,7 @@
-"""Which sequence numbers of a stream were seen: a sliding window, modulo 2^32.
+"""Sliding window of received sequence numbers of a stream, modulo 2^32.
 
-The window of the anti-replay service of IPsec [1]: the highest number seen, and a bit for each of
-the `WIDTH` numbers up to it.
+As in the anti-replay service of IPsec [1]: the highest received number, and a bit for each of the
+`WIDTH` numbers up to it.
 
 References:
     [1] Kent, RFC 4303 IP Encapsulating Security Payload, section 3.4.3.
@@ -13,42 +13,42 @@ from enum import Enum
 
 MODULUS = 1 << 32
 WIDTH = 1024
-"""[-] Ten seconds of a stream at 100 Hz."""
+"""[-] Width of the window: ten seconds of a stream at 100 Hz."""
 
 _MASK = (1 << WIDTH) - 1
 
 
 class Place(Enum):
-    """Where a number is, seen from the window."""
+    """Place of a number relative to the window."""
 
     AHEAD = "ahead"
-    """Higher than all seen."""
+    """Higher than all received ones."""
     NEW = "new"
-    """Lower than the highest, not seen."""
+    """Lower than the highest, not received."""
     SEEN = "seen"
     OLD = "old"
-    """Below the window: whether it was seen is not known."""
+    """Below the window: unknown whether it was received."""
 
 
 class SequenceWindow:
-    """The numbers seen of one stream."""
+    """Received numbers of one stream."""
 
     highest: int
 
     def __init__(self, first: int, *, endless: bool, before: bool = True) -> None:
-        """A window whose highest number was seen.
+        """Create a window whose highest number was received.
 
         Args:
-            first: That number.
-            endless: The numbers go on at 0 after 2^32 - 1. Else what is lower is older, for good.
-            before: Whether numbers below the first may still come.
+            first: The highest number.
+            endless: True if 0 follows 2^32 - 1; else lower numbers are always older.
+            before: True if numbers below the first may still arrive.
         """
         self.highest = first % MODULUS
         self._endless = endless
         self._seen = 1 if before else _MASK
 
     def place(self, sequence: int) -> Place:
-        """Where a number is; changes nothing."""
+        """Return the place of a number without storing it."""
         back = self._back(sequence)
         if back < 0:
             return Place.AHEAD
@@ -57,7 +57,7 @@ class SequenceWindow:
         return Place.SEEN if self._seen >> back & 1 else Place.NEW
 
     def take(self, sequence: int) -> None:
-        """A number was seen; one below the window changes nothing."""
+        """Store a number as received; one below the window has no effect."""
         back = self._back(sequence)
         if back < 0:
             self._seen = (self._seen << min(-back, WIDTH) | 1) & _MASK
@@ -66,7 +66,7 @@ class SequenceWindow:
             self._seen |= 1 << back
 
     def _back(self, sequence: int) -> int:
-        """How far a number is below the highest; negative if it is higher."""
+        """Return the distance of a number below the highest; negative if it is higher."""
         back = self.highest - sequence % MODULUS
         if self._endless:
             half = MODULUS // 2

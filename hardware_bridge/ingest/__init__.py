@@ -1,1 +1,1 @@
-"""From bytes of ports to measurements of nodes."""
+"""Conversion of bytes from ports to measurements of nodes."""

@@ -1,7 +1,7 @@
-"""What IMUs read before anything moves: gravity upwards and in m/s2, and no rotation.
+"""Check of IMU samples at rest: gravity upwards and in m/s2, and no rotation.
 
-Cars stand while they wait to be armed. One whose IMU is upside down or counts in g would drive on
-estimates that are wrong and say they hold.
+Cars are at rest until they are armed. A car whose IMU is upside down or measures in g would drive
+with wrong estimates that are reported as valid.
 """
 
 from __future__ import annotations
@@ -15,26 +15,26 @@ from tracking.findings import KINDS
 from tracking.findings.at_rest import find_in_samples
 
 SECONDS = 2.0
-"""[s] So much of every IMU is looked at, once."""
+"""[s] Duration of the initial samples of every IMU that are checked, once."""
 
 
 class AtRest:
-    """Looks at the first samples, node by node."""
+    """Check of the first samples of each node."""
 
     def __init__(self, nodes: Sequence[NodeConfig]) -> None:
-        """Begin with none; nodes by index."""
+        """Create a check without samples; nodes by index."""
         self._nodes = nodes
         self._samples: dict[int, list[tuple[float, ...]]] = {}
         self.wrong: dict[int, str] = {}
-        """What makes the IMU of a node of no use, by index."""
+        """Reason why the IMU of a node is unusable, by index."""
 
     def note(self, node: int, values: tuple[float, ...], t_ns: int) -> list[tuple[int, str]]:
-        """Take a sample; the time and what is to be said of the node, once it is known.
+        """Add a sample; return times and texts of notices about the node once its check completes.
 
         Args:
-            node: Whose, by index.
-            values: Angular rate and specific force.
-            t_ns: When it came, by the host's clock [ns].
+            node: Index of the node.
+            values: Angular rate [rad/s] and specific force [m/s2].
+            t_ns: Arrival, by the host's clock [ns].
         """
         taken, hz = self._samples.setdefault(node, []), self._nodes[node].imu_hz
         needed = round(SECONDS * hz)

@@ -1,4 +1,4 @@
-"""Measurements that arrived and were not handed to the tracker yet."""
+"""Measurements that arrived and were not passed to the tracker yet."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ Row = tuple[float, int, int, int, int, int, tuple[float, ...], bool]
 
 
 class Events:
-    """A list that becomes a block, in place."""
+    """List of measurements that are moved into a block in place."""
 
     def __init__(self) -> None:
         self._rows: list[Row] = []
@@ -19,17 +19,17 @@ class Events:
         return len(self._rows)
 
     def add(self, t: float, kind: Kind, node: int, values: tuple[float, ...]) -> None:
-        """Note what one node measured; arguments as the columns of `MeasurementBlock`."""
+        """Add a measurement of one node; arguments as the columns of `MeasurementBlock`."""
         self._rows.append((t, kind, node, node, 0, 0, values, False))
 
     def add_range(
         self, t: float, ends: tuple[int, int], antennas: tuple[int, int], values: tuple[float, ...]
     ) -> None:
-        """Note a range: distance alone, or with received and first-path power."""
+        """Add a range: distance alone, or with received and first-path power."""
         self._rows.append((t, Kind.RANGE, *ends, *antennas, values, len(values) == 3))
 
     def move_into(self, block: MeasurementBlock) -> None:
-        """Fill the first environment of a block, which has room for all, and forget them."""
+        """Move all measurements into the first environment of a block of sufficient capacity."""
         n = len(self._rows)
         block.valid[0] = False
         if n:

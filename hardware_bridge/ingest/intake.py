@@ -1,8 +1,8 @@
-"""From bytes to measurements: decode, find out who speaks and when, refuse what cannot be.
+"""From bytes to measurements: decoding, sender identification, timing and plausibility.
 
     Chunk -> Decoder -> Identities -> StreamTime -> Plausibility -> Events
 
-Pure: the same chunks with the same times give the same measurements.
+Deterministic: the same chunks with the same times give the same measurements.
 """
 
 from __future__ import annotations
@@ -50,39 +50,39 @@ NS = 1e-9
 
 
 class Intake:
-    """The streams of a swarm."""
+    """Conversion of all streams of a swarm to measurements."""
 
     def __init__(self, config: SwarmConfig, start_ns: int) -> None:
-        """Begin with nothing heard.
+        """Create an intake without received data.
 
         Args:
             config: Links and cars.
-            start_ns: Host time that is 0 s of the measurements [ns].
+            start_ns: Host time of 0 s in the measurements [ns].
 
         Raises:
-            BridgeError: A format or driver that does not fit its options.
+            BridgeError: A format or driver does not fit its options.
         """
         self.group = config.constellation
         self.start_ns = start_ns
         self.events = Events()
         self.plausibility = Plausibility()
         self.heard_ns: dict[int, int] = {}
-        """Host time at which each node was last heard, by index."""
+        """Host time [ns] of each node's last accepted message, by index."""
         self.sensed_ns: dict[int, int] = {}
-        """Host time of each node's last word of its own motion, by index. Others that measure
-        ranges to a node do not say which way it turns."""
+        """Host time [ns] of each node's last IMU or orientation sample, by index. Ranges measured
+        by other nodes do not determine its heading."""
         self.near = Near(config.n_slots, config.task.proximity)
         self.motion: dict[int, tuple[int, MotionReading]] = {}
-        """What each car last said of its motion, with its host time [ns], by index."""
+        """Last motion reading of each car with its host time [ns], by index."""
         self.voltage: dict[int, float] = {}
-        """Of each node, by index [V]."""
+        """Supply voltage of each node [V], by index."""
         self.fault: dict[tuple[str, int], int] = {}
-        """What boards and controllers last said is wrong with them, by their own numbers, 0 is
-        nothing; by link or car, and index of the node."""
+        """Last fault codes of boards and controllers, 0 is none; by link or car, and index of the
+        node."""
         self.refused: Counter[str] = Counter()
-        """Readings that were not used, by reason."""
+        """Number of refused readings, by reason."""
         self.notices: list[tuple[int, str]] = []
-        """Time [ns] and what the user should read; taking them clears the list."""
+        """Time [ns] and text of notices to the user; the reader clears the list."""
         rates = [node.imu_hz for node in self.group.nodes]
         self.sample_rates = SampleRates(rates)
         self.at_rest = AtRest(self.group.nodes)
@@ -104,7 +104,7 @@ class Intake:
         self.antennas = [_only_antenna(self.group, node) for node in self.group.ids]
 
     def take(self, chunk: Chunk) -> None:
-        """Take bytes as they came."""
+        """Process received bytes."""
         stream = self.streams[chunk.link]
         for reading in stream.decoder.feed(chunk.data):
             self._take(stream, reading, chunk.t_ns)
@@ -114,25 +114,25 @@ class Intake:
                 identities.notices.clear()
 
     def release(self, node: int, t_ns: int) -> None:
-        """Believe a node again that was quarantined; by its id."""
+        """Accept messages of a quarantined node again, by its id."""
         for identities in self._identities:
             identities.release(node, t_ns)
 
     def marks(self, ahead: int = 0) -> dict[str, dict[int, Mark]]:
-        """The newest signed messages, by who shares a key; see `Identities.high_water`."""
+        """Return the newest signed messages, by owner of a key; see `Identities.high_water`."""
         return {who: each.high_water(ahead) for who, each in self._signed.items()}
 
     def restore(self, marks: Mapping[str, Mapping[int, Mark]]) -> None:
-        """Believe nothing that is as old as these marks."""
+        """Refuse all messages that are not newer than these marks."""
         for who, each in self._signed.items():
             each.restore(marks.get(who, {}))
 
     def seconds(self, t_ns: int) -> float:
-        """Host time as that of measurements [s]."""
+        """Convert host time to the time of the measurements [s]."""
         return (t_ns - self.start_ns) * NS
 
     def wrong_rate(self, node: int) -> str:
-        """What is to be said of a node whose samples do not come as often as configured."""
+        """Return the notice about a node whose sample rate is not the configured one."""
         rate, given = self.sample_rates.rate[node], self.group.nodes[node].imu_hz
         return (
             f"nodes.{self.group.ids[node]}.imu_hz: {given:g} configured, but {rate:.0f} samples a "
@@ -146,7 +146,7 @@ class Intake:
 
     def _telemetry(self, car: CarConfig) -> Stream:
         driver = make_driver(car.driver, car.node, car.options, car.key, 0, lambda: 0)
-        # The car's controller numbers its own messages: it is another device than its node.
+        # The car's controller numbers its own messages: it is not the same device as its node.
         identities = Identities(authenticated=bool(car.key))
         self._identities.append(identities)
         if car.key:
@@ -187,7 +187,7 @@ class Intake:
             self.heard_ns[node] = arrival_ns
 
     def _judge(self, stream: Stream, source: Source, node: int, arrival_ns: int) -> None:
-        """Find out whether a message is to be believed, and when it was measured."""
+        """Check the identity of the sender of a message and determine the time of measurement."""
         verdict = stream.identities.check(stream.name, source, arrival_ns, self.group.ids[node])
         stream.source, stream.verdict = source, verdict
         if not verdict.accepted:
@@ -199,7 +199,7 @@ class Intake:
         stream.t_ns = clock.map(source.ticks, arrival_ns)
 
     def _use(self, stream: Stream, reading: Reading, node: int, t_ns: int, arrival_ns: int) -> bool:
-        """Turn a reading into what the tracker takes; whether it was believed."""
+        """Convert a reading to measurements; return whether it was accepted."""
         t = self.seconds(t_ns)
         match reading:
             case ImuReading(gyr=gyr, acc=acc, mag=mag):
@@ -239,7 +239,7 @@ class Intake:
     def _repeats(
         self, source: Source, node: int, values: tuple[float, ...], arrival_ns: int
     ) -> bool:
-        """Whether a sample is the one before once more; of a stuck sensor it is told once."""
+        """Return whether a sample is repeated; a frozen sensor is reported once."""
         known = node in self._repeated.stuck
         why = self._repeated.refusal(node, source, values, arrival_ns)
         if why:
@@ -267,7 +267,7 @@ class Intake:
             values = (reading.distance, powers[0], powers[1])  # type: ignore[assignment]
         self.events.add_range(self.seconds(t_ns), (near, far), antennas, values)
         if stream.name.startswith("links."):
-            self.heard_ns[near] = self.heard_ns[far] = arrival_ns  # it answered
+            self.heard_ns[near] = self.heard_ns[far] = arrival_ns  # the far node answered
         return True
 
     def _note_fault(self, stream: Stream, node: int, fault: int, arrival_ns: int) -> None:
@@ -279,7 +279,7 @@ class Intake:
 
 
 def _only_antenna(group: Constellation, node: int) -> int:
-    """Index of the antenna that a node's ranges are between; the first of several."""
+    """Return the index of the antenna used for a node's ranges; the first of several."""
     try:
         return group.antenna_index(node, None)
     except ConfigError:

@@ -1,4 +1,4 @@
-"""Which node of the group a device is, by what its format and the configuration call it."""
+"""Assignment of devices to nodes of the group, by the names in their format and configuration."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from hardware_bridge.ingest.stream import Stream
 from tracking.constellation import Constellation
 
 MOST_STRANGERS = 32
-"""Devices that are not in the configuration are told of so many times."""
+"""[-] Largest number of devices outside of the configuration that are reported."""
 
 
 def node_of(
     device: str | None, speaker: int | None, ids: Mapping[str, int], *, mixed: bool = False
 ) -> int | None:
-    """Id of the node that a device is; None where the configuration makes it none.
+    """Return the id of the node that a device is; None if the configuration assigns none.
 
     Args:
-        device: As its format writes it; None is the sender.
-        speaker: Id of who does, None for unknown.
-        ids: Of the link. Where it has some, a device that is not among them is unknown.
-        mixed: Others go by the ids of nodes, too, but for those that `ids` gives to a device.
+        device: Name of the device as its format writes it; None for the sender.
+        speaker: Node id of the sender, None if unknown.
+        ids: Node ids by device name of the link. If any are given, other devices are unknown.
+        mixed: True if other devices may also be named by node ids that `ids` does not contain.
     """
     if device is None:
         return speaker
@@ -33,17 +33,17 @@ def node_of(
 
 
 class Naming:
-    """Names of devices to indices of nodes; strangers are counted, and told of once."""
+    """Mapping of device names to node indices; unknown devices are counted and reported once."""
 
     def __init__(
         self, group: Constellation, refused: Counter[str], notices: list[tuple[int, str]]
     ) -> None:
-        """Begin with no device received.
+        """Create a mapping without received devices.
 
         Args:
-            group: Whose nodes they are.
-            refused: Counts strangers.
-            notices: Gets a line on each.
+            group: The nodes.
+            refused: Counter of refused readings; unknown devices are counted here.
+            notices: List of notices; each unknown device is reported here.
         """
         self._group, self._refused, self._notices = group, refused, notices
         self._strangers: set[tuple[str, str]] = set()
@@ -57,13 +57,13 @@ class Naming:
         named: bool = False,
         mixed: bool = False,
     ) -> int | None:
-        """Index of the node that a device is; None for strangers.
+        """Return the index of the node that a device is; None for unknown devices.
 
         Args:
-            stream: That tells of it.
-            device: As its format writes it; None is the sender on this stream.
-            t_ns: Now, by the host's clock [ns].
-            named: Another device names it.
+            stream: Stream that names the device.
+            device: Name of the device as its format writes it; None for the sender on this stream.
+            t_ns: Current host time [ns].
+            named: True if another device names it.
             mixed: See `node_of`.
         """
         node = node_of(device, stream.node, stream.ids, mixed=mixed)

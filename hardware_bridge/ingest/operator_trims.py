@@ -1,4 +1,4 @@
-"""What operators ask of the cars by remote control: velocities on top of the plan."""
+"""Velocity trims by operators with a remote control, added to the plan."""
 
 from __future__ import annotations
 
@@ -10,34 +10,34 @@ from hardware_bridge.ingest.stream import Stream
 from hardware_bridge.readings import UNNAMED, OperatorReading
 
 NO_NODE = -1
-"""In place of an id, of an operator without."""
+"""Node id used for an operator without an id."""
 
 
 class Trims:
-    """The newest of each car."""
+    """The newest trim of each car."""
 
     def __init__(self, naming: Naming, refused: Counter[str]) -> None:
-        """Begin with none.
+        """Create an empty table of trims.
 
         Args:
             naming: Names of devices to indices of nodes.
-            refused: Readings that were not used, by reason; counted on.
+            refused: Counter of refused readings, by reason; continued.
         """
         self.newest: dict[int, tuple[int, tuple[float, float]]] = {}
-        """By index of the node: host time of arrival [ns], velocity in the world frame [m/s]."""
+        """Host time of arrival [ns] and velocity in the world frame [m/s], by index of the node."""
         self._naming, self._refused = naming, refused
 
     def take(self, stream: Stream, reading: OperatorReading, arrival_ns: int) -> None:
-        """Take a reading if its message is accepted; velocities that are not finite are left out.
+        """Store a reading if its message is accepted; non-finite velocities are ignored.
 
         Args:
-            stream: It came on.
-            reading: What is asked of one car.
-            arrival_ns: Host time [ns].
+            stream: Stream of the reading.
+            reading: The trim of one car.
+            arrival_ns: Host time of arrival [ns].
         """
         source, device = reading.source, reading.source.device
         if source is not stream.source or source is UNNAMED:
-            # A remote control is none of the nodes; it has an id of its own.
+            # A remote control is not a node; it has an id of its own.
             who = int(device) if device and device.isascii() and device.isdigit() else NO_NODE
             stream.verdict = stream.identities.check(stream.name, source, arrival_ns, who)
             stream.source = source

@@ -1,4 +1,4 @@
-"""What cars' own distance sensors see, as beams evenly round each car."""
+"""Measurements of the cars' own distance sensors, as sensors evenly spaced around each car."""
 
 from __future__ import annotations
 
@@ -12,35 +12,35 @@ from relpos_env.interface.beams import FARTHEST
 from tracking.arrays import F64, I64
 
 LASTS, N_SPANS = 0.3, 6
-"""[s, -] Time that a measurement counts, and number of spans that it is divided into. All spans but
-one last longer than a turn of a slow scanner."""
+"""[s, -] Validity of a measurement, and number of spans that it is divided into. All spans but one
+together are longer than a revolution of a slow scanner."""
 SPAN_NS = round(LASTS * 1e9) // N_SPANS
 
 
 class Near:
-    """Of the cars of a group. A beam tells what is nearest in its sector."""
+    """Distance sensors of a group of cars. A sensor measures the nearest distance in its sector."""
 
     def __init__(self, n_slots: int, n_beams: int) -> None:
-        """Begin with nothing measured.
+        """Create sensors without measurements.
 
         Args:
-            n_slots: Cars.
-            n_beams: Round each of them; 0 for none.
+            n_slots: Number of cars.
+            n_beams: Number of distance sensors around each car; 0 for none.
         """
         shape = n_slots, n_beams, N_SPANS
         self._distance: F64 = np.zeros(shape)
-        """Nearest of a span of time, the spans a ring [m]."""
+        """[m] Nearest distance per time span, (slot, beam, span); the spans are a ring buffer."""
         self._span: I64 = np.full(shape, -N_SPANS, dtype=np.int64)
-        """Which span that was."""
+        """[-] Number of the time span of each entry of `_distance`."""
 
     def take(self, slot: int, bearing: float, distance: float | None, t_ns: int) -> None:
-        """One measurement.
+        """Store one measurement.
 
         Args:
-            slot: Of the car.
-            bearing: [rad] 0 ahead, left is positive.
-            distance: [m] None where nothing is.
-            t_ns: When it came [ns].
+            slot: Slot of the car.
+            bearing: Direction [rad], 0 ahead, left is positive.
+            distance: Distance [m]; None if there is no object.
+            t_ns: Arrival [ns].
         """
         n_slots, n_beams, _ = self._distance.shape
         if not (n_beams and slot < n_slots and math.isfinite(bearing)):
@@ -55,7 +55,7 @@ class Near:
     def take_scan(
         self, slot: int, reading: ScanReading, mount: ScannerMount | None, t_ns: int
     ) -> None:
-        """What a scanner measured; a direction without a distance tells nothing."""
+        """Store a measurement of a scanner; one without a distance carries no information."""
         if reading.distance is None or mount is None:
             return
         seen = mount.seen(reading.bearing, reading.distance)
@@ -63,7 +63,7 @@ class Near:
             self.take(slot, *seen, t_ns)
 
     def beams(self, t_ns: int) -> F64:
-        """Distances now, (slot, beam) [m]; 0, a touch, where nothing was measured of late."""
+        """Return the distances at `t_ns`, (slot, beam) [m]; 0 without a recent one, a contact."""
         fresh = self._span > t_ns // SPAN_NS - N_SPANS
         nearest = np.where(fresh, self._distance, np.inf).min(axis=-1)
         distances: F64 = np.where(np.isfinite(nearest), nearest, 0.0)

@@ -1,11 +1,11 @@
-"""Samples that are the one before once more: a message that came twice, or a sensor that is stuck.
+"""Detection of repeated samples: a message received twice, or a frozen sensor.
 
-Where messages have numbers, copies are found by these. Where they have none, the same sample again
-before the next one could have been measured is a copy: integrated, it would turn the node twice.
+Copies of numbered messages are detected by their numbers. Without numbers, the same sample before
+the next one can have been measured is a copy: integrated, it would count a rotation twice.
 
-A sensor whose own bus hangs repeats its last sample for ever. Each is plausible by itself, and a
-heading that is integrated from them runs away. A sensor that works has noise: all its axes do not
-stay the same, to the last bit, for long.
+A sensor whose own bus hangs repeats its last sample forever. Each sample is plausible by itself,
+and the heading integrated from them diverges. A working sensor has noise: its axes do not all stay
+the same to the last bit for long.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from dataclasses import dataclass
 from hardware_bridge.readings import Source
 
 STUCK = 0.25
-"""[s] The same numbers for so long. Devices that send more often than they measure repeat them
-too, for less than 0.2 s."""
+"""[s] Duration of identical samples that counts as frozen. Devices that send faster than they
+measure also repeat samples, for less than 0.2 s."""
 FEWEST = 5
-"""[-] And as many samples, for streams that are slow."""
+"""[-] Smallest number of identical samples that counts as frozen, for slow streams."""
 SOON = 0.5
-"""[-] Of a period, after which the next sample may come."""
+"""[-] Fraction of a period after which the next sample may arrive."""
 
 
 @dataclass(slots=True)
 class _Held:
-    """The last numbers of a node."""
+    """Last values of a node."""
 
     values: tuple[float, ...]
     since_ns: int
@@ -35,31 +35,31 @@ class _Held:
 
 
 class RepeatedSamples:
-    """Tells repeated samples from others, node by node.
+    """Detector of repeated samples, node by node.
 
-    Laws: a sample that differs from the one before is always taken; of samples that never differ
-    none is taken after `STUCK`, once there were `FEWEST`.
+    Invariants: a sample that differs from the previous one is always accepted; identical samples
+    are refused after `STUCK` and at least `FEWEST` of them.
     """
 
     def __init__(self, rates: Sequence[float]) -> None:
-        """Begin without samples.
+        """Create a detector without samples.
 
         Args:
-            rates: Of the nodes' samples, by index [1/s].
+            rates: Sample rates of the nodes, by index [1/s].
         """
         self._soon_ns = [round(SOON * 1e9 / rate) for rate in rates]
         self._held: dict[int, _Held] = {}
         self.stuck: set[int] = set()
-        """Nodes whose last sample was refused because the sensor is."""
+        """Nodes whose last sample was refused because of a frozen sensor."""
 
     def refusal(self, node: int, source: Source, values: tuple[float, ...], t_ns: int) -> str:
-        """Why a sample is not to be used: ``duplicate`` or ``stuck``; empty if it is.
+        """Return the reason to refuse a sample: ``duplicate`` or ``stuck``; empty if none.
 
         Args:
-            node: Whose, by index.
-            source: Of the message.
-            values: All that the sensor measured.
-            t_ns: When it came, by the host's clock [ns].
+            node: Index of the node.
+            source: Source of the message.
+            values: All values of the sensor.
+            t_ns: Arrival, by the host's clock [ns].
         """
         held = self._held.get(node)
         if held is None or held.values != values:

@@ -1,7 +1,7 @@
-"""How often inertial samples come, next to how often the configuration says.
+"""Measured rates of inertial samples, compared with the configured ones.
 
-Orientations are filtered sample by sample at the configured rate: with a wrong one their time
-constants are wrong by that factor and they lag behind turns, and nothing else tells.
+The attitude filter runs at the configured rate: with a wrong one its time constants are wrong by
+the same factor and attitudes lag behind rotations, without any other symptom.
 """
 
 from __future__ import annotations
@@ -9,42 +9,42 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 WINDOW = 1.0
-"""[s] Over which samples are counted."""
+"""[s] Duration over which samples are counted."""
 BACKLOG = 0.5
-"""[s] What comes at first is not counted: a port hands on at once what it has kept."""
+"""[s] Initial time that is not counted: a port first delivers its backlog at once."""
 PAUSE = 0.5
-"""[s] After a longer one they are counted again."""
+"""[s] Pause after which counting restarts."""
 OFF = 0.3
-"""[-] A rate that differs by more is another one. What comes in bunches, or is lost, is within it;
-rates that were mistaken differ by a factor of two."""
+"""[-] Relative deviation above which a rate is wrong. Bunching and losses stay within it; confused
+rates differ by a factor of two."""
 
 
 def is_off(rate: float, configured: float) -> bool:
-    """Whether samples come at another rate than the configured one [1/s]."""
+    """Return whether a sample rate differs from the configured one [1/s]."""
     return abs(rate - configured) > OFF * configured
 
 
 class SampleRates:
-    """Counts samples, node by node."""
+    """Counter of samples, node by node."""
 
     def __init__(self, configured: Sequence[float]) -> None:
-        """Begin with none.
+        """Create a counter without samples.
 
         Args:
-            configured: Rates, by index of the node [1/s].
+            configured: Configured rates, by index of the node [1/s].
         """
         self._configured = configured
         self._counted: dict[int, tuple[int, int, int]] = {}
         self._doubted: set[int] = set()
         self.rate: dict[int, float] = {}
-        """Of the last whole window [1/s]; a wrong one only after the second in a row."""
+        """Rate of the last complete window [1/s]; a wrong one only after the second in a row."""
 
     def note(self, node: int, t_ns: int) -> bool:
-        """Count a sample; whether it ends a window that was the first of a wrong rate.
+        """Count a sample; return whether it completes the window that confirms a wrong rate.
 
         Args:
-            node: Whose, by index.
-            t_ns: When it came, by the host's clock [ns].
+            node: Index of the node.
+            t_ns: Arrival, by the host's clock [ns].
         """
         begins = t_ns + round(BACKLOG * 1e9)
         first_ns, last_ns, n = self._counted.get(node, (begins, t_ns, 0))
@@ -65,9 +65,9 @@ class SampleRates:
         return self.is_off(node) and not was_off
 
     def is_off(self, node: int) -> bool:
-        """Whether a node was found to have another rate than the configured one."""
+        """Return whether a node was found to have another rate than the configured one."""
         return node in self.rate and is_off(self.rate[node], self._configured[node])
 
     def is_open(self, node: int) -> bool:
-        """Whether a node has begun to send samples, and its rate is not known yet."""
+        """Return whether a node has begun to send samples and its rate is not known yet."""
         return node in self._counted and node not in self.rate

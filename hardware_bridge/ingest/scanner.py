@@ -1,4 +1,4 @@
-"""Where a scanner is on its car: from what it measures to what is near the car's body."""
+"""Mounting of a scanner on its car: its measurements relative to the car's body."""
 
 from __future__ import annotations
 
@@ -8,29 +8,29 @@ from math import atan2, cos, hypot, sin
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ScannerMount:
-    """The scanner in the frame of the car, x forward and y left of the body's middle."""
+    """Pose of the scanner in the car's frame, x forward and y left from the body's centre."""
 
     x: float = 0.0
-    """[m]"""
+    """[m] Position along x."""
     y: float = 0.0
-    """[m]"""
+    """[m] Position along y."""
     yaw: float = 0.0
-    """[rad] Of the scanner's front from the car's, left is positive."""
+    """[rad] Direction of the scanner's front relative to the car's, left is positive."""
     length: float = 0.42
-    """[m] Of the car's body, along x."""
+    """[m] Length of the car's body, along x."""
     width: float = 0.2
-    """[m] Along y."""
+    """[m] Width of the car's body, along y."""
 
     def seen(self, bearing: float, distance: float) -> tuple[float, float] | None:
-        """What was measured, from the car's body.
+        """Convert a measurement to bearing and distance from the car's body.
 
         Args:
-            bearing: [rad] From the scanner's front, left is positive.
-            distance: [m] From the scanner.
+            bearing: Direction [rad] from the scanner's front, left is positive.
+            distance: Distance [m] from the scanner.
 
         Returns:
-            The bearing from the middle of the body [rad], and the distance [m] along that ray from
-            where it leaves the body. None for a point of the body itself: a mast, an antenna.
+            The bearing from the centre of the body [rad], and the distance [m] along that ray from
+            the edge of the body. None for a point of the body itself: a mast, an antenna.
         """
         x = self.x + distance * cos(self.yaw + bearing)
         y = self.y + distance * sin(self.yaw + bearing)

@@ -1,4 +1,4 @@
-"""What is known of one port that measures, or of a car's telemetry."""
+"""State of one port that measures, or of a car's telemetry."""
 
 from __future__ import annotations
 
@@ -19,40 +19,40 @@ from hardware_bridge.readings import (
 )
 
 OF_A_CAR = (MotionReading, NearReading, StatusReading, AckReading, HeartbeatReading)
-"""What a car's controller can say; nothing else is believed on its line."""
+"""Readings that a car's controller may send; others are refused on its line."""
 
 
 @dataclass(slots=True)
 class Stream:
-    """What is known of one port."""
+    """State of one port."""
 
     name: str
     decoder: Decoder
     node: int | None
-    """Id of the sender, where the format does not name it."""
+    """Node id of the sender, for formats that do not name it."""
     ids: dict[str, int]
     identities: Identities
     is_car: bool = False
-    """Of a car's controller: no other device sends there."""
+    """True for the port of a car's controller: no other device sends there."""
     scanner: ScannerMount | None = None
-    """Where it is on its car, if it is one."""
+    """Mounting on the car, for scanners."""
     times: dict[int, StreamTime] = field(default_factory=dict)
-    """By node index."""
+    """Conversions of stamps to host time, by node index."""
     clocks: dict[int, DeviceClock] = field(default_factory=dict)
-    """The counter of `times`, by node index; none where they are times of arrival."""
+    """Counter of each conversion in `times`, by node index; none for arrival times."""
     other: dict[int, DeviceClock | None] = field(default_factory=dict)
-    """Another counter that the last stamp was of, by node index."""
+    """Differing counter of the last stamp, by node index."""
     even: dict[int, EvenTime] = field(default_factory=dict)
     """Times of samples without stamps, by node index."""
     source: Source | None = None
-    """Of the last reading: those of one message share it, and are taken or refused together."""
+    """Source of the last reading: readings of a message share it, and one verdict."""
     verdict: Verdict = Verdict.UNNUMBERED
     t_ns: int = 0
 
     def clock(self, node: int, source: Source) -> StreamTime:
-        """What maps the stamps of a node, by its index: a new one where they change their counter.
+        """Return the conversion of a node's stamps, by its index: a new one if the counter changes.
 
-        A single stamp of another counter is a damaged one, and counts as when it came.
+        A single stamp of another counter is considered damaged and mapped to its arrival.
         """
         counter = None if source.ticks is None else source.clock
         if node in self.times:

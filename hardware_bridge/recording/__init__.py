@@ -1,4 +1,4 @@
-"""Recordings: every byte of every link with its time, in a file that only grows."""
+"""Recordings: every byte of every link with its time, in an append-only file."""
 
 from hardware_bridge.recording.format import Header, Kind, Record
 from hardware_bridge.recording.reader import Recording, read_recording

@@ -1,4 +1,4 @@
-"""The file under a recorder: opened new, only appended to, cut back to whole records."""
+"""File of a recorder: created, appended to, and truncated to complete records."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from hardware_bridge.recording.syncer import Syncer
 
 
 class RecordingFile:
-    """Used by one thread.
+    """Recording file, used by one thread.
 
     Raises:
         BridgeError: The file exists or cannot be written.
@@ -52,13 +52,13 @@ class RecordingFile:
         self._syncer = Syncer(self._fd)
 
     def append(self, records: list[Record]) -> tuple[int, str | None]:
-        """Number records and write them at the end, with one write if the system takes it.
+        """Number records and append them, with one write if the system accepts it.
 
         Returns:
-            How many of them, from the first, are in the file, and why not all.
+            Number of leading records that are in the file, and the reason if not all are.
 
         Raises:
-            ValueError: One of them is none, see `format.check_record`.
+            ValueError: A record is invalid, see `format.check_record`.
         """
         parts = [
             encode_record(self._marker, replace(record, sequence=self._sequence + k))
@@ -78,24 +78,24 @@ class RecordingFile:
             try:
                 os.ftruncate(self._fd, start + end)
             except OSError:
-                # What stands there now is unknown, so its numbers must not come again. A
-                # reader finds its way over the torn record.
+                # The content after `end` is unknown, so its numbers must not be reused. A reader
+                # skips the torn record.
                 self._sequence += len(parts) - whole
         return whole, failure
 
     @property
     def sync_failure(self) -> str | None:
-        """Why the disk may lack some of what was written."""
+        """Reason why the disk may lack written data."""
         return self._syncer.failure
 
     def close(self) -> None:
-        """Bring it onto the disk and give it back."""
+        """Sync the file to the disk and close it."""
         self._syncer.stop()
         with contextlib.suppress(OSError):
             os.close(self._fd)
 
     def _put(self, data: bytes) -> tuple[int, str | None]:
-        """Bytes written, and why not all."""
+        """Write data; return the number of bytes written and the reason if not all were."""
         done = 0
         while done < len(data):
             try:

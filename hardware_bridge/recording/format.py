@@ -1,8 +1,8 @@
-"""What a recording looks like as bytes: a head of 16 bytes, a header record, records.
+"""Byte format of a recording: a head of 16 bytes, a header record, records.
 
-Every record starts with the file's own random marker and ends with a check sum over all before
-it, marker included. So a reader finds the next whole record behind a damaged place, and takes
-nothing for a record that stood in a payload or in another recording (`docs/how-to/recording.md`).
+Every record starts with the file's random marker and ends with a check sum over all preceding
+bytes, marker included. A reader thus finds the next complete record behind a damaged place, and
+mistakes no part of a payload or of another recording for a record (`docs/how-to/recording.md`).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from enum import IntEnum
 from typing import Any
 
 MAGIC = b"\x89RELPOS\n"
-"""A byte above 127 and a line end show a file that was sent as text."""
+"""Magic bytes; a byte above 127 and a line end reveal a transfer in text mode."""
 VERSION = 2
 HEAD = struct.Struct("<8sHH4s")
 """Magic, version, 0, marker."""
@@ -24,45 +24,45 @@ PREFIX = struct.Struct("<4sBHQqI")
 CHECK = struct.Struct("<I")
 """CRC-32 of prefix and payload, as zlib computes it."""
 OVERHEAD = PREFIX.size + CHECK.size
-"""[bytes] What a record costs beyond its payload."""
+"""[bytes] Size of a record in addition to its payload."""
 MOST_PAYLOAD = 1 << 16
-"""[bytes] In one record; far more than a port gives at once."""
+"""[bytes] Largest payload of one record; far more than a port delivers at once."""
 MOST_HEADER = 1 << 20
-"""[bytes] In the header record, which holds a configuration."""
+"""[bytes] Largest payload of the header record, which holds a configuration."""
 
 
 class Kind(IntEnum):
-    """What a record holds. None is 0, so that zeros on a disk are no record."""
+    """Kind of a record. None is 0, so that zeros on a disk are no record."""
 
     HEADER = 1
     """`Header` as JSON; the first record and no other."""
     BYTES_IN = 2
-    """What was read from a link at once."""
+    """Bytes of one read from a link."""
     TICK = 3
-    """A decision: the tracker was asked for an estimate at this time. No payload."""
+    """A control step: the tracker was asked for an estimate at this time. No payload."""
     EVENT = 4
-    """A JSON object with the field ``event``: a notice, what the gate let pass, records that were
-    lost."""
+    """A JSON object with the field ``event``: a notice, commands passed by the gate, or lost
+    records."""
 
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """One thing that happened."""
+    """One recorded event."""
 
     kind: Kind
     link: int
-    """Index into `Header.links`; 0 where the kind belongs to no link."""
+    """Index into `Header.links`; 0 for kinds without a link."""
     t_ns: int
-    """By the host's monotonic clock [ns]."""
+    """Time by the host's monotonic clock [ns]."""
     payload: bytes
     sequence: int = 0
-    """Counts the records of a file from 1, the header being 0, without gaps."""
+    """Number of the record in the file, without gaps; the header is 0."""
 
     def event(self) -> dict[str, Any]:
-        """The payload of an EVENT.
+        """Return the payload of an EVENT.
 
         Raises:
-            ValueError: It is no JSON, so this is no EVENT.
+            ValueError: The payload is not JSON, so this is no EVENT.
         """
         try:
             value = json.loads(self.payload)
@@ -72,35 +72,35 @@ class Record:
 
 
 LATEST = 1 << 62
-"""[ns] Later there is no time."""
+"""[ns] Largest accepted time."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Header:
-    """What was recorded, and with what."""
+    """Metadata of a recording."""
 
     software: str
-    """Name and version of the software that recorded."""
+    """Name and version of the recording software."""
     config: str
-    """The text of swarm.toml."""
+    """Text of swarm.toml."""
     links: tuple[str, ...]
     """Names of all links and cars, ``links.left`` or ``cars.1``; records hold their indices."""
     monotonic_ns: int
-    """[ns] The host's monotonic clock at the start."""
+    """[ns] Time of the host's monotonic clock at the start."""
     wall_ns: int
-    """[ns] UTC since 1970 at the same moment, 0 s of its measurements and estimates: for people
+    """[ns] UTC since 1970 at the same moment, 0 s of the measurements and estimates: for display
     and exports, never for tracking."""
 
     def encode(self) -> bytes:
-        """The payload of the header record."""
+        """Return the payload of the header record."""
         return json.dumps(asdict(self)).encode()
 
     @classmethod
     def decode(cls, payload: bytes) -> Header:
-        """The header of a payload.
+        """Return the header in a payload.
 
         Raises:
-            ValueError: It is not one.
+            ValueError: The payload is not a header.
         """
         raw = json.loads(payload)
         if not isinstance(raw, dict):
@@ -121,7 +121,7 @@ class Header:
 
 
 def check_record(record: Record) -> None:
-    """See that a record can be written.
+    """Check that a record can be written.
 
     Raises:
         ValueError: A number does not fit its field, or the payload is too long.
@@ -130,10 +130,10 @@ def check_record(record: Record) -> None:
 
 
 def encode_record(marker: bytes, record: Record) -> bytes:
-    """A record as it stands in the file of that marker.
+    """Return the bytes of a record in the file with that marker.
 
     Raises:
-        ValueError: As `check_record`.
+        ValueError: The record is invalid, see `check_record`.
     """
     body = _prefix(marker, record) + record.payload
     return body + CHECK.pack(zlib.crc32(body))
@@ -150,7 +150,7 @@ def _prefix(marker: bytes, record: Record) -> bytes:
 
 
 def decode_record(data: bytes | bytearray, at: int, marker: bytes) -> Record | None:
-    """The record that starts there, or None where there is no whole and right one."""
+    """Return the record that starts at `at`, or None without a complete and valid one."""
     size = record_size(data, at, marker)
     if size is None or at + size > len(data):
         return None
@@ -163,7 +163,7 @@ def decode_record(data: bytes | bytearray, at: int, marker: bytes) -> Record | N
 
 
 def record_size(data: bytes | bytearray, at: int, marker: bytes) -> int | None:
-    """[bytes] Size of the record that starts there by its prefix, None where none does."""
+    """Return the size [bytes] of the record at `at` by its prefix, None without one."""
     if at + PREFIX.size > len(data):
         return None
     found, kind, _, _, _, length = PREFIX.unpack_from(data, at)
@@ -173,7 +173,7 @@ def record_size(data: bytes | bytearray, at: int, marker: bytes) -> int | None:
 
 
 def most_payload(kind: int) -> int:
-    """[bytes] The longest payload of a kind."""
+    """Return the largest payload of a kind [bytes]."""
     return MOST_HEADER if kind == Kind.HEADER else MOST_PAYLOAD
 
 

@@ -1,4 +1,4 @@
-"""Reading a recording, whole, torn or damaged: never a record that was not written."""
+"""Reader of recordings, also torn or damaged ones; it never returns an unwritten record."""
 
 from __future__ import annotations
 
@@ -23,25 +23,25 @@ from hardware_bridge.recording.format import (
 )
 
 _STEP = 1 << 20
-"""[bytes] Read at once."""
+"""[bytes] Size of one read."""
 _REACH = MOST_PAYLOAD + OVERHEAD
-"""[bytes] The longest record but the header."""
+"""[bytes] Size of the longest record except the header."""
 
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """What `read_recording` found; iterating reads the records, each time from the file."""
+    """Result of `read_recording`; iteration reads the records, each time from the file."""
 
     path: Path
     header: Header
     n_records: int
-    """Whole records, the header not counted."""
+    """Number of complete records, without the header."""
     torn: bool
-    """The file ends in the middle of a record, as after the end of a process or a full disk."""
+    """True if the file ends within a record, as after a killed process or on a full disk."""
     damaged: int
-    """Places before the end where bytes are no record, and were skipped."""
+    """Number of places before the end that hold no valid record and were skipped."""
     missing: int
-    """Records that those places held, by the numbers of the others."""
+    """Number of records lost in these places, by the sequence numbers."""
     t_range_ns: tuple[int, int]
     """[ns] Earliest and latest time of a record; those of the header if there is none."""
     _start: int
@@ -49,10 +49,10 @@ class Recording:
     _marker: bytes
 
     def event(self, record: Record) -> dict[str, Any]:
-        """What an EVENT of it says.
+        """Return the content of an EVENT.
 
         Raises:
-            BridgeError: It says nothing that can be read.
+            BridgeError: The content is invalid.
         """
         try:
             return record.event()
@@ -60,7 +60,7 @@ class Recording:
             raise BridgeError(f"{self.path.name}: a damaged record of an event: {error}") from error
 
     def __iter__(self) -> Iterator[Record]:
-        """Whole records in the order in which they were written."""
+        """Yield complete records in the order of writing."""
         with open(self.path, "rb") as file:
             file.seek(self._start)
             scan = _Scan(file, self._end - self._start, self._marker)
@@ -68,11 +68,11 @@ class Recording:
 
 
 def read_recording(path: Path | str) -> Recording:
-    """Go over a recording once: check every record and count.
+    """Scan a recording once: check and count every record.
 
     Raises:
-        BridgeError: No such file, not a recording, of a later version, or its header
-            is damaged.
+        BridgeError: The file is missing, not a recording, or of a later version, or its header is
+            damaged.
     """
     path = Path(path)
     try:
@@ -128,7 +128,7 @@ def _read(path: Path, file: BinaryIO) -> Recording:
 
 
 class _Scan:
-    """One pass over so many bytes of a file, in bounded memory."""
+    """One pass over part of a file, in bounded memory."""
 
     def __init__(self, file: BinaryIO, size: int, marker: bytes) -> None:
         self._file = file
@@ -142,10 +142,10 @@ class _Scan:
         self.torn = False
 
     def records(self) -> Iterator[Record]:
-        """Whole records; numbers only rise, so that a block that stands twice counts once."""
+        """Yield complete records with rising numbers, so that a repeated block counts once."""
         while self._fill():
             record = decode_record(self._data, self._at, self._marker)
-            # The numbers would also fall where an older block of the same file were left.
+            # Numbers also fall if an older block of the same file remains.
             if record is not None and record.sequence > self.last and record.kind != Kind.HEADER:
                 self.damaged += self.torn
                 self.torn = False
@@ -157,7 +157,7 @@ class _Scan:
                 self._seek_marker()
 
     def _fill(self) -> bool:
-        """Have a whole record from here on, as far as the file goes; False at its end."""
+        """Buffer a complete record, as far as the file reaches; return False at its end."""
         if len(self._data) - self._at < _REACH and self._left > 0:
             del self._data[: self._at]
             self._at = 0
@@ -168,11 +168,11 @@ class _Scan:
         return self._at < len(self._data)
 
     def _seek_marker(self) -> None:
-        """Go to the next place where a record may start."""
+        """Move to the next possible start of a record."""
         found = self._data.find(self._marker, self._at + 1)
         if found >= 0:
             self._at = found
         else:
-            # The marker may begin in the last bytes and go on in those not yet read.
+            # The marker may begin in the last bytes and continue in unread ones.
             keep = len(self._marker) - 1 if self._left > 0 else 0
             self._at = max(self._at + 1, len(self._data) - keep)

@@ -1,7 +1,7 @@
-"""Writing a recording from a loop that must not wait.
+"""Recorder for loops that must not block.
 
-`add` puts a record into a queue of bounded size; a thread writes. A disk that is full or slow
-costs records, which are counted and flagged, and never time of the caller.
+`add` puts a record into a bounded queue; a thread writes. A full or slow disk costs records, which
+are counted and reported, but never blocks the caller.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from hardware_bridge.recording.file import RecordingFile
 from hardware_bridge.recording.format import OVERHEAD, Header, Kind, Record, check_record
 
 MOST_WAITING = 8 << 20
-"""[bytes] Of records in the queue: over a minute of a dozen nodes."""
+"""[bytes] Bound of the queue: over a minute of data of a dozen nodes."""
 RETRY_S = 1.0
-"""[s] After a write that failed, the next one is tried so much later."""
+"""[s] Delay of the next attempt after a failed write."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Loss:
-    """So many records that are not in the file, from that time on."""
+    """Number of records missing in the file, and the time of the first."""
 
     n: int
     t_ns: int
@@ -39,16 +39,16 @@ class _Loss:
 class Recorder:
     """An open recording.
 
-    What `flush` acknowledged survives the end of the process, SIGKILL included. After a write
-    that failed the file ends with its last whole record; records are dropped until a write
-    succeeds again, and an EVENT ``recording_lost`` says how many.
+    Records acknowledged by `flush` survive the end of the process, SIGKILL included. After a failed
+    write the file ends with its last complete record; records are dropped until a write succeeds
+    again, and an EVENT ``recording_lost`` reports their number.
 
     Args:
-        path: A file that is not there yet.
-        header: What is recorded.
-        most_waiting: [bytes] Bound of the queue.
-        clock: [s] Monotonic, for the time between tries.
-        write: As `os.write`.
+        path: File to create.
+        header: Metadata of the recording.
+        most_waiting: Bound of the queue [bytes].
+        clock: Monotonic clock [s], for the time between attempts.
+        write: Function like `os.write`.
 
     Raises:
         BridgeError: The file exists or cannot be written.
@@ -67,7 +67,7 @@ class Recorder:
         self._clock = clock
         self._most_waiting = most_waiting
         self._changed = threading.Condition()
-        # Guarded by the condition's lock, down to `_closing`.
+        # The following fields, down to `_closing`, are guarded by the condition's lock.
         self._queue: deque[Record | _Loss] = deque()
         self._waiting = 0
         self._added = self._handled = self._dropped = 0
@@ -75,7 +75,7 @@ class Recorder:
         self._lost: str | None = None
         self._failing = False
         self._closing = False
-        # Of the writing thread alone: losses the file does not tell yet, and when to do what.
+        # Used by the writing thread only: losses not yet in the file, time of the next attempt.
         self._untold: _Loss | None = None
         self._retry_at = clock()
         self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
@@ -83,21 +83,21 @@ class Recorder:
 
     @property
     def lost(self) -> str | None:
-        """Why records are missing in the file, the last reason; None while it has them all."""
+        """Last reason for records missing in the file; None if it is complete."""
         return self._lost
 
     @property
     def dropped(self) -> int:
-        """Records that are not in the file and will not be."""
+        """Number of records that are not in the file and will not be."""
         return self._dropped
 
     @property
     def failing(self) -> bool:
-        """Whether the last write failed, so that records are being dropped now."""
+        """True if the last write failed, so that records are being dropped."""
         return self._failing
 
     def add(self, kind: Kind, link: int, t_ns: int, payload: bytes = b"") -> None:
-        """Take a record; never waits for the disk, never raises."""
+        """Queue a record; never blocks on the disk, never raises."""
         try:
             record = Record(kind, link, t_ns, bytes(payload))
             check_record(record)
@@ -127,16 +127,16 @@ class Recorder:
                 self._changed.notify_all()
 
     def add_event(self, t_ns: int, event: str, **fields: object) -> None:
-        """Take an EVENT; what is none of JSON's types is written as text."""
+        """Queue an EVENT; values of types unknown to JSON are written as text."""
         text = json.dumps({"event": event, **fields}, default=str)
         self.add(Kind.EVENT, 0, t_ns, text.encode())
 
     def flush(self, timeout: float = 5.0) -> bool:
-        """Wait until all that was added before is handed to the system.
+        """Wait until all records added so far are passed to the operating system.
 
         Returns:
-            True if every one of those records is in the file, False if some were dropped or
-            the time was over.
+            True if every one of those records is in the file, False if some were dropped or the
+            timeout expired.
         """
         with self._changed:
             goal = self._added
@@ -144,11 +144,11 @@ class Recorder:
             return done and self._dropped == 0
 
     def close(self, timeout: float = 5.0) -> bool:
-        """Write what waits and close the file.
+        """Write queued records and close the file.
 
         Returns:
-            True if every record that was added is in the file and on the disk. A disk that hangs
-            longer than `timeout` [s] keeps its thread; it ends with the process.
+            True if every added record is in the file and on the disk. A disk that blocks for longer
+            than `timeout` [s] keeps its thread, which ends with the process.
         """
         with self._changed:
             self._closing = True
@@ -168,7 +168,7 @@ class Recorder:
             while self._take_turn():
                 pass
         except Exception as error:
-            # A mistake here must show as a lost recording, and stop nothing else.
+            # An error here must show as a lost recording, and stop nothing else.
             with self._changed:
                 self._closing = True
                 self._drop(self._added - self._handled, f"the recorder failed: {error!r}")
@@ -177,11 +177,11 @@ class Recorder:
             self._note_sync()
 
     def _take_turn(self) -> bool:
-        """Handle what waits; False at the end."""
+        """Write the queued records; return False at the end."""
         with self._changed:
             self._changed.wait_for(lambda: self._queue or self._closing)
             closing, loss = self._closing, self._loss
-            # Swapped, not copied: `add` waits for this lock.
+            # Swapped, not copied: `add` blocks on this lock.
             queue, self._queue = self._queue, deque()
             if closing:
                 self._loss = None
@@ -197,7 +197,7 @@ class Recorder:
         return not closing
 
     def _handle(self, batch: list[Record | _Loss], closing: bool) -> None:
-        """Write a batch, or as much of it as the disk takes."""
+        """Write a batch, or as much of it as the disk accepts."""
         now = self._clock()
         n, error = 0, self._lost
         if not self._failing or now >= self._retry_at or closing:
@@ -220,14 +220,14 @@ class Recorder:
             self._changed.notify_all()
 
     def _record(self, item: Record | _Loss) -> Record:
-        """What stands in the file; for a loss the EVENT in place of what is missing."""
+        """Return the record to write; for a loss an EVENT in place of the missing records."""
         if isinstance(item, Record):
             return item
         event = {"event": "recording_lost", "records": item.n, "why": self._lost}
         return Record(Kind.EVENT, 0, item.t_ns, json.dumps(event).encode())
 
     def _note_sync(self) -> None:
-        """What was written may not be on the disk: that is said as well."""
+        """Store the reason of a failed sync: written data may not be on the disk."""
         if self._file.sync_failure is not None:
             with self._changed:
                 self._lost = self._file.sync_failure

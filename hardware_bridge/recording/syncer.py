@@ -1,7 +1,7 @@
-"""Forcing a growing file onto the disk from time to time, while another thread writes.
+"""Periodic sync of a growing file to the disk, while another thread writes.
 
-A sync can take as long as the disk likes. The writing thread goes on meanwhile, so that what is
-recorded is soon in the hands of the system, where the end of the process cannot reach it.
+A sync can take arbitrarily long. The writing thread continues meanwhile, so that records are soon
+passed to the operating system and survive the end of the process.
 """
 
 from __future__ import annotations
@@ -11,28 +11,28 @@ import os
 import threading
 
 SYNC_S = 1.0
-"""[s] Between two syncs: with the time one takes, what a power cut may cost."""
+"""[s] Interval of syncs; plus the duration of one, the largest loss by a power cut."""
 _CANNOT = (errno.EINVAL, errno.ENOTSUP, errno.EROFS)
-"""What files answer that cannot be synced at all."""
+"""Errors of files that do not support sync."""
 
 
 class Syncer:
-    """Syncs a file until it is stopped.
+    """Periodic sync of a file until it is stopped.
 
     Args:
-        fd: The file; it stays open until `stop` came back.
+        fd: The file; it must stay open until `stop` has returned.
     """
 
     def __init__(self, fd: int) -> None:
         self._fd = fd
         self._end = threading.Event()
         self.failure: str | None = None
-        """Why a sync failed, so that the disk may lack what was written."""
+        """Reason of a failed sync, after which the disk may lack written data."""
         self._thread = threading.Thread(target=self._run, name="recording sync", daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
-        """Sync once more and come to an end, however long that takes."""
+        """Sync once more and end the thread, however long that takes."""
         self._end.set()
         self._thread.join()
 

@@ -1,8 +1,8 @@
 """CRC-32 and SipHash-2-4 of bytes in an array.
 
-CRC-32 is that of zlib and Ethernet: reflected polynomial 0xEDB88320, begun and ended with all ones,
-eight bytes at a time from tables ("slicing by 8", [1]). SipHash-2-4 is a keyed hash for short
-messages [2], with 64 bit as its result.
+CRC-32 is that of zlib and Ethernet: reflected polynomial 0xEDB88320, initial value and final XOR
+all ones, eight bytes at a time from tables ("slicing by 8", [1]). SipHash-2-4 is a keyed hash for
+short messages [2], with a 64 bit result.
 
 References:
     [1] Kounavis, Berry, A systematic approach to building high performance software-based CRC
@@ -17,7 +17,7 @@ from tracking.kernels.jit import kernel, small_kernel
 
 @small_kernel
 def crc32(data, n, table):
-    """CRC-32 of the first n bytes."""
+    """Return the CRC-32 of the first n bytes."""
     crc = np.uint32(0xFFFFFFFF)
     full = np.uint32(0xFF)
     at = 0
@@ -67,14 +67,14 @@ def _round(v0, v1, v2, v3):
 
 @small_kernel
 def siphash(data, n, key):
-    """SipHash-2-4 of the first n bytes; the key is two little-endian words."""
+    """Return the SipHash-2-4 of the first n bytes; the key is two little-endian words."""
     v0 = key[0] ^ np.uint64(0x736F6D6570736575)
     v1 = key[1] ^ np.uint64(0x646F72616E646F6D)
     v2 = key[0] ^ np.uint64(0x6C7967656E657261)
     v3 = key[1] ^ np.uint64(0x7465646279746573)
     at = 0
     while at <= n:
-        # The last word holds what is left and, in its highest byte, the length.
+        # The last word holds the remaining bytes and, in its highest byte, the length.
         word = np.uint64(0)
         most = min(8, n - at)
         for k in range(most):
@@ -94,6 +94,6 @@ def siphash(data, n, key):
 
 @kernel
 def check_sums(data, n, table, key, out):
-    """CRC-32 and SipHash of the first n bytes, into out (2) of uint64."""
+    """Write CRC-32 and SipHash of the first n bytes into out, (2) of uint64."""
     out[0] = np.uint64(crc32(data, n, table))
     out[1] = siphash(data, n, key)

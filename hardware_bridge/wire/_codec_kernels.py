@@ -1,7 +1,7 @@
-"""Whole buffers of bytes to arrays of frames and values, and back.
+"""Conversion of complete byte buffers to arrays of frames and values, and back.
 
-A frame on the wire is stuffed by COBS [1], so that it holds no zero byte. A zero ends it; one
-before it ends whatever noise came first.
+A frame on the wire is stuffed by COBS [1], so that it contains no zero byte. A zero terminates it;
+a zero before it terminates any preceding noise.
 
 References:
     [1] Cheshire, Baker, Consistent overhead byte stuffing, IEEE/ACM Transactions on Networking
@@ -20,7 +20,7 @@ POSITION, FRAMES, ROWS, SKIPPED, DAMAGED, STRANGE = 0, 1, 2, 3, 4, 5
 
 @small_kernel
 def _unstuff(data, at, end, raw):
-    """COBS: bytes of the frame between two zeros, or -1 if it is none."""
+    """Undo COBS of the bytes between two zeros; return the frame's length, or -1 if invalid."""
     n = 0
     while at < end:
         code = np.int64(data[at])
@@ -38,7 +38,7 @@ def _unstuff(data, at, end, raw):
 
 @small_kernel
 def _stuff(raw, n, out, at):
-    """COBS and the zero: the place behind them."""
+    """Write a frame with COBS and a final zero; return the position behind it."""
     mark = at
     at += 1
     for k in range(n):
@@ -71,20 +71,20 @@ def _put(raw, at, size, value):
 
 @kernel
 def decode_frames(data, key, keyed, crc_table, messages, columns, raw, frames, values, state):
-    """Every whole frame from state[POSITION] on, as long as there is room.
+    """Decode complete frames from state[POSITION] on, as long as there is capacity.
 
     Args:
         data: Bytes, (n).
-        key: Of the MAC, two words; read only if keyed.
-        keyed: Refuse frames without MAC or with a wrong one.
-        crc_table: (8, 256), see `hardware_bridge.wire.layout`, as the next two.
-        messages: By type, (256).
-        columns: (column).
-        raw: Room for one frame, (`MOST_CODED`).
-        frames: Out, (frame).
-        values: Out, (row, column), in SI units.
-        state: Position in data, in and out; then out: frames, rows, and what was counted of
-            skipped, damaged and strange, which is added to.
+        key: Key of the MAC, two words; read only if keyed.
+        keyed: True to refuse frames without MAC or with a wrong one.
+        crc_table: CRC table, (8, 256); as the next two from `hardware_bridge.wire.layout`.
+        messages: Messages by type, (256).
+        columns: Columns, (column).
+        raw: Work array for one frame, (`MOST_CODED`).
+        frames: Output, (frame).
+        values: Output in SI units, (row, column).
+        state: Position in data, input and output; then outputs: number of frames and of rows, and
+            counters of skipped, damaged and strange, which are incremented.
     """
     n = len(data)
     at = state[POSITION]
@@ -167,20 +167,20 @@ def decode_frames(data, key, keyed, crc_table, messages, columns, raw, frames, v
 
 @kernel
 def encode_frames(frames, n_frames, values, key, crc_table, messages, columns, raw, out):
-    """The bytes of frames, each between two zeros; returns how many they are, or -1.
+    """Encode frames, each between two zeros; return the number of bytes, or -1.
 
-    Values beyond what a number can hold become the nearest that it can.
+    Values out of range are clipped to the limits of their number.
 
     Args:
-        frames: (frame); types that are known, rows that fit, as the caller has seen to.
-        n_frames: So many of them.
-        values: (row, column), in SI units; -1 is returned if one is not finite.
-        key: Of the MAC, two words, for frames that carry one.
-        crc_table: As in `decode_frames`, with the next three.
-        messages: By type.
-        columns: By column.
-        raw: Room for one frame.
-        out: Bytes, room for the longest that they can be.
+        frames: Frames, (frame); the caller has checked that types are known and rows fit.
+        n_frames: Number of frames to encode.
+        values: Values in SI units, (row, column); -1 is returned if one is not finite.
+        key: Key of the MAC, two words, for frames that carry one.
+        crc_table: CRC table; this and the next two as in `decode_frames`.
+        messages: Messages by type.
+        columns: Columns, (column).
+        raw: Work array for one frame.
+        out: Output bytes, with capacity for the longest frames.
     """
     at = 0
     for f in range(n_frames):

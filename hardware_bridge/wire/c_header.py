@@ -1,8 +1,8 @@
-"""The wire format as one C header for firmware, made from the definition.
+"""Generator of the C header of the wire format for firmware, from the definition.
 
     python -m hardware_bridge.wire.c_header --out relpos_wire.h
 
-What depends on the messages is written here; the rest stands in relpos_wire.h.in.
+The parts that depend on the messages are generated; the others are in relpos_wire.h.in.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from hardware_bridge.wire.layout import CRC_TABLE
 
 TEMPLATE = Path(__file__).with_name("relpos_wire.h.in")
 HEADER = Path(__file__).with_name("relpos_wire.h")
-"""The copy that comes along."""
+"""Generated copy in the package."""
 
 
 def c_header() -> str:
-    """The text of the header."""
+    """Return the text of the header."""
     spoken = [message for message in MESSAGES if message.fields]
     parts = {
         "VERSION": str(wire.VERSION),
@@ -50,7 +50,7 @@ def _c_type(field: Field) -> str:
 
 
 def _types(message: Message) -> str:
-    """Number, struct and names of bits of a message."""
+    """Return number, struct and bit names of a message."""
     upper = f"RELPOS_{message.name.upper()}"
     lines = [f"/* {message.meaning} */", f"#define {upper} {message.type}u"]
     lines += [
@@ -79,7 +79,7 @@ def _member(field: Field) -> str:
 
 
 def _places(message: Message) -> Iterator[tuple[Field, str, int]]:
-    """Every number of a row: its field, its name in the struct, its place in the bytes."""
+    """Yield field, name in the struct and byte offset of every number of a row."""
     at = 0
     for field in message.fields:
         for k in range(field.n):
@@ -88,7 +88,7 @@ def _places(message: Message) -> Iterator[tuple[Field, str, int]]:
 
 
 def _code(message: Message) -> str:
-    """Functions that write and read a row, and those that scale its fields."""
+    """Return functions that write and read a row, and those that scale its fields."""
     struct, size = _struct(message), message.size
     puts = [
         f"    relpos_put(out + {at}, (uint32_t)m->{name}, {field.size});\n"
@@ -109,7 +109,7 @@ def _code(message: Message) -> str:
 
 
 def _scaled(struct: str, field: Field) -> str:
-    """Set and read a field in its unit."""
+    """Return functions that set and read a field in its unit."""
     index, place = ("size_t k, ", "[k]") if field.n > 1 else ("", "")
     low, high = field.limits
     least = f"-{-low - 1} - 1" if low < 0 else str(low)
@@ -162,7 +162,7 @@ def _unpack_case(message: Message) -> str:
 
 
 def _crc_table() -> str:
-    """Remainders of four bits: those of the bytes whose high half is zero, in steps of 16."""
+    """Return the table of four-bit remainders: every 16th entry of the byte table."""
     row = [f"0x{int(CRC_TABLE[0, 16 * k]):08x}u" for k in range(16)]
     lines = [", ".join(row[k : k + 4]) for k in range(0, 16, 4)]
     return "".join(f"        {line},\n" for line in lines)

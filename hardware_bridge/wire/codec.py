@@ -1,4 +1,4 @@
-"""Whole buffers of our wire format, to arrays of frames and values, and back."""
+"""Codec of complete buffers of our wire format, to arrays of frames and values, and back."""
 
 from __future__ import annotations
 
@@ -22,26 +22,26 @@ from hardware_bridge.wire.layout import (
 from tracking.params.short_repr import short_repr
 
 MOST_CODED = MOST_FRAME + 3
-"""[bytes] Longest frame when it is stuffed, without the zero that ends it."""
+"""[bytes] Longest stuffed frame, without its final zero."""
 _ROOM = MOST_FRAME + 8
 
 
 @dataclass(slots=True)
 class Batch:
-    """Frames, and the values of all of them one below the other.
+    """Frames, and the values of all frames in consecutive rows.
 
-    Values stand in the order of `hardware_bridge.wire.definition`, in SI units (uT and dBm), a
-    row for a message or for each row of a message that has rows; columns beyond are not written.
+    Values are in the order of `hardware_bridge.wire.definition`, in SI units (uT and dBm), one row
+    per message or per row of a message with rows; unused columns are not written.
     """
 
     __repr__ = short_repr
 
     capacity: int = 256
-    """Frames; for each there is room for four rows."""
+    """Largest number of frames, with capacity for four rows each."""
     frames: Records = field(init=False)
-    """(capacity) of `hardware_bridge.wire.layout.FRAME`."""
+    """Array (capacity) of `hardware_bridge.wire.layout.FRAME`."""
     values: NDArray[np.float64] = field(init=False)
-    """(4 capacity + `MOST_ROWS`, column)"""
+    """Array (4 capacity + `MOST_ROWS`, column)."""
     n_frames: int = 0
     n_rows: int = 0
 
@@ -51,19 +51,19 @@ class Batch:
 
 
 class Codec:
-    """Of one key: what is decoded carries a right MAC, what is encoded carries one if it says so.
+    """Codec with an optional key: decoding checks the MAC, encoding writes one if requested.
 
-    Without a key MACs are not checked: a reader without one accepts every whole frame.
+    Without a key MACs are not checked: every complete frame is accepted.
     """
 
     def __init__(self, key: bytes | None = None) -> None:
-        """Take the key.
+        """Create a codec.
 
         Args:
-            key: 16 bytes, or None.
+            key: Key of 16 bytes, or None.
 
         Raises:
-            ValueError: It is not so long.
+            ValueError: The key does not have 16 bytes.
         """
         if key is not None and len(key) != KEY_BYTES:
             raise ValueError(f"key: expected {KEY_BYTES} bytes, got {len(key)}")
@@ -73,16 +73,16 @@ class Codec:
         self._state = np.zeros(6, np.int64)
 
     def decode(self, data: NDArray[np.uint8], start: int, batch: Batch, counts: Counts) -> int:
-        """Decode as many whole frames as the batch has room for.
+        """Decode as many complete frames as fit into the batch.
 
         Args:
             data: Bytes; a frame ends with a zero.
-            start: Where to begin.
-            batch: Filled from its beginning.
-            counts: Added to, but for `n_bytes`.
+            start: Position of the first byte.
+            batch: Output, filled from its beginning.
+            counts: Counters to increment, except `n_bytes`.
 
         Returns:
-            Where the next call begins; where it began if there is no whole frame any more.
+            Start of the next call; equal to `start` if no complete frame is left.
         """
         state = self._state
         state[:] = (start, 0, 0, 0, 0, 0)
@@ -98,13 +98,13 @@ class Codec:
         return int(at)
 
     def encode(self, batch: Batch) -> NDArray[np.uint8]:
-        """The bytes of the frames of a batch, each between two zeros.
+        """Return the bytes of the frames of a batch, each between two zeros.
 
-        Values that a number cannot hold become the nearest that it can.
+        Values out of range are clipped to the limits of their number.
 
         Raises:
-            ValueError: A value is not finite, a type is unknown, a frame has too many rows, or
-                one with MAC meets a codec without key.
+            ValueError: A value is not finite, a type is unknown, a frame has too many rows, or a
+                frame with MAC is given to a codec without key.
         """
         frames, values = batch.frames[: batch.n_frames], batch.values[: batch.n_rows]
         messages = MESSAGE_TABLE[frames["type"]]

@@ -1,4 +1,4 @@
-"""Readings as messages of the wire format, and back."""
+"""Conversion of readings to messages of the wire format, and back."""
 
 from __future__ import annotations
 
@@ -28,24 +28,24 @@ Row: TypeAlias = Sequence[float]
 Spoken: TypeAlias = tuple[Message, tuple[float, ...]]
 
 made: Callable[[type, tuple[Any, ...]], Any] = tuple.__new__
-"""A reading of all its fields, in a third less time than by its name: of what comes most often."""
+"""Build a reading from all its fields, a third faster than by its class; for frequent types."""
 UNIT_WITHIN = 1e-3
-"""[-] A quaternion whose length is farther from 1 is none."""
+"""[-] Largest deviation of the norm of a quaternion from 1."""
 NODE_LIMIT = 1 << 16
 WORD_LIMIT = 1 << 32
 
 
 @cache
 def name_of(node: float) -> str:
-    """How a reading names a node, 0 to 65535."""
+    """Return the name of a node, 0 to 65535, in readings."""
     return str(int(node))
 
 
 def node_number(name: str, device: str) -> int:
-    """The node that a reading names.
+    """Return the node number in a name.
 
     Raises:
-        ValueError: It is no decimal number from 0 to 65535, in its shortest form.
+        ValueError: The name is not a decimal number from 0 to 65535 without leading zeros.
     """
     if not (device.isascii() and device.isdecimal() and len(device) <= 5):
         raise ValueError(f"{name}: expected a node, 0 to {NODE_LIMIT - 1}, got {device!r}")
@@ -56,10 +56,10 @@ def node_number(name: str, device: str) -> int:
 
 
 def word(name: str, value: int) -> int:
-    """A number of 32 bit.
+    """Return a number after checking that it has 32 bits.
 
     Raises:
-        ValueError: It is none.
+        ValueError: The number is out of range.
     """
     if not 0 <= value < WORD_LIMIT:
         raise ValueError(f"{name}: expected 0 to {WORD_LIMIT - 1}, got {value}")
@@ -67,7 +67,7 @@ def word(name: str, value: int) -> int:
 
 
 def is_unit(q: Sequence[float]) -> bool:
-    """Whether four numbers can be a rotation."""
+    """Return whether four numbers are a unit quaternion."""
     return abs(math.sqrt(sum(x * x for x in q)) - 1.0) <= UNIT_WITHIN
 
 
@@ -122,10 +122,10 @@ _OF: dict[type, Callable[[Any], Spoken]] = {
 
 
 def message_of(reading: Reading) -> Spoken:
-    """The message of a reading and its values, of a message with rows one row.
+    """Return message and values of a reading; for a message with rows, one row.
 
     Raises:
-        ValueError: A value is not finite, a node is no number, a quaternion has no unit length.
+        ValueError: A value is not finite, a node not a number, or a quaternion not normalised.
     """
     message, values = _OF[type(reading)](reading)
     if not all(map(math.isfinite, values)):
@@ -187,4 +187,4 @@ AS_READING: dict[int, Callable[[Source, Row], Reading | None]] = {
     wire.REMOTE.type: lambda s, v: OperatorReading(s, name_of(v[0]), (v[1], v[2])),
     wire.ACK.type: lambda s, v: AckReading(s, int(v[0])),
 }
-"""By type of message: a row of values to a reading, None where a number cannot be."""
+"""Functions by type of message from a row of values to a reading, None if invalid."""

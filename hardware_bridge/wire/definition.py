@@ -1,11 +1,11 @@
 """The messages of our own nodes and cars, as data.
 
-Everything else follows from it: the tables of the codec (`hardware_bridge.wire.layout`), the
-table of docs/reference/wire-format.md, and the C header of the firmware
+The definition is the source of the tables of the codec (`hardware_bridge.wire.layout`), the table
+of docs/reference/wire-format.md, and the C header of the firmware
 (`hardware_bridge.wire.c_header`).
 
-A number on the wire is a little-endian integer, `steps` to the unit. The
-quantisation of every measured value is far below the noise of the best sensor that is meant.
+A number on the wire is a little-endian integer, `steps` per unit. The quantisation of every
+measured value is far below the noise of the best intended sensor.
 """
 
 from __future__ import annotations
@@ -14,37 +14,37 @@ from dataclasses import dataclass
 
 VERSION = 1
 HOST = 0xFFFF
-"""The node of the host that commands the cars; nodes have 0 to 65534."""
+"""Node id of the host that commands the cars; nodes have 0 to 65534."""
 MOST_ROWS = 32
-"""[-] Of a message with rows."""
+"""[-] Largest number of rows of a message."""
 MOST_FRAME = 512
-"""[bytes] Longest frame of any version, before it is stuffed."""
+"""[bytes] Longest frame of any version, before stuffing."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Field:
-    """A number of a message, or several of one kind."""
+    """A number of a message, or an array of numbers."""
 
     name: str
     type: str
-    """u8, u16, u32, i8, i16, i24 or i32."""
+    """Type: u8, u16, u32, i8, i16, i24 or i32."""
     n: int = 1
-    """So many one after the other."""
+    """Number of consecutive numbers."""
     steps: int = 1
-    """[1/unit] The number on the wire is so many times the value."""
+    """[1/unit] Ratio of the number on the wire to the value."""
     unit: str = ""
     bits: tuple[str, ...] = ()
-    """What the bits mean, lowest first; the others are sent as 0 and not read."""
+    """Names of the bits, lowest first; other bits are sent as 0 and ignored."""
     meaning: str
 
     @property
     def size(self) -> int:
-        """[bytes] Of one number."""
+        """[bytes] Size of one number."""
         return int(self.type[1:]) // 8
 
     @property
     def limits(self) -> tuple[int, int]:
-        """The least and the greatest number on the wire."""
+        """Smallest and largest number on the wire."""
         bits = 8 * self.size
         return (
             (-(1 << bits - 1), (1 << bits - 1) - 1) if self.type[0] == "i" else (0, (1 << bits) - 1)
@@ -53,27 +53,27 @@ class Field:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Message:
-    """One kind of message."""
+    """A type of message."""
 
     type: int
     name: str
     meaning: str
     fields: tuple[Field, ...] = ()
     repeated: bool = False
-    """The payload is a count, u8 up to `MOST_ROWS`, and so many rows of the fields."""
+    """True if the payload is a count, u8 up to `MOST_ROWS`, followed by rows of the fields."""
 
     def field(self, name: str) -> Field:
-        """The field of that name."""
+        """Return the field of that name."""
         return next(field for field in self.fields if field.name == name)
 
     @property
     def columns(self) -> int:
-        """Numbers of the message, or of one row."""
+        """Number of values of the message, or of one row."""
         return sum(field.n for field in self.fields)
 
     @property
     def size(self) -> int:
-        """[bytes] Of the payload, or of one row."""
+        """[bytes] Size of the payload, or of one row."""
         return sum(field.n * field.size for field in self.fields)
 
 
@@ -211,7 +211,7 @@ ACK = Message(
 MESSAGES = (
     IMU, IMU_MAG, STATE, RANGES, MOTION, STATUS, HEARTBEAT, NEAR, COMMAND, REMOTE, ACK,
 )  # fmt: skip
-"""Types that are not here are kept for later; receivers skip them."""
+"""All messages. Other types are reserved; receivers skip them."""
 
 HEADER = (
     Field(name="form", type="u8", meaning="version in the high four bits, flags in the low four"),
@@ -227,4 +227,4 @@ HEADER_BYTES = sum(field.size for field in HEADER)
 MAC_BYTES = 8
 CRC_BYTES = 4
 FLAG_MAC = 1
-"""The frame carries a MAC. Other flags belong to versions to come."""
+"""Flag of frames with a MAC. Other flags are reserved for later versions."""

@@ -1,4 +1,4 @@
-"""Readings to the bytes that a node or a car of ours would send."""
+"""Encoder of readings to the bytes that one of our nodes or cars would send."""
 
 from __future__ import annotations
 
@@ -9,41 +9,41 @@ from hardware_bridge.wire.definition import MOST_ROWS
 
 
 class RelposEncoder:
-    """One start of one device; see `hardware_bridge.decoders.base.Encoder`.
+    """Encoder for one boot of one device; see `hardware_bridge.decoders.base.Encoder`.
 
-    Frames are numbered from 0. After 2^32 of them the boot goes up by one, so that no pair of boot
-    and sequence comes twice.
+    Frames are numbered from 0. After 2^32 frames the boot increases by one, so that no pair of boot
+    and sequence is repeated.
     """
 
     def __init__(self, node: int, boot: int, key: bytes | None = None) -> None:
-        """Name the device.
+        """Create an encoder for a device.
 
         Args:
-            node: 0 to 65535; `hardware_bridge.wire.definition.HOST` is who commands cars.
-            boot: 0 to 2^32 - 1, differs from one start to the next; rises where a key is used.
-            key: 16 bytes: every frame carries a MAC.
+            node: Node id, 0 to 65535; `hardware_bridge.wire.definition.HOST` commands cars.
+            boot: Boot number, 0 to 2^32 - 1, different at each start; rising if a key is used.
+            key: Key of 16 bytes: every frame carries a MAC.
 
         Raises:
-            ValueError: One of them is not so.
+            ValueError: An argument is invalid.
         """
         if not 0 <= node < NODE_LIMIT:
             raise ValueError(f"node: expected 0 to {NODE_LIMIT - 1}, got {node}")
         self.node = node
         self.boot = word("boot", boot)
         self.sequence = 0
-        """Of the next frame."""
+        """Number of the next frame."""
         self._codec = Codec(key)
         self._batch = Batch()
 
     def encode(self, readings: list[Reading]) -> bytes:
-        """Bytes of one moment of the device, in the order of the readings.
+        """Return the bytes of one instant of the device, in the order of the readings.
 
-        Ranges that follow each other and have one time share a frame. Of sources only the time is
-        taken, which must be there; boot and sequence are the encoder's.
+        Consecutive ranges with the same time share a frame. Sources must have a time, and only this
+        is used; boot and sequence are the encoder's.
 
         Raises:
-            ValueError: A reading has no time in microseconds, is of another device, or holds
-                what the format refuses; nothing was encoded, and no number was used up.
+            ValueError: A reading has no time in microseconds, is of another device, or holds an
+                invalid value; nothing was encoded, and no sequence number was used.
         """
         said = [(self._time(reading.source), *message_of(reading)) for reading in readings]
         out = bytearray()

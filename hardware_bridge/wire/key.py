@@ -1,4 +1,4 @@
-"""The key of a MAC, as people write it."""
+"""Keys of MACs in their text form."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from hardware_bridge.errors import BridgeError
 
 KEY_BYTES = 16
 REMOVED = "removed"
-"""Stands in recordings in place of a key."""
+"""Text in place of a key in recordings."""
 REMOVED_KEY = b"removed from rec"
-"""That a message was signed is known where this is the key, and not whether rightly."""
+"""Key in place of a removed one: messages are known to be signed, but MACs are not checked."""
 
 
 def parse_key(text: str | None) -> bytes | None:
-    """The key that hex digits are; None is none.
+    """Return the key in hex digits; None for None.
 
     Raises:
-        ValueError: They are no key. What may be a secret with a slip in it is not in the message.
+        ValueError: The text is not a key; the message omits it, as it may be a mistyped secret.
     """
     if text is None:
         return None
@@ -37,24 +37,24 @@ def parse_key(text: str | None) -> bytes | None:
 
 
 def without_keys(text: str, keys: Iterable[bytes | None]) -> str:
-    """A configuration whose keys are removed, so that it can be shared.
+    """Remove the keys of a configuration, so that it can be shared.
 
     Args:
-        text: Of a swarm.toml.
-        keys: All that are in it.
+        text: Content of a swarm.toml.
+        keys: All keys in it.
 
     Raises:
-        BridgeError: A key is written so that it cannot be found in the text.
+        BridgeError: A key is written in a way that cannot be found in the text.
     """
     for key in keys:
         if key is not None and key != REMOVED_KEY:
-            # Hex digits as people write them: in any case, with or without space between.
+            # Hex digits in upper or lower case, with or without space in between.
             digits = r"\s*".join(key.hex())
             text = re.sub(digits, REMOVED, text, flags=re.IGNORECASE)
     try:
         left = [name for name, written in _keys_in(tomllib.loads(text)) if written != REMOVED]
     except tomllib.TOMLDecodeError:
-        left = ["key"]  # one with an escape, of which a part was removed
+        left = ["key"]  # a key with an escape, partly removed
     if left:
         raise BridgeError(
             f"{left[0]}: cannot be kept out of the recording as it is written; "
@@ -64,7 +64,7 @@ def without_keys(text: str, keys: Iterable[bytes | None]) -> str:
 
 
 def _keys_in(table: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, object]]:
-    """All fields `key` of a table and of those in it, by their full names."""
+    """Yield all fields `key` of a table and its inner tables, by their full names."""
     for name, value in table.items():
         if isinstance(value, Mapping):
             yield from _keys_in(value, f"{path}{name}.")
@@ -73,12 +73,12 @@ def _keys_in(table: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, ob
 
 
 def read_key(text: str | None) -> bytes | None:
-    """The key that a person gives: hex digits, or ``@`` and the name of a file that holds them.
+    """Return a key from hex digits, or from ``@`` and the name of a file that holds them.
 
-    Arguments of commands can be seen by everybody on a machine, files need not.
+    Arguments of commands are visible to every user of a machine, files need not be.
 
     Raises:
-        ValueError: There is no such file, or it holds no key.
+        ValueError: The file cannot be read, or the text is not a key.
     """
     if text is None or not text.startswith("@"):
         return parse_key(text)

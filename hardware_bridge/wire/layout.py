@@ -1,4 +1,4 @@
-"""The definition as tables that kernels read."""
+"""Definition of the wire format as tables for kernels."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ Records: TypeAlias = NDArray[Any]
 FRAME = np.dtype(
     [
         ("type", np.uint8),
-        ("mac", np.uint8),  # whether it carries one
+        ("mac", np.uint8),  # 1 if the frame carries a MAC
         ("node", np.uint16),
         ("boot", np.uint32),
         ("sequence", np.uint32),
         ("time", np.uint32),  # [us]
-        ("first", np.int32),  # its first row of values
-        ("rows", np.int32),  # and how many
+        ("first", np.int32),  # first row of values
+        ("rows", np.int32),  # number of rows
     ]
 )
-"""What stands in front of the values of a frame."""
+"""Metadata of a frame."""
 
 _MESSAGE = np.dtype(
     [
         ("known", np.uint8),
         ("repeated", np.uint8),
-        ("first", np.int32),  # its first column
+        ("first", np.int32),  # first column
         ("columns", np.int32),
-        ("size", np.int32),  # [bytes] of a row
+        ("size", np.int32),  # [bytes] size of a row
     ]
 )
 _COLUMN = np.dtype(
@@ -45,7 +45,7 @@ _COLUMN = np.dtype(
 )
 
 COLUMNS = max(message.columns for message in MESSAGES)
-"""Of an array of values."""
+"""Number of columns of an array of values."""
 
 
 def _tables() -> tuple[Records, Records]:
@@ -61,11 +61,11 @@ def _tables() -> tuple[Records, Records]:
 
 
 MESSAGE_TABLE, COLUMN_TABLE = _tables()
-"""By type of message, and by column of all messages one after the other."""
+"""Tables by type of message, and by column of all messages in sequence."""
 
 
 def _crc_table() -> NDArray[np.uint32]:
-    """Remainders of a byte by the reflected polynomial 0xEDB88320, and of it k zero bytes later."""
+    """Return remainders of a byte, and of it and k zero bytes, by 0xEDB88320, (8, 256)."""
     table = np.zeros((8, 256), np.uint32)
     for byte in range(256):
         value = byte

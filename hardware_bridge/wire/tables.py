@@ -11,7 +11,7 @@ Table: TypeAlias = tuple[tuple[str, ...], list[list[str]]]
 
 
 def header_table() -> Table:
-    """What stands in front of every payload."""
+    """Return the table of the frame header."""
     rows, at = [], 0
     for field in HEADER:
         unit = f" [{field.unit}]" if field.unit else ""
@@ -21,7 +21,7 @@ def header_table() -> Table:
 
 
 def message_table() -> Table:
-    """Every message with its fields."""
+    """Return the table of all messages with their fields."""
     rows = []
     for message in MESSAGES:
         size = f"{message.size} bytes"

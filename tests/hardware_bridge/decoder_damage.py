@@ -1,4 +1,4 @@
-"""What happens to bytes on the way, and what decoders make of it."""
+"""Damage of bytes in transmission, and its effect on decoders."""
 
 from dataclasses import dataclass
 from random import Random
@@ -26,7 +26,7 @@ def burst(rng, frame, other):
 
 
 def splice(rng, frame, other):
-    """The beginning of one and the end of another: what a full buffer leaves."""
+    """Return the beginning of one frame and the end of another, as after a buffer overflow."""
     return frame[: rng.randrange(len(frame) + 1)] + other[rng.randrange(len(other) + 1) :]
 
 
@@ -40,12 +40,12 @@ class Fuzzed:
     readings: int = 0
     most_waiting: int = 0
     checks: int = 0
-    """How often it was asked whether it is in step."""
+    """Number of checks for resynchronisation."""
     out_of_step: int = 0
 
 
 def chunk_of(rng, sample):
-    """Something that comes out of a port."""
+    """Return a chunk as it may come out of a port."""
     kind = rng.randrange(6)
     frames = sample.all_frames
     if kind == 0:
@@ -64,10 +64,10 @@ def chunk_of(rng, sample):
 
 
 def fuzz(name, chunks, seed=0, check_every=4):
-    """Feed one decoder with chunks, and ask now and then whether it reads a good frame.
+    """Feed one decoder with chunks, and check regularly that it reads a good frame.
 
-    It may lose the first good frame, which garbage without an end may run into; the next must give
-    what it gives alone.
+    It may lose the first good frame, which may continue preceding garbage; the next must give the
+    same readings as alone.
     """
     rng = Random(seed)
     sample = SAMPLES[name]
@@ -91,9 +91,8 @@ def fuzz(name, chunks, seed=0, check_every=4):
 
 
 def wrongly_accepted(name, kind, trials, seed=0):
-    """Of how many damaged frames comes a reading that nobody sent, and of how many a wrong
-    distance, of a scanner or to a device that is known: an unknown one is refused by the
-    configuration."""
+    """Return the number of damaged frames with a reading that was not sent, and of those with a
+    wrong distance, of a scanner or to a known device: the configuration refuses unknown ones."""
     rng = Random(seed)
     frames = [f for f in SAMPLES[name].all_frames if decoder_of(name).feed(f)]
     true = {f: decoder_of(name).feed(f) for f in frames}
@@ -104,7 +103,7 @@ def wrongly_accepted(name, kind, trials, seed=0):
         if damaged in (frame, other):
             continue
         sent = true[frame] + true[other]
-        # A magnetometer that got lost makes nothing wrong.
+        # The loss of a magnetometer frame is not an error.
         sent += [r._replace(mag=None) for r in sent if isinstance(r, ImuReading)]
         strange = [r for r in decoder_of(name).feed(damaged) if r not in sent]
         wrong += bool(strange)

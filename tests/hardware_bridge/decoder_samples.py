@@ -1,4 +1,4 @@
-"""For every format: what devices sent, and a frame after which a decoder must be in step."""
+"""Samples of every format: frames of devices, and a frame that resynchronises a decoder."""
 
 import struct
 from dataclasses import dataclass, field
@@ -17,13 +17,13 @@ from hardware_bridge.wire.encoder import RelposEncoder
 @dataclass(frozen=True, kw_only=True)
 class Sample:
     unit: bytes
-    """Whole frames that give readings at once; a line with its end, or all frames of a moment."""
+    """Complete frames that give readings at once; a line with its end, or a set of frames."""
     frames: tuple[bytes, ...] = ()
-    """More of them, of devices."""
+    """Further frames of devices."""
     tokens: tuple[bytes, ...] = field(default=())
-    """Pieces of the format that random bytes would seldom hit."""
+    """Tokens of the format that random bytes rarely contain."""
     end: bytes = b"\n"
-    """Bytes after which nothing that went before matters."""
+    """Bytes after which preceding bytes have no effect."""
     key: bytes | None = None
 
     @property
@@ -58,7 +58,7 @@ def summed(body):
 
 
 def node_frame_2(distance=2500, gyr=(0.25, -0.5, 1.5), acc=(0.5, -0.25, 9.75)):
-    """Laid out by the table of the format, offset by offset."""
+    """Build a frame offset by offset, from the table of the format."""
     frame = bytearray(119 + 13)
     frame[0:2] = b"\x55\x04"
     struct.pack_into("<H", frame, 2, 119 + 13 + 1)
@@ -99,7 +99,7 @@ DWM1001 = (
     b"DIST,4,AN0,0090,0.00,0.00,0.00,3.25,AN1,D91E,0.00,0.00,0.00,3.33,AN2,0487,0.00,0.00,0.00,"
     b"0.18,AN3,15BA,0.00,0,AN3,15BA,0.00,0.00,0.00,0.00\r\n",
 )
-"""The last one is damaged."""
+"""Lines of a device; the last one is damaged."""
 
 
 def witmotion_frame(kind, *counts):
@@ -128,7 +128,7 @@ POSITIONS = (
 
 
 def relpos_frames():
-    """Two messages of each kind that a node sends."""
+    """Return two messages of each of three types that a node sends."""
     encoder, frames = RelposEncoder(1, 7, KEY), []
     for k in range(2):
         source = Source(device="1", ticks=1000 * k, clock=MICROSECONDS_32)
@@ -146,7 +146,7 @@ RELPOS = relpos_frames()
 
 
 def scanned(*samples):
-    """Samples of an RPLidar, bit by bit: angle [1/64 deg] and distance [1/4 mm]."""
+    """Return samples of an RPLidar, bit by bit: angle [1/64 deg] and distance [1/4 mm]."""
     frames = [
         bytes(
             (
@@ -220,4 +220,4 @@ SAMPLES = {
         tokens=(b"\x55", b"\x55\x51", b"\x55\x52", b"\x55\x54"),
     ),
 }  # fmt: skip
-"""Name of the format to its sample; all formats of the registry must have one."""
+"""Samples by name of the format; all registered formats must have one."""

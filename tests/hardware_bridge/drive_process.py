@@ -1,8 +1,8 @@
-"""A drive in a process of its own, that says what it knows after every decision.
+"""A drive in a separate process that prints its state after every control step.
 
     python drive_process.py CONFIG '{"seconds": 60, ...}'
 
-Orders come as JSON lines on stdin: {"order": "arm"}, {"hang": SECONDS}, {"disk": BYTES}.
+Orders are JSON lines on stdin: {"order": "arm"}, {"hang": SECONDS}, {"disk": BYTES}.
 """
 
 import json
@@ -23,7 +23,7 @@ HANG = [0.0]
 
 
 class Sleepy:
-    """A driver that does nothing for a while when it is asked to."""
+    """A driver that hangs for a while on request."""
 
     def __init__(self, driver):
         self.driver = driver
@@ -86,7 +86,7 @@ class Watch:
         elif "hang" in order:
             HANG[0] = order["hang"]
         elif "disk" in order:
-            # What is written past this size fails as on a full disk.
+            # Writes beyond this file size fail as on a full disk.
             _, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
             size = order["disk"] if order["disk"] >= 0 else hard
             resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
@@ -110,6 +110,6 @@ def main(config, options):
 
 
 if __name__ == "__main__":
-    # Tests that were started with nohup would hand on that a hang-up is ignored.
+    # If the tests run under nohup, ignoring SIGHUP would be inherited.
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
     main(sys.argv[1], json.loads(sys.argv[2]))

@@ -1,9 +1,9 @@
-"""An emulation in real time, in a process of its own, that writes down what its cars receive.
+"""An emulation in real time in a separate process that records the commands of its cars.
 
     python emulation_process.py FOLDER '{"scenario": "cars-nlos", ...}'
 
-One JSON line a step goes to FOLDER/heard.jsonl, what devices said to FOLDER/said, unless
-``"keep": false``; orders come as JSON lines on stdin.
+One JSON line per step goes to FOLDER/heard.jsonl, bytes of devices to FOLDER/said, unless ``"keep":
+false``; orders are JSON lines on stdin.
 """
 
 import contextlib
@@ -24,7 +24,7 @@ from hardware_bridge.emulator.pty import PtyPort
 
 
 class Tap(PtyPort):
-    """A port that keeps all that its device said to a host."""
+    """A port that keeps all bytes its device has sent to the host."""
 
     def __init__(self, link, copy):
         self._copy = open(copy, "wb", buffering=0)  # noqa: SIM115
@@ -37,7 +37,7 @@ class Tap(PtyPort):
 
 
 class Ears:
-    """Commands that a car understood since the last step."""
+    """Commands that a car decoded since the last step."""
 
     def __init__(self, device):
         self.commands = []
@@ -65,7 +65,7 @@ class Ears:
 def main(folder, options, keep):
     folder = Path(folder)
     warm_up(options)
-    # Priority as a device has it, which waits for nobody's computer; where that is allowed.
+    # High priority, if permitted, as a real device does not depend on the host's load.
     with contextlib.suppress(OSError):
         os.setpriority(os.PRIO_PROCESS, 0, -15)
     copies = folder / "said"
@@ -109,7 +109,7 @@ def main(folder, options, keep):
 
 
 def listen(orders):
-    """Lines of stdin; None at its end."""
+    """Append orders from the lines of stdin; None at its end."""
     for line in sys.stdin:
         orders.append(json.loads(line))
     orders.append(None)

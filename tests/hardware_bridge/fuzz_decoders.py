@@ -1,11 +1,11 @@
-"""Feed every decoder with a million damaged chunks, and see which damage passes for a value.
+"""Feed every decoder with a million damaged chunks, and measure undetected damage.
 
 python tests/hardware_bridge/fuzz_decoders.py [--chunks 1000000] [--trials 200000] [FORMAT ...]
 
-Prints two tables in Markdown, those of docs/reference/decoders.md. Of the second each cell has
-three numbers: readings that differ from what was sent, without the bounds of
+Prints two tables in Markdown, those of docs/reference/decoders.md. The cells of the second have
+three numbers: readings that differ from the sent ones, without the bounds of
 `hardware_bridge.decoders.plausible`; the same with them; and of these the ones with a wrong
-distance to a device that is known.
+distance to a known device.
 """
 
 import argparse
@@ -19,7 +19,7 @@ from hardware_bridge.decoders import DECODERS, dw1000, dwm1001, linktrack, uwb_c
 
 @contextmanager
 def without_bounds():
-    """Every number is possible."""
+    """Disable the bounds of distance and power."""
     with ExitStack() as stack:
         for module in (dw1000, dwm1001, linktrack, uwb_core):
             for bound in ("distance", "power"):
@@ -29,7 +29,7 @@ def without_bounds():
 
 
 def fuzz_table(names, chunks):
-    """What a million chunks do."""
+    """Print the results of `fuzz`."""
     print("| format | chunks | bytes | readings | most bytes waiting | asked | out of step |")
     print("|---|--:|--:|--:|--:|--:|--:|")
     for name in names:
@@ -41,7 +41,7 @@ def fuzz_table(names, chunks):
 
 
 def damage_table(names, trials):
-    """Shares of damaged frames that give a reading nobody sent."""
+    """Print the percentage of damaged frames that give a reading that was not sent."""
     print("| format | " + " | ".join(DAMAGES) + " |")
     print("|---|" + "--:|" * len(DAMAGES))
     for name in names:

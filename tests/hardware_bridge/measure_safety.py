@@ -1,4 +1,4 @@
-"""The figures of docs/explanation/safety.md.
+"""Measure the figures of docs/explanation/safety.md.
 
 PYTHONPATH=.:tests/hardware_bridge python tests/hardware_bridge/measure_safety.py
 """

@@ -1,4 +1,4 @@
-"""Emulation and drive as processes, seen from a test that does things to them."""
+"""Emulation and drive as processes that tests control and observe."""
 
 import contextlib
 import json
@@ -16,7 +16,7 @@ MS = 1_000_000
 
 
 class Talking:
-    """A process that says JSON lines and takes such."""
+    """A process that prints and reads JSON lines."""
 
     def __init__(self, script, *args):
         env = os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
@@ -41,14 +41,14 @@ class Talking:
             self._changed.notify_all()
 
     def tell(self, **order):
-        """Send an order; a time before it was heard [ns]."""
+        """Send an order; return a time before its reception [ns]."""
         t_ns = time.monotonic_ns()
         self.process.stdin.write(json.dumps(order) + "\n")
         self.process.stdin.flush()
         return t_ns
 
     def wait_for(self, fits, seconds=60.0, since=0):
-        """The first line at or after a time [ns] that fits."""
+        """Return the first line at or after a time [ns] that satisfies `fits`."""
         end, k = time.monotonic() + seconds, 0
         with self._changed:
             while True:
@@ -59,11 +59,13 @@ class Talking:
                         return line
                 left = end - time.monotonic()
                 over = self.process.poll() is not None and not self._thread.is_alive()
-                assert left > 0 and not over, f"it did not happen; last: {self.said[-5:]}"  # noqa: PT018
+                assert left > 0 and not over, (  # noqa: PT018
+                    f"it did not happen; last: {self.said[-5:]}"
+                )
                 self._changed.wait(min(left, 0.2))
 
     def between(self, start, end, key):
-        """Lines of a time [ns] that have a key."""
+        """Return the lines between two times [ns] that have a key."""
         return [s for s in list(self.said) if key in s and start <= s["t_ns"] <= end]
 
     def close(self):
@@ -82,7 +84,7 @@ class Talking:
 
 
 class Emulation(Talking):
-    """Cars at pseudo terminals, and what they hear."""
+    """Cars at pseudo terminals, and the commands they receive."""
 
     def __init__(self, folder, **options):
         super().__init__("emulation_process.py", folder, json.dumps(options))
@@ -92,37 +94,37 @@ class Emulation(Talking):
         self._file = open(folder / "heard.jsonl")  # noqa: SIM115
 
     def befall(self, kind, target, seconds):
-        """Let a fault happen now; when it did [ns]."""
+        """Inject a fault; return its time [ns]."""
         t_ns = self.tell(kind=kind, target=target, seconds=seconds)
         return self.wait_for(lambda s: "befell" in s, since=t_ns)["t_ns"]
 
     @property
     def steps(self):
-        """What was heard in every step so far."""
+        """Commands received in every step so far."""
         text = self._rest + self._file.read()
         *lines, self._rest = text.split("\n")
         self._steps += [json.loads(line) for line in lines]
         return self._steps
 
     def commands(self, car, start, end=None):
-        """Of a car: time [ns], brake and speed of each."""
+        """Return time [ns], brake and speed of each command to a car."""
         commands = [c for s in self.steps if s["t_ns"] >= start for c in s["heard"][car]]
         return [c for c in commands if c[0] >= start and (end is None or c[0] <= end)]
 
     def first_brake(self, start, cars=range(3)):
-        """When the last of the cars heard that it is to stand, after a time [ns]."""
+        """Return when the last of the cars received its first stop command after a time [ns]."""
         return max(
             min((t for t, brake, _ in self.commands(k, start) if brake), default=1 << 62)
             for k in cars
         )
 
     def motors(self, start, end):
-        """Fastest that each motor was asked to turn by the car's controller [m/s]."""
+        """Return the highest speed that a car's controller requested of each motor [m/s]."""
         rows = [s["motor"] for s in self.steps if start <= s["t_ns"] <= end]
         return [max(map(abs, column)) for column in zip(*rows, strict=True)]
 
     def last_turn(self, start):
-        """When the last motor stopped that turned after a time [ns]."""
+        """Return the last time [ns] at or after `start` when any motor turned."""
         return max((s["t_ns"] for s in self.steps if s["t_ns"] >= start and any(s["motor"])),
                    default=start)  # fmt: skip
 
@@ -133,20 +135,20 @@ class Emulation(Talking):
 
 
 class Drive(Talking):
-    """A policy on these cars."""
+    """A drive of a policy on these cars."""
 
     def __init__(self, config, **options):
         super().__init__("drive_process.py", config, json.dumps({"seconds": 300.0, **options}))
         self.supervisor = self.wait_for(lambda s: "supervisor" in s)["supervisor"]
 
     def moving(self, since=0, cars=range(3), seconds=60.0):
-        """Wait until the cars are armed and asked to move."""
+        """Wait until the cars are armed."""
         return self.wait_for(
             lambda s: "armed" in s and all(s["armed"][k] for k in cars), seconds, since
         )
 
     def arm(self):
-        """Arm all as soon as that can be; when they were [ns]."""
+        """Arm all cars as soon as possible; return the time when they are armed [ns]."""
         since = time.monotonic_ns()
         self.wait_for(
             lambda s: "armed" in s and not all(s["armed"]) and min(s["well_for"]) > 0.55,
@@ -155,7 +157,7 @@ class Drive(Talking):
         return self.moving(self.tell(order="arm"))["t_ns"]
 
     def signal(self, what):
-        """Send a signal to the deciding process; a time before it came [ns]."""
+        """Send a signal to the deciding process; return a time before its reception [ns]."""
         t_ns = time.monotonic_ns()
         os.kill(self.process.pid, what)
         return t_ns

@@ -1,7 +1,7 @@
-"""Cars for the tests of the gate: bicycles with a motor, a servo, a wire, and a deadman.
+"""Cars for the tests of the gate: bicycle models with motor, servo, link delay and deadman.
 
-Numbers of a 1:10 car as in `relpos_env.world.car`; what differs from car to car is drawn. They do
-not collide: what is asked is how near they come.
+Parameters are those of a 1:10 car as in `relpos_env.world.car`; some are sampled per car. The cars
+do not collide: the tests measure their distances.
 """
 
 import numpy as np
@@ -12,11 +12,11 @@ MAX_STEERING, STEERING_RATE, STEERING_DELAY = 0.42, 3.2, 2
 SPEED_GAIN, MOTOR_LAG, MAX_ACCEL = 8.0, 0.05, 2.5
 DEADMAN = 0.2
 KEPT = 8
-"""[ticks] Of commands on their way."""
+"""[ticks] Length of the buffer of commands in transit."""
 
 
 class Cars:
-    """Arrays over (env, car); the place is that of the middle, `pos` (env, car, 2)."""
+    """Arrays over (env, car); `pos` (env, car, 2) is the position of the centre."""
 
     def __init__(self, pos, heading, rng):
         shape = heading.shape
@@ -36,7 +36,7 @@ class Cars:
 
     @property
     def slip(self):
-        """Of the middle, off the heading [rad]."""
+        """Slip angle of the centre, relative to the heading [rad]."""
         return np.arctan(REAR / (FRONT + REAR) * np.tan(self.steering))
 
     @property
@@ -46,7 +46,7 @@ class Cars:
         return along[..., None] * np.stack([np.cos(course), np.sin(course)], axis=-1)
 
     def step(self, speed, steering, moving, linked):
-        """One tick under what the gate sends; of what is not linked nothing arrives."""
+        """Simulate one tick with the output of the gate; unlinked cars receive nothing."""
         self._wire[self._tick % KEPT] = speed, steering, moving
         late = (self._tick - self.latency) % KEPT
         ago = (late - STEERING_DELAY) % KEPT
@@ -61,7 +61,7 @@ class Cars:
         self.steering += np.clip(angle - self.steering, -turn, turn)
         v = self.speed
         asked = SPEED_GAIN * (np.where(drives, wanted, 0.0) - v)
-        # Against its motion a car brakes, along it the motor drives; a stop is all of the brake.
+        # Brake against the motion, drive with the motor along it; a stop is full braking.
         ahead = np.where(v != 0.0, np.sign(v), np.sign(asked))
         driven = np.clip(asked * ahead, -self.brake, MAX_ACCEL) * ahead
         asked = np.where(drives, driven, -np.sign(v) * self.brake)

@@ -1,8 +1,8 @@
-"""Estimates of the cars: late, wrong by as much as they say, and now and then worse than that.
+"""Estimates of the cars: delayed, with errors that match their covariance, and with faults.
 
-An error is a Gaussian process of time constant `MEMORY`, cut off at `WORST` standard deviations in
-its size; the covariance says the truth about it, always. The position is that of some time ago,
-dead-reckoned to now by the velocity of then.
+An error is a Gaussian process of time constant `MEMORY`, its norm limited to `WORST` standard
+deviations; the covariance is that of the process. The position is a past one, dead-reckoned to the
+current time by the velocity of that time.
 """
 
 import numpy as np
@@ -14,7 +14,7 @@ MEMORY, WORST, HEADING = 1.5, 2.5, 0.03
 
 
 class Errors:
-    """Of something with so many numbers of a place, (env, ..., 2) in standard deviations."""
+    """Position errors, (env, ..., 2) in standard deviations."""
 
     def __init__(self, shape, rng):
         self._rng = rng
@@ -30,7 +30,7 @@ class Errors:
 
 
 class Estimates:
-    """Draws pictures of cars."""
+    """Generator of snapshots of cars."""
 
     def __init__(self, n_envs, n_cars, rng, sigma=(0.03, 0.3)):
         self._rng = rng
@@ -44,12 +44,12 @@ class Estimates:
         self._past = []
 
     def watch(self, cars, present):
-        """Remember a tick."""
+        """Store the state of a tick."""
         self._past.append((cars.pos.copy(), cars.vel.copy()))
         del self._past[:-13]
 
     def picture(self, t, cars, present, dt, faults):
-        """What is believed now; `faults` says of what more is wrong."""
+        """Return the current estimates; `faults` adds further errors."""
         n_envs, n_cars = present.shape
         lag = np.minimum(np.round(self.delay / 0.01).astype(int), len(self._past) - 1)
         env, jump = np.arange(n_envs), faults.jump[:, None, None]
@@ -87,6 +87,6 @@ class Estimates:
         unsure = faults.ambiguous[:, None, None] & (hit | np.swapaxes(hit, 1, 2)) & both
         doubt = np.where(env % 2 == 0, Status.AMBIGUOUS, Status.DOUBTFUL)
         q.status[:] = np.where(unsure, doubt[:, None, None], q.status)
-        # Where the position is not known, what is told of it means nothing.
+        # Unknown positions are meaningless values.
         q.pos[:] = np.where(unsure[..., None], self._rng.normal(0.0, 2.0, q.pos.shape), q.pos)
         return q

@@ -1,4 +1,4 @@
-"""What goes wrong in a run: one fault at a time, of one car or of all, again and again."""
+"""Random faults of a run: one at a time, of one car or of all, repeatedly."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ LONGEST = 1.5
 
 
 class Faults:
-    """Drawn again for every environment when the last one is over; arrays over (env)."""
+    """Faults, sampled for every environment when the last one ends; arrays over (env)."""
 
     def __init__(self, n_envs, n_cars, rng, kinds=KINDS):
         self._rng, self._n = rng, n_cars
@@ -41,7 +41,7 @@ class Faults:
 
     @property
     def held(self):
-        """Pictures come late: the old one is sent again."""
+        """True where snapshots are late: the old one is sent again."""
         return self._is("held")
 
     @property
@@ -54,7 +54,7 @@ class Faults:
 
     @property
     def stale(self):
-        """(env, car)"""
+        """True for cars without telemetry, (env, car)."""
         return self._is("stale")[:, None] & self._one
 
     @property
@@ -66,5 +66,5 @@ class Faults:
         return np.arange(self._n) == self._victim[:, None]
 
     def hit(self, n_cars):
-        """Whose view is hit, (env, car, 1)."""
+        """True for the car whose view is affected, (env, car, 1)."""
         return self._one[:, :, None]

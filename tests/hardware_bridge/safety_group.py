@@ -1,4 +1,4 @@
-"""Groups of which all is known and well, for tests of the gate that then spoil it."""
+"""Groups with known and healthy states, for tests of the gate that add faults."""
 
 import numpy as np
 
@@ -16,7 +16,7 @@ SQUARE = Fence(node=9, corners=((0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0)))
 
 
 def picture(n_envs=1, n_cars=2, *, t=0.0, sigma=0.05, spacing=3.0) -> Picture:
-    """Cars in a row along x that all point along y; they want full speed."""
+    """Return cars in a row along x with headings along y, which request full speed."""
     q = blank_picture(n_envs, n_cars)
     q.t[:] = t
     q.speed_wanted[:] = 3.0
@@ -35,7 +35,7 @@ def picture(n_envs=1, n_cars=2, *, t=0.0, sigma=0.05, spacing=3.0) -> Picture:
 
 
 def check(name, q, params=None, *, now=0.0, word=0.0, heard=0.0, was_slow=False, **other):
-    """The verdict of one rule."""
+    """Return the verdict of one rule."""
     shape = q.heading.shape
     rule = next(rule for rule in RULES if rule.name == name)
     fields = {
@@ -54,7 +54,7 @@ def check(name, q, params=None, *, now=0.0, word=0.0, heard=0.0, was_slow=False,
 
 
 class Driven:
-    """A gate with a clock, and a group that is well unless it is told otherwise."""
+    """A gate with a clock, and a group that is healthy by default."""
 
     def __init__(self, params=None, n_envs=1, n_cars=2, **options):
         self.params = params or SafetyParams()
@@ -84,7 +84,7 @@ class Driven:
         return self.gate.arm(self.now, np.ones(self.shape, dtype=bool))
 
     def drive(self):
-        """Armed and at full speed."""
+        """Arm the cars and bring them to full speed."""
         self.tick(60)
         assert self.arm().all()
         self.tick(60)

@@ -1,4 +1,4 @@
-"""Policies that want what they should not: at the fence, at each other, and anything else."""
+"""Adversarial policies: towards the fence, towards each other, and random commands."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ NAMES = (
 
 
 class Policies:
-    """One for every car, drawn again every few seconds; speed and steering, (env, car)."""
+    """One policy for every car, sampled every few seconds; speed and steering, (env, car)."""
 
     def __init__(self, shape, rng):
         self._rng, self._shape = rng, shape

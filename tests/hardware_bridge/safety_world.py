@@ -1,7 +1,7 @@
-"""Many groups of cars under one gate each, driven by policies that mean ill, with faults.
+"""Many groups of cars with one gate each, driven by adversarial policies, with faults.
 
-What the gate must hold is asked of the truth: no middle of a car outside the fence, no two middles
-nearer than the separation.
+The guarantees of the gate are checked on the true state: the centre of no car is outside the fence,
+and no two centres are nearer than the separation.
 """
 
 from typing import NamedTuple
@@ -17,34 +17,34 @@ from hardware_bridge.safety.geometry.polygon import to_edges
 from hardware_bridge.safety.params import Fence
 
 DECISION = 10
-"""[ticks]"""
+"""[ticks] Control period."""
 ROOM = Fence(node=9, corners=((0.0, 0.0), (5.0, 0.0), (5.0, 4.0), (0.0, 4.0)))
 CORNER = Fence(
     node=9,
     corners=((0.0, 0.0), (6.0, 0.0), (6.0, 3.5), (3.5, 3.5), (3.5, 6.0), (0.0, 6.0)),
 )
-"""With a corner that points inwards."""
+"""A fence with a reflex corner."""
 
 
 class Outcome(NamedTuple):
-    """Of runs, arrays over (env) but the last three."""
+    """Results of runs, arrays over (env) except the last three."""
 
     nearest: np.ndarray
-    """Least distance of two middles [m]."""
+    """Smallest distance of two centres [m]."""
     furthest: np.ndarray
-    """Furthest that a middle was outside the fence; negative inside [m]."""
+    """Largest distance of a centre outside the fence; negative inside [m]."""
     way: np.ndarray
-    """Driven by all cars [m]."""
+    """Distance travelled by all cars [m]."""
     armed: float
-    """Share of the time in which cars were armed."""
+    """Fraction of time in which cars were armed."""
     capped: float
-    """Share of the armed time in which less speed was allowed than wanted."""
+    """Fraction of the armed time in which the allowed speed was below the requested one."""
     n_armings: int
-    """Cars armed again after a stop."""
+    """Number of cars armed again after a stop."""
 
 
 def start(n_envs, n_cars, corners, rng):
-    """Places inside the fence, 1.3 m apart and 0.9 m from it where that is possible."""
+    """Sample positions inside the fence, 0.6 m from it and 1.3 m apart if possible."""
     low, high = np.min(corners, axis=0), np.max(corners, axis=0)
     pos = np.zeros((n_envs, n_cars, 2))
     for k in range(n_cars):
@@ -61,7 +61,7 @@ def start(n_envs, n_cars, corners, rng):
 
 
 def run(params, n_envs, seconds, seed, *, n_cars=4, kinds=KINDS, sigma=(0.03, 0.3), deciding=None):
-    """Drive; 2 to `n_cars` cars take part. `deciding` replaces the policies."""
+    """Simulate 2 to `n_cars` cars per group. `deciding` replaces the policies."""
     rng = np.random.default_rng(seed)
     pos, heading = start(n_envs, n_cars, params.fence.corners, rng)
     cars, gate = Cars(pos, heading, rng), Gate(params, n_envs, n_cars)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 class FakeDevice:
-    """The master end of a pty behind a path that stays, as /dev/serial/by-id/... does."""
+    """Master end of a pty behind a permanent path, like /dev/serial/by-id/..."""
 
     def __init__(self, path: Path):
         self.path = path
@@ -27,7 +27,7 @@ class FakeDevice:
             self.master = -1
 
     def say(self, data: bytes) -> int:
-        """As much as there is room for."""
+        """Send as much as fits; return the number of bytes."""
         try:
             return os.write(self.master, data)
         except BlockingIOError:
@@ -41,7 +41,7 @@ class FakeDevice:
 
 
 def until(links, done, seconds=10.0):
-    """Wait with the links until `done` says so; all chunks since then."""
+    """Wait with the links until `done` returns true; return all chunks since then."""
     end = time.monotonic() + seconds
     chunks = []
     while not done(chunks):

@@ -1,4 +1,4 @@
-"""Where cars believe themselves to be: as seen, and while it is not sure, as the wheels say."""
+"""Estimated positions of cars: as tracked, and by odometry while tracking is uncertain."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ START = np.array([0.0, 2.1, 4.2, 5.3])
 
 
 def seen_at(view, t, ok):
-    """Cars on one circle, as an exact tracker that is sure of some sees them."""
+    """Set cars on one circle, as seen by an exact tracker; return their centred positions."""
     n = len(ok)
     phase = START[:n] + RATE * t
     pos = RADIUS * np.stack([np.cos(phase), np.sin(phase)], axis=-1)
@@ -66,7 +66,7 @@ def test_a_place_that_goes_on_outlasts_who_comes_back():
     believed, view = Believed(4), make_view(1, 4)
     of_three = np.array([True, True, True, False])
     for k in range(40):
-        # Nobody is sure of car 3 any more; then car 0 is away for a while.
+        # Car 3 is never tracked again; then car 0 is away for a while.
         ok = np.ones(4, dtype=bool) if k < 10 else of_three.copy()
         ok[0] = not 15 <= k < 20
         true = seen_at(view, k * DT, ok)

@@ -1,4 +1,4 @@
-"""Where frames and lines begin and end: against a plain search, and at the edges."""
+"""Boundaries of frames and lines: against a plain search, and at the edges."""
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -30,7 +30,7 @@ def is_frame(data):
 
 
 def plain_search(data):
-    """Of all right frames the one that ends first, the longest of these; and so on behind it."""
+    """Repeatedly take the valid frame that ends first, and of these the longest."""
     found, at = [], 0
     while True:
         ends = (
@@ -46,7 +46,7 @@ def plain_search(data):
         found.append(data[begin:at])
 
 
-# Sums of small bytes are small bytes: right frames, also within each other, come often.
+# Sums of small bytes are small bytes: valid frames, also nested ones, are frequent.
 SMALL = st.lists(st.sampled_from([0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10]), max_size=60).map(bytes)
 GOOD = st.lists(st.integers(0, 9), min_size=0, max_size=4).map(
     lambda body: (lambda b: b + bytes((sum(b),)))(bytes((START, len(body) + 3, *body)))

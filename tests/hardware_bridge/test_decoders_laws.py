@@ -1,4 +1,4 @@
-"""What every decoder of the registry keeps, whatever the bytes are."""
+"""Invariants of every registered decoder, for any bytes."""
 
 import tracemalloc
 from dataclasses import asdict
@@ -24,7 +24,7 @@ def cut(data, places):
 
 
 def pieces(name):
-    """Frames, garbage and pieces of the format in any order."""
+    """Return frames, garbage and tokens of the format in any order."""
     sample = SAMPLES[name]
     parts = st.sampled_from([*sample.all_frames, *sample.tokens])
     return st.lists(parts | st.binary(max_size=20), max_size=12).map(b"".join)
@@ -61,7 +61,7 @@ def test_damage_and_garbage_cost_at_most_one_frame(name):
 @settings(max_examples=60)
 @given(data=st.data())
 def test_garbage_that_ends_costs_nothing(name, data):
-    """Between whole frames, and not itself the beginning of one."""
+    """The garbage is between complete frames, and not itself the beginning of one."""
     noise = bytes(data.draw(st.lists(st.integers(0x80, 0xFF), max_size=300)))
     unit = SAMPLES[name].unit
     decoder = decoder_of(name)
@@ -104,7 +104,7 @@ def test_frames_without_damage_are_not_counted_as_damaged(name):
 @FORMATS
 @pytest.mark.parametrize("kind", list(DAMAGES))
 def test_what_is_refused_is_counted(name, kind):
-    """A frame of which nothing comes left a trace in the counts."""
+    """Every frame without a reading is counted or still kept."""
     rng = Random(5)
     unit = SAMPLES[name].unit
     n_silent = 0

@@ -1,4 +1,4 @@
-"""What the devices' ends write is what the decoders read, within the resolution of the format."""
+"""Decoders read the output of the encoders, within the resolution of the format."""
 
 import math
 
@@ -51,7 +51,7 @@ def same_ranges(got, sent, metres, decibels):
 
 
 def test_every_decoder_of_devices_has_its_other_end():
-    # That of our own nodes is in hardware_bridge.wire: it needs a boot number and a key.
+    # The encoder of our own format is in hardware_bridge.wire: it needs a boot number and a key.
     assert set(ENCODERS) == set(DECODERS) - {"relpos"}
 
 
@@ -161,7 +161,7 @@ def test_rplidar_is_not_read_before_enough_samples_follow_each_other():
     assert decoder.feed(jump) == []
     still = decoder_of("rplidar")
     assert still.feed(encoder.encode([ScanReading(UNNAMED, 1.0, 1.0)]) * 30) == []
-    # One that stands after it has turned is soon not believed, nor one that turns back.
+    # A scanner that stops or turns back after a rotation is soon not accepted.
     for step in (0.0, 0.02):
         turned, scanner = decoder_of("rplidar"), make_encoder("rplidar", "")
         turned.feed(scanner.encode(sent))

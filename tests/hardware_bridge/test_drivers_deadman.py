@@ -1,4 +1,4 @@
-"""Emulated cars stop by themselves when nobody commands their motor."""
+"""Emulated cars stop by themselves without commands to their motor."""
 
 import pytest
 from hypothesis import HealthCheck, given, settings

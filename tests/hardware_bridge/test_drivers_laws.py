@@ -1,4 +1,4 @@
-"""Every driver with the firmware of its controller: laws over the registries."""
+"""Invariants of every driver with the firmware of its controller."""
 
 from math import inf, isfinite, nan
 
@@ -15,15 +15,15 @@ patient = settings(suppress_health_check=[HealthCheck.too_slow])
 
 KEY = bytes(range(16))
 REVERSING = {"pwm": {"reverse": [[0.5, 1440], [2.0, 1300]]}}
-"""Options next to the defaults."""
+"""Options that differ from the defaults."""
 EVERY = pytest.mark.parametrize("name", sorted(DRIVERS))
 anything = st.floats(allow_nan=True, allow_infinity=True)
 within = st.floats(0.5, 1.5), st.floats(-0.25, 0.25)
-"""What every car can do with its default limits: speed [m/s], steering [rad]."""
+"""Speed [m/s] and steering [rad] within the default limits of every car."""
 
 
 def pair(name):
-    """A driver and the firmware that it talks to."""
+    """Return a driver and the firmware that it communicates with."""
     options = REVERSING.get(name, {})
     key = KEY if DRIVERS[name].takes_key else None
     ticks = iter(range(0, 10**12, 10_000))
@@ -113,7 +113,7 @@ def test_slower_than_it_can_is_standing(name, speed):
 
 
 def a_drive(driver):
-    """Bytes of a short drive with all there is."""
+    """Return the bytes of a short drive with all commands."""
     parts = [driver.opening()]
     for k in range(12):
         parts += [driver.drive(0.3 * k - 1.5, 0.05 * k - 0.25), driver.ask()]
@@ -164,7 +164,7 @@ def test_damage_is_survived(name, data):
             assert isfinite(reading.speed)
             assert isfinite(reading.steering)
         driver.telemetry.feed(part)
-    # However long a frame the damage pretends, whole ones get through after it.
+    # Whatever the length of a damaged frame, complete ones are read after it.
     for _ in range(400):
         read = firmware.feed(driver.neutral())
     assert len(read) == 1

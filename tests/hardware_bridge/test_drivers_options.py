@@ -1,4 +1,4 @@
-"""Configurations of drivers: what is wrong is named by its path."""
+"""Configurations of drivers: errors name the path of the wrong option."""
 
 from dataclasses import fields, is_dataclass
 

@@ -60,7 +60,7 @@ def test_golden_commands():
 
 
 def test_crc_is_xmodem():
-    """The check value of the catalogue of CRCs."""
+    """Compare with the check value of the CRC catalogue."""
     assert crc_hqx(b"123456789", 0) == 0x31C3
 
 
@@ -86,7 +86,7 @@ def test_frames_of_all_lengths(payloads, data):
 
 @pytest.mark.parametrize("n", [255, 256, MOST_PAYLOAD])
 def test_long_heads(n):
-    """255 bytes may come with either head; no other length has two."""
+    """A payload of 255 bytes may have either head; no other length has two."""
     payload = bytes(n)
     sent = b"\x03" + n.to_bytes(2, "big") + payload + crc_hqx(payload, 0).to_bytes(2, "big") + b"\3"
     assert FrameReader(Counts()).feed(sent) == [payload]
@@ -106,7 +106,7 @@ def test_one_wrong_bit_is_seen(bit):
 @patient
 @given(noise=st.binary(max_size=200), n=st.integers(0, 9))
 def test_frames_after_damage_are_read(noise, n):
-    """A false length hides what follows for `LONGEST` bytes at most, and loses nothing of it."""
+    """A false length hides at most the next `LONGEST` bytes, and loses none of them."""
     reader = FrameReader(counts := Counts())
     brake = set_current_brake(5000)
     lost = set_rpm(3000)[:n]
@@ -128,7 +128,7 @@ def test_layout_of_the_values():
     assert answer[27:29] == struct.pack(">h", 117)
     assert answer[53] == 3
     assert read_values(answer) == VescValues(erpm=-4614, voltage=11.7, fault=3)
-    # Older firmware ends earlier; what is cut off before the fault is no answer.
+    # Older firmware sends fewer values; a message that ends before the fault is no answer.
     assert read_values(answer[:54]) == read_values(answer)
     assert read_values(answer[:53]) is None
     assert read_values(b"\x05" + answer[1:]) is None
@@ -159,7 +159,7 @@ def test_telemetry_comes_back(speed, voltage, fault, how):
 
 def test_other_answers_are_skipped():
     telemetry = VescDriver(VescOptions()).telemetry
-    # The answer to FW_VERSION and a text that it prints.
+    # The answer to FW_VERSION and a printed text.
     assert telemetry.feed(frame(b"\x00\x06\x02VESC6\x00") + frame(b"\x15hello")) == []
     assert (telemetry.counts.frames, telemetry.counts.skipped) == (0, 2)
 
@@ -169,7 +169,7 @@ def test_without_telemetry_nothing_is_asked():
 
 
 def test_limits_of_the_servo():
-    """Those of F1TENTH are narrower than what the steering is asked for."""
+    """The limits of F1TENTH are narrower than the commanded steering."""
     driver, firmware = VescDriver(VescOptions()), VescFirmware(1, VescOptions())
     (left,) = firmware.feed(driver.drive(1.0, 0.42))
     (right,) = firmware.feed(driver.drive(1.0, -0.42))

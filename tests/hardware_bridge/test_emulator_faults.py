@@ -1,4 +1,4 @@
-"""What the fault injector does to frames, and what a fault plan may say."""
+"""Effects of the fault injector on frames, and validation of fault plans."""
 
 import tomllib
 
@@ -17,7 +17,7 @@ FRAMES = [bytes([k % 251, k // 251]) * 8 for k in range(4000)]
 
 
 def through(params, frames=FRAMES, every=10 * MS, seed=1):
-    """What arrives, with the time of each; frames set out at even times."""
+    """Return the injector and arrivals with their times; frames are sent at a constant rate."""
     injector = FaultInjector(params, np.random.default_rng(seed))
     arrived, t = [], 0
     for k, frame in enumerate(frames):

@@ -1,4 +1,4 @@
-"""What emulated nodes say is what they measured, in every format, by clocks of their own."""
+"""Emulated nodes send their measurements in every format, stamped by their own clocks."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ RESOLUTION = {
 
 
 def block_of(n_steps=20, seed=4):
-    """Steps of 10 ms: every node's IMU and magnetometer, and a range of every pair."""
+    """Return steps of 10 ms with IMU and magnetometer of every node and a range of every pair."""
     rng, rows = np.random.default_rng(seed), []
     for k in range(1, n_steps + 1):
         t = 0.01 * k
@@ -59,7 +59,7 @@ def node_of(*names, index=0, seed=5, key=None, **params):
 
 
 def said(node, rows, steps=1, key=None):
-    """What a host reads of each of the node's ports."""
+    """Return the readings that a host decodes from each of the node's ports."""
     decoders = [make_decoder(f.name, key if f.name == "relpos" else None) for f in node.formats]
     readings = [[] for _ in decoders]
     for part in np.array_split(np.arange(len(rows)), steps):
@@ -113,7 +113,7 @@ def test_what_the_host_reads_is_what_was_measured(names, keyed):
         if turn is not None:
             imus = [r for r in rows if r.kind is Kind.IMU]
             mags = [r for r in rows if r.kind is Kind.MAG]
-            # The last may wait for a frame that tells it is complete.
+            # The last sample may wait for a frame that completes it.
             assert len(imus) - 1 <= len(samples) <= len(imus)
             for reading, imu, mag in zip(samples, imus, mags, strict=False):
                 np.testing.assert_allclose(reading.gyr, imu.values[:3], atol=turn)

@@ -1,4 +1,4 @@
-"""Pseudo terminals behave as serial devices that somebody plugs in and pulls out."""
+"""Pseudo terminals behave like serial devices that are plugged in and unplugged."""
 
 import os
 import select
@@ -25,7 +25,7 @@ def open_host(link):
 
 
 def read_host(fd, n, seconds=5.0):
-    """So many bytes, or what came until the end."""
+    """Read n bytes, or as many as arrive before the end of file or the timeout."""
     found, end = b"", time.monotonic() + seconds
     while len(found) < n and time.monotonic() < end:
         if select.select([fd], [], [], 0.1)[0]:
@@ -91,7 +91,7 @@ def test_unplugged_it_is_gone_and_comes_back_under_its_name(port):
         port.unplug()
         assert not port.plugged
         assert not port.link.is_symlink()
-        with suppress(OSError):  # what other systems say
+        with suppress(OSError):  # raised by other systems
             assert os.read(host, 10) == b""
         port.write(b"nobody")
         assert port.read() == b""

@@ -1,4 +1,4 @@
-"""Files as ports: every byte once, from the start, as long as the file is the same."""
+"""Files as ports: every byte once, from the start, while the file is not replaced."""
 
 import random
 import time

@@ -1,4 +1,4 @@
-"""What must not happen, whatever files say: leaks, crashes, limits that switch the gate off."""
+"""Malicious files cause no leaks, no crashes and no limits that disable the gate."""
 
 import gzip
 import json

@@ -1,4 +1,4 @@
-"""Who is believed on the line of a car, and for how long."""
+"""Devices accepted on the line of a car, and the validity time of their messages."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What was signed and said once is not believed again, whoever starts again, and however."""
+"""Replay protection: signed messages are accepted once, across any restarts."""
 
 import json
 from dataclasses import replace
@@ -22,7 +22,7 @@ S = 1_000_000_000
 
 @pytest.fixture
 def said(tmp_path):
-    """What three signed nodes and cars say in a second, line by line, and their configuration."""
+    """Return the configuration of three signed nodes and cars and their messages of a second."""
     rig = EmulatedRig(EmulateOptions(scenario="cars-nlos", seed=3, key=KEY))
     path = tmp_path / "swarm.toml"
     path.write_text(rig.swarm_toml(Path("/nowhere")))
@@ -39,7 +39,7 @@ def said(tmp_path):
 
 
 def hears(path, lines):
-    """An intake that knows the marks and hears all of it."""
+    """Feed the lines to an intake with the kept marks; return the intake and its marks."""
     swarm = LiveSwarm(read_config(path), 0)
     marks = KeptMarks(swarm.config.marks, swarm.intake)
     for chunk in lines:
@@ -56,7 +56,7 @@ def test_a_recording_of_the_last_time_is_refused_by_the_next_host(said):
     again, _ = hears(path, lines)
     assert len(again.events) == 0
     assert again.refused["replay"] + again.refused["duplicate"] + again.refused["stale"] > 200
-    # What comes after the last message is believed.
+    # Messages after the last marks are accepted.
     first, second = lines[: len(lines) // 2], lines[len(lines) // 2 :]
     path.with_suffix(".marks.json").unlink()
     hears(path, first)[1].close()
@@ -70,7 +70,7 @@ def test_after_a_crash_nothing_that_was_heard_is_believed(said):
     intake, marks = hears(path, lines[:20])
     marks.keep(S)
     marks._writing.join()
-    # No close: the process was killed after more had come.
+    # No close: the process was killed after further messages had arrived.
     for chunk in lines[20:]:
         intake.take(chunk)
     again, _ = hears(path, lines)

@@ -1,4 +1,4 @@
-"""Which node a device is."""
+"""Assignment of devices to nodes."""
 
 import pytest
 
@@ -22,7 +22,7 @@ def test_ids_of_a_link_are_all_that_counts_where_there_are_some(device, ids, mix
 
 
 def test_no_node_has_the_id_of_the_host():
-    """A driver that speaks to it would be told of it by a traceback."""
+    """A driver for that id would otherwise fail with a traceback."""
     where = Where("swarm.toml", raises=BridgeError)
     assert node_id(str(HOST - 1), where) == HOST - 1
     with pytest.raises(BridgeError, match="expected an id from 0 to 65534"):

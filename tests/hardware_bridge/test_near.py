@@ -1,4 +1,4 @@
-"""Distance sensors of real cars: from the wire to what a policy sees."""
+"""Distance sensors of real cars: from the wire to the observation of a policy."""
 
 import math
 

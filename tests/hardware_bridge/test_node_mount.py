@@ -1,4 +1,4 @@
-"""Where a node and its sensors sit: ``[nodes.N.mount]``, ``imu_axes``, ``mag_axes``."""
+"""Mounting of a node and its sensors: ``[nodes.N.mount]``, ``imu_axes``, ``mag_axes``."""
 
 import tomllib
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What was there before is not looked through again; garbage made since is still found."""
+"""Existing objects are not scanned again; later garbage is still collected."""
 
 import gc
 import weakref
@@ -7,7 +7,7 @@ from hardware_bridge.pauses import short_pauses
 
 
 class Knot:
-    """Refers to itself: only a collection finds it."""
+    """Object that refers to itself: only a collection frees it."""
 
     def __init__(self):
         self.itself = self

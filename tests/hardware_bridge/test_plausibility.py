@@ -1,4 +1,4 @@
-"""What cannot be is refused, what can be never, and a real jump is believed after a moment."""
+"""Impossible values are refused, possible ones never, and a real jump is accepted soon."""
 
 import math
 import random
@@ -19,7 +19,7 @@ JSON = re.compile(r'"raz": \[(-?\d+\.\d+)\]')
 
 
 def true_distance(t):
-    """Two cars that pass each other at up to 6 m/s."""
+    """Return the distance of two cars that pass each other at up to 6 m/s."""
     return 5.0 + 4.0 * math.sin(1.4 * t)
 
 
@@ -49,7 +49,7 @@ def burst(line, rng):
 
 
 def splice(line, rng):
-    """The rest of the line is of a later one, of another pair."""
+    """Replace the rest of the line by that of a later one, of another pair."""
     k = rng.randrange(len(line))
     other = line.replace(b"A1B2", b"C3D4")
     line[k:] = other[rng.randrange(len(line)) :]
@@ -58,7 +58,7 @@ def splice(line, rng):
 @pytest.mark.parametrize("damage", [one_bit, byte_lost, burst, splice])
 @pytest.mark.parametrize(("write", "pattern"), [(dw1000, LINE), (uwb_core, JSON)])
 def test_what_damage_lets_through_is_near_the_truth(write, pattern, damage):
-    """At 50 Hz, one line in three damaged: what is far off never passes, what is right always."""
+    """At 50 Hz with one line in three damaged: outliers never pass, correct lines always do."""
     rng = random.Random(0)
     gate = Plausibility()
     worst, worst_passed = 0.0, 0.0
@@ -77,7 +77,7 @@ def test_what_damage_lets_through_is_near_the_truth(write, pattern, damage):
             worst_passed = max(worst_passed, error)
         else:
             assert error > 0.5
-    # The jump that is allowed, and the way of 6 m/s while a few lines in a row were damaged.
+    # The allowed jump, and the distance at 6 m/s while a few lines in a row were damaged.
     assert worst_passed < 1.5
     if damage is one_bit:
         assert worst > 3.0

@@ -1,4 +1,4 @@
-"""Which device a configuration means, and who may open it."""
+"""Identification of the configured device, and the permission to open it."""
 
 import errno
 import os

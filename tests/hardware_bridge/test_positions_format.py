@@ -1,4 +1,4 @@
-"""Lines of other trackers: what they mean, and what is refused."""
+"""Lines of external trackers: their meaning, and refused lines."""
 
 import json
 import math
@@ -35,7 +35,7 @@ def test_golden_lines():
     assert pair == PairReading(
         at(81250000), "1", "2", (1.25, -0.5, 0.125), (0.1, 0.0, -0.2), (v, 0, 0, 0, v, 0, 0, 0, v)
     )
-    # Nothing was said across the plane: the larger of the two variances.
+    # The variance of z is not given: it is the larger one of x and y.
     cov = (4e-4, 1e-4, 0, 1e-4, 9e-4, 0, 0, 0, 9e-4)
     assert plane == PairReading(
         at(81250000), "2", "3", (1.0, 2.0, 0.0), None, cov, Status.LOST, 0.25

@@ -1,4 +1,4 @@
-"""A swarm on the lines of another tracker: over a pty, over a file, as the simulator sees it."""
+"""A swarm with lines of an external tracker: over a pty, over a file, as in the simulator."""
 
 import json
 import time
@@ -49,7 +49,7 @@ def line(**said):
 
 
 class PortFeed:
-    """Ports, read until something came."""
+    """Feed that reads ports until data arrives."""
 
     def __init__(self, swarm, links, say):
         self.swarm, self.links, self.say = swarm, links, say
@@ -68,7 +68,7 @@ class PortFeed:
 
 
 def drive(config, say):
-    """Observations after some lines, of two cars that stand."""
+    """Return the swarm and the observations of two cars at rest after some lines."""
     with Links([link.port for link in config.links], NOW) as links:
         swarm = LiveSwarm(config, NOW())
         group = LiveGroup(swarm, PortFeed(swarm, links, say), observation_mode("estimate", 2))
@@ -117,7 +117,7 @@ def test_over_a_file_beside_the_configuration(tmp_path):
 
 
 def test_a_recording_gives_the_same(tmp_path):
-    """At the same times, to the last bit."""
+    """Views at the same times are equal to the last bit."""
     config, run, seen = tmp_path / "swarm.toml", tmp_path / "run.rec", {}
     config.write_text(config_text("file:mocap.jsonl"))
     with (tmp_path / "mocap.jsonl").open("wb") as file:  # noqa: SIM117
@@ -143,7 +143,7 @@ def test_a_recording_gives_the_same(tmp_path):
 
 
 def test_it_sees_what_the_simulator_shows():
-    """The truth as lines gives the observations of the mode `truth`."""
+    """True states sent as lines give the observations of the mode `truth`."""
     env = formation_v0.parallel_env(n_cars=3, scenario="ring-los", observation="truth")
     observations, _ = env.reset(seed=3)
     rng = np.random.default_rng(1)
@@ -236,7 +236,7 @@ def test_all_is_loaded_before_a_drive():
 
 
 def test_a_recording_stays_whatever_goes_wrong_at_the_end(tmp_path, monkeypatch):
-    """As a second Ctrl-C while everything is being closed."""
+    """The error is like a second Ctrl-C during shutdown."""
     config, run = tmp_path / "swarm.toml", tmp_path / "run.rec"
     config.write_text(config_text("file:mocap.jsonl"))
     (tmp_path / "mocap.jsonl").write_bytes(lines_now())

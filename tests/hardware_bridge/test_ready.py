@@ -1,4 +1,4 @@
-"""Positions that come ready: what is believed of them between and after the lines."""
+"""Positions of an external tracker: estimates between and after the lines."""
 
 import math
 
@@ -19,7 +19,7 @@ from tracking.measurements import Kind, MeasurementBlock
 
 
 class Watcher:
-    """A perception, fed by hand: nodes 0, 1, 2 move, node 3 stands."""
+    """A perception with manual input: nodes 0, 1, 2 move, node 3 is at rest."""
 
     def __init__(self, dimensions=2, **params):
         nodes = (*(NodeConfig(id=k) for k in range(3)), NodeConfig(id=3, kind="static"))
@@ -60,11 +60,11 @@ def test_nothing_is_known_before_the_first_line():
 
 
 def test_constant_velocity_is_carried_exactly():
-    """Of a pair that is told, and of one that follows from the places of its nodes."""
+    """Holds for a reported pair, and for a pair derived from the positions of its nodes."""
     watcher = Watcher(std=1e-6)
     start, vel = np.array([1.0, -2.0, 0.0]), np.array([0.5, 1.5, 0.0])
     for t in np.arange(0.0, 2.0, 0.02):
-        watcher.pair(t, 1, 0, -(start + t * vel))  # told the other way round
+        watcher.pair(t, 1, 0, -(start + t * vel))  # reported in reverse order
         watcher.node(t, 2, start - t * vel)
         watcher.node(t, 1, (0.0, 0.0, 0.0))
         watcher.see(t)
@@ -190,7 +190,7 @@ def test_headings_are_told_or_unknown():
 @pytest.mark.parametrize("rate", [-3.0, 0.0, 0.7])
 def test_what_turns_evenly_is_carried_exactly(rate):
     headings = Headings(1)
-    for t in np.arange(0.0, 3.0, 0.02):  # over the cut at pi and back
+    for t in np.arange(0.0, 3.0, 0.02):  # across the wrap at pi and back
         yaw = 2.0 + rate * t
         headings.take([(0, ToldHeading(t, (math.cos(yaw / 2), 0, 0, math.sin(yaw / 2))))])
         assert headings.turns(t)[0] == 0.0
@@ -208,7 +208,7 @@ def test_a_position_is_a_distance_for_whoever_sees_ranges():
 
 
 def twin(told, q, var, first_var):
-    """The filter of one axis with matrices by hand."""
+    """Reference implementation of the filter of one axis, without matrices."""
     (t, z), *rest = told
     p, v, a, b, c = z, 0.0, var, 0.0, first_var
     for t2, z2 in rest:
@@ -246,7 +246,7 @@ def test_the_filter_is_its_twin():
 
 
 def test_the_covariance_is_that_of_the_errors():
-    """Normalised squared errors over many runs have the mean that their size gives."""
+    """The mean NEES over many runs is the dimension of the state."""
     rng = np.random.default_rng(5)
     n, steps, dt, psd, std = 400, 60, 0.05, 1.5, 0.03
     tracks = Tracks(n, np.full(n, psd), np.full(n, 3.0), std, 0.1)

@@ -1,4 +1,4 @@
-"""Recordings as bytes: what is written comes back, and what is damaged is never made up."""
+"""Byte format of recordings: records are read back, and damage never creates a record."""
 
 import json
 import os
@@ -46,7 +46,7 @@ def write(path, content, header=HEADER):
 
 
 def plain(content):
-    """Without the sequence numbers."""
+    """Return records without sequence numbers."""
     return [(r.kind, r.link, r.t_ns, r.payload) for r in content]
 
 
@@ -57,7 +57,7 @@ def is_part_in_order(part, whole):
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory):
-    """A new path on every call, on a disk that need not be waited for."""
+    """Return a function that gives a new path on every call; syncs are disabled."""
     folder, n = tmp_path_factory.mktemp("recordings"), iter(range(10**9))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(os, "fsync", lambda fd: None)
@@ -152,7 +152,7 @@ def test_damage_gives_some_of_what_was_written_in_order(place, content, blows):
 
 
 def test_behind_a_damaged_record_the_next_is_read(place):
-    # Numbers of one length: behind a shorter one the check sum may look like its next digit.
+    # Numbers of equal length: behind a shorter one the check sum may look like its next digit.
     content = [Record(Kind.BYTES_IN, 0, k, b"frame %03d" % k) for k in range(100)]
     path = write(place(), content)
     data = bytearray(path.read_bytes())
@@ -176,7 +176,7 @@ def test_a_length_that_lies_costs_one_record(place):
 
 
 def test_a_record_inside_a_payload_is_none(place):
-    """Neither one of another file nor, in a damaged record, one of this."""
+    """It is neither a record of another file nor, in a damaged record, one of this file."""
     inner = encode_record(b"\x01\x02\x03\x04", Record(Kind.TICK, 0, 1, b"", 7))
     path = write(place(), [Record(Kind.BYTES_IN, 0, 1, inner)] * 3)
     data = bytearray(path.read_bytes())
@@ -189,7 +189,7 @@ def test_memory_is_bounded_and_long_files_are_whole(place):
     content = [Record(Kind.BYTES_IN, k, k, bytes([k]) * MOST_PAYLOAD) for k in range(70)]
     path = write(place(), content)
     data = bytearray(path.read_bytes())
-    # Damage across the border of what is read at once.
+    # Damage across the boundary of two reads.
     at = start_of_records(data) + (1 << 20) - 50
     data[at : at + 100] = bytes(100)
     path.write_bytes(data)
@@ -236,7 +236,7 @@ def test_other_versions_and_no_file_are_refused(place, tmp_path):
 
 
 def test_the_bytes_are_those_of_the_documentation(place):
-    """docs/how-to/recording.md, followed by hand."""
+    """The bytes are built by hand as described in docs/how-to/recording.md."""
 
     def record(kind, link, sequence, t_ns, payload):
         body = b"mark" + bytes([kind]) + link.to_bytes(2, "little")

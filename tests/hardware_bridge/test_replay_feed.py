@@ -1,4 +1,4 @@
-"""Law: a recording gives what was seen live, to the last bit, whatever went wrong."""
+"""Invariant: a replay gives the live estimates to the last bit, with any faults."""
 
 import errno
 import os
@@ -39,12 +39,12 @@ CALIBRATION = Calibration(
 
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory):
-    """A run in which nothing goes wrong, for tests that only read its recording."""
+    """Return a run without faults, for tests that only read its recording."""
     return run_live(tmp_path_factory.mktemp("plain"), EmulateOptions(seed=3), 40)
 
 
 def again(feed: ReplayFeed):
-    """Estimates, times and views of all decisions of a recording."""
+    """Return estimates, times and views of all control steps of a recording."""
     history, views = History(feed.config.constellation), []
     while (t_ns := feed.advance()) is not None:
         feed.swarm.step(t_ns)
@@ -108,7 +108,7 @@ def test_the_calibration_is_in_the_recording(tmp_path):
     feed = open_replay(run.path)
     assert feed.calibration == CALIBRATION
     same_bits(again(feed)[0].estimate, run.estimate)
-    # Without it nothing would be the same, so that is refused.
+    # Without the calibration the estimates would differ, so the replay is refused.
     data = run.path.read_bytes()
     at = data.index(b"gyr_offset", data.index(b'"calibration"'))
     (tmp_path / "bad.rec").write_bytes(data[:at] + b"X" + data[at + 1 :])

@@ -1,4 +1,4 @@
-"""What users get wrong: one clear line, exit status 2, and no car hears a thing."""
+"""User errors: one clear line, exit status 2, and no command to any car."""
 
 import errno
 import json
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.slow
 
 
 class RunningRig:
-    """Devices at pseudo terminals that go on by themselves."""
+    """Devices at pseudo terminals that run in a thread."""
 
     def __init__(self, folder, **options):
         chosen = EmulateOptions(**{"scenario": "cars-nlos", "seed": 3, "seconds": 600.0} | options)
@@ -36,7 +36,7 @@ class RunningRig:
 
     @property
     def moved(self):
-        """Whether any car was told to do anything but stand."""
+        """True if any car received a command other than stop."""
         return any(
             car._car._last is not None and not car._car._last.brake
             for car in self.rig.emulator.cars
@@ -44,7 +44,7 @@ class RunningRig:
 
     @property
     def heard(self):
-        """Whether any car was sent a byte."""
+        """True if any car received a byte."""
         return any(car.heard for car in self.rig.emulator.cars)
 
     def close(self):
@@ -63,7 +63,7 @@ def rig(tmp_path_factory):
 
 @pytest.fixture
 def relpos(monkeypatch, capfd):
-    """The command line: the one line that it says, and its status."""
+    """Return a function that runs the command line and returns its one line of error."""
     monkeypatch.setattr(os, "setpriority", lambda *_: None)  # other tests share this process
 
     def run(*args):
@@ -82,7 +82,7 @@ def relpos(monkeypatch, capfd):
 
 
 def written(tmp_path, rig, change):
-    """The rig's configuration, with something wrong in it."""
+    """Write the rig's configuration with an error; return its path."""
     text = rig.config.read_text()
     changed = change(text)
     assert changed != text
@@ -249,7 +249,7 @@ def test_stream_that_says_nothing_that_can_be_read(change, advice, tmp_path, mon
         path = written(tmp_path, own, change)
         with pytest.raises(BridgeError, match=r"node 1: not well within 3 s: it was not heard"):
             drive(config=path, arm=True, seconds=2.0, wait=3.0)
-        # The ports of cars were opened, and they were told to stand.
+        # The ports of cars were opened, and the cars received stop commands.
         assert not own.moved
         monkeypatch.setattr(sys, "argv", ["relpos", "doctor", "--config", str(path), "--seconds",
                                           "2", "--json"])  # fmt: skip
@@ -264,7 +264,7 @@ def test_stream_that_says_nothing_that_can_be_read(change, advice, tmp_path, mon
 
 
 def test_wrong_baud_rate(tmp_path):
-    """On a pseudo terminal any rate works; a wrong one sounds like noise."""
+    """Any rate works on a pseudo terminal; noise represents the wrong one."""
     import random
 
     own = RunningRig(tmp_path / "rig")

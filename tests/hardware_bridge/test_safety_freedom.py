@@ -1,4 +1,4 @@
-"""The gate is not so timid that nothing can be driven: formations, rings, and ways out."""
+"""The gate is permissive enough to drive: formations, rings, and escapes."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ TRIANGLE = np.array([[0.577, 0.0], [-0.289, 0.5], [-0.289, -0.5]])
 
 
 class Estimated:
-    """Groups of cars that are known well, (env, car) or one group, which want to go somewhere."""
+    """Groups of cars with known states, (env, car) or one group, and given commands."""
 
     def __init__(self, pos, heading, *, sigma=0.1, **options):
         self.params = SafetyParams(**options)
@@ -25,7 +25,7 @@ class Estimated:
         self.out = None
 
     def drive(self, seconds, decide):
-        """`decide(pos, heading, t)` gives speeds and steering angles."""
+        """Simulate; `decide(pos, heading, t)` returns speeds and steering angles."""
         shape = self.cars.heading.shape
         everyone = np.ones(shape, dtype=bool)
         for _ in range(round(seconds / DT)):
@@ -49,7 +49,7 @@ class Estimated:
 
     @property
     def share_capped(self):
-        """Of the time since the first second."""
+        """Fraction of time with a capped speed, after the first second."""
         return float(np.mean(self.capped[100:]))
 
 
@@ -87,7 +87,7 @@ def test_at_rest_at_1_m_cars_can_go_sideways_or_away(bearing, other):
 
 
 def test_a_ring_at_1_m_s_with_2_m_between_is_not_slowed():
-    """As the task `ring` in a room of 3 m x 5 m: half circles of 0.84 m and straight sides."""
+    """Drive as in the task `ring` in a room of 3 m x 5 m: half circles of 0.84 m and straights."""
     radius, half = 0.84, 1.2
 
     def curve(s):
@@ -130,7 +130,7 @@ def test_a_ring_at_1_m_s_with_2_m_between_is_not_slowed():
 
 
 def steer_to(course):
-    """The first car turns to a course at full speed, forwards or backwards as is nearer, (env)."""
+    """Let the first car turn to a course, forwards or backwards, whichever is nearer, (env)."""
 
     def decide(pos, heading, t):
         off = wrapped(course - heading[:, 0])
@@ -149,7 +149,7 @@ def wrapped(angle):
 
 @pytest.mark.parametrize(("sigma", "stuck"), [(0.05, 0), (0.1, 0), (0.15, 0.15)])
 def test_nobody_is_stuck_near_another(sigma, stuck):
-    """But for few bearings when it is hardly known where the other is."""
+    """Few bearings may be stuck if the position of the other car is uncertain."""
     bearing = np.linspace(-np.pi, np.pi, 49)
     away = 0.6 * np.stack([np.cos(bearing), np.sin(bearing)], axis=-1)
     pos = np.stack([0.0 * away, away], axis=1)

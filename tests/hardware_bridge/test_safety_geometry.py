@@ -1,4 +1,4 @@
-"""Ways to a stop, turns and polygons: closed forms against driving them."""
+"""Stopping distances, turns and polygons: closed forms against simulation."""
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ def test_way_within_is_the_inverse_of_gain(room, angle, radius):
 
 @given(ways, angles, radii)
 def test_no_steering_brings_a_car_nearer(way, angle, radius):
-    """Driven with any steering that switches twice, it is never nearer than `gain` says."""
+    """With any steering that switches twice, the approach never exceeds `gain`."""
     n = 400
     s = (np.arange(n) + 0.5) * way / n
     most = gain(way, angle, radius)
@@ -45,7 +45,7 @@ def test_no_steering_brings_a_car_nearer(way, angle, radius):
 
 @given(st.floats(0.05, 2.0), radii)
 def test_the_tightest_turn_reaches_it(share, radius):
-    """It is sharp: turned in at once the car comes as near as it says."""
+    """The bound is tight: an immediate full turn reaches it."""
     angle = 0.5 * np.pi
     way = share * angle * radius
     s = (np.arange(4000) + 0.5) * way / 4000

@@ -1,4 +1,4 @@
-"""Pictures and messages as bytes and back."""
+"""Serialisation of snapshots and messages."""
 
 import numpy as np
 import pytest
@@ -75,7 +75,7 @@ def test_pictures_of_another_number_of_cars_are_refused(n_cars):
 
 @given(st.binary(max_size=300))
 def test_other_bytes_are_refused_or_understood(data):
-    """Nothing but ValueError, and what is understood says the same again."""
+    """Only ValueError is raised, and an accepted message is encoded with the same type."""
     try:
         message = unpack(data, N)
     except ValueError:

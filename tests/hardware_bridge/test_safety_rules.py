@@ -1,4 +1,4 @@
-"""Every rule of the gate alone: at its thresholds, and with what is no number."""
+"""Every rule of the gate alone: at its thresholds, and with NaN."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from tracking.estimate import Status
 
 P = SafetyParams()
 NO_TIMES = (np.nan, np.inf, -np.inf, 5.0)
-"""Neither of the past nor recent; the clock says 0."""
+"""Times that are neither in the past nor recent; the clock is at 0."""
 
 
 def caps(verdict):
@@ -63,7 +63,7 @@ def test_covariance_of_one_pair(sound):
     q = picture(n_cars=3)
     q.sound[0, 0, 2] = sound
     assert check("covariance", q).hold.tolist() == [[True, False, False]]
-    q.status[0, 0, 2] = Status.STARTING  # nothing is said of it then
+    q.status[0, 0, 2] = Status.STARTING  # there is no estimate then
     assert not check("covariance", q).hold.any()
 
 
@@ -170,7 +170,7 @@ def test_whoever_nobody_holds_to_rules_gets_all_the_room():
 
 @pytest.mark.parametrize("way", [(-1.0, 0.0), (0.0, 1.0), (1.0, 0.0)])
 def test_whoever_is_no_car_of_ours_is_as_fast_as_it_is_seen_to_be(way):
-    """A person with a node has no telemetry, and may turn at the next step."""
+    """A person with a node has no telemetry, and may turn at any time."""
     armed, walking = np.array([[True, False]]), 1.4
     stands = pair(2.0, (0.0, np.pi))
     walks = pair(2.0, (0.0, np.pi))
@@ -179,7 +179,7 @@ def test_whoever_is_no_car_of_ours_is_as_fast_as_it_is_seen_to_be(way):
     caps = [check("separation", q, armed=armed).forward[0, 0] for q in (stands, walks, told)]
     assert caps[1] == pytest.approx(caps[2], abs=0.05)
     assert caps[1] < 0.5 * caps[0]
-    # A car that drives towards one that stands sees it come nearer, and knows why.
+    # A car approaching one at rest sees it come nearer through its own motion.
     drives = pair(2.0, (0.0, np.pi), (1.0, 0.0))
     drives.vel[0, 0, 1] = -1.0, 0.0
     assert check("separation", drives, armed=armed).forward[0, 0] == pytest.approx(caps[0])
@@ -204,7 +204,7 @@ def test_separation_of_what_is_no_number_is_none(name):
     q = pair(3.0, (0.0, np.pi))
     getattr(q, name)[:] = np.nan
     cap = check("separation", q).forward[0, 0]
-    # An unknown place is the matter of another rule, see above.
+    # An unknown position is handled by another rule, see above.
     assert np.isinf(cap) if name == "pos" else not cap > 0.0
 
 

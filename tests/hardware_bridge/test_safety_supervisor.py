@@ -1,4 +1,4 @@
-"""The supervisor, pure: what it tells the cars, whoever fails."""
+"""The supervisor without processes: commands to the cars under any failure."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ NEUTRAL = b"stand"
 
 
 class Driver:
-    """Says what it was asked for; may fail."""
+    """Driver that returns the command as text; may fail."""
 
     gap = 0.0
     answers = False
@@ -42,7 +42,7 @@ class Driver:
 
 
 class Drive:
-    """A supervisor of two cars with a clock, told that all is well."""
+    """A supervisor of two cars with a clock, healthy by default."""
 
     def __init__(self):
         self.drivers = {0: Driver(), 1: Driver()}
@@ -213,7 +213,7 @@ def test_a_controller_that_is_slow_to_take_commands_is_not_swamped():
 
 
 def test_a_port_that_is_open_and_takes_nothing_is_a_lost_one(drive):
-    """A network that is gone for a while: the car stops by itself, and is not to drive on."""
+    """During a network outage the car stops by itself, and must not continue afterwards."""
     drive.takes = [1]
     assert stands(drive.tick(19)) == [False, False]
     assert stands(drive.tick(3)) == [True, False]
@@ -235,7 +235,7 @@ def test_what_a_port_did_not_take_is_said_again_at_once():
 
 @pytest.mark.parametrize("suspended", [False, True])
 def test_after_a_pause_in_which_cars_stopped_nobody_drives_on(drive, suspended):
-    """Held up, or suspended: then no time has passed by the clock that all go by."""
+    """The process stalled, or was suspended: then its monotonic clock has not advanced."""
     if suspended:
         drive.supervisor.interrupt()
     else:

@@ -1,4 +1,4 @@
-"""Samples that come at another rate than configured, and other things that a stream betrays."""
+"""Samples at another rate than configured, and other faults visible in a stream."""
 
 import json
 from pathlib import Path
@@ -27,7 +27,7 @@ def parsed(links):
 
 
 def relpos(intake, node, readings):
-    """Let a node of our own format speak, as (t_ns, reading)."""
+    """Feed readings of a node of our own format, as (t_ns, reading)."""
     encoder = RelposEncoder(node, 1, None)
     for t_ns, reading in readings:
         source = Source(ticks=t_ns // 1000, clock=MICROSECONDS_32)
@@ -52,7 +52,7 @@ def test_a_rate_that_differs_is_found_and_one_that_fits_is_not(configured, ratio
 
 
 def test_what_a_port_has_kept_is_no_rate():
-    """All at once, as after it is opened; and a bunch later."""
+    """A backlog arrives at once, as after opening a port; and a bunch later."""
     rates = SampleRates([100.0])
     times = sorted([0] * 200 + [k * S // 100 for k in range(600)] + [3 * S] * 60)
     assert not any(rates.note(0, t_ns) for t_ns in times)
@@ -109,7 +109,7 @@ def test_cars_are_not_armed_by_an_imu_that_reads_at_rest_what_none_does(acc, rea
 
 
 def test_samples_are_turned_to_axes_of_the_body():
-    """A board upside down whose mounting is said is none that is wrong."""
+    """A board mounted upside down is correct if the mounting is configured."""
     axes = 'imu_axes = ["x", "-y", "-z"]\nmag_axes = ["-x", "y", "z"]\n'
     swarm = parse_config(f"[nodes.1]\n{axes}[nodes.2]\n{NODES}", file="swarm.toml", folder=Path())
     intake = Intake(swarm, 0)
@@ -140,7 +140,7 @@ def test_faults_are_told_when_they_change():
 
 @pytest.mark.parametrize("damaged", [(), (0,), (0, 1), (30,), (30, 31, 32)])
 def test_stamps_of_another_counter_do_not_decide_for_good(damaged):
-    """uwb-core has microseconds and radio ticks, told apart by their size."""
+    """uwb-core has microseconds and radio ticks, distinguished by their size."""
     intake = Intake(parsed('[links.a]\nport = "/dev/a"\nformat = "uwb-core"\nnode = 1\n'), 0)
     for k in range(100):
         t = k / 10
@@ -177,7 +177,7 @@ def test_a_tracker_that_hangs_is_not_believed_while_cars_drive(hangs, speed):
     if speed and hangs != "old time":
         texts = [text for _, text in swarm.intake.notices]
         assert texts == ["the place of 1 stays the same while it drives: its tracker hangs"]
-    # And once it moves on it is believed again.
+    # When the position changes again, it is accepted.
     said = {"node": 1, "pos": [1.1, 0.0], "yaw": 0.0}
     swarm.take(Chunk("links.a", t_ns + S, (json.dumps(said) + "\n").encode()))
     assert swarm.intake.heard_ns[0] == t_ns + S

@@ -1,4 +1,4 @@
-"""Times of samples that come at a steady rate, whatever happens on their way."""
+"""Times of samples at a constant rate, for any delays."""
 
 import pytest
 from hypothesis import given
@@ -23,7 +23,7 @@ def gaps(times):
 
 
 def in_order(delays, taken):
-    """Arrivals on a line where one that is late holds up those behind it."""
+    """Return arrivals on a line where a late sample delays those behind it."""
     arrivals = []
     for t, delay in zip(taken, delays, strict=True):
         arrivals.append(max([t + delay, *arrivals[-1:]]))

@@ -1,4 +1,4 @@
-"""A scanner of its own port: asked when it is plugged in, and seen from the body of its car."""
+"""A scanner with a port of its own: requested on opening, and seen from its car's body."""
 
 import math
 import time
@@ -48,7 +48,7 @@ def parsed(text):
 
 
 def in_a_corridor(mount, bearing):
-    """From the scanner to the walls y = 1 and y = -2 of the car's frame, step by step."""
+    """Return the distance to the walls y = 1 and y = -2 of the car's frame, step by step."""
     step = 1e-3 * np.array([math.cos(mount.yaw + bearing), math.sin(mount.yaw + bearing)])
     far = np.array([mount.x, mount.y]) + np.arange(1, 20_000)[:, None] * step
     hit = np.flatnonzero((far[:, 1] > 1.0) | (far[:, 1] < -2.0))
@@ -56,7 +56,7 @@ def in_a_corridor(mount, bearing):
 
 
 def turn(mount, n=800):
-    """A whole turn of the scanner, clockwise."""
+    """Return the samples of a full revolution of the scanner, clockwise."""
     bearings = [-2.0 * math.pi * k / n for k in range(n)]
     return [ScanReading(UNNAMED, b, in_a_corridor(mount, b)) for b in bearings]
 
@@ -97,7 +97,7 @@ def test_beams_are_those_of_sensors_on_the_body():
     assert beams[1] == pytest.approx(expected, abs=0.03)
     assert not beams[0].any()  # the scanner is on the other car
     assert not swarm.intake.near.beams(1001 + round(LASTS * 1e9)).any()
-    assert not swarm.intake.heard_ns  # a scanner says nothing of where its car is
+    assert not swarm.intake.heard_ns  # a scanner does not report the position of its car
 
 
 def test_it_is_asked_whenever_its_port_comes_up(tmp_path):
@@ -118,7 +118,7 @@ def test_it_is_asked_whenever_its_port_comes_up(tmp_path):
             until(links, lambda _: not links.is_up("links.scanner"))
             scanner.plug()
         assert other.heard() == b""
-        # One that was still starting is asked again; one that speaks is not.
+        # A scanner that was still starting is asked again; one that sends is not.
         until(links, lambda _: links.is_up("links.scanner"))
         asked = until_heard(scanner, links) + until_heard(scanner, links)
         assert asked == 2 * REQUEST
@@ -130,7 +130,7 @@ def test_it_is_asked_whenever_its_port_comes_up(tmp_path):
 
 
 def until_heard(device, links):
-    """What a device hears next, while the host reads its ports."""
+    """Return the next bytes that a device receives, while the host reads its ports."""
     for _ in range(3000):
         links.wait(0.001)
         if said := device.heard():
@@ -149,7 +149,7 @@ def test_its_motor_is_let_run(monkeypatch, tmp_path):
 
 
 def test_beams_have_no_gaps_while_the_scanner_turns_slowly():
-    """A box in front at 1 m, with noise and a wall far behind it, seen once a turn."""
+    """Box in front at 1 m, with noise and a wall far behind it, measured once per revolution."""
     near, rng, n = Near(1, 8), np.random.default_rng(1), 40
     for k in range(60 * n):
         t_ns = round(0.18e9 * k / n)

@@ -1,4 +1,4 @@
-"""Other systems are refused in one sentence."""
+"""Other systems are refused with a one-line message."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""How long emulated cars go on without commands, measured over their ports in real time."""
+"""Time that emulated cars move without commands, measured over their ports in real time."""
 
 import json
 import threading
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.realtime
 
 
 class Emulation:
-    """Runs in a thread until it is left."""
+    """Emulation that runs in a thread within the context."""
 
     def __init__(self, folder, **options):
         self.rig = EmulatedRig(EmulateOptions(scenario="open", cars=2, **options), folder=folder)
@@ -77,7 +77,7 @@ def test_the_command_writes_into_the_file(tmp_path):
 
 
 class Interrupted:
-    """Links that are interrupted once the car says that it drives."""
+    """Links that raise KeyboardInterrupt once the car was driven."""
 
     def __init__(self, ports, now_ns):
         self.sent = []
@@ -112,7 +112,7 @@ def test_whatever_ends_it_the_car_is_told_to_stand(tmp_path, monkeypatch):
 
 
 class DriveDecoder:
-    """Reads commands as the car does."""
+    """Decoder of commands as in the car."""
 
     def __init__(self, car):
         self._decoder = RelposDecoder(car.key)

@@ -41,7 +41,7 @@ def test_the_command_writes_it(tmp_path):
 
 
 def printing():
-    """C code that prints every number of a frame."""
+    """Return C code that prints every number of a frame."""
     cases = []
     for message in MESSAGES:
         lines = [f"case {message.type}:"]
@@ -57,9 +57,9 @@ def printing():
 
 
 def program():
-    """A frame a line in hexadecimal, in and out.
+    """Return C code that decodes frames and prints one per line.
 
-    What it decodes it prints, and then the bytes of encoding it again; at the end the counts.
+    Prints the decoded numbers and the bytes encoded again in hexadecimal; at the end the counts.
     """
     return f"""
 #include <stdio.h>
@@ -124,9 +124,9 @@ def echo(request, tmp_path_factory):
     path = compile_c(tmp_path_factory.mktemp("c"), program(), flags)
 
     def run(data, key=None):
-        """Numbers and bytes of every frame, and the counts."""
+        """Return numbers and bytes of every frame, and the counts."""
         command = [str(path)] + ([key.hex()] if key else [])
-        # Memory that leaks is none of ours, and looking for it fails where tracing is forbidden.
+        # Leak detection is not needed, and fails where tracing is forbidden.
         environment = {**os.environ, "ASAN_OPTIONS": "detect_leaks=0"}
         done = subprocess.run(command, input=data, capture_output=True, env=environment)
         assert done.returncode == 0, done.stderr.decode()
@@ -139,7 +139,7 @@ def echo(request, tmp_path_factory):
 
 
 def same(data, key, echo):
-    """Both say the same of the bytes; what C encodes again is what Python makes of it."""
+    """Compare the decoders of C and Python; return readings and the bytes that C encodes again."""
     decoder = RelposDecoder(key)
     met = decoder.feed(data)
     _, back, counts = echo(data, key)

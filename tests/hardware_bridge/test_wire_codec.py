@@ -1,4 +1,4 @@
-"""The codec against its plain twin, published vectors, and what it must refuse."""
+"""The codec against its reference implementation, published vectors, and refused input."""
 
 import struct
 import zlib
@@ -22,8 +22,8 @@ VECTORS = {
     0: 0x726FDB47DD0E0E31, 1: 0x74F839C593DC67FD, 7: 0xAB0200F58B01D137, 8: 0x93F5F5799A932462,
     15: 0xA129CA6149BE45E5, 63: 0x958A324CEB064572,
 }  # fmt: skip
-"""Of SipHash-2-4 with the key 00 .. 0f, of the bytes 00, 01, ...: length to result; that of 15
-stands in the paper, the others in the authors' reference implementation."""
+"""Results of SipHash-2-4 with the key 00 .. 0f for the bytes 00, 01, ..., by length; that of 15 is
+from the paper, the others from the authors' reference implementation."""
 
 
 def sums(data, key=KEY):
@@ -50,7 +50,7 @@ def test_check_sums_are_those_of_the_twins(data, key):
 
 
 def decode(data, key=None):
-    """What the codec says of bytes: frames with their values, and counts."""
+    """Return the decoded frames with their values, and the counts."""
     codec, batch, counts = Codec(key), Batch(), Counts()
     frames, at = [], 0
     while True:
@@ -110,12 +110,12 @@ def sealed(raw):
     (sealed(HEAD), Counts(frames=1)),
     (b"\0\0" + sealed(HEAD) + b"\0", Counts(frames=1)),
     (sealed(b"\x20" + HEAD[1:]), Counts(skipped=1)),  # another version
-    (sealed(b"\x12" + HEAD[1:]), Counts(skipped=1)),  # a flag of a version to come
+    (sealed(b"\x12" + HEAD[1:]), Counts(skipped=1)),  # a flag of a later version
     (sealed(HEAD[:1] + b"\xfe" + HEAD[2:]), Counts(skipped=1)),  # another message
     (sealed(HEAD[:1] + b"\xfe" + HEAD[2:] + bytes(484)), Counts(skipped=1)),
     (sealed(HEAD + bytes(493)), Counts(damaged=1)),  # longer than any frame
     (sealed(HEAD + b"\1"), Counts(damaged=1)),  # longer than its message
-    (sealed(b"\x11" + HEAD[1:]), Counts(damaged=1)),  # says that it has a MAC
+    (sealed(b"\x11" + HEAD[1:]), Counts(damaged=1)),  # flag of a MAC, but no MAC
     (sealed(HEAD[:-1]), Counts(damaged=1)),
     (sealed(b""), Counts(damaged=1)),
     (b"\x09abc\0" + sealed(HEAD), Counts(frames=1, damaged=1)),
@@ -146,7 +146,7 @@ def test_with_a_key_only_its_frames_are_taken():
 
 
 def test_each_bit_is_under_the_mac():
-    """Who has no key can make the CRC fit, and nothing else."""
+    """An attacker without the key can fix the CRC, but nothing else."""
     raw = cobs.decode(frame(wire.COMMAND.type, 1, 2, 3, 4, bytes(7), KEY)[1:-1])[:-4]
     for bit in range(8 * len(raw)):
         changed = bytearray(raw)

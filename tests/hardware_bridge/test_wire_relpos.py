@@ -75,7 +75,7 @@ def test_any_cut_gives_the_same(seed, places, garbage, behind):
 
 
 def damage(seed, n, key):
-    """Streams of mutated frames: no other reading than what was sent, and in step again at once."""
+    """Feed mutated frames: only sent readings are decoded, and the next good frame is read."""
     rng = random.Random(seed)
     frames = spread(seed, n, key)
     sent = {repr(r) for r in said(frames, key)[0]}

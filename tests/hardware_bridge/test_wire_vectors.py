@@ -1,4 +1,4 @@
-"""The vectors of docs/reference/wire-format.md: bytes of this version never change."""
+"""Test vectors of docs/reference/wire-format.md: bytes of this version never change."""
 
 import re
 from pathlib import Path

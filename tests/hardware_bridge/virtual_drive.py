@@ -1,4 +1,4 @@
-"""A drive on emulated cars in a time of its own, and what tests see of it and do to it."""
+"""A drive on emulated cars in simulated time, with access for tests to observe and disturb."""
 
 from collections import deque
 
@@ -12,13 +12,13 @@ from hardware_bridge.live.env import HardwareFormationEnv
 
 
 class WatchedLine(MemoryPort):
-    """A line on which something else may be heard, and which knows what it carried last."""
+    """A line that stores the last bytes sent, and on which tests can tamper or inject."""
 
     def __init__(self, name, drive):
         super().__init__()
         self._name, self._drive = name, drive
         self.last = b""
-        """What the bridge sent last, to a car."""
+        """Last bytes sent by the bridge to a car."""
 
     def receive(self):
         return self._drive.tamper(self._name, super().receive())
@@ -28,20 +28,20 @@ class WatchedLine(MemoryPort):
         super().send(data)
 
     def slip_in(self, data):
-        """Send what is not the bridge's."""
+        """Inject bytes that are not from the bridge."""
         super().send(data)
 
 
 class VirtualDrive:
-    """A driver on a `VirtualBridge`; it stands between the environment and the bridge's feed."""
+    """A driver on a `VirtualBridge`, inserted between the environment and the bridge's feed."""
 
     def __init__(self, options, name="consensus"):
         self.tamper = lambda name, data: data
-        """What comes over a line, as it is heard."""
+        """Function from name and received bytes of a line to the bytes that are passed on."""
         self.gate = deque(maxlen=1000)
-        """Time of a tick [ns] and what the gate let pass."""
+        """Time of a tick [ns] and output of the gate."""
         self.errors = []
-        """Of what cars believe of each other, by the truth, mean after every decision [m]."""
+        """[m] Mean error of relative positions after every control step."""
         self.bridge = VirtualBridge(options, ports=lambda name: WatchedLine(name, self))
         self.rig, self.swarm, self.feed = self.bridge.rig, self.bridge.swarm, self.bridge.feed
         self.supervisor = self.feed.supervisor
@@ -58,12 +58,12 @@ class VirtualDrive:
         self._seen = None
 
     def start(self):
-        """Arm the cars, and let them find each other."""
+        """Arm the cars, and let them localise each other."""
         self._seen, _ = self.env.reset()
         return self
 
     def drive(self, seconds):
-        """Go on for a while."""
+        """Continue for some seconds."""
         for _ in range(round(10 * seconds)):
             if not self.env.agents:
                 self._seen, _ = self.env.reset()
@@ -82,11 +82,11 @@ class VirtualDrive:
         self.feed.decide(picture)
 
     def order(self, what):
-        """What a person asks for."""
+        """Send an order of the operator."""
         self.feed.order(what)
 
     def befall(self, kind, target, seconds):
-        """Let a fault happen now."""
+        """Inject a fault."""
         world = self.rig.world
         fault = Fault(t=max(world.t, 0.0), kind=kind, target=target, seconds=seconds)
         self.rig.emulator._befall(fault, world.t)
@@ -95,7 +95,7 @@ class VirtualDrive:
         self.gate.append((self.t_ns, self.supervisor._output))
 
     def error(self):
-        """Of the relative positions that cars can use, mean now [m]; NaN if there are none."""
+        """Return the mean error of relative positions with status ok [m]; NaN if there are none."""
         pos = self.rig.world.swarm.state.pos_w[0]
         wrong = np.linalg.norm(self.swarm.view.pos[0] - (pos[None] - pos[:, None]), axis=-1)
         known = wrong[self.swarm.view.ok[0] & ~np.eye(len(pos), dtype=bool)]
@@ -103,17 +103,17 @@ class VirtualDrive:
 
     @property
     def t_ns(self):
-        """Now [ns]."""
+        """Current time [ns]."""
         return self.feed.t_ns
 
     @property
     def report(self):
-        """What the gate did, the latest."""
+        """Latest report of the gate."""
         return self.feed.report
 
     @property
     def notices(self):
-        """What the user is to read, but for the orders that were given."""
+        """Texts of notices to the user, without the given orders."""
         return [text for _, text in self.feed.notices if text != "arm"]
 
     @property
@@ -122,11 +122,11 @@ class VirtualDrive:
 
     @property
     def places(self):
-        """Where the cars are, (car, 2) [m]."""
+        """True positions of the cars, (car, 2) [m]."""
         return self.rig.world.swarm.state.pos_w[0].copy()
 
     def sent(self):
-        """What each car was sent last, by the name of its line."""
+        """Return the last bytes sent to each car, by the name of its line."""
         return {name: port.last for name, port in self.rig.ports.items() if name[:3] == "car"}
 
     def close(self):

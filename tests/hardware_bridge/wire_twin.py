@@ -1,4 +1,4 @@
-"""The wire format once more, in plain Python with the `cobs` package and zlib."""
+"""Reference implementation of the wire format in Python, with the `cobs` package and zlib."""
 
 import random
 import struct
@@ -27,7 +27,7 @@ MASK = (1 << 64) - 1
 
 
 def siphash(data, key):
-    """SipHash-2-4 as the paper writes it."""
+    """Return SipHash-2-4 as in the paper."""
     k = struct.unpack("<2Q", key)
     v = [k[0] ^ 0x736F6D6570736575, k[1] ^ 0x646F72616E646F6D]
     v += [k[0] ^ 0x6C7967656E657261, k[1] ^ 0x7465646279746573]
@@ -59,7 +59,7 @@ def siphash(data, key):
 
 
 def frame(type_, node, boot, sequence, time, payload, key=None, form=None):
-    """The bytes of a frame between its zeros."""
+    """Return the bytes of a frame with its zeros."""
     form = (1 << 4 | (key is not None)) if form is None else form
     raw = struct.pack("<BBHIII", form, type_, node, boot, sequence, time) + payload
     if key is not None:
@@ -68,7 +68,7 @@ def frame(type_, node, boot, sequence, time, payload, key=None, form=None):
 
 
 def payload(message, rows):
-    """Numbers, in steps, of a message."""
+    """Return the payload of a message with numbers in steps."""
     out = bytes((len(rows),)) if message.repeated else b""
     for row in rows:
         numbers = iter(row)
@@ -79,14 +79,14 @@ def payload(message, rows):
 
 
 def row_of(message):
-    """Any numbers of a row."""
+    """Return a strategy for the numbers of a row."""
     numbers = [st.integers(*field.limits) for field in message.fields for _ in range(field.n)]
     return st.tuples(*numbers)
 
 
 @st.composite
 def payloads(draw):
-    """A message and its payload, whatever the numbers."""
+    """Draw a message and its payload, with any numbers."""
     message = draw(st.sampled_from(MESSAGES))
     most = 32 if message.repeated else 1
     rows = draw(st.lists(row_of(message), min_size=most % 32, max_size=most))
@@ -99,7 +99,7 @@ sources = words.map(lambda ticks: Source(ticks=ticks, clock=MICROSECONDS_32))
 
 
 def steps(bits, per):
-    """Numbers that a field can say exactly."""
+    """Return a strategy for numbers that a field represents exactly."""
     limit = 1 << (bits - 1)
     return st.integers(-limit, limit - 1).map(lambda n: n / per)
 
@@ -123,11 +123,11 @@ readings = st.one_of(
     st.builds(OperatorReading, sources, names, st.tuples(*[steps(16, 1000)] * 2)),
     st.builds(DriveReading, sources, names, steps(16, 1000), steps(16, 10_000), st.booleans()),
 )  # fmt: skip
-"""Any reading, with values that the format says exactly, and a time of its own."""
+"""Any reading, with values that the format represents exactly, and a time of its own."""
 
 
 def spread(seed, n, key=None):
-    """The bytes of so many frames of all messages, drawn by a generator."""
+    """Return the bytes of n random frames of all messages."""
     rng = random.Random(seed)
     out = []
     for k in range(n):
@@ -147,7 +147,7 @@ def spread(seed, n, key=None):
 
 
 def mutate(rng, data):
-    """What a bad line does to bytes."""
+    """Return bytes with damage as by a bad line."""
     data = bytearray(data)
     kind = rng.randrange(6)
     at = rng.randrange(len(data))
