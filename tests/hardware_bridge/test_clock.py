@@ -1,5 +1,5 @@
-"""Stamps of devices are unwrapped exactly and mapped to the host within a fraction of a
-millisecond, whatever the way of the bytes does to their arrival."""
+"""Stamps of devices are unwrapped exactly and mapped to host time within a fraction of a
+millisecond, whatever the delays of the link."""
 
 import math
 import random
@@ -19,7 +19,7 @@ WRAPPING = [MICROSECONDS_32, RADIO_40]
 
 
 class Device:
-    """A counter that drifts, and a link that is late."""
+    """A counter with drift, and a link with delays."""
 
     def __init__(self, clock=MICROSECONDS_32, ppm=0.0, wander=0.0, ticks=123, seed=0):
         self.clock, self.ppm, self.wander, self.start = clock, ppm, wander, ticks
@@ -27,7 +27,7 @@ class Device:
         self.until = self.busy_until = 0
 
     def count(self, t):
-        """Ticks [-] at true time t [s], not wrapped. The rate swings by `wander` ppm in 10 min."""
+        """Return unwrapped ticks at true time t [s]; the rate varies by `wander` ppm in 10 min."""
         swing = 600.0 / (2.0 * math.pi)
         phase = self.wander * swing * (1.0 - math.cos(t / swing))
         return self.start + round(self.clock.hz * (t + 1e-6 * (self.ppm * t + phase)))
@@ -36,7 +36,7 @@ class Device:
         return self.count(t) % self.clock.modulus
 
     def arrival(self, t):
-        """Serial: 1 to 3 ms, once a second nothing for up to 100 ms, then all at once."""
+        """Return the arrival on a serial port: 1 to 3 ms late, with pauses of up to 100 ms."""
         if self.random.random() < 0.01:
             self.busy_until = max(self.busy_until, t + self.random.uniform(0.0, 0.1))
         came = max(t + self.random.uniform(1e-3, 3e-3), self.busy_until)
@@ -45,7 +45,7 @@ class Device:
 
 
 def errors(device, stream, seconds, hz=100.0):
-    """(t [s], error [s], dt error [-]) of every stamp, less the least delay of 1 ms."""
+    """Return t [s], error [s] and dt error [-] of every stamp, less the least delay of 1 ms."""
     out, before = [], None
     for k in range(1, int(seconds * hz)):
         t = k / hz
@@ -72,7 +72,7 @@ def test_times_are_right_to_a_fraction_of_a_millisecond(clock, ppm):
 
 def test_times_are_smooth_once_the_stream_is_known():
     got = errors(Device(ppm=50.0, wander=20.0), DeviceTime(MICROSECONDS_32), 120.0)
-    # Slew, drift and a tick in 10 ms; a faster stamp than all before pulls the time with it.
+    # Slew, drift and one tick in 10 ms; a faster stamp than all earlier ones shifts the time.
     assert max(abs(dt) for t, _, dt in got if t > 2.1) < 10e-3
     assert max(abs(dt) for t, _, dt in got if t > 10.0) < 2.5e-3
 
@@ -104,7 +104,7 @@ def test_a_thousand_wraps_are_unwrapped_exactly(clock, ppm):
     st.lists(st.tuples(st.floats(1e-4, 3000.0), st.floats(0.0, 0.3)), min_size=1, max_size=40),
 )
 def test_any_silence_is_unwrapped_exactly(clock, ppm, gaps):
-    """Silences of up to 170 wraps of the radio's counter."""
+    """The silences have up to 170 wraps of the radio's counter."""
     device, stream = Device(clock, ppm), DeviceTime(clock, ClockParams(stray=0.5))
     t, arrival = 0.0, 0
     stream.map(device.ticks(0.0), 0)
@@ -149,7 +149,7 @@ def test_times_never_fall_and_never_come_after_the_arrival(ppm, stamps):
     ),
 )
 def test_any_stamps_and_arrivals_are_survived(clock, stamps):
-    """Even arrivals that go back, which a monotonic clock never gives."""
+    """The arrivals may decrease, unlike those of a monotonic clock."""
     twice = []
     for _ in range(2):
         stream, arrival = DeviceTime(clock), 0
@@ -259,7 +259,7 @@ def test_a_port_that_was_always_congested_is_learned_anew():
 
 
 def follow(device, stream, delays, start, hz=50.0):
-    """Errors [s] of mapped times where every message takes as long as is said."""
+    """Return the errors [s] of mapped times of messages with given delays."""
     out = []
     for k, delay in enumerate(delays):
         t = start + k / hz
@@ -273,7 +273,7 @@ def test_a_way_that_became_longer_is_followed_smoothly(more, seconds):
     got = follow(device, stream, [0.001 + more] * (50 * seconds), 5.0)
     rates = [50.0 * (b - a) for a, b in zip(got, got[1:], strict=False)]
     assert max(abs(r) for r in rates) < max(2e-3, more / 10.0) + 0.5e-3
-    # At first it may as well be drift.
+    # Initially the delay is indistinguishable from drift.
     assert got[30 * 50] == pytest.approx(0.001, abs=0.01)
     assert got[-1] == pytest.approx(0.001 + more, abs=2e-3)
 
@@ -286,7 +286,7 @@ def test_a_way_that_became_shorter_is_known_with_the_next_stamp():
 
 def test_times_do_not_fall_when_a_doubted_stamp_is_believed():
     device, stream = settled()
-    # The fit rises to 80 ms after its window, mapped times are slow to follow; then a faster way.
+    # The fit rises to 80 ms after its window, mapped times follow slowly; then delays decrease.
     follow(device, stream, [0.08] * 850, 5.0, hz=20.0)
     after = follow(device, stream, [0.045] * 50, 47.5, hz=200.0)
     times = [round((k / 200.0 + error) * S) for k, error in enumerate(after)]

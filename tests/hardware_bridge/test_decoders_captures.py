@@ -1,4 +1,4 @@
-"""What devices really sent, with all values, whole and byte by byte."""
+"""Bytes captured from devices, with all values, as a whole and byte by byte."""
 
 import struct
 
@@ -32,7 +32,7 @@ from hardware_bridge.readings import (
 
 
 def decode(name, data):
-    """Readings and counts; byte by byte they must be the same."""
+    """Return readings and counts, which must be equal byte by byte."""
     whole, bytewise = make_decoder(name), make_decoder(name)
     readings = whole.feed(data)
     assert [r for byte in data for r in bytewise.feed(bytes((byte,)))] == readings
@@ -122,7 +122,7 @@ def test_linktrack_count_of_neighbours_must_fit_the_length():
 
 def test_a_false_beginning_holds_up_nothing():
     decoder = make_decoder("linktrack")
-    decoder.feed(b"\x55\x00\xff\x03" * 3)  # 1023 bytes that never come
+    decoder.feed(b"\x55\x00\xff\x03" * 3)  # announces 1023 bytes that do not follow
     assert len(decoder.feed(LINKTRACK[0])) == 2
     assert decoder.waiting == 0
 
@@ -306,7 +306,7 @@ def near(readings, expected):
     (ACC + GYR + ANGLE + MAG + QUATERNION, [WITH_MAG]),
     (ACC + GYR, []),  # a magnetometer may follow
     (ACC + GYR + ANGLE + ACC, [IMU]),
-    ((ACC + GYR) * 3, [IMU, IMU]),  # the second at once, after the first told that none follows
+    ((ACC + GYR) * 3, [IMU, IMU]),  # the second at once: no magnetometer followed the first
     (ACC + GYR + ACC + GYR + MAG + ACC + GYR + MAG, [IMU, IMU, WITH_MAG]),
     (ACC + GYR + MAG + ACC + GYR + ACC + GYR + MAG, [WITH_MAG, IMU, IMU]),
     (ACC + ANGLE + GYR + MAG, []),  # the gyroscope of this burst was lost

@@ -1,4 +1,4 @@
-"""The page of the hardware says what is so: its files are read, compiled and run."""
+"""The hardware page is correct: its files are read, compiled and run."""
 
 import ast
 import os
@@ -44,7 +44,7 @@ DEADMAN = 200
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory):
-    """Both skeletons, without a key and with one."""
+    """Return the folder of both skeletons, compiled without and with a key."""
     compiler = next((c for c in ("cc", "gcc", "clang") if shutil.which(c)), None)
     if compiler is None:
         pytest.skip("no C compiler")
@@ -61,18 +61,18 @@ def built(tmp_path_factory):
 
 
 def run(program, milliseconds, said=b""):
-    # The sanitizer's hunt for leaks does not work where processes are traced.
+    # The leak detection of the sanitizer does not work where processes are traced.
     env = {**os.environ, "ASAN_OPTIONS": "detect_leaks=0"}
     command = [program, str(milliseconds)]
     return subprocess.run(command, input=said, capture_output=True, check=True, env=env)
 
 
 def drive(program, milliseconds, commands):
-    """What the motor was told, and what the car said.
+    """Run a car; return the commands of its motor and the bytes it sent.
 
     Args:
-        program: Of the car.
-        milliseconds: How long it runs.
+        program: Program of the car.
+        milliseconds: Run time [ms].
         commands: Time [ms] and bytes.
     """
     lines = "".join(f"{t} {data.hex()}\n" for t, data in commands)
@@ -82,11 +82,11 @@ def drive(program, milliseconds, commands):
 
 
 class Host:
-    """Commands with the time [ms] at which they come."""
+    """Commands of the host with their arrival times [ms]."""
 
     def __init__(self, boot=100, key=None, node=1):
         self._t = 0
-        # Its counter wraps in the middle of it.
+        # The counter wraps within the test.
         now_us = lambda: (4_294_900_000 + 1000 * self._t) % (1 << 32)  # noqa: E731
         self._driver = RelposDriver(node, RelposOptions(), key, boot, now_us)
 
@@ -100,7 +100,7 @@ class Host:
 
 
 class TestNode:
-    """What the skeleton of a node sends."""
+    """Output of the skeleton of a node."""
 
     @pytest.mark.parametrize("key", [None, KEY], ids=["open", "keyed"])
     def test_rates_and_values(self, built, key):
@@ -123,11 +123,11 @@ class TestNode:
                 assert r.voltage == pytest.approx(7.4, abs=1e-3)
         numbers = list(dict.fromkeys(r.source.sequence for r in readings))
         assert numbers == list(range(len(numbers)))
-        # The rate that the page promises to fit into 115200 baud, ten bits a byte.
+        # The documented rate fits into 115200 baud, with ten bits per byte.
         assert len(data) / 3.0 < 11520
 
     def test_a_swarm_takes_it(self, built):
-        """Through decoder, identity and clock, over the wrap of the counter."""
+        """Readings pass decoder, identity and clock, across a wrap of the counter."""
         swarm = parse_config(
             "[nodes.1]\n[nodes.2]\n[nodes.3]\n[links.a]\nport = '/dev/x'\nformat = 'relpos'\n",
             file="swarm.toml",
@@ -151,7 +151,7 @@ class TestNode:
 
 
 class TestCar:
-    """What the skeleton of a car obeys."""
+    """Commands obeyed by the skeleton of a car."""
 
     @pytest.mark.parametrize("key", [None, KEY], ids=["open", "keyed"])
     def test_obeys_and_tells(self, built, key):
@@ -188,7 +188,7 @@ class TestCar:
         assert motor[1:] == [(50, ["0.500", "0.000"]), (60, ["brake"])]
 
     def test_does_not_drive_on_old_commands(self, built):
-        """After an outage of the network, which then delivers all at once."""
+        """After a network outage all commands are delivered at once."""
         host = Host()
         before = [host.drive(t, 0.5) for t in range(10, 100, 10)]
         held_up = [host.drive(t, 0.5, late=900 - t) for t in range(100, 400, 10)]
@@ -221,7 +221,7 @@ class TestCar:
 
 
 class TestExample:
-    """examples/three_cars.toml."""
+    """Tests of examples/three_cars.toml."""
 
     def test_it_is_read(self):
         swarm = read_config(EXAMPLE)
@@ -244,7 +244,7 @@ class TestExample:
 
     @pytest.mark.parametrize("text", re.findall(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL))
     def test_pieces_on_the_page(self, text):
-        """Each replaces or adds to the example's tables."""
+        """Each snippet replaces or extends tables of the example."""
         import tomllib
 
         piece, whole = tomllib.loads(text), tomllib.loads(EXAMPLE.read_text())
@@ -252,10 +252,10 @@ class TestExample:
 
 
 class TestPage:
-    """docs/how-to/hardware.md."""
+    """Tests of docs/how-to/hardware.md."""
 
     def test_the_start_keeps_to_its_place(self):
-        """Half a metre, as long as the wheels hold what is asked."""
+        """The cars stay within half a metre if the wheels follow the commands."""
         params = StartParams()
         step = 0.01
         for n in (2, 3, 6):
@@ -269,7 +269,7 @@ class TestPage:
             assert furthest < 0.5, n
 
     def test_truth_of_boards_that_stand(self, tmp_path, monkeypatch):
-        """The snippet makes a log that the ranges can be calibrated with."""
+        """The snippet makes a log from which the ranges can be calibrated."""
         snippet = next(
             s for s in re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL) if "truth" in s
         )

@@ -1,4 +1,4 @@
-"""Exports: what other tools read is what was measured and estimated."""
+"""Exports: other tools read the measurements and estimates unchanged."""
 
 import errno
 
@@ -83,7 +83,7 @@ def estimate():
 
 
 def decoded(path):
-    """Topic to list of (log time, type, message)."""
+    """Return lists of (log time, type, message) by topic."""
     found = {}
     with open(path, "rb") as file:
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
@@ -160,7 +160,7 @@ def test_mcap_estimates_are_poses_in_the_frame_of_the_first_node(block, estimate
             cov = np.reshape(cov, (6, 6))
             assert np.allclose(np.linalg.eigvalsh(cov[:3, :3]), np.linalg.eigvalsh(own))
             assert cov[3, 3] > 3.0
-        # The squared length over its variance is the same in any axes.
+        # The Mahalanobis norm does not depend on the axes.
         d, cov = vector(m.pose.pose.position), np.reshape(m.pose.covariance, (6, 6))[:3, :3]
         own = estimate.pos_ij_w[k, p]
         own_nees = own @ np.linalg.solve(estimate.cov[k, p, :3, :3], own)
@@ -180,7 +180,7 @@ def test_the_tree_of_frames_agrees_with_the_poses(block, estimate, tmp_path):
         assert {one.header.frame_id for one in m.transforms} == {"map"}
         assert set(frames) == {"node_1", "node_5", "node_7", "node_8"}
         assert np.array_equal(vector(frames["node_5"].translation), np.zeros(3))
-        # A static node without an orientation stands along the axes of the world.
+        # A static node without an orientation is aligned with the axes of the world.
         assert np.array_equal(wxyz(frames["node_7"].rotation), [1, 0, 0, 0])
         one, other = frames["node_1"], frames["node_7"]
         pose = odom[t].pose.pose
@@ -230,7 +230,7 @@ def test_a_log_folder_reads_back_to_the_last_bit(block, tmp_path):
     wanted = block.sorted()
     for name in ("t", "kind", "i", "j", "antenna_i", "antenna_j", "has_power"):
         assert np.array_equal(getattr(log.block, name), getattr(wanted, name)), name
-    # Orientations are made of unit length, and powers that are none are not written.
+    # Orientations are normalised, and missing powers are not written.
     unsaid = (wanted.kind == Kind.RANGE) & ~wanted.has_power
     values = np.where(
         unsaid[..., None] & (np.arange(N_VALUES) > 0),

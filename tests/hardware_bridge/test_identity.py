@@ -1,4 +1,4 @@
-"""Every message once, restarts at once, two devices with one id never for long, no replay."""
+"""Messages are accepted once, restarts at once, two devices with one id not for long."""
 
 import random
 
@@ -25,7 +25,7 @@ def texts(identities):
 
 
 class OneDevice(RuleBasedStateMachine):
-    """A device that restarts, over ways that lose, repeat and reorder."""
+    """A device that restarts, over links that lose, repeat and reorder messages."""
 
     authenticated = False
 
@@ -46,7 +46,7 @@ class OneDevice(RuleBasedStateMachine):
         return verdict
 
     def arrive(self, sequence):
-        """A message of the current boot arrives."""
+        """Deliver a message of the current boot."""
         new = (self.boot, sequence) not in self.accepted
         back = 0 if self.highest is None else (self.highest - sequence) % MODULUS
         verdict = self.check(self.boot, sequence)
@@ -86,7 +86,7 @@ class OneDevice(RuleBasedStateMachine):
     @precondition(lambda self: self.highest is not None)
     @rule(stragglers=st.integers(0, 3), seconds=st.integers(2, 100))
     def restart(self, stragglers, seconds):
-        """Up to three messages of the old boot come after the first of the new one."""
+        """Deliver up to three messages of the old boot after the first of the new one."""
         self.t += seconds * S
         over, self.boot = self.boot, self.boot + 1
         self.next = 1
@@ -103,7 +103,7 @@ class OneDevice(RuleBasedStateMachine):
 
 
 class OneAuthenticatedDevice(OneDevice):
-    """The same with MAC, an attacker who has recorded all, and a host that restarts too."""
+    """The same with MAC, an attacker with a recording of all messages, and restarts of the host."""
 
     authenticated = True
 
@@ -120,7 +120,7 @@ class OneAuthenticatedDevice(OneDevice):
         marks = self.identities.high_water()
         self.identities = Identities(True)
         self.identities.restore(marks)
-        # What was on its way is lost.
+        # Messages in flight are lost.
         self.in_flight.clear()
 
 
@@ -133,7 +133,7 @@ TestOneAuthenticatedDevice.settings = TestOneDevice.settings
 @settings(max_examples=200)
 @given(st.lists(st.booleans(), max_size=60), st.integers(1, 1000))
 def test_twins_are_found_within_four_messages(turns, period_ms):
-    """Two devices that speak by any turns: four messages of the first after one of the other."""
+    """Two devices alternate in any order: four messages of the first after one of the other."""
     identities = Identities()
     sequences, after_the_other, heard = {7: 900, 8: 20}, 0, []
     for k, first in enumerate([True, *turns, False, *[True] * 5]):
@@ -223,7 +223,7 @@ def test_authenticated_boots_rise():
 
 
 def test_authenticated_numbers_do_not_go_round():
-    """Else a message recorded 2^31 messages ago would be taken for a new one."""
+    """Otherwise a message recorded 2^31 messages ago would count as new."""
     identities = Identities(authenticated=True)
     identities.check("a", numbered(1, MODULUS - 1), 0, 3)
     assert identities.check("a", numbered(1, 0), 0, 3) is Verdict.REPLAY
@@ -248,7 +248,7 @@ def test_marks_survive_a_restart_of_the_host():
 def test_formats_without_numbers_are_accepted():
     identities = Identities()
     for k in range(10):
-        # One node's IMU and its radio, on two ports whose configuration names the node.
+        # The IMU and the radio of a node, on two ports whose configuration names the node.
         for link in ("imu", "uwb"):
             assert identities.check(link, Source(), k * 10 * MS, 3) is Verdict.UNNUMBERED
     assert identities.quarantined == ()

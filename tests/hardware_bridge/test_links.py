@@ -1,4 +1,4 @@
-"""Ports over pseudo terminals and TCP: opened, drained, lost in any way, found again."""
+"""Ports over pseudo terminals and TCP: opened, drained, lost in any way, reopened."""
 
 import contextlib
 import errno
@@ -98,10 +98,10 @@ def test_unplugged_is_noticed_and_plugged_in_again_found(devices):
             assert not chunks
             ups = [n for n in links.drain_notices() if n.up]
             assert [n.link for n in ups] == ["links.0"]
-            assert devices[0].heard() == b""  # nothing is sent by itself
+            assert devices[0].heard() == b""  # nothing is sent automatically
             devices[0].say(b"back")
             assert data_of(until(links, bool), "links.0") == b"back"
-        assert min(noticed_after) < 100e6  # what is promised; a busy machine may be late once
+        assert min(noticed_after) < 100e6  # documented limit; a busy machine may be late once
 
 
 def test_what_was_said_before_the_plug_was_pulled_does_not_make_a_loss_unseen(device):
@@ -137,7 +137,7 @@ def test_sends_whole_messages_or_none(device):
 
 @pytest.mark.parametrize("piece", [10_000, 16_383, 1 << 14])
 def test_what_is_read_at_once_fits_a_record(monkeypatch, piece):
-    """A port that hands out odd pieces: what is heard live is in the recording too."""
+    """A port that returns pieces of odd sizes: all live data is in the recording, too."""
     left = 3 * MOST_PAYLOAD
 
     def read(fd, most):
@@ -271,7 +271,7 @@ def test_two_links_at_one_device_are_refused(device):
 
 
 class FakePort:
-    """A pipe whose reads and writes do what the test says."""
+    """A pipe with programmable errors of reads and writes."""
 
     def __init__(self):
         self.read_end, self.write_end = os.pipe()
@@ -322,7 +322,7 @@ def failures():
 
 
 class Shelf:
-    """Ports of three links; which of them can be opened."""
+    """Ports of three links, with programmable errors of opening."""
 
     def __init__(self):
         self.ports = {}
@@ -416,7 +416,7 @@ def test_a_port_that_takes_its_time_holds_up_nobody(device):
     specs = [PortSpec(name=n, port=f"tcp:{n}:1") for n in ("links.slow", "links.a")]
     with Links(specs, NOW, wait_for_ports=True, open_port=first) as links:
         end = time.monotonic() + 0.3
-        while time.monotonic() < end:  # the retry hangs all this time
+        while time.monotonic() < end:  # the retry blocks all this time
             os.write(shelf.ports["links.a"].write_end, b"tick")
             assert data_of(until(links, bool)) == b"tick"
         assert not links.is_up("links.slow")

@@ -1,4 +1,4 @@
-"""The environment on cars is that of the simulator: spaces, loops, wrappers; without real time."""
+"""The environment on cars is that of the simulator: spaces, loops, wrappers; in virtual time."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ MODES = [name for name in OBSERVATIONS if name != "truth"]
 
 @pytest.fixture
 def bridge():
-    """Cars that are never armed: a reset takes no time, and whatever is asked for, they stand."""
+    """Yield cars that are never armed: a reset takes no time, and no command moves them."""
     with_nobody = VirtualBridge(OPTIONS, arm=False)
     yield with_nobody
     with_nobody.close()
@@ -38,7 +38,7 @@ def bridge():
 
 @pytest.fixture(scope="module")
 def armed():
-    """Cars that are armed, and know where the others are."""
+    """Yield cars that are armed and localised."""
     started = VirtualBridge(OPTIONS)
     started.env().reset()
     yield started
@@ -46,7 +46,7 @@ def armed():
 
 
 def drive(env, act, seed=7):
-    """A policy loop as anybody writes it; observations, rewards and the last infos."""
+    """Run a common policy loop; return observations, rewards and the last infos."""
     seen, rewards = [], []
     observations, infos = env.reset(seed=seed)
     while env.agents:
@@ -116,7 +116,7 @@ def test_the_checkers_of_pettingzoo_pass(bridge):
 
 
 class Slower(BaseParallelWrapper):
-    """A wrapper as somebody wrote it for the simulator: gentler, and rewards in tenths."""
+    """A wrapper as written for the simulator: scaled actions, and rewards in tenths."""
 
     def step(self, actions):
         gentler = {agent: np.float32([0.9, 1.0]) * action for agent, action in actions.items()}
@@ -125,7 +125,7 @@ class Slower(BaseParallelWrapper):
 
 
 def wrapped(env):
-    """In wrappers, there and back again."""
+    """Wrap the environment and convert it to AEC and back."""
     return aec_to_parallel(parallel_to_aec(Slower(env)))
 
 
@@ -135,7 +135,7 @@ def consensus(env, agent, observation):
 
 @pytest.mark.parametrize("wrap", [lambda env: env, Slower, wrapped], ids=["bare", "own", "turns"])
 def test_a_loop_with_wrappers_runs_on_both(armed, wrap):
-    """The same lines drive simulated and emulated cars into formation."""
+    """The same code drives simulated and emulated cars into formation."""
     live = armed.env(max_cycles=60)
     simulated = formation_v0.parallel_env(**SIMULATOR, max_cycles=60)
     fields = simulated.fields
@@ -156,7 +156,7 @@ def test_a_reset_arms_and_lets_cars_find_each_other():
     t_ns = bridge.feed.t_ns
     assert t_ns > START_NS
     drive(env, consensus)
-    # Armed already, and known: the next episode begins after a second of looking and standing.
+    # The cars are already armed and localised, so the next episode begins soon.
     assert bridge.feed.t_ns - t_ns < 10_000_000_000
     assert [text for _, text in bridge.feed.notices] == ["arm"]
     env.close()
@@ -244,7 +244,7 @@ def test_a_virtual_drive_is_the_same_every_time():
 
 
 def test_commands_pass_the_gate(armed):
-    """What is asked for beyond the limits does not reach the cars, and a stop stops."""
+    """Commands beyond the limits do not reach the cars, and a stop order stops them."""
     limit = armed.config.safety.max_speed
     env = armed.env()
     env.reset()
@@ -258,10 +258,10 @@ def test_commands_pass_the_gate(armed):
         moves.append(np.array(armed.rig.world.motion()[0]))
     assert not armed.feed.report.armed.any()
     np.testing.assert_array_equal(armed.feed.report.speed, 0.0)
-    # The odometer of a car that stands is off by 0.02 m/s rms: its mean over two seconds tells.
+    # The odometer of a car at rest has noise of 0.02 m/s rms: use its mean over two seconds.
     assert np.abs(np.mean(moves[10:], axis=0)).max() < 0.03
     armed.feed.order("clear")
-    armed.start.attend = lambda: armed.feed.order("arm")  # only a person arms them again
+    armed.start.attend = lambda: armed.feed.order("arm")  # only the operator arms them again
     env.reset()
     armed.start.attend = None
     assert armed.feed.report.armed.all()
@@ -279,7 +279,7 @@ def test_unplugged_cars_are_known_to_be():
 
 
 def test_cars_that_wriggle_come_home():
-    """Bicycles without slip, in thousandths of a second."""
+    """Simulate bicycles without slip in steps of 1 ms."""
     p, n, dt, wheelbase = StartParams(), 5, 1e-3, 0.26
     pose, n_home = np.zeros((n, 3)), np.zeros(n)
     period = p.period * (1.0 + 0.2 * np.arange(n))
@@ -300,7 +300,7 @@ def test_cars_that_wriggle_come_home():
 
 
 class Recorded:
-    """A feed that keeps what went through it, as the real one does; cars are armed for a while."""
+    """A feed that records its data like the real one; cars are armed for a while."""
 
     def __init__(self, feed, recorder, names):
         self._feed, self._recorder, self._names, self._n = feed, recorder, names, 0
@@ -347,6 +347,6 @@ def test_a_replay_is_the_same_environment(tmp_path, monkeypatch):
     assert swarm.view.speed.any()
     for one, other in zip(seen, again, strict=True):
         np.testing.assert_array_equal(list(one.values()), list(other.values()))
-    # A recording that has no more to give truncates the episode, and passes the checker.
+    # The end of a recording truncates the episode, and the environment passes the checker.
     feed = ReplayFeed(read_recording(tmp_path / "run.relpos"))
     parallel_api_test(HardwareFormationEnv(feed.swarm, feed, max_cycles=10), num_cycles=20)

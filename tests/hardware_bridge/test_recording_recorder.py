@@ -1,4 +1,4 @@
-"""The recorder under a disk that is full, slow, gone, and under SIGKILL."""
+"""The recorder with a disk that is full, slow or missing, and under SIGKILL."""
 
 import errno
 import os
@@ -21,7 +21,7 @@ HEADER = Header(software="test", config="", links=("links.a",), monotonic_ns=0, 
 
 
 class Disk:
-    """Takes `room` bytes and then none; a negative room is endless."""
+    """Disk that accepts `room` bytes and then none; a negative `room` is unlimited."""
 
     def __init__(self, room=-1):
         self.room = room
@@ -39,7 +39,7 @@ def frames(recording):
 
 
 def told(recording):
-    """Losses that the recording tells of."""
+    """Return the numbers of lost records that the recording reports."""
     events = [r.event() for r in recording if r.kind == Kind.EVENT]
     return [e["records"] for e in events if e["event"] == "recording_lost"]
 
@@ -82,7 +82,7 @@ def test_it_goes_on_when_there_is_room_again(tmp_path):
         if k == 5:
             disk.room = OVERHEAD + 3
         if k == 10:
-            # There is room again, but it is not tried yet.
+            # The disk accepts bytes again, but the next attempt is not due yet.
             disk.room = -1
         if k == 12:
             clock[0] = 100.0
@@ -140,7 +140,7 @@ def test_what_is_no_record_is_refused_and_the_rest_goes_on(tmp_path):
     assert recorder.dropped == 7
     recording = read_recording(tmp_path / "a.rec")
     assert frames(recording) == [7]
-    assert sum(told(recording)) == 6  # all but the one that is of no time
+    assert sum(told(recording)) == 6  # all except the one without a valid time
     *_, last = recording
     assert last.event() == {"event": "link_down", "link": "links.a", "odd": "{1}"}
 
@@ -211,7 +211,7 @@ def test_a_mistake_in_the_thread_is_a_lost_recording(tmp_path):
     )
 )
 def test_every_record_is_in_the_file_or_counted(tmp_path_factory, steps):
-    """Whatever the disk takes; where it can be cut back and where it cannot."""
+    """Holds for any errors of the disk, and whether or not the file can be truncated."""
     path = tmp_path_factory.mktemp("r") / "a.rec"
     disk, clock, n = Disk(), [0.0], 0
     truncate = os.ftruncate
@@ -234,7 +234,7 @@ def test_every_record_is_in_the_file_or_counted(tmp_path_factory, steps):
     recording = read_recording(path)
     found = frames(recording)
     assert found == sorted(set(found))
-    # With room at the end, the file itself tells of all that is not in it.
+    # With space at the end, the file itself reports all missing records.
     assert len(found) + sum(told(recording)) == n
     assert sum(told(recording)) == recorder.dropped
     assert closed_well == (recorder.dropped == 0) == (recorder.lost is None)

@@ -1,5 +1,5 @@
-"""Real processes at real pseudo terminals, and what happens to them: hung, stopped, killed,
-unplugged, silent, a disk that is full. Times are those at which the cars hear it."""
+"""Real processes at real pseudo terminals that are hung, stopped, killed, unplugged or silent, or
+have a full disk. Times are those at which the cars receive commands."""
 
 import os
 import signal
@@ -23,7 +23,7 @@ class Garage:
         self.emulation = Emulation(folder / "emulation", scenario="cars-nlos", seed=3, seconds=900)
 
     def driven(self):
-        """A drive whose cars are armed, and have been for a while."""
+        """Return emulation and drive once the cars have been armed for a while."""
         if self.drive is None or self.drive.process.poll() is not None:
             self.end()
             self._n += 1
@@ -57,7 +57,7 @@ def garage(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def figures():
-    """What was measured, for who reads along with -s."""
+    """Collect the measurements and print them, for display with -s."""
     told = []
     yield told
     print()
@@ -66,23 +66,23 @@ def figures():
 
 
 def brakes(emulation, start, end, cars=CARS):
-    """Commands to stand in a time."""
+    """Return the stop commands between two times."""
     return [c for k in cars for c in emulation.commands(k, start, end) if c[1]]
 
 
 def drives(emulation, start, end, cars=CARS):
-    """Commands that let move in a time."""
+    """Return the commands other than stop between two times."""
     return [c for k in cars for c in emulation.commands(k, start, end) if not c[1]]
 
 
 def longest_gap(emulation, car, start, end):
-    """Between two commands that a car heard [ms]."""
+    """Return the longest time between two commands to a car [ms]."""
     times = [start, *(c[0] for c in emulation.commands(car, start, end)), end]
     return max(b - a for a, b in zip(times, times[1:], strict=False)) / MS
 
 
 def best(figures, name, limit, measure, tries=3):
-    """Measure until it is within the limit; another program may have had the processor."""
+    """Measure until within the limit; other programs may have used the processor."""
     measured = []
     for _ in range(tries):
         measured.append(measure())
@@ -109,7 +109,7 @@ def test_hung_or_stopped(garage, figures, begin):
         drive.signal(signal.SIGCONT)
         back = time.monotonic_ns()
         heard = emulation.first_brake(start)
-        # Alive again it moves nothing by itself.
+        # After resuming, the process moves no car by itself.
         drive.wait_for(lambda s: "armed" in s, since=back + SECOND)
         assert drives(emulation, back, back + SECOND) == []
         assert max(emulation.motors(heard + 20 * MS, back + SECOND)) == 0.0
@@ -133,7 +133,7 @@ def test_killed(garage, figures):
 
 
 def test_closed_terminal(garage, figures):
-    """Its hang-up and what its keys do reach the deciding process alone."""
+    """SIGHUP and SIGINT of the terminal affect the deciding process only."""
 
     def measure():
         emulation, drive = garage.driven()
@@ -166,7 +166,7 @@ def test_supervisor_told_to_end(garage, figures):
 
 
 def ends(pid, within=5.0):
-    """Whether a process ends; how soon is nobody's business once the cars stand."""
+    """Return whether a process ends; the time does not matter once the cars are stopped."""
     until = time.monotonic() + within
     while running(pid) and time.monotonic() < until:
         time.sleep(0.02)
@@ -174,7 +174,7 @@ def ends(pid, within=5.0):
 
 
 def running(pid):
-    """Whether a process is there and no zombie."""
+    """Return whether a process exists and is not a zombie."""
     try:
         with open(f"/proc/{pid}/stat") as file:
             return file.read().rsplit(")", 1)[1].split()[0] != "Z"
@@ -183,7 +183,7 @@ def running(pid):
 
 
 def check_recording(emulation, drive, killed_ns, figures):
-    """All that came until the last moment is in the file, byte for byte."""
+    """Check that the file holds all received bytes until shortly before the end."""
     recording = read_recording(drive.record)
     assert recording.damaged == 0
     assert recording.missing == 0
@@ -237,9 +237,9 @@ def test_silent_node(garage, figures):
     assert 290.0 <= age <= 450.0
     fast = [c for c in drives(emulation, start + 250 * MS, now, [0]) if abs(c[2]) > 0.301]
     assert fast == []
-    # It speaks again for a second now, and does not move.
+    # The node has sent again for a second, and the car does not move.
     assert drives(emulation, first + 1, now, [0]) == []
-    # Armed before it was well for long enough, it stays.
+    # An arm order before the car was healthy for long enough is refused.
     start = emulation.befall("silence", "nodes.1", 0.5)
     drive.wait_for(lambda s: "armed" in s, since=start + 600 * MS)
     early = drive.tell(order="arm")
@@ -252,7 +252,7 @@ def test_silent_node(garage, figures):
 
 
 def notice(drive, text, since, seconds=10.0):
-    """When somebody was told of something [ns]."""
+    """Return the time of a notice [ns]."""
     return drive.wait_for(lambda s: s.get("notice", "").startswith(text), seconds, since)["at_ns"]
 
 

@@ -1,4 +1,4 @@
-"""What goes wrong with streams, through bytes, intake, trackers, policy, gate and cars at once."""
+"""Faults of streams, through bytes, intake, trackers, policy, gate and cars at once."""
 
 import ast
 import datetime
@@ -21,11 +21,11 @@ pytestmark = pytest.mark.slow
 SILENT = "stopped: its node was not heard, or nothing was estimated"
 KEY = bytes(range(16))
 CAR_LENGTH = 0.42
-"""[m]"""
+"""[m] Length of a car."""
 
 
 class Watched(VirtualDrive):
-    """A drive in which nothing moves that should not, and nobody comes too near."""
+    """A drive that checks that disarmed cars do not move, and measures the smallest distance."""
 
     def __init__(self, options):
         self.nearest, self._stood = np.inf, {}
@@ -37,7 +37,7 @@ class Watched(VirtualDrive):
         apart = np.linalg.norm(places[:, None] - places, axis=-1)
         self.nearest = min(self.nearest, apart[~np.eye(len(places), dtype=bool)].min())
         for car, armed in enumerate(self.armed):
-            # A car that was stopped brakes from its top speed within a second, and stays there.
+            # A stopped car brakes from its top speed within a second, and stays there.
             place, n = self._stood.get(car, (places[car], 0))
             if armed or n < 10:
                 place = places[car]
@@ -52,7 +52,7 @@ class Watched(VirtualDrive):
 
 @pytest.fixture
 def drive():
-    """Begin a drive of three cars that have found each other."""
+    """Yield a function that begins a drive of three localised cars."""
     begun = []
 
     def begin(**options):
@@ -68,7 +68,7 @@ def drive():
 
 @pytest.fixture(scope="module")
 def usual():
-    """Error of a drive in which all is well [m]."""
+    """Return the mean error of a drive without faults [m]."""
     options = EmulateOptions(scenario="cars-nlos", seed=3, seconds=600.0)
     each = Watched(options).start()
     n = len(each.errors)
@@ -96,9 +96,9 @@ def test_frames_lost_doubled_late_reordered_and_damaged(drive, usual, form):
     assert told > 0.5 * damaged
     if form == "relpos":
         doubled = sum(i.doubled for i in injectors)
-        # A copy of a damaged frame is one as well.
+        # A copy of a damaged frame is damaged, too.
         assert 0.8 * doubled < intake.refused["duplicate"] <= doubled
-    # A digit that was damaged may make a name of nobody, where a text has no check sum.
+    # Without a check sum a damaged digit may give an unknown name.
     assert [text for text in each.notices if "no node" not in text] == []
     assert each.mean_error(n) < 1.5 * usual + 0.05
 
@@ -125,7 +125,7 @@ def test_a_ring_closes_again_when_cars_are_armed_again(drive):
     each.drive(12.0)
     error = each.env.group.task.error
     assert error.mean() < 0.25
-    # Where one is, is not known to the others any more: all stand while the plan goes on.
+    # The other cars do not know the position of one: all stop while the plan continues.
     each.befall("silence", "nodes.1", 2.0)
     each.drive(8.0)
     assert not any(each.armed)
@@ -192,7 +192,7 @@ def test_silence(drive):
     gate = [((t - since) / 1e6, out) for t, out in each.gate if t > since]
     slow = next(t for t, out in gate if out.cap[0, 0] <= 0.3)
     stopped = next(t for t, out in gate if not out.moving[0, 0])
-    # The last sample is up to a step old, and so is the tick.
+    # The last sample and the tick are up to one step old.
     assert 140.0 < slow <= 170.0
     assert 290.0 < stopped <= 320.0
     assert max(abs(out.speed[0, 0]) for t, out in gate if t >= slow) <= 0.3
@@ -210,7 +210,7 @@ def test_silence(drive):
 
 
 class Attacker:
-    """Hears all lines and speaks on them: what was said before, and what nobody said."""
+    """Attacker that records all lines, replays messages and injects forged ones."""
 
     def __init__(self, each):
         self.each, self.heard, self.n = each, {}, 0
@@ -225,7 +225,7 @@ class Attacker:
         before.append(data)
         said = data + b"".join(before[-100:-97])
         source = Source("1", 0xFFFFFFF0, self.n, self.n * 1000, MICROSECONDS_32)
-        # What was said on the other lines, by nodes, cars and the operator.
+        # Replay messages of the other lines, from nodes, cars and the operator.
         said += b"".join(b"".join(h[-50:-49]) for h in self.heard.values())
         if name.startswith("n"):
             said += b"".join(
@@ -282,9 +282,9 @@ def test_the_clock_on_the_wall_changes_nothing(drive, monkeypatch):
 
 
 ALLOWED = {
-    "live/bridge.py": 1,  # when a recording was made, and the number of a start, which rises
+    "live/bridge.py": 1,  # time of a recording, and the boot number, which rises
 }
-"""Where the clock on the wall is read, and how often."""
+"""Number of reads of the wall clock, by file."""
 WALL = {"time", "time_ns", "localtime", "gmtime", "ctime", "asctime"}
 
 
@@ -311,7 +311,7 @@ def test_nobody_else_reads_the_clock_on_the_wall():
 
 
 def test_everything_at_once(drive, usual):
-    """A minute of it; whoever is stopped and well again is armed again."""
+    """All faults within a minute; stopped cars are armed again when healthy."""
     frames = FaultParams(loss=0.01, corruption=0.005, duplication=0.01, reordering=0.01)
     each = drive(faults=FaultPlan(frames=frames))
     n = len(each.errors)

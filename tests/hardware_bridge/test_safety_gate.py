@@ -1,4 +1,4 @@
-"""The gate: arming, what is stopped for good, limits of what comes out, and its laws."""
+"""The gate: arming, latched stops, limits of the output, and its invariants."""
 
 import numpy as np
 import pytest
@@ -44,7 +44,7 @@ def test_health_begins_anew_after_every_fault():
 
 
 def spoil(group, fault):
-    """Hit car 0; how to let it happen and how to mend it again."""
+    """Inject a fault of car 0."""
     q = group.q
     if fault == "link":
         group.linked[0, 0] = False
@@ -74,7 +74,7 @@ def test_what_was_stopped_for_good_moves_only_after_arming(fault):
     group.q, group.linked[:] = well, True
     out = group.tick(300)
     assert not out.moving[0, 0]
-    assert out.reason[0, 0] == NAMES.index(fault)  # it still says why
+    assert out.reason[0, 0] == NAMES.index(fault)  # the reason is kept
     assert group.arm().all()
     assert group.tick(10).speed[0, 0] > 0.0
 
@@ -167,7 +167,7 @@ def test_what_is_no_number_moves_nothing_beyond_what_is_allowed(name, value):
         assert (np.abs(out.speed) <= p.max_speed).all()
         assert (np.abs(out.steering) <= p.max_steering).all()
     if name in ("speed_wanted", "steering_wanted", "distance", "ranged", "vel"):
-        return  # wishes, and what says nothing as long as places are known
+        return  # commands, and values without effect while positions are known
     if name == "speed":
         assert (out.speed <= before.speed + 1e-9).all()
     elif name in ("status", "pos"):
@@ -213,7 +213,7 @@ numbers = st.one_of(st.floats(-4.0, 4.0), st.floats(allow_nan=True, allow_infini
 
 
 class Gates(RuleBasedStateMachine):
-    """Whatever happens to a gate, in any order."""
+    """Any sequence of events at a gate."""
 
     def __init__(self):
         super().__init__()
@@ -222,7 +222,7 @@ class Gates(RuleBasedStateMachine):
         self.may_move = np.zeros((1, 2), dtype=bool)
 
     def seen(self, out):
-        """What was stopped may not move before it is armed again."""
+        """Check that a stopped car does not move before it is armed again."""
         assert not (out.moving & ~self.may_move).any()
         self.may_move &= out.moving
 
@@ -243,7 +243,7 @@ class Gates(RuleBasedStateMachine):
 
     @rule()
     def fall_silent(self):
-        """Longer than the limit: all stand, from any state."""
+        """After the timeout all cars stop, from any state."""
         for _ in range(7):
             out = self.group.tick(word=False)
             self.seen(out)

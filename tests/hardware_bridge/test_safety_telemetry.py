@@ -1,4 +1,4 @@
-"""What the gate makes of what cars say of themselves, and of cars that say nothing any more."""
+"""Reaction of the gate to telemetry of cars, and to its absence."""
 
 from dataclasses import replace
 
@@ -74,7 +74,7 @@ def test_a_slow_watchdog_counts_as_a_longer_reaction():
 
 
 class Telling(Drive):
-    """Two cars that say how fast they are."""
+    """Two cars that report their speed."""
 
     def __init__(self, answers=False, cells=0, slowest=0.0):
         super().__init__()
@@ -92,7 +92,7 @@ class Telling(Drive):
         return sent
 
     def answer(self, n, late=0):
-        """Of car 0, to the last command or one so much older."""
+        """Let car 0 acknowledge the last command, or one that is `late` commands older."""
         for _ in range(n):
             self.say(AckReading(UNNAMED, self.drivers[0].sequence - 1 - late))
 
@@ -145,12 +145,12 @@ def test_a_car_that_answers_nothing_is_never_armed_and_one_that_stops_answering_
     drive.answer(100)
     assert len(drive.arm()) == 1
     assert drive.moves() == [True, False]
-    drive.say(AckReading(UNNAMED, drive.drivers[0].sequence - 1), n=60)  # one that was recorded
+    drive.say(AckReading(UNNAMED, drive.drivers[0].sequence - 1), n=60)  # a replayed one
     assert drive.moves() == [False, False]
 
 
 def test_a_car_that_answers_late_was_told_late():
-    """A serial server keeps commands while its network is gone, and passes on all of them."""
+    """A serial server buffers commands during a network outage, and then delivers all."""
     drive = Telling(answers=True)
     drive.tick(60)
     drive.answer(120, late=40)
@@ -207,7 +207,7 @@ def test_words_of_others_and_old_ones_are_not_listened_to():
 
 
 def test_a_car_that_tells_its_speed_no_more_is_stopped():
-    """What is sent to it may wait in a serial server, and come all at once."""
+    """Its commands may be buffered in a serial server, and be delivered all at once."""
     drive = ready()
     drive.say(MotionReading(UNNAMED, 1.0), n=20)
     drive.tick(40)
@@ -224,7 +224,7 @@ def test_a_silent_car_stays_where_it_was_until_it_is_dismissed():
     view.speed[0] = [0.5, 0.0, 0.0]  # car 0 drives along x
     silent.move(view, 0.0)
     silent.note(view, np.full((3, 3), 0.1), np.ones(3, dtype=bool))
-    view.ok[0, :, 2] = False  # what is known of it then is not worth noting
+    view.ok[0, :, 2] = False  # its estimates are not worth storing then
     silent.note(view, np.full((3, 3), 9.0), np.array([True, True, False]))
     silent.keep(2)
     view.present[0, 2] = False
@@ -244,7 +244,7 @@ def test_a_silent_car_stays_where_it_was_until_it_is_dismissed():
 
 
 def test_the_gate_knows_where_a_car_is_that_has_fallen_silent():
-    """Though the trackers lose it long before it counts as gone."""
+    """The trackers lose a car long before it counts as gone."""
     bridge = VirtualBridge(EmulateOptions(scenario="ring-los", task="hold", cars=3, seconds=60.0))
     env, swarm = bridge.env(max_cycles=400), bridge.swarm
     env.reset()
@@ -257,7 +257,7 @@ def test_the_gate_knows_where_a_car_is_that_has_fallen_silent():
     heard = swarm.intake.heard_ns
 
     class Silenced(dict):
-        """Node 2 is heard no more."""
+        """Reception times without those of node 2."""
 
         def __setitem__(self, node, t_ns):
             if node != 2:
@@ -279,7 +279,7 @@ def test_the_gate_knows_where_a_car_is_that_has_fallen_silent():
 
 
 class Intake:
-    """Has no marks."""
+    """Intake without marks."""
 
     def restore(self, marks):
         pass
