@@ -102,7 +102,7 @@ MECHANISMS: dict[str, Callable[[TrackerParams], TrackerParams]] = {
     "fault: outliers": part("supervision", outlier_ratio=2.0),
     "fault: position": part("supervision", position_misfit=NEVER),
     "fault: alignment": part("start", respawn_nis=NEVER),
-    "group outliers": part("supervision", group_outlier_ratio=2.0),
+    "group surprise": part("supervision", surprise_limit=NEVER),
     "frozen ranges": part("supervision", frozen_ranges=NEVER),
     "IMU: stuck": sanity(stuck_after=NEVER),
     "IMU: spikes": sanity(gyr_jump=NEVER, acc_jump=NEVER),

@@ -32,7 +32,7 @@ from tracking.filters.joint.hypotheses.initialisation import can_join, can_start
 from tracking.filters.joint.hypotheses.static_initialisation import all_static, may_move
 from tracking.filters.joint.state import one_env
 from tracking.filters.joint.supervision.frozen_range import is_frozen
-from tracking.filters.joint.supervision.residuals import update_residuals
+from tracking.filters.joint.supervision.residuals import count_surprise, update_residuals
 from tracking.filters.joint.supervision.staleness import is_silent, note_seen, update_interval
 from tracking.filters.joint.supervision.supervise import supervise
 from tracking.filters.joint.updates.motion_constraints import (
@@ -90,10 +90,14 @@ def run_events(coefficients, layout, state, work, block, t_out, out):
                 a_i, a_j = antenna_i[e, k], antenna_j[e, k]
                 if i > j:
                     i, j, a_i, a_j = j, i, a_j, a_i
-                sight = (0.0, c.los_to_nlos_rate, c.nlos_to_los_rate)
+                sight = (0.0, c.los_to_nlos_rate, c.nlos_to_los_rate, c.nlos_large_share)
                 if has_power[e, k]:
-                    evidence = power_evidence(c, values[e, k, 1] - values[e, k, 2])
-                    sight = (evidence, c.los_to_nlos_rate_with_power, c.nlos_to_los_rate_with_power)
+                    sight = (
+                        power_evidence(c, values[e, k, 1] - values[e, k, 2]),
+                        c.los_to_nlos_rate_with_power,
+                        c.nlos_to_los_rate_with_power,
+                        c.nlos_large_share_with_power,
+                    )
                 is_survey, now, distance = what == SURVEY, t[e, k], values[e, k, 0]
                 action = process_range(
                     c, s, layout, work, i, j, a_i, a_j, now, distance, sight, is_survey
@@ -241,6 +245,7 @@ def update_range(c, s, layout, work, p, a_i, a_j, t, distance, sight, is_survey)
         if h == group.best:
             group.loglik_sum += loglik
             group.loglik_n += 1
+            count_surprise(s, pair, loglik)
             pair.nis = nis
             update_residuals(c, s, p, dt, distance, nu, misfit, weight)
             if weight > c.least_sane:

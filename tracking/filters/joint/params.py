@@ -55,6 +55,8 @@ class NlosParams:
     """[m] Its standard deviation."""
     nlos_large_share: float = 0.0
     """[-] Share of obstacles that add much more."""
+    nlos_large_share_with_power: float = 0.0
+    """[-] The same where powers are reported."""
     nlos_bias_large: float = 0.6
     """[m] What they add, in the mean."""
     nlos_bias_large_std: float = 0.5
@@ -87,17 +89,23 @@ class NlosParams:
     """[m] They lie anywhere in so much."""
 
     def __post_init__(self) -> None:
-        check_numbers(self, may_be_zero=("nlos_large_share",))
-        if not 0.0 <= self.nlos_large_share <= 1.0:
-            raise ConfigError(
-                f"nlos_large_share: expected a share from 0 to 1, got {self.nlos_large_share}"
-            )
+        check_numbers(self, may_be_zero=("nlos_large_share", "nlos_large_share_with_power"))
+        for name in ("nlos_large_share", "nlos_large_share_with_power"):
+            share = getattr(self, name)
+            if not 0.0 <= share <= 1.0:
+                raise ConfigError(f"{name}: expected a share from 0 to 1, got {share}")
 
 
+NLOS_IN_PLANE = NlosParams(
+    los_to_nlos_rate=0.2, nlos_to_los_rate=1.0, nlos_large_share=0.3, nlos_bias_length=10.0
+)
+"""Without powers, small excesses are not told from other range errors: what counts are obstacles
+that stay for a second and may add half a metre."""
 NLOS_IN_SPACE = NlosParams(
     los_to_nlos_rate=0.5,
     nlos_to_los_rate=2.0,
     nlos_large_share=0.2,
+    nlos_large_share_with_power=0.2,
     nlos_bias_length=10.0,
     white_std=0.2,
 )
@@ -241,7 +249,7 @@ class JointParams:
     vehicles: dict[str, VehicleParams] = field(default_factory=lambda: dict(VEHICLES))
     """By `NodeConfig.vehicle`."""
     range_error: RangeErrorParams = field(default_factory=RangeErrorParams)
-    nlos: NlosParams = field(default_factory=NlosParams)
+    nlos: NlosParams = NLOS_IN_PLANE
     """In the plane."""
     nlos_in_space: NlosParams = NLOS_IN_SPACE
     noise_learning: NoiseLearningParams = field(default_factory=NoiseLearningParams)

@@ -120,6 +120,9 @@ GROUP = np.dtype(
         ("mean_nis", "f8"),  # running mean of NIS, of nodes without a fault [-]
         ("misfit", "f8"),  # slow running mean of that [-]
         ("misfit_limit", "f8"),  # how much of it brings up other rotations [-]
+        ("surprise", "f8"),  # running mean of that of ranges, see `residuals.update_surprise` [-]
+        ("surprise_sum", "f8"),  # of ranges since it was last updated
+        ("surprise_n", "i8"),
         ("nis_sum", "f8"),
         ("nis_n", "i8"),
         ("loglik_sum", "f8"),  # of all ranges, in the hypothesis that was the best

@@ -21,6 +21,7 @@ from tracking.filters.joint.supervision.residuals import (
     mean_range_error,
     node_outlier_ratio,
     others_fit,
+    update_surprise,
 )
 from tracking.kernels.jit import kernel
 from tracking.maths.exponentials import decay
@@ -45,7 +46,7 @@ class Fault(IntEnum):
     LINK = 6
     """The ranges of one pair contradict those of the other pairs."""
     GROUP = 7
-    """Ranges all over the group do not fit: the estimate, or the error model, is wrong."""
+    """Ranges of the whole group are less likely than they should be: estimate or model is wrong."""
     FROZEN = 8
     """A pair repeats one range while its ends travel."""
     STALE = 9
@@ -62,7 +63,8 @@ class Remedy(NamedTuple):
     action: str
 
 
-PERIOD, RANGE = "each period, by the largest ratio", "each range"
+PERIOD, PERIOD_ALL = "each period, by the largest ratio", "each period"
+RANGE = "each range"
 CATALOGUE: dict[Fault, Remedy] = {
     Fault.BIAS: Remedy(
         "node_bias_limit", PERIOD, "an offset common to the node's ranges becomes a state"
@@ -89,7 +91,7 @@ CATALOGUE: dict[Fault, Remedy] = {
         "pair_nis_limit", RANGE, "its ranges count less and less; the pair is `doubtful`"
     ),
     Fault.GROUP: Remedy(
-        "supervision.group_outlier_ratio", RANGE, "every pair of the group is `doubtful`"
+        "supervision.surprise_limit", PERIOD_ALL, "every pair of the group is `doubtful`"
     ),
     Fault.FROZEN: Remedy(
         "supervision.frozen_ranges", RANGE, "the range is ignored until another number comes"
@@ -182,7 +184,9 @@ def position_misfit(c, s, layout, i, t):
 def update_group_misfit(c, s, dt):
     """Carry the group's misfit, and the limit that rises with each challenge, over dt [s]."""
     group = s.group[0]
-    group.misfit += (1.0 - decay(dt / c.misfit_time)) * (group.mean_nis - group.misfit)
+    share = 1.0 - decay(dt / c.misfit_time)
+    group.misfit += share * (group.mean_nis - group.misfit)
+    update_surprise(group, share)
     keep = decay(dt / c.challenge_time)
     group.misfit_limit = keep * group.misfit_limit + (1.0 - keep) * c.respawn_nis
 

@@ -24,9 +24,9 @@ class SupervisionParams:
     """[-] A single range moves the mean NIS by no more; one that means nothing counts as this."""
     outlier_nis: float = 6.0
     """[-] A range with a larger NIS does not fit, one in seventy."""
-    group_outlier_ratio: float = 0.1
-    """[-] Nothing of a group is ok while more of its ranges do not fit, in the mean over its
-    pairs."""
+    surprise_limit: float = 1.2
+    """[-] Nothing of a group is ok while the mean surprise of its ranges over `misfit_time` is
+    larger; 0.5 is that of white noise alone."""
     residual_clip: float = 1.0
     """[m] A single range moves these means by no more."""
     fastest: float = 10.0

@@ -165,7 +165,7 @@ def range_update(c, s, h, p, dt, distance, levers, sight, work):
         distance: The range [m].
         levers: Antennas of i and j relative to their nodes, six numbers [m].
         sight: What its powers say of it: log-likelihood ratio of none, 0 where they are not
-            reported; how often it is lost, and regained [1/s].
+            reported; how often it is lost, and regained [1/s]; share of large excesses.
         work: Room.
 
     Returns:
