@@ -74,7 +74,7 @@ class CarParams:
     front_drive: float = 0.5
     """[-] Share of the motor and brake force at the front axle; 0.5 is four-wheel drive."""
     rolling_resistance: float = 0.02
-    """[-] Force per load: 0.015 on hard floor [2], more for soft treads. The motor compensates it."""
+    """[-] Force per load: 0.015 on hard floor [2], more for soft treads; the motor adds it."""
     max_speed: float = 3.0
     """[m/s] Largest speed, forwards and backwards."""
     max_accel: float = 2.5
