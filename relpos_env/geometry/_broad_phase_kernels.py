@@ -72,7 +72,7 @@ def touches_soon(body, present, box_body, boxes, room, size, e):
 
 @small_kernel
 def is_far(body, present, boxes, room, reach, e, n):
-    """Return whether a car is far from all objects at any heading; half a car is < reach [m]."""
+    """Return whether a car is far from all objects at any heading; `reach` > half a car [m]."""
     x, y, far = body[e, n, 0], body[e, n, 1], reach + MARGIN
     if abs(x) + far > room[e, 0] or abs(y) + far > room[e, 1]:
         return False
