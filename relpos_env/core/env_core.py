@@ -78,9 +78,9 @@ class EnvCore:
         self.weights = reward_weights(config.task, self.task, config.weights)
         self._size = total_size(parts.mode.fields)
         self.observations: F32 = np.zeros((n_envs, n, config.history * self._size), np.float32)
-        """(env, car, size); zeros for absent cars."""
+        """Observations, (env, car, size); zeros for absent cars."""
         self.rewards: F64 = np.zeros((n_envs, n))
-        """(env, car); 0 for absent cars."""
+        """Rewards, (env, car); 0 for absent cars."""
         self.team = TeamResults(np.zeros(n_envs), np.zeros(n_envs), np.zeros(n_envs))
         """Outcome of the last step for all cars together, (env)."""
         self.own_reward: F64 = np.zeros((n_envs, n))

@@ -51,7 +51,7 @@ class Air(NamedTuple):
     channel: np.ndarray
     """CHANNEL, (env)."""
     seeds: np.ndarray
-    """uint64, (env)."""
+    """Seeds, uint64, (env)."""
     window: np.ndarray
     """Number of completed windows, (env)."""
 

@@ -138,7 +138,7 @@ BODY = ChannelParams(
 excess cap: the shape of `INDOOR`, scaled so that the errors of NLOS pairs equal the 27.5 cm
     (root mean square) that Armani and Holz report for occluded pairs on a body (ICRA 2024).
 excess_length: equal to the length of the shadowing, since the posture causes both.
-attenuation: the first path round a body falls with exponents of 9 to 13 ("Path loss modeling
+attenuation: the first path around a body falls with exponents of 9 to 13 ("Path loss modeling
     for UWB creeping waves around human body", anechoic, 2 GHz to 8 GHz); a body attenuates the
     direct path strongly, while the path around it is hardly longer (Kilic et al., WPNC 2012).
     Errors thus come from later paths detected as the first. Twice that of `INDOOR` is assumed.
