@@ -1,4 +1,4 @@
-"""What an environment is made of: the arguments that all its forms share."""
+"""Configuration of an environment: the arguments that all its forms share."""
 
 from __future__ import annotations
 
@@ -35,68 +35,67 @@ KINDS: dict[str, tuple[type, ...]] = {
     "end_on_collision": (bool,),
     "gate": (bool,),
 }
-"""What arguments that are no names or numbers have to be."""
+"""Types of arguments that are neither names nor numbers."""
 
 
 RewardTerm = Callable[[Any], F64]
-"""Takes the `relpos_env.core.env_core.EnvCore` after a step."""
+"""Function of the `relpos_env.core.env_core.EnvCore` after a step."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FormationConfig:
-    """One environment, whichever interface it has."""
+    """Configuration of one environment with any interface."""
 
     scenario: str | Path | Scenario | None = None
     """Room, obstacles, sensors and randomisation: a name in `relpos_env.scenarios.SCENARIOS`, a
     TOML file, or a scenario; by default that of the task in
     `relpos_env.tasks.needs.DEFAULT_SCENARIO`."""
     task: str | TaskBuilder = "ring"
-    """What is asked of the cars: one of `relpos_env.tasks.TASKS`, or of
+    """Task of the cars: one of `relpos_env.tasks.TASKS`, or
     [your own](../how-to/adding.md#your-own-without-a-change-here)."""
     task_options: Mapping[str, Any] = field(default_factory=dict)
     """The task's own options, by name."""
     n_cars: int | None = None
-    """Slots for cars, 2 to 20; by default as many as the scenario can have at a time."""
+    """Number of car slots, 2 to 20; by default the largest number of cars of the scenario."""
     level: int | None = None
-    """Randomisation of a level of the curriculum, 0 to 4, in place of the scenario's own."""
+    """Curriculum level of the randomisation, 0 to 4, in place of the scenario's own."""
     observation: str | ModeBuilder = "estimate"
-    """One of `relpos_env.interface.observations.OBSERVATIONS`, or of your own."""
+    """Observation mode: one of `relpos_env.interface.observations.OBSERVATIONS`, or your own."""
     history: int = 1
     """Number of stacked observations, the newest first."""
     proximity: int = 0
     """Number of distance sensors of each car, 0 to 32; their readings are appended to the
     observation."""
     actions: str | Callable[[], ActionMode] = "continuous"
-    """One of `relpos_env.interface.actions.ACTIONS`, or of your own."""
+    """Action mode: one of `relpos_env.interface.actions.ACTIONS`, or your own."""
     filter: str | FilterBuilder = DEFAULT_FILTER
-    """Position filter of the trackers, one of `tracking.filters.FILTERS`, or of your own."""
+    """Position filter of the trackers: one of `tracking.filters.FILTERS`, or your own."""
     params: TrackerParams | None = None
     """Parameters of the tracker; by default `relpos_env.core.tracked_world.default_params`."""
     operator: OperatorSimParams = field(default_factory=OperatorSimParams)
-    """The operator who tells the group where to go."""
+    """Parameters of the simulated operator who commands the group."""
     weights: Mapping[str, float] | None = None
     """Weights of reward terms that differ from `relpos_env.tasks.DEFAULT_WEIGHTS`."""
     physics: Physics | None = None
-    """``pymunk``: a space that is kept for the episode, see
-    `relpos_env.world.pymunk_space`; ``fast``: the same motion while nothing touches, for batches.
-    By default ``pymunk`` in the PettingZoo and
-    Gymnasium environments, ``fast`` in the vector forms."""
+    """``pymunk``: the cars move in a space that is kept for the episode, see
+    `relpos_env.world.pymunk_space`; ``fast``: equal motion without contacts, for batches. The
+    default is ``pymunk`` in the PettingZoo and Gymnasium environments, ``fast`` in vector forms."""
     reward: str | RewardTerm | None = None
-    """A reward term of your own, ``(formation) -> (env, car)``, which is added to the others; infos
-    have it as ``reward_own``."""
+    """Your own reward term, ``(formation) -> (env, car)``, which is added to the others; infos
+    contain it as ``reward_own``."""
     gate: bool = False
-    """Every command passes the safety gate of real cars, `hardware_bridge.safety.gate`, each step;
-    infos say what it allowed, and why."""
+    """True to apply the safety gate of real cars, `hardware_bridge.safety.gate`, to all commands;
+    infos contain the allowed commands and the reasons."""
     max_cycles: int = 600
     """Steps of 0.1 s until truncation."""
     end_on_collision: bool = False
-    """A contact terminates the episode."""
+    """True to terminate the episode at a contact."""
 
     def resolve(self) -> Parts:
-        """Look everything up.
+        """Look up all names and check all values.
 
         Raises:
-            EnvError: An unknown name or a number out of range; the argument is named.
+            EnvError: A name is unknown or a number out of range; the message names the argument.
         """
         config = replace(
             self,
@@ -148,7 +147,7 @@ class FormationConfig:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parts:
-    """A configuration with its names looked up."""
+    """Configuration with its names looked up."""
 
     config: FormationConfig
     scenario: Scenario
@@ -160,17 +159,17 @@ class Parts:
     reward: RewardTerm | None
 
     def make_task(self, n_envs: int) -> Task:
-        """The task of a batch."""
+        """Return the task of a batch."""
         return make_task(
             self.config.task, self.n_cars, n_envs, self.scenario.room, **self.task_options
         )
 
 
 def configure(arguments: Mapping[str, Any]) -> Parts:
-    """The parts that keyword arguments ask for.
+    """Return the parts of a configuration from keyword arguments.
 
     Raises:
-        EnvError: An argument of no such name, an unknown name or a number out of range.
+        EnvError: An argument or a name is unknown, or a number out of range.
     """
     known = [f.name for f in fields(FormationConfig)]
     for name in arguments:
@@ -182,10 +181,10 @@ def configure(arguments: Mapping[str, Any]) -> Parts:
 
 
 def whole_number(name: str, value: Any, least: int, most: int) -> int:
-    """The value, if it is a whole number in a range.
+    """Return the value, if it is a whole number in a range.
 
     Raises:
-        EnvError: It is not; the argument is named.
+        EnvError: It is not; the message names the argument.
     """
     whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
     if not (whole and least <= value <= most):

@@ -1,9 +1,9 @@
-"""What can go wrong in a way the user can mend."""
+"""User errors of the package."""
 
 
 class EnvError(Exception):
-    """Root of the package's errors; names the argument, what is allowed and what came."""
+    """Base class of user errors; messages name the argument, the allowed and the given value."""
 
 
 class UnknownArgument(EnvError, TypeError):
-    """An argument of no such name, as Python's own error for it, which other tools look for."""
+    """Unknown argument; also a `TypeError` as in Python itself, which other tools expect."""

@@ -1,7 +1,7 @@
 """Formation driving on estimated relative positions, as a PettingZoo environment.
 
-`parallel_env` is the environment itself; `env` is its turn-by-turn (AEC) form with the usual
-checks around it, `raw_env` the same without them.
+`parallel_env` is the environment itself; `env` is its turn-by-turn (AEC) form with checks of the
+order of calls, `raw_env` the AEC form without checks.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ parallel_env = FormationEnv
 
 
 def raw_env(**arguments: Any) -> AECEnv:
-    """The turn-by-turn form; arguments as for `parallel_env`."""
+    """Return the turn-by-turn (AEC) form; arguments as for `parallel_env`."""
     return parallel_to_aec(FormationEnv(**arguments))
 
 
 def env(**arguments: Any) -> AECEnv:
-    """The turn-by-turn form that refuses calls in the wrong order; arguments likewise."""
+    """Return the AEC form that checks the order of calls; arguments as for `parallel_env`."""
     return OrderEnforcingWrapper(raw_env(**arguments))
 
 

@@ -1,10 +1,10 @@
-"""The clock of the simulated world."""
+"""Time constants of the simulated world."""
 
 DT = 0.01
-"""[s] One step of the physics, of the IMUs, and of the air."""
+"""[s] Step of the physics, the IMUs and the radios."""
 DECISION = 0.1
-"""[s] From one action of a policy to the next."""
+"""[s] Control period, from one action of a policy to the next."""
 STAND_STILL = 2.0
-"""[s] Cars and people stand while their trackers are switched on, as real ones do."""
+"""[s] Initial rest of cars and people while their trackers are switched on, as for real ones."""
 SOON = 1e-9
-"""[s] What happens to cars is due that much earlier, for the roundings of times."""
+"""[s] Time by which events are due early, because of rounding errors of times."""

@@ -1,1 +1,1 @@
-"""One environment form for each library."""
+"""Environments for PettingZoo, Gymnasium and Stable-Baselines3."""

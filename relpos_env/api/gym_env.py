@@ -1,7 +1,7 @@
-"""The Gymnasium environment: one controller for all cars.
+"""Gymnasium environment: one controller for all cars.
 
-The observations and actions of the cars stand one after the other; the reward is the mean over
-the cars that take part.
+The observations and actions of the cars are concatenated; the reward is the mean over the
+participating cars.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ from tracking.arrays import F64
 
 
 def team_observation_space(parts: Parts) -> spaces.Box:
-    """Observations of all cars, one after the other, (car size)."""
+    """Return the space of the concatenated observations of all cars, (car size)."""
     one = space_of(parts.mode.fields, parts.config.history)
     n = parts.n_cars
     return spaces.Box(np.tile(one.low, n), np.tile(one.high, n), dtype=np.float32)
 
 
 def team_action_space(parts: Parts) -> spaces.Space[Any]:
-    """Actions of all cars, one after the other, (car action)."""
+    """Return the space of the concatenated actions of all cars, (car action)."""
     one, n = parts.actions.space(), parts.n_cars
     if isinstance(one, spaces.Discrete):
         return spaces.MultiDiscrete(np.full(n, one.n))
@@ -48,10 +48,10 @@ def team_action_space(parts: Parts) -> spaces.Space[Any]:
 def decode_team(
     actions: Any, mode: ActionMode, batch: tuple[int, ...], n_cars: int, where: str
 ) -> tuple[F64, F64]:
-    """Commands of all cars, each (*batch, car), from actions (*batch, car action).
+    """Return the commands of all cars, each (*batch, car), from actions (*batch, car action).
 
     Raises:
-        EnvError: A wrong shape, or as `ActionMode.decode`.
+        EnvError: The shape is wrong, or as `ActionMode.decode`.
     """
     shape = (*batch, n_cars * int(np.prod(mode.shape, dtype=int)))
     if np.shape(actions) != shape:
@@ -60,7 +60,7 @@ def decode_team(
 
 
 class FormationGymEnv(gymnasium.Env[F32, Any]):
-    """``gymnasium.make("relpos_env/Formation-v0")``. Law as for `FormationEnv`."""
+    """``gymnasium.make("relpos_env/Formation-v0")``. It has the property of `FormationEnv`."""
 
     metadata = {"render_modes": ["human", "rgb_array"], "render_fps": 10}  # noqa: RUF012
 
@@ -106,7 +106,7 @@ class FormationGymEnv(gymnasium.Env[F32, Any]):
 
     @property
     def spec(self) -> EnvSpec | None:
-        """How it was made; `max_episode_steps` is that of its configuration."""
+        """Specification of the environment; `max_episode_steps` is that of its configuration."""
         return self._spec
 
     @spec.setter
@@ -122,15 +122,15 @@ class FormationGymEnv(gymnasium.Env[F32, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[F32, dict[str, Any]]:
-        """Begin an episode; a seed makes this and all that follow it repeatable.
+        """Start an episode; a seed makes this and all following episodes repeatable.
 
         Args:
-            seed: None goes on with the generator of the episode before.
+            seed: Seed of the episode; None continues with the current generator.
             options: ``poses``, ``goals``, ``scenario``, see
                 `relpos_env.core.reset_options.ResetOptions`.
 
         Raises:
-            EnvError: An unknown option, or one that cannot be fulfilled.
+            EnvError: An option is unknown or cannot be fulfilled.
         """
         super().reset(seed=seed)
         wishes = reset_options(options, self._parts)
@@ -138,7 +138,7 @@ class FormationGymEnv(gymnasium.Env[F32, Any]):
             # Episodes have a generator of their own, so that `np_random` is the user's.
             self._formation.seed(0, episode_rng(seed))
             self._seeded = True
-        self._begun = False  # until all wishes are fulfilled
+        self._begun = False  # until all requests are fulfilled
         self._formation.begin([0], options=wishes)
         self._begun, self._over = True, False
         self._film.forget()
@@ -168,12 +168,12 @@ class FormationGymEnv(gymnasium.Env[F32, Any]):
         )
 
     def state(self) -> F32:
-        """The truth, for critics; as in `FormationEnv.state`."""
+        """Return the true state for critics, as in `FormationEnv.state`."""
         state: F32 = truth_inside(self.formation.state, state_space(self._parts))[0]
         return state
 
     def render(self) -> Any:
-        """A picture of now, uint8 (height, width, 3); None without a mode or with a window."""
+        """Return an image, uint8 (height, width, 3); None without a mode or with a window."""
         return self._film.picture(self.formation)
 
     def close(self) -> None:

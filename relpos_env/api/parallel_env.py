@@ -1,8 +1,8 @@
-"""The PettingZoo environment: cars keep a formation on what their trackers tell them.
+"""PettingZoo environment: cars keep a formation with the estimates of their trackers.
 
-Every step a car sees where its tracker believes the others to be (or, in the mode ``truth``,
-where they are), and answers with a speed and a steering angle. `docs/reference/environment.md`
-has the tables of observations, actions and rewards.
+Every step, a car observes the estimated positions of the others (or, in the mode ``truth``, the
+true ones), and returns a speed and a steering angle. `docs/reference/environment.md` has the
+tables of observations, actions and rewards.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from tracking.log import Log
 
 
 class FormationEnv(BaseFormationParallelEnv):
-    """Cars in a room keep a formation on the estimates of the tracker that serves the group.
+    """Cars in a room that keep a formation with the estimates of the group's tracker.
 
-    Agents come and go as `BaseFormationParallelEnv` says. `reset` takes the options of
+    Agents join and leave as described in `BaseFormationParallelEnv`. `reset` takes the options of
     `relpos_env.core.reset_options.ResetOptions`: ``poses``, ``goals`` and ``scenario``.
 
-    Law: same arguments, seed and actions, same everything, bit for bit.
+    Property: equal arguments, seeds and actions give equal results, bit for bit.
     """
 
     def __init__(
@@ -47,9 +47,9 @@ class FormationEnv(BaseFormationParallelEnv):
 
         Args:
             render_mode: None, ``human`` or ``rgb_array``.
-            record: Keep measurements and truth of the episode, see `recorded_log`.
-            fixed_agents: Every slot is an agent for the whole episode, for tools that know no
-                agents that come and go.
+            record: True to record measurements and truth of the episode, see `recorded_log`.
+            fixed_agents: True to make every slot an agent for the whole episode, for tools that
+                need a constant set of agents.
             arguments: Fields of `relpos_env.config.FormationConfig`.
 
         Raises:
@@ -117,15 +117,15 @@ class FormationEnv(BaseFormationParallelEnv):
         return self._parts.config.max_cycles
 
     def state(self) -> F32:
-        """The truth, for critics, (8 car), inside `state_space`; zeros for absent cars.
+        """Return the true state for critics, (8 car), inside `state_space`; zeros for absent cars.
 
-        Of each car: 1, x, y, cosine and sine of the heading, velocity x, y, yaw rate.
+        Columns of each car: 1, x, y, cosine and sine of the heading, velocity x, y, yaw rate.
         """
         state: F32 = truth_inside(self.formation.state, self.state_space)[0]
         return state
 
     def recorded_log(self, name: str) -> Log:
-        """The episode so far as a log with truth.
+        """Return the episode so far as a log with truth.
 
         Raises:
             EnvError: The environment was not made with ``record=True``, or not reset.
@@ -136,9 +136,9 @@ class FormationEnv(BaseFormationParallelEnv):
         return self._recording.to_log(name, self.scenario.name, constellation, truth_every=2)
 
     def render(self) -> Any:
-        """A picture of now, uint8 (height, width, 3).
+        """Return an image of the current state, uint8 (height, width, 3).
 
-        None without a render mode, or with a window, which shows itself at every step.
+        None without a render mode, or with a window, which is updated at every step.
 
         Raises:
             EnvError: Before the first reset.

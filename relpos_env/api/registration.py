@@ -1,4 +1,4 @@
-"""The names under which Gymnasium and PettingZoo know the environments."""
+"""Registration of the environments in Gymnasium and PettingZoo."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pettingzoo
 
 
 def register_environments() -> None:
-    """Register all; doing it twice changes nothing."""
+    """Register all environments; repeated calls have no effect."""
     if "relpos_env/Formation-v0" in gymnasium.registry:
         return
     gymnasium.register(
@@ -15,7 +15,7 @@ def register_environments() -> None:
         entry_point="relpos_env.api.gym_env:FormationGymEnv",
         vector_entry_point="relpos_env.api.vector_env:FormationVectorEnv",
     )
-    # Versions of PettingZoo before 1.27 have no registry; `formation_v0` is all they need.
+    # Versions of PettingZoo before 1.27 have no registry and use `formation_v0` directly.
     if not hasattr(pettingzoo, "register"):
         return
     module = "relpos_env.formation_v0"

@@ -1,4 +1,4 @@
-"""Stable-Baselines3: a seat for every car of every environment, all with one shared policy."""
+"""Stable-Baselines3 environment: an agent slot per car and environment, one shared policy."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ from tracking.arrays import F64, Bool
 
 
 class FormationVecEnv(SharedAttributeVecEnv):
-    """``n_envs`` environments; seat ``e * n_cars + k`` is car k of environment e.
+    """``n_envs`` environments; agent slot ``e * n_cars + k`` is car k of environment e.
 
-    Seeds count on from environment to environment. A seat is done when the episode of its
-    environment is over, or when its car leaves for good; its info then has the figures of
-    `relpos_env.interface.infos`, the last observation that the car had as
-    ``terminal_observation``, and ``TimeLimit.truncated``. A seat without a car sees zeros, gets no
-    reward, and its info has ``active`` False at every step: plain algorithms of Stable-Baselines3
-    learn from these rows too, unless they use
-    `agents.training.ppo.buffer.SwarmRolloutBuffer`, which leaves them out.
+    Seeds increase by 1 from environment to environment. A slot is done when the episode of its
+    environment is over, or when its car leaves for good; its info then has the values of
+    `relpos_env.interface.infos`, the last observation of the car as ``terminal_observation``, and
+    ``TimeLimit.truncated``. A slot without a car has zeros as observations and rewards, and its
+    info has ``active`` False at every step: plain algorithms of Stable-Baselines3 learn from these
+    rows, too, unless they use `agents.training.ppo.buffer.SwarmRolloutBuffer`, which leaves them
+    out.
     """
 
     def __init__(
@@ -48,11 +48,11 @@ class FormationVecEnv(SharedAttributeVecEnv):
         """Build the environments.
 
         Args:
-            n_envs: How many.
+            n_envs: Number of environments.
             threads: Number of parts of the batch that are stepped at a time.
-            render_mode: None, ``human`` or ``rgb_array``: pictures of the first environment.
-            with_truth: Every observation is followed by that of
-                `relpos_env.api.state_space.truth_of_each`, for critics.
+            render_mode: None, ``human`` or ``rgb_array``: images of the first environment.
+            with_truth: True to append `relpos_env.api.state_space.truth_of_each` to every
+                observation, for critics.
             arguments: Fields of `relpos_env.config.FormationConfig`.
 
         Raises:
@@ -81,50 +81,50 @@ class FormationVecEnv(SharedAttributeVecEnv):
 
     @property
     def active(self) -> Bool:
-        """Which seats have a car that takes part, (seat)."""
+        """Mask of the agent slots whose car participates, (slot)."""
         return self.formation.active.ravel()
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
-        """Seed all environments, from the next reset on; None leaves their generators alone."""
+        """Seed all environments from the next reset on; None keeps their generators."""
         if seed is not None:
             self._next_seeds = seeds_of_batch(seed, self.formation.n_envs)
         return [s for s in self._next_seeds for _ in range(self.n_cars)]
 
     def stagger(self, rng: np.random.Generator) -> None:
-        """Let episodes that begin now end at random times, no two together but by chance.
+        """Randomise the elapsed steps of all episodes, so that they end at independent times.
 
         Args:
-            rng: Draws how much of `max_cycles` has passed already.
+            rng: Generator of the elapsed steps, less than `max_cycles`.
         """
         cycles = self.formation.cycles
         cycles[:] = rng.integers(0, self._parts.config.max_cycles, len(cycles))
 
     def reweigh(self, weights: Mapping[str, float]) -> None:
-        """Let reward terms count by other weights from the next step on.
+        """Set the weights of reward terms from the next step on.
 
         Args:
-            weights: By term; those that are not named count as the task has it.
+            weights: Weights by term; other terms get the default weights of the task.
 
         Raises:
-            EnvError: No term of that name, or a weight that is not finite.
+            EnvError: A term is unknown or a weight is not finite.
         """
         task = self._parts.config.task
         self.formation.weights[:] = reward_weights(task, self.formation.task, weights)
 
     def reset(self) -> F32:
-        """Begin an episode in every environment; observations, (seat, size).
+        """Start an episode in every environment and return the observations, (slot, size).
 
-        The options of `set_options` are those of the first seat of each room; see
+        The options of `set_options` are those of the first agent slot of each room; see
         `relpos_env.core.reset_options`.
 
         Raises:
-            EnvError: An unknown option, or one that cannot be fulfilled.
+            EnvError: An option is unknown or cannot be fulfilled.
         """
         rooms = range(self.formation.n_envs)
         for env, seed in enumerate(self._next_seeds):
             if seed is not None or not self._begun:
                 self.formation.seed(env, episode_rng(seed))
-        self._begun = False  # until all wishes are fulfilled
+        self._begun = False  # until all requests are fulfilled
         wishes = [reset_options(self._options[k * self.n_cars], self._parts) for k in rooms]
         if not any(self._options):
             self.formation.begin(rooms)
@@ -140,7 +140,7 @@ class FormationVecEnv(SharedAttributeVecEnv):
         return self._observations()
 
     def step_async(self, actions: Any) -> None:
-        """Take the actions of all seats, (seat, ...).
+        """Store the actions of all agent slots, (slot, ...).
 
         Raises:
             EnvError: The actions have a wrong shape, are not finite or not in the space; or
@@ -155,7 +155,7 @@ class FormationVecEnv(SharedAttributeVecEnv):
         self._commands = self._parts.actions.decode(rows, "actions")
 
     def step_wait(self) -> tuple[F32, F32, Bool, list[dict[str, Any]]]:
-        """Drive for 0.1 s: observations, rewards, dones and infos of all seats."""
+        """Drive for 0.1 s and return observations, rewards, dones and infos of all agent slots."""
         assert self._commands is not None
         f = self.formation
         f.step(*self._commands)
@@ -187,19 +187,19 @@ class FormationVecEnv(SharedAttributeVecEnv):
         self._film.close()
 
     def get_images(self) -> list[Any]:
-        """A picture of the first environment."""
+        """Return an image of the first environment."""
         return [self._film.picture(self.formation)]
 
     def render(self, mode: str | None = None) -> Any:
-        """A picture of the first environment; None without a render mode or with a window."""
+        """Return an image of the first environment; None without a mode or with a window."""
         return self._film.picture(self.formation)
 
     def _observations(self) -> F32:
-        """What the seats see now; zeros where a car has left."""
+        """Return the current observations of all agent slots; zeros for cars that have left."""
         return self._rows(self.formation.team_observations())
 
     def _rows(self, observations: F32) -> F32:
-        """Observations of all seats, with the truth if it is wanted; a copy."""
+        """Return observations of all agent slots, with the truth if `with_truth`; a copy."""
         observations = observations.reshape(self.num_envs, -1)
         if self.with_truth:
             truth = (
@@ -212,4 +212,4 @@ class FormationVecEnv(SharedAttributeVecEnv):
         if self.render_mode is not None:
             self._film.add(self.formation)
 
-    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 10}  # noqa: RUF012
+    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 10}

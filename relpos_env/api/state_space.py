@@ -1,4 +1,4 @@
-"""The truth for critics, of all cars and as each car would put it, inside a space."""
+"""True state for critics, of all cars or relative to each car, inside a space."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from relpos_env.world.world_state import WorldState
 from tracking.arrays import F64
 
 N_TRUTH = 8
-"""[-] Numbers of the truth about each car: 1, x, y, cosine and sine of the heading, velocity x, y,
+"""[-] Number of true values of each car: 1, x, y, cosine and sine of the heading, velocity x, y,
 yaw rate."""
 FASTEST, FASTEST_TURN = 20.0, 100.0
-"""[m/s], [rad/s] Velocities beyond are cut off; no car of ours is so fast."""
+"""[m/s, rad/s] Velocities are clipped at these limits; no car is that fast."""
 
 
 def state_space(parts: Parts) -> spaces.Box:
-    """The space of `truth_inside` of one environment, (8 car)."""
+    """Return the space of `truth_inside` for one environment, (8 car)."""
     w, d = 0.5 * parts.scenario.room[0], 0.5 * parts.scenario.room[1]
     high = np.array([1.0, w, d, 1.0, 1.0, FASTEST, FASTEST, FASTEST_TURN], dtype=np.float32)
     low = -high
@@ -27,14 +27,14 @@ def state_space(parts: Parts) -> spaces.Box:
 
 
 def truth_inside(state: WorldState, space: spaces.Box) -> F32:
-    """The truth of every environment, cut off at the limits of the space, (env, 8 car)."""
+    """Return the true state of every environment, clipped to the space, (env, 8 car)."""
     flat = truth_of(state).reshape(len(state.heading), -1)
     truth: F32 = np.clip(flat, space.low, space.high).astype(np.float32)
     return truth
 
 
 def truth_of(state: WorldState) -> F64:
-    """`N_TRUTH` numbers of every car, zeros for absent ones, (env, car, 8)."""
+    """Return `N_TRUTH` values of every car, zeros for absent ones, (env, car, 8)."""
     columns = [
         np.ones_like(state.heading),
         state.pos_w[..., 0],
@@ -50,10 +50,10 @@ def truth_of(state: WorldState) -> F64:
 
 
 def truth_of_each(state: WorldState) -> F64:
-    """The truth as each car would put it, for critics of one car, (env, car, 8 car).
+    """Return the true state relative to each car, for critics of one car, (env, car, 8 car).
 
-    The car itself comes first, at its place in the room, then the others relative to it;
-    directions are in its frame; of each the numbers of `truth_of`. Zeros for absent cars.
+    The car itself comes first, with its position in the room, then the others relative to it;
+    directions are in its frame. The values are those of `truth_of`, zeros for absent cars.
     """
     s = truth_of(state)
     n_envs, n, _ = s.shape

@@ -1,4 +1,4 @@
-"""The native vector form of the Gymnasium environment: all environments in compiled code."""
+"""Native vector form of the Gymnasium environment: all environments in compiled code."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ from tracking.arrays import F64, Bool
 class FormationVectorEnv(VectorEnv[F32, Any, Any]):
     """``gymnasium.make_vec("relpos_env/Formation-v0", num_envs=64)``.
 
-    It keeps the contract of `gymnasium.vector.VectorEnv`: with a mode of resets it gives what
-    `SyncVectorEnv` gives of single environments, infos included.
+    It follows the contract of `gymnasium.vector.VectorEnv`: with the same autoreset mode it returns
+    the results of `SyncVectorEnv` with single environments, infos included.
 
-    Law: environment k with seed s is the single environment with seed s + k and the same `physics`,
-    bit for bit.
+    Property: environment k with seed s equals the single environment with seed s + k and the same
+    `physics`, bit for bit.
     """
 
     metadata = {  # noqa: RUF012
@@ -55,13 +55,13 @@ class FormationVectorEnv(VectorEnv[F32, Any, Any]):
         """Build the environments.
 
         Args:
-            num_envs: How many.
-            autoreset_mode: ``NextStep``: an environment whose episode is over begins the next one
+            num_envs: Number of environments.
+            autoreset_mode: ``NextStep``: an environment whose episode is over starts the next one
                 in the next step; ``SameStep``: in the same step, the last observation is in
                 ``infos["final_obs"]``; ``Disabled``: by ``reset(options={"reset_mask": ...})``.
             threads: Number of parts of the batch that are stepped at a time.
-            render_mode: None or ``rgb_array``; `render` gives a picture of each environment.
-            max_episode_steps: Another name of ``max_cycles``; the smaller one counts.
+            render_mode: None or ``rgb_array``; `render` returns an image of each environment.
+            max_episode_steps: Another name of ``max_cycles``; the smaller one applies.
             arguments: Fields of `relpos_env.config.FormationConfig`.
 
         Raises:
@@ -105,16 +105,16 @@ class FormationVectorEnv(VectorEnv[F32, Any, Any]):
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[F32, dict[str, Any]]:
-        """Begin an episode in every environment.
+        """Start an episode in every environment.
 
         Args:
-            seed: Of the first environment, the others count on; or one for each.
-            options: ``reset_mask``, (env): only these begin again; and what a single environment
-                takes, the same for all.
+            seed: Seed of the first environment, to which others add their index; or one for each.
+            options: ``reset_mask``, (env): mask of environments to reset; and the options of a
+                single environment, the same for all.
 
         Raises:
-            EnvError: Not as many seeds or flags as environments; some begin, others never did; or
-                an option that is unknown or cannot be fulfilled.
+            EnvError: Seeds or flags do not match the environments; the first reset leaves some out;
+                or an option is unknown or cannot be fulfilled.
         """
         seeds = seeds_of_batch(seed, self.num_envs)
         options = dict(options or {})
@@ -138,7 +138,7 @@ class FormationVectorEnv(VectorEnv[F32, Any, Any]):
 
         Raises:
             EnvError: The actions have a wrong shape, are not finite or not in the space; there
-                was no reset; or nothing resets an environment whose episode is over.
+                was no reset; or an environment whose episode is over was not reset.
         """
         if not self._begun.all():
             raise EnvError("the environment must be reset first")
@@ -167,25 +167,25 @@ class FormationVectorEnv(VectorEnv[F32, Any, Any]):
         return self._observations(), rewards, terminated, truncated, infos
 
     def state(self) -> F32:
-        """The truth, for critics, (env, 8 car); as in `FormationEnv.state`."""
+        """Return the true state for critics, (env, 8 car), as in `FormationEnv.state`."""
         return truth_inside(self.formation.state, self._state_space)
 
     def render(self) -> tuple[Any, ...] | None:
-        """A picture of every environment, or None without a render mode."""
+        """Return an image of every environment, or None without a render mode."""
         if self.render_mode is None:
             return None
         return tuple(film.picture(self.formation) for film in self._films)
 
     def close_extras(self, **kwargs: Any) -> None:
-        """Release threads and pictures."""
+        """Release threads and images."""
         self.formation.close()
         for film in self._films:
             film.close()
 
     def _begin(self, envs: Bool, wishes: ResetOptions = NO_OPTIONS) -> None:
-        """Begin an episode in some environments, (env)."""
+        """Start an episode in some environments, (env)."""
         which = np.flatnonzero(envs).tolist()
-        self._begun[envs] = False  # until all wishes are fulfilled
+        self._begun[envs] = False  # until all requests are fulfilled
         self.formation.begin(which, options=wishes)
         self._begun[envs], self._over[envs] = True, False
         if self.render_mode is not None:
@@ -194,7 +194,7 @@ class FormationVectorEnv(VectorEnv[F32, Any, Any]):
                 self._films[env].add(self.formation)
 
     def _begin_at_once(self, over: Bool) -> dict[str, Any]:
-        """Begin the next episodes; infos with the last observations and infos of those before."""
+        """Start the next episodes; return infos with the final observations and infos."""
         last, final = self._observations(), self._infos(over)
         final_obs = np.full(self.num_envs, None, dtype=object)
         for env in np.flatnonzero(over):
@@ -207,5 +207,5 @@ class FormationVectorEnv(VectorEnv[F32, Any, Any]):
         return self.formation.team_observations()
 
     def _infos(self, envs: Bool | None = None) -> dict[str, Any]:
-        """The infos of some environments, without a dict for any."""
+        """Return the infos of some environments in vector form."""
         return vector_infos(team_columns(self.formation.infos()), envs)

@@ -1,1 +1,1 @@
-"""The batched environment: world, tracker, task and outcome of a step."""
+"""Batched environment: world, tracker, task and outcome of a step."""

@@ -1,4 +1,4 @@
-"""What came of a step: rewards, who takes part, what is over, and how far estimates are off."""
+"""Outcome of a step: rewards, participating cars, ends of episodes and tracking errors."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from tracking.kernels.jit import kernel
 
 
 class TeamResults(NamedTuple):
-    """What came of a step for all cars of an environment that take part, arrays over (env)."""
+    """Outcome of a step over the cars of an environment, arrays over (env)."""
 
     reward: np.ndarray
-    """Mean."""
+    """Mean reward of the participating cars."""
     error: np.ndarray
-    """Formation error, mean of those in the room [m]."""
+    """Formation error, mean over the cars in the room [m]."""
     contacts: np.ndarray
-    """Begun in the step, of all cars, whether or not they take part."""
+    """Contacts begun in the step by all cars, participating or not."""
 
 
 @kernel
@@ -26,28 +26,28 @@ def judge(
     first, end, present, to_come, contacts, error, terms, weights, done, cycles, max_cycles,
     collision_ends, time, rewards, team, active, left, terminated, truncated,
 ):  # fmt: skip
-    """Sum rewards up, and note who left and which episodes are over.
+    """Compute rewards, departed cars and ends of episodes.
 
     Args:
         first: First environment.
-        end: The one after the last.
+        end: One past the last environment.
         present: Cars in the room, (env, car).
-        to_come: Cars that will come in, (env, car).
-        contacts: Begun in the step, (env, car).
+        to_come: Cars that will join, (env, car).
+        contacts: Contacts begun in the step, (env, car).
         error: Formation errors, (env, car) [m].
-        terms: Reward terms, (env, car, term); that of time is updated where a contact is the end.
-        weights: (term)
-        done: The task is accomplished, (env).
+        terms: Reward terms, (env, car, term); the one of time is updated if a contact terminates.
+        weights: Weights of the terms, (term).
+        done: True if the task is accomplished, (env).
         cycles: Steps of the episode, (env).
-        max_cycles: After so many it is over.
-        collision_ends: Whether a contact ends it.
-        time: Number of the term of that name, -1 if the task has none.
-        rewards: (env, car), written.
+        max_cycles: Steps until truncation.
+        collision_ends: True if a contact terminates the episode.
+        time: Index of the time term, -1 if the task has none.
+        rewards: Weighted sums of the terms, (env, car), written.
         team: TeamResults, written.
-        active: Cars that take part, (env, car), updated.
+        active: Participating cars, (env, car), updated.
         left: Cars that left for good, (env, car), written.
-        terminated: (env), written.
-        truncated: (env), written.
+        terminated: Terminated episodes, (env), written.
+        truncated: Truncated episodes, (env), written.
     """
     for e in range(first, end):
         terminated[e] = done[e]
@@ -57,7 +57,7 @@ def judge(
         hit = False
         for n in range(present.shape[1]):
             hit = hit or contacts[e, n] > 0.0
-        # Who runs into something is not through: it pays for the time that was left.
+        # A collision does not accomplish the task: it costs the remaining time.
         unpaid = max(max_cycles - cycles[e], 0) if collision_ends and hit and not done[e] else 0
         for n in range(present.shape[1]):
             if present[e, n] and time >= 0:
@@ -84,13 +84,13 @@ def judge(
 
 @kernel
 def tracking_errors(body, believed, ok, out):
-    """Distance of believed from true relative positions, mean over the others that can be used.
+    """Write the mean distance of estimated from true relative positions of usable estimates.
 
     Args:
-        body: The truth: x and y first, (env, car, 6) [m].
-        believed: (env, car, other, 2) [m]
-        ok: Where an estimate can be used, (env, car, other).
-        out: (env, car) [m], written; NaN where none can.
+        body: True states, x and y first, (env, car, 6) [m].
+        believed: Estimated relative positions, (env, car, other, 2) [m].
+        ok: Mask of usable estimates, (env, car, other).
+        out: Mean distances, (env, car) [m], written; NaN without usable estimates.
     """
     for e in range(out.shape[0]):
         for a in range(out.shape[1]):

@@ -1,4 +1,4 @@
-"""What commands can pass on their way to the simulated cars: the safety gate of real ones."""
+"""Safety gate of the real cars for the commands of simulated ones."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from relpos_env.registry import look_up
 from tracking.arrays import F64
 
 GATE = "hardware_bridge.safety.simulated:SimulatedGate"
-"""Found by its name: the simulation needs nothing of the hardware."""
+"""Name for look-up, so the simulation does not depend on `hardware_bridge`."""
 
 
 class CommandGate(Protocol):
-    """Of a batch of rooms."""
+    """Safety gate of a batch of rooms."""
 
     def reset(self, env: int) -> None:
         """Reset one room."""
 
     def allow(self, view: AgentView, speed: F64, steering: F64) -> tuple[F64, F64]:
-        """Speed [m/s] and steering [rad] that the cars may do, each (env, car)."""
+        """Return the allowed speed [m/s] and steering angle [rad] of the cars, each (env, car)."""
 
     def infos(self) -> Columns:
-        """What infos say of it, (env, car)."""
+        """Return the columns of the gate for infos, (env, car)."""
 
 
 def make_gate(n_envs: int, n_cars: int) -> CommandGate:
-    """The gate of real cars, with its usual limits."""
+    """Return the gate of real cars with its default limits."""
     none: dict[str, Callable[[int, int], CommandGate]] = {}
     return look_up(none, GATE, "gate", group="relpos_env.gates")(n_envs, n_cars)

@@ -1,7 +1,7 @@
-"""A batch of environments without an interface: rooms, trackers, operator, task, observations.
+"""Batch of environments without an interface: rooms, trackers, operator, task, observations.
 
-The PettingZoo, Gymnasium and Stable-Baselines3 environments are thin forms of this one, so they
-cannot differ.
+The PettingZoo, Gymnasium and Stable-Baselines3 environments are thin wrappers of this one, so
+they cannot differ.
 """
 
 from __future__ import annotations
@@ -36,22 +36,22 @@ NO_OPTIONS = ResetOptions()
 
 
 class EnvCore:
-    """Environments of one configuration, their results in arrays.
+    """Environments of one configuration, with their results in arrays.
 
-    Laws: same configuration, seeds and actions, same everything, bit for bit; environment k of
-    a batch is that environment alone.
+    Properties: equal configurations, seeds and actions give equal results, bit for bit;
+    environment k of a batch equals that environment alone.
     """
 
     def __init__(
         self, parts: Parts, n_envs: int = 1, threads: int = 1, physics: Physics = "fast"
     ) -> None:
-        """Make room for the batch; `begin` puts episodes into it.
+        """Allocate the batch; `begin` starts its episodes.
 
         Args:
-            parts: What the environments are made of.
-            n_envs: How many.
+            parts: Resolved configuration of the environments.
+            n_envs: Number of environments.
             threads: Number of parts of the batch that are stepped at a time.
-            physics: Where the configuration says nothing.
+            physics: Default if the configuration has no value.
         """
         n_envs = whole_number("n_envs", n_envs, 1, MOST_ENVS)
         threads = whole_number("threads", threads, 1, n_envs)
@@ -78,16 +78,16 @@ class EnvCore:
         self.weights = reward_weights(config.task, self.task, config.weights)
         self._size = total_size(parts.mode.fields)
         self.observations: F32 = np.zeros((n_envs, n, config.history * self._size), np.float32)
-        """(env, car, size); zeros for absent cars."""
+        """Observations, (env, car, size); zeros for absent cars."""
         self.rewards: F64 = np.zeros((n_envs, n))
-        """(env, car); 0 for absent cars."""
+        """Rewards, (env, car); 0 for absent cars."""
         self.team = TeamResults(np.zeros(n_envs), np.zeros(n_envs), np.zeros(n_envs))
-        """What came of the last step for all cars together, (env)."""
+        """Outcome of the last step for all cars together, (env)."""
         self.own_reward: F64 = np.zeros((n_envs, n))
-        """What the user's term added to it, (env, car)."""
+        """Reward of the user's own term, (env, car)."""
         self.gate = make_gate(n_envs, n) if config.gate else None
         self.active: Bool = np.zeros((n_envs, n), dtype=bool)
-        """Cars that take part, (env, car): in the room, or away and to return."""
+        """Participating cars, (env, car): in the room, or temporarily absent."""
         self.left: Bool = np.zeros((n_envs, n), dtype=bool)
         """Cars that left for good in the last step, (env, car)."""
         self.terminated: Bool = np.zeros(n_envs, dtype=bool)
@@ -106,7 +106,7 @@ class EnvCore:
         self._share_out()
 
     def seed(self, env: int, rng: np.random.Generator) -> None:
-        """Let the episodes of an environment come from a generator, from the next one on."""
+        """Set the generator of an environment, which draws its episodes from the next one on."""
         self._rngs[env] = rng
 
     def begin(
@@ -115,15 +115,15 @@ class EnvCore:
         watch: Callable[[World], None] | None = None,
         options: ResetOptions = NO_OPTIONS,
     ) -> None:
-        """Begin a new episode in some environments and observe it.
+        """Start a new episode in some environments and observe it.
 
         Args:
-            envs: Which, ascending.
-            watch: Called with each group after each step in which it stands at first.
-            options: Wishes for the episodes.
+            envs: Indices of the environments, ascending.
+            watch: Called with the groups after each step of the initial rest.
+            options: Requests for the episodes.
 
         Raises:
-            EnvError: A wish that cannot be fulfilled.
+            EnvError: A request cannot be fulfilled.
         """
         scenario = options.scenario or self.parts.scenario
         seconds = STAND_STILL + DECISION * self.parts.config.max_cycles
@@ -154,11 +154,11 @@ class EnvCore:
         self.observations[env] = 0.0
 
     def step(self, speed: F64, steering: F64) -> None:
-        """Drive all environments for one decision; the results are in the arrays.
+        """Drive all environments for one control period; the results are in the arrays.
 
         Args:
-            speed: (env, car) [m/s]; without effect where the car is not in the room yet.
-            steering: (env, car) [rad]; likewise.
+            speed: Commanded speed, (env, car) [m/s]; without effect for cars outside the room.
+            steering: Commanded angle, (env, car) [rad]; without effect for cars outside the room.
         """
         if self.gate is not None:
             speed, steering = self.gate.allow(self.loop.view, speed, steering)
@@ -180,34 +180,34 @@ class EnvCore:
 
     @property
     def state(self) -> WorldState:
-        """The truth now."""
+        """Current true state."""
         return self.loop.swarm.state
 
     @property
     def t(self) -> F64:
-        """Time since the cars were let go, (env) [s]; written again at the next step."""
+        """Time since the end of the initial rest, (env) [s]; overwritten at the next step."""
         np.subtract(self.loop.swarm.t, STAND_STILL, out=self._t)
         return self._t
 
     def tracking_error(self) -> F64:
-        """Distance of believed from true relative positions, (env, car) [m].
+        """Return the distance of estimated from true relative positions, (env, car) [m].
 
-        Mean over the others that a car can use; NaN where it can use none.
+        Mean over the usable estimates of a car; NaN if it has none.
         """
         self._compare()
         return self._tracking_error.copy()
 
     def team_observations(self) -> F32:
-        """Observations of all cars one after the other, (env, car size); a copy.
+        """Return the concatenated observations of all cars, (env, car size); a copy.
 
-        Zeros for absent cars, and for those that left in the last step too.
+        Zeros for absent cars, also for those that left in the last step.
         """
         rows = self.observations.copy()
         rows[self.left] = 0.0
         return rows.reshape(self.n_envs, -1)
 
     def infos(self) -> Columns:
-        """What infos say of every car, see `relpos_env.interface.infos`; shares memory."""
+        """Return the infos of every car, see `relpos_env.interface.infos`; shares memory."""
         self._compare()
         self._figure()
         return self._columns | ({} if self.gate is None else self.gate.infos())
@@ -219,7 +219,7 @@ class EnvCore:
             self._pool = None
 
     def _judge(self, envs: slice) -> None:
-        """What the task, the operator and the clock say of now."""
+        """Update task, operator and outcome with the current state."""
         self.task.update(self.state, self.t, self.loop.swarm.contacts, envs)
         self.operator.sample(self.state, self.task, envs)
         if envs.stop - envs.start == self.n_envs:
@@ -231,7 +231,7 @@ class EnvCore:
         """Add the user's term to the rewards of the cars in the room.
 
         Raises:
-            EnvError: It gives no finite number for each car.
+            EnvError: The term does not return a finite number for each car.
         """
         own = np.asarray(term(self), dtype=np.float64)
         if own.shape != self.rewards.shape or not np.isfinite(own).all():
@@ -242,9 +242,9 @@ class EnvCore:
         self.team.reward[:] += self.own_reward.sum(axis=1) / n
 
     def _observe(self, envs: slice | Sequence[int]) -> None:
-        """Write the observations of some environments; those of the others stay what they are.
+        """Write the observations of some environments; those of the others do not change.
 
-        A car that left for good saw the room for the last time before it left.
+        A car that left for good keeps its last observation before it left.
         """
         some_left = self.left.any()
         last = self.observations[self.left] if some_left else None
@@ -262,7 +262,7 @@ class EnvCore:
             self.observations[self.left] = last
 
     def _share_out(self) -> None:
-        """Cut the batch into parts for the threads; put together what kernels take."""
+        """Partition the batch for the threads and bind the kernels to their arrays."""
         edges = np.linspace(0, self.n_envs, self._threads + 1).astype(int)
         slices = [slice(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
         self._lanes = [(envs, self.loop.part(envs)) for envs in slices] if len(slices) > 1 else []
@@ -287,7 +287,7 @@ class EnvCore:
         self._pool = ThreadPoolExecutor(self._threads) if self._threads > 1 else None
 
     def __getstate__(self) -> dict[str, object]:
-        """Threads and views stay behind."""
+        """Return the state without threads, views and bound kernels."""
         behind = {"_lanes", "_pool", "_write", "_verdict", "_judge_all", "_compare"}
         behind |= {"_figure", "_columns"}
         return {k: v for k, v in self.__dict__.items() if k not in behind}

@@ -1,10 +1,9 @@
-"""What a filter would believe if it knew the simulated world: for bounds and consistency tests.
+"""Filter parameters that match the simulated world, for bounds and consistency tests.
 
-Filters and worlds have parameters of different types on purpose. This is the one place that
-translates. Noise of sensors follows from their parameters; what the orientation stage makes of
-them (heading and slow acceleration errors), how tyres slip beyond what the filter knows and how
-often sight is lost were measured on simulated runs, as written next to the numbers
-(`benchmarks/measure_world.py`).
+Filters and worlds have parameters of different types on purpose; only this module translates.
+Noise of sensors follows from their parameters. The errors of the attitude filter (heading and slow
+acceleration errors), tyre slip beyond the model of the filter and the rates of NLOS transitions
+were measured on simulated runs, as noted next to the numbers (`benchmarks/measure_world.py`).
 """
 
 from __future__ import annotations
@@ -28,20 +27,20 @@ from tracking.ranging.frames.timestamps import SPEED_OF_LIGHT
 from tracking.vehicles import VEHICLES
 
 STAMPS = 0.61
-"""[-] White noise of a range over that of its three receive stamps' worth of way."""
+"""[-] White noise of a range, from three receive stamps, over that of one stamp as a distance."""
 ENTER_RATE, LEAVE_RATE = 0.15, 0.3
-"""[1/s] How often a pair of cars loses sight of each other behind the box of `cars-nlos`, and how
-often it gets it back; taken for other rooms with obstacles and for bodies, too."""
+"""[1/s] Rates from LOS to NLOS and back of a pair of cars in `cars-nlos`; used for other rooms with
+obstacles and for bodies, too."""
 NEVER = 1e-9
-"""[1/s] or [-] What does not happen; the filter takes logarithms of it."""
+"""[1/s, -] Rate or probability of an event that never occurs; the filter takes its logarithm."""
 SIDEWAYS = 0.035
-"""[m/s] Slip of rear axles that no mount and cornering stiffness explains, as white noise 20 times
-a second: what is white and has the same mean over 8 s, 40 drives. In half of them it is below
-0.015; a crash is most of it."""
+"""[m/s] Slip of rear axles not explained by mount and cornering stiffness, as white noise at 20 Hz
+with the same mean over 8 s, from 40 drives. In half of them it is below 0.015; crashes are most
+of it."""
 
 
 def matched_params(scenario: Scenario | HumanScenario) -> JointParams:
-    """Parameters of the joint filter that are those of a scenario."""
+    """Return the parameters of the joint filter that match a scenario."""
     channel, imu = scenario.radio.channel, scenario.imu
     mean, std = excess_moments(channel)
     hidden = can_hide(scenario)
@@ -54,10 +53,10 @@ def matched_params(scenario: Scenario | HumanScenario) -> JointParams:
         carriers["human"] = replace(
             carriers["human"],
             accel_psd=math.hypot(imu.acc_noise, 0.6 * imu.vibration) * math.sqrt(DT),
-            # Tilt of VQF under limb accelerations, over three seconds: 0.03 to 0.1 m/s2.
+            # Tilt error of VQF under limb accelerations, over three seconds: 0.03 to 0.1 m/s2.
             bias_std=0.08,
             bias_tau=5.0,
-            # World yaw of VQF against the truth: 1 to 3 degrees and constant offsets to 5.
+            # Yaw error of VQF: 1 to 3 degrees, and constant offsets of up to 5 degrees.
             heading_std=0.07,
             heading_tau=15.0,
         )
@@ -67,8 +66,8 @@ def matched_params(scenario: Scenario | HumanScenario) -> JointParams:
             accel_psd=math.hypot(imu.acc_noise, imu.vibration) * math.sqrt(DT),
             bias_std=math.hypot(imu.acc_bias, imu.acc_drift),
             bias_tau=imu.drift_tau,
-            # World yaw of VQF against the truth: 0.6 to 1.4 degrees round offsets of a degree; 6
-            # degrees before the first move, 2 about the mean of three cars ten seconds later.
+            # Yaw error of VQF: 0.6 to 1.4 degrees around offsets of a degree; 6 degrees before the
+            # first motion, 2 degrees around the mean of three cars ten seconds later.
             first_heading_std=0.1,
             heading_std=0.022,
             heading_tau=8.0,
@@ -87,7 +86,7 @@ def matched_params(scenario: Scenario | HumanScenario) -> JointParams:
         power_diff_los_std=max(power_diff_los_std, 0.1),
         power_diff_nlos=channel.gap + max(channel.gap_nlos, 0.1),
         power_diff_nlos_std=max(power_diff_nlos_std, 0.1),
-        # Simulated radios lose ranges; none of those that come means nothing.
+        # Simulated radios lose ranges but give no outliers.
         outlier_prob=NEVER,
     )
     return JointParams(
@@ -101,21 +100,21 @@ def matched_params(scenario: Scenario | HumanScenario) -> JointParams:
         ),
         nlos=nlos,
         nlos_in_space=nlos,
-        noise_learning=NoiseLearningParams(learns=False),  # it is known
-        # The NIS is 1 where noise is what it is believed to be.
+        noise_learning=NoiseLearningParams(learns=False),  # the noise is known
+        # The mean NIS is 1 if the noise model is correct.
         start=JointStartParams(respawn_nis=2.0),
     )
 
 
 def can_hide(scenario: Scenario | HumanScenario) -> bool:
-    """Whether something may stand between two nodes: obstacles, those of episodes, bodies."""
+    """Return whether obstacles (of the scenario or drawn) or bodies can occlude a pair of nodes."""
     if isinstance(scenario, HumanScenario):
         return True
     return bool(scenario.obstacles) or scenario.randomisation.obstacles[1] > 0
 
 
 def excess_moments(channel: ChannelParams) -> tuple[float, float]:
-    """Mean and standard deviation of what is added behind an obstacle [m]."""
+    """Return mean and standard deviation of the excess (NLOS bias) behind an obstacle [m]."""
     mu, sigma, cap = channel.excess
     z, weight = np.polynomial.hermite_e.hermegauss(64)
     excess = cap / (1.0 + np.exp(-(mu + sigma * z)))

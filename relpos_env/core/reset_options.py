@@ -1,4 +1,4 @@
-"""What `reset(options=...)` can ask of an episode."""
+"""Options of `reset(options=...)` for an episode."""
 
 from __future__ import annotations
 
@@ -24,24 +24,24 @@ KNOWN = ("poses", "goals", "scenario")
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ResetOptions:
-    """Wishes for one episode."""
+    """Requests for one episode."""
 
     __repr__ = short_repr
 
     poses: F64 | None = None
     """x, y, heading of the first cars at the start, (car, 3) [m, m, rad]; drawn if None."""
     goals: F64 | None = None
-    """Where the cars shall stand, (car, 2) [m], if the task is `hold`; where they shall meet, (2),
+    """Goal positions of the cars, (car, 2) [m], if the task is `hold`; the meeting point, (2) [m],
     if it is `rendezvous`; chosen by the task if None."""
     scenario: Scenario | None = None
-    """In place of that of the environment; of the same room, protocol, antennas, magnetic waves
-    and furnishing, with no more boxes."""
+    """Scenario in place of that of the environment, with the same room, protocol, antennas,
+    magnetic waves and furnishing, and no more boxes."""
 
     def placed(self, episode: Episode, size: tuple[float, float]) -> Episode:
-        """The episode with its first cars where they are wanted.
+        """Return the episode with its first cars at the requested poses.
 
         Raises:
-            EnvError: A car in a wall, an obstacle or another car, or more cars than slots.
+            EnvError: A car is in a wall, an obstacle or another car, or cars outnumber the slots.
         """
         if self.poses is None:
             return episode
@@ -67,11 +67,11 @@ def reset_options(options: Mapping[str, Any] | None, parts: Parts) -> ResetOptio
     """Read the options of a reset.
 
     Args:
-        options: By name; None for none.
-        parts: Of the environment.
+        options: Options by name; None for no options.
+        parts: Resolved configuration of the environment.
 
     Raises:
-        EnvError: An unknown option, or one of a wrong shape.
+        EnvError: An option is unknown or has a wrong shape.
     """
     options = options or {}
     for name in options:
@@ -87,10 +87,10 @@ def reset_options(options: Mapping[str, Any] | None, parts: Parts) -> ResetOptio
 
 
 def _rows(name: str, value: Any, columns: int) -> F64:
-    """Finite numbers, (row, columns), or (columns) as one row.
+    """Return a value as finite numbers, (row, columns); (columns) becomes one row.
 
     Raises:
-        EnvError: They are not.
+        EnvError: The value has another shape or is not finite.
     """
     try:
         array = np.atleast_2d(np.asarray(value, dtype=np.float64))
@@ -102,10 +102,10 @@ def _rows(name: str, value: Any, columns: int) -> F64:
 
 
 def _fitting(wanted: Scenario, parts: Parts) -> Scenario:
-    """The scenario, if an environment that was made for another can have it.
+    """Return the scenario, if it fits an environment that was made for another one.
 
     Raises:
-        EnvError: It cannot.
+        EnvError: The scenario does not fit.
     """
     made = parts.scenario
     if wanted.room != made.room:

@@ -1,8 +1,8 @@
-"""The tracker in the loop: rooms, their measurements, and what the cars believe.
+"""Tracker in the loop: rooms, their measurements, and the estimates of the cars.
 
     command -> World -> measurements -> Perception -> view of every car
 
-The tracker gets nothing but measurements.
+Measurements are the only input of the tracker.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from tracking.tracker import TrackerParams
 
 
 def default_params(scenario: Scenario, n_cars: int) -> TrackerParams:
-    """What the trackers believe by default: they wait for ranges as long as a round takes."""
+    """Return the default tracker parameters; their horizon covers 1.5 ranging rounds."""
     radio = scenario.radio.for_nodes(n_cars)
     rounds = 1.5 / round_rate(radio.session.phy, n_cars)
     horizon = HorizonParams(delay=max(HorizonParams().delay, rounds))
@@ -34,7 +34,7 @@ def default_params(scenario: Scenario, n_cars: int) -> TrackerParams:
 
 
 def waiting_at_most(scenario: Scenario, n_cars: int, params: TrackerParams, n_steps: int) -> int:
-    """Measurements that the horizon holds at a time, and some."""
+    """Return an upper bound on the number of measurements in the horizon."""
     pairs = n_cars * (n_cars - 1) // 2
     phy = scenario.radio.for_nodes(n_cars).session.phy
     rate = 2 * n_cars / DT + pairs * round_rate(phy, n_cars)
@@ -42,7 +42,7 @@ def waiting_at_most(scenario: Scenario, n_cars: int, params: TrackerParams, n_st
 
 
 class TrackedWorld:
-    """Groups of cars that know each other through their trackers."""
+    """Simulated groups of cars with a tracker."""
 
     def __init__(
         self,
@@ -70,24 +70,24 @@ class TrackedWorld:
 
     @property
     def view(self) -> AgentView:
-        """What every car sees now."""
+        """Current view of every car."""
         return self.perception.view
 
     @property
     def estimate(self) -> TeamEstimate:
-        """The tracker's last estimate, as old as the horizon, overwritten by the next."""
+        """Last estimate of the tracker, as old as the horizon; the next one overwrites it."""
         return self.perception.estimate
 
     def part(self, envs: slice) -> TrackedWorld:
-        """Some of the groups; shares their memory."""
-        part = TrackedWorld.__new__(TrackedWorld)  # to copy binds the kernels of the whole, 2 ms
+        """Return a view of some of the groups that shares their memory."""
+        part = TrackedWorld.__new__(TrackedWorld)  # a copy would bind all kernels, 2 ms
         part.swarm = self.swarm.part(envs)
         part.perception = self.perception.part(envs, part.swarm.block, part.swarm.powered)
         part._singles = {}
         return part
 
     def share(self, target: F64, wanted: Bool, command: F64) -> None:
-        """Let the view have what the task and the operator want, in their own memory.
+        """Let the view share the memory of the targets and commands of task and operator.
 
         Args:
             target: As in `AgentView`.
@@ -104,13 +104,13 @@ class TrackedWorld:
         rngs: Sequence[np.random.Generator],
         watch: Callable[[World], None] | None = None,
     ) -> None:
-        """Reset some groups and let them stand while their trackers are switched on.
+        """Reset some groups and keep them at rest while their trackers are switched on.
 
         Args:
-            envs: Which, ascending.
-            episodes: What each is made of.
-            rngs: One for each.
-            watch: Called with each group after each of its steps.
+            envs: Indices of the groups, ascending.
+            episodes: Episode of each group.
+            rngs: Generator of each group.
+            watch: Called with the groups after each of their steps.
         """
         for env, episode, rng in zip(envs, episodes, rngs, strict=True):
             self.swarm.begin(env, episode, rng)
@@ -124,7 +124,7 @@ class TrackedWorld:
                     watch(part.swarm)
 
     def _parts(self, envs: Sequence[int]) -> Iterator[TrackedWorld]:
-        """Groups to step: the whole batch at once, or each by itself."""
+        """Yield the groups to step: the whole batch at once, or each by itself."""
         if len(envs) == self.swarm.n_envs:
             yield self
             return
@@ -134,11 +134,11 @@ class TrackedWorld:
             yield self._singles[env]
 
     def step(self, speed: F64, steering: F64) -> None:
-        """Drive for one decision and let the tracker catch up.
+        """Drive for one control period and update the tracker.
 
         Args:
-            speed: Wanted, (env, car) [m/s].
-            steering: Wanted, (env, car) [rad].
+            speed: Commanded speed, (env, car) [m/s].
+            steering: Commanded steering angle, (env, car) [rad].
         """
         swarm, view = self.swarm, self.view
         swarm.step(speed, steering)
@@ -151,7 +151,7 @@ class TrackedWorld:
         self.perception.step()
 
     def __getstate__(self) -> dict[str, object]:
-        """Parts stay behind."""
+        """Return the state without the parts."""
         return {**self.__dict__, "_singles": {}}
 
     def __setstate__(self, state: dict[str, object]) -> None:

@@ -1,1 +1,1 @@
-"""Distances, contacts to come and lines of sight between boxes."""
+"""Distances, imminent contacts and lines of sight between cars and boxes."""

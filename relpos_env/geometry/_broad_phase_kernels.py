@@ -1,7 +1,7 @@
-"""Whether anything in a room is about to touch: only then a step needs the rigid-body solver.
+"""Broad phase: tests for imminent contacts, since only these need the rigid-body solver.
 
-Bodies that touch nothing move by their forces alone, which `_vehicle_kernels` does with the
-solver's own formulas, so leaving the solver out changes no bit.
+Bodies without contacts move by their forces alone. `relpos_env.world._car_kernels` uses the
+formulas of the solver for these, so the result without the solver is equal, bit for bit.
 """
 
 from __future__ import annotations
@@ -11,21 +11,21 @@ import math
 from tracking.kernels.jit import small_kernel
 
 MARGIN = 0.10
-"""[m] More than two bodies come nearer within a step, with the roundings of their corners."""
+"""[m] More than the approach of two bodies within a step plus their rounded corners."""
 
 
 @small_kernel
 def touches_soon(body, present, box_body, boxes, room, size, e):
-    """True if a present car is nearly at a wall, a box or another car, or if a box moves.
+    """Return whether a present car is close to a wall, a box or another car, or a box moves.
 
     Args:
         body: x, y, heading and velocities of cars, (env, car, 6).
-        present: (env, car)
-        box_body: The same of boxes, (env, box, 6).
+        present: Mask of present cars, (env, car).
+        box_body: x, y, angle and velocities of boxes, (env, box, 6).
         boxes: Centre, half width and depth [m], cosine, sine, (env, box, 6).
         room: Half width and depth [m], (env, 2).
         size: Half length and width of a car [m], (env, 2).
-        e: Environment.
+        e: Index of the environment.
     """
     for b in range(box_body.shape[1]):
         if box_body[e, b, 3] != 0.0 or box_body[e, b, 4] != 0.0 or box_body[e, b, 5] != 0.0:
@@ -72,7 +72,7 @@ def touches_soon(body, present, box_body, boxes, room, size, e):
 
 @small_kernel
 def is_far(body, present, boxes, room, reach, e, n):
-    """True if a car is far from all else, however turned; half of any is below reach [m]."""
+    """Return whether a car is far from all objects at any heading; `reach` > half a car [m]."""
     x, y, far = body[e, n, 0], body[e, n, 1], reach + MARGIN
     if abs(x) + far > room[e, 0] or abs(y) + far > room[e, 1]:
         return False

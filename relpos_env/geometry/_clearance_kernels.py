@@ -1,7 +1,7 @@
-"""How much room cars have: the free way between their bodies and what is nearest, compiled.
+"""Clearance of cars: distances between their bodies and the nearest object, compiled.
 
-The distance of two rectangles that are apart is that of a corner of one from the other. Bodies
-have rounded edges, which stand out by their radius.
+The distance of two separate rectangles is that of a corner of one from the other. Bodies have
+rounded edges, which extend them by their radius.
 """
 
 from __future__ import annotations
@@ -12,21 +12,21 @@ from relpos_env.world.pymunk_space import CAR_RADIUS, WALL_RADIUS
 from tracking.kernels.jit import kernel, small_kernel
 
 FARTHEST = 0.5
-"""[m] What is farther away is not looked for."""
+"""[m] Largest clearance."""
 
 
 @kernel
 def read_clearances(body, present, size, room, boxes, out):
-    """Way between every car and the wall, box or car nearest to it.
+    """Write the distance between every car and the nearest wall, box or car.
 
     Args:
         body: x, y, heading and velocities of cars, (env, car, 6).
-        present: (env, car)
+        present: Mask of present cars, (env, car).
         size: Half length and width of a car [m], (env, 2).
         room: Half width and depth [m], (env, 2).
-        boxes: Centre, half width and depth [m], cosine, sine, (env, box, 6); zero half width for
-            none.
-        out: (env, car) [m], written: 0 at a touch, at most `FARTHEST`; that of absent cars too.
+        boxes: Centre, half width and depth [m], cosine, sine, (env, box, 6); a half width of 0
+            marks an unused row.
+        out: Clearances, (env, car) [m], written: 0 at a contact; `FARTHEST` for absent cars.
     """
     for e in range(out.shape[0]):
         half_l, half_w = size[e, 0], size[e, 1]
@@ -68,19 +68,19 @@ def read_clearances(body, present, size, room, boxes, out):
 
 @small_kernel
 def gap(dx, dy, c_a, s_a, half_l_a, half_w_a, c_b, s_b, half_l_b, half_w_b):
-    """Distance of two rectangles, 0 where a corner of one is in the other [m].
+    """Return the distance of two rectangles, 0 if a corner of one is in the other [m].
 
     Args:
-        dx: From the middle of the first to that of the second [m].
-        dy: From the middle of the first to that of the second [m], along y.
+        dx: x from the centre of the first to that of the second [m].
+        dy: y from the centre of the first to that of the second [m].
         c_a: Cosine of the angle of the first.
-        s_a: Sine of it.
-        half_l_a: Its half sides [m].
-        half_w_a: Its half sides [m].
+        s_a: Sine of the angle of the first.
+        half_l_a: Half length of the first [m].
+        half_w_a: Half width of the first [m].
         c_b: Cosine of the angle of the second.
-        s_b: Sine of it.
-        half_l_b: Its half sides [m].
-        half_w_b: Its half sides [m].
+        s_b: Sine of the angle of the second.
+        half_l_b: Half length of the second [m].
+        half_w_b: Half width of the second [m].
     """
     c, s = c_a * c_b + s_a * s_b, c_a * s_b - s_a * c_b
     ahead, left = c_a * dx + s_a * dy, c_a * dy - s_a * dx
@@ -93,17 +93,17 @@ def gap(dx, dy, c_a, s_a, half_l_a, half_w_a, c_b, s_b, half_l_b, half_w_b):
 
 @small_kernel
 def corner_to_box(x, y, c, s, half_l, half_w, box_l, box_w):
-    """Least distance of the corners of a rectangle from a box along the axes at the origin [m].
+    """Return the least distance of a rectangle's corners to an axis-aligned box at the origin [m].
 
     Args:
-        x: Middle of the rectangle [m].
-        y: Middle of the rectangle [m], along y.
-        c: Cosine of its angle.
-        s: Sine of it.
-        half_l: Its half sides [m].
-        half_w: Its half sides [m].
-        box_l: Those of the box [m].
-        box_w: Those of the box [m].
+        x: x of the centre of the rectangle [m].
+        y: y of the centre of the rectangle [m].
+        c: Cosine of the angle of the rectangle.
+        s: Sine of the angle of the rectangle.
+        half_l: Half length of the rectangle [m].
+        half_w: Half width of the rectangle [m].
+        box_l: Half length of the box [m].
+        box_w: Half width of the box [m].
     """
     least = math.inf
     for k in range(4):

@@ -1,4 +1,4 @@
-"""Who sees whom: lines of sight between points of a room."""
+"""Lines of sight between points of a room."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from tracking.arrays import F64, Bool
 
 
 def pairs_in_sight(pos: F64, boxes: F64) -> Bool:
-    """Which points have nothing between them.
+    """Return which pairs of points have line of sight.
 
     Args:
-        pos: (point, 2) [m]
+        pos: Positions, (point, 2) [m].
         boxes: Centre, half width and depth [m], cosine, sine, (box, 6).
 
     Returns:
-        (point, point)
+        True without a box in between, (point, point).
     """
     sight = np.ones((len(pos), len(pos)), dtype=bool)
     pairs_cross_boxes(np.ascontiguousarray(pos), boxes, sight)

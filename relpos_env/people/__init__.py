@@ -1,5 +1,5 @@
-"""People in motion: trackers on the skin, limbs in the way of the radio.
+"""People in motion: trackers on the skin, limbs that occlude the radio.
 
-`motion` turns samples into a smooth motion; they come from `procedural` (a skeleton that does
-the exercises of `exercises`) or from `recorded` (motion capture).
+`motion` turns samples into a smooth motion; the samples come from `procedural` (a skeleton that
+does the exercises of `exercises`) or from `recorded` (motion capture).
 """

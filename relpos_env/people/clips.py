@@ -1,4 +1,4 @@
-"""Motion capture of people, as read from a folder of `.npz` files.
+"""Motion capture of people, read from a folder of `.npz` files.
 
 A file holds evenly spaced times `t`, `position` and `quaternion` of six trackers at joint
 centres, and `body_start`, `body_end`, `body_radius` of the limbs called `body_names`. The
@@ -21,10 +21,10 @@ from tracking.geometry import quat_from_yaw, quat_multiply, rotate
 from tracking.params.short_repr import short_repr
 
 FOREARM = 0.04
-"""[m] Radius."""
+"""[m] Radius of a forearm."""
 WAIST = 0.05
-"""[m] The axis of the trunk begins so far over the hip joints, so that its end fills the pelvis;
-that of the files begins at the waist."""
+"""[m] Height of the lower end of the trunk's axis over the hip joints, so that the end fills the
+pelvis; in the files it is at the waist."""
 ON_SKIN = np.array(
     [
         [0.0, 0.065, 0.0],
@@ -35,8 +35,8 @@ ON_SKIN = np.array(
         [0.053, 0.083, 0.054],
     ]
 )
-"""[m] Trackers from the joint centres of the files, in segment frames: outside of the arms, on
-the belt, and on the thighs 6 cm over the knees, half outside and half in front."""
+"""[m] Offsets of trackers from the joint centres of the files, in segment frames: outside of the
+arms, on the belt, and on the thighs 6 cm over the knees, half outside and half in front."""
 ARRAYS = {
     "t", "position", "quaternion", "body_names", "body_start", "body_end", "body_radius"
 }  # fmt: skip
@@ -44,7 +44,7 @@ ARRAYS = {
 
 @dataclass(frozen=True, slots=True)
 class Clip:
-    """One recording, round the middle of the floor."""
+    """One recording, centred on the middle of the floor."""
 
     __repr__ = short_repr
 
@@ -55,14 +55,14 @@ class Clip:
     q_wb: F64
     """Orientation of the trackers, (time, site, 4)."""
     radius: F64
-    """(limb) [m]"""
+    """Radius of the limbs, (limb) [m]."""
     hides: Bool
-    """True for limbs that hide what is behind them, (limb)."""
+    """True for limbs that occlude the radio, (limb)."""
     hips: tuple[int, int]
-    """Left and right hip joint among the points."""
+    """Indices of the left and right hip joint among the points."""
 
     def turned(self, yaw: float) -> Clip:
-        """The same, turned about the vertical through the middle [rad]."""
+        """Return the clip rotated by `yaw` about the vertical through the middle [rad]."""
         q = quat_from_yaw(yaw)
         return replace(
             self,
@@ -71,14 +71,14 @@ class Clip:
         )
 
     def place(self) -> tuple[F64, F64]:
-        """Middle of the hips, (time, 2) [m], and where the person faces, (time) [rad]."""
+        """Return the middle of the hips, (time, 2) [m], and the facing direction, (time) [rad]."""
         left, right = (self.points[:, k, :2] for k in self.hips)
         across = left - right
         return 0.5 * (left + right), np.arctan2(-across[:, 0], across[:, 1])
 
 
 def find_recordings() -> Path | None:
-    """Folder of motion capture: in RELPOS_DATA, or in ../shared/data next to the project."""
+    """Return the motion capture folder in RELPOS_DATA or ../shared/data next to the project."""
     named = os.environ.get("RELPOS_DATA")
     data = Path(named) if named else Path(__file__).resolve().parents[3] / "shared" / "data"
     folder = data / "human_motion"
@@ -89,10 +89,10 @@ def load_clips(folder: Path | None = None) -> list[Clip]:
     """Read all clips of a folder.
 
     Args:
-        folder: With `.npz` files; None looks where `find_recordings` does.
+        folder: Folder with `.npz` files; that of `find_recordings` if None.
 
     Raises:
-        EnvError: There is no such folder, or a file is not as expected.
+        EnvError: There is no such folder, or a file has unexpected contents.
     """
     folder = folder or find_recordings()
     files = sorted(folder.glob("*.npz")) if folder is not None else []

@@ -1,6 +1,6 @@
-"""Smooth ways from one value to another: speed and acceleration have no steps.
+"""Smooth transitions between values: speed and acceleration have no steps.
 
-The ramp is the quintic 10 x^3 - 15 x^4 + 6 x^5, the path of least jerk between two rests [1].
+The ramp is the quintic 10 x^3 - 15 x^4 + 6 x^5, the minimum-jerk path between two rests [1].
 
 References:
     [1] Flash, Hogan, The coordination of arm movements, J. Neuroscience 5 (1985) 1688.
@@ -14,39 +14,39 @@ from tracking.arrays import F64
 
 
 def ease(x: F64) -> F64:
-    """From 0 at x = 0 to 1 at x = 1, and level outside."""
+    """Return a ramp from 0 at x = 0 to 1 at x = 1, constant outside."""
     x = np.clip(x, 0.0, 1.0)
     return np.asarray(x**3 * (10.0 - 15.0 * x + 6.0 * x**2))
 
 
 def ease_integral(x: F64) -> F64:
-    """The integral of `ease` from 0 to x."""
+    """Return the integral of `ease` from 0 to x."""
     inside = np.clip(x, 0.0, 1.0)
     within = inside**4 * (2.5 - 3.0 * inside + inside**2)
     return np.asarray(within + np.maximum(x - 1.0, 0.0))
 
 
 def bump(x: F64) -> F64:
-    """From 0 at x = 0 to 1 at x = 1/2 and back to 0 at x = 1; level outside."""
+    """Return a bump from 0 at x = 0 to 1 at x = 1/2 and back to 0 at x = 1, constant outside."""
     x = np.clip(x, 0.0, 1.0)
     return np.asarray(64.0 * x**3 * (1.0 - x) ** 3)
 
 
 def window(t: F64, seconds: float, ramp: float) -> F64:
-    """1 from 0 to so many seconds, with ramps inside at both ends."""
+    """Return a window of 1 from 0 to `seconds`, with ramps inside at both ends."""
     return ease(t / ramp) * ease((seconds - t) / ramp)
 
 
 def join(
     t: F64, seconds: float, begin: tuple[float, float, float], end: tuple[float, float, float]
 ) -> F64:
-    """The quintic from one state to another.
+    """Return the quintic from one state to another.
 
     Args:
         t: Times since the first state, (time) [s].
-        seconds: When the second state is reached [s].
-        begin: Value, speed and acceleration of the first.
-        end: Those of the second.
+        seconds: Time of the second state [s].
+        begin: Value, speed and acceleration of the first state.
+        end: Value, speed and acceleration of the second state.
     """
     x, h = t / seconds, seconds
     p0, v0, a0 = begin[0], begin[1] * h, begin[2] * h * h

@@ -1,8 +1,8 @@
-"""The motion of a body: sampled positions and orientations, made smooth by splines.
+"""Motion of a body: smooth splines through sampled positions and orientations.
 
 Positions are interpolated by quintic splines, so that the acceleration is their second
-derivative and itself smooth. A quaternion is a quintic spline s(t) in each component,
-brought to unit length, and the angular rate follows from it [1]:
+derivative and itself smooth. A quaternion is a normalised quintic spline s(t) in each
+component, and the angular rate follows from it [1]:
 
     q = s / |s|,    rate_b = 2 vec(q* dq/dt),    dq/dt = (ds/dt - (q . ds/dt) q) / |s|
 
@@ -23,67 +23,67 @@ from tracking.geometry import quat_conjugate, quat_multiply
 from tracking.params.short_repr import short_repr
 
 HIDING = ("trunk", "head")
-"""Limbs that hide what is behind them. Arms and legs, 8 cm to 16 cm thick, are narrower than the
-first Fresnel zone, 17 cm to 21 cm across halfway along 0.6 m at 6.5 GHz to 4 GHz: waves bend
-round them with little loss and hardly any detour."""
+"""Limbs that occlude the radio. Arms and legs, 8 cm to 16 cm thick, are narrower than the first
+Fresnel zone, 17 cm to 21 cm across halfway along 0.6 m at 6.5 GHz to 4 GHz: waves are diffracted
+around them with little loss and hardly any detour."""
 SITES = ("right upper arm", "right wrist", "right hip", "left wrist", "right knee", "left knee")
-"""Where the trackers are worn (Armani and Holz, ICRA 2024), in the order of the nodes."""
+"""Sites of the trackers (Armani and Holz, ICRA 2024), in the order of the nodes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BodySamples:
-    """A body at evenly spaced times."""
+    """Samples of a body at evenly spaced times."""
 
     __repr__ = short_repr
 
     t: F64
-    """(time) [s]"""
+    """Times, (time) [s]."""
     pos_w: F64
-    """Trackers, (time, site, 3) [m]."""
+    """Positions of the trackers, (time, site, 3) [m]."""
     q_wb: F64
-    """Their orientation, segment to world, (time, site, 4)."""
+    """Orientations of the trackers, segment to world, (time, site, 4)."""
     start_w: F64
     """One end of the axis of each limb, a capsule, (time, limb, 3) [m]."""
     end_w: F64
-    """The other end."""
+    """Other end of the axis of each limb, (time, limb, 3) [m]."""
     radius: F64
-    """(limb) [m]"""
+    """Radius of the limbs, (limb) [m]."""
     hides: Bool
-    """True for limbs that hide what is behind them from the radio, (limb)."""
+    """True for limbs that occlude the radio, (limb)."""
 
 
 @dataclass(frozen=True, slots=True)
 class BodyState:
-    """The trackers at some times."""
+    """State of the trackers at some times."""
 
     __repr__ = short_repr
 
     pos_w: F64
-    """(time, site, 3) [m]"""
+    """Position, (time, site, 3) [m]."""
     vel_w: F64
-    """[m/s]"""
+    """Velocity, (time, site, 3) [m/s]."""
     accel_w: F64
-    """[m/s2]"""
+    """Acceleration, (time, site, 3) [m/s2]."""
     q_wb: F64
-    """Body to world, (time, site, 4)."""
+    """Orientation, body to world, (time, site, 4)."""
     rate_b: F64
     """Angular rate in the body frame, (time, site, 3) [rad/s]."""
 
 
 class BodyMotion:
-    """A body in motion over a run.
+    """Motion of a body over a run.
 
-    Law: speed, acceleration and angular rate are the derivatives of position and orientation.
+    Property: speed, acceleration and angular rate are the derivatives of position and orientation.
     """
 
     def __init__(self, samples: BodySamples) -> None:
         """Fit the splines.
 
         Args:
-            samples: At least six, all finite.
+            samples: At least six samples, all finite.
 
         Raises:
-            EnvError: Too few samples, or numbers that are not finite.
+            EnvError: There are too few samples, or some are not finite.
         """
         if len(samples.t) < 6 or not all(
             np.isfinite(a).all() for a in (samples.pos_w, samples.q_wb, samples.start_w)
@@ -95,7 +95,7 @@ class BodyMotion:
 
     @property
     def duration(self) -> float:
-        """When the motion ends [s]."""
+        """Time of the end of the motion [s]."""
         return float(self._samples.t[-1])
 
     @property
@@ -104,7 +104,7 @@ class BodyMotion:
         return int(self._samples.pos_w.shape[1])
 
     def at(self, t: F64) -> BodyState:
-        """The trackers at some times from 0 to `duration`, (time) [s]."""
+        """Return the state of the trackers at times from 0 to `duration`, (time) [s]."""
         s, ds = self._quat(t), self._quat(t, 1)
         length = np.linalg.norm(s, axis=-1, keepdims=True)
         q = s / length
@@ -113,7 +113,7 @@ class BodyMotion:
         return BodyState(self._pos(t), self._pos(t, 1), self._pos(t, 2), q, rate)
 
     def limbs(self, t: F64) -> F64:
-        """Where the limbs are, straight between samples.
+        """Return the limbs, interpolated linearly between samples.
 
         Args:
             t: Times from 0 to `duration`, (time) [s].
@@ -132,12 +132,12 @@ class BodyMotion:
         return np.concatenate([*ends, radius], axis=-1)
 
     def obstacles(self, t: F64) -> F64:
-        """The limbs that stand in the way of the radio, as `limbs` gives them."""
+        """Return the limbs that occlude the radio, as `limbs` does."""
         return self.limbs(t)[:, self._samples.hides]
 
 
 def one_sided(q: F64) -> F64:
-    """The same orientations with signs that never jump, (time, ..., 4)."""
+    """Return the same orientations with continuous signs, (time, ..., 4)."""
     same = np.sum(q[1:] * q[:-1], axis=-1, keepdims=True) >= 0.0
     sign = np.cumprod(np.where(same, 1.0, -1.0), axis=0)
     return np.concatenate([q[:1], q[1:] * sign])

@@ -1,8 +1,8 @@
-"""Where a person goes: a figure of eight in the room, told by the way along it.
+"""Path of a person: a figure of eight in the room, as a function of the distance along it.
 
     x = a sin(2 phi + shift),    y = b sin(phi)
 
-It turns as much to the left as to the right, so its direction comes back to where it was.
+Its left and right turns cancel, so the heading is periodic.
 """
 
 from __future__ import annotations
@@ -13,19 +13,19 @@ from scipy.interpolate import CubicSpline
 from tracking.arrays import F64
 
 MARGIN = 0.85
-"""[m] From the path to the walls; arms reach 0.8 m."""
+"""[m] Distance from the path to the walls; arms reach 0.8 m."""
 KNOTS = 721
 
 
 class Path:
-    """The eight of one person."""
+    """Figure of eight of one person."""
 
     def __init__(self, room: tuple[float, float], rng: np.random.Generator) -> None:
-        """Draw it.
+        """Draw the path.
 
         Args:
-            room: Along x and along y [m]; the origin is the centre.
-            rng: For its size, its shape, where it starts and which way round it goes.
+            room: Size along x and along y [m]; the origin is the centre.
+            rng: Generator of size, shape, start and sense of rotation.
         """
         a, b = np.maximum(0.5 * np.array(room) - MARGIN, 0.3) * rng.uniform(0.85, 1.0, 2)
         shift = rng.uniform(-0.25, 0.25)
@@ -42,13 +42,13 @@ class Path:
         self._spline = CubicSpline(way, rows, bc_type="periodic")
 
     def at(self, way: F64) -> tuple[F64, F64]:
-        """Places on the path.
+        """Return points on the path.
 
         Args:
-            way: From its start, (place) [m]; it goes round and round.
+            way: Distance along the path from its start, (point) [m]; the path is periodic.
 
         Returns:
-            (place, 2) [m], and the direction there without jumps, (place) [rad].
+            Positions, (point, 2) [m], and the heading without jumps, (point) [rad].
         """
         rows = self._spline(way % self._length)
         return rows[:, :2], rows[:, 2]

@@ -1,8 +1,7 @@
-"""What a person does over time: the numbers that a skeleton's joints are worked out from.
+"""Pose of a person over time, from which the joints of a skeleton are computed.
 
-The feet come first: they say where the ground is held. The legs follow from feet and pelvis,
-so that a foot on the floor stays where it is. All channels are arrays over time; a pair of
-sides is (right, left), as in `SIDES`.
+Feet and pelvis are given, and the legs follow from them, so that a foot on the floor does not
+move. All channels are arrays over time; a pair of sides is (right, left), as in `SIDES`.
 """
 
 from __future__ import annotations
@@ -16,54 +15,54 @@ from tracking.arrays import F64
 from tracking.params.short_repr import short_repr
 
 SIDES = np.array([-1.0, 1.0])
-"""Right and left; y points left."""
+"""Signs of right and left; y points left."""
 STANCE = 0.14
-"""[m] From the middle to the ball of each foot of a person who stands."""
+"""[m] Distance from the middle to the ball of each foot of a standing person."""
 TOE_OUT = 0.12
-"""[rad] Feet point outwards by so much."""
+"""[rad] Outward angle of the feet."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pose:
-    """A person over time."""
+    """Pose of a person over time."""
 
     __repr__ = short_repr
 
     pelvis_w: F64
     """Middle between the hip joints, (time, 3) [m]."""
     heading: F64
-    """Where the person goes or looks, without jumps, (time) [rad]."""
+    """Direction of walking or facing, without jumps, (time) [rad]."""
     pelvis_turn: F64
-    """Of the pelvis against the heading, to the left, (time) [rad]."""
+    """Yaw of the pelvis relative to the heading, to the left, (time) [rad]."""
     pelvis_tilt: F64
-    """Forwards, (time) [rad]."""
+    """Tilt of the pelvis, forwards, (time) [rad]."""
     twist: F64
-    """Of the trunk against the pelvis, to the left, (time) [rad]."""
+    """Yaw of the trunk relative to the pelvis, to the left, (time) [rad]."""
     lean: F64
-    """Of the trunk against the pelvis, forwards, (time) [rad]."""
+    """Tilt of the trunk relative to the pelvis, forwards, (time) [rad]."""
     ball_w: F64
-    """Balls of the feet, (time, side, 3) [m]; on the floor where z is 0."""
+    """Balls of the feet, (time, side, 3) [m]; on the floor if z is 0."""
     foot_yaw: F64
-    """(time, side) [rad]"""
+    """Yaw of the feet, (time, side) [rad]."""
     heel_lift: F64
     """Angle of the sole with the floor, heel up, (time, side) [rad]."""
     flexion: F64
-    """Of the shoulder, arm forwards, (time, side) [rad]."""
+    """Flexion of the shoulder, arm forwards, (time, side) [rad]."""
     abduction: F64
-    """Of the shoulder, arm sideways, (time, side) [rad]."""
+    """Abduction of the shoulder, arm sideways, (time, side) [rad]."""
     roll: F64
-    """Of the upper arm about its axis, outwards, (time, side) [rad]."""
+    """Rotation of the upper arm about its axis, outwards, (time, side) [rad]."""
     elbow: F64
-    """Flexion, (time, side) [rad]."""
+    """Flexion of the elbow, (time, side) [rad]."""
 
     @classmethod
     def standing(cls, size: SkeletonSize, pos: F64, heading: F64) -> Pose:
-        """A person who stands upright.
+        """Return the pose of a person who stands upright.
 
         Args:
-            size: Of the person.
-            pos: Where, (time, 2) [m].
-            heading: (time) [rad].
+            size: Size of the person.
+            pos: Position, (time, 2) [m].
+            heading: Heading, (time) [rad].
         """
         n = len(pos)
         still, sides = np.zeros(n), np.zeros((n, 2))
@@ -89,28 +88,28 @@ class Pose:
         return len(self.heading)
 
     def head(self, n: int) -> Pose:
-        """The first so many times."""
+        """Return the pose at the first `n` times."""
         return replace(self, **{f.name: getattr(self, f.name)[:n] for f in fields(self)})
 
 
 def join_poses(poses: list[Pose]) -> Pose:
-    """One after another."""
+    """Concatenate poses over time."""
     return Pose(
         **{f.name: np.concatenate([getattr(p, f.name) for p in poses]) for f in fields(Pose)}
     )
 
 
 def ball_at(size: SkeletonSize, pos: F64, heading: F64, apart: F64 | float = STANCE) -> F64:
-    """Balls of the feet of a person who stands somewhere.
+    """Return the balls of the feet of a standing person.
 
     Args:
-        size: Of the person.
-        pos: Under the middle of the pelvis, (..., 2) [m].
-        heading: (...) [rad].
-        apart: From the middle to each foot, (...) or one number [m].
+        size: Size of the person.
+        pos: Point under the middle of the pelvis, (..., 2) [m].
+        heading: Heading, (...) [rad].
+        apart: Distance from the middle to each foot, (...) or one number [m].
 
     Returns:
-        (..., side, 3) [m]
+        Positions, (..., side, 3) [m].
     """
     c, s = np.cos(heading)[..., None], np.sin(heading)[..., None]
     side = np.asarray(apart)[..., None] * SIDES

@@ -1,4 +1,4 @@
-"""A person who exercises: bouts one after another, with a breath in between.
+"""Simulated exercises of a person: consecutive bouts with short pauses in between.
 
 Every person has a size and a path of their own, and every bout its own rate and reach.
 """
@@ -27,15 +27,15 @@ def procedural_pose(
     dt: float,
     rng: np.random.Generator,
 ) -> tuple[SkeletonSize, Pose, F64]:
-    """What a person does who stands, and then goes through the exercises again and again.
+    """Return the pose of a person who stands first and then repeats the exercises.
 
     Args:
         exercises: Names in `EXERCISES`, in order.
-        room: Along x and along y [m]; the person stays inside.
-        seconds: Length of the run.
-        still: How long the person stands first [s].
+        room: Size along x and along y [m]; the person stays inside.
+        seconds: Length of the run [s].
+        still: Duration of the initial stand [s].
         dt: Time step [s].
-        rng: For the person and all that differs from bout to bout.
+        rng: Generator of the person and of the variations between bouts.
 
     Returns:
         The person's size, the pose, and its times, (time) [s].
@@ -66,7 +66,7 @@ def procedural_body(
     dt: float,
     rng: np.random.Generator,
 ) -> BodySamples:
-    """Where the limbs and trackers of that person are; arguments as for `procedural_pose`."""
+    """Return limbs and trackers of that person; arguments as for `procedural_pose`."""
     size, pose, t = procedural_pose(exercises, room, seconds, still, dt, rng)
     return body_samples(size, pose, t)
 
@@ -77,7 +77,7 @@ def _pause(size: SkeletonSize, path: Path, way: float, seconds: float, dt: float
 
 
 def _sway(t: F64, still: float, rng: np.random.Generator) -> F64:
-    """People do not stand still: the pelvis sways by some millimetres, (time, 3) [m]."""
+    """Return the postural sway of the pelvis, some millimetres, (time, 3) [m]."""
     hz, phase = rng.uniform(0.15, 0.6, (3, 2)), rng.uniform(0.0, 2.0 * np.pi, (3, 2))
     wave = np.sin(2.0 * np.pi * hz * t[:, None, None] + phase).sum(axis=1)
     sway = np.zeros((len(t), 3))

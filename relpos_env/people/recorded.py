@@ -1,8 +1,8 @@
-"""A person who moves as recorded: clips of motion capture, joined to a run of any length.
+"""Recorded motion of a person: clips of motion capture, joined to a run of any length.
 
-Each clip is entered where its pose is most like the one that is left, turned so that the person
-faces the same way. For a moment both are mixed: feet slide, and an arm that is up in one clip
-and down in the other shrinks on its way.
+Each clip is entered and left at the most similar poses, and rotated so that the person faces the
+same direction. Both clips are blended for a short time: feet slide, and an arm that is up in one
+clip and down in the other is shortened meanwhile.
 """
 
 from __future__ import annotations
@@ -19,28 +19,28 @@ from tracking.arrays import F64, I64
 from tracking.geometry import quat_conjugate, quat_from_yaw, quat_multiply, rotate
 
 BLEND = 0.8
-"""[s] Two clips are mixed for so long."""
+"""[s] Duration of the blend of two clips."""
 DRIFT = 8.0
-"""[s] In so long after that the person is led back to where the clip was recorded."""
+"""[s] Time after the blend in which the person returns to the recorded position of the clip."""
 LEAVE, ENTER = 5.0, 1.0
-"""[s] At the end of a clip and at the start of the next, searched for the poses most alike."""
+"""[s] Parts at the end of a clip and the start of the next, searched for similar poses."""
 LOOK_AHEAD = 0.2
-"""[s] Speeds count in the likeness by what they do in so long."""
+"""[s] Time by which speeds are multiplied in the comparison of poses."""
 START = 1.5
-"""[s] From the first pose, held, to the full speed of the recording."""
+"""[s] Time from the first pose, held, to the full speed of the recording."""
 
 
 def recorded_body(
     clips: list[Clip], seconds: float, still: float, dt: float, rng: np.random.Generator
 ) -> BodySamples:
-    """A person who holds a first pose and then moves as people in recordings did.
+    """Return a person who holds a first pose and then moves as recorded.
 
     Args:
-        clips: To play, all of one rate.
-        seconds: Length of the run.
-        still: How long the person stands first [s].
+        clips: Clips to play, all of one rate.
+        seconds: Length of the run [s].
+        still: Duration of the initial stand [s].
         dt: Time step of the samples [s].
-        rng: For the order of the clips and the first direction.
+        rng: Generator of the order of the clips and of the first heading.
     """
     n = len(clips)
     order = [int(k) for k in rng.permutation(n)]
@@ -76,7 +76,7 @@ def recorded_body(
 
 
 def _join(run: Clip, clip: Clip) -> tuple[Clip, Clip]:
-    """Two clips, left and entered where their poses are most alike, the second after the first."""
+    """Return two clips cut at their most similar poses, with the second blended to the first."""
     n, stride = round(BLEND / run.dt), max(round(0.05 / run.dt), 1)
     last, most = len(run.points) - n, len(clip.points) - n - 1
     leave = np.arange(max(last - round(LEAVE / run.dt), 0), last, stride, dtype=np.int64)
@@ -96,12 +96,12 @@ def _join(run: Clip, clip: Clip) -> tuple[Clip, Clip]:
 
 
 def _mixed(old: F64, new: F64, weight: F64) -> F64:
-    """Orientations on the way from old to new ones, the same way round at all times.
+    """Return orientations between old and new ones, with the same sense of rotation at all times.
 
     Args:
-        old: (time, site, 4)
-        new: (time, site, 4)
-        weight: Share of the way done, (time, 1) [-].
+        old: Old orientations, (time, site, 4).
+        new: New orientations, (time, site, 4).
+        weight: Share of the rotation to the new ones, (time, 1) [-].
     """
     turn = quat_multiply(quat_conjugate(old), new)
     turn = np.where(turn[..., :1].sum(axis=0) < 0.0, -turn, turn)
@@ -117,7 +117,7 @@ def _cut(clip: Clip, part: slice) -> Clip:
 
 
 def _features(clip: Clip, k: I64) -> F64:
-    """Poses and speeds as the person sees them, (frame, feature) [m]."""
+    """Return poses and speeds in the frame of the person, (sample, feature) [m]."""
     middle, heading = clip.place()
     points = clip.points.copy()
     points[..., :2] -= middle[:, None]
@@ -128,5 +128,5 @@ def _features(clip: Clip, k: I64) -> F64:
 
 
 def _speed(points: F64) -> F64:
-    """Metres a sample, (time, point)."""
+    """Return the distance moved per sample, (time, point) [m]."""
     return np.asarray(np.linalg.norm(np.gradient(points, axis=0), axis=-1))

@@ -1,7 +1,7 @@
-"""The simulation of a person: a motion with sensors on it, giving blocks of measurements.
+"""Simulation of a person: a motion with sensors, which gives blocks of measurements.
 
-The counterpart of `relpos_env.simulation.simulation` without physics: where the trackers are is
-known before, and what they measure follows from it.
+The counterpart of `relpos_env.simulation.simulation` without physics: the motion of the trackers
+is given, and their measurements follow from it.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from tracking.log import Log
 from tracking.measurements import MeasurementBlock
 
 LONGEST = 1800.0
-"""[s] Of a run: the whole motion is held in memory, up to 0.7 MB a second."""
+"""[s] Longest run: the whole motion is held in memory, up to 0.7 MB per second."""
 
 
 def human_constellation() -> Constellation:
-    """The nodes that a person wears: ids from 1 in the order of `SITES`, antennas at the origin."""
+    """Return the nodes of a person: ids from 1 in the order of `SITES`, antennas at the origin."""
     return Constellation(
         nodes=tuple(
             NodeConfig(id=k + 1, vehicle="human", imu_hz=1.0 / DT) for k in range(len(SITES))
@@ -38,7 +38,7 @@ def human_constellation() -> Constellation:
 
 
 class BodySimulation:
-    """One person. Law: same scenario, length and seed, same everything, bit for bit."""
+    """One person. Equal scenarios, lengths and seeds give equal results, bit for bit."""
 
     def __init__(
         self,
@@ -48,16 +48,16 @@ class BodySimulation:
         *,
         record: bool = False,
     ) -> None:
-        """Make the motion and switch the trackers on.
+        """Generate the motion and switch the trackers on.
 
         Args:
-            scenario: Who, where and with what.
-            rng: For everything.
-            seconds: How long the run is going to be.
-            record: Whether to keep everything for a log.
+            scenario: Motion, room and sensors.
+            rng: Generator of all random numbers.
+            seconds: Length of the run [s].
+            record: True to record everything for a log.
 
         Raises:
-            EnvError: Too long, no such exercise, or no motion capture where it is asked for.
+            EnvError: The run is too long, an exercise is unknown, or motion capture is missing.
         """
         if not 0.0 < seconds <= LONGEST:
             raise EnvError(f"seconds: expected at most {LONGEST:g} for people, got {seconds:g}")
@@ -82,10 +82,10 @@ class BodySimulation:
         return self._steps * DT
 
     def step(self, n_steps: int = 10) -> MeasurementBlock:
-        """Go on for some steps of `DT` and return all that was measured, in order.
+        """Simulate some steps of `DT` and return all measurements in order of time.
 
         Args:
-            n_steps: Not beyond the end of the run.
+            n_steps: Number of steps, not beyond the end of the run.
 
         Raises:
             EnvError: The run is over.
@@ -115,11 +115,11 @@ class BodySimulation:
         return block.sorted()
 
     def to_log(self, name: str, *, truth_every: int = 1) -> Log:
-        """What was recorded, as a log with truth.
+        """Return the recording as a log with truth.
 
         Args:
-            name: Its name.
-            truth_every: Truth of every so-manieth step; 1 is 100 Hz, since limbs move fast.
+            name: Name of the log.
+            truth_every: Steps per sample of the truth; 1 is 100 Hz, since limbs move fast.
 
         Raises:
             EnvError: Nothing was recorded.
@@ -132,7 +132,7 @@ class BodySimulation:
 
 
 def _samples(scenario: HumanScenario, seconds: float, rng: np.random.Generator) -> BodySamples:
-    """The body of a scenario, standing first while the trackers are switched on."""
+    """Return the body of a scenario, which stands first while the trackers are switched on."""
     if scenario.motion == "recorded":
         return recorded_body(load_clips(), seconds, STAND_STILL, DT, rng)
     return procedural_body(scenario.exercises, scenario.room, seconds, STAND_STILL, DT, rng)

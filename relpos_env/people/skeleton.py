@@ -1,8 +1,8 @@
-"""From what a person does to where limbs and trackers are: forward kinematics.
+"""Forward kinematics: positions of limbs and trackers from the pose of a person.
 
 Frames of all segments are x forward, y left, z up when the person stands with hanging arms.
 The legs are solved from hip and ankle in the plane of the foot's direction; every other joint
-turns by the angles of the pose. Trackers lie on the skin, outside their own limb.
+rotates by the angles of the pose. Trackers are on the skin, outside their own limb.
 """
 
 from __future__ import annotations
@@ -16,26 +16,26 @@ from relpos_env.people.skeleton_size import SkeletonSize
 from tracking.arrays import F64
 
 SKIN = 0.015
-"""[m] From the skin to the middle of a tracker."""
+"""[m] Distance from the skin to the middle of a tracker."""
 WAIST = 0.05
-"""[m] The axis of the trunk begins so far over the hip joints."""
+"""[m] Height of the lower end of the trunk's axis over the hip joints."""
 LIMBS = (
     "trunk", "head", "right thigh", "left thigh", "right shank", "left shank",
     "right upper arm", "left upper arm", "right forearm", "left forearm",
 )  # fmt: skip
-"""The capsules, in order."""
+"""Limbs as capsules, in order."""
 WORN_ON = ("right upper arm", "right forearm", "trunk", "left forearm", "right thigh", "left thigh")
 """The limb under each tracker."""
 RIGHT, LEFT = 0, 1
 
 
 def body_samples(size: SkeletonSize, pose: Pose, t: F64) -> BodySamples:
-    """Where everything is.
+    """Return limbs and trackers of a person.
 
     Args:
-        size: Of the person.
-        pose: Over time.
-        t: Its times, (time) [s].
+        size: Size of the person.
+        pose: Pose over time.
+        t: Times of the pose, (time) [s].
     """
     pelvis = Rotation.from_euler(
         "ZY", np.column_stack([pose.heading + pose.pelvis_turn, pose.pelvis_tilt])
@@ -58,7 +58,7 @@ def body_samples(size: SkeletonSize, pose: Pose, t: F64) -> BodySamples:
     ):
         for k in (RIGHT, LEFT):
             begin, end = ends[0][:, k], ends[1][:, k]
-            # The ball at the end of a capsule must not reach past the joint.
+            # The sphere at the end of a capsule must not extend past the joint.
             short = r(name) * (end - begin) / np.linalg.norm(end - begin, axis=1, keepdims=True)
             limbs.append((begin, end - 0.5 * short, r(name)))
     sites = [
@@ -83,7 +83,7 @@ def body_samples(size: SkeletonSize, pose: Pose, t: F64) -> BodySamples:
 
 
 def ankles(size: SkeletonSize, pose: Pose) -> F64:
-    """Ankles over the balls of the feet, (time, side, 3) [m]."""
+    """Return the ankles over the balls of the feet, (time, side, 3) [m]."""
     c, s = np.cos(pose.heel_lift), np.sin(pose.heel_lift)
     back = size.foot * c - size.ankle * s
     offset = np.stack(
@@ -98,7 +98,7 @@ def ankles(size: SkeletonSize, pose: Pose) -> F64:
 
 
 def leg_stretch(size: SkeletonSize, pose: Pose) -> F64:
-    """Distance from hip to ankle over the length of a straight leg, (time, side); below 1."""
+    """Return the distance from hip to ankle over the length of a straight leg, (time, side)."""
     pelvis = Rotation.from_euler(
         "ZY", np.column_stack([pose.heading + pose.pelvis_turn, pose.pelvis_tilt])
     )
@@ -111,7 +111,7 @@ def _hips(size: SkeletonSize, pose: Pose, pelvis: Rotation) -> F64:
 
 
 def _legs(size: SkeletonSize, pose: Pose, pelvis: Rotation) -> tuple[F64, F64, F64, list[Rotation]]:
-    """Hips, knees and ankles, (time, side, 3) [m], and the frames of the thighs."""
+    """Return hips, knees and ankles, (time, side, 3) [m], and the frames of the thighs."""
     hip, ankle = _hips(size, pose, pelvis), ankles(size, pose)
     span = ankle - hip
     length = np.linalg.norm(span, axis=-1, keepdims=True)
@@ -132,7 +132,7 @@ def _legs(size: SkeletonSize, pose: Pose, pelvis: Rotation) -> tuple[F64, F64, F
 def _arms(
     size: SkeletonSize, pose: Pose, trunk: Rotation, neck: F64
 ) -> tuple[F64, F64, F64, list[Rotation], list[Rotation]]:
-    """Shoulders, elbows, wrists, (time, side, 3) [m]; frames of upper arms and forearms."""
+    """Return shoulders, elbows, wrists, (time, side, 3) [m]; frames of upper arms and forearms."""
     upper, fore, joints = [], [], []
     for k, side in enumerate(SIDES):
         turns = np.column_stack(
@@ -148,13 +148,13 @@ def _arms(
 
 
 def _on(limb: str, size: SkeletonSize, up: float, front: float, side: int) -> F64:
-    """A place on the skin of a limb, from its upper joint [m].
+    """Return a point on the skin of a limb, relative to its upper joint [m].
 
     Args:
-        limb: Its name.
-        size: Of the person.
-        up: Along the axis [m].
-        front: How far round to the front from the outside [rad].
+        limb: Name of the limb.
+        size: Size of the person.
+        up: Position along the axis [m].
+        front: Angle from the outside towards the front [rad].
         side: -1 right, 1 left.
     """
     out = size.radius(limb) + SKIN

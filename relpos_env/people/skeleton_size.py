@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 STRETCH = 0.985
-"""[-] A standing leg is so long against a straight one."""
+"""[-] Length of a standing leg relative to a straight one."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,12 +28,12 @@ class SkeletonSize:
 
     @property
     def thigh(self) -> float:
-        """Hip to knee."""
+        """Distance from hip to knee."""
         return 0.245 * self.height
 
     @property
     def shank(self) -> float:
-        """Knee to ankle."""
+        """Distance from knee to ankle."""
         return 0.246 * self.height
 
     @property
@@ -43,53 +43,53 @@ class SkeletonSize:
 
     @property
     def foot(self) -> float:
-        """Ankle to the ball of the foot, along the floor."""
+        """Distance from the ankle to the ball of the foot, along the floor."""
         return 0.070 * self.height
 
     @property
     def toe_ahead(self) -> float:
-        """From under the pelvis to the ball of the foot of a person who stands."""
+        """Distance from under the pelvis to the ball of the foot of a standing person."""
         return self.foot - 0.02
 
     @property
     def hip(self) -> float:
-        """Middle of the pelvis to a hip joint."""
+        """Distance from the middle of the pelvis to a hip joint."""
         return 0.050 * self.height
 
     @property
     def trunk(self) -> float:
-        """Hips to shoulders."""
+        """Distance from hips to shoulders."""
         return 0.288 * self.height
 
     @property
     def shoulder(self) -> float:
-        """Middle to a shoulder joint."""
+        """Distance from the middle to a shoulder joint."""
         return 0.112 * self.height
 
     @property
     def upper_arm(self) -> float:
-        """Shoulder to elbow."""
+        """Distance from shoulder to elbow."""
         return 0.186 * self.height
 
     @property
     def forearm(self) -> float:
-        """Elbow to wrist."""
+        """Distance from elbow to wrist."""
         return 0.146 * self.height
 
     @property
     def head(self) -> float:
-        """Shoulders to the top of the head."""
+        """Distance from the shoulders to the top of the head."""
         return 0.182 * self.height
 
     def radius(self, limb: str) -> float:
-        """Radius of a limb: trunk, head, thigh, shank, upper arm or forearm."""
+        """Return the radius of a limb: trunk, head, thigh, shank, upper arm or forearm."""
         return self.height / 1.75 * RADII[limb]
 
     def standing_hip(self, stance: float) -> float:
-        """Height of the hips of a person who stands.
+        """Return the height of the hips of a standing person.
 
         Args:
-            stance: From the middle to the ball of each foot [m].
+            stance: Distance from the middle to the ball of each foot [m].
         """
         leg = STRETCH * (self.thigh + self.shank)
         behind = self.foot - self.toe_ahead
@@ -104,4 +104,4 @@ RADII = {
     "upper arm": 0.05,
     "forearm": 0.04,
 }
-"""[m] Of a body of 1.75 m."""
+"""[m] Radii for a body of 1.75 m."""

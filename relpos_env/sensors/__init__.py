@@ -1,4 +1,4 @@
-"""Simulated sensors: what the world does to measurements, never what a filter believes."""
+"""Simulated sensors and their error models; filters have parameters of their own."""
 
 from relpos_env.sensors.imu import HUMAN_IMU, Imu, ImuSimParams
 from relpos_env.sensors.magnetometer import Magnetometer, MagSimParams

@@ -1,4 +1,4 @@
-"""What the IMU of a car reads: the formulas of `relpos_env.sensors.imu`, one sample at a time."""
+"""IMU of a car, one sample at a time, with the formulas of `relpos_env.sensors.imu`."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from tracking.kernels.jit import kernel, small_kernel
 
 GRAVITY = 9.81
 DRIFT_EVERY = 10
-"""[-] Samples between two steps of the slow part, whose time constant is a thousand times that."""
+"""[-] Samples between two updates of the bias drift; its time constant is 1000 times as long."""
 STARTS = 1 << 50
-"""Counter of the draws at the start of an episode."""
+"""First counter of the draws at the start of an episode."""
 
 
 @kernel
 def start_imus(p, seed, bias, drift, e):
-    """Draw what calibration left on every IMU of an environment.
+    """Draw the residual biases of every IMU of an environment after calibration.
 
     Args:
         p: IMU of the environment.
-        seed: Of its IMUs, uint64.
+        seed: Seed of its IMUs, uint64.
         bias: Constant part, (env, node, 6) [rad/s, m/s2], written.
-        drift: Slow part, likewise.
-        e: Which environment.
+        drift: Slow part, (env, node, 6) [rad/s, m/s2], written.
+        e: Index of the environment.
     """
     for n in range(bias.shape[1]):
         key = draw_key(seed, np.uint64(STARTS + n))
@@ -40,20 +40,20 @@ def start_imus(p, seed, bias, drift, e):
 
 @small_kernel
 def read_imu(p, seed, count, bias, drift, e, n, truth, speed, out, row):
-    """One sample of one IMU.
+    """Write one sample of one IMU.
 
     Args:
         p: IMU of the environment.
-        seed: Of its IMUs, uint64.
+        seed: Seed of its IMUs, uint64.
         count: Number of the sample.
-        bias: (env, node, 6).
-        drift: (env, node, 6), updated.
-        e: Environment.
-        n: Node.
+        bias: Constant bias, (env, node, 6) [rad/s, m/s2].
+        drift: Slow bias, (env, node, 6) [rad/s, m/s2], updated.
+        e: Index of the environment.
+        n: Index of the node.
         truth: Six numbers: angular rate [rad/s] and specific force [m/s2] in the body frame.
-        speed: Of the carrier [m/s].
+        speed: Speed of the carrier [m/s].
         out: Values of events, (env, event, ...); columns 0 to 5 of the row are written.
-        row: Which.
+        row: Index of the event.
     """
     key = draw_key(seed, np.uint64(count * 64 + n))
     if count % DRIFT_EVERY == 0:
@@ -75,29 +75,29 @@ def read_imu(p, seed, count, bias, drift, e, n, truth, speed, out, row):
 
 @small_kernel
 def steps_per_unit(resolution):
-    """How many steps of a converter make a unit; 0 for a resolution of 0, which means none."""
+    """Return the steps of a converter per unit; 0 for a resolution of 0 (no rounding)."""
     return 1.0 / resolution if resolution > 0.0 else 0.0
 
 
 @small_kernel
 def quantise(reading, full_scale, resolution, steps):
-    """A reading cut at +- full scale and rounded to the converter's resolution, if it has one."""
+    """Clip a reading to +- full scale and round it to the converter's resolution, if not 0."""
     cut = min(max(reading, -full_scale), full_scale)
     return math.floor(cut * steps + 0.5) * resolution if steps > 0.0 else cut
 
 
 @small_kernel
 def felt_on_car(yaw_rate, forward, left, roll, pitch, roll_rate, pitch_rate):
-    """Angular rate and specific force in the frame of a body that rolls and pitches.
+    """Return angular rate and specific force in the frame of a body that rolls and pitches.
 
     Args:
-        yaw_rate: [rad/s]
-        forward: Acceleration along the heading, level [m/s2].
-        left: Acceleration across it [m/s2].
+        yaw_rate: Yaw rate [rad/s].
+        forward: Horizontal acceleration along the heading [m/s2].
+        left: Horizontal acceleration to the left of it [m/s2].
         roll: Cosine and sine of the angle about the forward axis, left side up is positive.
-        pitch: The same about the left axis, nose down is positive.
-        roll_rate: [rad/s]
-        pitch_rate: [rad/s]
+        pitch: Cosine and sine of the angle about the left axis, nose down is positive.
+        roll_rate: Roll rate [rad/s].
+        pitch_rate: Pitch rate [rad/s].
     """
     cr, sr = roll
     cp, sp = pitch

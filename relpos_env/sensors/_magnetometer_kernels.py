@@ -1,4 +1,4 @@
-"""What the magnetometer of a car reads: the formulas of `relpos_env.sensors.magnetometer`."""
+"""Magnetometer of a car, with the formulas of `relpos_env.sensors.magnetometer`."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from tracking.kernels.jit import kernel, small_kernel
 N_WAVE = 6
 """Columns of a wave: wave vector x, y [turns/m], phase [turns], amplitude x, y, z [uT]."""
 SINE = tuple((-1) ** k / math.factorial(2 * k + 1) for k in range(1, 7))
-"""Of x^3, x^5, ... in the Taylor series, exact to 1e-9 up to a quarter of a turn."""
+"""Taylor coefficients of sin(x) for x^3, x^5, ...; exact to 1e-9 up to a quarter turn."""
 
 
 @kernel
 def start_magnetometers(p, seed, waves, hard_iron, e):
-    """Draw the field of a building and what calibration left on every magnetometer.
+    """Draw the field of a building and the residual hard iron of every magnetometer.
 
     Args:
         p: MAG of the environment.
-        seed: Of its magnetometers, uint64.
-        waves: (env, wave, N_WAVE), written.
-        hard_iron: (env, node, 3) [uT], written.
-        e: Which environment.
+        seed: Seed of its magnetometers, uint64.
+        waves: Waves of the field, (env, wave, N_WAVE), written.
+        hard_iron: Offsets, (env, node, 3) [uT], written.
+        e: Index of the environment.
     """
     n_waves = int(p.n_waves)
     scale = p.disturbance * math.sqrt(2.0 / max(n_waves, 1))
@@ -48,7 +48,7 @@ def start_magnetometers(p, seed, waves, hard_iron, e):
 
 @small_kernel
 def cosine_of_turns(x):
-    """cos(2 pi x) = 1 - 2 sin(pi x)^2, in code that is put in place: most of a reading is this."""
+    """Return cos(2 pi x) = 1 - 2 sin(pi x)^2, inlined: it dominates the cost of a reading."""
     half = math.pi * (x - np.rint(x))
     square = half * half
     rest = 0.0
@@ -60,22 +60,22 @@ def cosine_of_turns(x):
 
 @small_kernel
 def read_magnetometer(p, seed, count, waves, hard_iron, e, n, at, heading, roll, pitch, out, row):
-    """One reading of one magnetometer.
+    """Write one reading of one magnetometer.
 
     Args:
         p: MAG of the environment.
-        seed: Of its magnetometers, uint64.
+        seed: Seed of its magnetometers, uint64.
         count: Number of the sample.
-        waves: (env, wave, N_WAVE).
-        hard_iron: (env, node, 3).
-        e: Environment.
-        n: Node.
+        waves: Waves of the field, (env, wave, N_WAVE).
+        hard_iron: Offsets, (env, node, 3) [uT].
+        e: Index of the environment.
+        n: Index of the node.
         at: x, y of the node [m].
         heading: Cosine and sine of the heading.
         roll: Cosine and sine of the roll.
         pitch: Cosine and sine of the pitch.
         out: Values of events, (env, event, ...); columns 0 to 2 of the row are written.
-        row: Which.
+        row: Index of the event.
     """
     x, y, z = p.field_x, p.field_y, p.field_z
     for k in range(waves.shape[1]):

@@ -1,4 +1,4 @@
-"""What the odometers of all cars read: the formulas of `relpos_env.sensors.odometer`."""
+"""Odometers of all cars, with the formulas of `relpos_env.sensors.odometer`."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from tracking.kernels.jit import kernel
 
 @kernel
 def read_odometers(p, seeds, tick, body, present, out):
-    """One reading of every car.
+    """Write one reading of every car.
 
     Args:
         p: ODOMETER, (env).
-        seeds: uint64, (env).
-        tick: Counts the readings, (env).
-        body: (env, car, 6).
-        present: (env, car)
+        seeds: Seeds of the odometers, uint64, (env).
+        tick: Number of the reading, (env).
+        body: x, y, heading and velocities of cars, (env, car, 6).
+        present: Mask of present cars, (env, car).
         out: Forward speed, (env, car) [m/s], written; 0 for absent cars.
     """
     for e in range(body.shape[0]):
@@ -29,7 +29,7 @@ def read_odometers(p, seeds, tick, body, present, out):
             out[e, n] = 0.0
             if present[e, n]:
                 c, s = math.cos(body[e, n, 2]), math.sin(body[e, n, 2])
-                # The wheel radius is wrong by the same share all through an episode.
+                # The relative error of the wheel radius is constant during an episode.
                 scale = normal(draw_key(seeds[e], np.uint64(STARTS + n)), 0)
                 noise = normal(draw_key(seeds[e], np.uint64(tick[e] * 64 + n)), 0)
                 speed = c * body[e, n, 3] + s * body[e, n, 4]

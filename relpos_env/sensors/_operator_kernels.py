@@ -1,4 +1,4 @@
-"""What an operator sees and asks for, compiled."""
+"""Compiled model of the operators: perceived position errors and commanded velocities."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from relpos_env.sensors.radio._random_kernels import draw_key, uniform
 from tracking.kernels.jit import kernel
 
 _WHO = np.uint64(0xFFFFFFFFFFFFFFFF)
-"""Counts no sample: the draw of whether there is an operator."""
+"""Counter of the draw that decides whether an episode has an operator; no sample has it."""
 
 
 @kernel
@@ -26,23 +26,23 @@ def draw_gains(seeds, gain, share, gains):
 def operate(
     start, stop, pos, present, plan, goal, seeds, counts, offset, seen, gains, limits, command
 ):  # fmt: skip
-    """Velocities asked of the cars of the environments from start to stop.
+    """Write the commanded velocities of the cars of environments `start` to `stop`.
 
     Args:
         start: First environment.
-        stop: One behind the last.
-        pos: (env, car, 2) [m].
-        present: (env, car).
-        plan: (env, car, 2) [m/s].
-        goal: (env, car, 2) [m].
-        seeds: (env) uint64.
+        stop: One past the last environment.
+        pos: Positions, (env, car, 2) [m].
+        present: Mask of present cars, (env, car).
+        plan: Planned velocities, (env, car, 2) [m/s].
+        goal: Goal positions, (env, car, 2) [m].
+        seeds: Seeds of the operators, (env) uint64.
         counts: Samples since the start of the episode, (env), updated.
-        offset: Error of the operator's eye, (env, 2) [m], updated.
-        seen: How far off the group was at the last samples, (env, slot, 2) [m], updated.
-        gains: (env) [1/s].
-        limits: Largest trim [m/s], largest speed [m/s], standard deviation of the eye's error
+        offset: Position error of the operator, (env, 2) [m], updated.
+        seen: Perceived offset of the group at the last samples, (env, slot, 2) [m], updated.
+        gains: Trim gains, (env) [1/s].
+        limits: Largest trim [m/s], largest speed [m/s], standard deviation of the position error
             [m], and its correlation from sample to sample [-].
-        command: (env, car, 2) [m/s], written; 0 of absent cars.
+        command: Velocities, (env, car, 2) [m/s], written; 0 for absent cars.
     """
     max_trim, max_speed, std, keep = limits
     depth = seen.shape[1]
@@ -64,7 +64,7 @@ def operate(
         slot = count % depth
         seen[env, slot, 0] = x / max(n, 1) + offset[env, 0]
         seen[env, slot, 1] = y / max(n, 1) + offset[env, 1]
-        # The oldest there is: the slot that is written next or, before all are, the first.
+        # Oldest sample: the slot written next or, until all slots are written, the first.
         late = (count + 1) % depth if count + 1 >= depth else 0
         trim_x, trim_y = -gains[env] * seen[env, late, 0], -gains[env] * seen[env, late, 1]
         length = math.hypot(trim_x, trim_y)

@@ -1,4 +1,4 @@
-"""What the distance sensors of all cars read: the formulas of `relpos_env.sensors.proximity`."""
+"""Distance sensors of all cars, with the formulas of `relpos_env.sensors.proximity`."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from tracking.kernels.jit import kernel, small_kernel
 
 @kernel
 def read_proximity(p, seeds, tick, directions, body, present, size, room, boxes, out):
-    """One reading of every beam.
+    """Write one reading of every distance sensor.
 
     Args:
         p: PROXIMITY, (env).
-        seeds: uint64, (env).
-        tick: Counts the readings, (env).
-        directions: Of beams in the frame of their car, (beam, 2).
+        seeds: Seeds of the sensors, uint64, (env).
+        tick: Number of the reading, (env).
+        directions: Unit vectors of the sensor axes in the frame of the car, (beam, 2).
         body: x, y, heading and velocities of cars, (env, car, 6).
-        present: (env, car)
+        present: Mask of present cars, (env, car).
         size: Half length and width of a car [m], (env, 2).
         room: Half width and depth [m], (env, 2).
-        boxes: Centre, half width and depth [m], cosine, sine, (env, box, 6); zero half width for
-            none.
-        out: Distances, (env, car, beam) [m], written; 0 of absent cars.
+        boxes: Centre, half width and depth [m], cosine, sine, (env, box, 6); a half width of 0
+            marks an unused row.
+        out: Distances, (env, car, beam) [m], written; 0 for absent cars.
     """
     for e in range(out.shape[0]):
         for n in range(out.shape[1]):
@@ -55,23 +55,23 @@ def read_proximity(p, seeds, tick, directions, body, present, size, room, boxes,
 
 @small_kernel
 def nearest(x, y, ux, uy, cone_cos, cone_sin, most, body, present, size, room, boxes, e, n):
-    """Distance from a point to what is nearest in a cone, or `most` [m].
+    """Return the distance from a point to the nearest surface in a cone, at most `most` [m].
 
     Args:
-        x: Tip of the cone [m].
-        y: Tip of the cone [m], along y.
-        ux: Its axis, of length 1.
-        uy: Its axis, of length 1, along y.
-        cone_cos: Cosine of half its angle.
-        cone_sin: Sine of it.
-        most: [m]
-        body: As for `read_proximity`; likewise the others.
-        present: Which cars there are.
-        size: Of cars.
-        room: Half sides.
-        boxes: What stands in it.
-        e: Environment.
-        n: Whose beam; it does not see itself.
+        x: x of the tip of the cone [m].
+        y: y of the tip of the cone [m].
+        ux: x of the axis of the cone, of length 1.
+        uy: y of the axis of the cone, of length 1.
+        cone_cos: Cosine of half the angle of the cone.
+        cone_sin: Sine of half the angle of the cone.
+        most: Largest distance [m].
+        body: As for `read_proximity`.
+        present: As for `read_proximity`.
+        size: As for `read_proximity` [m].
+        room: As for `read_proximity` [m].
+        boxes: As for `read_proximity`.
+        e: Index of the environment.
+        n: Index of the car with the sensor; the sensor does not measure this car.
     """
     best = to_wall(room[e, 0] - x, ux, cone_cos, cone_sin, most)
     best = to_wall(room[e, 0] + x, -ux, cone_cos, cone_sin, best)
@@ -87,7 +87,7 @@ def nearest(x, y, ux, uy, cone_cos, cone_sin, most, body, present, size, room, b
         if m == n or not present[e, m]:
             continue
         dx, dy = x - body[e, m, 0], y - body[e, m, 1]
-        # The cosine is only worth its time for who is in reach.
+        # Cosine and sine are computed only for cars within reach.
         if abs(dx) + abs(dy) < 1.5 * best + 2.0 * (size[e, 0] + size[e, 1]):
             c, s = math.cos(body[e, m, 2]), math.sin(body[e, m, 2])
             best = to_box(
@@ -98,14 +98,14 @@ def nearest(x, y, ux, uy, cone_cos, cone_sin, most, body, present, size, room, b
 
 @small_kernel
 def to_wall(away, straight, cone_cos, cone_sin, best):
-    """Distance in a cone to a wall, if less than the best so far [m].
+    """Return the distance in a cone to a wall, at most `best` [m].
 
     Args:
-        away: Of the tip from the wall, less than 0 behind it [m].
+        away: Distance of the tip from the wall, less than 0 behind it [m].
         straight: Cosine of the angle between axis and normal of the wall.
-        cone_cos: Of half the angle of the cone.
-        cone_sin: Sine of it.
-        best: [m]
+        cone_cos: Cosine of half the angle of the cone.
+        cone_sin: Sine of half the angle of the cone.
+        best: Smallest distance found so far [m].
     """
     if away <= 0.0:
         return 0.0
@@ -113,30 +113,30 @@ def to_wall(away, straight, cone_cos, cone_sin, best):
         return best
     if straight >= cone_cos:
         return away
-    # The side of the cone that looks most straight at it.
+    # The edge of the cone nearest to the normal of the wall.
     steepest = straight * cone_cos + math.sqrt(max(1.0 - straight * straight, 0.0)) * cone_sin
     return min(away / steepest, best) if steepest > 1e-12 else best
 
 
 @small_kernel
 def to_box(x, y, ux, uy, c, s, half_l, half_w, cone_cos, cone_sin, best):
-    """Distance in a cone to a box, if less than the best so far [m].
+    """Return the distance in a cone to a box, at most `best` [m].
 
-    The nearest point of the box counts if it is in the cone; else the nearest that is in it is on
-    one of the cone's sides, since the box is convex.
+    If the nearest point of the box is outside the cone, the nearest point inside is on one of
+    the edges of the cone, since the box is convex.
 
     Args:
-        x: Tip, from the centre of the box [m].
-        y: Tip, from the centre of the box [m], along y.
-        ux: Axis, of length 1.
-        uy: Axis, of length 1, along y.
+        x: x of the tip relative to the centre of the box [m].
+        y: y of the tip relative to the centre of the box [m].
+        ux: x of the axis of the cone, of length 1.
+        uy: y of the axis of the cone, of length 1.
         c: Cosine of the angle of the box.
-        s: Sine of it.
-        half_l: Half sides [m].
-        half_w: Half sides [m].
-        cone_cos: Of half the angle of the cone.
-        cone_sin: Sine of it.
-        best: [m]
+        s: Sine of the angle of the box.
+        half_l: Half length of the box [m].
+        half_w: Half width of the box [m].
+        cone_cos: Cosine of half the angle of the cone.
+        cone_sin: Sine of half the angle of the cone.
+        best: Smallest distance found so far [m].
     """
     x, y, ux, uy = c * x + s * y, c * y - s * x, c * ux + s * uy, c * uy - s * ux
     to_x, to_y = min(max(x, -half_l), half_l) - x, min(max(y, -half_w), half_w) - y
@@ -156,7 +156,7 @@ def to_box(x, y, ux, uy, c, s, half_l, half_w, cone_cos, cone_sin, best):
 
 @small_kernel
 def along_ray(x, y, ux, uy, half_l, half_w):
-    """Way along a ray to a box that is turned as the axes are; infinite if it misses [m]."""
+    """Return the distance along a ray to an axis-aligned box; infinite if it misses [m]."""
     low, high = 0.0, math.inf
     for axis in range(2):
         start, step, half = (x, ux, half_l) if axis == 0 else (y, uy, half_w)

@@ -1,4 +1,4 @@
-"""The arrays of everything that measures on cars, over environments, and what they measured."""
+"""Sensor state and measured events of all environments, as arrays."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ Array = NDArray[Any]
 
 
 class Sensors(NamedTuple):
-    """Everything that measures, arrays over (env, ...)."""
+    """State of all sensors, arrays over (env, ...)."""
 
     imu: Array
     """IMU, (env)."""
     imu_seed: Array
     bias: Array
-    """(env, car, 6)"""
+    """Constant bias of the IMUs, (env, car, 6) [rad/s, m/s2]."""
     drift: Array
-    """(env, car, 6)"""
+    """Slow bias of the IMUs, (env, car, 6) [rad/s, m/s2]."""
     mag: Array
     """MAG, (env)."""
     mag_seed: Array
     waves: Array
-    """(env, wave, N_WAVE)"""
+    """Waves of the magnetic field, (env, wave, N_WAVE)."""
     hard_iron: Array
-    """(env, car, 3)"""
+    """Offsets of the magnetometers, (env, car, 3) [uT]."""
     mast: Array
     """Height of the antenna over the tracker [m], (env)."""
     mount: Array
@@ -53,7 +53,7 @@ class Sensors(NamedTuple):
 
 
 class Events(NamedTuple):
-    """What was measured, arrays over (env, event), as in `MeasurementBlock`."""
+    """Measured events, arrays over (env, event), as in `MeasurementBlock`."""
 
     t: Array
     kind: Array
@@ -65,15 +65,15 @@ class Events(NamedTuple):
     has_power: Array
     valid: Array
     nlos: Array
-    """Ranges that an obstacle was in the way of."""
+    """True for ranges across an obstacle (NLOS)."""
     used: Array
-    """Events written, (env)."""
+    """Number of events written, (env)."""
     pose: Array
-    """The truth after every step: x, y, heading, roll, pitch; (env, step, car, 5)."""
+    """True pose after every step: x, y, heading, roll, pitch; (env, step, car, 5)."""
 
 
 def make_sensors(n_envs: int, n_cars: int, n_waves: int) -> Sensors:
-    """Nothing yet."""
+    """Return zeroed sensor arrays."""
     e, n = n_envs, n_cars
     return Sensors(
         imu=np.zeros(e, dtype=IMU),
@@ -94,13 +94,13 @@ def make_sensors(n_envs: int, n_cars: int, n_waves: int) -> Sensors:
 
 
 def start_sensors(s: Sensors, env: int, episode: Episode, rng: np.random.Generator) -> None:
-    """Draw what calibration left on the sensors of an environment, and the field of its building.
+    """Draw residual sensor errors of an environment and the magnetic field of its building.
 
     Args:
-        s: Written.
-        env: Which.
-        episode: What it is made of.
-        rng: Gives a seed to each kind of sensor but those of distance.
+        s: Arrays of the sensors, written.
+        env: Index of the environment.
+        episode: Parameters of the sensors.
+        rng: Source of the seeds of IMUs, magnetometers and odometers.
     """
     s.imu_seed[env], s.mag_seed[env], s.odometer_seed[env] = rng.integers(1 << 62, size=3)
     fill_imu(s.imu[env], episode.imu, DT)
@@ -114,13 +114,13 @@ def start_sensors(s: Sensors, env: int, episode: Episode, rng: np.random.Generat
 
 
 def make_events(n_envs: int, n_cars: int, n_steps: int, n_ranges: int) -> Events:
-    """Room for what so many steps can bring.
+    """Return an empty event buffer, large enough for a number of steps.
 
     Args:
-        n_envs: Environments.
-        n_cars: Cars.
-        n_steps: Steps.
-        n_ranges: In one of them, at most.
+        n_envs: Number of environments.
+        n_cars: Number of cars.
+        n_steps: Number of steps.
+        n_ranges: Largest number of ranges in a step.
     """
     shape = (n_envs, n_steps * (2 * n_cars + n_ranges))
 

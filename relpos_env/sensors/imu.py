@@ -1,10 +1,10 @@
-"""A six-axis IMU on a car or a body: gyroscope and accelerometer with their errors.
+"""Six-axis IMU on a car or a body: gyroscope and accelerometer with their errors.
 
     reading = round(clip(truth + bias(t) + noise + vibration))
 
-The bias is what calibration at rest leaves: a constant and a slow first-order Markov part.
-Noise, range and resolution are those of the LSM6DSOX [1]; vibration is that of a car on a
-floor or of a strap on skin, white at the output rate and growing with speed.
+The bias is the residual of a calibration at rest: a constant and a slow first-order Markov
+part. Noise, range and resolution are those of the LSM6DSOX [1]; vibration is that of a car on
+a floor or of a strap on skin, white at the output rate and growing with speed.
 
 References:
     [1] STMicroelectronics, LSM6DSOX data sheet DS12814.
@@ -25,53 +25,53 @@ from tracking.geometry import GRAVITY, quat_conjugate, rotate
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImuSimParams:
-    """What the simulated IMU does."""
+    """Parameters of the simulated IMU."""
 
     gyr_noise: float = 4.7e-4
-    """[rad/s] 3.8 mdps/sqrt(Hz) in 50 Hz of bandwidth."""
+    """[rad/s] White noise of an axis: 3.8 mdps/sqrt(Hz) in 50 Hz of bandwidth."""
     acc_noise: float = 5.0e-3
-    """[m/s2] 70 ug/sqrt(Hz) in 50 Hz of bandwidth."""
+    """[m/s2] White noise of an axis: 70 ug/sqrt(Hz) in 50 Hz of bandwidth."""
     gyr_bias: float = 3.5e-3
-    """[rad/s] Left by calibration, 0.2 deg/s."""
+    """[rad/s] Standard deviation of the constant bias after calibration, 0.2 deg/s."""
     acc_bias: float = 0.03
-    """[m/s2] Left by calibration, 3 mg."""
+    """[m/s2] Standard deviation of the constant bias after calibration, 3 mg."""
     gyr_drift: float = 8.7e-4
-    """[rad/s] Standard deviation of the slow part, 0.05 deg/s."""
+    """[rad/s] Standard deviation of the slow bias, 0.05 deg/s."""
     acc_drift: float = 0.01
-    """[m/s2] Standard deviation of the slow part."""
+    """[m/s2] Standard deviation of the slow bias."""
     drift_tau: float = 100.0
-    """[s] Time constant of the slow part."""
+    """[s] Time constant of the slow bias."""
     vibration: float = 0.35
-    """[m/s2] Of an accelerometer axis at `vibration_speed` and above."""
+    """[m/s2] Vibration noise of an accelerometer axis at `vibration_speed` and above."""
     gyr_vibration: float = 0.02
-    """[rad/s] Of a gyroscope axis, likewise."""
+    """[rad/s] Vibration noise of a gyroscope axis at `vibration_speed` and above."""
     vibration_speed: float = 1.0
-    """[m/s]"""
+    """[m/s] Speed at which the vibration noise is full; it is proportional below."""
     gyr_range: float = 34.9
-    """[rad/s] 2000 deg/s."""
+    """[rad/s] Full scale of the gyroscope, 2000 deg/s."""
     acc_range: float = 78.5
-    """[m/s2] 8 g."""
+    """[m/s2] Full scale of the accelerometer, 8 g."""
     bits: int = 16
-    """[-] Resolution over the range; 0 for none."""
+    """[-] Bits of the converter over the range; 0 disables rounding."""
 
 
 HUMAN_IMU = ImuSimParams(vibration=0.5, gyr_vibration=0.05, vibration_speed=2.0)
-"""On a person: skin and straps shake behind heel strikes and swings. The size is assumed: soft
-tissue moves by millimetres at 10 Hz to 20 Hz, of which 0.5 m/s2 is a modest share."""
+"""IMU worn by a person: skin and straps vibrate after heel strikes and swings. The amplitude is
+assumed: soft tissue moves by millimetres at 10 Hz to 20 Hz, of which 0.5 m/s2 is a small part."""
 
 
 IMU = numbers_dtype(
     ImuSimParams, ("keep", "gyr_step", "acc_step", "gyr_resolution", "acc_resolution")
 )
-"""`ImuSimParams` as the kernels take it."""
+"""Record type of `ImuSimParams` for the kernels."""
 
 
 def fill_imu(record: Any, params: ImuSimParams, dt: float) -> None:
-    """Write the numbers of the kernels.
+    """Write parameters into a record for the kernels.
 
     Args:
-        record: IMU, of one environment.
-        params: What its IMUs do.
+        record: IMU of one environment, written.
+        params: Parameters of its IMUs.
         dt: Time between two samples [s].
     """
     fill_numbers(record, params)
@@ -85,7 +85,7 @@ def fill_imu(record: Any, params: ImuSimParams, dt: float) -> None:
 
 
 class Imu:
-    """The IMUs of all nodes. Laws: same seed, same stream; no errors, the truth."""
+    """IMUs of all nodes. Equal seeds give equal streams; without errors, readings are the truth."""
 
     def __init__(
         self, params: ImuSimParams, n_nodes: int, rng: np.random.Generator, dt: float = 0.01
@@ -102,13 +102,13 @@ class Imu:
         self._keep = float(np.exp(-dt / p.drift_tau))
 
     def sample_3d(self, q_wb: F64, rate_b: F64, accel_w: F64, speed: F64) -> F64:
-        """One sample of every node, which moves in space.
+        """Return one sample of every node that moves in 3D.
 
         Args:
             q_wb: Orientation, body to world, (node, 4).
             rate_b: Angular rate in the body frame, (node, 3) [rad/s].
             accel_w: World acceleration, (node, 3) [m/s2].
-            speed: (node) [m/s].
+            speed: Speed of the nodes, (node) [m/s].
 
         Returns:
             Gyroscope [rad/s] and specific force [m/s2] in the body frame, (node, 6).
@@ -117,7 +117,7 @@ class Imu:
         return self._read(np.hstack([rate_b, rotate(quat_conjugate(q_wb), force_w)]), speed)
 
     def _read(self, truth: F64, speed: F64) -> F64:
-        """What the IMUs make of the true rates and specific forces, (node, 6)."""
+        """Return the readings for true angular rates and specific forces, (node, 6)."""
         n = len(truth)
         innovation = np.sqrt(1.0 - self._keep**2) * self._drift_std
         self._drift = self._keep * self._drift + innovation * self._rng.standard_normal((n, 6))
@@ -128,7 +128,7 @@ class Imu:
 
 
 def quantise(reading: F64, full_scale: F64 | float, bits: int) -> F64:
-    """A reading clipped to +- full scale and rounded to the resolution of the converter."""
+    """Clip a reading to +- full scale and round it to the resolution of the converter."""
     clipped = np.clip(reading, -full_scale, full_scale)
     if bits == 0:
         return clipped

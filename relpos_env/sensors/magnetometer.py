@@ -1,9 +1,9 @@
-"""A magnetometer on a car or a body: the field of the earth, bent by the building.
+"""Magnetometer on a car or a body: the earth's field, disturbed by the building.
 
-The disturbance is a smooth field fixed in the room: a few waves of a few metres' length, as
-steel in floors and walls makes it. It is the same at every height: real fields are bent most
-near the floor, so that a person's knees would see more of it than the arms. Noise, range and
-resolution are those of the LIS3MDL [1].
+The disturbance is a smooth field fixed in the room: a few waves with lengths of a few metres,
+as caused by steel in floors and walls. It is the same at every height. Real disturbances are
+largest near the floor, so a person's knees would measure more of them than the arms. Noise,
+range and resolution are those of the LIS3MDL [1].
 
 References:
     [1] STMicroelectronics, LIS3MDL data sheet DS9463.
@@ -24,32 +24,32 @@ from tracking.geometry import quat_conjugate, rotate
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MagSimParams:
-    """What the simulated magnetometer and the field around it do."""
+    """Parameters of the simulated magnetometer and of the magnetic field around it."""
 
     field_w: tuple[float, float, float] = (0.0, 20.0, -43.0)
-    """[uT] Of the earth in central Europe: x east, y north, z up."""
+    """[uT] Earth's magnetic field in central Europe: x east, y north, z up."""
     disturbance: float = 2.0
     """[uT] Standard deviation of one axis of the building's field."""
     wavelength: float = 4.0
-    """[m] Mean length of its waves."""
+    """[m] Length scale of the building's field; its waves are 0.6 to 1.6 times as long."""
     n_waves: int = 6
-    """[-]"""
+    """[-] Number of waves of the building's field."""
     hard_iron: float = 0.3
-    """[uT] Offset that calibration left, one axis."""
+    """[uT] Standard deviation of the offset of one axis after calibration."""
     noise: float = 0.35
-    """[uT] Of a reading, one axis: 3.2 to 4.1 mgauss."""
+    """[uT] White noise of one axis, 3.2 to 4.1 mgauss."""
     full_scale: float = 800.0
-    """[uT] 8 gauss."""
+    """[uT] Full scale, 8 gauss."""
     bits: int = 16
-    """[-] Resolution over the range; 0 for none."""
+    """[-] Bits of the converter over the range; 0 disables rounding."""
 
 
 MAG = numbers_dtype(MagSimParams, ("field_x", "field_y", "field_z", "resolution"))
-"""`MagSimParams` as the kernels take it."""
+"""Record type of `MagSimParams` for the kernels."""
 
 
 def fill_mag(record: Any, params: MagSimParams) -> None:
-    """Write the numbers of the kernels into MAG, of one environment."""
+    """Write parameters into the MAG record of one environment for the kernels."""
     fill_numbers(record, params)
     for name, value in zip("xyz", params.field_w, strict=True):
         record[f"field_{name}"] = value
@@ -57,7 +57,7 @@ def fill_mag(record: Any, params: MagSimParams) -> None:
 
 
 class Magnetometer:
-    """The magnetometers of all nodes, in one room. Laws as for `Imu`."""
+    """Magnetometers of all nodes in one room, with the properties of `Imu`."""
 
     def __init__(self, params: MagSimParams, n_nodes: int, rng: np.random.Generator) -> None:
         self._params = p = params
@@ -71,20 +71,20 @@ class Magnetometer:
         self._hard_iron = p.hard_iron * rng.standard_normal((n_nodes, 3))
 
     def field(self, pos_w: F64) -> F64:
-        """Field in the world frame at points of the plane, (point, 3) [uT]."""
+        """Return the field in the world frame at points of the plane, (point, 3) [uT]."""
         waves = np.cos(pos_w @ self._wave + self._phase)
         field: F64 = np.array(self._params.field_w) + waves @ self._amplitude
         return field
 
     def sample_3d(self, pos_w: F64, q_wb: F64) -> F64:
-        """One reading of every node in space, in its body frame.
+        """Return one reading of every node in 3D, in its body frame.
 
         Args:
-            pos_w: (node, 3) [m].
+            pos_w: Positions, (node, 3) [m].
             q_wb: Orientation, body to world, (node, 4).
 
         Returns:
-            (node, 3) [uT].
+            Magnetic field, (node, 3) [uT].
         """
         return self._read(rotate(quat_conjugate(q_wb), self.field(pos_w[:, :2])))
 

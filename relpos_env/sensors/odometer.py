@@ -1,4 +1,4 @@
-"""Wheel speed: what a car knows of its own motion."""
+"""Wheel odometer: the measured forward speed of a car."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from relpos_env.world.parameter_records import numbers_dtype
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OdometerSimParams:
-    """What the simulated odometer does."""
+    """Parameters of the simulated odometer."""
 
     scale_std: float = 0.02
-    """[-] Error of the wheel radius, constant for a car."""
+    """[-] Standard deviation of the wheel radius error, constant per car and episode."""
     noise: float = 0.02
-    """[m/s]"""
+    """[m/s] White noise of a reading."""
 
 
 ODOMETER = numbers_dtype(OdometerSimParams)
-"""`OdometerSimParams` as the kernels take it."""
+"""Record type of `OdometerSimParams` for the kernels."""

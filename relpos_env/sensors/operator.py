@@ -1,13 +1,13 @@
-"""The operator: a person with a remote control who sees the room with an error, and late.
+"""Simulated operator: a person with a remote control, a reaction delay and position errors.
 
-He tells every car the velocity of the plan, and the same trim on top that brings the group
-back to where the plan wants it:
+The operator commands the planned velocity to every car, plus a common trim that moves the
+group back to its planned position:
 
     u_i(t) = plan_i(t) - k (mean_j (p_j - g_j)(t - d) + e(t - d)),   |k (...)| limited, |u_i| too
 
-with the reaction delay d, and the error e of his eye, a stationary first-order Gauss-Markov
-process on each axis. Since all get the same trim, it says nothing of who is where in the
-formation: that must come from the cars' own estimates.
+with the reaction delay d and the operator's position error e, a stationary first-order
+Gauss-Markov process on each axis. The common trim contains no information about positions
+within the formation: these must come from the cars' own estimates.
 """
 
 from __future__ import annotations
@@ -25,29 +25,29 @@ from relpos_env.sensors._operator_kernels import draw_gains, operate
 from tracking.arrays import F64, Bool
 
 CONTROL_STEP = 0.1
-"""[s] From sample to sample."""
+"""[s] Sampling period."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OperatorSimParams:
-    """What the simulated operator does. A gain of 0 leaves the plan alone."""
+    """Parameters of the simulated operator. A gain of 0 does not change the plan."""
 
     gain: float = 0.4
-    """[1/s] Trim per metre that the group is off. Larger holds it more firmly; with the delay,
-    much more than 1 / (2 reaction) swings. Author's choice, for a person who is not in a hurry."""
+    """[1/s] Trim per metre of the group's position error. Larger gains hold more firmly, but far
+    above 1 / (2 reaction) they oscillate. Author's choice, for a person who is not in a hurry."""
     reaction: float = 0.3
-    """[s] From seeing to moving the stick, in whole control steps: choice reactions of people
-    take 0.25 to 0.4 s (Hick, Q. J. Exp. Psychol. 4 (1952) 11)."""
+    """[s] Reaction delay, rounded to whole control steps: choice reactions of people take
+    0.25 to 0.4 s (Hick, Q. J. Exp. Psychol. 4 (1952) 11)."""
     position_std: float = 0.15
-    """[m] Of the error on each axis of where the group seems to be. Author's choice."""
+    """[m] Standard deviation of the operator's position error, per axis. Author's choice."""
     position_time: float = 5.0
-    """[s] Correlation time of that error. Author's choice."""
+    """[s] Correlation time of the operator's position error. Author's choice."""
     max_trim: float = 0.5
     """[m/s] Largest trim."""
     max_speed: float = 2.0
-    """[m/s] Largest velocity asked of a car."""
+    """[m/s] Largest commanded speed of a car."""
     share: float = 1.0
-    """[-] Of episodes that have an operator. In the others the plan alone is asked for, as on
+    """[-] Share of episodes with an operator. In the others only the plan is commanded, as on
     real cars without a remote control."""
 
     def __post_init__(self) -> None:
@@ -70,7 +70,7 @@ def _is_number(value: object) -> bool:
 
 
 class Seen(Protocol):
-    """What the operator sees of the world."""
+    """World state that the operator observes."""
 
     @property
     def pos_w(self) -> F64:
@@ -78,35 +78,35 @@ class Seen(Protocol):
 
     @property
     def present(self) -> Bool:
-        """Who is in the room, (env, car)."""
+        """Mask of the cars in the room, (env, car)."""
 
 
 class Wanted(Protocol):
-    """What the operator is told of the task."""
+    """Task state that the operator receives."""
 
     @property
     def plan(self) -> F64:
-        """Velocity wanted by the plan, (env, car, 2) [m/s]."""
+        """Planned velocity, (env, car, 2) [m/s]."""
 
     @property
     def goal_w(self) -> F64:
-        """Where the plan wants the car, (env, car, 2) [m]."""
+        """Planned position, (env, car, 2) [m]."""
 
 
 class Operator:
-    """One operator a room, sampled once a control step.
+    """One operator per room, sampled once per control step.
 
-    Laws: same seed, same error, whatever the cars do and in whatever batch; no error, no delay
-    and a gain pull the group's mean to that of its goals.
+    Properties: the error depends only on the seed, not on the cars or the batch; without error
+    and delay, a positive gain moves the mean position of the group to that of its goals.
     """
 
     def __init__(self, params: OperatorSimParams, n_cars: int, n_envs: int) -> None:
-        """Make the arrays.
+        """Allocate the arrays.
 
         Args:
-            params: The same for all rooms.
-            n_cars: Slots for cars.
-            n_envs: Environments.
+            params: Parameters of all operators.
+            n_cars: Number of car slots.
+            n_envs: Number of environments.
         """
         depth = round(params.reaction / CONTROL_STEP) + 1
         keep = float(np.exp(-CONTROL_STEP / params.position_time))
@@ -118,18 +118,18 @@ class Operator:
             keep,
         )
         self.command: F64 = np.zeros((n_envs, n_cars, 2))
-        """Velocity asked of each car in the world frame, (env, car, 2) [m/s]."""
+        """Commanded velocity of each car in the world frame, (env, car, 2) [m/s]."""
         self._seeds = np.zeros(n_envs, dtype=np.uint64)
         self._counts, self._gains = np.zeros(n_envs, dtype=np.int64), np.zeros(n_envs)
         self._offset, self._seen = np.zeros((n_envs, 2)), np.zeros((n_envs, depth, 2))
         self._n_envs = n_envs
 
     def reset(self, seeds: NDArray[np.uint64], envs: slice) -> None:
-        """Begin an episode.
+        """Start an episode.
 
         Args:
             seeds: One for each of these environments.
-            envs: Which begin.
+            envs: Environments to reset.
         """
         self._seeds[envs] = seeds
         draw_gains(self._seeds[envs], self._gain, self._share, self._gains[envs])
@@ -139,15 +139,15 @@ class Operator:
         self.command[envs] = 0.0
 
     def sample(self, state: Seen, task: Wanted, envs: slice) -> F64:
-        """See the room and tell the cars.
+        """Compute the commanded velocities.
 
         Args:
-            state: The truth, of all environments.
-            task: Plan and goals of now, of all environments.
-            envs: Which to sample, contiguous.
+            state: True state of all environments.
+            task: Current plan and goals of all environments.
+            envs: Environments to sample, contiguous.
 
         Returns:
-            `command`, of all environments; the array is written again at the next sample.
+            `command` of all environments; the next sample overwrites the array.
 
         Raises:
             EnvError: `envs` is not contiguous.

@@ -1,7 +1,7 @@
-"""Distance sensors round a car: walls, boxes and other cars, which no radio tells of.
+"""Distance sensors around a car: ranges to walls, boxes and cars, independent of radios.
 
-Where beams stand is in `relpos_env.interface.beams`. A beam is a cone, and reads the distance from
-its tip to the nearest surface in it.
+`relpos_env.interface.beams` defines their positions and directions. The field of view of a
+sensor is a cone; a reading is the distance from its tip to the nearest surface in the cone.
 
 References:
     [1] ST, VL53L1X time-of-flight ranging sensor, datasheet DocID031281 Rev 3, 2018: up to 4 m,
@@ -20,23 +20,23 @@ from relpos_env.world.parameter_records import fill_numbers, numbers_dtype
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProximitySimParams:
-    """What the simulated distance sensors do."""
+    """Parameters of the simulated distance sensors."""
 
     max_range: float = FARTHEST
-    """[m] What a beam reads that meets nothing; 4 m in the dark [1], less in light."""
+    """[m] Reading without an object in range; the range is 4 m in the dark [1], less in light."""
     cone: float = radians(27.0)
-    """[rad] Full angle of a beam [1]. Wider misses less and tells less where it is."""
+    """[rad] Full angle of the cone [1]. A wider cone misses less but locates less precisely."""
     noise_std: float = 0.02
-    """[m] Of a reading, new at each decision [1]."""
+    """[m] Standard deviation of a reading at distance 0, drawn at each control step [1]."""
     noise_share: float = 0.01
-    """[-] Its standard deviation grows by so much of the distance; assumed."""
+    """[-] Increase of the standard deviation per metre of distance; assumed."""
 
 
 PROXIMITY = numbers_dtype(ProximitySimParams, ("cone_cos", "cone_sin"))
-"""`ProximitySimParams` as the kernels take it."""
+"""Record type of `ProximitySimParams` for the kernels."""
 
 
 def fill_proximity(record: Any, params: ProximitySimParams) -> None:
-    """Copy parameters into a record."""
+    """Write parameters into a record for the kernels."""
     fill_numbers(record, params)
     record["cone_cos"], record["cone_sin"] = cos(0.5 * params.cone), sin(0.5 * params.cone)

@@ -1,1 +1,1 @@
-"""One room that is driven by a script and recorded."""
+"""Simulation of one room with scripted drivers and a recording."""

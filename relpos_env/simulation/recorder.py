@@ -1,4 +1,4 @@
-"""What a simulation keeps of its measurements and of the truth, to become a log."""
+"""Recording of the measurements and the truth of a simulation, for a log."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tracking.measurements import Kind, MeasurementBlock
 
 
 class Recording:
-    """A run so far."""
+    """Measurements and truth of a run."""
 
     def __init__(self) -> None:
         self._blocks: list[MeasurementBlock] = []
@@ -23,29 +23,29 @@ class Recording:
         self._truth: list[tuple[float, F64, F64, Bool]] = []
 
     def add_truth(self, t: float, pos_w: F64, q_wb: F64, present: Bool | None = None) -> None:
-        """Keep where the nodes are.
+        """Append the true poses of the nodes.
 
         Args:
             t: Time, later than the last [s].
-            pos_w: (node, 3) [m].
-            q_wb: (node, 4).
-            present: Which of them are there at all, (node).
+            pos_w: Positions, (node, 3) [m].
+            q_wb: Orientations, body to world, (node, 4).
+            present: Mask of the present nodes, (node); all if None.
         """
         there = np.ones(len(pos_w), dtype=bool) if present is None else present.copy()
         self._truth.append((t, pos_w, q_wb, there))
 
     def add_block(self, block: MeasurementBlock, nlos: Bool) -> None:
-        """Keep what was measured in a step.
+        """Append the measurements of a step.
 
         Args:
-            block: In any order.
-            nlos: Which of its ranges lacked line of sight, (range).
+            block: Measurements in any order.
+            nlos: Mask of its ranges without line of sight, (range).
         """
         self._blocks.append(block)
         self._nlos.append(nlos)
 
     def add_swarm(self, swarm: World) -> None:
-        """Keep what the last step of a swarm's first group brought."""
+        """Append measurements and truth of the last step of the first group."""
         n, events = int(swarm.events.used[0]), swarm.events
         steps = swarm.events.pose[0]
         yaw, roll, pitch = (np.moveaxis(steps, -1, 0)[k] for k in (2, 3, 4))
@@ -62,13 +62,13 @@ class Recording:
     def to_log(
         self, name: str, scenario: str, constellation: Constellation, *, truth_every: int
     ) -> Log:
-        """A log with truth.
+        """Return a log with truth.
 
         Args:
-            name: Its name.
-            scenario: That of the scenario, for the source.
-            constellation: The nodes.
-            truth_every: Truth of every so-manieth step.
+            name: Name of the log.
+            scenario: Name of the scenario, for the source.
+            constellation: Nodes of the log.
+            truth_every: Number of steps per sample of the truth.
         """
         kept = self._truth[truth_every - 1 :: truth_every]
         n = constellation.n_nodes
@@ -97,7 +97,7 @@ class Recording:
 
 
 def range_block(ranges: Ranges) -> tuple[MeasurementBlock, Bool]:
-    """Ranges that the nodes of the first environment resolved, and which lacked line of sight."""
+    """Return the ranges of the first environment, and the mask of those without line of sight."""
     n = int(ranges.count[0])
     i, j = ranges.i[0, :n], ranges.j[0, :n]
     block = MeasurementBlock.of_kind(
@@ -113,12 +113,12 @@ def range_block(ranges: Ranges) -> tuple[MeasurementBlock, Bool]:
 
 
 def inertial_blocks(t: float, imu: F64, mag: F64) -> list[MeasurementBlock]:
-    """One IMU and magnetometer sample of every node.
+    """Return one IMU and magnetometer sample of every node.
 
     Args:
-        t: When [s].
-        imu: (node, 6), as `Imu` gives it.
-        mag: (node, 3) [uT].
+        t: Time of the samples [s].
+        imu: Samples as returned by `Imu`, (node, 6).
+        mag: Magnetic field, (node, 3) [uT].
     """
     times, nodes = np.full(len(imu), t), np.arange(len(imu), dtype=np.int64)
     return [
@@ -128,7 +128,7 @@ def inertial_blocks(t: float, imu: F64, mag: F64) -> list[MeasurementBlock]:
 
 
 def quat_from_tilt(roll: F64, pitch: F64) -> F64:
-    """Orientation of a body that is turned by pitch about y and then by roll about its own x."""
+    """Return the orientation of a body rotated by pitch about y, then by roll about its own x."""
     cr, sr = np.cos(0.5 * roll), np.sin(0.5 * roll)
     cp, sp = np.cos(0.5 * pitch), np.sin(0.5 * pitch)
     q: F64 = np.stack([cp * cr, cp * sr, sp * cr, -sp * sr], axis=-1)

@@ -1,4 +1,4 @@
-"""The drivers of a recorded run: people with remote controls, who see the room."""
+"""Scripted drivers of a recorded run: people with remote controls who see the room."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from tracking.arrays import F64, Bool
 
 
 class LoopDrivers:
-    """Drive every car round the middle of the room, each at its own changing speed and width.
+    """Drivers that circle the middle of the room, each at its own varying speed and radius.
 
-    They steer along the loop, keep apart from each other and from the walls, and back out
-    when they are stuck.
+    They steer along the loop, keep away from each other and from the walls, and reverse when
+    they are stuck.
     """
 
     def __init__(
@@ -29,7 +29,7 @@ class LoopDrivers:
         self._back_until = np.full(n, -np.inf)
 
     def command(self, state: WorldState) -> DriveCommand:
-        """What every driver does now."""
+        """Return the current command of every driver."""
         n = len(state.heading)
         wave = np.sin(2.0 * np.pi * self._frequency * state.t + self._phase)
         speed = 1.2 + 0.5 * wave[0]
@@ -52,7 +52,7 @@ class LoopDrivers:
         return DriveCommand(float(state.t), speed, steering)
 
     def _loop_direction(self, pos: F64, lane: F64) -> F64:
-        """Along the ellipse, and towards the lane, (car, 2)."""
+        """Return the direction along the ellipse and towards the lane, (car, 2)."""
         scaled = pos / self._ring
         radius = np.maximum(np.linalg.norm(scaled, axis=1), 1e-3)[:, None]
         tangent = np.stack([-scaled[:, 1], scaled[:, 0]], axis=1) * self._ring
@@ -62,7 +62,7 @@ class LoopDrivers:
         return direction
 
     def _keep_apart(self, pos: F64, present: Bool) -> F64:
-        """Away from cars in the room nearer than 0.9 m and walls nearer than 0.4 m, (car, 2)."""
+        """Return the direction away from cars within 0.9 m and walls within 0.4 m, (car, 2)."""
         away = pos[:, None] - pos[None, :]
         distance = np.linalg.norm(away, axis=-1) + 1e3 * (np.eye(len(pos)) + ~present)
         push = np.maximum(0.9 - distance, 0.0) / np.maximum(distance, 0.1)

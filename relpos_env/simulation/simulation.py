@@ -1,4 +1,4 @@
-"""One room that is driven and recorded: a world of one room with its recording."""
+"""Simulation of one room with its recording."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tracking.measurements import MeasurementBlock
 
 
 class Simulation:
-    """One group of cars. Law: same scenario, generator and commands, same everything."""
+    """One group of cars. Equal scenarios, generators and commands give equal results."""
 
     def __init__(
         self, scenario: Scenario, rng: np.random.Generator, *, seconds: float = 3600.0
@@ -26,8 +26,8 @@ class Simulation:
         """Draw an episode of a scenario.
 
         Args:
-            scenario: As many cars as it has at most.
-            rng: A child of it is for the driver: `driver_rng`.
+            scenario: Scenario; the group has its largest number of cars.
+            rng: Generator of the episode; the driver gets a child of it, `driver_rng`.
             seconds: Length of the episode.
         """
         n = scenario.most_cars
@@ -39,12 +39,12 @@ class Simulation:
 
     @property
     def constellation(self) -> Constellation:
-        """The nodes that the cars carry."""
+        """Nodes on the cars."""
         return self.swarm.constellation
 
     @property
     def state(self) -> WorldState:
-        """The truth now, arrays over (car, ...)."""
+        """Current true state, arrays over (car, ...)."""
         return self.swarm.state.take(0)
 
     @property
@@ -59,11 +59,11 @@ class Simulation:
         return contacts
 
     def step(self, command: DriveCommand) -> MeasurementBlock:
-        """Drive for a tenth of a second and return all that was measured, in order."""
+        """Drive for one control period (0.1 s) and return all measurements in order of time."""
         block = self.swarm.step(command.speed[None], command.steering[None])
         self._recording.add_swarm(self.swarm)
         return block.env(0).sorted()
 
     def to_log(self, name: str) -> Log:
-        """What was recorded, as a log with truth at 50 Hz."""
+        """Return the recording as a log with truth at 50 Hz."""
         return self._recording.to_log(name, self.scenario.name, self.constellation, truth_every=2)

@@ -1,1 +1,1 @@
-"""The simulated truth: rooms, cars, contacts and their steps."""
+"""Simulated world: rooms, cars, contacts and their steps."""

@@ -1,4 +1,4 @@
-"""The dynamic bicycle, compiled: servo, motor, tyres, roll and pitch of one car and of many.
+"""Compiled dynamic bicycle: servo, motor, tyres, roll and pitch of one car and of many.
 
 Derived in docs/reference/vehicle.md. In the frame of the car (x forward, y left), with the wheels'
 rolling velocities u and side slips s at the rear and the front axle,
@@ -8,9 +8,9 @@ rolling velocities u and side slips s at the rear and the front axle,
     I r'             = l_f (F_xf sin d + F_yf cos d) - l_r F_yr
     F_y = -sign(s) Y (1 - (1 - z)^3),   z = min(1, C |s| / (3 Y |u|)),   Y^2 + F_x^2 = (mu N)^2
 
-which is the brush tyre of [1] inside the friction ellipse. Every force against a slip is
-at most what stops this slip within the step, for the inverse masses that an axle feels from all
-axles; so the tyres can only take energy, whatever the step, and hold at standstill.
+which is the brush tyre of [1] inside the friction ellipse. A force against a slip is at most
+the force that stops this slip within the step, given the inverse masses that couple the axles.
+Tyres therefore only dissipate energy, for any step, and hold at standstill.
 
 References:
     [1] Pacejka, Tire and Vehicle Dynamics, 3rd ed., Butterworth-Heinemann 2012, section 3.2.
@@ -27,13 +27,13 @@ X, Y, HEADING, VX, VY, RATE = range(6)
 STEERING, ACCEL, ROLL, ROLL_RATE, ROLL_ACCEL, PITCH, PITCH_RATE, PITCH_ACCEL = range(8)
 """Columns of a drive: front wheels [rad], motor [m/s2], then angles [rad] and their derivatives."""
 TURN, PAST = 8, 9
-"""Columns of a drive: place of the next steering command, and the first of the last commands."""
+"""Columns of a drive: index of the next steering command in its ring buffer, and the buffer."""
 N_PAST = 16
-"""[-] Steering commands remembered; a delay is shorter than as many steps."""
+"""[-] Steering commands in the ring buffer; the delay in steps must be shorter."""
 N_DRIVE = PAST + N_PAST
 """[-] Columns of a drive; all zero is a car at rest."""
 SETTLED = 1e-12
-"""[m/s2], [rad/s] A motor or a body as slow as this stands: no numbers too small to be fast."""
+"""[m/s2, m/s, rad/s] Motors and bodies below this are set to rest; avoids denormal numbers."""
 
 
 @small_kernel
@@ -41,14 +41,14 @@ def drive_car(p, body, drive, e, n, speed, steering, dt, wrench):
     """Advance the drive of one car and write the force and torque on it for the next step.
 
     Args:
-        p: The car, a record of `relpos_env.world.car.CAR`.
+        p: Car, a record of `relpos_env.world.car.CAR`.
         body: (env, car, 6), read.
         drive: (env, car, `N_DRIVE`), advanced.
-        e: Environment.
-        n: Car.
-        speed: Command, backwards if negative [m/s].
-        steering: Command, left is positive [rad].
-        dt: Step, that which the record was made for [s].
+        e: Index of the environment.
+        n: Index of the car.
+        speed: Commanded speed, backwards if negative [m/s].
+        steering: Commanded steering angle, left is positive [rad].
+        dt: Step, equal to that of the record [s].
         wrench: Force x, y [N] in the world frame, torque [N m], (env, car, 3), written.
     """
     c, s = math.cos(body[e, n, HEADING]), math.sin(body[e, n, HEADING])
@@ -74,7 +74,7 @@ def drive_car(p, body, drive, e, n, speed, steering, dt, wrench):
         wrench[e, n, 1] = -body[e, n, VY] * p.mass / dt
         wrench[e, n, 2] = -rate * p.inertia / dt
 
-    # The body leans out of a turn (to the right in a left one) and dives when braking.
+    # The body rolls outwards in a turn (to the right in a left turn) and dives when braking.
     lean, dive = p.roll_per_force * f_y, -p.pitch_per_force * f_x
     _sway(drive, e, n, ROLL, lean, p.roll_stiffness, p.roll_damping, p.roll_slack, dt)
     _sway(drive, e, n, PITCH, dive, p.pitch_stiffness, p.pitch_damping, p.pitch_slack, dt)
@@ -82,7 +82,7 @@ def drive_car(p, body, drive, e, n, speed, steering, dt, wrench):
 
 @small_kernel
 def integrate_car(p, body, wrench, e, n, dt):
-    """What Chipmunk does with a body that touches nothing: first the pose, then the velocity."""
+    """Integrate a body without contacts as Chipmunk does: first the pose, then the velocity."""
     body[e, n, X] += body[e, n, VX] * dt
     body[e, n, Y] += body[e, n, VY] * dt
     body[e, n, HEADING] += body[e, n, RATE] * dt
@@ -93,15 +93,15 @@ def integrate_car(p, body, wrench, e, n, dt):
 
 @kernel
 def drive_cars(cars, body, drive, present, command_speed, command_steering, dt, wrench):
-    """`drive_car` for all cars; nothing acts on the absent.
+    """Apply `drive_car` to all cars; the force on absent cars is 0.
 
     Args:
         cars: Records of `relpos_env.world.car.CAR`, (env).
         body: (env, car, 6).
         drive: (env, car, `N_DRIVE`), advanced.
-        present: (env, car) bool.
-        command_speed: (env, car) [m/s].
-        command_steering: (env, car) [rad].
+        present: Mask of present cars, (env, car).
+        command_speed: Commanded speeds, (env, car) [m/s].
+        command_steering: Commanded steering angles, (env, car) [rad].
         dt: Step [s].
         wrench: (env, car, 3), written.
     """
@@ -117,7 +117,7 @@ def drive_cars(cars, body, drive, present, command_speed, command_steering, dt, 
 
 @kernel
 def integrate_cars(cars, body, present, wrench, dt):
-    """`integrate_car` for all cars that are present; arguments as of `drive_cars`."""
+    """Apply `integrate_car` to all present cars; arguments as of `drive_cars`."""
     for e in range(body.shape[0]):
         p = cars[e]
         for n in range(body.shape[1]):
@@ -132,7 +132,7 @@ def _clip(value, limit):
 
 @small_kernel
 def _steer(p, drive, e, n, command, dt):
-    """Angle of the front wheels after a step: the servo follows the command of a while ago."""
+    """Return the angle of the front wheels after a step: the servo follows a delayed command."""
     turn = int(drive[e, n, TURN])
     drive[e, n, PAST + turn] = command
     then = (turn - int(p.delay_steps)) & (N_PAST - 1)
@@ -144,7 +144,7 @@ def _steer(p, drive, e, n, command, dt):
 
 @small_kernel
 def _motor(p, motor, wanted, v_x):
-    """Acceleration that the motor gives after a step: a speed controller behind a lag [m/s2]."""
+    """Return the motor acceleration after a step: a speed controller with a lag [m/s2]."""
     asked = p.speed_gain * (wanted - v_x)
     if wanted != 0.0:
         asked += math.copysign(p.rolling, wanted)
@@ -155,15 +155,15 @@ def _motor(p, motor, wanted, v_x):
 
 @small_kernel
 def _tyres(p, v_x, v_y, rate, angle, motor, pushes, dt):
-    """Force forward and to the left [N], and torque [N m], of both axles' tyres on the car."""
+    """Return forward and left force [N] and torque [N m] of the tyres of both axles on the car."""
     sd = math.sin(angle)
     cd = math.sqrt(1.0 - sd * sd)
     hub = v_y + p.front * rate
     u_front, s_front = cd * v_x + sd * hub, cd * hub - sd * v_x
     s_rear = v_y - p.rear * rate
 
-    # How fast a force changes the slip it acts against: row sums of J M^-1 J' along the wheels
-    # and across them, times dt. Within slip / row sum, the forces of both axles take energy.
+    # Change of a slip per force against it: row sums of J M^-1 J' along and across the wheels,
+    # times dt. Forces up to slip / row sum dissipate energy.
     cross = abs(cd * (p.mass_inv - p.front * p.rear * p.inertia_inv))
     lever = p.front * cd
     across_rear = dt * (p.mass_inv + p.rear * p.rear * p.inertia_inv + cross)
@@ -186,10 +186,10 @@ def _tyres(p, v_x, v_y, rate, angle, motor, pushes, dt):
 
 @small_kernel
 def _along(u, motor, pushes, drag, grip, yields):
-    """Force along an axle's wheels that roll at u: motor or brake, rolling resistance, grip [N].
+    """Return the longitudinal force of an axle that rolls at u: motor, brake, resistance, grip [N].
 
-    Where the motor does not push towards the speed that is wanted it is a brake: it never turns
-    wheels, and holds them once they stand. The force u / yields would stop the wheels.
+    A motor that does not push towards the commanded speed is a brake: it never drives the wheels
+    and holds them at rest. The force -u / yields stops the wheels within the step.
     """
     if not pushes:
         if motor * u > 0.0:
@@ -204,7 +204,7 @@ def _along(u, motor, pushes, drag, grip, yields):
 
 @small_kernel
 def _across(s, u, along, grip, stiffness, yields):
-    """Force across an axle's wheels that slip at s while they roll at u [N]."""
+    """Return the lateral force of an axle that slips at s while it rolls at u [N]."""
     room = math.sqrt(max(grip * grip - along * along, 0.0))
     slip, full = stiffness * abs(s), 3.0 * room * abs(u)
     force = room
@@ -220,8 +220,8 @@ def _across(s, u, along, grip, stiffness, yields):
 def _sway(drive, e, n, column, rest, stiffness, damping, slack, dt):
     """Step a spring-damper towards its rest angle by the implicit midpoint rule.
 
-    Stiffness is omega^2 [1/s2], damping 2 zeta omega [1/s], and slack what the rule divides by,
-    1 / (1 + damping dt / 2 + stiffness dt^2 / 4).
+    Stiffness is omega^2 [1/s2], damping 2 zeta omega [1/s], and slack the factor of the implicit
+    step, 1 / (1 + damping dt / 2 + stiffness dt^2 / 4).
     """
     angle, rate = drive[e, n, column], drive[e, n, column + 1]
     h = 0.5 * dt

@@ -1,4 +1,4 @@
-"""A move of an environment by the rigid-body solver, without the interpreter."""
+"""Steps of an environment by the rigid-body solver, called from compiled code."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from relpos_env.world.pymunk_space import REST
 from tracking.kernels.jit import kernel, small_kernel
 
 LASTS = 3
-"""[-] Steps for which the solver remembers a contact that is gone; what comes back then is not
-new."""
+"""[-] Steps for which the solver remembers an ended contact; a contact that recurs within them
+is not new."""
 
 
 def _call(returns, *arguments):
-    """An intrinsic's type and code: a call of a C function by its address, the first argument."""
+    """Return signature and code of an intrinsic that calls the C function at its first argument."""
 
     def generate(context, builder, signature, values):
         kinds = [context.get_value_type(kind) for kind in signature.args[1:]]
@@ -30,25 +30,25 @@ def _call(returns, *arguments):
 
 @intrinsic
 def call_step(context, function, space, dt):
-    """``function(space, dt)``: the step of a space."""
+    """Call ``function(space, dt)``, which steps a space."""
     return _call(types.void, types.uint64, types.float64)
 
 
 @intrinsic
 def call_each(context, function, space, visit, data):
-    """``function(space, visit, data)``: `visit` for all bodies or contacts of a space."""
+    """Call ``function(space, visit, data)``: `visit` for all bodies or contacts of a space."""
     return _call(types.void, types.uint64, types.uint64, types.uint64)
 
 
 @kernel
 def solve(bodies, solver, e, dt):
-    """Make one move of an environment.
+    """Make one step of an environment with the solver.
 
     Args:
         bodies: Bodies; the state of cars and boxes and the contacts are updated.
-        solver: Solver; connected.
-        e: Environment.
-        dt: [s]
+        solver: Solver, with a connected space.
+        e: Index of the environment.
+        dt: Step [s].
     """
     calls = solver.calls[e]
     put_bodies(bodies, solver, e)
@@ -68,7 +68,7 @@ def solve(bodies, solver, e, dt):
 
 @small_kernel
 def put_bodies(bodies, solver, e):
-    """Where everything is and what pushes it, in the order of the space."""
+    """Write the states of bodies and the forces on them, in the order of the space."""
     rows, n_cars = solver.bodies, bodies.body.shape[1]
     for row in range(rows.shape[1]):
         owner = solver.owner[e, row]
@@ -86,7 +86,7 @@ def put_bodies(bodies, solver, e):
 
 @small_kernel
 def take_bodies(bodies, solver, e):
-    """Where everything is after the step."""
+    """Read the states of bodies after the step."""
     rows, n_cars = solver.moved, bodies.body.shape[1]
     for row in range(rows.shape[1]):
         owner = solver.owner[e, row]
@@ -107,11 +107,11 @@ def take_bodies(bodies, solver, e):
 
 @small_kernel
 def count_contacts(bodies, solver, e, n_met):
-    """Add the contacts that are new to those that the cars began.
+    """Add new contacts to the counts of the cars.
 
-    To a fresh space all are: of these, what touched just before does not count again. A car that
-    touches two things that are no cars, one of them again, in that very step goes for one that
-    touches on.
+    All contacts of a fresh space are new to it; those that lasted until shortly before are not
+    counted again. Objects other than cars share one entry, so a car that touches several of them
+    in the first step of a fresh space counts at most one.
     """
     n_cars, tick, fresh = bodies.contacts.shape[1], bodies.tick[e], solver.calls[e].fresh
     for k in range(n_met):
@@ -127,7 +127,7 @@ def count_contacts(bodies, solver, e, n_met):
 
 @small_kernel
 def find_car(solver, e, n_cars, number):
-    """Which car a body of the solver is; `n_cars` for what is none."""
+    """Return the index of the car with a body ID of the solver; `n_cars` for other bodies."""
     for n in range(n_cars):
         if solver.car_ids[e, n] != 0 and solver.car_ids[e, n] == number:
             return n

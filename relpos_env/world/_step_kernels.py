@@ -1,8 +1,8 @@
-"""One decision of every environment: cars drive, sensors read, radios talk, step by step.
+"""One control period of every environment, step by step: cars, sensors and radios.
 
-Cars move in a space of pymunk. With `physics="fast"` only those steps are made there in which
-something touches, or nearly. An environment waits where its space cannot be stepped by compiled
-code: a space must be built, or others have put something into it.
+Cars move in a space of pymunk. With `physics="fast"` the space makes only the steps in which
+bodies touch, or nearly. An environment waits if compiled code cannot step its space: the space
+must be built, or other code has access to it.
 """
 
 from __future__ import annotations
@@ -29,26 +29,26 @@ from tracking.maths.angles import cosine_sine
 
 MAG, IMU, RANGE = 1, 2, 5
 WAITS, PUSHED, MOVED = 0, 1, 2
-"""How far the step under way is: nothing is done, forces are known, bodies have moved."""
+"""Stages of the current step: not started, forces computed, bodies moved."""
 CALM = 5
-"""[-] Steps that the solver keeps a room in which nothing touches any more: it remembers contacts
-for three."""
+"""[-] Steps for which the solver stays in use after the last contact: it remembers contacts for
+three."""
 
 
 @kernel
 def begin_decision(bodies, events, t, next_life, speed, steering):
-    """Forget what the last decision brought; who is absent is not driven.
+    """Clear the results of the last control period and the commands of absent cars.
 
     Args:
         bodies: Bodies, updated.
         events: Events, updated.
-        t: Now, (env) [s].
-        next_life: When a car comes or goes next, (env) [s].
-        speed: Commands, (env, car) [m/s], updated.
-        steering: Commands, (env, car) [rad], updated.
+        t: Current time, (env) [s].
+        next_life: Time of the next event of a car or tracker, (env) [s].
+        speed: Commanded speeds, (env, car) [m/s], updated.
+        steering: Commanded steering angles, (env, car) [rad], updated.
 
     Returns:
-        In how many environments a car comes or goes now.
+        Number of environments with a due event.
     """
     n_due = 0
     for e in range(bodies.done.shape[0]):
@@ -69,25 +69,25 @@ def run_steps(
     bodies, solver, sensors, radio, members, scenes, n_steps, dt, events, speed, steering, t,
     waiting,
 ):  # fmt: skip
-    """Go on with the decision of every environment until it is over or must wait.
+    """Step every environment until its control period is over or it must wait.
 
     Args:
         bodies: Bodies, updated.
         solver: Solver, updated.
         sensors: Sensors, updated.
         radio: SessionNumbers, RadioNumbers, Air and RangeBuffer; updated.
-        members: What is kept of who is in the group, (env, node, 2), see `note_members`.
+        members: Membership state of each node, (env, node, 2), see `note_members`.
         scenes: Scene of all environments.
-        n_steps: Steps of a decision.
-        dt: [s]
+        n_steps: Steps of a control period.
+        dt: Step [s].
         events: Events, appended.
-        speed: Commands, (env, car) [m/s].
-        steering: Commands, (env, car) [rad].
+        speed: Commanded speeds, (env, car) [m/s].
+        steering: Commanded steering angles, (env, car) [rad].
         t: Time since each environment began, (env) [s], written.
-        waiting: Numbers of the environments that wait for `RoomState.move`, written.
+        waiting: Indices of the environments that wait for `RoomState.move`, written.
 
     Returns:
-        How many wait.
+        Number of waiting environments.
     """
     n_waiting = 0
     for e in range(bodies.done.shape[0]):
@@ -122,7 +122,7 @@ def run_steps(
 
 @small_kernel
 def push_cars(bodies, speed, steering, dt, e):
-    """Forces on the cars; velocities are kept where accelerations will be, likewise headings."""
+    """Compute forces on the cars; `accel` and `turn` keep velocity and heading until `sense`."""
     for n in range(bodies.body.shape[1]):
         if bodies.present[e, n]:
             drive_car(
@@ -136,7 +136,7 @@ def push_cars(bodies, speed, steering, dt, e):
 
 @small_kernel
 def sense(bodies, sensors, radio, members, scenes, dt, events, e):
-    """All that the nodes of an environment measure in a step, after it."""
+    """Append all measurements of the nodes of an environment after a step."""
     body, drive, accel, turn = bodies.body, bodies.drive, bodies.accel, bodies.turn
     tick, step = bodies.tick[e], bodies.done[e]
     t = tick * dt
@@ -164,7 +164,7 @@ def sense(bodies, sensors, radio, members, scenes, dt, events, e):
         c, s = level
         forward = c * accel[e, n, 0] + s * accel[e, n, 1]
         left = c * accel[e, n, 1] - s * accel[e, n, 0]
-        # The tracker goes round the centre of mass.
+        # Lever arm from the centre of mass to the tracker.
         forward -= turn[e, n] * turn[e, n] * ahead + spin_up * aside
         left += spin_up * ahead - turn[e, n] * turn[e, n] * aside
         truth = felt_on_car(
@@ -205,7 +205,7 @@ def sense(bodies, sensors, radio, members, scenes, dt, events, e):
 
 @small_kernel
 def write_own(events, e, k, t, kind, n):
-    """Everything of an event of one node but its values."""
+    """Write an event of one node, except for its values."""
     events.t[e, k], events.kind[e, k] = t, kind
     events.i[e, k], events.j[e, k] = n, n
     events.antenna_i[e, k], events.antenna_j[e, k] = 0, 0
@@ -216,9 +216,9 @@ def write_own(events, e, k, t, kind, n):
 
 @small_kernel
 def place_antenna(sensors, scenes, at, heading, roll, pitch, e, n):
-    """Move the antenna of a car on: where it was, and where it is on its mast.
+    """Update the previous and the current position of a car's antenna on its mast.
 
-    The angles are pairs of cosine and sine, `at` is where the tracker is [m].
+    The angles are pairs of cosine and sine, `at` is the position of the tracker [m].
     """
     before, now, h = scenes.pos0, scenes.pos1, sensors.mast[e] + sensors.mount[e, n, 2]
     for a in range(3):

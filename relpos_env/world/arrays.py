@@ -1,4 +1,4 @@
-"""The arrays of everything that moves, over environments."""
+"""Arrays of cars and boxes, over environments."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from relpos_env.world.car import CAR, car_record
 
 Array = NDArray[Any]
 NO_BOX = (1e6, 1e6, 0.0, 0.0, 1.0, 0.0)
-"""A place that no box has taken must be in no car's way."""
+"""Row without a box, far away from all cars."""
 LONG_AGO = -(1 << 40)
-"""[-] A step that never was."""
+"""[-] Number of a step before all others."""
 
 
 class Bodies(NamedTuple):
-    """Everything that moves, arrays over (env, ...)."""
+    """State of cars and boxes, arrays over (env, ...)."""
 
     body: Array
     """x, y [m], heading [rad], vx, vy [m/s], yaw rate [rad/s]; (env, car, 6)."""
@@ -33,15 +33,15 @@ class Bodies(NamedTuple):
     turn: Array
     """Mean yaw rate over the last step, (env, car) [rad/s]."""
     turned: Array
-    """The same over the step before, (env, car) [rad/s]."""
+    """Mean yaw rate over the step before the last, (env, car) [rad/s]."""
     present: Array
-    """The car is in the room, (env, car)."""
+    """True if the car is in the room, (env, car)."""
     powered: Array
-    """Its tracker has power, (env, car)."""
+    """True if the tracker of the car has power, (env, car)."""
     contacts: Array
-    """Contacts that each car began in this decision, (env, car)."""
+    """Contacts that each car began in this control period, (env, car)."""
     touched: Array
-    """Step in which each car last touched another, or at the end what is no car,
+    """Step of each car's last contact with each other car and, at the end, with any other object,
     (env, car, car + 1)."""
     cars: Array
     """CAR, (env)."""
@@ -50,23 +50,23 @@ class Bodies(NamedTuple):
     room: Array
     """Half width and depth [m], (env, 2)."""
     boxes: Array
-    """Centre, half width and depth [m], cosine, sine; zeros for none; (env, box, 6)."""
+    """Centre, half width and depth [m], cosine, sine; `NO_BOX` if unused; (env, box, 6)."""
     box_body: Array
     """x, y, angle and velocities of boxes, (env, box, 6)."""
     tick: Array
     """Steps since the environment began, (env)."""
     done: Array
-    """Steps of this decision that are done, (env)."""
+    """Completed steps of this control period, (env)."""
     calm: Array
-    """Steps for which the solver keeps the room yet, (env)."""
+    """Steps for which the solver stays in use, (env)."""
     stage: Array
-    """How far the step under way is, see `block_propagation`, (env)."""
+    """Stage of the current step, see `relpos_env.world._step_kernels`, (env)."""
     fast: Array
-    """Steps in which nothing touches are made without the space, (env)."""
+    """True if steps without contacts are made without the space, (env)."""
 
 
 def make_bodies(n_envs: int, n_cars: int, n_boxes: int) -> Bodies:
-    """Nothing yet."""
+    """Return the arrays of a batch without cars and boxes."""
     e, n = n_envs, n_cars
     return Bodies(
         body=np.zeros((e, n, 6)),
@@ -93,12 +93,12 @@ def make_bodies(n_envs: int, n_cars: int, n_boxes: int) -> Bodies:
 
 
 def place_bodies(b: Bodies, env: int, episode: Episode, room: tuple[float, float]) -> None:
-    """Put the cars and boxes of an episode into an environment.
+    """Write the initial state of an episode's cars and boxes into an environment.
 
     Args:
-        b: Written.
-        env: Which.
-        episode: What it is made of.
+        b: Bodies, written.
+        env: Index of the environment.
+        episode: Episode with its cars and boxes.
         room: Width and depth [m].
     """
     for array in (
@@ -127,5 +127,5 @@ def place_bodies(b: Bodies, env: int, episode: Episode, room: tuple[float, float
 
 
 def box_row(x: float, y: float, width: float, height: float, angle: float) -> tuple[float, ...]:
-    """A box as kernels take it: centre, half width and depth [m], cosine, sine."""
+    """Return a box for the kernels: centre, half width and depth [m], cosine, sine."""
     return x, y, 0.5 * width, 0.5 * height, float(np.cos(angle)), float(np.sin(angle))

@@ -1,7 +1,7 @@
-"""The car: a dynamic bicycle with a servo, a motor, tyres that can slide and a body that sways.
+"""Car model: a dynamic bicycle with servo, motor, tyres that can slide, roll and pitch.
 
 Equations and closed forms in docs/reference/vehicle.md. The centre of mass is the origin of the
-car and the middle of the box that collides; the axles stand where the weight on them says.
+car and the middle of its collision box; the positions of the axles follow from their loads.
 
 References:
     [1] F1TENTH Gym, parameters of a 1:10 car: friction 1.0489, cornering stiffness 4.718 and
@@ -25,7 +25,7 @@ from relpos_env.world._car_kernels import N_PAST
 from tracking.geometry import GRAVITY
 
 MAX_STEERING_DELAY = (N_PAST - 1) * DT
-"""[s]"""
+"""[s] Largest steering delay."""
 CAR = np.dtype(
     (np.record, [
         (name, np.float64)
@@ -39,7 +39,7 @@ CAR = np.dtype(
         )
     ])
 )  # fmt: skip
-"""A car for the kernels, one record an environment; see `car_record`."""
+"""Record type of a car for the kernels; see `car_record`."""
 
 _POSITIVE = (
     "mass", "length", "width", "wheelbase", "friction", "front_cornering", "rear_cornering",
@@ -53,52 +53,52 @@ _NOT_NEGATIVE = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CarParams:
-    """A 1:10 RC car."""
+    """Parameters of a 1:10 RC car."""
 
     mass: float = 2.5
-    """[kg]"""
+    """[kg] Mass of the car."""
     length: float = 0.42
-    """[m] Of the body that collides."""
+    """[m] Length of the collision box."""
     width: float = 0.20
-    """[m]"""
+    """[m] Width of the collision box."""
     wheelbase: float = 0.30
-    """[m]"""
+    """[m] Distance between the axles."""
     front_share: float = 0.52
-    """[-] Share of the weight on the front axle, l_r / wheelbase [1]. More understeers."""
+    """[-] Share of the weight on the front axle, l_r / wheelbase [1]. A larger one understeers."""
     friction: float = 1.05
-    """[-] Tyre on indoor floor [1]."""
+    """[-] Friction of the tyres on an indoor floor [1]."""
     front_cornering: float = 4.95
-    """[1/rad] Cornering stiffness of the front axle per load on it [1]. Less understeers."""
+    """[1/rad] Cornering stiffness of the front axle per load on it [1]. A lower one understeers."""
     rear_cornering: float = 5.72
     """[1/rad] Cornering stiffness of the rear axle per load on it [1]."""
     front_drive: float = 0.5
-    """[-] Share of the motor and its brake at the front axle; 0.5 is four-wheel drive."""
+    """[-] Share of the motor and brake force at the front axle; 0.5 is four-wheel drive."""
     rolling_resistance: float = 0.02
-    """[-] Force per load; 0.015 on hard floor [2], soft treads more. The controller adds it."""
+    """[-] Force per load: 0.015 on hard floor [2], more for soft treads; the motor adds it."""
     max_speed: float = 3.0
-    """[m/s] Forwards and backwards."""
+    """[m/s] Largest speed, forwards and backwards."""
     max_accel: float = 2.5
-    """[m/s2] Of the motor, rolling resistance included."""
+    """[m/s2] Largest acceleration of the motor, rolling resistance included."""
     max_brake: float = 2.5
-    """[m/s2] Of the motor as a brake."""
+    """[m/s2] Largest deceleration by the motor as a brake."""
     speed_gain: float = 8.0
-    """[1/s] The motor controller asks for so much acceleration per speed error."""
+    """[1/s] Gain of the motor controller, acceleration per speed error."""
     motor_lag: float = 0.05
-    """[s] Time constant of the acceleration behind the controller; assumed."""
+    """[s] Time constant of the lag of the motor's acceleration; assumed."""
     max_steering: float = 0.42
-    """[rad] [1]"""
+    """[rad] Largest steering angle [1]."""
     steering_rate: float = 3.2
-    """[rad/s] Of the servo [1]."""
+    """[rad/s] Largest rate of the servo [1]."""
     steering_delay: float = 0.02
-    """[s] Until the servo starts; rounded to steps, at most `MAX_STEERING_DELAY`."""
+    """[s] Delay of the servo; rounded to steps, at most `MAX_STEERING_DELAY`."""
     roll_compliance: float = 0.005
-    """[rad/(m/s2)] Lean per lateral acceleration: 2.8 deg/g, a stiff car."""
+    """[rad/(m/s2)] Roll per lateral acceleration: 2.8 deg/g, a stiff car."""
     pitch_compliance: float = 0.003
-    """[rad/(m/s2)] Dive per braking: 1.7 deg/g; assumed."""
+    """[rad/(m/s2)] Dive per braking deceleration: 1.7 deg/g; assumed."""
     roll_frequency: float = 5.0
-    """[Hz] Undamped. A car's 1.5 Hz [2] times sqrt(10) for the scale."""
+    """[Hz] Undamped natural frequency of roll: a car's 1.5 Hz [2] times sqrt(10) for the scale."""
     pitch_frequency: float = 5.0
-    """[Hz] Undamped. A car's 1.5 Hz [2] times sqrt(10) for the scale."""
+    """[Hz] Undamped natural frequency of pitch: a car's 1.5 Hz [2] times sqrt(10) for the scale."""
     sway_damping: float = 0.4
     """[-] Damping ratio of roll and pitch; 0.2 to 0.4 in cars [2]."""
 
@@ -138,12 +138,12 @@ class CarParams:
 
     @property
     def understeer(self) -> float:
-        """K of the yaw rate gain v / (wheelbase + K v^2) far below the grip [s2 rad]."""
+        """Gradient K of the yaw rate gain v / (wheelbase + K v^2) far below the grip [s2 rad]."""
         return (1.0 / self.front_cornering - 1.0 / self.rear_cornering) / GRAVITY
 
 
 def car_record(params: CarParams, dt: float = DT) -> NDArray[np.void]:
-    """A car for the kernels, made for steps of dt [s]: dtype `CAR`, shape ()."""
+    """Return the record of a car for steps of dt [s]: dtype `CAR`, shape ()."""
     p, weight = params, params.mass * GRAVITY
     record = np.zeros((), CAR)
     for name in (

@@ -1,4 +1,4 @@
-"""The nodes that cars carry."""
+"""Nodes on the cars."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from tracking.constellation import Antenna, Constellation, NodeConfig
 
 
 def car_constellation(scenario: Scenario, n_cars: int) -> Constellation:
-    """The nodes that the cars carry: ids from 1, antenna on a mast over the tracker."""
+    """Return the nodes on the cars: ids from 1, antenna on a mast over the tracker."""
     ids = range(1, n_cars + 1)
     height = scenario.radio.antenna_height
     return Constellation(

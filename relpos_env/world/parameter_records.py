@@ -1,4 +1,4 @@
-"""Parameters of one environment each, as the records that kernels take."""
+"""Parameters of environments as records for the kernels."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Records = NDArray[Any]
 
 
 def numbers_dtype(params: type, derived: tuple[str, ...] = ()) -> np.dtype[Any]:
-    """A record type with a float for every plain number of a parameter class.
+    """Return a record type with a float for every plain number of a parameter class.
 
     Args:
         params: A dataclass; fields that are not annotated as float or int are left out.

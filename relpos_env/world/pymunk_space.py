@@ -1,9 +1,9 @@
-"""The pymunk space of one environment: cars, walls, boxes, and whatever else is put into it.
+"""Pymunk space of one environment: cars, walls, boxes and added objects.
 
-`PhysicsSpace.space` is an ordinary `pymunk.Space`. What is added to it (bodies, joints, shapes,
-collision handlers) moves and collides with the cars. Radios, distance sensors and pictures see
-each shape that is no sensor as a box: a polygon as the smallest rectangle around it, a circle as
-the square of its area. Shapes on the body of a car are part of it, and not seen.
+`PhysicsSpace.space` is an ordinary `pymunk.Space`. Added bodies, joints, shapes and collision
+handlers interact with the cars. Radios, distance sensors and renderings treat each shape that is
+not a sensor as a box: a polygon as the smallest rectangle around it, a circle as the square of
+equal area. Shapes on the body of a car are part of the car and left out.
 """
 
 from __future__ import annotations
@@ -24,42 +24,42 @@ from tracking.geometry import GRAVITY
 
 N_WALLS = 4
 FRICTION, ELASTICITY = 0.09, 0.04
-"""[-] Between any two bodies; the solver multiplies what the two shapes have. Little: cars slide
-along what they touch. At 0.3 and 0.2 they catch on it and are thrown back."""
+"""[-] Values between any two bodies; the solver multiplies those of both shapes. Small, so that
+cars slide along obstacles: at 0.3 and 0.2 they catch on them and are thrown back."""
 CAR_RADIUS, WALL_RADIUS = 0.01, 0.02
-"""[m] Their edges are rounded, and stand out by so much; those of boxes are sharp."""
+"""[m] Radius of the rounded edges, which extend the shapes; edges of boxes are sharp."""
 BOX_FRICTION = 0.4
-"""[-] Of a movable box on the floor."""
+"""[-] Friction of a movable box on the floor."""
 BOX_DENSITY = 8.0
-"""[kg/m2] Of a movable box, over its floor area: cardboard with little in it. The motor of a car
-moves one of up to 0.4 m; what is larger yields to a blow only."""
+"""[kg/m2] Mass of a movable box per floor area: cardboard with little in it. The motor of a car
+moves a box of up to 0.4 m; larger ones move only at an impact."""
 MOST_KNOWN = 100
 """[-] Largest number of cached rectangles."""
 REST = 1e-4
-"""[m/s, rad/s] A box that is slower stands."""
+"""[m/s, rad/s] Slower boxes are set to rest."""
 
 Rectangle = tuple[float, float, float, float, float]
 """Centre x, y, width, height [m] and angle [rad], in the frame of a body."""
 
 
 class PhysicsSpace:
-    """The cars that are present and all that they can touch.
+    """Present cars and all objects that they can touch.
 
-    The arrays of `Bodies` have the state of cars and boxes too. As long as no other code has the
-    space, compiled code steps it (`relpos_env.world.solver`); from then on `step` does, by the
-    public interface of pymunk, to the same result.
+    The arrays of `Bodies` have the state of cars and boxes, too. Compiled code steps the space
+    (`relpos_env.world.solver`) until other code obtains it; from then on `step` does, through the
+    public interface of pymunk, with the same result.
     """
 
     def __init__(
         self, size: tuple[float, float], boxes: Sequence[Obstacle], car: CarParams, cars: I64
     ) -> None:
-        """Build the world.
+        """Build the space.
 
         Args:
             size: Width along x and depth along y [m]; the origin is the centre.
-            boxes: What stands in it.
-            car: The cars, all alike.
-            cars: Numbers of the cars that are present, (present).
+            boxes: Obstacles in the room.
+            car: Parameters of all cars.
+            cars: Indices of the present cars, (present).
         """
         self.space = space = pymunk.Space()
         space.iterations = 10
@@ -70,11 +70,11 @@ class PhysicsSpace:
             a, b = corners[k], corners[(k + 1) % N_WALLS]
             self._add(pymunk.Segment(space.static_body, a, b, WALL_RADIUS))
         self.cars: dict[int, pymunk.Body] = {}
-        """By number, those that are present."""
+        """Bodies of the present cars, by index of the car."""
         for n in cars.tolist():
             self.add_car(n)
         self.boxes: dict[int, pymunk.Body] = {}
-        """Those that can be pushed, by their number among the obstacles."""
+        """Bodies of the movable boxes, by index of the obstacle."""
         self._n_obstacles = len(boxes)
         for k, box in enumerate(boxes):
             if box.movable:
@@ -83,18 +83,18 @@ class PhysicsSpace:
                 self._add(pymunk.Poly(space.static_body, [tuple(c) for c in box.corners()]))
         self._own = set(space.shapes)
         self.is_open = False
-        """True from when other code has the space."""
+        """True once other code has obtained the space."""
         self._rectangles: dict[tuple[Any, ...], Rectangle] = {}
 
     def add_car(self, n: int) -> None:
-        """Put a car into the space; `put` says where."""
+        """Add a car to the space; `put` sets its pose."""
         body = self.cars[n] = pymunk.Body(self._car.mass, self._car.inertia)
         self.space.add(body)
         size = self._car.length, self._car.width
         self._add(pymunk.Poly.create_box(body, size, CAR_RADIUS))
 
     def remove_car(self, n: int) -> None:
-        """Take a car out of the space, with all that hangs on it."""
+        """Remove a car from the space, with its shapes and joints."""
         body = self.cars.pop(n)
         self.space.remove(body, *body.shapes, *body.constraints)
 
@@ -106,10 +106,10 @@ class PhysicsSpace:
             body.velocity, body.angular_velocity = (vx, vy), rate
 
     def take(self, b: Bodies, env: int) -> None:
-        """Read the state of cars and boxes, and where all else is, from the space.
+        """Read the state of cars and boxes, and the rectangles of added shapes, from the space.
 
         Raises:
-            EnvError: More shapes than there is room for.
+            EnvError: There are more added shapes than free rows.
         """
         for body, row in self._rows(b, env):
             row[:] = *body.position, body.angle, *body.velocity, body.angular_velocity
@@ -134,17 +134,17 @@ class PhysicsSpace:
             rows[k] = box_row(centre.x, centre.y, width, height, shape.body.angle + angle)
 
     def reindex(self) -> None:
-        """Let queries find shapes where `put` has moved their bodies to."""
+        """Update the index of queries after `put` has moved bodies."""
         for body in (*self.cars.values(), *self.boxes.values()):
             self.space.reindex_shapes_for_body(body)
 
     def step(self, b: Bodies, env: int, dt: float) -> None:
-        """Make one step by the interface of pymunk.
+        """Make one step through the interface of pymunk.
 
         Args:
-            b: Forces on the cars; state and contacts are updated.
-            env: Number of the environment in it.
-            dt: [s]
+            b: Bodies with the forces on the cars; state and contacts are updated.
+            env: Index of the environment in it.
+            dt: Step [s].
         """
         for n, body in self.cars.items():
             x, y, torque = b.wrench[env, n].tolist()
@@ -159,12 +159,12 @@ class PhysicsSpace:
             body.each_arbiter(_count, b.contacts[env], n)
 
     def _is_added(self, shape: pymunk.Shape) -> bool:
-        """True for shapes that hide and block: neither ours, nor a car's, nor a sensor."""
+        """Return whether a shape is an added obstacle: neither ours, nor a car's, nor a sensor."""
         is_ours = shape in self._own or shape.body in self.cars.values()
         return not (is_ours or shape.sensor)
 
     def _rows(self, b: Bodies, env: int) -> list[tuple[pymunk.Body, Any]]:
-        """Each body with the row of its state."""
+        """Return each body with the row of its state."""
         cars = [(body, b.body[env, n]) for n, body in self.cars.items()]
         return cars + [(body, b.box_body[env, k]) for k, body in self.boxes.items()]
 
@@ -173,8 +173,8 @@ class PhysicsSpace:
         body = pymunk.Body(mass, mass * (box.width**2 + box.height**2) / 12.0)
         self.space.add(body)
         self._add(pymunk.Poly.create_box(body, (box.width, box.height)))
-        # The floor holds it in place by up to so much, and turns nothing back: joints that yield.
-        # As forces against the speed of the last step it would let every push creep.
+        # Floor friction: joints with a limited force and without position correction. Forces
+        # against the speed of the last step would let every pushed box creep.
         grip, floor = BOX_FRICTION * mass * GRAVITY, self.space.static_body
         stand = pymunk.PivotJoint(floor, body, (0.0, 0.0), (0.0, 0.0))
         turn = pymunk.GearJoint(floor, body, 0.0, 1.0)
@@ -190,7 +190,7 @@ class PhysicsSpace:
 
 
 def rectangle_of(shape: pymunk.Shape) -> Rectangle:
-    """What sensors take a shape for."""
+    """Return the rectangle that sensors use for a shape."""
     if isinstance(shape, pymunk.Circle):
         side = math.sqrt(math.pi) * shape.radius
         return *shape.offset, side, side, 0.0
@@ -214,7 +214,7 @@ def rectangle_of(shape: pymunk.Shape) -> Rectangle:
 
 
 def _geometry(shape: pymunk.Shape) -> tuple[Any, ...]:
-    """What its rectangle depends on; users may change it."""
+    """Return the geometry that determines the rectangle of a shape; users may change it."""
     if isinstance(shape, pymunk.Circle):
         return shape.radius, shape.offset
     if isinstance(shape, pymunk.Segment):
@@ -224,5 +224,5 @@ def _geometry(shape: pymunk.Shape) -> tuple[Any, ...]:
 
 
 def _count(arbiter: pymunk.Arbiter, contacts: Any, car: int) -> None:
-    """Count a contact that a car begins."""
+    """Add a contact of a car to its count if it is new."""
     contacts[car] += arbiter.is_first_contact

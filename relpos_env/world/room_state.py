@@ -1,4 +1,4 @@
-"""What a group of cars has besides numbers: its boxes, its world in pymunk, its life."""
+"""State of a group of cars outside the arrays: boxes, pymunk space, future events."""
 
 from __future__ import annotations
 
@@ -22,58 +22,58 @@ from tracking.arrays import F64, Bool
 from tracking.params.short_repr import short_repr
 
 WAIT = 0.5
-"""[s] A car that cannot come in, because another stands there, tries again after so long."""
+"""[s] Delay until a car tries again to join if its pose is occupied."""
 
 
 @dataclass(slots=True)
 class RoomState:
-    """One environment; the whole of a batch and its parts have the same object."""
+    """State of one environment; a batch and its parts share the object."""
 
     __repr__ = short_repr
 
     life: tuple[LifeEvent, ...] = ()
-    """What is still to happen, by rising time."""
+    """Future events, by rising time."""
     boots: np.random.Generator = field(default_factory=np.random.default_rng)
-    """For what the radios draw when they are switched on."""
+    """Generator of the boot numbers of the radios when they are switched on."""
     obstacles: tuple[Obstacle, ...] = ()
     car: CarParams = field(default_factory=CarParams)
     size: tuple[float, float] = (0.0, 0.0)
     """[m] Width and depth of the room."""
     world: PhysicsSpace | None = None
-    """Kept for a whole episode; with `physics="fast"` for as long as something touches."""
+    """Space of a whole episode; with `physics="fast"` that of the current contacts."""
 
     @property
     def next_event(self) -> float:
-        """When something happens to a car or a tracker next [s]; inf for never."""
+        """Time of the next event of a car or a tracker [s]; inf if there is none."""
         return self.life[0].t if self.life else np.inf
 
     def to_come(self) -> list[int]:
-        """Cars that will come in, for the first time or again."""
+        """Return the cars that will join, for the first time or again."""
         return [event.car for event in self.life if event.what == "join"]
 
     def movable(self, n_boxes: int) -> Bool:
-        """Which of so many boxes can be pushed, (box)."""
+        """Return which boxes are movable, padded to `n_boxes`, (box)."""
         movable = np.zeros(n_boxes, dtype=bool)
         movable[: len(self.obstacles)] = [box.movable for box in self.obstacles]
         return movable
 
     def begin(self, b: Bodies, solver: Solver, env: int) -> None:
-        """Build the world of an episode, if it is kept."""
+        """Build the space of an episode, unless its physics is fast."""
         disconnect(solver, env)
         self.world = None if b.fast[env] else self._build(b, env)
 
     def move(self, b: Bodies, solver: Solver, env: int, dt: float) -> None:
-        """Let the next step of the environment be made by its space, or make it.
+        """Connect the space of the environment for its next step, or make the step.
 
         Args:
             b: Bodies, updated.
-            solver: Connected, if compiled code can make the step.
-            env: Number of the environment in these.
-            dt: [s]
+            solver: Solver; connected if compiled code can make the step.
+            env: Index of the environment in both.
+            dt: Step [s].
         """
         if self.world is None or (b.fast[env] and not UNKNOWN):
-            # The order in which a space takes its contacts is a matter of what it had before, so
-            # that each time something touches begins with a new one.
+            # The order of contacts in a space depends on its history, so that every sequence of
+            # contacts begins with a new space.
             self.world = self._build(b, env)
         if UNKNOWN or self.world.is_open:
             if b.fast[env]:
@@ -84,15 +84,15 @@ class RoomState:
             connect(solver, env, self.world, int(b.tick[env]))
 
     def read(self, b: Bodies, env: int) -> None:
-        """Read from the space what others have changed in it."""
+        """Read the changes by other code from the space."""
         if self.world is not None and self.world.is_open:
             self.world.take(b, env)
 
     def open(self, b: Bodies, solver: Solver, env: int) -> PhysicsSpace:
-        """The world for others to look into and to change.
+        """Return the space for other code to inspect and change.
 
         Raises:
-            EnvError: It is not kept.
+            EnvError: The space is not kept.
         """
         if self.world is None or b.fast[env]:
             raise EnvError("world: expected physics 'pymunk', a fast one keeps no space")
@@ -111,15 +111,15 @@ class RoomState:
     def live(
         self, b: Bodies, solver: Solver, radio: Radio, antennas: F64, env: int, t: float
     ) -> None:
-        """Let happen what is due.
+        """Apply all due events.
 
         Args:
-            b: Cars, updated.
-            solver: Disconnected where another number of cars is present from now on.
-            radio: Their radios, updated.
-            antennas: Where these are, (env, car, 3) [m], updated.
-            env: Number of the environment in these.
-            t: Now [s].
+            b: Bodies, updated.
+            solver: Solver; disconnected if a car joins or leaves.
+            radio: Radios of the cars, updated.
+            antennas: Positions of the antennas, (env, car, 3) [m], updated.
+            env: Index of the environment in these.
+            t: Current time [s].
         """
         events = self.life
         while events and events[0].t <= t + SOON:
@@ -130,7 +130,7 @@ class RoomState:
                 events = tuple(sorted((*events, later), key=lambda each: each.t))
                 continue
             if event.what == "leave" and not b.present[env, n]:
-                # It still waits outside, and does not come in any more.
+                # The car still waits to join; its join is dropped.
                 waits = next((e for e in events if e.car == n and e.what == "join"), None)
                 events = tuple(e for e in events if e is not waits)
             if not _makes_sense(event, b.present[env]):
@@ -155,7 +155,7 @@ class RoomState:
         self.life = events
 
     def _come_or_go(self, b: Bodies, env: int, car: int) -> None:
-        """Let the world have the cars that are present."""
+        """Add a car to the space or remove it, as it joins or leaves."""
         if b.fast[env]:
             self.world = None
         elif self.world is not None and b.present[env, car]:
@@ -167,23 +167,23 @@ class RoomState:
             self.world.remove_car(car)
 
     def _is_taken(self, b: Bodies, env: int, event: LifeEvent) -> bool:
-        """True while a car or a box that was pushed stands where one is to come in."""
+        """Return whether a car or a movable box occupies the pose of a car that joins."""
         assert event.pose is not None
         place = np.array(event.pose[:2])
         away = np.linalg.norm(b.body[env, b.present[env], :2] - place, axis=-1)
         if (away < spacing(self.car)).any():
             return True
         boxes = b.boxes[env]
-        # Places to come in were drawn with more room than this next to the boxes.
+        # Poses for joining are drawn with more clearance from boxes than this.
         reach = 0.5 * np.hypot(self.car.length, self.car.width)
         pushed = boxes[self.movable(len(boxes))]
         return any(distance(place, box) < reach for box in pushed)
 
 
 def _makes_sense(event: LifeEvent, present: Bool) -> bool:
-    """Whether an event can happen: others were drawn as if no car ever had to wait outside.
+    """Return whether an event is possible: events are drawn as if no car had to wait to join.
 
-    Two cars at least stay.
+    At least two cars stay present.
     """
     if event.what == "join":
         return not present[event.car]

@@ -1,13 +1,13 @@
-"""The rigid-body solver as compiled code calls it.
+"""Interface of compiled code to the rigid-body solver.
 
 Through the interface of pymunk a step is Python that calls C three times, which takes several
-times as long as the solver's own work and keeps other threads waiting. Here the addresses of the
-same C functions, those behind `Space.step` and `pymunk.batch`, and the structures that they read
-and fill stand in arrays, and a kernel (`_contact_kernels`) makes the step.
+times as long as the solver itself and blocks other threads. Here, arrays hold the addresses of
+the same C functions, those behind `Space.step` and `pymunk.batch`, and the structures that they
+read and fill, and a kernel (`_contact_kernels`) makes the step.
 
-Addresses hold for one process, and for one place in memory: copies begin without any. All that is
-private to pymunk is in this file. If a version of pymunk lays it out otherwise, `UNKNOWN` says how,
-and `PhysicsSpace.step` makes the steps.
+Addresses are valid in one process and for one memory location: copies begin without any. All code
+that depends on private parts of pymunk is in this file. If a version of pymunk has another layout,
+`UNKNOWN` describes the difference, and `PhysicsSpace.step` makes the steps.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from relpos_env.world.pymunk_space import N_WALLS, PhysicsSpace
 from tracking.arrays import F64, I64
 
 N_STATE, N_INPUT, N_TOUCH = 6, 9, 3
-"""Numbers of a body that is read, of one that is written, and of a contact."""
+"""Number of values per body read, per body written and per contact."""
 _BATCH = (("ints", "u8"), ("floats", "u8"), ("fields", "u4"), ("pad", "u4"))
-"""`pmBatchedData`: pointers to two arrays, and which fields are meant."""
+"""Layout of `pmBatchedData`: pointers to two arrays, and the mask of fields."""
 _ARRAY = (("num", "i4"), ("max", "i4"), ("arr", "u8"))
-"""`pmFloatArray` and `pmIntArray`: numbers there are, room, and where."""
+"""Layout of `pmFloatArray` and `pmIntArray`: used length, capacity and data pointer."""
 _WAYS = ("put", "got", "met")
 SOLVER = np.dtype(
     [
-        ("ready", "i8"),  # the step that the space can make next; -1 for none
-        ("moves", "i8"),  # steps that were made, by whichever space
-        ("fresh", "i8"),  # 1: the space has made none
+        ("ready", "i8"),  # step that the space can make next; -1 for none
+        ("moves", "i8"),  # steps made by all spaces together
+        ("fresh", "i8"),  # 1: the space has not made a step yet
         ("space", "u8"),
         # Addresses of functions.
         ("step", "u8"),
@@ -42,7 +42,7 @@ SOLVER = np.dtype(
         ("put", "u8"),
         ("get", "u8"),
         ("tell", "u8"),
-        # Addresses of what follows.
+        # Addresses of the structures below.
         *((f"{way}_data", "u8") for way in _WAYS),
         *((f"{way}_{name}", kind) for way in _WAYS for name, kind in (*_BATCH, *_ARRAY)),
     ]
@@ -53,27 +53,27 @@ _OFFSETS = {name: at for name, (_, at, *_) in (SOLVER.fields or {}).items()}
 
 
 class Solver(NamedTuple):
-    """What kernels need for the moves of the solver, arrays over (env, ...)."""
+    """Data of the kernels for steps of the solver, arrays over (env, ...)."""
 
     calls: NDArray[Any]
     """SOLVER, (env)."""
     bodies: F64
-    """Of cars, boxes that can be pushed and the room itself: position, angle, velocities, force
-    and torque, (env, row, N_INPUT)."""
+    """Position, angle, velocities, force and torque of cars, movable boxes and the room itself,
+    (env, row, N_INPUT)."""
     moved: F64
     """Position, angle and velocities after the step, (env, row, N_STATE)."""
     met: I64
-    """The two bodies of a contact, and whether it is new, (env, contact, N_TOUCH)."""
+    """IDs of the two bodies of a contact, and 1 if it is new, (env, contact, N_TOUCH)."""
     car_ids: I64
-    """The solver's number of each car, 0 for those that it does not have, (env, car)."""
+    """Body ID of each car in the solver, 0 for absent cars, (env, car)."""
     owner: I64
-    """What the rows of `bodies` are: a car, a box (its number plus that of all cars), or -1 for
-    what does not move, (env, row)."""
+    """Owner of each row of `bodies`: a car, a box (its index plus the number of cars), or -1 for
+    static bodies, (env, row)."""
 
 
 def make_solver(n_envs: int, n_cars: int, n_boxes: int) -> Solver:
-    """Nothing is connected yet."""
-    # Nothing may ever be too small: the C code would move it. It keeps a row's worth of room free.
+    """Return the arrays of a solver without connected spaces."""
+    # No array may ever be too small: the C code would reallocate it. It keeps one row free.
     n_bodies = n_cars + n_boxes
     n_met = n_bodies * (n_bodies - 1) // 2 + n_bodies * N_WALLS + 1
     solver = Solver(
@@ -89,13 +89,13 @@ def make_solver(n_envs: int, n_cars: int, n_boxes: int) -> Solver:
 
 
 def connect(solver: Solver, env: int, world: PhysicsSpace, tick: int) -> None:
-    """Let compiled code step the space of a world.
+    """Connect a space to compiled code, which then steps it.
 
     Args:
-        solver: Written.
-        env: Which.
-        world: Must be kept by the caller as long as it is connected.
-        tick: The step that is to be made first.
+        solver: Solver, written.
+        env: Index of the environment.
+        world: Space; the caller must keep it as long as it is connected.
+        tick: Number of the first step to make.
     """
     calls = solver.calls[env]
     calls["ready"], calls["space"], calls["fresh"] = tick, _PRIVATE.address(world.space._space), 1
@@ -119,14 +119,14 @@ def connect(solver: Solver, env: int, world: PhysicsSpace, tick: int) -> None:
 
 
 def disconnect(solver: Solver, env: int) -> None:
-    """Let an environment be moved by no space, until the next is connected."""
+    """Disconnect the space of an environment from compiled code."""
     solver.calls["ready"][env] = -1
 
 
 def _describe(
     calls: Any, way: str, start: int, which: str, fields: int, array: NDArray[Any]
 ) -> None:
-    """Fill in the structures of one way to or from the solver; the array is its memory."""
+    """Fill in the structures of one transfer to or from the solver, with `array` as memory."""
     calls[f"{way}_data"] = start + _OFFSETS[f"{way}_ints"]
     calls[f"{way}_{which}"] = start + _OFFSETS[f"{way}_num"]
     calls[f"{way}_fields"] = fields
@@ -138,26 +138,26 @@ LAYOUTS = {
     "pmFloatArray": (16, {"num": 0, "max": 4, "arr": 8}),
     "pmIntArray": (16, {"num": 0, "max": 4, "arr": 8}),
 }
-"""Size and offsets of the fields of C structures, as `SOLVER` has them [bytes]."""
+"""Size and offsets of the fields of C structures, as in `SOLVER` [bytes]."""
 
 
 class _Private(NamedTuple):
-    """What is private to a version of pymunk."""
+    """Private parts of a version of pymunk."""
 
     functions: dict[str, int]
-    """Addresses."""
+    """Addresses of C functions by field of `SOLVER`."""
     fields_put: int
     fields_got: int
     fields_met: int
     address: Any
-    """Of a C pointer."""
+    """Function that returns the address of a C pointer."""
 
 
 def _find_private() -> _Private:
-    """Look up the functions of the solver, and see that its structures are laid out like ours.
+    """Look up the functions of the solver, and check that its structures have the layout of ours.
 
     Raises:
-        ImportError: They are not.
+        ImportError: The layout differs.
         AttributeError: A function has another name.
     """
     from pymunk._chipmunk_cffi import ffi, lib
@@ -202,4 +202,4 @@ def _find_or_say_why() -> tuple[Any, str]:
 
 
 _PRIVATE, UNKNOWN = _find_or_say_why()
-"""`UNKNOWN` says what of pymunk is not as expected; empty if compiled code can step its spaces."""
+"""`UNKNOWN` describes an unexpected pymunk; empty if compiled code can step its spaces."""

@@ -1,7 +1,7 @@
-"""A batch of simulated rooms: cars, their sensors and radios, stepped by commands.
+"""Batch of simulated rooms: cars, their sensors and radios, stepped by commands.
 
-It has no notion of agents, rewards or episodes that end. The blocks it gives are all that a
-tracker ever gets; recorded to a log and tracked from there they give the same estimates.
+It has no agents, rewards or ends of episodes. Its measurement blocks are the only input of a
+tracker; recorded to a log and tracked from there, they give the same estimates.
 """
 
 from __future__ import annotations
@@ -37,14 +37,14 @@ from tracking.records import as_records
 
 Physics = Literal["pymunk", "fast"]
 SPARE_BOXES = 8
-"""[-] Shapes that can be added to a space and that sensors see."""
+"""[-] Largest number of shapes added to a space that sensors detect."""
 
 
 class World:
-    """Groups of cars.
+    """Simulated groups of cars.
 
-    Laws: same episode, seed and commands, same everything, bit for bit; environment k of a
-    batch is that environment alone.
+    Properties: equal episodes, seeds and commands give equal results, bit for bit; environment k
+    of a batch equals that environment alone.
     """
 
     def __init__(
@@ -56,16 +56,16 @@ class World:
         proximity: int = 0,
         physics: Physics = "pymunk",
     ) -> None:
-        """Make room for the batch; `begin` puts something into it.
+        """Allocate the batch; `begin` starts its episodes.
 
         Args:
-            scenario: Its room, protocol and largest number of boxes hold for all episodes.
+            scenario: Scenario; its room, protocol and number of boxes hold for all episodes.
             n_cars: Largest number of cars in a group.
             n_envs: Number of groups.
             n_steps: Steps of `DT` in one `step`.
-            proximity: Beams that measure distances round each car.
-            physics: `pymunk`: the cars move in a space that is kept, see `world`. `fast`: the same,
-                to the last bit while nothing touches, but the space is left out then.
+            proximity: Number of distance sensors of each car.
+            physics: `pymunk`: the cars move in a space that is kept, see `world`. `fast`: the space
+                is used only for contacts; the motion without contacts is equal, bit for bit.
         """
         self.scenario, self.n_steps = scenario, n_steps
         self.constellation = car_constellation(scenario, n_cars)
@@ -75,9 +75,9 @@ class World:
         self._bodies.fast[:] = physics == "fast"
         self._sensors = make_sensors(e, n, scenario.mag.n_waves)
         self.odometer: F64 = np.zeros((e, n))
-        """Last readings, (env, car) [m/s]."""
+        """Last readings of the odometers, (env, car) [m/s]."""
         self.proximity: F64 = np.zeros((e, n, proximity))
-        """Last readings of the distance sensors, (env, car, beam) [m]; 0 of absent cars."""
+        """Last readings of the distance sensors, (env, car, beam) [m]; 0 for absent cars."""
         self._clearance: F64 = np.zeros((e, n))
         self._radio = Radio(scenario.radio.for_nodes(n), n, [0] * e, DT)
         self._scene = Scene(
@@ -89,7 +89,7 @@ class World:
         self._solver = make_solver(e, n, self._bodies.boxes.shape[1])
         self._next_life = np.full(e, np.inf)
         self.to_come: Bool = np.zeros((e, n), dtype=bool)
-        """Cars that will come in, for the first time or again, (env, car)."""
+        """Cars that will join, for the first time or again, (env, car)."""
         self.t: F64 = np.zeros(e)
         """Time since each group began, (env) [s]."""
         self._bind()
@@ -106,7 +106,7 @@ class World:
 
     @property
     def powered(self) -> Bool:
-        """Which trackers have power, (env, car)."""
+        """Mask of the trackers with power, (env, car)."""
         return self._bodies.powered
 
     @property
@@ -116,26 +116,26 @@ class World:
 
     @property
     def solver_moves(self) -> int:
-        """Steps that the rigid-body solver has made, in all groups together."""
+        """Number of steps made by the rigid-body solver, in all groups together."""
         return int(self._solver.calls["moves"].sum())
 
     @property
     def boxes(self) -> F64:
-        """What stands in the rooms, (env, box, 6); half sizes are zero for nothing.
+        """Obstacles in the rooms, (env, box, 6); half sizes are zero in unused rows.
 
-        Of each box: centre x, y, half width and depth [m], cosine and sine of its angle.
+        Columns: centre x, y, half width and depth [m], cosine and sine of the angle.
         """
         return self._bodies.boxes
 
     @property
     def nlos_share(self) -> F64:
-        """Share of the ranges of the last step that an obstacle was in the way of, (env)."""
+        """Share of NLOS ranges in the last step, (env)."""
         ranges = self.events.valid & self.events.has_power
         share: F64 = (self.events.nlos & ranges).sum(axis=1) / np.maximum(ranges.sum(axis=1), 1)
         return share
 
     def part(self, envs: slice) -> World:
-        """Some of the groups; shares their memory."""
+        """Return a view of some of the groups that shares their memory."""
         part = copy.copy(self)
         part._bodies = Bodies._make(a[envs] for a in self._bodies)
         part._sensors = Sensors._make(a[envs] for a in self._sensors)
@@ -151,12 +151,12 @@ class World:
         return part
 
     def begin(self, env: int, episode: Episode, rng: np.random.Generator) -> None:
-        """Begin a group again.
+        """Start an episode of a group.
 
         Args:
-            env: Which.
-            episode: What it is made of.
-            rng: Its own; no part's draws depend on another's.
+            env: Index of the group.
+            episode: Episode to start.
+            rng: Generator of the group; draws of its parts do not depend on each other.
         """
         b, group = self._bodies, self._groups[env]
         place_bodies(b, env, episode, self.scenario.room)
@@ -172,7 +172,7 @@ class World:
         group.boots = rng.spawn(1)[0]
         for n in np.nonzero(episode.present)[0].tolist():
             self._radio.switch_on(env, n, boot=int(group.boots.integers(256)))
-        # Last, so that all other draws are what they are without beams.
+        # Drawn last, so that the other draws are the same without distance sensors.
         self._sensors.proximity_seed[env] = rng.integers(1 << 62)
         if self.scenario.furnish is not None:
             self.scenario.furnish(self.world(env), rng.spawn(1)[0])
@@ -181,11 +181,11 @@ class World:
         self._look_ahead(env)
 
     def step(self, speed: F64, steering: F64) -> MeasurementBlock:
-        """Drive for `n_steps` steps and return all that was measured.
+        """Drive for `n_steps` steps and return all measurements.
 
         Args:
-            speed: Forward speed wanted, (env, car) [m/s]; 0 for cars that come in just now.
-            steering: Steering angle wanted, (env, car) [rad]; likewise.
+            speed: Commanded speed, (env, car) [m/s]; cars that join in this step use 0.
+            steering: Commanded steering angle, (env, car) [rad]; cars that join in this step use 0.
 
         Returns:
             Measurements, roughly in order; valid until the next step.
@@ -210,7 +210,7 @@ class World:
         return self.block
 
     def world(self, env: int) -> PhysicsSpace:
-        """The space of a group, to look into and to change; from now on stepped by pymunk alone.
+        """Return the space of a group to inspect and change; from then on, only pymunk steps it.
 
         Raises:
             EnvError: `physics` is "fast".
@@ -218,22 +218,22 @@ class World:
         return self._groups[env].open(self._bodies, self._solver, env)
 
     def movable(self, env: int) -> Bool:
-        """Which boxes of a room can be pushed, (box)."""
+        """Return which boxes of a room are movable, (box)."""
         return self._groups[env].movable(self.boxes.shape[1])
 
     def line_of_sight(self, env: int) -> Bool:
-        """Which cars see each other, (car, car)."""
+        """Return which cars have line of sight to each other, (car, car)."""
         return pairs_in_sight(self._bodies.body[env, :, :2], self._bodies.boxes[env])
 
     def _look_ahead(self, env: int) -> None:
-        """When something happens next, and who will come."""
+        """Update the time of the next event and the cars that will join."""
         group = self._groups[env]
         self._next_life[env] = group.next_event
         self.to_come[env] = False
         self.to_come[env, group.to_come()] = True
 
     def __getstate__(self) -> dict[str, Any]:
-        """What is put together by `_bind` stays behind, and the solver with its addresses."""
+        """Return the state without the results of `_bind` and the solver with its addresses."""
         bound = {"_begin_decision", "_run_steps", "_read_odometers", "_read_proximity"}
         bound |= {"_read_clearances", "block", "state", "_solver"}
         return {k: v for k, v in self.__dict__.items() if k not in bound}
@@ -245,7 +245,7 @@ class World:
         self._bind()
 
     def _bind(self) -> None:
-        """Put together what the kernels take: arrays that stay where they are."""
+        """Bind the kernels to their arrays, which stay at the same addresses."""
         sensors = self._sensors
         bodies = self._bodies._replace(cars=as_records(self._bodies.cars))
         sensors = sensors._replace(
@@ -280,7 +280,7 @@ class World:
             self._clearance,
         )  # fmt: skip
         self.block = MeasurementBlock(*self.events[:9])
-        """What the last step measured; shares memory."""
+        """Measurements of the last step; shares memory."""
         b = self._bodies
         self.state = WorldState(
             t=self.t,
@@ -293,4 +293,4 @@ class World:
             clearance=self._clearance,
             present=b.present,
         )
-        """The truth now; shares memory."""
+        """Current true state; shares memory."""

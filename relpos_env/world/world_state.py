@@ -1,4 +1,4 @@
-"""The truth about every car."""
+"""True state of every car."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ from tracking.params.short_repr import short_repr
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorldState:
-    """Arrays over (env, car, ...), or over (car, ...) for one environment."""
+    """True state, arrays over (env, car, ...), or over (car, ...) for one environment."""
 
     __repr__ = short_repr
 
     t: F64
     """Time since the environment began, (env) [s]."""
     pos_w: F64
-    """(env, car, 2) [m]"""
+    """Position, (env, car, 2) [m]."""
     vel_w: F64
-    """(env, car, 2) [m/s]"""
+    """Velocity, (env, car, 2) [m/s]."""
     accel_w: F64
-    """Mean over the last step, (env, car, 2) [m/s2]."""
+    """Mean acceleration over the last step, (env, car, 2) [m/s2]."""
     heading: F64
-    """(env, car) [rad]"""
+    """Heading, (env, car) [rad]."""
     yaw_rate: F64
-    """(env, car) [rad/s]"""
+    """Yaw rate, (env, car) [rad/s]."""
     steering: F64
-    """(env, car) [rad]"""
+    """Angle of the front wheels, (env, car) [rad]."""
     clearance: F64
-    """Way between the car's body and the wall, box or car nearest to it, (env, car) [m]: 0 at a
-    touch, at most 0.5."""
+    """Distance between the car's body and the nearest wall, box or car, (env, car) [m]: 0 at a
+    contact, at most 0.5."""
     present: Bool
-    """The car is in the room, (env, car)."""
+    """True if the car is in the room, (env, car)."""
 
     @property
     def speed(self) -> F64:
@@ -45,5 +45,5 @@ class WorldState:
         return forward
 
     def take(self, env: int) -> WorldState:
-        """One environment, its axis removed."""
+        """Return one environment without its axis."""
         return WorldState(**{f.name: getattr(self, f.name)[env] for f in fields(self)})

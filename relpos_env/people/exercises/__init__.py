@@ -1,4 +1,4 @@
-"""Exercises that a simulated person does. Adding one: a file and a line here."""
+"""Exercises of a simulated person; a new one needs a file and a line here."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ EXERCISES: dict[str, Exercise] = {
 
 
 def exercise(name: str) -> Exercise:
-    """Look an exercise up.
+    """Return the exercise of a name.
 
     Raises:
-        EnvError: No exercise of that name.
+        EnvError: There is no exercise of that name.
     """
     return look_up(EXERCISES, name, "exercise")
 

@@ -1,4 +1,4 @@
-"""What an exercise is: a bout that begins and ends standing, somewhere on the person's path."""
+"""Interface of exercises: bouts that begin and end standing, on the person's path."""
 
 from __future__ import annotations
 
@@ -17,39 +17,39 @@ from tracking.params.short_repr import short_repr
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bout:
-    """Some seconds of an exercise."""
+    """One bout of an exercise."""
 
     __repr__ = short_repr
 
     pose: Pose
-    """At steps of `dt`; standing at both ends."""
+    """Pose at steps of `dt`; standing at both ends."""
     way: float
-    """[m] Where on the path it ends."""
+    """[m] Position along the path at the end."""
 
 
 Exercise = Callable[[SkeletonSize, Path, float, float, np.random.Generator], Bout]
-"""Make a bout: size of the person, path, way on it at the start [m], time step [s], and the
-generator for what differs from bout to bout and from person to person."""
+"""Function that makes a bout. Arguments: size of the person, path, position along it at the start
+[m], time step [s], and generator of the variations between bouts and persons."""
 
 
 def step_times(seconds: float, dt: float) -> F64:
-    """Times of a bout, the last one at or after its end, (time) [s].
+    """Return the times of a bout, the last one at or after its end, (time) [s].
 
     Args:
-        seconds: Its length.
+        seconds: Length of the bout [s].
         dt: Time step [s].
     """
     return dt * np.arange(int(np.ceil(seconds / dt - 1e-9)) + 1, dtype=np.float64)
 
 
 def too_long(size: SkeletonSize, pose: Pose) -> F64:
-    """How much lower the pelvis would have to be for the legs to reach the feet, (time) [m].
+    """Return the amount to lower the pelvis for the legs to reach the feet, (time) [m].
 
-    A leg may be stretched as far as a standing one's; never negative.
+    A leg may be stretched as far as that of a standing person. The amount is never negative.
 
     Args:
-        size: Of the person.
-        pose: Over time.
+        size: Size of the person.
+        pose: Pose over time.
     """
     stretch = leg_stretch(size, pose).max(axis=1)
     leg = size.thigh + size.shank

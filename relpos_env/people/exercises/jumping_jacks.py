@@ -1,8 +1,7 @@
 """Jumping jacks: hops that open and close the feet while the arms go up and down.
 
-In flight the pelvis follows the parabola of a thrown body; between flights it is led by the
-quintic that takes over its height, speed and acceleration at touchdown and gives them back at
-take-off. Feet move in flight only.
+In flight the pelvis follows a ballistic parabola; between flights it follows the quintic that
+matches height, speed and acceleration at touchdown and at take-off. Feet move in flight only.
 """
 
 from __future__ import annotations
@@ -22,36 +21,36 @@ from tracking.geometry import GRAVITY
 from tracking.params.short_repr import short_repr
 
 WIND_UP = 0.45
-"""[s] From standing to the first take-off, and from the last touchdown to standing."""
+"""[s] Time from standing to the first take-off, and from the last touchdown to standing."""
 CLEARANCE = 0.4
-"""[-] The feet rise by so much of the height of the hop."""
+"""[-] Rise of the feet as a share of the height of the hop."""
 PUSH, HEEL = 0.12, 1.1
-"""[s], [rad] The heels leave the floor so long before the toes, and rise by such an angle."""
+"""[s, rad] Time by which the heels leave the floor before the toes, and angle of their lift."""
 
 
 @dataclass(frozen=True, slots=True)
 class Hops:
-    """When the person is in the air."""
+    """Flight times of the person."""
 
     __repr__ = short_repr
 
     off: F64
-    """Take-offs, (hop) [s]."""
+    """Times of take-off, (hop) [s]."""
     on: F64
-    """Touchdowns, (hop) [s]."""
+    """Times of touchdown, (hop) [s]."""
 
     @property
     def seconds(self) -> float:
-        """From standing to standing."""
+        """Duration from standing to standing [s]."""
         return float(self.on[-1]) + WIND_UP
 
     def height(self, t: F64, flight: float, standing: float) -> F64:
-        """Of the pelvis, (time) [m].
+        """Return the height of the pelvis, (time) [m].
 
         Args:
-            t: (time) [s]
-            flight: Its height at every take-off and touchdown [m].
-            standing: Before and after [m].
+            t: Times, (time) [s].
+            flight: Height at every take-off and touchdown [m].
+            standing: Height before and after the bout [m].
         """
         z = np.full(len(t), standing)
         speed = 0.5 * GRAVITY * (self.on - self.off)
@@ -74,7 +73,7 @@ class Hops:
         return z
 
     def aloft(self, t: F64) -> tuple[F64, F64]:
-        """Hop by hop, how much of a flight is done, (hop, time), and its height, (hop) [m]."""
+        """Return the completed share of each flight, (hop, time), and its height, (hop) [m]."""
         share = (t - self.off[:, None]) / (self.on - self.off)[:, None]
         return share, GRAVITY / 8.0 * (self.on - self.off) ** 2
 
@@ -82,14 +81,14 @@ class Hops:
 def jumping_jacks(
     size: SkeletonSize, path: Path, way: float, dt: float, rng: np.random.Generator
 ) -> Bout:
-    """A bout of 6 to 14 jumping jacks, 0.9 s to 1.2 s each.
+    """Return a bout of 6 to 14 jumping jacks, 0.9 s to 1.2 s each.
 
     Args:
-        size: Of the person.
-        path: The person stays where it is.
-        way: On the path [m].
+        size: Size of the person.
+        path: Path of the person, who stays in place.
+        way: Position along the path [m].
         dt: Time step [s].
-        rng: For their number, rate and reach.
+        rng: Generator of number, rate and reach.
     """
     n = 2 * int(rng.integers(6, 15))
     period, share = rng.uniform([0.46, 0.36], [0.60, 0.44])
@@ -127,7 +126,7 @@ def jumping_jacks(
 
 
 def _count(hops: Hops, t: F64) -> F64:
-    """Hops done, rising softly from 0 to their number, (time)."""
+    """Return the number of hops done, rising smoothly from 0 to their total, (time)."""
     between = 0.5 * (hops.on[:-1] + hops.off[1:])
     knots = np.concatenate([[0.5 * hops.off[0]], between, [hops.seconds - 0.1]])
     spline = CubicSpline(knots, np.arange(len(hops.on) + 1.0), bc_type="clamped")

@@ -1,4 +1,4 @@
-"""Squats: down and up on both feet, the trunk leaning, the arms stretched forward."""
+"""Squats: down and up on both feet, the trunk tilted, the arms stretched forward."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from relpos_env.people.skeleton_size import SkeletonSize
 
 
 def squats(size: SkeletonSize, path: Path, way: float, dt: float, rng: np.random.Generator) -> Bout:
-    """A bout of 4 to 8 squats, 1.4 s to 2.4 s each.
+    """Return a bout of 4 to 8 squats, 1.4 s to 2.4 s each.
 
     Args:
-        size: Of the person.
-        path: The person stays where it is.
-        way: On the path [m].
+        size: Size of the person.
+        path: Path of the person, who stays in place.
+        way: Position along the path [m].
         dt: Time step [s].
-        rng: For their number, depth and rate.
+        rng: Generator of number, depth and rate.
     """
     n, period = int(rng.integers(4, 9)), rng.uniform(1.4, 2.4)
     deep, lean, reach = rng.uniform([0.30, 0.35, 0.6], [0.50, 0.65, 1.5])

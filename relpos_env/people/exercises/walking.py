@@ -1,7 +1,7 @@
 """Walking along the path: feet are planted, swing forward, and are planted again.
 
-The gait is told in steps u: the pelvis is at u step lengths, and a foot planted at m stays
-there while the pelvis goes from m - 1/2 to m + 1/2 + `DOUBLE`. u(t) starts and ends softly.
+The gait is a function of steps u: the pelvis is at u step lengths, and a foot planted at m stays
+there while the pelvis moves from m - 1/2 to m + 1/2 + `DOUBLE`. u(t) starts and ends smoothly.
 """
 
 from __future__ import annotations
@@ -18,24 +18,24 @@ from relpos_env.people.skeleton_size import SkeletonSize
 from tracking.arrays import F64
 
 DOUBLE = 0.1
-"""[steps] Both feet are on the floor for so long in every step."""
+"""[steps] Duration of double support in every step."""
 RISE, HEEL = 0.05, 0.95
-"""[m], [rad] How far a foot and its heel are lifted in a full step."""
+"""[m, rad] Lift of a foot and of its heel in a full step."""
 RAMP = 0.9
-"""[s] From standing to full speed."""
+"""[s] Time from standing to full speed."""
 
 
 def walking(
     size: SkeletonSize, path: Path, way: float, dt: float, rng: np.random.Generator
 ) -> Bout:
-    """A walk of 12 to 24 steps at 0.7 m/s to 1.1 m/s.
+    """Return a walk of 12 to 24 steps at 0.7 m/s to 1.1 m/s.
 
     Args:
-        size: Of the person.
-        path: To walk on.
-        way: Where it starts [m].
+        size: Size of the person.
+        path: Path to walk on.
+        way: Position along the path at the start [m].
         dt: Time step [s].
-        rng: For steps, cadence and swing.
+        rng: Generator of steps, cadence and swing.
     """
     n_steps = int(rng.integers(12, 25))
     length = size.height / 1.75 * rng.uniform(0.46, 0.60)
@@ -78,25 +78,25 @@ def walking(
 
 @dataclass(frozen=True, slots=True)
 class _Walk:
-    """Where the feet are planted."""
+    """Footholds of a walk."""
 
     size: SkeletonSize
     path: Path
     way: float
-    """On the path at the start [m]."""
+    """Position along the path at the start [m]."""
     length: float
-    """Of a step [m]."""
+    """Length of a step [m]."""
     n_steps: int
     width: float
-    """From the middle to each foot while walking [m]."""
+    """Distance from the middle to each foot while walking [m]."""
 
     def foot(self, u: F64, side: int, *, late: bool) -> tuple[F64, F64, F64]:
-        """What one foot does.
+        """Return the motion of one foot.
 
         Args:
             u: Steps done, (time) [-].
             side: 0 right, 1 left.
-            late: It makes the second step, not the first.
+            late: True if it makes the second step, not the first.
 
         Returns:
             Ball of the foot, (time, 3) [m], yaw and heel lift, (time) [rad].
@@ -126,7 +126,7 @@ class _Walk:
 
 
 def _lowered(size: SkeletonSize, pose: Pose, share: F64) -> Pose:
-    """The same with the pelvis as low as the legs need it, most in the middle."""
+    """Return the pose with the pelvis lowered as far as the legs need it, weighted by `share`."""
     for _ in range(3):
         need = too_long(size, pose)
         depth = np.max(need / np.maximum(share, 0.2))

@@ -1,1 +1,1 @@
-"""The air between the nodes: clocks, paths, collisions; see `docs/explanation/simulator.md`."""
+"""Radio simulation: clocks, paths, collisions; see `docs/explanation/simulator.md`."""

@@ -1,4 +1,4 @@
-"""Clocks, antennas and single messages of one environment, for the reference air."""
+"""Clocks, antennas and single messages of one environment, for the reference in `air`."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ def make_nodes(nodes, seed, clock_offset, antenna_std):
 
     Args:
         nodes: NODE, (node), written.
-        seed: Of the environment, uint64.
-        clock_offset: `RadioSimParams`.
-        antenna_std: `RadioSimParams`.
+        seed: Seed of the environment, uint64.
+        clock_offset: As in `RadioSimParams` [1].
+        antenna_std: `RadioSimParams.antenna_delay_std` [m].
     """
     for k in range(nodes.shape[0]):
         key = draw_key(seed, np.uint64(STARTS + k))
@@ -37,38 +37,38 @@ def make_nodes(nodes, seed, clock_offset, antenna_std):
 
 @kernel
 def next_window(nodes, seed, window, wander, dt):
-    """Move the clocks of one environment to the next window."""
+    """Advance the clocks of one environment to the next window."""
     for k in range(nodes.shape[0]):
         enter_next_window(nodes[k], seed, window, k, dt, wander)
 
 
 @kernel
 def local_now(nodes, k, t):
-    """Ticks of a node's clock at a time since the start of the window [s]."""
+    """Return the ticks of a node's clock at a time since the start of the window [s]."""
     return read_clock(nodes[k], t)
 
 
 @kernel
 def true_at(nodes, k, ticks):
-    """Time since the start of the window [s] at which a node's clock shows so many ticks."""
+    """Return the time since the start of the window at which a node's clock shows `ticks` [s]."""
     return true_time(nodes[k], ticks)
 
 
 @kernel
 def hear_message(channel, latents, seed, nodes, s, r, t, motion, boxes, capsules, receptions):
-    """Whether node r detects the message of node s; what it hears goes to its RECEPTION.
+    """Return whether node r detects the message of node s, and write its RECEPTION.
 
     Args:
         channel: CHANNEL, (1).
         latents: LATENT, (node, node), the part above the diagonal is used and updated.
-        seed: Of the environment, uint64.
+        seed: Seed of the environment, uint64.
         nodes: NODE, (node).
-        s: Sender.
-        r: Receiver.
-        t: Stamp moment since the start of the window [s].
-        motion: Antennas at its start and end, (node, 3) [m], and its length [s].
-        boxes: What stands in the plane, (box, 6).
-        capsules: What stands in space, (capsule, 7).
+        s: Index of the sender.
+        r: Index of the receiver.
+        t: Time of the message's stamp since the start of the window [s].
+        motion: Antennas at the start and end of the window, (node, 3) [m], and its length [s].
+        boxes: Obstacles in the plane, (box, 6).
+        capsules: Obstacles in 3D, (capsule, 7).
         receptions: RECEPTION, (node), written.
     """
     pos0, pos1, dt = motion

@@ -1,4 +1,4 @@
-"""The records that the kernels of the air work on."""
+"""Record types of the radio kernels."""
 
 from __future__ import annotations
 
@@ -24,81 +24,81 @@ _CHANNEL_DERIVED = (
     "rho_shadow", "rho_place",
 )  # fmt: skip
 CHANNEL = np.dtype([(name, "f8") for name in (*_CHANNEL_NUMBERS, *_CHANNEL_DERIVED)])
-"""`ChannelParams` as the kernels take it, with what is derived from it."""
+"""Record type of `ChannelParams` for the kernels, with derived values."""
 
 LATENT = np.dtype(
     [("knot", "i8")]
     + [(f"{z}{k}", "f8") for k in (0, 1) for z in ("fast", "slow", "excess", "shadow", "place")]
 )
-"""The slowly changing part of one pair's channel, at two knots of the way travelled."""
+"""Slowly varying processes of one pair's channel, at two knots of the distance travelled."""
 
 NODE = np.dtype(
     [
         ("on", "?"),
-        ("since", "f8"),  # s since the start of the window; deaf before
+        ("since", "f8"),  # s since the start of the window; no reception until then
         ("base", "i8"),  # local clock at the start of the window, whole ticks
-        ("frac", "f8"),  # and the rest of a tick
+        ("frac", "f8"),  # fraction of a tick to add to it
         ("rate", "f8"),  # ticks per second of true time
         ("path", "f8"),  # m travelled up to the start of the window
         ("step", "f8"),  # m travelled in the window
-        ("antenna", "f8"),  # m that its antenna delay adds to a range
-        ("sent", "i8"),  # messages so far
+        ("antenna", "f8"),  # m added to a range by its antenna delay
+        ("sent", "i8"),  # messages sent
     ]
 )
 """One radio: clock, motion and antenna."""
 
 RECEPTION = np.dtype(
     [
-        ("src", "i8"),  # node whose message is coming in, -1 if none
-        ("bad", "?"),  # something else was on the air meanwhile
+        ("src", "i8"),  # node whose message is being received, -1 if none
+        ("bad", "?"),  # the message is corrupted
         ("nlos", "?"),
         ("stamp", "i8"),  # receiver's clock, ticks
-        ("strength", "f8"),  # dBm, that arrives
+        ("strength", "f8"),  # dBm, at the antenna
         ("rx_power", "f8"),  # dBm, as reported
         ("fp_power", "f8"),  # dBm
-        ("carrier", "f8"),  # 1
+        ("carrier", "f8"),  # carrier offset [1]
     ]
 )
-"""What a receiver is locked on."""
+"""Message that a receiver is locked on."""
 
 FLIGHT = np.dtype(
     [
-        ("active", "?"),  # ordered, or on the air
-        ("moment", "f8"),  # of its stamp, s since the start of the window
-        ("detect", "f8"),  # when receivers can notice it; inf once that is past
-        ("end", "f8"),  # inf if there is none
+        ("active", "?"),  # scheduled or on the air
+        ("moment", "f8"),  # time of its stamp, s since the start of the window
+        ("detect", "f8"),  # when receivers can detect it; inf afterwards
+        ("end", "f8"),  # end of the message; inf if there is none
     ]
 )
-"""The message of one node on its way."""
+"""Message that one node transmits."""
 
 
 class RadioNumbers(NamedTuple):
-    """What the kernels need of `RadioSimParams`."""
+    """Values of `RadioSimParams` for the kernels."""
 
     header_time: float
     detect: float
     capture: float
     wander: float
     airtime: F64
-    """Of a message with k rows, (k) [s]."""
+    """Airtime of a message with k rows, (k) [s]."""
 
 
 class RangeBuffer(NamedTuple):
-    """Where ranges are written, (env, slot)."""
+    """Output buffer for ranges, (env, slot)."""
 
     t: F64
-    """When it was so, s since the start of the window."""
+    """Time of the range, s since the start of the window."""
     i: I64
     j: I64
     values: F64
     """Distance [m], received and first-path power [dBm], (env, slot, 3)."""
     nlos: Bool
     used: I64
-    """Ranges written, (env)."""
+    """Number of ranges written, (env)."""
 
 
 def make_channel(params: ChannelParams, knot: float) -> Records:
-    """Derive the numbers of the kernels, (1)."""
+    """Return channel parameters and derived values for the kernels, CHANNEL (1)."""
     c = np.zeros(1, dtype=CHANNEL)
     k2 = params.gap_skew**2
     lengths = {

@@ -12,18 +12,18 @@ from tracking.kernels.jit import small_kernel
 
 _DECIBEL = 20.0 / math.log(10.0)
 KNOT = 0.05
-"""[m] The processes are drawn every so far and straight between."""
+"""[m] Distance between knots of the processes, which are linear in between."""
 
 
 @small_kernel
 def bring_latents(c, latent, key, travelled):
-    """Bring the processes of a pair to the way travelled.
+    """Advance the processes of a pair to the distance travelled.
 
     Args:
         c: CHANNEL.
         latent: LATENT of the pair, updated.
-        key: Of the pair's draws.
-        travelled: By both ends together [m]; never less than before.
+        key: Key of the pair's draws.
+        travelled: Sum of the distances travelled by both ends [m]; must not decrease.
 
     Returns:
         Weight of the later knot.
@@ -38,7 +38,7 @@ def bring_latents(c, latent, key, travelled):
 
 @small_kernel
 def _draw_knot(c, latent, key, knot, correlated):
-    """Move on to a knot, from the one before."""
+    """Advance from the previous knot to `knot`."""
     here = draw_key(key, np.uint64(knot))
     latent.fast0, latent.slow0, latent.excess0 = latent.fast1, latent.slow1, latent.excess1
     latent.shadow0, latent.place0 = latent.shadow1, latent.place1
@@ -58,7 +58,7 @@ def _step(rho, last, noise, correlated):
 
 @small_kernel
 def path_error(c, latent, weight, distance, nlos):
-    """What a range is wrong by, without the noise of its stamps [m]."""
+    """Return the range error without the noise of the stamps [m]."""
     error = c.bias
     if distance > 2.0 and c.rise != 0.0:
         error += c.rise * (1.0 - math.exp(-(distance - 2.0) / c.rise_length))
@@ -73,7 +73,7 @@ def path_error(c, latent, weight, distance, nlos):
 
 @small_kernel
 def path_strength(c, latent, weight, distance, nlos):
-    """Power that arrives [dBm]."""
+    """Return the power at the antenna [dBm]."""
     p = c.power_1m - _DECIBEL * math.log(max(distance, 0.1))
     return (
         p
@@ -84,7 +84,7 @@ def path_strength(c, latent, weight, distance, nlos):
 
 @small_kernel
 def reported_power(c, strength):
-    """What the radio makes of it, before the noise of the reading [dBm]."""
+    """Return the power that the radio reports, without the noise of the reading [dBm]."""
     below = (c.ceiling - strength) / c.knee
     if below > 30.0:
         return strength
@@ -93,7 +93,7 @@ def reported_power(c, strength):
 
 @small_kernel
 def power_gap(c, latent, weight, distance, nlos, key):
-    """Received minus first-path power [dB]."""
+    """Return the received minus first-path power [dB]."""
     share_e = c.gap_share_excess if nlos else 0.0
     rest = math.sqrt(1.0 - share_e * share_e - c.gap_share_shadow * c.gap_share_shadow)
     z = rest * _mix(latent.place0, latent.place1, weight) + c.gap_share_shadow * _mix(

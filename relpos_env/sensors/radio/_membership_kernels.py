@@ -1,8 +1,8 @@
-"""Who is in the group, as the radios' own protocol has it: JOIN and LEAVE events.
+"""Group membership by the radios' own protocol: JOIN and LEAVE events.
 
-The initiator of a round decides who takes part in the next (`tracking.ranging.members`), and a host
-that listens hears its table. A node in no table for `PATIENCE` has left: an obstacle that hides a
-node for some rounds is no reason to forget where it is.
+The initiator of a round decides on the members of the next (`tracking.ranging.members`), and a
+listening host receives its table. A node in no table for `PATIENCE` has left; the delay keeps
+the estimates of a node that is behind an obstacle for a few rounds.
 """
 
 from __future__ import annotations
@@ -13,22 +13,22 @@ INITIATOR = 1
 """Role of a session, see `tracking.ranging.compiled.turns`."""
 JOIN, LEAVE = 0, 6
 PATIENCE = 1.0
-"""[s]"""
+"""[s] Time without an entry in a table after which a node has left."""
 LAST, IS_MEMBER = 0, 1
-"""Columns of what is kept of each node: when it was last in a table [s]; 1 after its JOIN."""
+"""Columns of the membership state of a node: time of its last table [s]; 1 after its JOIN."""
 
 
 @small_kernel
 def note_members(air, members, t, events, e, k):
-    """Append what has changed in the group; returns the place of the next event.
+    """Append JOIN and LEAVE events of the group and return the index of the next event.
 
     Args:
         air: Air of all environments.
-        members: What is kept of each node, (env, node, 2), updated.
-        t: Now [s].
-        events: Events, appended from place k on.
-        e: Environment.
-        k: Place of the next event.
+        members: Membership state of each node, (env, node, 2), updated.
+        t: Current time [s].
+        events: Events, written from index k on.
+        e: Index of the environment.
+        k: Index of the next event.
     """
     table = 0
     for n in range(members.shape[1]):
@@ -54,7 +54,7 @@ def note_members(air, members, t, events, e, k):
 
 @small_kernel
 def write_member(events, e, k, t, kind, n):
-    """An event of one node without values."""
+    """Write an event of one node without values."""
     events.t[e, k], events.kind[e, k] = t, kind
     events.i[e, k], events.j[e, k] = n, n
     events.antenna_i[e, k], events.antenna_j[e, k] = 0, 0

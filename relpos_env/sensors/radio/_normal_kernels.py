@@ -1,9 +1,9 @@
-"""Normal random numbers by counting: the ziggurat of Marsaglia and Tsang [1].
+"""Counter-based normal random numbers: the ziggurat of Marsaglia and Tsang [1].
 
-The area under half of exp(-x^2 / 2) is cut into 256 layers of one size, the lowest of which has
-the tail. A number is drawn uniformly within a layer that is drawn uniformly, and all but one in a
-hundred lie so far in that no density need be worked out. Layer and number come from different
-bits of a draw, without which they would depend on each other [2].
+The area under half of exp(-x^2 / 2) is cut into 256 layers of equal area, the lowest of which
+contains the tail. A number is drawn uniformly within a uniformly drawn layer; for all but one in
+a hundred, no density needs to be evaluated. Layer and number use different bits of a draw, since
+they would depend on each other otherwise [2].
 
 References:
     [1] Marsaglia, Tsang, The Ziggurat Method for Generating Random Variables, Journal of
@@ -24,13 +24,13 @@ from tracking.kernels.jit import kernel, small_kernel
 
 N_LAYERS = 256
 TAIL = 3.6541528853610088
-"""Where the tail begins if so many layers are to end at 0 [1]."""
+"""Start of the tail for which `N_LAYERS` layers end at 0 [1]."""
 
 
 def layer_edges() -> F64:
-    """How far the layers reach, from the lowest on, (layer + 1); 0 is the end.
+    """Return the widths of the layers from the lowest on, (layer + 1), with a final 0.
 
-    The lowest is given as wide as a rectangle of its area would be.
+    The width of the lowest layer is that of a rectangle of its area.
     """
     density = math.exp(-0.5 * TAIL**2)
     area = TAIL * density + math.sqrt(0.5 * math.pi) * math.erfc(TAIL / math.sqrt(2.0))
@@ -45,15 +45,15 @@ def layer_edges() -> F64:
 EDGES = layer_edges()
 DENSITIES = np.exp(-0.5 * EDGES**2)
 STEPS = EDGES * 2.0**-52
-"""Of a layer's numbers: 2^52 to either side."""
+"""Spacing of the numbers in each layer: 2^52 to either side."""
 _LAYER, _REST = np.uint64(N_LAYERS - 1), np.int64(11)
 APART = 64
-"""Draws that numbers of one key are apart: none needs as many."""
+"""Counter distance between the numbers of one key; no number needs as many draws."""
 
 
 @small_kernel
 def normal(key, k):
-    """The k-th standard normal number of a key."""
+    """Return the k-th standard normal number of a key."""
     at = APART * (k + 1)
     bits = draw_key(key, np.uint64(at))
     layer = np.int64(bits & _LAYER)
@@ -63,7 +63,7 @@ def normal(key, k):
 
 @kernel
 def _rare_normal(key, at, layer, x):
-    """Decide on a number that is not well inside its layer, and draw again if it is not under."""
+    """Accept a number at the edge of its layer, or draw again if it is above the density."""
     while abs(x) >= EDGES[layer + 1]:
         if layer == 0:
             return math.copysign(_tail(key, at), x)
@@ -79,7 +79,7 @@ def _rare_normal(key, at, layer, x):
 
 @small_kernel
 def _tail(key, at):
-    """A number beyond the layers (Marsaglia, Technometrics 6(1), 1964)."""
+    """Return a number in the tail (Marsaglia, Technometrics 6(1), 1964)."""
     while True:
         at += 2
         beyond = -math.log(uniform(key, at - 1)) / TAIL

@@ -1,4 +1,4 @@
-"""What stands between two antennas: upright boxes, and capsules such as limbs in space."""
+"""Occlusion between two antennas by upright boxes and by capsules in 3D, such as limbs."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from tracking.kernels.jit import kernel, small_kernel
 
 @small_kernel
 def crosses_box(ax, ay, bx, by, box, berth):
-    """Whether the line from a to b in the plane passes through a box.
+    """Return whether the line from a to b in the plane passes through a box.
 
     Args:
-        ax: Its one end [m].
-        ay: Its one end [m], along y.
-        bx: Its other end [m].
-        by: Its other end [m], along y.
+        ax: x of end a [m].
+        ay: y of end a [m].
+        bx: x of end b [m].
+        by: y of end b [m].
         box: Centre x y [m], half width, half depth [m], cosine and sine of its angle.
-        berth: How much larger the box is taken on all sides [m].
+        berth: Margin around the box on all sides [m].
     """
     x, y, dx, dy = ax - box[0], ay - box[1], bx - ax, by - ay
-    # Most boxes are nowhere near: how far the line passes their centre, times its length.
+    # Quick rejection: distance of the line from the centre of the box, times its length.
     across, half2 = x * dy - y * dx, (box[2] + berth) ** 2 + (box[3] + berth) ** 2
     if across * across > half2 * (dx * dx + dy * dy):
         return False
@@ -43,18 +43,18 @@ def crosses_box(ax, ay, bx, by, box, berth):
 
 @small_kernel
 def crosses_capsule(ax, ay, az, bx, by, bz, capsule, skin):
-    """Whether the line from a to b passes through the inside of a capsule.
+    """Return whether the line from a to b passes through the inside of a capsule.
 
     Args:
-        ax: Its one end [m].
-        ay: Its one end [m], along y.
-        az: Its one end [m], along z.
-        bx: Its other end [m].
-        by: Its other end [m], along y.
-        bz: Its other end [m], along z.
+        ax: x of end a [m].
+        ay: y of end a [m].
+        az: z of end a [m].
+        bx: x of end b [m].
+        by: y of end b [m].
+        bz: z of end b [m].
         capsule: Ends of the axis, 3 and 3 [m], and the radius [m].
-        skin: Share of the radius that counts as inside, below 1: an antenna is worn on the
-            surface and is not hidden by that.
+        skin: Share of the radius that counts as inside, below 1: a capsule must not occlude an
+            antenna that is worn on its surface.
     """
     ux, uy, uz = bx - ax, by - ay, bz - az
     vx, vy, vz = capsule[3] - capsule[0], capsule[4] - capsule[1], capsule[5] - capsule[2]
@@ -65,7 +65,7 @@ def crosses_capsule(ax, ay, az, bx, by, bz, capsule, skin):
     det = a * c - b * b
     s = min(max((b * e - c * d) / det, 0.0), 1.0) if det > 1e-12 * a * c else 0.0
     t = (b * s + e) / c if c > 0.0 else 0.0
-    if c <= 0.0 < a:  # a ball
+    if c <= 0.0 < a:  # a sphere
         s = min(max(-d / a, 0.0), 1.0)
     if t < 0.0 or t > 1.0:
         t = min(max(t, 0.0), 1.0)
@@ -76,12 +76,12 @@ def crosses_capsule(ax, ay, az, bx, by, bz, capsule, skin):
 
 @kernel
 def pairs_cross_boxes(pos, boxes, sight):
-    """Note which points have no box between them.
+    """Write which pairs of points have no box between them.
 
     Args:
-        pos: (point, 2) [m]
-        boxes: (box, 6)
-        sight: (point, point), written.
+        pos: Positions, (point, 2) [m].
+        boxes: As for `crosses_box`, (box, 6).
+        sight: True without a box in between, (point, point), written.
     """
     for a in range(pos.shape[0]):
         for b in range(pos.shape[0]):

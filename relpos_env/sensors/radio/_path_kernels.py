@@ -1,4 +1,4 @@
-"""One message on its way from an antenna to another, both of them moving."""
+"""Propagation of one message between two moving antennas."""
 
 from __future__ import annotations
 
@@ -20,40 +20,40 @@ from tracking.kernels.jit import small_kernel
 from tracking.ranging.frames.timestamps import SPEED_OF_LIGHT
 
 MESSAGES, PAIRS, CLOCKS, STARTS = 1 << 40, 2 << 40, 3 << 40, 4 << 40
-"""Counters of what random numbers are for."""
+"""First counters of the random numbers, one per purpose."""
 SKIN = 0.9
-"""Share of a capsule's radius that hides what is behind it."""
+"""[-] Share of a capsule's radius that occludes."""
 
 
 @small_kernel
 def read_clock(node, t):
-    """Ticks of a node's clock at a time since the start of the window [s]."""
+    """Return the ticks of a node's clock at a time since the start of the window [s]."""
     return node.base + int(math.floor(node.frac + t * node.rate))
 
 
 @small_kernel
 def nearest_tick(node, t):
-    """The tick nearest to a time: a stamp is rounded, not cut."""
+    """Return the tick nearest to a time: stamps are rounded, not truncated."""
     return node.base + int(math.floor(node.frac + t * node.rate + 0.5))
 
 
 @small_kernel
 def true_time(node, ticks):
-    """Time since the start of the window [s] at which a node's clock shows so many ticks."""
+    """Return the time since the start of the window at which a node's clock shows `ticks` [s]."""
     return (float(ticks - node.base) - node.frac) / node.rate
 
 
 @small_kernel
 def enter_next_window(node, seed, window, k, dt, wander):
-    """Move the clock and the way travelled of a node to the next window; the rate wanders.
+    """Advance clock, clock rate and distance travelled of a node to the next window.
 
     Args:
         node: NODE, updated.
-        seed: Of the environment.
-        window: Number of the window that ends.
-        k: Number of the node.
+        seed: Seed of the environment.
+        window: Index of the window that ends.
+        k: Index of the node.
         dt: Length of the window [s].
-        wander: Standard deviation of the change of rate in a second [1].
+        wander: Standard deviation of the relative change of rate in a second [1].
     """
     noise = normal(draw_key(seed, np.uint64(CLOCKS + window * 64 + k)), 0)
     total = node.frac + dt * node.rate
@@ -68,27 +68,27 @@ def enter_next_window(node, seed, window, k, dt, wander):
 def receive(
     c, latent, seed, sender, receiver, s, r, t, pos0, pos1, dt, boxes, capsules, readings, rx
 ):  # fmt: skip
-    """Work out what a node hears of a message.
+    """Compute the reception of a message at a node.
 
     Args:
         c: CHANNEL.
         latent: LATENT of the pair, updated.
-        seed: Of the environment.
+        seed: Seed of the environment.
         sender: NODE.
         receiver: NODE.
-        s: Number of the sender.
-        r: Number of the receiver.
-        t: Stamp moment of the message since the start of the window [s].
+        s: Index of the sender.
+        r: Index of the receiver.
+        t: Time of the message's stamp since the start of the window [s].
         pos0: Antennas at the start of the window, (node, 3) [m].
-        pos1: Antennas at its end.
+        pos1: Antennas at the end of the window, (node, 3) [m].
         dt: Length of the window [s].
-        boxes: What stands in the plane, (box, 6).
-        capsules: What stands in space, (capsule, 7).
-        readings: Whether to work out powers and carrier offset too; nothing else depends on it.
+        boxes: Obstacles in the plane, (box, 6).
+        capsules: Obstacles in 3D, (capsule, 7).
+        readings: True to compute powers and carrier offset, too; nothing else depends on it.
         rx: RECEPTION, written.
 
     Returns:
-        True if the radio detects it.
+        True if the radio detects the message.
     """
     key = draw_key(seed, np.uint64(MESSAGES + sender.sent * 4096 + s * 64 + r))
     share = t / dt
@@ -109,7 +109,7 @@ def receive(
         nlos = crosses_capsule(ax, ay, az, bx, by, bz, capsules[k], SKIN)
     if uniform(key, 0) < (c.loss_nlos if nlos else c.loss):
         return False
-    # The receiver moves on while the message flies.
+    # The receiver moves during the time of flight.
     inverse = 1.0 / max(distance, 1e-9)
     vx, vy, vz = (
         (pos1[r, 0] - pos0[r, 0]) / dt,

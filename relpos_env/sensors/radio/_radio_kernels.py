@@ -1,4 +1,4 @@
-"""The compiled air: every message of every environment, the twin of `air`."""
+"""Compiled messages of all environments; `air` is the reference implementation."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ NOTHING, END, DETECT, DEADLINE = -1, 0, 1, 2
 
 
 class Air(NamedTuple):
-    """All that evolves between the nodes of a batch, arrays over (env, ...)."""
+    """State of the nodes of a batch and of their messages, arrays over (env, ...)."""
 
     nodes: np.ndarray
     """NODE, (env, node)."""
@@ -47,17 +47,17 @@ class Air(NamedTuple):
     flights: np.ndarray
     """FLIGHT, (env, node)."""
     due: np.ndarray
-    """Deadlines, s since the start of the window, (env, node)."""
+    """Deadlines since the start of the window, (env, node) [s]."""
     channel: np.ndarray
     """CHANNEL, (env)."""
     seeds: np.ndarray
-    """uint64, (env)."""
+    """Seeds, uint64, (env)."""
     window: np.ndarray
-    """Windows gone by, (env)."""
+    """Number of completed windows, (env)."""
 
 
 class OneAir(NamedTuple):
-    """What a kernel of one environment works on."""
+    """State of one environment."""
 
     nodes: np.ndarray
     """NODE, (node)."""
@@ -76,25 +76,25 @@ class OneAir(NamedTuple):
     flights: np.ndarray
     """FLIGHT, (node)."""
     due: np.ndarray
-    """Deadlines, s since the start of the window, (node)."""
+    """Deadlines since the start of the window, (node) [s]."""
 
 
 class Scene(NamedTuple):
-    """Where everything is during the window."""
+    """Antennas and obstacles during a window."""
 
     pos0: np.ndarray
-    """Antennas at its start, (node, 3) [m]."""
+    """Antennas at the start of the window, (node, 3) [m]."""
     pos1: np.ndarray
-    """At its end."""
+    """Antennas at the end of the window, (node, 3) [m]."""
     boxes: np.ndarray
-    """(box, 6)"""
+    """Obstacles in the plane, (box, 6)."""
     capsules: np.ndarray
-    """(capsule, 7)"""
+    """Obstacles in 3D, (capsule, 7)."""
 
 
 @kernel
 def run_window(p, radio, batch, scenes, dt, out):
-    """Let all environments send and hear for one window.
+    """Simulate the messages of all environments for one window.
 
     Args:
         p: SessionNumbers.
@@ -102,7 +102,7 @@ def run_window(p, radio, batch, scenes, dt, out):
         batch: Air of all environments, updated.
         scenes: Scene of all environments.
         dt: Length of the window [s].
-        out: RangeBuffer, written; it must have room for what a window can bring.
+        out: RangeBuffer, written; it must hold the largest number of ranges of a window.
     """
     for e in range(batch.seeds.shape[0]):
         run_env_window(p, radio, batch, scenes, dt, out, e)
@@ -110,7 +110,7 @@ def run_window(p, radio, batch, scenes, dt, out):
 
 @kernel
 def run_env_window(p, radio, batch, scenes, dt, out, e):
-    """Let one environment send and hear for one window; arguments as for `run_window`."""
+    """Simulate the messages of environment e for one window; arguments as for `run_window`."""
     air = OneAir(
         batch.nodes[e],
         batch.latents[e],
@@ -165,7 +165,7 @@ def power_nodes(p, batch, e, k, on, boot, t):
 
 @small_kernel
 def distance_moved(scene, k):
-    """Way of an antenna in the window [m]."""
+    """Return the distance that an antenna moves in the window [m]."""
     x, y, z = (
         scene.pos1[k, 0] - scene.pos0[k, 0],
         scene.pos1[k, 1] - scene.pos0[k, 1],
@@ -176,14 +176,14 @@ def distance_moved(scene, k):
 
 @small_kernel
 def plan(air, k):
-    """Note when a node's deadline comes."""
+    """Update the due time of a node's deadline."""
     node = air.nodes[k]
     air.due[k] = true_time(node, air.sessions[k].deadline) if node.on else np.inf
 
 
 @small_kernel
 def next_event(air, dt):
-    """Kind, node and time of what happens next in the window; of equal times the lower kind."""
+    """Return kind, node and time of the next event in the window; the lower kind wins ties."""
     best, what, which = dt, NOTHING, 0
     for k in range(air.flights.shape[0]):
         if air.flights[k].end <= best and (what != END or air.flights[k].end < best):
@@ -201,7 +201,7 @@ def next_event(air, dt):
 
 @small_kernel
 def launch(radio, air, k):
-    """Put a message that a session wants to send on its way, and note the next deadline."""
+    """Start the pending transmission of a session, if any, and update its deadline."""
     session, node, flight = air.sessions[k], air.nodes[k], air.flights[k]
     if session.speaks:
         session.speaks = False
@@ -215,7 +215,7 @@ def launch(radio, air, k):
 
 @small_kernel
 def detect(p, radio, c, seed, air, scene, s, r, t, dt):
-    """A node that is free locks on a message; of one that is not the message may be spoilt."""
+    """Lock a free receiver on a message, which may corrupt the message of a busy receiver."""
     node = air.nodes[r]
     if r == s or not node.on or t < node.since or air.flights[r].active:
         return
@@ -239,7 +239,7 @@ def detect(p, radio, c, seed, air, scene, s, r, t, dt):
 
 @small_kernel
 def end_message(p, radio, c, seed, air, scene, s, t, dt, out, e):
-    """A message is over: radios that were locked on it have it, and all are free for others."""
+    """End a message: deliver it to the radios locked on it and free these for other ones."""
     n = air.nodes.shape[0]
     air.flights[s].active, air.flights[s].end = False, np.inf
     air.nodes[s].sent += 1
@@ -265,7 +265,7 @@ def end_message(p, radio, c, seed, air, scene, s, t, dt, out, e):
         launch(radio, air, r)
     for m in range(n):
         flight = air.flights[m]
-        # A preamble that goes on long enough can still be detected.
+        # A preamble that lasts long enough can still be detected.
         if flight.active and flight.detect == np.inf and t < flight.moment - radio.detect:
             for r in range(n):
                 if (free >> r) & 1 and air.receptions[r].src < 0:
@@ -274,7 +274,7 @@ def end_message(p, radio, c, seed, air, scene, s, t, dt, out, e):
 
 @small_kernel
 def note_range(air, i, j, distance, time, rx, out, e):
-    """Write a range down."""
+    """Append a range to the buffer."""
     k = out.used[e]
     if k < out.t.shape[1]:
         out.t[e, k] = true_time(air.nodes[i], time)
@@ -287,7 +287,7 @@ def note_range(air, i, j, distance, time, rx, out, e):
 
 @small_kernel
 def close_window(radio, air, seed, window, dt):
-    """Make the end of the window the start of the next."""
+    """Advance the nodes to the start of the next window and shift all times to it."""
     for k in range(air.nodes.shape[0]):
         node, flight = air.nodes[k], air.flights[k]
         enter_next_window(node, seed, window, k, dt, radio.wander)

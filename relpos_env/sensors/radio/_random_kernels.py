@@ -1,7 +1,7 @@
-"""Random numbers by counting: a draw depends on what it is for, never on the draws before it.
+"""Counter-based random numbers: a draw depends on its key and counter, not on other draws.
 
-SplitMix64 (Steele, Lea, Flood, OOPSLA 2014) as a hash of a key and a counter; so environments,
-messages and sensors can be computed in any order and still get the same numbers.
+SplitMix64 (Steele, Lea, Flood, OOPSLA 2014) hashes a key and a counter. Environments, messages
+and sensors can therefore be computed in any order and get the same numbers.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _S30, _S27, _S31, _S11 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(
 
 @small_kernel
 def draw_key(seed, counter):
-    """A key of its own for every count under a seed, both uint64."""
+    """Return the key of a counter under a seed, both uint64; every counter has its own key."""
     x = seed + _GOLDEN * (counter + np.uint64(1))
     x = (x ^ (x >> _S30)) * _A
     x = (x ^ (x >> _S27)) * _B
@@ -27,5 +27,5 @@ def draw_key(seed, counter):
 
 @small_kernel
 def uniform(key, k):
-    """The k-th number of a key, uniform in (0, 1)."""
+    """Return the k-th number of a key, uniform in (0, 1)."""
     return (float(draw_key(key, np.uint64(k)) >> _S11) + 0.5) * (1.0 / 9007199254740992.0)

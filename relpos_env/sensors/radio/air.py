@@ -1,12 +1,12 @@
-"""The air between nodes that run the reference session: every message, clock and collision.
+"""Reference simulation of nodes that run the reference session: messages, clocks, collisions.
 
-The compiled form for batches of environments, `radio`, is held to this one by a
-test. Time advances in windows of one step of the world; inside a window all true times
+A test compares the compiled form for batches of environments, `radio`, with this one.
+Time advances in windows of one step of the world; inside a window all true times
 are seconds since its start.
 
-A receiver that is free locks on a message when it detects its preamble, also late while the
-preamble lasts, and hears nothing else until it ends. Another message meanwhile spoils it
-unless it is weaker by the capture margin. A node that sends, or is about to, hears nothing.
+A free receiver locks on a message when it detects the preamble, also late while the preamble
+lasts, and receives nothing else until the message ends. Another message during this time corrupts
+it unless weaker by the capture margin. A node that sends, or is about to, receives nothing.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ NO_BOXES, NO_CAPSULES = np.zeros((0, 6)), np.zeros((0, 7))
 
 @dataclass(slots=True)
 class OnAir:
-    """One frame that is sent; times since the start of the window [s]."""
+    """A frame in transmission; times since the start of the window [s]."""
 
     data: bytes
     moment: float
-    """Of its stamp."""
+    """Time of its stamp."""
     detect: float
     end: float
     detected: bool = False
@@ -51,36 +51,36 @@ class OnAir:
 
 @dataclass(frozen=True, slots=True)
 class Sent:
-    """A frame that went out, for those who look on."""
+    """A transmitted frame, for observers."""
 
     t: float
-    """True time of its stamp moment [s]."""
+    """True time of its stamp [s]."""
     node: int
     data: bytes
 
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """An event that a session gave."""
+    """An event returned by a session."""
 
     t: float
-    """[s]"""
+    """True time [s]."""
     node: int
     event: Event
 
 
 class Air:
-    """One group of nodes and the air between them.
+    """One group of nodes and the channels between them.
 
-    Law: same parameters, seed and motion, same everything, bit for bit.
+    Property: equal parameters, seed and motion give equal results, bit for bit.
     """
 
     def __init__(self, params: RadioSimParams, n_nodes: int, seed: int, dt: float) -> None:
-        """Set everything up; no node is switched on.
+        """Allocate the state with every node switched off.
 
         Args:
-            params: What the radios do.
-            n_nodes: At most 64; node k has the ID k unless `switch_on` says otherwise.
+            params: Parameters of the radios.
+            n_nodes: At most 64; node k has the ID k unless `switch_on` sets another one.
             seed: Any number.
             dt: Length of a window [s].
         """
@@ -101,9 +101,9 @@ class Air:
         self._switch: list[tuple[float, int, Session | None]] = []
         self._window = 0
         self.sent: list[Sent] = []
-        """Frames that went out; clear it when you like."""
+        """Transmitted frames; callers may clear the list."""
         self.told: list[Told] = []
-        """What the sessions told; clear it when you like."""
+        """Events returned by the sessions; callers may clear the list."""
 
     @property
     def t(self) -> float:
@@ -111,24 +111,24 @@ class Air:
         return self._window * self._dt
 
     def switch_on(self, node: int, *, boot: int, at: float = 0.0, id: int | None = None) -> None:
-        """Give a node power, `at` seconds after the start of the next window."""
+        """Switch a node on, `at` seconds after the start of the next window."""
         name = node if id is None else id
         self._switch.append((at, node, Session(name, self._params.session, boot=boot)))
 
     def switch_off(self, node: int, *, at: float = 0.0) -> None:
-        """Take a node's power, `at` seconds after the start of the next window."""
+        """Switch a node off, `at` seconds after the start of the next window."""
         self._switch.append((at, node, None))
 
     def step(
         self, pos0: F64, pos1: F64, boxes: F64 = NO_BOXES, capsules: F64 = NO_CAPSULES
     ) -> None:
-        """Go through one window.
+        """Simulate one window.
 
         Args:
-            pos0: Antennas at its start, (node, 3) [m].
-            pos1: Antennas at its end.
-            boxes: What stands in the plane, (box, 6).
-            capsules: What stands in space, (capsule, 7).
+            pos0: Antennas at the start of the window, (node, 3) [m].
+            pos1: Antennas at the end of the window, (node, 3) [m].
+            boxes: Obstacles in the plane, (box, 6).
+            capsules: Obstacles in 3D, (capsule, 7).
         """
         self._scene = (pos0, pos1, self._dt), boxes, capsules
         self._nodes["step"] = np.linalg.norm(pos1 - pos0, axis=1)
@@ -162,7 +162,7 @@ class Air:
         return session
 
     def _next(self) -> tuple[float, int, int]:
-        """Time, kind and node of what happens next."""
+        """Return time, kind and node of the next event."""
         events = [(q[0].end, END, k) for k, q in enumerate(self._queue) if q]
         events += [
             (q[0].detect, DETECT, k) for k, q in enumerate(self._queue) if q and not q[0].detected
@@ -188,7 +188,7 @@ class Air:
             self._take(k, t, session.start(local_now(self._nodes, k, t) % MODULUS))
 
     def _detect(self, s: int, t: float, receivers: Iterable[int]) -> None:
-        """Nodes that are free lock on a message; those on another one have it spoilt."""
+        """Lock free receivers on a message, which may corrupt the messages of busy receivers."""
         message = self._queue[s][0]
         for r in receivers:
             if r == s or self.sessions[r] is None or self._queue[r]:
@@ -208,7 +208,7 @@ class Air:
             self._take(r, t, self._session(r).preamble(local_now(self._nodes, r, t) % MODULUS))
 
     def _end(self, s: int, t: float) -> None:
-        """A message is over: radios that were locked on it have it, and all are free for others."""
+        """End a message: deliver it to the radios locked on it and free these for other ones."""
         message = self._queue[s].pop(0)
         self._nodes[s]["sent"] += 1
         free = [s]
@@ -238,7 +238,7 @@ class Air:
                 self._detect(m, t, [r for r in free if self._heard[r]["src"] < 0])
 
     def _take(self, k: int, t: float, outputs: list[Output]) -> None:
-        """Carry out what a session wants."""
+        """Execute the outputs of a session."""
         for output in outputs:
             if isinstance(output, Transmission):
                 self._send(k, output)
@@ -250,7 +250,7 @@ class Air:
         return unwrap(self._session(k).deadline, local_now(self._nodes, k, 0.0))
 
     def _plan(self, k: int, t: float) -> None:
-        """Note when a node's deadline comes: now, if it is past."""
+        """Update the due time of a node's deadline, t if it has passed."""
         if self.sessions[k] is not None:
             self._due[k] = max(true_at(self._nodes, k, self._deadline(k)), t)
 

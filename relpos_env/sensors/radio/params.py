@@ -1,4 +1,4 @@
-"""What the simulated radios do, apart from what the place does to their messages."""
+"""Parameters of the simulated radios; `channel` has those of the propagation."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from tracking.ranging.params import SessionParams
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RadioSimParams:
-    """What the simulated radios do."""
+    """Parameters of the simulated radios."""
 
     session: SessionParams = field(default_factory=SessionParams)
-    """The protocol that they run, and its radio setting."""
+    """Ranging protocol and its radio setting."""
     channel: ChannelParams = field(default=CALIBRATED)
-    """The place."""
+    """Propagation in the radio environment."""
     clock_offset: float = 10e-6
-    """[1] Standard deviation of a clock's rate, cut at 20 ppm."""
+    """[1] Standard deviation of the rate offset of a clock, cut at 20 ppm."""
     clock_wander: float = 5e-10
-    """[1] Standard deviation of the change of its rate in a second."""
+    """[1] Standard deviation of the change of a clock's rate in a second."""
     antenna_delay_std: float = 0.0
-    """[m] What the antenna of each node adds to all its ranges; calibrated away by default."""
+    """[m] Standard deviation of a node's antenna delay; calibrated away by default."""
     capture: float = 8.0
-    """[dB] A message survives another one that is weaker by so much."""
+    """[dB] Capture margin: a message survives another one that is weaker by this much."""
     antenna_height: float = 0.12
-    """[m] Of the antenna over the tracker; the same on every car."""
+    """[m] Height of the antenna over the tracker; the same on every car."""
 
     def for_nodes(self, n_nodes: int) -> RadioSimParams:
-        """The same, with the long frames of the radio where a table needs them."""
+        """Return these parameters, with long radio frames if the table of `n_nodes` needs them."""
         phy = self.session.phy
         if n_nodes - 1 <= entries_per_frame(phy.max_frame):
             return self

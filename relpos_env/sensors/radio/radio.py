@@ -1,8 +1,8 @@
-"""The radios of a batch of environments: ranges by the protocol, message by message.
+"""Radios of a batch of environments: ranges from the protocol, simulated per message.
 
-Every node runs the compiled session of `tracking.ranging`; the ranges that come out are those
-that the nodes resolve themselves, at the node with the smaller number. A range belongs to the
-moment at which that node spoke, and is known a good part of a round later.
+Every node runs the compiled session of `tracking.ranging`. The nodes resolve the ranges
+themselves, at the node with the smaller number. A range refers to the time of that node's
+transmission and is available a good part of a round later.
 """
 
 from __future__ import annotations
@@ -43,28 +43,28 @@ from tracking.ranging.members import MAX_MEMBERS
 
 @dataclass(frozen=True, slots=True)
 class Ranges:
-    """What the radios resolved in one window, padded; (env, slot)."""
+    """Ranges resolved in one window, padded; (env, slot)."""
 
     __repr__ = short_repr
 
     t: F64
-    """When it was so [s]."""
+    """Time of the range [s]."""
     i: I64
     """The node with the smaller number."""
     j: I64
     values: F64
     """Distance [m], received and first-path power [dBm], (env, slot, 3)."""
     nlos: Bool
-    """Whether an obstacle stood between."""
+    """True if an obstacle was between the antennas (NLOS)."""
     count: I64
-    """Slots used, (env)."""
+    """Number of slots used, (env)."""
 
 
 class Radio:
-    """The radios and the air of all environments.
+    """Radios of all environments and the channels between them.
 
-    Laws: same seed and motion, same stream; environment k of a batch is that environment
-    alone, bit for bit; no errors and no clocks, the distance.
+    Properties: equal seeds and motions give equal streams; environment k of a batch equals that
+    environment alone, bit for bit; without errors and clock offsets, ranges equal distances.
     """
 
     def __init__(
@@ -75,18 +75,17 @@ class Radio:
         dt: float,
         clocks: F64 | None = None,
     ) -> None:
-        """Set everything up; no node is switched on.
+        """Allocate the state with every node switched off.
 
         Args:
-            params: What the radios do.
-            n_nodes: In each environment.
+            params: Parameters of the radios.
+            n_nodes: Number of nodes in each environment.
             seeds: One for each environment, 0 to 2^63.
             dt: Length of a window [s].
-            clocks: How much faster each node's clock runs than a perfect one, (node) [1];
-                drawn if it is None.
+            clocks: Relative rate offset of each node's clock, (node) [1]; drawn if None.
 
         Raises:
-            EnvError: More nodes than a message has room for.
+            EnvError: There are more nodes than a message can list.
         """
         phy = params.session.phy
         most = min(MAX_MEMBERS, entries_per_frame(phy.max_frame) + 1)
@@ -127,7 +126,7 @@ class Radio:
             self._air.nodes["rate"] = TICK_HZ * (1.0 + clocks)
         pairs = n * (n - 1) // 2
         self.room = room = pairs * (2 + int(np.ceil(dt * round_rate(phy, max(n, 2)))))
-        """Ranges that a window can bring at most."""
+        """Largest number of ranges in a window."""
         self._out = RangeBuffer(
             np.zeros((e, room)),
             np.zeros((e, room), dtype=np.int64),
@@ -138,13 +137,13 @@ class Radio:
         )
 
     def reset(self, env: int, seed: int, params: RadioSimParams | None = None) -> None:
-        """Begin again in one environment, with every node switched off.
+        """Restart one environment with every node switched off.
 
         Args:
-            env: Which.
-            seed: 0 to 2^63.
-            params: Channel, clock offsets and antenna delays of this environment from now on;
-                by default as when it was made. The protocol stays.
+            env: Index of the environment.
+            seed: Seed of the environment, 0 to 2^63.
+            params: Channel, clock offsets and antenna delays of this environment; by default those
+                of the constructor. The protocol does not change.
         """
         params, air = params or self._params, self._air
         sessions, peers = make_sessions(1, air.nodes.shape[1])
@@ -160,7 +159,7 @@ class Radio:
         make_nodes(air.nodes[env], air.seeds[env], params.clock_offset, params.antenna_delay_std)
 
     def part(self, envs: slice) -> Radio:
-        """Some of the environments; shares their memory."""
+        """Return a view of some of the environments that shares their memory."""
         part = copy.copy(self)
         part._air = Air._make(array[envs] for array in self._air)
         part._out = RangeBuffer._make(array[envs] for array in self._out)
@@ -168,28 +167,28 @@ class Radio:
 
     @property
     def kernel_arguments(self) -> tuple[SessionNumbers, RadioNumbers, Air, RangeBuffer]:
-        """What `run_env_window` needs besides the scene."""
+        """Arguments of `run_env_window` that this object holds."""
         return self._numbers, self._radio, self._air, self._out
 
     def switch_on(self, env: int, node: int, *, boot: int, after: float = 0.0) -> None:
-        """Give a node power, so many seconds after the start of the next window."""
+        """Switch a node on, `after` seconds after the start of the next window."""
         power_nodes(self._numbers, self._air, env, node, True, boot, after)
 
     def switch_off(self, env: int, node: int) -> None:
-        """Take a node's power at the start of the next window."""
+        """Switch a node off at the start of the next window."""
         power_nodes(self._numbers, self._air, env, node, False, 0, 0.0)
 
     def step(
         self, pos0: F64, pos1: F64, boxes: F64 | None = None, capsules: F64 | None = None
     ) -> Ranges:
-        """Go through one window.
+        """Simulate one window.
 
         Args:
-            pos0: Antennas at its start, (env, node, 3) [m].
-            pos1: Antennas at its end.
-            boxes: What stands in the plane: centre x y, half width, half depth [m], cosine and
+            pos0: Antennas at the start of the window, (env, node, 3) [m].
+            pos1: Antennas at the end of the window, (env, node, 3) [m].
+            boxes: Obstacles in the plane: centre x y, half width, half depth [m], cosine and
                 sine of the angle, (env, box, 6).
-            capsules: What stands in space: two ends and the radius [m], (env, capsule, 7).
+            capsules: Obstacles in 3D: two ends and the radius [m], (env, capsule, 7).
         """
         e = len(self._air.seeds)
         scene = Scene(
