@@ -12,5 +12,7 @@ look_up = partial(find, raises=EnvError)
 
 
 def name_of(thing: object) -> str:
-    """The name by which something that was chosen can be looked up again, see `look_up`."""
-    return thing if isinstance(thing, str) else f"{thing.__module__}:{thing.__qualname__}"  # type: ignore[attr-defined]
+    """Return the name by which `look_up` finds something again."""
+    if isinstance(thing, str):
+        return thing
+    return f"{thing.__module__}:{thing.__qualname__}"  # type: ignore[attr-defined]
