@@ -19,6 +19,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from ablation_tables import tables
+
 from agents.settings import leaves
 from agents.training.config import TrainConfig
 from hardware_bridge.decoders import DECODERS
@@ -388,7 +390,13 @@ def parameters(params: Any, names: tuple[str, ...]) -> str:
     return markdown(("parameter", "default", "unit", "meaning"), rows)
 
 
+def ablation() -> str:
+    """Worth of each mechanism of the joint filter."""
+    return tables((MEASURED / "ablation.jsonl").read_text().splitlines()) + "\n"
+
+
 TABLES: dict[str, Callable[[], str]] = {
+    "ablation": ablation,
     "alignment": alignment,
     "faults": faults,
     "findings": findings,

@@ -18,7 +18,9 @@ from relpos_env.tasks import TASKS
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-MAKE = runpy.run_path(str(ROOT / "benchmarks" / "make_tables.py"))
+with pytest.MonkeyPatch.context() as patch:
+    patch.syspath_prepend(str(ROOT / "benchmarks"))
+    MAKE = runpy.run_path(str(ROOT / "benchmarks" / "make_tables.py"))
 CODE = re.compile(r"^```(?:python|toml)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 TOP = (
     "tracking/",
