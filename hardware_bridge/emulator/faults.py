@@ -51,7 +51,7 @@ class FaultInjector:
     """Queue that applies faults to frames.
 
     Invariants: without faults every frame comes out once, whole, in order and at once; a damaged
-        frame is changed; the rate of one fault does not change which frames other faults affect.
+    frame is changed; the rate of one fault does not change which frames other faults affect.
     """
 
     def __init__(self, params: FaultParams, rng: np.random.Generator) -> None:

@@ -48,7 +48,7 @@ class EmulatedNode:
     """A node with one or several ports, each with its own format.
 
     Invariants: equal rows, times and generator give equal bytes; a sample is stamped with its time
-        of measurement, by the node's clock.
+    of measurement, by the node's clock.
     """
 
     def __init__(

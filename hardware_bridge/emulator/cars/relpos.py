@@ -17,7 +17,7 @@ class RelposFirmware:
     """Firmware as described at the head of this file; `options` are those of the driver.
 
     Invariant: a command is executed at most once. Within a boot of the host only rising numbers are
-        accepted; with a key also only rising boots, so that a recorded command never moves the car.
+    accepted; with a key also only rising boots, so that a recorded command never moves the car.
     """
 
     deadman = DEADMAN
