@@ -17,7 +17,7 @@ T = TypeVar("T")
 
 
 def expect(is_right: bool, name: str, expected: str, value: object) -> None:
-    """Refuse a value of a field.
+    """Refuse a value of a field that is not right.
 
     Raises:
         BridgeError: ``name: expected ..., got ...``

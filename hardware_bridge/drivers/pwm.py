@@ -35,7 +35,7 @@ Points: TypeAlias = tuple[tuple[float, int], ...]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PwmOptions:
-    """A car with a servo and a speed controller behind a PWM board. All pulses in microseconds."""
+    """Options of a car with servo and speed controller on a PWM board; pulses in microseconds."""
 
     steering_centre: int = 1500
     """[us] Pulse at which the car drives straight [1]."""

@@ -155,7 +155,7 @@ class CarDevice:
 
 
 class OperatorDevice:
-    """The receiver of the operator's remote control."""
+    """Receiver of the operator's remote control."""
 
     def __init__(self, line: Line, encoder: Encoder, boot: int, cars: Sequence[int]) -> None:
         """Create a receiver.

@@ -51,7 +51,7 @@ class Fault:
     clock jumps. ``stuck-sensor``: the IMU repeats its last sample. ``silence``: the device works
     but sends nothing. ``twin``: a second device sends with the same id on the same line."""
     target: str
-    """``nodes.1``, ``cars.1`` or a port: ``links.n1``, ``links.operator``."""
+    """Target: ``nodes.1``, ``cars.1`` or a port, ``links.n1`` or ``links.operator``."""
     seconds: float = REBOOT
     """[s] Duration; for ``clock-step`` the size of the jump, which may be negative."""
 
@@ -73,7 +73,7 @@ class Fault:
 
     @property
     def group(self) -> str:
-        """``nodes``, ``cars`` or ``links``."""
+        """The group of the target: ``nodes``, ``cars`` or ``links``."""
         return self.target.split(".", 1)[0]
 
     @property

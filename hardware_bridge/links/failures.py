@@ -27,7 +27,7 @@ _WORDS = {
 
 
 class LinkLost(Exception):
-    """A port that was open is gone, or cannot be opened again yet."""
+    """Loss of an open port, or a failed attempt to open it again."""
 
     def __init__(self, reason: str) -> None:
         super().__init__(reason)

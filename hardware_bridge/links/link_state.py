@@ -22,7 +22,7 @@ starting, or lost only its power."""
 
 @dataclass(frozen=True, slots=True)
 class LinkNotice:
-    """A link came up or went down."""
+    """Notice of a link that came up or went down."""
 
     link: str
     t_ns: int

@@ -115,8 +115,8 @@ class LiveGroup:
         """Request speeds and steering angles and run one control step.
 
         Args:
-            speed: (1, slot) [m/s]
-            steering: (1, slot) [rad]
+            speed: Requested speed, (1, slot) [m/s].
+            steering: Requested steering angle, (1, slot) [rad].
         """
         fence = self.swarm.config.safety.fence
         t = self.t_ns * 1e-9

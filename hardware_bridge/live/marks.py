@@ -53,7 +53,7 @@ def parse_marks(raw: Mapping[str, Mapping[str, list[int]]]) -> Marks:
     """Return the marks in parsed JSON.
 
     Raises:
-        ValueError: They are invalid; or TypeError or AttributeError.
+        ValueError: The marks are invalid; or TypeError or AttributeError.
     """
     marks = {}
     for who, devices in raw.items():
@@ -64,7 +64,7 @@ def parse_marks(raw: Mapping[str, Mapping[str, list[int]]]) -> Marks:
 
 
 class KeptMarks:
-    """The marks of an intake in a file."""
+    """The marks of an intake, kept in a file."""
 
     def __init__(self, path: Path, intake: Intake, wall_s: int = 0) -> None:
         """Restore the marks of a file and write the boot number of this start.

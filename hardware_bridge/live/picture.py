@@ -53,7 +53,7 @@ def is_sound(cov: F64) -> Bool:
         cov: Covariance of position and velocity, (pair, 6, 6).
 
     Returns:
-        (pair)
+        True for valid covariances, (pair).
     """
     plane = cov[:, PLANE[:, None], PLANE[None, :]]
     finite: Bool = np.all(np.isfinite(plane), axis=(1, 2))

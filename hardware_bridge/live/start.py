@@ -250,7 +250,7 @@ def is_home(p: StartParams, n_cars: int, t: float) -> Bool:
         t: Time since its start [s].
 
     Returns:
-        (car)
+        True for cars at their start, (car).
     """
     periods = _periods(p, n_cars)
     off = np.abs(t - np.round(t / periods) * periods)

@@ -100,8 +100,8 @@ class LiveSwarm:
         """Store the commands passed by the gate, for cars that do not report their motion.
 
         Args:
-            speed: (slot) [m/s]
-            steering: (slot) [rad]
+            speed: Permitted speed, (slot) [m/s].
+            steering: Permitted steering angle, (slot) [rad].
             armed: 1 for armed cars, (slot).
             reason: Reason for a limit, see `hardware_bridge.safety.gate.reason_text`, (slot).
         """

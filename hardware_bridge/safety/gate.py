@@ -52,9 +52,9 @@ class GateOutput:
     __repr__ = short_repr
 
     speed: F64
-    """[m/s]"""
+    """[m/s] Commanded speed."""
     steering: F64
-    """[rad]"""
+    """[rad] Commanded steering angle."""
     moving: Bool
     """False for neutral with brakes on."""
     armed: Bool
@@ -80,7 +80,7 @@ class Gate:
         self._last: F64 = np.full(n_envs, -np.inf)
 
     def stop(self, envs: slice = slice(None)) -> None:
-        """Emergency stop of whole groups."""
+        """Stop whole groups in an emergency, until `clear`."""
         self.emergency[envs] = True
         self.armed[envs] = False
         self._held[envs] = NOT_ARMED
@@ -104,7 +104,7 @@ class Gate:
         """Arm the requested cars after `SafetyParams.health` seconds without a disarming rule.
 
         Args:
-            now: (env) [s]
+            now: Current time, (env) [s].
             cars: Cars to arm, (env, car).
 
         Returns:

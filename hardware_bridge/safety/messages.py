@@ -60,7 +60,7 @@ class Report:
     __repr__ = short_repr
 
     t: float
-    """[s]"""
+    """[s] Time of the last tick."""
     speed: F64
     steering: F64
     cap: F64
@@ -68,7 +68,7 @@ class Report:
     linked: F64
     reason: F64
     well_for: F64
-    """[s]"""
+    """[s] Time without a disarming rule."""
     emergency: bool
     late: float
     """[s] Largest delay of a tick since the last report."""

@@ -19,7 +19,7 @@ class Moment(NamedTuple):
 
     picture: Picture
     now: F64
-    """(env) [s]"""
+    """Current time, (env) [s]."""
     word: F64
     """Time of the deciding process's last heartbeat, (env) [s]."""
     heard: F64
@@ -27,7 +27,7 @@ class Moment(NamedTuple):
     linked: Bool
     """True if the car's own port is open, (env, car)."""
     armed: Bool
-    """True if the gate limits the car by its rules, (env, car)."""
+    """True for armed cars, which the gate limits by its rules, (env, car)."""
     recent: Recent
     """Bounds of the cars' motion given the latest commands."""
     told: Told

@@ -19,15 +19,15 @@ class Picture(NamedTuple):
     t: F64
     """Time, by the host's monotonic clock, (env) [s]."""
     speed_wanted: F64
-    """(env, car) [m/s]"""
+    """Requested speed, (env, car) [m/s]."""
     steering_wanted: F64
-    """(env, car) [rad]"""
+    """Requested steering angle, (env, car) [rad]."""
     present: F64
     """1 if the car takes part, (env, car)."""
     oriented: F64
     """1 if the heading is known, (env, car)."""
     heading: F64
-    """(env, car) [rad]"""
+    """Heading, (env, car) [rad]."""
     speed: F64
     """Forward speed, (env, car) [m/s]."""
     status: F64
@@ -39,7 +39,7 @@ class Picture(NamedTuple):
     pos: F64
     """Position of the other relative to the car, (env, car, other, 2) [m]."""
     vel: F64
-    """(env, car, other, 2) [m/s]"""
+    """Velocity of the other relative to the car, (env, car, other, 2) [m/s]."""
     distance: F64
     """Last range as measured, (env, car, other) [m]."""
     ranged: F64
@@ -103,10 +103,10 @@ def largest_std(cov: F64) -> F64:
     """Return the largest standard deviation in the plane; NaN if it is not defined.
 
     Args:
-        cov: xx, yy, xy, (..., 3) [m2]
+        cov: Covariance xx, yy, xy, (..., 3) [m2].
 
     Returns:
-        (...) [m]
+        Standard deviation, (...) [m].
     """
     xx, yy, xy = cov[..., 0], cov[..., 1], cov[..., 2]
     with np.errstate(invalid="ignore"):

@@ -36,7 +36,7 @@ LONG_AGO = 60.0
 
 
 class Rule(NamedTuple):
-    """One line of the table."""
+    """A rule of the table."""
 
     name: str
     check: Callable[[Moment, SafetyParams], Verdict]
@@ -68,7 +68,7 @@ def runaway(m: Moment, p: SafetyParams) -> Verdict:
 
 
 def deaf(m: Moment, p: SafetyParams) -> Verdict:
-    """The car acknowledges no commands, reports no speed, or stands despite a command to drive."""
+    """The car acknowledges no commands, reports no speed, or is at rest despite commands."""
     return _held((m.told.deaf_for >= p.answer_time) | (m.told.idle_for >= p.idle_time))
 
 

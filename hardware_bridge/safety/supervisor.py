@@ -135,7 +135,7 @@ class Supervisor:
         After a pause in which cars have stopped by themselves, none moves until it is armed again.
 
         Args:
-            now: [s]
+            now: Current time [s].
             late: Delay of this tick [s].
             linked: Slots of the cars with an open port; in a dry run of all.
 
@@ -195,7 +195,7 @@ class Supervisor:
         """Record that the commands of the last tick were passed to the ports.
 
         Args:
-            now: [s]
+            now: Current time [s].
             taken: Slots whose ports took the command.
         """
         for slot in self._sent:

@@ -116,7 +116,7 @@ class Telemetry:
         """Return the input of the rules, of one environment.
 
         Args:
-            now: [s]
+            now: Current time [s].
             recent: Bounds of the cars' motion given the commands sent so far.
             moving: True for cars permitted to drive, (car).
             linked: True for cars with an open port, (car).

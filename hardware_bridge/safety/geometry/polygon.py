@@ -11,8 +11,8 @@ def to_edges(place: F64, corners: F64) -> tuple[Bool, F64]:
     """Return whether points are inside a polygon, and the offset to the nearest point of each edge.
 
     Args:
-        place: (..., 2) [m]
-        corners: (corner, 2) [m]
+        place: Points, (..., 2) [m].
+        corners: Corners of the polygon, (corner, 2) [m].
 
     Returns:
         Inside, (...); offsets to the edges, (..., corner, 2) [m].
