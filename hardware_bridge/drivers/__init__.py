@@ -19,15 +19,15 @@ Build: TypeAlias = Callable[[int, Any, bytes | None, int, Callable[[], int]], Ca
 
 @dataclass(frozen=True, slots=True)
 class DriverEntry:
-    """What is known of a driver before it is built."""
+    """Registry entry of a driver."""
 
     build: Build
     options: type
-    """Frozen dataclass, every field with a default or told as missing."""
+    """Frozen dataclass of its options; fields without a default are required."""
     baud: int
-    """[1/s] Of the port, where the configuration does not say."""
+    """[1/s] Default baud rate of the port."""
     takes_key: bool = False
-    """Its frames are signed."""
+    """True if its frames are signed."""
 
 
 DRIVERS: dict[str, DriverEntry] = {
@@ -37,14 +37,14 @@ DRIVERS: dict[str, DriverEntry] = {
     ),
     "relpos": DriverEntry(RelposDriver, RelposOptions, RelposDriver.baud, takes_key=True),
 }
-"""Name to how it is built."""
+"""Registry of drivers by name."""
 
 
 def driver_entry(name: str, node: int) -> DriverEntry:
-    """What is known of a driver.
+    """Return the registry entry of a driver.
 
     Raises:
-        BridgeError: There is none of that name; ``cars.<node>.driver`` is named.
+        BridgeError: Unknown name; ``cars.<node>.driver`` is named.
     """
     if name not in DRIVERS:
         known = ", ".join(DRIVERS)
@@ -53,7 +53,7 @@ def driver_entry(name: str, node: int) -> DriverEntry:
 
 
 def driver_options(name: str, node: int, options: Mapping[str, object], key: bytes | None) -> Any:
-    """The options of a driver, checked, without building it.
+    """Return the checked options of a driver, without building it.
 
     Raises:
         BridgeError: As in `make_driver`.
@@ -72,11 +72,11 @@ def make_driver(
     boot: int,
     now_us: Callable[[], int],
 ) -> CarDriver:
-    """A driver as a configuration describes it.
+    """Return a driver built from its configuration.
 
     Args:
         name: One of `DRIVERS`.
-        node: The node that the car carries.
+        node: Node that the car carries.
         options: Fields of the driver's options.
         key: 16 bytes that sign commands, for drivers that sign.
         boot: Differs from one start of this program to the next, for drivers that number commands.

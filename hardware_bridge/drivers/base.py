@@ -1,4 +1,4 @@
-"""What a car driver is: commands to the bytes of a motor controller, and what it answers."""
+"""Protocol of car drivers: commands to bytes of a motor controller, and decoding of telemetry."""
 
 from __future__ import annotations
 
@@ -8,39 +8,39 @@ from hardware_bridge.decoders.base import Decoder
 
 
 class CarDriver(Protocol):
-    """One car's controller. Pure: no clock, no port.
+    """Driver of one car's controller. Pure: no clock, no port.
 
-    Laws: `neutral` asks for no motion whatever went before; every command stays within what the
-    controller was configured for, whatever is asked.
+    Invariants: `neutral` requests no motion, whatever was sent earlier; every command stays within
+    the configured limits, for any input.
     """
 
     baud: int
-    """[1/s] Of its port by default."""
+    """[1/s] Default baud rate of its port."""
     gap: float
-    """[s] Commands that follow each other faster pile up in the controller; 0 where none do."""
+    """[s] Least interval between commands: faster ones queue up in the controller; 0 if none do."""
     slowest: float
-    """[m/s] Asked for less it stands, one way or the other."""
+    """[m/s] Lowest speed that the car holds in both directions; slower commands may stop it."""
     answers: bool
-    """Whether every command is answered by an `AckReading`."""
+    """True if every command is acknowledged by an `AckReading`."""
 
     @property
     def sequence(self) -> int:
-        """Number of the next command; 0 where commands have none."""
+        """Number of the next command; 0 if commands are not numbered."""
 
     telemetry: Decoder
-    """For what the controller answers: `MotionReading`, `StatusReading`, `AckReading`."""
+    """Decoder of the controller's `MotionReading`, `StatusReading` and `AckReading`."""
 
     def opening(self) -> bytes:
-        """What is sent when the port was opened; moves nothing."""
+        """Return the bytes to send when the port was opened; they cause no motion."""
 
     def drive(self, speed: float, steering: float) -> bytes:
-        """Ask for a speed [m/s], forward positive, and a steering angle [rad], left positive.
+        """Return the command for a speed [m/s] and a steering angle [rad].
 
-        Numbers that are not finite are taken for `neutral`.
+        Forward and left are positive; values that are not finite give `neutral`.
         """
 
     def neutral(self) -> bytes:
-        """Ask for no motion, brakes on where there are any."""
+        """Return the command for no motion, with brakes on if there are any."""
 
     def ask(self) -> bytes:
-        """Ask for telemetry; empty where it comes by itself or there is none."""
+        """Return the request for telemetry; empty if it is sent unprompted or there is none."""

@@ -1,7 +1,7 @@
-"""Options of a driver: a table of a configuration to the dataclass that the driver reads.
+"""Options of a driver: conversion of a configuration table to the driver's dataclass.
 
-An options class is a frozen dataclass of numbers, switches, words and lists of numbers. What a
-number may be is checked where the dataclass is made, with `expect`.
+An options class is a frozen dataclass of numbers, booleans, strings and lists of numbers. It checks
+the range of numbers at construction, with `expect`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ T = TypeVar("T")
 
 
 def expect(is_right: bool, name: str, expected: str, value: object) -> None:
-    """Refuse a value of a field.
+    """Refuse a value of a field that is not right.
 
     Raises:
         BridgeError: ``name: expected ..., got ...``
@@ -27,15 +27,15 @@ def expect(is_right: bool, name: str, expected: str, value: object) -> None:
 
 
 def read_options(cls: type[T], given: Mapping[str, object], where: str) -> T:
-    """An options dataclass from a table as TOML gives it.
+    """Return an options dataclass from a parsed TOML table.
 
     Args:
-        cls: The dataclass; its annotations say what types are allowed.
+        cls: The dataclass; its annotations define the types.
         given: Field name to value; fields that are left out keep their defaults.
-        where: What the table is called in the configuration, ``cars.1.options``.
+        where: Name of the table in the configuration, ``cars.1.options``.
 
     Raises:
-        BridgeError: An unknown name, a missing one, a wrong type or a number out of range.
+        BridgeError: An unknown or missing name, a wrong type or a number out of range.
     """
     hints = get_type_hints(cls)
     names = [f.name for f in fields(cls)]  # type: ignore[arg-type]
@@ -57,7 +57,7 @@ def read_options(cls: type[T], given: Mapping[str, object], where: str) -> T:
 
 
 def _convert(value: Any, hint: Any) -> Any:
-    """A value of TOML as a field holds it; a ValueError says what was expected."""
+    """Return a TOML value as a field's type; a ValueError names the expected type."""
     if get_origin(hint) is tuple:
         return _convert_list(value, get_args(hint))
     if hint is bool:
@@ -78,7 +78,7 @@ def _convert(value: Any, hint: Any) -> Any:
 
 
 def _convert_list(value: Any, items: tuple[Any, ...]) -> tuple[Any, ...]:
-    """A list of TOML as a tuple: of any length for ``tuple[X, ...]``, else of that length."""
+    """Return a TOML list as a tuple: of any length for ``tuple[X, ...]``, else of that length."""
     if not isinstance(value, list | tuple):
         raise ValueError("a list")
     if items[-1] is Ellipsis:

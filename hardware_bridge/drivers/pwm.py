@@ -1,12 +1,12 @@
-r"""Controllers of lines of text that are servo pulses: ``"%d, %d\r"``, steering and throttle.
+r"""Driver of PWM boards that read lines of pulse widths: ``"%d, %d\r"``, steering and throttle.
 
-Both numbers are pulse widths in microseconds, four digits each, since the firmware of the RoboHAT
-MM1 takes the first and the last four characters of a line [1]. The lines have no check sum, and
-that firmware holds the last throttle for 10 s after the last line: see the page of drivers for
-what to change there before a car drives.
+Both numbers are pulse widths in microseconds, with four digits each, since the firmware of the
+RoboHAT MM1 reads the first and the last four characters of a line [1]. The lines have no check sum,
+and that firmware holds the last throttle for 10 s after the last line: the page of drivers
+describes the changes needed before a car drives.
 
-Which speed a throttle pulse gives is a table, measured for each car. Between two points it is
-linear; slower than the first point is the middle, faster than the last one is the last one.
+A table, measured for each car and interpolated linearly, gives the throttle pulse of a speed: the
+centre below the first point, the last pulse above the last point.
 
 References:
     [1] Donkeycar, donkeycar/contrib/robohat/code.py and donkeycar/parts/robohat.py.
@@ -26,34 +26,34 @@ from hardware_bridge.drivers.options import expect
 from hardware_bridge.readings import Reading
 
 LEAST_PULSE = 1000
-"""[us] Of a servo pulse."""
+"""[us] Shortest servo pulse."""
 MOST_PULSE = 2000
-"""[us]"""
+"""[us] Longest servo pulse."""
 Points: TypeAlias = tuple[tuple[float, int], ...]
 """Speed [m/s] and pulse [us], slowest first."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PwmOptions:
-    """A car with a servo and a speed controller behind a PWM board. All pulses in microseconds."""
+    """Options of a car with servo and speed controller on a PWM board; pulses in microseconds."""
 
     steering_centre: int = 1500
     """[us] Pulse at which the car drives straight [1]."""
     steering_span: int = 400
-    """[us] Added at `max_steering` to the left; negative where longer pulses turn right. Assumed:
-    measure it."""
+    """[us] Pulse added at `max_steering` to the left; negative if longer pulses turn right.
+    Assumed: measure it."""
     max_steering: float = 0.42
-    """[rad] Never more to either side; what the simulated car does."""
+    """[rad] Limit to either side; that of the simulated car."""
     throttle_centre: int = 1500
-    """[us] Pulse at which the motor stands [1]."""
+    """[us] Pulse at which the motor does not turn [1]."""
     forward: Points = ((0.4, 1560), (3.0, 1750))
-    """[m/s, us] Slowest speed that it holds, further points, top speed. Assumed: measure them."""
+    """[m/s, us] Lowest steady speed, further points, top speed. Assumed: measure them."""
     reverse: Points = ()
-    """[m/s, us] The same backwards, with positive speeds. Empty: it never drives backwards, and
-    stands when asked to."""
+    """[m/s, us] Points for driving backwards, with positive speeds. Empty: the car never drives
+    backwards, and stops at such commands."""
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be meant."""
+        """Refuse invalid values."""
         middle, span = self.steering_centre, self.steering_span
         pulses = f"{LEAST_PULSE} to {MOST_PULSE}"
         expect(LEAST_PULSE <= middle <= MOST_PULSE, "steering_centre", pulses, middle)
@@ -71,7 +71,7 @@ class PwmOptions:
 
 
 def _check_points(name: str, points: Points, centre: int, side: int) -> None:
-    """Refuse tables that do not lead away from the centre, to one side."""
+    """Refuse tables that are not monotonic away from the centre, to one side."""
     speeds = [0.0, *(speed for speed, _ in points)]
     steps = [0, *(side * (pulse - centre) for _, pulse in points)]
     rises = all(
@@ -89,14 +89,14 @@ def _check_points(name: str, points: Points, centre: int, side: int) -> None:
 
 
 def pulse_of(speed: float, points: Points, centre: int) -> int:
-    """Throttle pulse [us] for a speed of at least 0 [m/s]; the centre below the first point."""
+    """Return the throttle pulse [us] of a speed >= 0 [m/s]; the centre below the first point."""
     if not points or speed < points[0][0]:
         return centre
     return round(_line(speed, [(s, float(p)) for s, p in points]))
 
 
 def speed_of(pulse: int, points: Points, centre: int) -> float:
-    """Speed [m/s], at least 0, that a throttle pulse [us] on the side of these points gives."""
+    """Return the speed [m/s], at least 0, of a throttle pulse [us] on the side of these points."""
     if not points:
         return 0.0
     side = 1 if points[0][1] > centre else -1
@@ -106,7 +106,7 @@ def speed_of(pulse: int, points: Points, centre: int) -> float:
 
 
 def _line(x: float, points: Sequence[tuple[float, float]]) -> float:
-    """Linear between points, constant beyond the last; x is not less than the first."""
+    """Interpolate linearly, constant beyond the last point; x is not less than the first one's."""
     for (x0, y0), (x1, y1) in zip(points, points[1:], strict=False):
         if x <= x1:
             return y0 + (y1 - y0) * (x - x0) / (x1 - x0)
@@ -114,9 +114,9 @@ def _line(x: float, points: Sequence[tuple[float, float]]) -> float:
 
 
 class NoTelemetry:
-    """For boards that say nothing of the car: counts what they send and keeps none of it.
+    """Decoder for boards without telemetry: counts the received lines and returns no readings.
 
-    The RoboHAT MM1 sends what its remote control does, lines like the commands.
+    The RoboHAT MM1 sends the state of its remote control, in lines like the commands.
     """
 
     waiting = 0
@@ -125,14 +125,14 @@ class NoTelemetry:
         self.counts = Counts()
 
     def feed(self, data: bytes) -> list[Reading]:
-        """Nothing."""
+        """Count the bytes and lines; return no readings."""
         self.counts.n_bytes += len(data)
         self.counts.skipped += data.count(b"\n")
         return []
 
 
 class PwmDriver:
-    """A car behind a PWM board, see the head of this file."""
+    """Driver of a car with a PWM board as described at the head of this file."""
 
     baud = 115200
     gap = 0.03
@@ -141,16 +141,16 @@ class PwmDriver:
 
     def __init__(self, options: PwmOptions) -> None:
         self.options = options
-        backwards = options.reverse[0][0] if options.reverse else 0.0  # never, and known
+        backwards = options.reverse[0][0] if options.reverse else 0.0  # never driven
         self.slowest = max(options.forward[0][0], backwards)
         self.telemetry: Decoder = NoTelemetry()
 
     def opening(self) -> bytes:
-        """Ends a line that was cut off, and the middle of both: it arms the speed controller."""
+        """Return the end of a cut line, and neutral, which arms the speed controller."""
         return b"\r" + self.neutral()
 
     def drive(self, speed: float, steering: float) -> bytes:
-        """A line; speeds slower than the slowest of the table stand."""
+        """Return a line; speeds below the first point of the table give no motion."""
         if not (isfinite(speed) and isfinite(steering)):
             return self.neutral()
         options = self.options
@@ -160,11 +160,11 @@ class PwmDriver:
         return self._line(round(options.steering_centre + options.steering_span * share), throttle)
 
     def neutral(self) -> bytes:
-        """The middle of both."""
+        """Return a line with both centre pulses."""
         return self._line(self.options.steering_centre, self.options.throttle_centre)
 
     def ask(self) -> bytes:
-        """Nothing: there is no telemetry."""
+        """Return nothing, since there is no telemetry."""
         return b""
 
     @staticmethod

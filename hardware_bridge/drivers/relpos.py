@@ -1,4 +1,4 @@
-"""Cars with our own firmware: commands in the wire format, numbered and, with a key, with a MAC."""
+"""Driver of cars with our own firmware: numbered commands in the wire format, signed with a key."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from hardware_bridge.wire.encoder import RelposEncoder
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RelposOptions:
-    """What a car may be asked for; the format itself says up to 32.767 m/s and 3.2767 rad."""
+    """Limits of the commands; the format itself permits 32.767 m/s and 3.2767 rad."""
 
     max_speed: float = 2.0
-    """[m/s] Faster is asked for as this, both ways; default: that of the environment's actions."""
+    """[m/s] Limit in both directions; the default is that of the environment's actions."""
     max_steering: float = 0.42
-    """[rad] More is asked for as this, both ways; default: front wheels of cars of scale 1:10."""
+    """[rad] Limit to both sides; the default is that of the front wheels of 1:10 cars."""
 
     def __post_init__(self) -> None:
-        """Refuse what the format cannot say."""
+        """Refuse limits beyond the format."""
         for name, limit in (("max_speed", 32.767), ("max_steering", 3.2767)):
             value = getattr(self, name)
             if not 0.0 < value <= limit:
@@ -33,10 +33,10 @@ class RelposOptions:
 
 
 class RelposDriver:
-    """See `hardware_bridge.drivers.base.CarDriver`.
+    """Driver of one car, see `hardware_bridge.drivers.base.CarDriver`.
 
-    Every command is a frame of `HOST` with a number of its own, `sequence`; the car answers with an
-    `AckReading` of that number. It has to stop by itself when none came for a while.
+    Every command is a frame of `HOST` with its own number, `sequence`; the car answers with an
+    `AckReading` of that number. The car has to stop by itself after a while without commands.
     """
 
     baud = 115200
@@ -52,17 +52,17 @@ class RelposDriver:
         boot: int,
         now_us: Callable[[], int],
     ) -> None:
-        """Name the car.
+        """Create a driver.
 
         Args:
-            node: Of the car, 0 to 65534.
-            options: Its limits.
-            key: 16 bytes that the car has too, or None.
-            boot: Of this start of ours, 0 to 2^32 - 1; has to rise where a key is used.
+            node: Node of the car, 0 to 65534.
+            options: Limits of the commands.
+            key: 16 bytes that are also stored in the car, or None.
+            boot: Boot number of this start, 0 to 2^32 - 1; it must rise if a key is used.
             now_us: A monotonic clock [us].
 
         Raises:
-            ValueError: One of them is not so.
+            ValueError: An argument is out of range.
         """
         if not 0 <= node < NODE_LIMIT - 1:
             raise ValueError(f"node: expected 0 to {NODE_LIMIT - 2}, got {node}")
@@ -80,15 +80,15 @@ class RelposDriver:
 
     @property
     def boot(self) -> int:
-        """Of the next command."""
+        """Boot number of the next command."""
         return self._encoder.boot
 
     def opening(self) -> bytes:
-        """A zero: ends whatever the car took for the beginning of a frame."""
+        """Return a zero, which ends any partial frame in the car's buffer."""
         return b"\0"
 
     def drive(self, speed: float, steering: float) -> bytes:
-        """Ask for a speed [m/s], forward positive, and a steering angle [rad], left positive."""
+        """Return the command for a speed [m/s] and steering [rad]; see `CarDriver.drive`."""
         if not (math.isfinite(speed) and math.isfinite(steering)):
             return self.neutral()
         fastest, most = self._fastest, self._most
@@ -96,11 +96,11 @@ class RelposDriver:
         return self._say(speed, min(max(steering, -most), most), brake=False)
 
     def neutral(self) -> bytes:
-        """Ask for no motion, with the brake."""
+        """Return the command for no motion, with the brake."""
         return self._say(0.0, 0.0, brake=True)
 
     def ask(self) -> bytes:
-        """Nothing: telemetry comes by itself."""
+        """Return nothing, since telemetry is sent unprompted."""
         return b""
 
     def _say(self, speed: float, steering: float, *, brake: bool) -> bytes:
@@ -109,6 +109,6 @@ class RelposDriver:
 
 
 def _within(limit: float, name: str) -> float:
-    """The greatest number that the field can say and that is not beyond the limit."""
+    """Return the largest number that the field can represent within the limit."""
     steps = COMMAND.field(name).steps
     return math.floor(limit * steps) / steps

@@ -1,8 +1,8 @@
-"""The VESC, a motor controller with a servo output, on its UART or USB.
+"""Driver of the VESC, a motor controller with a servo output, on its UART or USB.
 
-Speed is SET_RPM, regulated by the VESC; steering is SERVO. Every command is sent again at every
-tick: the VESC stops its motor some time after the last *motor* command, whatever comes of SERVO
-or GET_VALUES. ALIVE, which keeps the last throttle going, is never sent.
+Speed is SET_RPM, regulated by the VESC; steering is SERVO. Every command is repeated at every tick:
+the VESC stops its motor some time after the last *motor* command, regardless of SERVO and
+GET_VALUES. ALIVE, which would extend the last throttle command, is never sent.
 
     erpm  = speed_to_erpm * speed
     servo = steering_to_servo * steering + servo_centre
@@ -35,40 +35,40 @@ from hardware_bridge.drivers.vesc_values import read_values
 from hardware_bridge.readings import UNNAMED, MotionReading, Reading, StatusReading
 
 MOST_ERPM = 1e6
-"""[1/min] More than any motor turns; keeps numbers in their fields."""
+"""[1/min] Above the speed of any motor; keeps numbers within their fields."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VescOptions:
-    """A car with a VESC; the defaults are F1TENTH's where they say so."""
+    """Options of a car with a VESC; defaults with [1] are F1TENTH's."""
 
     speed_to_erpm: float = 4614.0
-    """[1/min per m/s] Electrical revolutions per speed [1]; negative where the motor turns
-    backwards. Wrong values make every speed wrong by the same factor."""
+    """[1/min per m/s] Electrical revolutions per speed [1]; negative if the motor turns backwards.
+    A wrong value scales every speed by the same factor."""
     steering_to_servo: float = -1.2135
-    """[1/rad] Servo position per steering angle, left positive [1]; positive where the servo
-    turns the other way."""
+    """[1/rad] Servo position per steering angle, left positive [1]; positive if the servo turns the
+    other way."""
     servo_centre: float = 0.5304
     """[-] Servo position at which the car drives straight [1]."""
     servo_min: float = 0.15
-    """[-] Never less, saves the linkage [1]."""
+    """[-] Lower limit of the servo position, to protect the linkage [1]."""
     servo_max: float = 0.85
-    """[-] Never more [1]."""
+    """[-] Upper limit of the servo position [1]."""
     min_erpm: float = 900.0
-    """[1/min] "Minimum ERPM" of the VESC's speed controller, 900 when new [2]. Below, it does not
-    regulate: it brakes or rolls freely, by its firmware. Slower commands brake."""
+    """[1/min] "Minimum ERPM" of the VESC's speed controller, 900 by default [2]. Below it, the VESC
+    does not regulate but brakes or rolls freely, depending on its firmware. Slower commands
+    brake."""
     max_speed: float = 3.0
-    """[m/s] Never faster, forwards or backwards; what the simulated car does."""
+    """[m/s] Limit forwards and backwards; that of the simulated car."""
     max_steering: float = 0.42
-    """[rad] Never more to either side; what the simulated car does. The limits of the servo may
-    be narrower."""
+    """[rad] Limit to either side; that of the simulated car. The servo limits may be narrower."""
     brake_current: float = 5.0
-    """[A] Motor current that brakes when no motion is asked; assumed. More stops harder."""
+    """[A] Motor current for braking at commands without motion; assumed. More stops harder."""
     telemetry: bool = True
-    """Ask for speed, voltage and faults."""
+    """True to request speed, voltage and faults."""
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be meant."""
+        """Refuse invalid values."""
         for name in ("speed_to_erpm", "steering_to_servo"):
             value = getattr(self, name)
             expect(isfinite(value) and value != 0.0, name, "a number that is not 0", value)
@@ -90,22 +90,22 @@ class VescOptions:
 
 
 def set_rpm(erpm: int) -> bytes:
-    """The frame that asks for a speed."""
+    """Return the frame that commands a speed."""
     return frame(struct.pack(">Bi", SET_RPM, erpm))
 
 
 def set_servo(thousandths: int) -> bytes:
-    """The frame that turns the servo, 0 to 1000."""
+    """Return the frame that sets the servo position, 0 to 1000."""
     return frame(struct.pack(">Bh", SET_SERVO, thousandths))
 
 
 def set_current_brake(milliamperes: int) -> bytes:
-    """The frame that brakes."""
+    """Return the frame that brakes."""
     return frame(struct.pack(">Bi", SET_CURRENT_BRAKE, milliamperes))
 
 
 class VescTelemetry:
-    """Answers to GET_VALUES to a `MotionReading` and a `StatusReading` each."""
+    """Decoder of answers to GET_VALUES: a `MotionReading` and a `StatusReading` each."""
 
     def __init__(self, speed_to_erpm: float) -> None:
         self.counts = Counts()
@@ -114,11 +114,11 @@ class VescTelemetry:
 
     @property
     def waiting(self) -> int:
-        """Bytes kept of a frame that is not complete."""
+        """Number of bytes kept of an incomplete frame."""
         return self._frames.waiting
 
     def feed(self, data: bytes) -> list[Reading]:
-        """Take bytes as they come and return what they complete, in order."""
+        """Process received bytes and return the readings that they complete, in order."""
         readings: list[Reading] = []
         for payload in self._frames.feed(data):
             values = read_values(payload)
@@ -132,7 +132,7 @@ class VescTelemetry:
 
 
 class VescDriver:
-    """A car with a VESC, see the head of this file."""
+    """Driver of a car with a VESC as described at the head of this file."""
 
     baud = 115200
     gap = 0.0
@@ -146,30 +146,30 @@ class VescDriver:
         self._brake = set_current_brake(max(1, round(options.brake_current * 1e3)))
 
     def opening(self) -> bytes:
-        """Nothing: the VESC needs no greeting."""
+        """Return nothing, since the VESC needs no greeting."""
         return b""
 
     def drive(self, speed: float, steering: float) -> bytes:
-        """SERVO, then SET_RPM, or the brake where the speed is less than the VESC regulates."""
+        """Return SERVO and SET_RPM, or SERVO and the brake below the lowest regulated speed."""
         if not (isfinite(speed) and isfinite(steering)):
             return self.neutral()
         options = self.options
         speed = min(max(speed, -options.max_speed), options.max_speed)
-        # Cut towards 0, so that rounding does not pass the limit.
+        # Truncated towards 0, so that rounding does not exceed the limit.
         erpm = int(options.speed_to_erpm * speed)
         is_slow = erpm == 0 or abs(erpm) < options.min_erpm
         return set_servo(self._servo(steering)) + (self._brake if is_slow else set_rpm(erpm))
 
     def neutral(self) -> bytes:
-        """The brake; the wheels stay as they are turned."""
+        """Return the brake command; the steering angle is kept."""
         return self._brake
 
     def ask(self) -> bytes:
-        """GET_VALUES, where telemetry is wanted."""
+        """Return GET_VALUES if telemetry is enabled."""
         return frame(bytes((GET_VALUES,))) if self.options.telemetry else b""
 
     def _servo(self, steering: float) -> int:
-        """[1/1000] Servo position for a steering angle [rad], within all limits."""
+        """Return the servo position [1/1000] of a steering angle [rad], within all limits."""
         options = self.options
         steering = min(max(steering, -options.max_steering), options.max_steering)
         position = options.steering_to_servo * steering + options.servo_centre

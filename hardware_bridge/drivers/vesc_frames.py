@@ -4,9 +4,9 @@
     03 | length, 2 bytes, >= 255   | payload | CRC, 2 bytes | 03
 
 Numbers are big-endian, the CRC is CRC-16/XMODEM of the payload, its first byte is the command [1].
-A reader stands at a place in the stream that may begin a frame until that frame is complete,
-found damaged or impossible, as the VESC's own does; so a damaged length delays what follows by at
-most `LONGEST` bytes and loses none of it.
+The reader keeps a possible start of a frame until that frame is complete, damaged or invalid, like
+the VESC's own reader; so a damaged length delays later frames by at most `LONGEST` bytes and loses
+none of them.
 
 References:
     [1] VESC firmware, comm/packet.c and comm/packet.h (longest payload 512 bytes).
@@ -22,32 +22,32 @@ from hardware_bridge.counts import Counts
 
 GET_VALUES = 4
 SET_RPM = 8
-"""i32 electrical revolutions per minute."""
+"""Payload: i32 electrical revolutions per minute."""
 SET_CURRENT_BRAKE = 7
-"""i32 [mA]."""
+"""Payload: i32 [mA] brake current."""
 SET_SERVO = 12
-"""i16 [1/1000] of the way from the shortest pulse to the longest."""
+"""Payload: i16 [1/1000] from the shortest to the longest servo pulse."""
 
 MOST_PAYLOAD = 512
-"""[bytes] Of the firmware's default build."""
+"""[bytes] Largest payload of the firmware's default build."""
 LONGEST = 3 + MOST_PAYLOAD + 3
-"""[bytes] Of a frame."""
+"""[bytes] Length of the longest frame."""
 
 _START = re.compile(rb"[\x02\x03]")
 _STOP = 3
 
 
 def frame(payload: bytes) -> bytes:
-    """A payload of 1 to `MOST_PAYLOAD` bytes as it is sent."""
+    """Return the frame of a payload of 1 to `MOST_PAYLOAD` bytes."""
     n = len(payload)
     head = bytes((2, n)) if n < 256 else b"\x03" + n.to_bytes(2, "big")
     return head + payload + crc_hqx(payload, 0).to_bytes(2, "big") + bytes((_STOP,))
 
 
 class FrameReader:
-    """Bytes in any pieces to payloads; keeps fewer than `LONGEST` bytes.
+    """Decoder of bytes, in pieces of any size, to payloads; keeps fewer than `LONGEST` bytes.
 
-    It counts bytes and damage; what a payload says, and so whether it counts, is the caller's.
+    It counts bytes and damaged frames; the caller interprets and counts payloads.
     """
 
     def __init__(self, counts: Counts) -> None:
@@ -56,11 +56,11 @@ class FrameReader:
 
     @property
     def waiting(self) -> int:
-        """Bytes kept of a frame that is not complete."""
+        """Number of bytes kept of an incomplete frame."""
         return len(self._data)
 
     def feed(self, data: bytes) -> list[bytes]:
-        """The payloads that these bytes complete, in order."""
+        """Process received bytes and return the payloads that they complete, in order."""
         counts, buffer = self._counts, self._data
         counts.n_bytes += len(data)
         buffer += data
@@ -92,9 +92,9 @@ class FrameReader:
 
 
 def _span(buffer: bytearray, at: int) -> tuple[int, int] | None:
-    """Length of head and payload of the frame that begins there.
+    """Return the lengths of head and payload of the frame that begins at an index.
 
-    None while the head is not complete; a payload of 0 where no frame can begin.
+    None if the head is incomplete; a payload of 0 if no frame can begin at the index.
     """
     head = buffer[at]
     if len(buffer) - at < head:
@@ -106,6 +106,6 @@ def _span(buffer: bytearray, at: int) -> tuple[int, int] | None:
 
 
 def _is_whole(buffer: bytearray, at: int, n: int) -> bool:
-    """Whether a payload is followed by its CRC and the end of a frame."""
+    """Return whether a payload is followed by its CRC and the end of a frame."""
     check = int.from_bytes(buffer[at + n : at + n + 2], "big")
     return buffer[at + n + 2] == _STOP and crc_hqx(bytes(buffer[at : at + n]), 0) == check

@@ -1,4 +1,4 @@
-"""What a VESC answers to GET_VALUES: the layout, to be read and to be written.
+"""Layout of a VESC's answer to GET_VALUES, for reading and writing.
 
 All numbers are big-endian integers, scaled [1], from the first byte of the payload:
 
@@ -19,7 +19,7 @@ All numbers are big-endian integers, scaled [1], from the first byte of the payl
 | 65, 69 | Vd and Vq [V] | i32 x 1000 |
 | 73 | 1: stopped by its timeout; 2: by its kill switch | u8 |
 
-Older firmware ends earlier and newer may append, so nothing behind the fault is read.
+Older firmware ends earlier and newer may append, so nothing after the fault is read.
 
 References:
     [1] VESC firmware 6, comm/commands.c, `COMM_GET_VALUES`. https://github.com/vedderb/bldc
@@ -43,18 +43,18 @@ _FAULT_AT = 53
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VescValues:
-    """What we read of it."""
+    """The values in use."""
 
     erpm: int
-    """[1/min] Electrical."""
+    """[1/min] Electrical revolutions."""
     voltage: float
-    """[V] Of the battery."""
+    """[V] Battery voltage."""
     fault: int
-    """`mc_fault_code` of the firmware; 0 is none."""
+    """`mc_fault_code` of the firmware; 0 is no fault."""
 
 
 def read_values(payload: bytes) -> VescValues | None:
-    """The values of an answer; None if this is no answer to GET_VALUES, or too short."""
+    """Return the values of an answer; None if it is no answer to GET_VALUES, or too short."""
     if len(payload) <= _FAULT_AT or payload[0] != GET_VALUES:
         return None
     erpm, tenths = _RPM.unpack_from(payload, _RPM_AT)
@@ -62,7 +62,7 @@ def read_values(payload: bytes) -> VescValues | None:
 
 
 def write_values(values: VescValues) -> bytes:
-    """A payload with these values, cut to what the layout can hold, and zeros for the rest."""
+    """Return a payload with these values, clipped to the layout, and zeros for all others."""
     erpm = min(max(values.erpm, -(2**31)), 2**31 - 1)
     tenths = min(max(round(values.voltage * 10), -(2**15)), 2**15 - 1)
     head = (GET_VALUES, 0, 0, 0, 0, 0, 0, 0, erpm, tenths, 0, 0, 0, 0, 0, 0, values.fault & 255)

@@ -1,1 +1,1 @@
-"""Nodes and cars that are not there, behind real serial devices."""
+"""Emulated nodes and cars behind serial ports."""

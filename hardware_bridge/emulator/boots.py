@@ -1,4 +1,4 @@
-"""Boot numbers of an emulated device: they rise from start to start, as a key asks of firmware."""
+"""Boot numbers of an emulated device, rising with every start, as required with a key."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from collections.abc import Iterator
 import numpy as np
 
 FIRST = 1 << 31
-"""The first is drawn below this: what is above is left for starts to come."""
+"""Upper bound of the first number; higher ones remain for later starts."""
 
 
 def boot_numbers(rng: np.random.Generator) -> Iterator[int]:
-    """One number a start: the first is drawn, each later one is the next, as of a counter in flash.
+    """Return one number per start: the first is random, later ones count up, as a counter in flash.
 
     Args:
-        rng: Gives the first, at once.
+        rng: Generator of the first number, used at once.
     """
     return itertools.count(int(rng.integers(1, FIRST)))

@@ -1,4 +1,4 @@
-"""Devices on their lines: nodes, cars, and the operator's remote control."""
+"""Devices and their lines: nodes, cars, and the operator's remote control."""
 
 from __future__ import annotations
 
@@ -26,24 +26,24 @@ from relpos_env.interface.beams import FARTHEST
 from tracking.arrays import F64, Bool
 
 TELEMETRY_EVERY = 0.02
-"""[s] Between two readings that a car sends of its own motion."""
+"""[s] Period of a car's motion telemetry."""
 STATUS_EVERY = 1.0
-"""[s] Between two of its battery."""
+"""[s] Period of a car's battery reports."""
 OPERATOR_EVERY = 0.1
-"""[s] Between two messages of the operator to each car."""
+"""[s] Period of the operator's messages to each car."""
 OPERATOR = 0xFFFE
-"""The remote control's own id; the last one of our format."""
+"""Id of the remote control, the highest of our format."""
 SOON = 1e-6
-"""[s] What is due so soon is done now, for the roundings of times."""
+"""[s] Actions that are due within this time are run now, to absorb rounding errors."""
 
 
 def next_multiple(t: float, every: float) -> float:
-    """The first whole multiple of `every` after `t`, so that what is seldom keeps its beat."""
+    """Return the first multiple of `every` after `t`, which keeps the phase of the messages."""
     return (math.floor((t + SOON) / every) + 1) * every
 
 
 class NodeDevice:
-    """A node with its lines, and its twin while there is one."""
+    """A node with its lines, and temporarily a twin: a second device with the same id."""
 
     def __init__(
         self, node: EmulatedNode, lines: Sequence[Line], make_twin: Callable[[], EmulatedNode]
@@ -55,13 +55,13 @@ class NodeDevice:
         self._powered = True
 
     def step(self, t: float, t_ns: int, rows: Sequence[Measured], powered: bool) -> None:
-        """Send what was measured.
+        """Send measurements.
 
         Args:
-            t: Now, of the world [s].
-            t_ns: Now, of the host.
-            rows: Since the last step.
-            powered: Whether the node has power; it starts again when that comes back.
+            t: Current world time [s].
+            t_ns: Current host time.
+            rows: Measurements since the last step.
+            powered: True if the node has power; it restarts when power returns.
         """
         if powered and not self._powered:
             self.node.reboot(t, 0.0)
@@ -77,23 +77,23 @@ class NodeDevice:
             line.send(t_ns, sent)
 
     def meet_twin(self, until: float) -> None:
-        """Another device under the same id speaks on the same lines."""
+        """Add a second device with the same id to the lines until world time `until` [s]."""
         self._twin, self._twin_until = self._make_twin(), until
 
 
 class CarDevice:
-    """A car's controller on its line."""
+    """A car's controller with its line."""
 
     def __init__(
         self, node: int, line: Line, make_car: Callable[[], EmulatedCar], voltage: float
     ) -> None:
-        """Switch it on.
+        """Create a running controller.
 
         Args:
-            node: Its id.
-            line: Its own.
-            make_car: The controller as after a start.
-            voltage: Of its battery [V].
+            node: Id of the car's node.
+            line: Line of the controller.
+            make_car: Factory of a controller in its state after a start.
+            voltage: Battery voltage [V].
         """
         self.node, self.line = node, line
         self._make, self._car = make_car, make_car()
@@ -105,7 +105,7 @@ class CarDevice:
         """True once the host has sent anything."""
 
     def listen(self, t: float, t_ns: int) -> tuple[float, float]:
-        """Take what the host sent; give speed [m/s] and steering angle [rad] of now."""
+        """Process bytes of the host; return the commanded speed [m/s] and steering angle [rad]."""
         self.line.replug_if_due(t)
         data = self.line.port.read()
         self.heard |= bool(data)
@@ -118,14 +118,14 @@ class CarDevice:
     def tell(
         self, t: float, t_ns: int, speed: float, steering: float, near: Sequence[float] = ()
     ) -> None:
-        """Send what it says of its own motion, as often as it does.
+        """Send the telemetry that is due.
 
         Args:
-            t: Now, of the world [s].
-            t_ns: Now, of the host.
-            speed: By its own wheels [m/s].
-            steering: Of its front wheels [rad].
-            near: By its distance sensors, evenly round it, the first ahead [m].
+            t: Current world time [s].
+            t_ns: Current host time.
+            speed: Wheel speed [m/s].
+            steering: Angle of the front wheels [rad].
+            near: Distances of its sensors, evenly spaced around it, the first ahead [m].
         """
         frame = b""
         if t + SOON >= max(self._off_until, self._silent_until, self._next):
@@ -145,25 +145,25 @@ class CarDevice:
         self.line.send(t_ns, [frame] if frame else ())
 
     def reboot(self, t: float, seconds: float) -> None:
-        """Stop, forget everything, be deaf and silent for so long."""
+        """Restart without state; stop, ignore commands and send nothing for `seconds`."""
         self._car, self._off_until = self._make(), t + seconds
         self._clock.restart(t + seconds)
 
     def be_silent(self, until: float) -> None:
-        """Drive on and say nothing."""
+        """Send nothing until world time `until` [s]; commands are still executed."""
         self._silent_until = until
 
 
 class OperatorDevice:
-    """The receiver of the operator's remote control."""
+    """Receiver of the operator's remote control."""
 
     def __init__(self, line: Line, encoder: Encoder, boot: int, cars: Sequence[int]) -> None:
-        """Put it on its line.
+        """Create a receiver.
 
         Args:
-            line: Its own.
-            encoder: Of our format.
-            boot: Its boot number.
+            line: Line of the receiver.
+            encoder: Encoder of our format.
+            boot: Boot number of the receiver.
             cars: Node ids of the cars, by index.
         """
         self.line = line
@@ -171,13 +171,13 @@ class OperatorDevice:
         self._clock, self._sequence, self._next = NodeClock(), 0, 0.0
 
     def step(self, t: float, t_ns: int, velocity: F64, present: Bool) -> None:
-        """Tell every car what the operator wants, as often as he does.
+        """Send the operator's velocity to every present car, if it is due.
 
         Args:
-            t: Now, of the world [s].
-            t_ns: Now, of the host.
-            velocity: World frame, (car, 2) [m/s].
-            present: Who is in the room, (car).
+            t: Current world time [s].
+            t_ns: Current host time.
+            velocity: Commanded velocity, world frame, (car, 2) [m/s].
+            present: True for cars in the room, (car).
         """
         self.line.replug_if_due(t)
         if t + SOON < self._next:

@@ -1,9 +1,9 @@
-"""A simulated world behind devices: bytes to cars go in, bytes of nodes and cars come out.
+"""Emulator: a simulated world behind devices that exchange bytes with the host.
 
-    bytes to cars -> firmware -> World.step -> what was measured -> nodes -> faults -> ports
+    bytes to cars -> firmware -> World.step -> measurements -> nodes -> faults -> ports
 
-Pure but for the ports: time is an argument, and the same seeds and the same bytes to the cars
-give the same bytes back.
+Pure except for the ports: time is an argument, and equal seeds and equal bytes to the cars give
+equal bytes back.
 """
 
 from __future__ import annotations
@@ -23,48 +23,48 @@ from tracking.measurements import MeasurementBlock
 
 
 class World(Protocol):
-    """What the devices are in. Arrays over cars, in the order of the nodes."""
+    """World that contains the devices. Arrays over cars, in the order of the nodes."""
 
     @property
     def t(self) -> float:
-        """Time since it began [s]."""
+        """Time since the start of the world [s]."""
 
     @property
     def at_rest(self) -> bool:
-        """True while the cars are held in place at first, and none is commanded to move."""
+        """True during the initial standstill, in which no car is commanded to move."""
 
     @property
     def present(self) -> Bool:
-        """Who is in the room, (car)."""
+        """True for cars in the room, (car)."""
 
     @property
     def powered(self) -> Bool:
-        """Which nodes have power, (car)."""
+        """True for cars whose node has power, (car)."""
 
     @property
     def command(self) -> F64:
-        """Velocity that the operator asks for, world frame, (car, 2) [m/s]."""
+        """Velocity commanded by the operator, world frame, (car, 2) [m/s]."""
 
     def step(self, speed: F64, steering: F64) -> MeasurementBlock:
-        """Go on by 10 ms.
+        """Advance by 10 ms.
 
         Args:
-            speed: Asked of the motors, (car) [m/s].
-            steering: Asked of the servos, (car) [rad].
+            speed: Commanded speed, (car) [m/s].
+            steering: Commanded steering angle, (car) [rad].
 
         Returns:
-            What was measured, of one environment.
+            Measurements of one environment.
         """
 
     def motion(self) -> tuple[F64, F64]:
-        """Speeds by the cars' own wheels [m/s] and steering angles of their servos [rad], (car)."""
+        """Return the wheel speeds [m/s] and the steering angles of the servos [rad], (car)."""
 
     def near(self) -> F64:
-        """Distances by the cars' own sensors, (car, beam) [m]."""
+        """Return the distances measured by the cars' own sensors, (car, beam) [m]."""
 
 
 class Emulator:
-    """All devices of a group; it owns their lines."""
+    """All devices of a group, and their lines."""
 
     def __init__(
         self,
@@ -74,17 +74,17 @@ class Emulator:
         operator: OperatorDevice | None,
         plan: FaultPlan,
     ) -> None:
-        """Put devices into a world.
+        """Connect devices to a world.
 
         Args:
-            world: Where they are.
-            nodes: One a car, in the order of the world.
-            cars: One a car, in the order of the world.
+            world: World that contains the devices.
+            nodes: One per car, in the order of the world.
+            cars: One per car, in the order of the world.
             operator: None for no remote control.
-            plan: The script of what goes wrong; its chances are in the lines already.
+            plan: Its script is used; its frame faults are in the lines already.
 
         Raises:
-            BridgeError: The script names what is not there.
+            BridgeError: The script names an unknown device or line.
         """
         self.world, self.nodes, self.cars, self.operator = world, nodes, cars, operator
         by_name: dict[str, NodeDevice | CarDevice | Line] = {
@@ -99,24 +99,24 @@ class Emulator:
         self._script = [(f.t, k, f) for k, f in enumerate(plan.faults)]
         heapq.heapify(self._script)
         self.happened: list[Fault] = []
-        """Faults of the script so far."""
+        """Faults of the script that have occurred."""
         self._speed, self._steering = np.zeros((2, len(cars)))
 
     @property
     def lines(self) -> list[Line]:
-        """All of them: of the nodes, of the cars, of the operator."""
+        """All lines: of the nodes, of the cars, of the operator."""
         lines = [line for device in self.nodes for line in device.lines]
         lines += [car.line for car in self.cars]
         return lines + ([] if self.operator is None else [self.operator.line])
 
     def step(self, t_ns: int) -> MeasurementBlock:
-        """Go on by 10 ms of the world.
+        """Advance the world by 10 ms.
 
         Args:
-            t_ns: Now, of the host; never less than before.
+            t_ns: Current host time, non-decreasing.
 
         Returns:
-            What was measured, faults or not; valid until the next step.
+            Measurements without faults; valid until the next step.
         """
         world = self.world
         while self._script and self._script[0][0] <= world.t:
@@ -139,22 +139,22 @@ class Emulator:
         return block
 
     def listen(self, t_ns: int) -> bool:
-        """Let the cars take what the host sends while the world stands; whether it sent anything.
+        """Process bytes of the host without a step of the world; return whether any have ever come.
 
         Args:
-            t_ns: Now, of the host.
+            t_ns: Current host time.
         """
         for car in self.cars:
             car.listen(self.world.t, t_ns)
         return any(car.heard for car in self.cars)
 
     def close(self) -> None:
-        """Unplug everything."""
+        """Unplug all lines."""
         for line in self.lines:
             line.close()
 
     def _befall(self, fault: Fault, t: float) -> None:
-        """Let a fault of the script happen."""
+        """Apply a fault of the script."""
         self.happened.append(fault)
         thing, until = self._by_name[fault.target], t + fault.seconds
         if fault.kind == "unplug":
@@ -170,12 +170,12 @@ class Emulator:
 
 
 def lines_of(device: NodeDevice | CarDevice) -> list[Line]:
-    """The lines of a device."""
+    """Return the lines of a device."""
     return [device.line] if isinstance(device, CarDevice) else list(device.lines)
 
 
 def _befall_node(device: NodeDevice, fault: Fault, t: float) -> None:
-    """What can happen to a node besides its plugs."""
+    """Apply a fault other than ``unplug`` to a node."""
     until = t + fault.seconds
     if fault.kind == "reboot":
         device.node.reboot(t, fault.seconds)

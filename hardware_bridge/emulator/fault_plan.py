@@ -1,4 +1,4 @@
-"""What goes wrong in a run, and when: chances for frames and a script, from a TOML file.
+"""Fault plan of a run: probabilities of frame faults and a script of events, from a TOML file.
 
 [frames]
 loss = 0.02
@@ -33,27 +33,27 @@ FAULT_KINDS: Mapping[str, tuple[str, ...]] = {
     "silence": (NODES, CARS),
     "twin": (NODES,),
 }
-"""Kinds of faults and what they can befall."""
+"""Kinds of faults and the groups of targets that they apply to."""
 REBOOT = 1.0
-"""[s] A device that starts says nothing for so long, unless the script says otherwise."""
+"""[s] Default silence of a device that starts."""
 _TARGET = re.compile(r"(nodes|cars)\.([0-9]{1,9})|links\.([A-Za-z0-9_-]{1,64})")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fault:
-    """Something that goes wrong once."""
+    """A single fault of the script."""
 
     t: float
-    """[s] When, since the world began."""
+    """[s] Time since the start of the world."""
     kind: str
-    """``unplug``: the port is gone, and comes back under the same name. ``reboot``: silence, then
-    the next boot number and a clock from 0; a car forgets its command. ``clock-step``: the node's
-    clock jumps. ``stuck-sensor``: the IMU repeats its last sample. ``silence``: it works and says
-    nothing. ``twin``: another device speaks under the same id on the same line."""
+    """``unplug``: the port is gone, and comes back with the same name. ``reboot``: silence, then
+    the next boot number and a clock from 0; a car discards its command. ``clock-step``: the node's
+    clock jumps. ``stuck-sensor``: the IMU repeats its last sample. ``silence``: the device works
+    but sends nothing. ``twin``: a second device sends with the same id on the same line."""
     target: str
-    """``nodes.1``, ``cars.1`` or a port: ``links.n1``, ``links.operator``."""
+    """Target: ``nodes.1``, ``cars.1`` or a port, ``links.n1`` or ``links.operator``."""
     seconds: float = REBOOT
-    """[s] How long it lasts; the size of the jump for ``clock-step``, which may be negative."""
+    """[s] Duration; for ``clock-step`` the size of the jump, which may be negative."""
 
     def __post_init__(self) -> None:
         if self.kind not in FAULT_KINDS:
@@ -73,28 +73,28 @@ class Fault:
 
     @property
     def group(self) -> str:
-        """``nodes``, ``cars`` or ``links``."""
+        """The group of the target: ``nodes``, ``cars`` or ``links``."""
         return self.target.split(".", 1)[0]
 
     @property
     def name(self) -> str:
-        """What follows the group."""
+        """The target without its group."""
         return self.target.split(".", 1)[1]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaultPlan:
-    """All that goes wrong in a run; by default nothing does."""
+    """All faults of a run; by default there are none."""
 
     frames: FaultParams = field(default_factory=FaultParams)
-    """Of the lines of the nodes."""
+    """Frame faults of the lines of the nodes."""
     faults: tuple[Fault, ...] = ()
 
     def check(self, targets: Collection[str]) -> None:
-        """Refuse faults of what is not there.
+        """Refuse faults of unknown targets.
 
         Raises:
-            BridgeError: Names the first, and what is there.
+            BridgeError: A target is unknown; the first one and the known ones are named.
         """
         for k, fault in enumerate(self.faults):
             if fault.target not in targets:
@@ -108,8 +108,8 @@ def read_faults(path: Path) -> FaultPlan:
     """Read a fault plan.
 
     Raises:
-        BridgeError: No such file, no TOML, or a key that is unknown, missing or makes no sense;
-            file and key are named.
+        BridgeError: No such file, invalid TOML, or an unknown, missing or invalid key; file and key
+            are named.
     """
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -119,11 +119,11 @@ def read_faults(path: Path) -> FaultPlan:
 
 
 def parse_faults(table: Mapping[str, Any], file: str = "faults") -> FaultPlan:
-    """A fault plan from what its file says.
+    """Return the fault plan of a parsed file.
 
     Args:
-        table: The whole file.
-        file: Its name, for messages.
+        table: Contents of the file.
+        file: Name of the file, for messages.
 
     Raises:
         BridgeError: As `read_faults`.

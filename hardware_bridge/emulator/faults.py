@@ -1,4 +1,4 @@
-"""What happens to frames on their way: chances for each frame, as a pure queue."""
+"""Random faults of frames on a line, as a pure queue."""
 
 from __future__ import annotations
 
@@ -10,32 +10,32 @@ import numpy as np
 from hardware_bridge.errors import BridgeError
 
 MOST_FLIPS = 3
-"""[-] Bits that are turned over in a damaged frame, at most."""
+"""[-] Largest number of flipped bits in a damaged frame."""
 N_DRAWS = 5
-"""[-] Kinds of faults that are drawn for each frame."""
+"""[-] Number of kinds of faults that are sampled for each frame."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaultParams:
-    """Chances for each frame. Authors' choice all of them; by default nothing happens."""
+    """Probabilities of faults per frame, chosen by the authors; by default there are no faults."""
 
     loss: float = 0.0
     """[-] Share of frames that never arrive."""
     corruption: float = 0.0
-    """[-] Share of frames in which one to three bits are turned over."""
+    """[-] Share of frames in which one to three bits are flipped."""
     truncation: float = 0.0
-    """[-] Share of frames whose end is missing, from one byte to all but one."""
+    """[-] Share of frames that are cut off, by one byte up to all but one."""
     duplication: float = 0.0
-    """[-] Share of frames that come twice."""
+    """[-] Share of frames that arrive twice."""
     reordering: float = 0.0
     """[-] Share of frames that are overtaken by those of the next `reordering_by` seconds."""
     reordering_by: float = 0.03
-    """[s] Delay of those on top of `delay`."""
+    """[s] Delay of reordered frames in addition to `delay`."""
     delay: float = 0.0
     """[s] Mean delay of a frame."""
     delay_spread: float = 0.0
-    """[s] Standard deviation of that delay. Frames that are not reordered stay in order, as on
-    any line: one that is late holds up those behind it."""
+    """[s] Standard deviation of the delay. Frames that are not reordered stay in order, as on any
+    line: a late frame delays those behind it."""
 
     def __post_init__(self) -> None:
         for f in fields(self):
@@ -48,35 +48,35 @@ _SECONDS = ("reordering_by", "delay", "delay_spread")
 
 
 class FaultInjector:
-    """A queue of frames to which faults happen.
+    """Queue that applies faults to frames.
 
-    Laws: without faults every frame comes out once, whole, in order and at once; a frame that is
-    damaged differs from what it was; more of one fault changes not which frames others befall.
+    Invariants: without faults every frame comes out once, whole, in order and at once; a damaged
+    frame is changed; the rate of one fault does not change which frames other faults affect.
     """
 
     def __init__(self, params: FaultParams, rng: np.random.Generator) -> None:
-        """Begin with nothing under way.
+        """Create an empty queue.
 
         Args:
-            params: Chances.
-            rng: Its own.
+            params: Probabilities of faults.
+            rng: Generator used by this queue only.
         """
         self.params = params
         self._calm = params == FaultParams(reordering_by=params.reordering_by)
-        # What befalls a frame, when, and how, each by a generator of its own.
+        # Separate generators for kinds, delays and details of faults.
         self._what, self._when, self._how = rng.spawn(3)
         self._waiting: list[tuple[int, int, bytes]] = []
         self._order = 0
         self._last_ns = 0
         self.lost = self.damaged = self.doubled = self.reordered = 0
-        """Frames so far."""
+        """Number of frames affected so far."""
 
     def push(self, t_ns: int, frame: bytes) -> None:
-        """A frame sets out.
+        """Add a frame.
 
         Args:
-            t_ns: Now.
-            frame: Whole.
+            t_ns: Current host time.
+            frame: Complete frame.
         """
         if not frame:
             return
@@ -86,7 +86,7 @@ class FaultInjector:
         p = self.params
         loss, corruption, truncation, duplication, reordering = self._what.random(N_DRAWS).tolist()
         delay = max(p.delay + p.delay_spread * float(self._when.standard_normal()), 0.0)
-        # One that is lost still holds up the line: it was damaged on it.
+        # A lost frame still delays later ones: it was damaged on the line.
         self._last_ns = due_ns = max(self._last_ns, t_ns + round(1e9 * delay))
         if loss < p.loss:
             self.lost += 1
@@ -106,14 +106,14 @@ class FaultInjector:
             self._send(due_ns, frame)
 
     def due(self, t_ns: int) -> list[bytes]:
-        """Frames that have arrived by now, in order of arrival."""
+        """Return the frames that have arrived by now, in order of arrival."""
         arrived: list[bytes] = []
         while self._waiting and self._waiting[0][0] <= t_ns:
             arrived.append(heapq.heappop(self._waiting)[2])
         return arrived
 
     def forget(self) -> None:
-        """Lose what is under way."""
+        """Drop all frames in the queue."""
         self._waiting.clear()
 
     def _send(self, due_ns: int, frame: bytes) -> None:
@@ -121,7 +121,7 @@ class FaultInjector:
         self._order += 1
 
     def _flipped(self, frame: bytes) -> bytes:
-        """The frame with some of its bits turned over, no bit twice."""
+        """Return the frame with some of its bits flipped, no bit twice."""
         n_bits = 8 * len(frame)
         n = int(self._how.integers(1, MOST_FLIPS + 1))
         damaged = bytearray(frame)

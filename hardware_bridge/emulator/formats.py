@@ -1,4 +1,4 @@
-"""What an emulated node can say in each format, and how it writes names and times there."""
+"""Formats of emulated nodes: supported readings, ids and clocks."""
 
 from __future__ import annotations
 
@@ -27,50 +27,50 @@ IMUS: frozenset[type] = frozenset({ImuReading})
 
 
 def decimal(node: int) -> str:
-    """A node's id as most formats write it."""
+    """Return a node's id as most formats write it."""
     return str(node)
 
 
 def short_address(node: int) -> str:
-    """A node's id as a radio's short address, four capital hex digits."""
+    """Return a node's id as a radio's short address, four capital hex digits."""
     return f"{node:04X}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WireFormat:
-    """A format as a device speaks it."""
+    """A format as sent by a device."""
 
     name: str
     says: frozenset[type]
-    """Kinds of readings; all others are left out."""
+    """Kinds of supported readings; all others are left out."""
     clock: DeviceClock | None = None
-    """Of its time stamps; None where it has none."""
+    """Clock of its time stamps; None without time stamps."""
     name_of: Callable[[int], str] = decimal
-    """How it writes a node's id."""
+    """Conversion of a node's id to the format's id."""
     names_itself: bool = True
-    """False where the host must be told who speaks."""
+    """False if messages do not include the sender, which the host's configuration must give."""
     always_voltage: bool = False
-    """Every frame says the voltage of the battery."""
+    """True if every frame contains the battery voltage."""
     own: Callable[[int, int], Encoder] | None = None
-    """Node and boot number to an encoder; by default that of the device in
-    `hardware_bridge.emulator.encoders.ENCODERS`."""
+    """Node and boot number to an encoder; by default the encoder of this name in
+    `hardware_bridge.emulator.encoders.ENCODERS` is used."""
 
     def build(self, node: int, boot: int) -> Encoder:
-        """The encoder of a device that has just started."""
+        """Return the encoder of a device that has just started."""
         if self.own is not None:
             return self.own(node, boot)
         return make_encoder(self.name, self.name_of(node))
 
     def can_say(self, kind: type[Reading]) -> bool:
-        """Whether there is a message for this kind of reading."""
+        """Return whether the format has a message for this kind of reading."""
         return kind in self.says
 
 
 def relpos(key: bytes | None = None) -> WireFormat:
-    """The format of our own nodes.
+    """Return the format of our own nodes.
 
     Args:
-        key: Of its MAC, 16 bytes; None sends none.
+        key: Key of its MAC, 16 bytes; None for no MAC.
     """
 
     def build(node: int, boot: int) -> Encoder:
@@ -100,18 +100,18 @@ THIRD_PARTY: Mapping[str, WireFormat] = {
         WireFormat(name="witmotion", says=IMUS, names_itself=False),
     )
 }
-"""Formats of devices that one can buy."""
+"""Formats of commercial devices."""
 
 
 def wire_format(name: str, key: bytes | None = None) -> WireFormat:
-    """Look a format up.
+    """Return a format by name.
 
     Args:
         name: ``relpos`` or one of `THIRD_PARTY`.
         key: For the MAC of ``relpos``; the others have none.
 
     Raises:
-        BridgeError: None of that name.
+        BridgeError: Unknown name.
     """
     if name == "relpos":
         return relpos(key)
@@ -121,10 +121,10 @@ def wire_format(name: str, key: bytes | None = None) -> WireFormat:
 
 
 def check_formats(formats: tuple[WireFormat, ...]) -> None:
-    """Refuse a node that could not be tracked.
+    """Refuse formats that are insufficient for tracking.
 
     Raises:
-        BridgeError: Nothing says ranges, or nothing says inertial samples.
+        BridgeError: No format supports ranges, or none supports inertial samples.
     """
     names = " and ".join(f.name for f in formats)
     if not any(f.can_say(RangeReading) for f in formats):

@@ -1,4 +1,4 @@
-"""A device's line to the host: its port, and what happens to frames on the way to it."""
+"""Line from a device to the host: its port, and the faults of frames to the host."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from hardware_bridge.emulator.ports import DevicePort
 
 
 class Line:
-    """Frames go in, bytes come out at the host; the other way round bytes come as they are."""
+    """Line that applies faults to frames to the host; bytes to the device pass unchanged."""
 
     def __init__(self, name: str, port: DevicePort, injector: FaultInjector) -> None:
         self.name, self.port, self.injector = name, port, injector
         self.frames = 0
-        """Sent so far, before anything happens to them."""
+        """Number of frames sent, before faults."""
         self._unplugged_until = -np.inf
 
     def send(self, t_ns: int, frames: Iterable[bytes]) -> None:
-        """Let frames set out, and write those that have arrived.
+        """Queue frames, and write those that are due.
 
         Args:
-            t_ns: Now, of the host.
-            frames: Whole ones, in order.
+            t_ns: Current host time.
+            frames: Complete frames, in order.
         """
         for frame in frames:
             self.frames += 1
@@ -33,16 +33,16 @@ class Line:
             self.port.write(frame)
 
     def unplug(self, until: float) -> None:
-        """Pull the plug until `replug_if_due` is called at or after `until` of the world [s]."""
+        """Unplug until `replug_if_due` is called at or after world time `until` [s]."""
         self._unplugged_until = max(until, self._unplugged_until)
         self.injector.forget()
         self.port.unplug()
 
     def replug_if_due(self, t: float) -> None:
-        """Plug in again when it is time [s]."""
+        """Plug in again if the world time `t` [s] is late enough."""
         if not self.port.plugged and t >= self._unplugged_until:
             self.port.replug()
 
     def close(self) -> None:
-        """Unplug for good."""
+        """Unplug permanently."""
         self.port.unplug()

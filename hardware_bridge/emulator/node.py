@@ -1,6 +1,6 @@
-"""An emulated node: what it measured becomes bytes of its formats, by its own clock.
+"""Emulated node: measurements to bytes of its formats, stamped by its own clock.
 
-It knows nothing of the group but the ids of others, and nothing of the host.
+It depends on nothing of the group except the ids of others, and on nothing of the host.
 """
 
 from __future__ import annotations
@@ -27,29 +27,28 @@ from hardware_bridge.readings import (
 from tracking.measurements import Kind
 
 GRAVITY = 9.81
-"""[m/s2] Of a twin that lies on a table."""
+"""[m/s2] Specific force of a twin at rest."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NodeParams:
-    """How the devices differ from perfect ones."""
+    """Deviations of the devices from ideal ones."""
 
     drift_ppm: float = 20.0
-    """[ppm] Standard deviation of how much too fast a clock runs; crystals of such boards are
-    good for 10 to 40 ppm."""
+    """[ppm] Standard deviation of the clocks' drift; crystals of such boards have 10 to 40 ppm."""
     most_offset: float = 600.0
-    """[s] Devices were switched on up to so long before the world began."""
+    """[s] Longest time for which a device was on before the world began."""
     voltage: float = 3.9
-    """[V] What they say of their batteries."""
+    """[V] Reported battery voltage."""
     status_every: float = 1.0
-    """[s] Between two reports of it."""
+    """[s] Period of heartbeats and voltage reports."""
 
 
 class EmulatedNode:
-    """A node with one port or several, each with a format of its own.
+    """A node with one or several ports, each with its own format.
 
-    Laws: the same rows, times and generator give the same bytes; a sample that is sent carries
-    the time at which it was measured, by the node's clock.
+    Invariants: equal rows, times and generator give equal bytes; a sample is stamped with its time
+    of measurement, by the node's clock.
     """
 
     def __init__(
@@ -60,14 +59,14 @@ class EmulatedNode:
         rng: np.random.Generator,
         params: NodeParams,
     ) -> None:
-        """Switch it on before the world begins.
+        """Create a node that was switched on before the world began.
 
         Args:
-            node: Its id.
-            formats: Those of its ports; a reading goes out by the first that can say it.
+            node: Id of the node.
+            formats: Formats of its ports; a reading is sent in the first one that supports it.
             ids: Ids of all nodes, by index.
-            rng: For its clock and its first boot number.
-            params: Of all nodes.
+            rng: Generator of its clock and first boot number.
+            params: Parameters of all nodes.
         """
         self.node, self.formats, self.params = node, tuple(formats), params
         self._ids = tuple(ids)
@@ -80,11 +79,11 @@ class EmulatedNode:
         self._start()
 
     def say(self, rows: Sequence[Measured], t: float) -> list[list[bytes]]:
-        """What it sends, frames in order, by port.
+        """Return the frames to send, in order, by port.
 
         Args:
-            rows: What it measured since the last call.
-            t: Now [s].
+            rows: Measurements since the last call.
+            t: Current world time [s].
         """
         sent: list[list[bytes]] = [[] for _ in self.formats]
         for row in rows:
@@ -98,31 +97,31 @@ class EmulatedNode:
         return sent
 
     def reboot(self, t: float, seconds: float) -> None:
-        """Start again: silent for so long, then with the next boot number and a clock from 0."""
+        """Restart: silence for `seconds`, then the next boot number and a clock from 0."""
         self._silent_until = t + seconds
         self.clock.restart(t + seconds)
         self._start()
 
     def be_silent(self, until: float) -> None:
-        """Measure on and say nothing."""
+        """Send nothing until world time `until` [s]; measurements continue."""
         self._silent_until = max(self._silent_until, until)
 
     def stick(self, until: float) -> None:
-        """Let the IMU repeat its last sample."""
+        """Repeat the last IMU sample until world time `until` [s]."""
         self._stuck_until = until
 
     def _start(self) -> None:
-        """What a boot begins with."""
+        """Initialise the state of a boot."""
         self.boot = next(self._boots)
         self.sequences = [0] * len(self.formats)
-        """Messages of this boot, by port."""
+        """Number of messages of this boot, by port."""
         self._encoders: list[Encoder] = [f.build(self.node, self.boot) for f in self.formats]
         self._next_status = -np.inf
         self._mag: tuple[float, float, float] | None = None
         self._sample: ImuReading | None = None
 
     def _reading(self, row: Measured) -> Reading | None:
-        """What a row is in SI units; the magnetometer's goes with the next IMU sample."""
+        """Return a row in SI units; magnetometer values are added to the next IMU sample."""
         v, unnamed = row.values, Source()
         if row.kind is Kind.MAG:
             self._mag = v[0], v[1], v[2]
@@ -140,7 +139,7 @@ class EmulatedNode:
         return self._sample
 
     def _send(self, sent: list[list[bytes]], reading: Reading, t: float) -> None:
-        """Put a reading into the first format that can say it."""
+        """Encode a reading in the first format that supports it."""
         for port, wire in enumerate(self.formats):
             if type(reading) not in wire.says:
                 continue
@@ -161,6 +160,6 @@ class EmulatedNode:
 
 
 def at_rest(rows: Sequence[Measured]) -> list[Measured]:
-    """What a twin says instead: the same, but its IMU lies on a table."""
+    """Return the measurements of a twin: equal rows, but with an IMU at rest."""
     still = (0.0, 0.0, 0.0, 0.0, 0.0, GRAVITY)
     return [row._replace(values=still) if row.kind is Kind.IMU else row for row in rows]

@@ -1,4 +1,4 @@
-"""The clock of an emulated device: it starts somewhere, runs fast or slow, jumps, and wraps."""
+"""Clock of an emulated device, with offset, drift, jumps and wraps."""
 
 from __future__ import annotations
 
@@ -8,30 +8,30 @@ from hardware_bridge.readings import DeviceClock
 
 
 class NodeClock:
-    """Seconds of the world to seconds and ticks of a device."""
+    """Conversion of world time to seconds and ticks of a device."""
 
     def __init__(self, offset: float = 0.0, drift: float = 0.0) -> None:
-        """Set it.
+        """Create a clock.
 
         Args:
-            offset: What it shows when the world begins [s].
-            drift: How much too fast it runs [-]; 20e-6 is 20 ppm.
+            offset: Reading at the start of the world [s].
+            drift: Relative rate error, positive if fast [-]; 20e-6 is 20 ppm.
         """
         self.offset, self.drift = offset, drift
         self._began = 0.0
 
     def seconds(self, t: float) -> float:
-        """What it shows at `t` of the world [s], before it wraps."""
+        """Return the reading at world time `t` [s], before it wraps."""
         return (t - self._began) * (1.0 + self.drift) + self.offset
 
     def ticks(self, t: float, clock: DeviceClock) -> int:
-        """What a counter of this clock shows at `t` of the world [s]."""
+        """Return the count of a counter driven by this clock at world time `t` [s]."""
         return math.floor(self.seconds(t) * clock.hz) % clock.modulus
 
     def step(self, seconds: float) -> None:
-        """Jump ahead, or back."""
+        """Jump by some seconds, forwards or backwards."""
         self.offset += seconds
 
     def restart(self, t: float) -> None:
-        """Show 0 at `t` of the world [s]."""
+        """Restart from 0 at world time `t` [s]."""
         self._began, self.offset = t, 0.0

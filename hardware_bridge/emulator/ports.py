@@ -1,4 +1,4 @@
-"""The device's end of a line: what a device writes there, the host reads."""
+"""The device's end of a line to the host."""
 
 from __future__ import annotations
 
@@ -7,24 +7,24 @@ from dataclasses import dataclass
 from typing import Protocol, TypeAlias
 
 MOST_KEPT = 1 << 16
-"""[bytes] A line in memory keeps no more than this in each direction."""
+"""[bytes] Size of the buffer of a line in memory, per direction."""
 
 
 @dataclass(slots=True)
 class LineCounts:
-    """What went over a line since it was made, in bytes."""
+    """Numbers of bytes sent over a line since its creation."""
 
     written: int = 0
-    """Taken by the line."""
+    """Bytes accepted by the line."""
     dropped: int = 0
-    """The host did not read in time, and the line was full."""
+    """Bytes lost because the line was full: the host did not read in time."""
     unheard: int = 0
-    """The port was not open, or the device was unplugged."""
+    """Bytes lost because the port was not open or the device was unplugged."""
     read: int = 0
 
 
 class DevicePort(Protocol):
-    """The device's end. Nothing here ever waits."""
+    """The device's end of a line; its methods never block."""
 
     counts: LineCounts
 
@@ -33,16 +33,16 @@ class DevicePort(Protocol):
         """False after `unplug`."""
 
     def write(self, data: bytes) -> None:
-        """Send; what does not go out at once is lost and counted."""
+        """Send bytes; those that cannot be sent at once are lost and counted."""
 
     def read(self) -> bytes:
-        """All that the host has sent."""
+        """Return all pending bytes of the host."""
 
     def unplug(self) -> None:
-        """Pull the plug: the host's end is gone. Without effect where there is none."""
+        """Unplug the device and close the host's end. No effect if it is unplugged."""
 
     def replug(self) -> None:
-        """Plug in again, under the same name, as another device of the system."""
+        """Plug in again, with the same name, as another device of the system."""
 
 
 PortBuilder: TypeAlias = Callable[[str], DevicePort]
@@ -50,9 +50,9 @@ PortBuilder: TypeAlias = Callable[[str], DevicePort]
 
 
 class MemoryPort:
-    """A line without an operating system, for rigs that are stepped by hand.
+    """A line without an operating system, for tests that are stepped manually.
 
-    The host's end is `receive` and `send`; it always has the port open.
+    `receive` and `send` are the host's end, which is always open.
     """
 
     def __init__(self) -> None:
@@ -76,29 +76,29 @@ class MemoryPort:
         self.counts.dropped += len(data) - len(taken)
 
     def read(self) -> bytes:
-        """All that the host has sent."""
+        """Return all pending bytes of the host."""
         data = bytes(self._to_device)
         self._to_device.clear()
         self.counts.read += len(data)
         return data
 
     def unplug(self) -> None:
-        """What was under way is lost."""
+        """Unplug; bytes in both buffers are lost."""
         self._plugged = False
         self._to_host.clear()
         self._to_device.clear()
 
     def replug(self) -> None:
-        """Carry on."""
+        """Plug in again."""
         self._plugged = True
 
     def receive(self) -> bytes:
-        """The host reads what is there."""
+        """Return the pending bytes for the host."""
         data = bytes(self._to_host)
         self._to_host.clear()
         return data
 
     def send(self, data: bytes) -> None:
-        """The host writes; what an unplugged device would get is lost."""
+        """Send bytes from the host; they are lost while the device is unplugged."""
         if self._plugged:
             self._to_device += data[: MOST_KEPT - len(self._to_device)]

@@ -1,8 +1,7 @@
-"""A serial device that is none: a pseudo terminal behind a symbolic link of a fixed name.
+"""Emulated serial port: a pseudo terminal behind a symbolic link with a fixed name.
 
-Programs open the link as they would open ``/dev/serial/by-id/...``, with the same calls and the
-same failures: a device that is pulled out ends their reads, and comes back as another device
-under the same name.
+Programs open the link like ``/dev/serial/by-id/...``, with the same calls and the same failures:
+unplugging ends their reads, and the port comes back as another device with the same name.
 """
 
 from __future__ import annotations
@@ -18,26 +17,26 @@ from hardware_bridge.errors import BridgeError
 from hardware_bridge.systems import expect_posix
 
 READ_SIZE = 1 << 16
-"""[bytes] Read at a time."""
+"""[bytes] Largest number of bytes per read."""
 GONE = (errno.EIO, errno.EBADF)
-"""Error of the system when the other end is not open."""
+"""Errors of the system if the other end is not open."""
 
 
 class PtyPort:
     """The device's end of a pseudo terminal in raw mode; a `DevicePort`.
 
-    As at a real port, what is sent while it is not open is lost. The buffer of the line is
-    that of the system, some ten thousand bytes.
+    As at a real port, bytes sent while no host has it open are lost. The buffer is that of the
+    system, some ten thousand bytes.
     """
 
     def __init__(self, link: Path) -> None:
-        """Make the terminal and the link.
+        """Create the terminal and the link.
 
         Args:
-            link: Its name; a symbolic link that is there already is replaced.
+            link: Path of the link; an existing symbolic link is replaced.
 
         Raises:
-            BridgeError: Something else is there, or the system gives no terminals.
+            BridgeError: Another file is there, or the system provides no terminals.
         """
         if link.exists() and not link.is_symlink():
             raise BridgeError(f"{link}: expected a free name for a port, found a file")
@@ -81,7 +80,7 @@ class PtyPort:
         self.counts.dropped += len(data) - taken
 
     def read(self) -> bytes:
-        """All that the host has sent."""
+        """Return all pending bytes of the host."""
         found = bytearray()
         while self._fd is not None:
             try:
@@ -99,7 +98,7 @@ class PtyPort:
         return bytes(found)
 
     def unplug(self) -> None:
-        """Close the terminal and remove the link; a host that has it open reads an end."""
+        """Close the terminal and remove the link; a host that has it open reads end of file."""
         if self._fd is None:
             return
         with suppress(FileNotFoundError):
@@ -110,21 +109,21 @@ class PtyPort:
         self._fd = None
 
     def replug(self) -> None:
-        """A new terminal behind the same link.
+        """Open a new terminal behind the same link.
 
         Raises:
-            BridgeError: The system gives no terminals.
+            BridgeError: The system provides no terminals.
         """
         if self._fd is None:
             self._open()
 
     def _open(self) -> None:
-        """Make a terminal in raw mode and let the link point to it."""
+        """Open a terminal in raw mode and point the link to it."""
         if not hasattr(os, "openpty"):
             raise BridgeError(
                 f"{self.link}: this system has no pseudo terminals, use Linux or macOS"
             )
-        # Here, since not every system has it.
+        # Imported here, since some systems lack it.
         import tty
 
         try:
@@ -134,8 +133,8 @@ class PtyPort:
             raise BridgeError(f"{self.link}: the system gives no pseudo terminal ({error})") from (
                 error
             )
-        # Settings stay with the device while the host's end is closed, and an end that is closed
-        # tells the device whether anybody listens.
+        # The settings persist while the host's end is closed, and only with this end closed can the
+        # device detect whether a host has the port open.
         tty.setraw(host)
         self._device = os.ttyname(host)
         os.close(host)

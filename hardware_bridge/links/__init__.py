@@ -1,1 +1,1 @@
-"""Ports: serial and TCP, opened, read, lost and found again."""
+"""Transport: serial ports, TCP connections and files, with detection of losses and reopening."""

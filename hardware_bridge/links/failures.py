@@ -1,10 +1,9 @@
-"""The many ways in which a port is lost, as one exception.
+"""Conversion of the many errors of a lost port to one exception.
 
-An adapter that is pulled out shows itself as a hang-up of poll, as OSError (EIO, ENXIO, ENODEV), as
-a read that returns nothing although the port was readable, as pyserial's SerialException with or
-without a number, as its PortNotOpenError, as termios.error, which is no OSError, and as TypeError
-or ValueError where something else closed the descriptor. None of them tells more than that the
-port is gone.
+An unplugged adapter causes a hang-up of poll, an OSError (EIO, ENXIO, ENODEV), an empty read of a
+readable port, pyserial's SerialException with or without a number, its PortNotOpenError, a
+termios.error, which is no OSError, or a TypeError or ValueError if the descriptor was closed
+elsewhere. All of them mean that the port is gone.
 """
 
 from __future__ import annotations
@@ -28,21 +27,21 @@ _WORDS = {
 
 
 class LinkLost(Exception):
-    """A port that was open is gone, or cannot be opened again yet."""
+    """Loss of an open port, or a failed attempt to open it again."""
 
     def __init__(self, reason: str) -> None:
         super().__init__(reason)
         self.reason = reason
-        """Why, in words."""
+        """Reason as a text."""
 
 
 def lost_by(error: BaseException) -> LinkLost:
-    """Whatever a port raised, as the one exception."""
+    """Return the `LinkLost` for any exception of a port."""
     return error if isinstance(error, LinkLost) else LinkLost(reason_of(error))
 
 
 def reason_of(error: BaseException) -> str:
-    """What an exception of a port means, in a few words."""
+    """Return a short description of an exception of a port."""
     number = number_of(error)
     if number in _WORDS:
         return f"{_WORDS[number]} ({errno.errorcode[number]})"
@@ -57,7 +56,7 @@ def reason_of(error: BaseException) -> str:
 
 
 def number_of(error: BaseException) -> int | None:
-    """The errno of an OSError, of a SerialException that has one, or of termios.error."""
+    """Return the errno of an OSError, of a SerialException that has one, or of termios.error."""
     number = getattr(error, "errno", None)
     if number is None and error.args and type(error).__module__ == "termios":
         number = error.args[0]

@@ -1,8 +1,8 @@
-"""A stream from a file, read from its start and followed while it grows.
+"""Stream from a file, read from its start and followed while it grows.
 
-A regular file is always readable, so nothing waits for it: a thread looks for more, and what it
-finds goes through a pipe. A file that became shorter, was replaced or removed is a port that is
-lost; opened again it is read from its start.
+A regular file is always readable, so it cannot be polled: a thread reads appended bytes and passes
+them on through a pipe. A file that became shorter, was replaced or removed counts as a lost port;
+when opened again, it is read from its start.
 """
 
 from __future__ import annotations
@@ -19,21 +19,21 @@ from hardware_bridge.links.ports import PortSpec
 from hardware_bridge.links.stream import Stream
 
 LOOK = 0.01
-"""[s] From one look at the end of the file to the next."""
+"""[s] Polling interval for the end of the file."""
 RENAMED = 50
-"""[-] Looks from one to the next at whether the path still leads to the file."""
+"""[-] Number of polls between checks that the path still leads to the file."""
 PIECE = 1 << 14
-"""[bytes]"""
+"""[bytes] Largest number of bytes per read."""
 
 
 class FilePort:
-    """A file ``file:path``, as ``tail -f`` from its first byte. It implements `Port`."""
+    """A file ``file:path``, read like ``tail -f`` from its first byte. Implements `Port`."""
 
     def __init__(self, spec: PortSpec) -> None:
         """Open the file.
 
         Raises:
-            BridgeError: There is none; says what to do.
+            BridgeError: The file cannot be opened; the message names a remedy.
         """
         self._path = Path(spec.port.removeprefix("file:"))
         try:
@@ -57,26 +57,26 @@ class FilePort:
         self._thread.start()
 
     def fileno(self) -> int:
-        """To wait for bytes with."""
+        """Return the descriptor to wait for bytes with."""
         return self._stream.fd
 
     def read(self) -> bytes:
-        """Everything that is there."""
+        """Return all pending bytes."""
         try:
             return self._stream.read()
         except LinkLost as lost:
             raise LinkLost(self._reason or lost.reason) from lost
 
     def write(self, data: bytes) -> bool:
-        """Refuse: a file that measures is not written to."""
+        """Refuse any data, since files are only read."""
         return not data
 
     def flush(self) -> bool:
-        """Nothing is ever left."""
+        """Return True, since nothing is ever pending."""
         return True
 
     def close(self, linger: float = 0.0) -> None:
-        """Close."""
+        """Close the file and end the thread."""
         if self._closed:
             return
         self._closed = True
@@ -85,7 +85,7 @@ class FilePort:
         os.close(self._end)
 
     def _follow(self) -> None:
-        """Of the thread: the file to the pipe, until it is closed or the file is another."""
+        """Copy the file to the pipe until it is closed or replaced; run by the thread."""
         try:
             looks = 0
             while not self._ending.is_set():
@@ -103,7 +103,7 @@ class FilePort:
             os.close(self._begin)
 
     def _pass_on(self, piece: bytes) -> None:
-        """Into the pipe, as soon as there is room for it."""
+        """Write bytes into the pipe as soon as it has space."""
         while piece and not self._ending.is_set():
             with contextlib.suppress(BlockingIOError):
                 piece = piece[os.write(self._begin, piece) :]
@@ -111,10 +111,10 @@ class FilePort:
             self._ending.wait(LOOK)
 
     def _check(self, by_name: bool) -> None:
-        """Find out whether it is still the same file, and no shorter.
+        """Check that the file is the same one, and not shorter.
 
         Raises:
-            LinkLost: It is not.
+            LinkLost: The file is shorter or was replaced.
         """
         here = os.fstat(self._file)
         if here.st_size < os.lseek(self._file, 0, os.SEEK_CUR):

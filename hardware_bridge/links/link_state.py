@@ -1,4 +1,4 @@
-"""One port over time: open, lost, tried again ever less often."""
+"""State of one port: open, or lost and retried with exponential backoff."""
 
 from __future__ import annotations
 
@@ -11,64 +11,64 @@ from hardware_bridge.links.ports import PortSpec
 from hardware_bridge.links.stream import Port
 
 SOONEST = 100_000_000
-"""[ns] From a loss to the first attempt to open the port again; doubles from attempt to attempt."""
+"""[ns] Delay from a loss to the first attempt to open the port; doubles with every attempt."""
 LATEST = 2_000_000_000
-"""[ns] Between two attempts. A port that was open for so long starts from `SOONEST` again."""
+"""[ns] Longest delay between attempts. Ports that were open for this time restart at `SOONEST`."""
 
 ASK_AGAIN = 1_000_000_000
-"""[ns] Of silence, after which a device that measures only when it is asked is asked again: it was
-still starting, or has lost its power alone."""
+"""[ns] Silence after which a device that measures on request is requested again: it was still
+starting, or lost only its power."""
 
 
 @dataclass(frozen=True, slots=True)
 class LinkNotice:
-    """A link came up or went down."""
+    """Notice of a link that came up or went down."""
 
     link: str
     t_ns: int
-    """When it was noticed, by the host's monotonic clock [ns]."""
+    """Time of detection, by the host's monotonic clock [ns]."""
     up: bool
     reason: str = ""
-    """Why it is down."""
+    """Reason for being down."""
 
 
 @dataclass(slots=True)
 class LinkState:
-    """A port and what became of it."""
+    """A port and its state."""
 
     spec: PortSpec
     since_ns: int
-    """When it came up or went down [ns]."""
+    """Time at which it came up or went down [ns]."""
     port: Port | None = None
     """None while it is down."""
     fd: int = -1
     reason: str = "not opened yet"
-    """Why it is down; empty while it is up."""
+    """Reason for being down; empty while it is up."""
     delay_ns: int = SOONEST
-    """To the next attempt."""
+    """Delay of the next attempt."""
     retry_ns: int | None = None
-    """When to open it; None while it is open or being opened."""
+    """Time to open it; None while it is open or being opened."""
     waits_to_write: bool = False
-    """Part of a message is left, for which there was no room."""
+    """True if a message was sent in part, since the buffer was full."""
     asked_ns: int = 0
-    """When its request was sent last, or bytes came last [ns]."""
+    """Time of the last request, or of the last received bytes [ns]."""
 
     def back_off(self, now: int) -> None:
-        """Set when to try again, and wait twice as long the next time."""
+        """Schedule the next attempt, and double the delay."""
         self.retry_ns = now + self.delay_ns
         self.delay_ns = min(2 * self.delay_ns, LATEST)
 
     def forgive(self, now: int) -> None:
-        """A port that was open long enough is tried soon again; a loose contact is not."""
+        """Reset the delay if the port was open for long enough, unlike one with a loose contact."""
         if now - self.since_ns >= LATEST:
             self.delay_ns = SOONEST
 
 
 def check_distinct(specs: Sequence[PortSpec]) -> None:
-    """Each port has a name and a device of its own.
+    """Check that all ports have distinct names and devices.
 
     Raises:
-        BridgeError: Two have the same.
+        BridgeError: Two ports share a name or device.
     """
     seen: dict[str, str] = {}
     names: set[str] = set()

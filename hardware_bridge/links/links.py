@@ -1,4 +1,4 @@
-"""Several ports at once: bytes as they come, losses noticed, lost ports opened again."""
+"""Several ports at once: received bytes, detection of losses, reopening of lost ports."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from hardware_bridge.links.ports import Chunk, PortSpec
 from hardware_bridge.links.stream import Port
 
 LINGER = 0.1
-"""[s] What was sent has this time to leave when all is closed."""
+"""[s] Time for written bytes to be sent when all ports are closed."""
 
 
 class Links:
     """The ports of one process, used by one thread.
 
-    Laws: no byte is lost or doubled while a port is up; whatever one port does, the others go on;
-    nothing is ever sent but what was asked for by `send` since the port came up, and the port's own
-    request, as it comes up and while the device is silent.
+    Invariants: no byte is lost or duplicated while a port is up; failures of one port do not affect
+    the others; nothing is sent except messages passed to `send` since the port came up, and the
+    port's own request, when it comes up and while the device is silent.
     """
 
     def __init__(
@@ -36,11 +36,10 @@ class Links:
         """Open all ports.
 
         Args:
-            specs: The ports, each with a name of its own.
+            specs: The ports, with distinct names.
             now_ns: The host's monotonic clock [ns].
-            wait_for_ports: Ports that cannot be opened are down and tried again, instead of being
-                an error.
-            open_port: How a port is opened.
+            wait_for_ports: True to retry ports that cannot be opened; False to raise an error.
+            open_port: Function that opens a port.
 
         Raises:
             BridgeError: A port cannot be opened, or two links have the same name or device.
@@ -67,13 +66,13 @@ class Links:
                 self._failed(link, error)
 
     def wait(self, timeout: float) -> list[Chunk]:
-        """Wait for a byte, a loss or a return, then take what is there.
+        """Wait for bytes, a loss or a reopened port, and return the received bytes.
 
         Args:
-            timeout: At most so long [s]; it may come back earlier with nothing.
+            timeout: Longest wait [s]; the call may return earlier without bytes.
 
         Returns:
-            At most one chunk a link, stamped right after it was read.
+            At most one chunk per link, stamped right after it was read.
         """
         self._retry()
         for each in self._links.values():
@@ -96,10 +95,10 @@ class Links:
         return chunks
 
     def send(self, name: str, data: bytes) -> bool:
-        """Send a message now or not at all.
+        """Send a message at once or not at all.
 
         Returns:
-            False if the link is down or earlier bytes still wait to leave; `data` is forgotten.
+            False if the link is down or earlier bytes are still pending; `data` is then discarded.
         """
         link = self._links[name]
         if link.port is None:
@@ -114,32 +113,32 @@ class Links:
         return taken
 
     def watch(self, fd: int) -> None:
-        """Let `wait` come back when `fd`, the caller's own, is readable."""
+        """Make `wait` return when `fd`, which the caller owns, is readable."""
         self._selector.register(fd, selectors.EVENT_READ)
 
     def unwatch(self, fd: int) -> None:
-        """No longer; before it is closed."""
+        """Undo `watch`; to be called before `fd` is closed."""
         self._selector.unregister(fd)
 
     def is_up(self, name: str) -> bool:
-        """Whether the port is open."""
+        """Return whether the port is open."""
         return self._links[name].port is not None
 
     def since_ns(self, name: str) -> int:
-        """When the link came up or went down [ns]."""
+        """Return the time at which the link came up or went down [ns]."""
         return self._links[name].since_ns
 
     def reason(self, name: str) -> str:
-        """Why the link is down; empty while it is up."""
+        """Return the reason why the link is down; empty while it is up."""
         return self._links[name].reason
 
     def drain_notices(self) -> list[LinkNotice]:
-        """Who came up and went down since the last call, in order."""
+        """Return the links that came up or went down since the last call, in order."""
         notices, self._notices = self._notices, []
         return notices
 
     def close(self) -> None:
-        """Close all; what was sent has `LINGER` to leave. May be called again."""
+        """Close all ports after at most `LINGER` for written bytes. May be called again."""
         self._opener.close()
         for link in self._links.values():
             if link.port is not None:
@@ -173,7 +172,7 @@ class Links:
         return Chunk(link.spec.name, t_ns, data) if data else None
 
     def _flush(self, link: LinkState) -> None:
-        """Go on with a cut message, and wait for room as long as there is one."""
+        """Continue to send a partly sent message, and poll for buffer space while there is one."""
         assert link.port is not None
         waits = not link.port.flush()
         if waits != link.waits_to_write:
@@ -196,11 +195,11 @@ class Links:
                 link.retry_ns = None
                 try:
                     self._opener.ask(link.spec)
-                except RuntimeError as error:  # no more threads
+                except RuntimeError as error:  # no thread available
                     self._failed(link, error)
 
     def _request(self, link: LinkState) -> None:
-        """Ask a device to measure that does not by itself."""
+        """Send the request of a device that measures on request."""
         if link.spec.request and link.port is not None:
             link.asked_ns = self._now_ns()
             self.send(link.spec.name, link.spec.request)
@@ -217,7 +216,7 @@ class Links:
                 self._failed(link, error)
 
     def _take(self, link: LinkState, port: Port) -> None:
-        """A port was opened."""
+        """Register an opened port."""
         try:
             fd = port.fileno()
             self._selector.register(fd, selectors.EVENT_READ)
@@ -232,7 +231,7 @@ class Links:
         self._request(link)
 
     def _lose(self, link: LinkState, error: Exception) -> None:
-        """A port that was open failed."""
+        """Handle the failure of an open port."""
         now = self._now_ns()
         link.forgive(now)
         self._release(link, 0.0)
@@ -241,7 +240,7 @@ class Links:
         link.back_off(now)
 
     def _failed(self, link: LinkState, error: Exception) -> None:
-        """A port could not be opened; said once, not at every attempt."""
+        """Handle a failed attempt to open a port; each reason is reported once."""
         now = self._now_ns()
         reason = reason_of(error).removeprefix(f"{link.spec.name}: ")
         if reason != link.reason:

@@ -1,7 +1,7 @@
-"""Opening ports aside, so that a slow one delays no other.
+"""Opening of ports in threads, so that a slow one does not delay others.
 
-A name that must be resolved, a host that does not answer, an adapter that is just being plugged in:
-each may take seconds to open or to fail.
+Name resolution, a host that does not answer, or an adapter that is just being plugged in may each
+take seconds to succeed or fail.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def open_port(spec: PortSpec) -> Port:
     """Open a port of any kind.
 
     Raises:
-        BridgeError: It cannot be opened; says what to do.
+        BridgeError: The port cannot be opened; the message names a remedy.
     """
     if spec.port.startswith("tcp:"):
         from hardware_bridge.links.tcp_port import TcpPort
@@ -39,7 +39,7 @@ def open_port(spec: PortSpec) -> Port:
 
 
 class Opener:
-    """Opens each port that it is asked for in a thread of its own."""
+    """Opens each requested port in a separate thread."""
 
     def __init__(self, open_port: OpenPort = open_port) -> None:
         self._open_port = open_port
@@ -52,15 +52,15 @@ class Opener:
         os.set_blocking(self._waker, False)
 
     def fileno(self) -> int:
-        """Readable when something is done."""
+        """Return a descriptor that is readable when results are available."""
         return self._wake
 
     def ask(self, spec: PortSpec) -> None:
-        """Begin to open a port; do not ask for the same again before it is done."""
+        """Start to open a port; not to be called again for it before its result."""
         threading.Thread(target=self._open, args=(spec,), name=spec.name, daemon=True).start()
 
     def done(self) -> list[tuple[str, Port | Exception]]:
-        """What was opened, or could not be, since the last call: names, and ports or reasons."""
+        """Return the results since the last call: names, and open ports or errors."""
         with self._lock, contextlib.suppress(BlockingIOError):
             while len(os.read(self._wake, 4096)) == 4096:
                 pass
@@ -69,7 +69,7 @@ class Opener:
         return done
 
     def close(self) -> None:
-        """Wait for nothing; a port that opens later is closed at once."""
+        """Close without waiting; ports that open later are closed at once."""
         with self._lock:
             if self._closed:
                 return

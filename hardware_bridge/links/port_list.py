@@ -1,4 +1,4 @@
-"""The serial ports of this computer, who may open them, and which one a configuration means."""
+"""Serial ports of this computer, permissions, and the port that a configuration refers to."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ BY_ID = Path("/dev/serial/by-id")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SerialPortInfo:
-    """A serial port as the system lists it; empty is what it does not tell."""
+    """A serial port as listed by the system; unknown fields are empty."""
 
     path: str
     by_id: str = ""
-    """A path that stays with the adapter."""
+    """Path that is permanent for the adapter."""
     serial_number: str = ""
-    """Of the USB adapter: ``port = "serial:..."``."""
+    """Serial number of the USB adapter: ``port = "serial:..."``."""
     maker: str = ""
     product: str = ""
 
@@ -32,7 +32,7 @@ Listing = Callable[[], Sequence[SerialPortInfo]]
 
 
 def list_serial_ports() -> list[SerialPortInfo]:
-    """All serial ports that are there, by path.
+    """Return all available serial ports, sorted by path.
 
     Raises:
         BridgeError: pyserial is not installed.
@@ -46,7 +46,7 @@ def list_serial_ports() -> list[SerialPortInfo]:
 
     try:
         ports = comports()
-    except Exception as error:  # one that is being pulled out has no files to read any more
+    except Exception as error:  # the files of a port disappear while it is unplugged
         raise BridgeError(f"the serial ports cannot be listed: {error}; try again") from error
     names = _names_by_device()
     found = [
@@ -71,10 +71,10 @@ def _names_by_device() -> dict[str, str]:
 
 
 def device_path(spec: PortSpec, listing: Listing = list_serial_ports) -> str:
-    """The device that `spec` means; a serial number is looked up again each time.
+    """Return the device of `spec`; a serial number is looked up at every call.
 
     Raises:
-        BridgeError: None or several adapters have the number: never guessed.
+        BridgeError: No adapter or several have the number: there is no guess.
     """
     kind, _, number = spec.port.partition(":")
     if kind != "serial":
@@ -96,7 +96,7 @@ def device_path(spec: PortSpec, listing: Listing = list_serial_ports) -> str:
 
 
 def permission_remedy(path: str) -> str:
-    """What to do when a port may not be opened."""
+    """Return the remedy for a missing permission to open a port."""
     import grp
 
     device = os.path.realpath(path)

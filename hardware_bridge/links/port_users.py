@@ -1,4 +1,4 @@
-"""Who has a device open, as far as one may see."""
+"""Processes that have a device open, as far as visible."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from pathlib import Path
 
 
 def port_users(path: str, processes: Path = Path("/proc")) -> list[str]:
-    """Other programs that have `path` open, ``name (process id)``.
+    """Return other programs that have `path` open, as ``name (process id)``.
 
-    Those of other users are seen by root only; systems without /proc tell nothing.
+    Programs of other users are visible to root only; systems without /proc give an empty list.
     """
     device = os.path.realpath(path)
     users = []
@@ -21,5 +21,5 @@ def port_users(path: str, processes: Path = Path("/proc")) -> list[str]:
             if held:
                 users.append(f"{(process / 'comm').read_text().strip()} ({process.name})")
         except OSError:
-            continue  # ended meanwhile, or another user's
+            continue  # process ended, or belongs to another user
     return sorted(users)

@@ -1,12 +1,11 @@
-"""A serial port, opened with pyserial, never blocking.
+"""Serial port, opened with pyserial, non-blocking.
 
-Modem lines. Linux raises DTR and RTS together when a port is opened. They are left at that: to
-clear one of them, or one after the other, is what resets boards (on an ESP32, RTS without DTR pulls
-the reset line). HUPCL is cleared, so that closing leaves both lines up as well and a board with a
-capacitor from DTR to reset (Arduino) restarts only when it is plugged in. Exceptions are
-devices for which `PortSpec.dtr` is off: there the line stops a motor.
-
-VMIN is 1: a read without data then says so (EAGAIN), and an empty read is a hang-up.
+Modem lines: Linux raises DTR and RTS together when a port is opened, and both stay raised, since
+clearing one of them, or one after the other, resets some boards (on an ESP32, RTS without DTR pulls
+the reset line). HUPCL is cleared, so that closing leaves both lines raised as well and a board with
+a capacitor from DTR to reset (Arduino) restarts only when it is plugged in. Exceptions are devices
+with `PortSpec.dtr` off, on which DTR stops a motor.
+VMIN is 1: a read without data then returns EAGAIN, and an empty read means a hang-up.
 """
 
 from __future__ import annotations
@@ -32,31 +31,31 @@ if TYPE_CHECKING:
     import serial
 
 OLDEST_QUEUED = 0.02
-"""[s] Bytes that wait longer than this to leave are commands that come too late."""
+"""[s] Longest time for bytes to wait in the queue; later commands are outdated."""
 LEAST_QUEUED = 64
-"""[bytes] A command always fits."""
+"""[bytes] Least queue size, so that a command always fits."""
 
 
 class SerialPort:
-    """An open serial port, 8N1, for this process alone. It implements `Port`."""
+    """An open serial port, 8N1, for exclusive use by this process. Implements `Port`."""
 
     def __init__(self, spec: PortSpec, listing: Listing = list_serial_ports) -> None:
         """Open the port.
 
         Args:
             spec: A path, or ``serial:NUMBER``.
-            listing: The ports there are.
+            listing: Function that lists the available ports.
 
         Raises:
-            BridgeError: It is not there, may not be opened, is in use, is no serial port or has no
-                such rate; says what to do.
+            BridgeError: The port does not exist, is not permitted, is in use, is no serial port or
+                does not support the rate; the message names a remedy.
         """
         self.path = device_path(spec, listing)
         self._serial: Any = _opened(spec, self.path)
         try:
             _set_line(self._serial)
             if not spec.dtr:
-                # Pseudo terminals and some adapters have no such line.
+                # Pseudo terminals and some adapters lack this line.
                 with contextlib.suppress(OSError):
                     self._serial.dtr = False
             queued = max(LEAST_QUEUED, round(OLDEST_QUEUED * spec.baud / 10))
@@ -66,25 +65,25 @@ class SerialPort:
             raise BridgeError(f"{spec.name}: {self.path}: {reason_of(error)}") from error
 
     def fileno(self) -> int:
-        """To wait for bytes with."""
+        """Return the descriptor to wait for bytes with."""
         return self._stream.fd
 
     def read(self) -> bytes:
-        """Everything that is there."""
+        """Return all pending bytes."""
         return self._stream.read()
 
     def write(self, data: bytes) -> bool:
-        """Take all of `data`, or none of it."""
+        """Accept all of `data`, or none of it; return whether it was accepted."""
         return self._stream.write(data)
 
     def flush(self) -> bool:
-        """Go on with a message that was cut."""
+        """Continue to send a partly sent message."""
         return self._stream.flush()
 
     def close(self, linger: float = 0.0) -> None:
-        """Close. What has not left after `linger` seconds is thrown away.
+        """Close the port; discard bytes that were not sent after `linger` seconds.
 
-        The kernel would wait for it, up to 30 s at a device that no longer takes bytes.
+        The kernel would wait for them, up to 30 s if the device accepts no bytes.
         """
         import termios
 
@@ -110,10 +109,10 @@ def _opened(spec: PortSpec, path: str) -> serial.Serial:
             f"{spec.name}: serial ports need pyserial: pip install 'relpos-env[hardware]'"
         ) from error
     if spec.baud < 50:
-        # A rate of 0 would hang up the line.
+        # A rate of 0 hangs up the line.
         raise BridgeError(f"{spec.name}: baud: expected at least 50, got {spec.baud}")
     try:
-        # Opened in the constructor, DTR and RTS asserted as the system has them: no edge.
+        # Opened in the constructor, with DTR and RTS asserted by the system, to avoid an edge.
         return serial.Serial(path, spec.baud, timeout=0, write_timeout=0, exclusive=True)
     except Exception as error:
         raise BridgeError(f"{spec.name}: {_why_not(error, path, spec.baud)}") from error
@@ -127,13 +126,13 @@ def _set_line(port: serial.Serial) -> None:
     settings[2] &= ~termios.HUPCL
     settings[6][termios.VMIN], settings[6][termios.VTIME] = 1, 0
     termios.tcsetattr(fd, termios.TCSANOW, settings)
-    # FTDI adapters hold bytes back for 16 ms otherwise; many ports know nothing of it.
+    # FTDI adapters otherwise delay bytes by 16 ms; many ports do not support this mode.
     with contextlib.suppress(ValueError, NotImplementedError):
         port.set_low_latency_mode(True)
 
 
 def _why_not(error: Exception, path: str, baud: int) -> str:
-    """Why a port does not open, and what to do."""
+    """Return the reason why a port does not open, and a remedy."""
     number = number_of(error)
     text = str(error)
     if number in (errno.ENOENT, errno.ENXIO, errno.ENODEV):

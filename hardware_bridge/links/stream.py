@@ -1,7 +1,7 @@
-"""Bytes through a descriptor that never blocks: what serial ports and sockets have in common.
+"""Non-blocking streams of bytes: the common part of serial ports and sockets.
 
-Reads and writes go to the descriptor itself. pyserial's own `write` with a timeout of zero spins
-for ever once the buffer is full (serialposix.py of 3.5), and its `read` costs a `select` each time.
+Reads and writes use the descriptor itself. pyserial's own `write` with a timeout of zero spins
+forever once the buffer is full (serialposix.py of 3.5), and its `read` costs a `select` each time.
 """
 
 from __future__ import annotations
@@ -13,49 +13,49 @@ from typing import Protocol
 from hardware_bridge.links.failures import LinkLost, lost_by
 
 MOST_AT_ONCE = 1 << 16
-"""[bytes] Read from one port before the others have their turn."""
+"""[bytes] Largest number of bytes read from one port before the others are read."""
 _PIECE = 1 << 14
 
 
 class Port(Protocol):
-    """An open port. Every failure is a `LinkLost`, and nothing blocks."""
+    """An open port. Every failure is a `LinkLost`, and no method blocks."""
 
     def fileno(self) -> int:
-        """To wait for bytes with."""
+        """Return the descriptor to wait for bytes with."""
 
     def read(self) -> bytes:
-        """Everything that is there, up to `MOST_AT_ONCE` bytes; empty if there is nothing."""
+        """Return all pending bytes, up to `MOST_AT_ONCE`; empty if there are none."""
 
     def write(self, data: bytes) -> bool:
-        """Take all of `data`, or none of it and return False."""
+        """Accept all of `data` and return True, or none of it and return False."""
 
     def flush(self) -> bool:
-        """Go on with a message that was cut; True if nothing of it is left."""
+        """Continue to send a partly sent message; return True if nothing of it is left."""
 
     def close(self, linger: float = 0.0) -> None:
-        """Close; what was written has `linger` seconds to leave. Never raises."""
+        """Close; written bytes have `linger` seconds to be sent. Never raises."""
 
 
 class Stream:
-    """Reads and writes of a descriptor in non-blocking mode.
+    """Reads and writes of a non-blocking descriptor.
 
-    Law: a message is written whole or not at all, whatever is cut by a full buffer. So what is left
-    of one message is kept, never a second one: commands do not pile up and grow old.
+    Invariant: a message is written whole or not at all, even if a full buffer cuts it. The rest of
+    at most one message is kept, so that commands do not queue up and become outdated.
     """
 
     def __init__(self, fd: int, most_queued: int) -> None:
-        """Take a descriptor; it stays the caller's to close.
+        """Create a stream on a descriptor, which the caller closes.
 
         Args:
-            fd: Non-blocking, where an empty read means that the other end is gone.
-            most_queued: With more bytes than this on their way out, nothing more is taken.
+            fd: Non-blocking descriptor; an empty read means that the other end is closed.
+            most_queued: Largest number of queued bytes at which a message is accepted.
         """
         self.fd = fd
         self._most_queued = most_queued
         self._rest = b""
 
     def read(self) -> bytes:
-        """Drain; a loss is raised once there are no bytes left to hand over."""
+        """Read all pending bytes; raise a loss once there are none to return."""
         pieces: list[bytes] = []
         size = 0
         while size < MOST_AT_ONCE:
@@ -74,7 +74,7 @@ class Stream:
         return b"".join(pieces)
 
     def write(self, data: bytes) -> bool:
-        """Take a message if none is waiting; False if it was not taken."""
+        """Accept a message if none is pending; return False if it was not accepted."""
         if not data:
             return True
         if not self.flush() or self.queued() > self._most_queued:
@@ -85,20 +85,20 @@ class Stream:
         return sent > 0
 
     def flush(self) -> bool:
-        """Go on with the message that was cut."""
+        """Continue to send the partly sent message."""
         if self._rest:
             self._rest = self._rest[self._send(self._rest) :]
         return not self._rest
 
     def queued(self) -> int:
-        """Bytes that were written and have not left; 0 where the system does not tell."""
+        """Return the number of written bytes not sent yet; 0 if the system does not report it."""
         import fcntl
         import termios
 
         try:
             answer = fcntl.ioctl(self.fd, termios.TIOCOUTQ, bytes(4))
         except (OSError, ValueError, TypeError):
-            return 0  # a write will say whether the port is lost
+            return 0  # the next write detects a lost port
         return int.from_bytes(answer, sys.byteorder)
 
     def _send(self, data: bytes) -> int:

@@ -1,4 +1,4 @@
-"""A stream over TCP: a serial server, or a node with a network."""
+"""Stream over TCP: a serial server, or a node with a network interface."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from hardware_bridge.links.ports import PortSpec
 from hardware_bridge.links.stream import Stream
 
 CONNECT_TIME = 2.0
-"""[s] Given to the other end to answer."""
+"""[s] Timeout of connecting."""
 MOST_QUEUED = 1024
-"""[bytes] Sent and not acknowledged; more means that the other end does not keep up."""
+"""[bytes] Largest number of unacknowledged bytes; more means that the peer does not keep up."""
 SILENT_TIME = 3
-"""[s] A peer that answers no keep-alive for so long is lost."""
+"""[s] Time without an answer to keep-alive after which the peer is lost."""
 
 
 class TcpPort:
-    """A connection to ``tcp:host:port``. It implements `Port`."""
+    """A connection to ``tcp:host:port``. Implements `Port`."""
 
     def __init__(self, spec: PortSpec) -> None:
         """Connect.
 
         Raises:
-            BridgeError: No answer from there; says what to do.
+            BridgeError: No connection; the message names a remedy.
         """
         host, port = tcp_address(spec)
         try:
@@ -46,23 +46,23 @@ class TcpPort:
         self._stream = Stream(self._socket.fileno(), MOST_QUEUED)
 
     def fileno(self) -> int:
-        """To wait for bytes with."""
+        """Return the descriptor to wait for bytes with."""
         return self._stream.fd
 
     def read(self) -> bytes:
-        """Everything that is there."""
+        """Return all pending bytes."""
         return self._stream.read()
 
     def write(self, data: bytes) -> bool:
-        """Take all of `data`, or none of it."""
+        """Accept all of `data`, or none of it; return whether it was accepted."""
         return self._stream.write(data)
 
     def flush(self) -> bool:
-        """Go on with a message that was cut."""
+        """Continue to send a partly sent message."""
         return self._stream.flush()
 
     def close(self, linger: float = 0.0) -> None:
-        """Close; what was sent leaves by itself, a cut message has `linger` seconds."""
+        """Close the connection after at most `linger` seconds for a partly sent message."""
         with contextlib.suppress(Exception):
             for _ in range(round(linger / 0.001)):
                 if self._stream.flush():
@@ -73,10 +73,10 @@ class TcpPort:
 
 
 def tcp_address(spec: PortSpec) -> tuple[str, int]:
-    """Host and port of ``tcp:host:port``.
+    """Return the host and port of ``tcp:host:port``.
 
     Raises:
-        BridgeError: It is not written so.
+        BridgeError: The address has another form.
     """
     host, _, digits = spec.port.removeprefix("tcp:").rpartition(":")
     host = host.removeprefix("[").removesuffix("]")
@@ -96,5 +96,5 @@ def _set_options(connection: socket.socket) -> None:
         ("TCP_KEEPCNT", SILENT_TIME - 1),
         ("TCP_USER_TIMEOUT", 1000 * SILENT_TIME),
     ):
-        if hasattr(socket, name):  # not on every system
+        if hasattr(socket, name):  # system dependent
             connection.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)

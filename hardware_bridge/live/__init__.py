@@ -1,1 +1,1 @@
-"""Live streams into trackers: pure, so that a recording gives what was seen."""
+"""Live streams into trackers: pure, so that a recording reproduces the run."""

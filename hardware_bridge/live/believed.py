@@ -1,9 +1,9 @@
-"""Where cars believe themselves to be, in the place of a truth that is not known.
+"""Estimated state of the cars, in place of the unknown ground truth.
 
-Relative positions leave one place open: it is chosen so that the middle of the cars with a place
-is the origin. Tasks ask for nothing that depends on it but where a path lies in the room.
+Relative positions leave the translation of the group undetermined: the mean of the cars with a
+position is the origin. In tasks, only the location of a path in the room depends on it.
 
-For the seconds in which the tracker is not sure of a car, its place goes on by its odometer.
+While the tracker is not certain of a car, the car's position is propagated by its odometer.
 """
 
 from __future__ import annotations
@@ -15,29 +15,29 @@ from tracking.arrays import F64, Bool
 
 
 class Believed:
-    """What tasks read of the world, arrays over (1, slot, ...); world frame."""
+    """State of the world for tasks, arrays over (1, slot, ...); world frame."""
 
     def __init__(self, n_cars: int) -> None:
         shape = (1, n_cars)
         self.pos_w: F64 = np.zeros((*shape, 2))
-        """[m]"""
+        """[m] Positions."""
         self.vel_w: F64 = np.zeros((*shape, 2))
-        """[m/s] By odometer and heading."""
+        """[m/s] Velocities by odometer and heading."""
         self.accel_w: F64 = np.zeros((*shape, 2))
-        """[m/s2] From one decision to the next."""
+        """[m/s2] Mean accelerations since the last update."""
         self.clearance: F64 = np.full(shape, np.inf)
-        """[m] Infinite: what stands next to them is not known."""
+        """[m] Distances to obstacles; infinite, since they are unknown."""
         self.present: Bool = np.zeros(shape, dtype=bool)
         self.known: Bool = np.zeros(shape, dtype=bool)
-        """Whose place is known relative to the others'."""
+        """True if the position relative to the others is known."""
         self._placed: Bool = np.zeros(n_cars, dtype=bool)
 
     def update(self, view: AgentView, seconds: float) -> None:
-        """Take over what the cars see now.
+        """Update the state from a view.
 
         Args:
-            view: Of one environment.
-            seconds: Since the last update [s].
+            view: View of one environment.
+            seconds: Time since the last update [s].
         """
         present = view.present[0]
         self.present[0] = present
@@ -46,13 +46,13 @@ class Believed:
         ok = view.ok[0] & present[:, None] & present[None, :]
         self.known[0] = False
         if present.any():
-            # Seen from the car that knows most of the others.
+            # Positions are relative to the car with the most known others.
             seer = int(np.argmax(ok.sum(axis=1) + 0.5 * present))
             known = ok[seer].copy()
             known[seer] = True
             self.known[0] = known
             seen, both = view.pos[0, seer], known & self._placed
-            # What went on is put next to those that are seen and had a place before.
+            # Propagated positions are shifted to fit the cars that are known and had a position.
             shift = (seen - self.pos_w[0])[both].mean(axis=0) if both.any() else 0.0
             pos = np.where(known[:, None], seen, self.pos_w[0] + shift)
             self._placed = known | (self._placed & both.any())
@@ -61,7 +61,7 @@ class Believed:
             )
 
     def _move(self, view: AgentView, seconds: float) -> None:
-        """Everyone's place goes on by its odometer and heading."""
+        """Propagate all positions by odometer and heading."""
         ahead = np.stack([np.cos(view.heading[0]), np.sin(view.heading[0])], axis=-1)
         moves = view.present[0] & view.oriented[0]
         vel = np.where(moves[:, None], view.speed[0][:, None] * ahead, 0.0)
@@ -71,6 +71,6 @@ class Believed:
 
     @property
     def complete(self) -> bool:
-        """Whether every present car's place is known, of at least two."""
+        """True if the positions of all present cars are known, at least two."""
         present = self.present[0]
         return bool(present.sum() >= 2 and self.known[0, present].all())

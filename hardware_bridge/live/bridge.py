@@ -1,4 +1,4 @@
-"""Everything of a live swarm opened in its order, and closed whatever happens."""
+"""Opening of all parts of a live swarm in order, and closing in any case."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from tracking.calibration.file import calibration_toml
 
 
 class Bridge(OpenBridge):
-    """Ports, trackers, a recording, and a supervisor where cars are driven."""
+    """Ports, trackers, a recording, and a supervisor if cars are driven."""
 
     feed: LiveFeed
 
@@ -44,17 +44,17 @@ class Bridge(OpenBridge):
         """Open everything.
 
         Args:
-            config: Of the swarm.
-            drive: Whether a gate is there; without, nothing but listening.
-            arm: Whether the ports of the cars are opened, so that they can be armed. A drive
-                without is a dry run.
-            wait: So long is waited for all to be well before cars are armed [s].
-            record: File of the recording; must not be there yet.
+            config: Configuration of the swarm.
+            drive: True to start a gate; False to listen only.
+            arm: True to open the ports of the cars, so that they can be armed. A drive without is a
+                dry run.
+            wait: Longest wait until all cars are armed [s].
+            record: Path of the recording; must not exist.
             now_ns: The host's monotonic clock [ns].
 
         Raises:
-            BridgeError: A port, a calibration or the recording cannot be used, or cars are to
-                move and their ranges were never calibrated.
+            BridgeError: A port, a calibration or the recording cannot be used, or cars are to move
+                without a calibration of their ranges.
         """
         if REMOVED_KEY in config.keys:
             raise BridgeError('key: "removed", expected the keys that a recording does not hold')
@@ -100,8 +100,8 @@ class Bridge(OpenBridge):
                     wall_ns=wall_ns,
                 )
                 self.recorder = Recorder(record, header)
-                # One of a start that failed is none, and would take the name of the next. Once it
-                # is open, its recording stays, whatever goes wrong at the end.
+                # The recording of a failed start is removed, since it would occupy the name of the
+                # next. After a complete start it is kept, whatever error occurs later.
                 stack.push(lambda kind, *_: _remove(record) if kind and not self._is_open else None)
                 stack.callback(self.recorder.close)
                 if calibration is not None:
@@ -138,11 +138,11 @@ class Bridge(OpenBridge):
 
     @property
     def recording_lost(self) -> str | None:
-        """Why records are missing in the recording; None if none are, or there is none."""
+        """Reason for missing records in the recording; None if it is complete or there is none."""
         return None if self.recorder is None else self.recorder.lost
 
     def close(self) -> None:
-        """Let the cars stand and close everything."""
+        """Stop the cars and close everything."""
         self._stack.close()
 
     def __enter__(self) -> Bridge:

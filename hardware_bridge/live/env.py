@@ -14,13 +14,13 @@ from relpos_env.interface.observations import observation_mode
 
 
 class HardwareFormationEnv(BaseFormationParallelEnv):
-    """Cars that are moved by motors, in real time: a step takes a tenth of a second.
+    """Environment on real cars, in real time: a step takes a tenth of a second.
 
-    What the gate allows is what happens. Infos have the keys of the simulation but `collisions`,
-    which are not counted; formation errors and rewards are those of the estimates. They say
-    what the gate made of the last action: ``asked_speed`` and ``allowed_speed`` [m/s],
-    ``allowed_steering`` [rad], ``gate``, why that is less than asked, and ``stopped``, True where
-    the car is not armed, so that the transition is not the policy's.
+    The cars execute the actions as limited by the gate. Infos have the keys of the simulation
+    except `collisions`, which are not counted; formation errors and rewards are based on the
+    estimates. Infos also have the gate's result for the last action: ``asked_speed`` and
+    ``allowed_speed`` [m/s], ``allowed_steering`` [rad], ``gate``, the reason for a limit, and
+    ``stopped``, True if the car is not armed, so that the policy did not cause the transition.
     """
 
     metadata = {**BaseFormationParallelEnv.metadata, "render_modes": []}  # noqa: RUF012
@@ -36,20 +36,20 @@ class HardwareFormationEnv(BaseFormationParallelEnv):
         max_cycles: int = 600,
         prepare: Callable[[LiveGroup], None] | None = None,
     ) -> None:
-        """Give a swarm the face of the environment.
+        """Create an environment on a swarm.
 
         Args:
             swarm: Trackers of the cars.
             feed: Ports and supervisor, or a recording.
             observation: One of `relpos_env.interface.observations.OBSERVATIONS`.
-            history: So many observations in one, the newest first.
+            history: Number of stacked observations, the newest first.
             actions: One of `relpos_env.interface.actions.ACTIONS`.
-            max_cycles: Steps until truncation.
+            max_cycles: Number of steps until truncation.
             prepare: Called at every reset, before the episode: see `Start`.
 
         Raises:
-            EnvError: No such mode.
-            BridgeError: A mode that needs the truth.
+            EnvError: Unknown mode.
+            BridgeError: The observation mode needs ground truth.
         """
         n = swarm.config.n_slots
         mode = observation_mode(observation, n, swarm.config.task.proximity)
@@ -59,10 +59,10 @@ class HardwareFormationEnv(BaseFormationParallelEnv):
         self._prepare = prepare
 
     def render(self) -> None:
-        """Nothing: `relpos live --view` shows the swarm."""
+        """Do nothing: `relpos live --view` shows the swarm."""
 
     def close(self) -> None:
-        """Let the cars stand; the environment can be reset again."""
+        """Stop the cars; the environment can be reset again."""
         if self._begun:
             self.group.let_stand()
         self.agents = []

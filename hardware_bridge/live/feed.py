@@ -1,6 +1,6 @@
-"""Time that passes: ports are read, trackers fed, the supervisor told that all is well.
+"""Real-time feed: reads ports, updates trackers and sends heartbeats to the supervisor.
 
-One thread does all of it, the one that decides, so that a sign of life is one.
+The deciding thread does all of it, so that a heartbeat proves that this thread runs.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from relpos_env.timing import DECISION
 
 DECISION_NS = round(DECISION * 1e9)
 WORD_NS = 10_000_000
-"""[ns] From one sign of life to the next."""
+"""[ns] Period of heartbeats."""
 
 
 class LiveFeed:
@@ -36,15 +36,15 @@ class LiveFeed:
         recorder: Recorder | None = None,
         marks: KeptMarks | None = None,
     ) -> None:
-        """Put together what is open.
+        """Connect open ports and processes.
 
         Args:
-            swarm: Is fed.
-            links: Ports that measure.
+            swarm: Trackers that process the bytes.
+            links: Ports with measurements.
             now_ns: The host's monotonic clock [ns].
-            supervisor: Has the cars; None where nothing is driven.
-            recorder: Keeps what comes.
-            marks: Keep which signed messages are old.
+            supervisor: Supervisor of the cars; None without driving.
+            recorder: Recorder of all bytes.
+            marks: Replay protection of signed messages.
         """
         self._marks = marks
         self._swarm, self._links, self._now_ns = swarm, links, now_ns
@@ -56,16 +56,16 @@ class LiveFeed:
         self._spoken = 0
         self._told_of_disk = False
         self.report: Report | None = None
-        """What the gate did, the latest."""
+        """Latest report of the gate."""
         self.notices: list[tuple[int, str]] = []
-        """Time [ns] and what the user should read; taking them clears the list."""
+        """Time [ns] and text of notices to the user; the reader clears the list."""
         self.n_late = 0
-        """Decisions that were due while the one before was still made."""
+        """Number of control steps that were due while the previous one was still running."""
         self.attend: Callable[[], None] | None = None
-        """Called while waiting, every hundredth of a second or so: for keys and screens."""
+        """Called about every 10 ms while waiting, for keys and screens."""
 
     def advance(self) -> int:
-        """Wait for the next decision; see `Feed`."""
+        """Wait for the next control step; see `Feed`."""
         self._due += DECISION_NS
         now = self._now_ns()
         if now > self._due:
@@ -79,7 +79,7 @@ class LiveFeed:
             self._listen()
             if self.attend is not None:
                 self.attend()
-        # What came while the last of it was handled still belongs to this decision.
+        # Bytes received during this processing still belong to this control step.
         for chunk in self._links.wait(0.0):
             self._take(chunk)
         self._listen()
@@ -100,21 +100,21 @@ class LiveFeed:
         return now
 
     def decide(self, picture: Picture) -> None:
-        """Let the gate have it; see `Feed`."""
+        """Send a snapshot to the gate; see `Feed`."""
         if self._supervisor is not None:
             self._supervisor.send(Decision(picture))
             self._spoken = self._now_ns()
 
     def order(self, what: str) -> None:
-        """Pass on what a person asks for: see `Order`; ``gone`` ends the watch for silent cars.
+        """Forward an operator command, see `Order`; ``gone`` dismisses silent cars.
 
         Raises:
-            BridgeError: The supervisor does not take it.
+            BridgeError: The supervisor does not accept it.
         """
         if what == "gone":
             self._swarm.silent.dismiss()
         elif self._supervisor is not None and not self._supervisor.send(Order(what)):
-            # It takes nothing any more. Without it the cars stop by themselves.
+            # The supervisor accepts no messages and is ended; the cars then stop by themselves.
             self._supervisor.close()
             raise BridgeError(
                 f"supervisor: it did not take {what!r} and was ended; cars stop by their watchdogs"
@@ -122,7 +122,7 @@ class LiveFeed:
         self.note(self._now_ns(), what)
 
     def note(self, t_ns: int, text: str) -> None:
-        """Let the user, and the recording, have a line."""
+        """Report a line of text to the user and write it to the recording."""
         self.notices.append((t_ns, text))
         if self._recorder is not None:
             self._recorder.add_event(t_ns, "notice", text=text)
@@ -150,7 +150,7 @@ class LiveFeed:
                 case Notice(text):
                     self.note(self._now_ns(), text)
         if self._supervisor.gone:
-            # Their controllers stop them by themselves; no process is left to command them.
+            # The controllers stop the cars by themselves; there is no process to command them.
             raise BridgeError("supervisor: it is gone, so the cars stand; start the drive again")
 
     def _note_links(self) -> None:

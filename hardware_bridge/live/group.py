@@ -1,6 +1,6 @@
-"""A group of real cars in arrays, as the simulation has one: observations, rewards, an end.
+"""Group of real cars with the arrays of the simulation: observations, rewards, end of episode.
 
-Rewards and errors come from the estimates, since there is no truth; they say so in ``info``.
+Rewards and errors in ``info`` are based on the estimates, since there is no ground truth.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ from relpos_env.timing import DECISION
 from tracking.arrays import F64, Bool
 
 FASTEST_COMMAND = 2.0
-"""[m/s] Largest velocity asked of a car, as by the simulated operator."""
+"""[m/s] Largest commanded velocity of a car, equal to the simulated operator's."""
 
 
 class Feed(Protocol):
-    """Where chunks come from and pictures go to: ports and a supervisor, or a recording."""
+    """Source of chunks and destination of snapshots: ports and a supervisor, or a recording."""
 
     def advance(self) -> int | None:
-        """Feed the swarm until the next decision is due.
+        """Feed the swarm until the next control step is due.
 
         Returns:
-            Its time by the host's clock [ns]; None if there is nothing more to come.
+            Time of the control step by the host's clock [ns]; None at the end of the data.
         """
 
     def decide(self, picture: Picture) -> None:
-        """Let the gate have what is wanted and known."""
+        """Send requested commands and estimates to the gate."""
 
 
 class LiveGroup:
@@ -53,17 +53,17 @@ class LiveGroup:
         history: int = 1,
         max_cycles: int = 600,
     ) -> None:
-        """Make the arrays.
+        """Create the arrays.
 
         Args:
             swarm: Trackers of the cars.
-            feed: What moves time on.
-            mode: What the cars observe.
-            history: So many observations in one, the newest first.
-            max_cycles: Decisions until truncation.
+            feed: Feed of the swarm.
+            mode: Observation mode of the cars.
+            history: Number of stacked observations, the newest first.
+            max_cycles: Number of control steps until truncation.
 
         Raises:
-            BridgeError: The mode needs the truth.
+            BridgeError: The mode needs ground truth.
         """
         if mode.needs_truth:
             raise BridgeError("observation: real cars know no truth, choose another mode")
@@ -87,36 +87,36 @@ class LiveGroup:
         self.asked: F64 = np.zeros((n, 2))
         """Speed [m/s] and steering [rad] of the last actions, (slot, 2)."""
         self.t_ns = 0
-        """Host time of the last decision [ns]."""
+        """Host time of the last control step [ns]."""
         self._begun = 0
         self._armed: Bool = swarm.armed.copy()
         self.placed = False
-        """Whether places were given out knowing where all cars are."""
+        """True if slots were assigned with all cars' positions known."""
         self._newest: F32 = np.zeros((1, n, self._size), np.float32)
         self._mode = mode
         self._no_cars: F64 = np.zeros((1, n))
 
     def seed(self, env: int, rng: np.random.Generator) -> None:
-        """Nothing here is drawn."""
+        """Do nothing, since nothing is sampled."""
 
     def begin(self) -> None:
-        """Begin an episode from wherever the cars are."""
+        """Begin an episode at the current positions of the cars."""
         self.cycles = 0
         self.placed = False
         self.active[:] = True
         self.terminated[:] = self.truncated[:] = False
         self.observations[:] = 0.0
         if self.t_ns:
-            # What was decided last grows old meanwhile; cars that wait stand.
+            # The last request becomes outdated meanwhile, so waiting cars are stopped.
             self.let_stand()
         self._look(first=True)
 
     def step(self, speed: F64, steering: F64) -> None:
-        """Ask the cars for speeds and steering angles and let a decision's time pass.
+        """Request speeds and steering angles and run one control step.
 
         Args:
-            speed: (1, slot) [m/s]
-            steering: (1, slot) [rad]
+            speed: Requested speed, (1, slot) [m/s].
+            steering: Requested steering angle, (1, slot) [rad].
         """
         fence = self.swarm.config.safety.fence
         t = self.t_ns * 1e-9
@@ -126,7 +126,7 @@ class LiveGroup:
         self._look(first=False)
 
     def infos(self) -> Columns:
-        """What infos say of every car; errors and rewards are those of the estimates."""
+        """Return the infos of every car; errors and rewards are based on the estimates."""
         swarm = self.swarm
         unknown = np.full((1, self.believed.present.shape[1]), np.nan)
         write_figures(
@@ -147,7 +147,7 @@ class LiveGroup:
         return columns
 
     def let_stand(self) -> None:
-        """Ask for no motion, without waiting."""
+        """Request no motion, without waiting."""
         fence, n = self.swarm.config.safety.fence, self.swarm.config.n_slots
         still = np.zeros(n)
         self._feed.decide(draw_picture(self.swarm, self.t_ns * 1e-9, still, still, fence))
@@ -164,11 +164,11 @@ class LiveGroup:
         believed.update(swarm.view, seconds)
         here = slice(0, 1)
         if (swarm.armed & ~self._armed).any():
-            # While it stood the plan went on: no car is near the place that was given to it.
+            # The plan advanced while the car was stopped: it is not near its assigned slot.
             self.placed = False
         self._armed = swarm.armed.copy()
         if first or (not self.placed and believed.complete):
-            # Until all are known, places are given by what is known; then once more.
+            # Slots are assigned from the known positions, and once again when all are known.
             self.placed = believed.complete
             task.reset(believed, here)
             self._begun = self.cycles
@@ -181,7 +181,7 @@ class LiveGroup:
         self._observe()
 
     def _ask(self) -> None:
-        """The velocity that cars are asked for: the plan, and an operator's trim."""
+        """Write the commanded velocity of the cars: the plan, plus an operator's trim."""
         wanted = self.task.plan
         if self.swarm.config.task.command == "link":
             wanted = wanted + self.swarm.trim

@@ -1,6 +1,6 @@
-"""The newest signed messages, kept from start to start: older ones stay refused.
+"""Replay protection across restarts: marks of the newest signed messages, kept in a file.
 
-Without, a recording of an earlier boot would be believed until the first true message comes.
+Without it, a recording of an earlier boot would be accepted until the first genuine message.
 """
 
 from __future__ import annotations
@@ -18,21 +18,21 @@ from hardware_bridge.ingest.intake import Intake
 from hardware_bridge.safe_file import write_safely
 
 EVERY_NS = 10_000_000_000
-"""[ns] From one write to the next."""
+"""[ns] Period of writes."""
 AHEAD = 4000
-"""[-] So many messages of each device count as seen, more than come until the next write: nothing
-that was heard before a crash is believed after it."""
+"""[-] Number of further messages of each device that count as received, more than come until the
+next write: no message from before a crash is accepted after it."""
 OURS = "commands"
-"""Who signs them: we."""
+"""Name for our own commands in `Marks`."""
 Marks: TypeAlias = Mapping[str, Mapping[int, Mark]]
-"""Boot and number of the newest message, by who shares a key and by id."""
+"""Boot and number of the newest message, by owners of a key and by id."""
 
 
 def read_marks(path: Path) -> Marks:
-    """What was kept; nothing if there is no file.
+    """Return the marks in a file; none if it does not exist.
 
     Raises:
-        BridgeError: It cannot be read, or is damaged.
+        BridgeError: The file cannot be read, or is damaged.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -50,10 +50,10 @@ def read_marks(path: Path) -> Marks:
 
 
 def parse_marks(raw: Mapping[str, Mapping[str, list[int]]]) -> Marks:
-    """What JSON holds of them.
+    """Return the marks in parsed JSON.
 
     Raises:
-        ValueError: It does not; or TypeError or AttributeError.
+        ValueError: The marks are invalid; or TypeError or AttributeError.
     """
     marks = {}
     for who, devices in raw.items():
@@ -64,27 +64,27 @@ def parse_marks(raw: Mapping[str, Mapping[str, list[int]]]) -> Marks:
 
 
 class KeptMarks:
-    """The marks of an intake in a file."""
+    """The marks of an intake, kept in a file."""
 
     def __init__(self, path: Path, intake: Intake, wall_s: int = 0) -> None:
-        """Refuse what is older than what the file knows.
+        """Restore the marks of a file and write the boot number of this start.
 
         Args:
-            path: Of the file; made if it is not there.
-            intake: Whose devices they are.
-            wall_s: Time by the calendar, as far as the host knows it [s].
+            path: Path of the file; created if missing.
+            intake: Intake of the devices.
+            wall_s: Wall-clock time of the host [s].
 
         Raises:
-            BridgeError: It cannot be read or written, or is damaged.
+            BridgeError: The file cannot be read or written, or is damaged.
         """
         self._path, self._intake = path, intake
         self.known = read_marks(path)
-        """As they were."""
+        """Marks at the start."""
         intake.restore(self.known)
         newest, _ = self.known.get(OURS, {}).get(0, (0, 0))
         self.boot = max(wall_s, newest + 1)
-        """Of what we sign ourselves in this start: higher than that of any start before, even where
-        the host's calendar has gone back."""
+        """Boot number of our own signed commands: higher than that of any earlier start, even if
+        the host's wall clock was set back."""
         self._due: int | None = None
         self._writing: threading.Thread | None = None
         try:
@@ -93,10 +93,10 @@ class KeptMarks:
             raise BridgeError(f"{path}: cannot be written ({error.strerror})") from error
 
     def keep(self, t_ns: int) -> None:
-        """Write them now and then; a slow disk delays no command.
+        """Write the marks periodically, in a thread, so that a slow disk delays no command.
 
         Args:
-            t_ns: Now, by the host's clock [ns].
+            t_ns: Current host time [ns].
         """
         if self._due is None:
             self._due = t_ns
@@ -108,7 +108,7 @@ class KeptMarks:
         self._writing.start()
 
     def close(self) -> None:
-        """Write what they are, without more ahead."""
+        """Write the current marks, without messages ahead."""
         if self._writing is not None:
             self._writing.join()
         self._try_to_write(self._with_ours())

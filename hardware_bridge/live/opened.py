@@ -1,4 +1,4 @@
-"""What a drive needs of a bridge, whether ports and a clock are behind it or neither."""
+"""Interface of a bridge for drives, over ports and a clock or in memory."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from hardware_bridge.live.swarm import LiveSwarm
 
 
 class OpenFeed(Feed, Gated, Protocol):
-    """A feed with a gate at its end."""
+    """A feed with a gate."""
 
     notices: list[tuple[int, str]]
-    """Time [ns] and what the user should read; taking them clears the list."""
+    """Time [ns] and text of notices to the user; the reader clears the list."""
     n_late: int
-    """Decisions that were due while the one before was still made."""
+    """Number of control steps that were due while the previous one was still running."""
     attend: Callable[[], None] | None
-    """Called while waiting, every hundredth of a second or so: for keys and screens."""
+    """Called about every 10 ms while waiting, for keys and screens."""
 
 
 class OpenBridge(ABC):
-    """Everything of a swarm, opened: over ports and processes, or in memory."""
+    """All parts of an open swarm: over ports and processes, or in memory."""
 
     config: SwarmConfig
-    """Of the swarm."""
+    """Configuration of the swarm."""
     swarm: LiveSwarm
     """Trackers of the cars."""
     feed: OpenFeed
-    """Where bytes come from and pictures go to."""
+    """Source of bytes and destination of snapshots."""
     start: Start
-    """What happens before a drive."""
+    """Start-up before a drive."""
 
     def env(
         self,
@@ -44,7 +44,7 @@ class OpenBridge(ABC):
         actions: str = "continuous",
         max_cycles: int = 600,
     ) -> HardwareFormationEnv:
-        """Return the environment on these cars; the last one that was made is the one to use."""
+        """Return the environment on these cars; only the latest one may be used."""
         return HardwareFormationEnv(
             self.swarm,
             self.feed,
@@ -57,9 +57,9 @@ class OpenBridge(ABC):
 
     @property
     def recording_lost(self) -> str | None:
-        """Why records are missing in the recording; None if none are, or there is none."""
+        """Reason for missing records in the recording; None if it is complete or there is none."""
         return None
 
     @abstractmethod
     def close(self) -> None:
-        """Let the cars stand and close everything."""
+        """Stop the cars and close everything."""

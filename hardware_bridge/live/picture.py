@@ -1,4 +1,4 @@
-"""What the safety gate is told: the estimates behind an action, and how far they can be trusted."""
+"""Snapshot for the safety gate: the estimates behind an action, and their uncertainty."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from tracking.arrays import F64, Bool
 from tracking.estimate import Status
 
 PLANE = np.array([0, 1, 3, 4])
-"""Of a covariance, what lies in the plane: position and velocity."""
+"""Rows of a covariance that belong to the plane: position and velocity."""
 
 
 def draw_picture(
     swarm: LiveSwarm, t: float, speed: F64, steering: F64, fence: Fence | None
 ) -> Picture:
-    """The picture of now.
+    """Return the current snapshot.
 
     Args:
-        swarm: After its last step.
+        swarm: Trackers after their last step.
         t: Time of that step, by the host's clock [s].
-        speed: Wanted, (slot) [m/s].
-        steering: Wanted, (slot) [rad].
-        fence: Whose node places are relative to.
+        speed: Requested speed, (slot) [m/s].
+        steering: Requested steering angle, (slot) [rad].
+        fence: Fence, whose node is the origin of positions; None without a fence.
     """
     view, group, n = swarm.view, swarm.group, swarm.config.n_slots
     q = blank_picture(1, n)
@@ -47,13 +47,13 @@ def draw_picture(
 
 
 def is_sound(cov: F64) -> Bool:
-    """Whether matrices are covariances in the plane: finite, symmetric, positive definite.
+    """Return whether covariances are valid in the plane: finite, symmetric, positive definite.
 
     Args:
-        cov: Of position and velocity, (pair, 6, 6).
+        cov: Covariance of position and velocity, (pair, 6, 6).
 
     Returns:
-        (pair)
+        True for valid covariances, (pair).
     """
     plane = cov[:, PLANE[:, None], PLANE[None, :]]
     finite: Bool = np.all(np.isfinite(plane), axis=(1, 2))
@@ -65,7 +65,7 @@ def is_sound(cov: F64) -> Bool:
 
 
 def _place(swarm: LiveSwarm, q: Picture, post: int, sound: Bool) -> None:
-    """Where the cars are relative to the node of the fence."""
+    """Write the positions of the cars relative to the node of the fence."""
     e, group = swarm.estimate, swarm.group
     ok: Bool = np.asarray(e.status == Status.OK)
     elapsed = float(swarm.view.now[0] - e.t[0])

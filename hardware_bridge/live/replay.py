@@ -1,4 +1,4 @@
-"""A recording in place of ports: the same chunks and decisions, so the same estimates."""
+"""Replay of a recording in place of ports: equal chunks and control steps give equal estimates."""
 
 from __future__ import annotations
 
@@ -39,16 +39,16 @@ class ReplayFeed:
         """Open a recording.
 
         Args:
-            recording: As `read_recording` gives it.
-            pace: Called with the time of every decision [ns]; it may wait. None is as fast as
-                possible.
-            filter: In place of the recorded one; one of `tracking.filters.FILTERS`.
-            keys: The configuration that it was made with, for the keys: recordings hold none.
-                Without them signatures are not checked.
+            recording: Result of `read_recording`.
+            pace: Called with the time of every control step [ns]; it may wait. None replays as fast
+                as possible.
+            filter: Filter that replaces the recorded one; one of `tracking.filters.FILTERS`.
+            keys: Configuration of the recorded run, used for its keys, since recordings contain
+                none. Without it signatures are not checked.
 
         Raises:
-            BridgeError: Its configuration makes no sense here, or its calibration is damaged.
-            ConfigError: No such filter.
+            BridgeError: The recorded configuration is invalid, or the calibration is damaged.
+            ConfigError: Unknown filter.
         """
         self.recording, self._pace = recording, pace
         file = recording.path.name
@@ -59,7 +59,7 @@ class ReplayFeed:
         self.config: SwarmConfig = config if keys is None else with_keys_of(config, keys)
         config = self.config
         self.calibration = _calibration(recording)
-        """What the measurements were corrected with; None took them as they came."""
+        """Calibration of the measurements; None uses them as received."""
         if config.calibration and self.calibration is None:
             raise BridgeError(f"{file}: the calibration in it is lost, nothing can be tracked")
         self.swarm = LiveSwarm(config, recording.header.monotonic_ns, self.calibration)
@@ -69,10 +69,10 @@ class ReplayFeed:
                 raise BridgeError(f"{file}: has no stream {name} of its own configuration")
         self._records = iter(recording)
         self.notices: list[tuple[int, str]] = []
-        """What the user was told then; time [ns] and text."""
+        """Notices of the recorded run; time [ns] and text."""
 
     def advance(self) -> int | None:
-        """Go on to the next decision; see `Feed`."""
+        """Advance to the next control step; see `Feed`."""
         names = self.recording.header.links
         for record in self._records:
             if record.kind == Kind.BYTES_IN:
@@ -93,10 +93,10 @@ class ReplayFeed:
         return None
 
     def _applied(self, event: Mapping[str, Any]) -> dict[str, F64]:
-        """What the gate let the cars do, from a record of it.
+        """Return the commands passed by the gate, from a record.
 
         Raises:
-            BridgeError: The record lacks a number for a car, or has what is none.
+            BridgeError: The record lacks a number for a car, or has an invalid one.
         """
         n, found = self.swarm.config.n_slots, {}
         for key in APPLIED:
@@ -113,7 +113,7 @@ class ReplayFeed:
         return found
 
     def decide(self, picture: Picture) -> None:
-        """Nothing moves in a recording."""
+        """Do nothing, since no car moves in a replay."""
 
 
 def open_replay(
@@ -122,17 +122,17 @@ def open_replay(
     *,
     filter: str | None = None,
 ) -> ReplayFeed:
-    """A recording from its file; arguments as of `ReplayFeed`.
+    """Open a recording file; arguments as of `ReplayFeed`.
 
     Raises:
-        BridgeError: It is none, or its configuration makes no sense here.
-        ConfigError: No such filter.
+        BridgeError: The file is no recording, or its configuration is invalid.
+        ConfigError: Unknown filter.
     """
     return ReplayFeed(read_recording(path), pace, filter=filter)
 
 
 def _calibration(recording: Recording) -> Calibration | None:
-    """The calibration that the recording was made with, which is in it."""
+    """Return the calibration used in the recorded run, which the recording contains."""
     for record in recording:
         if record.kind != Kind.EVENT:
             continue
@@ -145,7 +145,7 @@ def _calibration(recording: Recording) -> Calibration | None:
 
 
 def _marks(recording: Recording) -> Marks:
-    """Which signed messages were old when it began."""
+    """Return the marks of signed messages at the start of the recording."""
     for record in recording:
         if record.kind == Kind.EVENT:
             event = recording.event(record)
@@ -162,7 +162,7 @@ def _marks(recording: Recording) -> Marks:
 
 
 def with_keys_of(config: SwarmConfig, keys: SwarmConfig) -> SwarmConfig:
-    """A configuration with the keys of another, by the names of links and cars."""
+    """Return a configuration with the keys of another, by the names of links and cars."""
     links = {link.name: link.key for link in keys.links}
     cars = {car.node: car.key for car in keys.cars}
     return replace(

@@ -1,7 +1,7 @@
-"""Cars that have fallen silent: they may stand in the way of the others until a person says not.
+"""Silent cars: they may be obstacles to the others until an operator dismisses them.
 
-The last place of each that was known well, relative to the others, is moved on by how far cars have
-driven since, and grows uncertain. Only the safety gate looks at it, once the car has left.
+The last well-known relative position of each is propagated by the cars' motion, with growing
+uncertainty. Only the safety gate uses it, once the car has left.
 """
 
 from __future__ import annotations
@@ -14,47 +14,47 @@ from tracking.arrays import F64, Bool
 from tracking.estimate import Status
 
 SILENT = 0.5
-"""[-] `Picture.present` of one: others look out for it, and it is held."""
+"""[-] `Picture.present` of a silent car: others avoid it, and it is disarmed."""
 GROWTH = 0.05
-"""[m/s] By which its place grows uncertain: dead reckoning of the others, and it may roll."""
+"""[m/s] Growth of its position uncertainty: dead reckoning of the others, and it may roll."""
 
 
 class SilentCars:
-    """Of one group of so many slots."""
+    """Silent cars of one group."""
 
     def __init__(self, n_slots: int) -> None:
         self.here: Bool = np.zeros(n_slots, dtype=bool)
-        """Which have fallen silent and are not known to be gone, (slot)."""
+        """True for silent cars that are not known to be gone, (slot)."""
         self._pos: F64 = np.zeros((n_slots, n_slots, 2))
         self._sigma: F64 = np.full((n_slots, n_slots), np.inf)
         self._t = -np.inf
 
     def note(self, view: AgentView, sigma: F64, heard: Bool) -> None:
-        """Note where those are that are heard and known to be there.
+        """Store the known positions of cars with recent messages.
 
         Args:
-            view: Of one environment.
-            sigma: Largest standard deviation of where each is to each, (slot, slot) [m].
-            heard: Which were heard just now, (slot).
+            view: View of one environment.
+            sigma: Largest standard deviation of each relative position, (slot, slot) [m].
+            heard: True for cars with recent messages, (slot).
         """
         known = view.ok[0] & np.isfinite(sigma) & heard
         self._pos[known] = view.pos[0][known]
         self._sigma[known] = sigma[known]
 
     def keep(self, slot: int) -> None:
-        """One has left."""
+        """Mark a car that has left as silent."""
         self.here[slot] = True
 
     def forget(self, slot: int) -> None:
-        """One is heard again."""
+        """Mark a car as not silent, after its next message."""
         self.here[slot] = False
 
     def dismiss(self) -> None:
-        """A person says that those who are silent are gone."""
+        """Mark all silent cars as gone, as an operator's command."""
         self.here[:] = False
 
     def move(self, view: AgentView, t: float) -> None:
-        """Move on to the time of a view [s], by what cars say of their own driving."""
+        """Propagate positions to the time of a view [s], by the cars' odometry."""
         elapsed = t - self._t if np.isfinite(self._t) else 0.0
         self._t = t
         own = _velocities(view)
@@ -62,7 +62,7 @@ class SilentCars:
         self._sigma += elapsed * GROWTH
 
     def write(self, q: Picture, view: AgentView) -> None:
-        """Let the gate see them: they stand where they were last."""
+        """Write silent cars into a snapshot, at rest at their last positions."""
         own = _velocities(view)
         for slot in np.flatnonzero(self.here).tolist():
             q.present[0, slot] = SILENT
@@ -75,7 +75,7 @@ class SilentCars:
 
 
 def _velocities(view: AgentView) -> F64:
-    """Of the cars in the world, by their own headings and odometers, (slot, 2) [m/s]."""
+    """Return the world velocities of the cars by heading and odometer, (slot, 2) [m/s]."""
     ahead = np.stack([np.cos(view.heading[0]), np.sin(view.heading[0])], axis=-1)
     velocities: F64 = ahead * np.where(view.present[0], view.speed[0], 0.0)[:, None]
     return velocities

@@ -1,9 +1,9 @@
-"""How a drive begins: all is well, the cars are armed, and they find out where the others are.
+"""Start-up of a drive: arm the cars, then excite the tracker until relative positions are known.
 
-While they stand, ranges leave open how the group is turned or mirrored. So at first every car
-wriggles within 0.4 m of its place (three cars), each in its own rhythm, until the trackers
-are sure; only then is it asked for anything. Every car ends where it began, and pointing as it
-did: cars that were put down in a formation are still in it, and not turned towards a wall.
+At rest, ranges do not determine the rotation and reflection of the group. At first every car
+therefore drives back and forth within 0.4 m of its start (three cars), with its own period, until
+the trackers are certain; only then the drive begins. Every car ends at its start pose: cars placed
+in a formation remain in it and do not turn towards a wall.
 """
 
 from __future__ import annotations
@@ -26,62 +26,62 @@ from tracking.arrays import F64, Bool
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StartParams:
-    """Of a start."""
+    """Parameters of the start-up."""
 
     wait: float = 60.0
-    """[s] For all to be well; cars that cannot be armed for so long end it."""
+    """[s] Longest wait until all cars are armed; then the start-up fails."""
     find: float = 30.0
-    """[s] For cars to find each other; then the drive begins as it is, once all are home."""
+    """[s] Longest excitation; then the drive begins once all cars are back at their start."""
     sure: float = 1.0
-    """[s] All places must have been known for so long."""
+    """[s] Time for which all positions must have been known."""
     speed: float = 0.3
-    """[m/s] Of the wriggling."""
+    """[m/s] Speed of the excitation."""
     steering: float = 0.4
-    """[rad] Of the wriggling."""
+    """[rad] Steering angle of the excitation."""
     period: float = 1.6
-    """[s] Forwards and back of the first car; the others take longer by fifths of it."""
+    """[s] Period of the excitation of the first car; that of car k is 1 + 0.2 k times as long."""
 
 
 class Gated(Protocol):
-    """Something with a gate at its end: ports and a supervisor, or both in memory."""
+    """A feed with a gate: ports and a supervisor, or both in memory."""
 
     report: Report | None
-    """What the gate did, the latest; None before the first word from it."""
+    """Latest report of the gate; None before the first."""
 
     def order(self, what: str) -> None:
-        """Pass on what a person asks for; see `Order`."""
+        """Forward an operator command; see `Order`."""
 
     def note(self, t_ns: int, text: str) -> None:
-        """Let the user have a line."""
+        """Show a line of text to the user."""
 
 
 class Start:
-    """Arms the cars and lets them find each other."""
+    """Arms the cars and excites the tracker."""
 
     def __init__(self, feed: Gated, *, arm: bool, params: StartParams | None = None) -> None:
-        """Prepare for a start.
+        """Prepare a start-up.
 
         Args:
-            feed: Of the cars' gate.
-            arm: Whether cars may move; otherwise nothing is done and nothing waited for.
-            params: How long, and how they wriggle.
+            feed: Feed with the cars' gate.
+            arm: True if cars may move; otherwise the start-up does nothing.
+            params: Durations and excitation.
         """
         self._feed, self._arm = feed, arm
         self._params = params or StartParams()
         self.attend: Callable[[], bool] | None = None
-        """Called after every decision; True ends it all with KeyboardInterrupt."""
+        """Called after every control step; True ends the run with KeyboardInterrupt."""
         self._held = False
         self._armed_once = False
 
     def heed(self, what: str) -> None:
-        """Take note of what a person has ordered: who has said stop arms the cars, too."""
+        """Record an operator command; a stop, disarm or clear prevents automatic arming."""
         self._held = what != "arm" and (self._held or what in ("stop", "disarm", "clear"))
 
     def run(self, group: LiveGroup) -> None:
-        """Do what is to be done before a drive.
+        """Run the start-up before a drive.
 
         Args:
-            group: Of the cars, begun.
+            group: Group of the cars, after `begin`.
 
         Raises:
             BridgeError: The cars could not be armed.
@@ -92,9 +92,9 @@ class Start:
         self._find(group)
 
     def _get_armed(self, group: LiveGroup) -> None:
-        """Let the cars stand and listen until all is well, and arm them.
+        """Keep the cars at rest until they have been healthy for long enough, and arm them.
 
-        By itself only the first start arms them. Cars that were stopped later wait for a person.
+        Only the first start-up arms automatically; cars stopped later wait for an operator.
         """
         config, feed = group.swarm.config, self._feed
         slots = [config.slot_of(car) for car in config.cars]
@@ -131,7 +131,7 @@ class Start:
         raise BridgeError(f"{self._unwell(group, slots)}; see `relpos doctor`")
 
     def _unwell(self, group: LiveGroup, slots: list[int]) -> str:
-        """Which node or car was not well all the time, and why; a silent node holds all."""
+        """Return the node or car that was not healthy, and why; a silent node blocks all cars."""
         report, swarm = self._feed.report, group.swarm
         assert report is not None
         ids, wait = swarm.group.ids, f"not well within {self._params.wait:g} s"
@@ -139,16 +139,16 @@ class Start:
         silent = [k for k in range(len(heard)) if not np.isfinite(heard[k])]
         if silent:
             return f"node {ids[silent[0]]}: {wait}: it was not heard"
-        # A car that is only not armed waits for another.
+        # A healthy car that is not armed waits for another one.
         unwell = [k for k in slots if not report.well_for[k] > swarm.config.safety.health]
         slot = next(iter(unwell), next((k for k in slots if not report.armed[k]), slots[0]))
         return f"cars.{ids[slot]}: {wait}: {reason_text(int(report.reason[slot]))}"
 
     def _rates_fit(self, group: LiveGroup, slots: list[int]) -> bool:
-        """Whether it is known that samples come as often as configured.
+        """Return whether sample rates are known and as configured.
 
         Raises:
-            BridgeError: Those of a car do not, or read at rest what no IMU does.
+            BridgeError: A car's rate differs, or its IMU's readings at rest are impossible.
         """
         swarm = group.swarm
         if swarm.config.tracker.source == "positions":
@@ -162,7 +162,7 @@ class Start:
         return not any(rates.is_open(slot) for slot in slots)
 
     def _find(self, group: LiveGroup) -> None:
-        """Let the cars wriggle until all know where the others are."""
+        """Run the excitation until all positions are known and all cars are back at their start."""
         p, n = self._params, group.swarm.config.n_slots
         known, k, home = 0.0, 0, np.zeros(n, dtype=bool)
         while not home.all():
@@ -184,17 +184,17 @@ class Start:
 
 
 def check_pace(config: SwarmConfig, params: StartParams | None = None) -> None:
-    """Refuse cars that cannot drive as slowly as a start asks for, before anything is opened.
+    """Refuse cars that cannot drive as slowly as the start-up requires, before opening any port.
 
     Args:
-        config: Of the swarm.
-        params: How it starts.
+        config: Configuration of the swarm.
+        params: Parameters of the start-up.
 
     Raises:
-        BridgeError: Names the first car that would stand, and what to change.
+        BridgeError: Names the first car with too high a lowest speed, and the remedy.
     """
     if config.tracker.source == "positions":
-        return  # where the others are is known without moving
+        return  # positions are known without motion
     asked = min((params or StartParams()).speed, config.safety.slow)
     for car in config.cars:
         driver = make_driver(car.driver, car.node, car.options, car.key, 0, lambda: 0)
@@ -207,7 +207,7 @@ def check_pace(config: SwarmConfig, params: StartParams | None = None) -> None:
 
 
 def check_watchdogs(config: SwarmConfig) -> None:
-    """Refuse cars of which it is not known when they stop by themselves.
+    """Refuse cars without a configured watchdog time.
 
     Raises:
         BridgeError: Names the first of them.
@@ -221,12 +221,12 @@ def check_watchdogs(config: SwarmConfig) -> None:
 
 
 def wriggle(p: StartParams, n_cars: int, t: float) -> tuple[F64, F64]:
-    """Speeds and steering angles that keep cars near their places.
+    """Return excitation commands that keep cars near their start.
 
     Args:
-        p: How they wriggle.
-        n_cars: How many.
-        t: Since it began [s].
+        p: Parameters of the excitation.
+        n_cars: Number of cars.
+        t: Time since its start [s].
 
     Returns:
         Speed [m/s] and steering [rad], each (1, car).
@@ -234,23 +234,23 @@ def wriggle(p: StartParams, n_cars: int, t: float) -> tuple[F64, F64]:
     k = np.arange(n_cars)
     turns = t / _periods(p, n_cars)
     speed = p.speed * np.where(np.sin(2.0 * np.pi * turns + 2.1 * k) >= 0.0, 1.0, -1.0)
-    # The wheels stay turned to one side while the car goes forwards and back: it retraces its arc,
-    # and is where it was.
+    # The steering angle is constant during a forward and backward run: the car retraces its arc
+    # back to its start.
     side = np.floor(turns + 1e-9).astype(int) + k
     steering = p.steering * np.where(side % 2 == 0, 1.0, -1.0)
     return speed[None], steering[None]
 
 
 def is_home(p: StartParams, n_cars: int, t: float) -> Bool:
-    """Whether cars that wriggle are where they began, to the nearest decision.
+    """Return whether cars in excitation are at their start, to the nearest control step.
 
     Args:
-        p: How they wriggle.
-        n_cars: How many.
-        t: Since it began [s].
+        p: Parameters of the excitation.
+        n_cars: Number of cars.
+        t: Time since its start [s].
 
     Returns:
-        (car)
+        True for cars at their start, (car).
     """
     periods = _periods(p, n_cars)
     off = np.abs(t - np.round(t / periods) * periods)
@@ -259,5 +259,5 @@ def is_home(p: StartParams, n_cars: int, t: float) -> Bool:
 
 
 def _periods(p: StartParams, n_cars: int) -> F64:
-    """Forwards and back, (car) [s]."""
+    """Return the periods of the cars' excitation, (car) [s]."""
     return np.array([p.period * (1.0 + 0.2 * k) for k in range(n_cars)], dtype=np.float64)

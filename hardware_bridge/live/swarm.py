@@ -1,6 +1,6 @@
-"""A swarm as its trackers see it, from chunks of bytes and times of decisions alone.
+"""A swarm's intake and trackers, driven only by chunks of bytes and times of control steps.
 
-Pure: what a live drive saw is what its recording gives, to the last bit.
+Pure: replaying a recording reproduces the live run to the last bit.
 """
 
 from __future__ import annotations
@@ -29,12 +29,11 @@ from tracking.measurements import Kind, MeasurementBlock
 from tracking.tracker import TrackerParams
 
 GONE = 5.0
-"""[s] A node that was not heard for so long has left, until it is heard again."""
+"""[s] A node without messages for this time has left, until its next message."""
 SILENT = 0.5
-"""[s] What an operator asked for so long ago is not asked any more; what a car said of its motion
-is not true any more."""
+"""[s] Age from which an operator's trim and a car's reported motion are not used."""
 ROOM = 1024
-"""[-] Measurements that there is room for at first."""
+"""[-] Initial capacity in measurements."""
 
 
 class LiveSwarm:
@@ -43,12 +42,12 @@ class LiveSwarm:
     def __init__(
         self, config: SwarmConfig, start_ns: int, calibration: Calibration | None = None
     ) -> None:
-        """Begin with nothing heard.
+        """Create a swarm without measurements.
 
         Args:
-            config: Who is in it, and where bytes come from.
+            config: Nodes, cars and ports.
             start_ns: Host time that is 0 s of the estimates [ns].
-            calibration: Of the sensors; None takes them as they come.
+            calibration: Calibration of the sensors; None uses measurements as received.
         """
         self.config, self.group = config, config.constellation
         self.intake = Intake(config, start_ns)
@@ -58,64 +57,64 @@ class LiveSwarm:
         self._room = ROOM
         self._here: set[int] = set()
         self.allowed: F64 = np.zeros((config.n_slots, 2))
-        """Speed [m/s] and steering [rad] that the gate let pass last, (slot, 2)."""
+        """Speed [m/s] and steering [rad] last passed by the gate, (slot, 2)."""
         self.reasons: I64 = np.zeros(config.n_slots, dtype=np.int64)
-        """Why these are less than asked, see `hardware_bridge.safety.gate.reason_text`, (slot)."""
+        """Reason for a limit, see `hardware_bridge.safety.gate.reason_text`, (slot)."""
         self.armed: Bool = np.zeros(config.n_slots, dtype=bool)
-        """Which cars the gate lets move, (slot)."""
+        """True for armed cars, (slot)."""
         self._perception = self._make_perception()
         self.silent = SilentCars(config.n_slots)
-        """Those that may stand in the way of the others."""
+        """Silent cars, which may be obstacles to the others."""
         self.tap: Callable[[MeasurementBlock], None] | None = None
-        """Called with what was measured since the last step, as it came, without calibration; the
-        block is overwritten by the next."""
+        """Called with the measurements since the last step, without calibration; the block is
+        overwritten by the next step."""
         self.trim: F64 = np.zeros((1, config.n_slots, 2))
-        """Velocity that an operator asks for on top of the plan, (1, slot, 2) [m/s]."""
+        """Velocity that an operator adds to the plan, (1, slot, 2) [m/s]."""
 
     @property
     def view(self) -> AgentView:
-        """What every car sees now; of one environment."""
+        """Current view of every car; of one environment."""
         return self._perception.view
 
     @property
     def estimate(self) -> TeamEstimate:
-        """The tracker's last estimate, as old as the horizon, overwritten by the next.
+        """Last estimate of the tracker, delayed by the horizon; the next one overwrites it.
 
-        Where positions come ready it is that of now.
+        With an external tracker it is for the current time.
         """
         return self._perception.estimate
 
     @property
     def n_late(self) -> int:
-        """Measurements that came later than the horizon waits."""
+        """Number of measurements that came later than the horizon waits."""
         return int(self._perception.n_late[0])
 
     def share(self, target: F64, wanted: Bool, command: F64) -> None:
-        """Let the view have what the task wants; see `Perception.share`."""
+        """Use arrays of the task in the view; see `Perception.share`."""
         self._perception.share(target, wanted, command)
 
     def take(self, chunk: Chunk) -> None:
-        """Take bytes as they came."""
+        """Process received bytes."""
         self.intake.take(chunk)
 
     def apply(self, speed: F64, steering: F64, armed: F64, reason: F64) -> None:
-        """Note what the gate let the cars do, for cars that do not tell themselves.
+        """Store the commands passed by the gate, for cars that do not report their motion.
 
         Args:
-            speed: (slot) [m/s]
-            steering: (slot) [rad]
-            armed: 1 where the car may move, (slot).
-            reason: Why it is slower than wanted, see `hardware_bridge.safety.gate.reason_text`.
+            speed: Permitted speed, (slot) [m/s].
+            steering: Permitted steering angle, (slot) [rad].
+            armed: 1 for armed cars, (slot).
+            reason: Reason for a limit, see `hardware_bridge.safety.gate.reason_text`, (slot).
         """
         self.allowed = np.stack([speed, steering], axis=-1)
         self.reasons = reason.astype(np.int64)
         self.armed = armed > 0.0
 
     def step(self, t_ns: int) -> None:
-        """Let the trackers catch up with what arrived, and see.
+        """Process all pending measurements and update the view.
 
         Args:
-            t_ns: Now, by the host's clock [ns]; not before the last step or chunk.
+            t_ns: Current host time [ns]; not before the last step or chunk.
         """
         now = self.intake.seconds(t_ns)
         self._let_go(t_ns, now)
@@ -134,7 +133,7 @@ class LiveSwarm:
         self.silent.note(self.view, largest_std(self.view.cov[0]), self._heard_since(t_ns, SILENT))
 
     def heard(self, never: float = -np.inf) -> F64:
-        """When each car's node last told of its motion, by the host's clock, (slot) [s]."""
+        """Return the host time of each car's last sample, else of its last message, (slot) [s]."""
         heard_ns = self.intake.heard_ns
         if self.config.tracker.source != "positions":
             heard_ns = heard_ns | self.intake.sensed_ns
@@ -145,7 +144,7 @@ class LiveSwarm:
         return range(self.config.n_slots)
 
     def _heard_since(self, t_ns: int, seconds: float) -> Bool:
-        """Which cars were heard in so long before a time, (slot)."""
+        """Return the cars with a message in the last `seconds` before a time, (slot)."""
         heard_ns, since = self.intake.heard_ns, t_ns - seconds * 1e9
         return np.array([heard_ns.get(k, -np.inf) >= since for k in self._slots])
 
@@ -173,7 +172,7 @@ class LiveSwarm:
         )
 
     def _let_go(self, t_ns: int, now: float) -> None:
-        """Nodes that are heard join; those that have fallen silent leave."""
+        """Add joining nodes, and nodes that leave by falling silent, to the events."""
         heard_ns = self.intake.heard_ns
         recent = {k for k, t in heard_ns.items() if (t_ns - t) * 1e-9 <= GONE}
         for node in sorted(recent - self._here):
@@ -187,7 +186,7 @@ class LiveSwarm:
         self._here = recent
 
     def _make_room(self, n: int) -> None:
-        """Grow, after a pause in which much has piled up."""
+        """Enlarge the buffers if many measurements are pending, as after a pause."""
         waiting = int(self._perception.n_waiting[0])
         if n + waiting <= self._room:
             return
@@ -198,7 +197,7 @@ class LiveSwarm:
         self._perception.rebind(self._block, self._powered)
 
     def _note_cars(self, t_ns: int) -> None:
-        """What the cars are known to do, and what is asked of them."""
+        """Write the motion, sensor readings and operator trims of the cars."""
         view, intake = self.view, self.intake
         driving: set[int] = set()
         for k in self._slots:
@@ -220,10 +219,10 @@ class LiveSwarm:
 
 
 def load_calibration(config: SwarmConfig) -> Calibration | None:
-    """What is known of the sensors' errors; None where they are taken as they come.
+    """Return the calibration of the sensors; None to use measurements as received.
 
     Raises:
-        BridgeError: A file is wrong, or ranges are calibrated and a node's antenna is not.
+        BridgeError: A file is invalid, or ranges are calibrated and a node's antenna is not.
     """
     if not config.calibration:
         return None

@@ -1,7 +1,7 @@
-"""A drive without cars, before the real one: what is loaded when first used is loaded then.
+"""Warm-up: a simulated drive that loads compiled code before any deadline applies.
 
-Compiled code comes from the disk when it is first called, which takes longer than a car may be
-left without a decision.
+Compiled code is loaded from disk at its first call, which takes longer than a car may be without a
+command.
 """
 
 from __future__ import annotations
@@ -21,26 +21,26 @@ from tracking.geometry import GRAVITY
 from tracking.measurements import Kind
 
 SECONDS = 3.0
-"""[s] Of it, long enough that estimates begin."""
+"""[s] Duration of the simulated drive, long enough for estimates to begin."""
 RATE = 50
-"""[1/s] Of samples and of ranges."""
+"""[1/s] Rate of samples and of ranges."""
 
 
 class _Pretend:
-    """Nodes that go round on circles of their own."""
+    """Feed with nodes that drive in circles."""
 
     def __init__(self, swarm: LiveSwarm) -> None:
         self._swarm, self._k = swarm, 0
 
     def advance(self) -> int:
-        """A decision's worth of samples and ranges."""
+        """Add the samples and ranges of one control step."""
         for _ in range(round(DECISION * RATE)):
             self._k += 1
             self._sample(self._k / RATE)
         return round(self._k / RATE * 1e9)
 
     def decide(self, picture: Picture) -> None:
-        """Nothing moves."""
+        """Do nothing, since there is no gate."""
 
     def _sample(self, t: float) -> None:
         swarm = self._swarm
@@ -59,11 +59,11 @@ class _Pretend:
 
 
 def warm_up(config: SwarmConfig, observation: str = "estimate") -> None:
-    """Run everything once that a drive needs, on a swarm of its own.
+    """Run all code of a drive once, on a separate swarm.
 
     Args:
-        config: Of the swarm.
-        observation: What its cars will see.
+        config: Configuration of the swarm.
+        observation: Observation mode of the drive.
     """
     swarm = LiveSwarm(config, 0)
     mode = observation_mode(observation, config.n_slots)

@@ -1,1 +1,1 @@
-"""What cars may do: pure rules, and the process that holds them to it."""
+"""Safety gate: pure rules that limit the cars' commands, and the process that applies them."""

@@ -1,4 +1,4 @@
-"""Which words of a car's controller are its own and new; the others are not listened to."""
+"""Filter for messages of a car's controller: foreign and repeated ones are dropped."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from hardware_bridge.readings import UNNAMED, Reading, Source
 
 
 class Believed:
-    """The line of one car."""
+    """Message filter of one car's port."""
 
     def __init__(self, car: CarConfig, marks: Mapping[int, Mark]) -> None:
-        """Begin with nothing heard.
+        """Create a filter that has received nothing.
 
         Args:
-            car: Whose line it is.
-            marks: Nothing as old as these is believed; see `Identities.restore`.
+            car: The car at this port.
+            marks: Messages up to these marks are refused, see `Identities.restore`.
         """
         self._link, self._node, self._own = car.port.name, car.node, str(car.node)
         self._identities = Identities(authenticated=bool(car.key))
@@ -26,17 +26,17 @@ class Believed:
         self._accepted = False
 
     def sift(self, readings: Iterable[Reading], t_ns: int) -> Iterator[Reading]:
-        """Those of the readings that are believed.
+        """Yield the readings of accepted messages.
 
         Args:
-            readings: As they were decoded.
-            t_ns: When they came, by the host's monotonic clock [ns].
+            readings: Readings in the order of decoding.
+            t_ns: Arrival, by the host's monotonic clock [ns].
         """
         for reading in readings:
             source = reading.source
             if source.device not in (None, self._own):
                 continue
-            # A message is judged once, for all that it holds.
+            # A message is checked once for all of its readings.
             if source is not self._source or source is UNNAMED:
                 verdict: Verdict = self._identities.check(self._link, source, t_ns, self._node)
                 self._source, self._accepted = source, verdict.accepted

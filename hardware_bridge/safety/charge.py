@@ -1,4 +1,4 @@
-"""What a supervisor is responsible for, and the rhythm it keeps."""
+"""Configuration of a supervisor and its periods."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from hardware_bridge.identity import Mark
 from hardware_bridge.safety.params import SafetyParams
 
 TICK_NS = 10_000_000
-"""[ns] From tick to tick."""
+"""[ns] Period of the ticks."""
 REPORT_EVERY = 5
-"""[ticks]"""
+"""[ticks] Period of the reports."""
 ROOM = 1 << 20
-"""[bytes] Of the buffers between the deciding process and the supervisor."""
+"""[bytes] Size of the buffers between the deciding process and the supervisor."""
 
 
 @dataclass(frozen=True, slots=True)
 class Charge:
-    """What a supervisor is started with."""
+    """Configuration that a supervisor is started with."""
 
     params: SafetyParams
     n_cars: int
     cars: tuple[tuple[int, CarConfig], ...]
-    """Slot and configuration; none in a dry run."""
+    """Slot and configuration of each car; empty in a dry run."""
     boot: int = 0
-    """Of this start, for what is signed; higher than that of any start before."""
+    """Boot number of this start, for signatures; higher than that of any earlier start."""
     dry: tuple[int, ...] = ()
-    """Slots of cars in a dry run: no port is opened, and the gate tells what it would allow."""
+    """Slots of cars in a dry run: no port is opened, and the gate only reports its output."""
     marks: Mapping[str, Mapping[int, Mark]] = field(default_factory=dict)
-    """Newest signed messages of starts before, by car: nothing as old is believed."""
+    """Newest signed messages of earlier starts, by port name; messages up to these are refused."""

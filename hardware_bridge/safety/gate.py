@@ -1,9 +1,9 @@
-"""The gate that every command passes: rules cap it, and cars are armed or they stand.
+"""The safety gate: rules cap every command, and only armed cars move.
 
-Pure: a state, a moment, and what the cars may do then. Laws: from any state, silence longer than
-the limit leads to a stop; the output is within the limits whatever comes in; a car that was
-stopped for good moves again only after `arm`, and that only after `SafetyParams.health` seconds
-in which all was well.
+The gate is pure: a state and a snapshot give the permitted commands. Invariants: from any state,
+silence longer than the limit leads to a stop; the output is within the limits for any input; a
+disarmed car moves again only after `arm`, which requires `SafetyParams.health` seconds without a
+disarming rule.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ NOT_ARMED = -2
 EMERGENCY = -3
 HELD_UP = -4
 LONGEST = 0.1
-"""[s] After a longer pause commands change by no more than after this one."""
+"""[s] Longest interval over which commands are ramped; longer pauses count as this one."""
 REASONS = {
     NO_REASON: "",
     NOT_ARMED: "not armed",
@@ -36,32 +36,32 @@ REASONS = {
 
 
 def reason_text(code: int) -> str:
-    """What a code of `GateOutput.reason` says."""
+    """Return the text of a code of `GateOutput.reason`."""
     return REASONS[code] if code < 0 else RULES[code].meaning
 
 
 def is_reason(code: int) -> bool:
-    """True for the codes that `reason_text` knows."""
+    """Return whether `reason_text` has a text for a code."""
     return code in REASONS or 0 <= code < len(RULES)
 
 
 @dataclass(frozen=True, slots=True)
 class GateOutput:
-    """What the cars are told now, arrays over (env, car)."""
+    """Commands to the cars, arrays over (env, car)."""
 
     __repr__ = short_repr
 
     speed: F64
-    """[m/s]"""
+    """[m/s] Commanded speed."""
     steering: F64
-    """[rad]"""
+    """[rad] Commanded steering angle."""
     moving: Bool
-    """False: neutral, brakes on."""
+    """False for neutral with brakes on."""
     armed: Bool
     cap: F64
-    """[m/s] What the rules allow in the direction that was wanted."""
+    """[m/s] Speed that the rules permit in the requested direction."""
     reason: I64
-    """Why it is slower than wanted, see `reason_text`."""
+    """Code of the reason for a speed below the requested one, see `reason_text`."""
 
 
 class Gate:
@@ -80,7 +80,7 @@ class Gate:
         self._last: F64 = np.full(n_envs, -np.inf)
 
     def stop(self, envs: slice = slice(None)) -> None:
-        """Emergency stop of whole groups."""
+        """Stop whole groups in an emergency, until `clear`."""
         self.emergency[envs] = True
         self.armed[envs] = False
         self._held[envs] = NOT_ARMED
@@ -90,25 +90,25 @@ class Gate:
         self.emergency[envs] = False
 
     def disarm(self) -> None:
-        """Let all cars stand."""
+        """Disarm all cars."""
         self.armed[:] = False
         self._held[:] = NOT_ARMED
 
     def interrupt(self) -> None:
-        """There was no supervision for a while: let all cars stand, and be well again."""
+        """Disarm all cars after a gap in the supervision and restart their `health` intervals."""
         self.armed[:] = False
         self._held[:] = HELD_UP
         self._well_since[:] = np.inf
 
     def arm(self, now: F64, cars: Bool) -> Bool:
-        """Arm those cars of which all was well for long enough.
+        """Arm the requested cars after `SafetyParams.health` seconds without a disarming rule.
 
         Args:
-            now: (env) [s]
-            cars: Which are asked for, (env, car).
+            now: Current time, (env) [s].
+            cars: Cars to arm, (env, car).
 
         Returns:
-            Which are armed now, (env, car).
+            All armed cars, (env, car).
         """
         well = now[:, None] - self._well_since >= self.params.health
         fit = cars & well & ~self.emergency[:, None]
@@ -117,12 +117,12 @@ class Gate:
         return self.armed.copy()
 
     def well_for(self, now: F64) -> F64:
-        """How long all has been well with each car, (env, car) [s]."""
+        """Return the time for which no disarming rule has applied to each car, (env, car) [s]."""
         return np.maximum(now[:, None] - self._well_since, 0.0)
 
     @property
     def recent(self) -> Recent:
-        """What the cars may still be doing for what they were sent."""
+        """Bounds of the cars' motion given the commands sent so far."""
         return self._recent
 
     def step(
@@ -134,15 +134,15 @@ class Gate:
         linked: Bool,
         told: Told | None = None,
     ) -> GateOutput:
-        """What the cars may do now.
+        """Return the permitted commands.
 
         Args:
-            picture: The latest.
-            now: Rises from call to call, (env) [s].
-            word: When the deciding process last gave a sign of life, (env) [s].
-            heard: When each car's node was last heard, (env, car) [s].
-            linked: Whether the car's port is open, (env, car).
-            told: What the cars' controllers say; None where they say nothing.
+            picture: Latest snapshot.
+            now: Current time, increasing from call to call, (env) [s].
+            word: Time of the deciding process's last heartbeat, (env) [s].
+            heard: Time of the last message of each car's node, (env, car) [s].
+            linked: True if the car's port is open, (env, car).
+            told: Telemetry of the cars' controllers; None without telemetry.
         """
         p = self.params
         told = nothing_told(heard.shape, p) if told is None else told
@@ -153,7 +153,7 @@ class Gate:
         )
         ahead = wanted >= 0.0
         limiting, holding = np.full((2, *heard.shape), NO_REASON)
-        # What is not a number passes no comparison; rules see to it that it passes for unwell.
+        # Comparisons with NaN are false; rules are written so that NaN counts as a fault.
         with np.errstate(invalid="ignore", over="ignore"):
             for k, rule in enumerate(RULES):
                 verdict = rule.check(
@@ -187,7 +187,7 @@ class Gate:
         )
 
     def _move(self, speed: F64, steering: F64, now: F64) -> None:
-        """Go towards what is allowed, no faster than commands may change."""
+        """Move the commands towards the permitted ones within the rate limits."""
         p = self.params
         elapsed = np.where(np.isfinite(self._last), now - self._last, 0.0)[:, None]
         self._last = now.copy()
@@ -200,7 +200,7 @@ class Gate:
         self._recent = self._recent.after(speed, steering, elapsed, p.braking)
 
     def _ramp(self, speed: F64, most: F64) -> F64:
-        """Speeds that rise by so much at most; they may fall, and reverse through zero."""
+        """Limit the increase of absolute speed to `most` [m/s]; a reversal starts from zero."""
         before = self._recent.speed
         same = np.sign(speed) * np.sign(before) >= 0.0
         start = np.where(same, np.abs(before), 0.0)

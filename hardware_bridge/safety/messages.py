@@ -1,6 +1,6 @@
-"""What the deciding process and the supervisor tell each other, one datagram each.
+"""Messages between the deciding process and the supervisor, one datagram each.
 
-Both run the same version of this program, so the layout is a matter of this file alone.
+Both processes run the same version of this program, so this file alone defines the layout.
 """
 
 from __future__ import annotations
@@ -18,49 +18,49 @@ from tracking.params.short_repr import short_repr
 
 @dataclass(frozen=True, slots=True)
 class Word:
-    """A sign of life."""
+    """Heartbeat of the deciding process."""
 
     __repr__ = short_repr
 
     t: float
-    """[s] When it was given."""
+    """[s] Time of the heartbeat."""
     heard: F64
-    """When each car's node was last heard, (car) [s]."""
+    """Time of the last message of each car's node, (car) [s]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """A picture with its wishes."""
+    """Snapshot with requested commands."""
 
     picture: Picture
-    """Of one environment."""
+    """Snapshot of one environment."""
 
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """What a person asks for: ``arm``, ``disarm``, ``stop`` (emergency), ``clear`` or ``quit``."""
+    """Operator command: ``arm``, ``disarm``, ``stop`` (emergency), ``clear`` or ``quit``."""
 
     what: str
 
 
 @dataclass(frozen=True, slots=True)
 class Telemetry:
-    """Bytes that a car sent."""
+    """Bytes received from a car."""
 
     car: int
-    """Slot."""
+    """Slot of the car."""
     t_ns: int
     data: bytes
 
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """What the gate did, arrays over (car)."""
+    """State and output of the gate, arrays over (car)."""
 
     __repr__ = short_repr
 
     t: float
-    """[s]"""
+    """[s] Time of the last tick."""
     speed: F64
     steering: F64
     cap: F64
@@ -68,29 +68,29 @@ class Report:
     linked: F64
     reason: F64
     well_for: F64
-    """[s]"""
+    """[s] Time without a disarming rule."""
     emergency: bool
     late: float
-    """[s] The latest tick since the last report, how late."""
+    """[s] Largest delay of a tick since the last report."""
     missed: int
-    """Ticks later than 20 ms since the start."""
+    """Number of ticks more than 20 ms late since the start."""
     lag: float
-    """[s] Of the latest decision: from the last byte that it rests on to its command's bytes."""
+    """[s] Latency of the latest decision, from its last input byte to writing its command."""
 
 
 @dataclass(frozen=True, slots=True)
 class Notice:
-    """Something that the user should read."""
+    """Text for the user."""
 
     text: str
 
 
 @dataclass(frozen=True, slots=True)
 class Ready:
-    """The supervisor has its ports and begins, or says why it cannot."""
+    """Result of the supervisor's start."""
 
     problem: str = ""
-    """Empty if it begins."""
+    """Reason for a failed start; empty if it succeeded."""
 
 
 Message: TypeAlias = Word | Decision | Order | Telemetry | Report | Notice | Ready
@@ -98,11 +98,11 @@ _REPORT = struct.Struct("<dd?qd")
 _TELEMETRY = struct.Struct("<Bq")
 _TIME = struct.Struct("<d")
 ROWS = 7
-"""Of numbers of every car in a report."""
+"""Number of rows of per-car numbers in a report."""
 
 
 def pack(message: Message) -> bytes:
-    """The bytes of a message."""
+    """Return the bytes of a message."""
     match message:
         case Word(t, heard):
             return b"W" + _TIME.pack(t) + heard.tobytes()
@@ -124,10 +124,10 @@ def pack(message: Message) -> bytes:
 
 
 def unpack(data: bytes, n_cars: int) -> Message:
-    """The message that the bytes are.
+    """Return the message of some bytes.
 
     Raises:
-        ValueError: They are none of a group of so many cars.
+        ValueError: The bytes are no message of a group of `n_cars` cars.
     """
     kind, rest = data[:1], data[1:]
     if kind == b"W":

@@ -1,4 +1,4 @@
-"""What a rule of the gate sees, and what it says."""
+"""Input and output of the gate's rules."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ FREE = np.inf
 
 
 class Moment(NamedTuple):
-    """All that rules see."""
+    """Input of a rule."""
 
     picture: Picture
     now: F64
-    """(env) [s]"""
+    """Current time, (env) [s]."""
     word: F64
-    """When the deciding process last gave a sign of life, (env) [s]."""
+    """Time of the deciding process's last heartbeat, (env) [s]."""
     heard: F64
-    """When each car's node was last heard, (env, car) [s]."""
+    """Time of the last message of each car's node, (env, car) [s]."""
     linked: Bool
-    """Whether the car's own port is open, (env, car)."""
+    """True if the car's own port is open, (env, car)."""
     armed: Bool
-    """Whether the gate holds the car to its rules, (env, car)."""
+    """True for armed cars, which the gate limits by its rules, (env, car)."""
     recent: Recent
-    """What the cars were told lately."""
+    """Bounds of the cars' motion given the latest commands."""
     told: Told
-    """What the cars' own controllers say."""
+    """Telemetry of the cars' controllers."""
     was_slow: Bool
-    """Whether the last verdict of this rule capped or stopped, (env, car): for hysteresis."""
+    """True if this rule's last verdict capped or stopped the car, (env, car): for hysteresis."""
 
 
 class Verdict(NamedTuple):
@@ -44,7 +44,7 @@ class Verdict(NamedTuple):
     backward: F64
     """Highest speed backwards, (env, car) [m/s]."""
     hold: Bool
-    """Stop for good: only arming again lets it move, (env, car)."""
+    """True to disarm the car, (env, car); it moves again only after arming."""
     left: F64 | float = FREE
     """Largest steering angle to the left, (env, car) [rad]."""
     right: F64 | float = FREE

@@ -1,4 +1,4 @@
-"""What the safety gate allows; every limit is a number that a user can set in ``[safety]``."""
+"""Limits of the safety gate; a user can set each of them in ``[safety]``."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ LIMITS = {
     "cell_slow": (0.5, 5.0),
     "cell_stop": (0.4, 5.0),
 }
-"""Least and most of each limit: beyond, a rule would be switched off, or no car would ever move."""
+"""Permitted interval of each limit: values outside disable a rule or keep every car at rest."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,7 +47,7 @@ class Fence:
     """A polygon that cars must not leave, fixed to a static node."""
 
     node: int
-    """Id of the static node that its corners are relative to."""
+    """Id of the static node; corners are relative to it."""
     corners: tuple[tuple[float, float], ...]
     """[m] World frame (x east, y magnetic north), in order, at least three."""
 
@@ -62,76 +62,74 @@ class Fence:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SafetyParams:
-    """Limits of the gate. A car that was stopped for good must be armed again."""
+    """Limits of the gate. A disarmed car stops and must be armed again."""
 
     max_speed: float = 1.5
-    """[m/s] Of any car."""
+    """[m/s] Speed limit of every car."""
     max_steering: float = 0.42
-    """[rad]"""
+    """[rad] Limit of the steering angle."""
     max_accel: float = 3.0
-    """[m/s2] Commanded speed rises no faster; it may fall at once."""
+    """[m/s2] Limit on the rise of commanded speed; it may fall at once."""
     max_steering_rate: float = 6.0
-    """[rad/s] Of the command; servos turn 3 to 6 rad/s."""
+    """[rad/s] Limit on the rate of the steering command; servos turn 3 to 6 rad/s."""
     slow: float = 0.3
-    """[m/s] Where a rule says slow."""
+    """[m/s] Speed cap of rules that slow cars down."""
     silence: float = 0.06
-    """[s] Without a word from the process that decides; then cars are stopped for good. With a
-    tick and a write this leaves 20 ms of the 100 within which neutral is on the wire."""
+    """[s] Longest time without a heartbeat of the deciding process; then cars are disarmed. With a
+    tick and a write this leaves 20 ms of the 100 ms within which neutral is on the wire."""
     stale_slow: float = 0.15
-    """[s] Since a car's node was last heard."""
+    """[s] Age of a node's last message, or of the estimates, above which its car is capped to
+    `slow`."""
     stale_stop: float = 0.3
-    """[s] Since a car's node was last heard; stopped for good."""
+    """[s] Age of a node's last message, or of the estimates, above which its car is disarmed."""
     sigma_slow: float = 0.5
-    """[m] Largest standard deviation of where another is."""
+    """[m] Standard deviation of another car's position above which a car is capped to `slow`."""
     sigma_stop: float = 1.0
-    """[m] Largest standard deviation of where another is; stopped for good."""
+    """[m] Standard deviation of another car's position above which a car is disarmed."""
     hysteresis: float = 0.8
-    """[-] What went over a limit counts as below it again at this share of it."""
+    """[-] Fraction of `sigma_slow` below which a capped car is no longer capped."""
     health: float = 0.5
-    """[s] Everything must have been well for so long before a car can be armed."""
+    """[s] Time without a disarming rule before a car can be armed."""
     braking: float = 2.0
-    """[m/s2] What cars surely brake with. 1:10 cars on a clean floor reach 2.5."""
+    """[m/s2] Deceleration that every car reaches at least; 1:10 cars on a clean floor reach 2.5."""
     hardest: float = 5.0
-    """[m/s2] What cars surely do not brake harder with: one that drives away does not stand at
-    once."""
+    """[m/s2] Deceleration that no car exceeds: a car that drives away takes time to stop."""
     reaction: float = 0.25
-    """[s] From a moment that the estimates tell of to brakes that bite, the age of the decision
-    not counted: tick, wire, motor and its controller, and what estimates lag behind."""
+    """[s] Delay from the time of the estimates to the onset of braking, without the age of the
+    decision: tick, wire, motor and its controller, and lag of the estimates."""
     turning_radius: float = 0.65
-    """[m] Of the cars' tightest turn: wheelbase over the tangent of `max_steering`."""
+    """[m] Radius of the cars' tightest turn: wheelbase over the tangent of `max_steering`."""
     turning_room: float = 0.4
-    """[m] With less room to something abeam, cars may turn towards it by a share of
-    `max_steering` only."""
+    """[m] Clearance to an obstacle abeam below which steering towards it is limited to a fraction
+    of `max_steering`."""
     deadman: float = 0.2
-    """[s] A car that hears nothing stops by itself after so long; counted for the others where a
-    car's port is lost."""
+    """[s] A car that receives nothing stops by itself after this time; the gate assumes that a car
+    without its port drives on for as long."""
     separation: float = 0.5
-    """[m] Between the middles of two cars, never less; a 1:10 car is 0.42 m long."""
+    """[m] Least distance between the centres of two cars; a 1:10 car is 0.42 m long."""
     confidence: float = 2.5
-    """[-] Standard deviations that positions are believed to be off at most."""
+    """[-] Largest assumed position error in standard deviations."""
     range_error: float = 0.2
-    """[m] By which a range alone is believed to be too long at most: no line of sight."""
+    """[m] Largest assumed excess of a range used without a position, as without line of sight."""
     range_limit: float = 1.0
-    """[s] Where positions are not known, a range as old as this says nothing any more; the car
-    stands."""
+    """[s] Age above which a range to a car of unknown position is not used; the car stops."""
     runaway_speed: float = 0.5
-    """[m/s] By which a car may be faster, by its own controller, than it can be for what it was
-    sent: errors of odometry, and wheels that spin."""
+    """[m/s] Tolerated excess of a car's reported speed over the highest one that its commands
+    explain: errors of odometry, and spinning wheels."""
     runaway_time: float = 0.3
-    """[s] For so long; then it is stopped for good."""
+    """[s] Duration of an excess above `runaway_speed` after which a car is disarmed."""
     idle_time: float = 3.0
-    """[s] A car whose wheels stand for so long although it is asked to drive is stopped for
-    good."""
+    """[s] Time at rest despite a command to drive after which a car is disarmed."""
     answer_time: float = 0.5
-    """[s] A car whose controller answers commands, and has answered none for so long, is stopped
-    for good."""
+    """[s] Time without an acknowledgement or a reported speed after which a car is disarmed; for
+    controllers that send them."""
     cell_slow: float = 3.4
-    """[V] Of a cell of the battery, mean over seconds; below, `slow`. Looked at where a car has
-    `cells`."""
+    """[V] Cell voltage, mean over seconds, below which a car is capped to `slow`. Checked for cars
+    with `cells`."""
     cell_stop: float = 3.2
-    """[V] Below, stopped for good."""
+    """[V] Cell voltage, mean over seconds, below which a car is disarmed."""
     fence: Fence | None = None
-    """None where there is none."""
+    """Fence that the cars must not leave; None without a fence."""
 
     def __post_init__(self) -> None:
         for f in fields(self):

@@ -1,7 +1,7 @@
-"""What the gate is told of a group: wishes, whereabouts, and how far they can be trusted.
+"""Snapshot of a group for the gate: requested commands, estimates and their uncertainty.
 
-Plain numbers in arrays over (env, car, ...): a supervisor has one environment, tests have
-thousands. A picture travels between processes as the bytes of its numbers.
+All values are arrays over (env, car, ...): a supervisor has one environment, tests have thousands.
+A snapshot is sent between processes as the bytes of its arrays.
 """
 
 from __future__ import annotations
@@ -14,53 +14,53 @@ from tracking.arrays import F64
 
 
 class Picture(NamedTuple):
-    """One moment of a group; all float64, masks are 0 or 1. World frame."""
+    """Snapshot of a group; all float64, masks are 0 or 1. World frame."""
 
     t: F64
-    """When, by the host's monotonic clock, (env) [s]."""
+    """Time, by the host's monotonic clock, (env) [s]."""
     speed_wanted: F64
-    """(env, car) [m/s]"""
+    """Requested speed, (env, car) [m/s]."""
     steering_wanted: F64
-    """(env, car) [rad]"""
+    """Requested steering angle, (env, car) [rad]."""
     present: F64
-    """Who takes part, (env, car)."""
+    """1 if the car takes part, (env, car)."""
     oriented: F64
-    """Whose heading is known, (env, car)."""
+    """1 if the heading is known, (env, car)."""
     heading: F64
-    """(env, car) [rad]"""
+    """Heading, (env, car) [rad]."""
     speed: F64
-    """Forward, (env, car) [m/s]."""
+    """Forward speed, (env, car) [m/s]."""
     status: F64
-    """A `tracking.Status` of each pair, (env, car, other)."""
+    """`tracking.Status` of each pair, (env, car, other)."""
     sound: F64
-    """Whether the covariance is one: finite, symmetric, positive definite, (env, car, other)."""
+    """1 if the covariance is finite, symmetric and positive definite, (env, car, other)."""
     sigma: F64
-    """Largest standard deviation of where the other is, (env, car, other) [m]."""
+    """Largest standard deviation of the other's position, (env, car, other) [m]."""
     pos: F64
-    """Of the other relative to the car, (env, car, other, 2) [m]."""
+    """Position of the other relative to the car, (env, car, other, 2) [m]."""
     vel: F64
-    """(env, car, other, 2) [m/s]"""
+    """Velocity of the other relative to the car, (env, car, other, 2) [m/s]."""
     distance: F64
-    """Last range as it came, (env, car, other) [m]."""
+    """Last range as measured, (env, car, other) [m]."""
     ranged: F64
-    """When that was, (env, car, other) [s]; -inf before the first."""
+    """Time of the last range, (env, car, other) [s]; -inf before the first."""
     placed: F64
-    """Whether the place in the fence is known, (env, car)."""
+    """1 if the position in the fence is known, (env, car)."""
     place: F64
-    """Relative to the node of the fence, (env, car, 2) [m]."""
+    """Position relative to the node of the fence, (env, car, 2) [m]."""
     place_sigma: F64
-    """Largest standard deviation of that, (env, car) [m]."""
+    """Largest standard deviation of `place`, (env, car) [m]."""
 
     def to_bytes(self) -> bytes:
-        """All numbers one after the other."""
+        """Return the bytes of all arrays in order."""
         return b"".join(array.tobytes() for array in self)
 
     @classmethod
     def from_bytes(cls, data: bytes, n_cars: int) -> Picture:
-        """The picture of one environment that these are.
+        """Return the snapshot of one environment from its bytes.
 
         Raises:
-            ValueError: The length is not that of a picture of so many cars.
+            ValueError: The length is not that of a snapshot of `n_cars` cars.
         """
         blank = blank_picture(1, n_cars)
         expected = sum(array.nbytes for array in blank)
@@ -75,7 +75,7 @@ class Picture(NamedTuple):
 
 
 def blank_picture(n_envs: int, n_cars: int) -> Picture:
-    """No car is there, and none is commanded to move."""
+    """Return a snapshot with no car present and none commanded to move."""
     own, pair = (n_envs, n_cars), (n_envs, n_cars, n_cars)
     z = np.zeros
     return Picture(
@@ -100,13 +100,13 @@ def blank_picture(n_envs: int, n_cars: int) -> Picture:
 
 
 def largest_std(cov: F64) -> F64:
-    """Largest standard deviation in the plane; NaN where there is none.
+    """Return the largest standard deviation in the plane; NaN if it is not defined.
 
     Args:
-        cov: xx, yy, xy, (..., 3) [m2]
+        cov: Covariance xx, yy, xy, (..., 3) [m2].
 
     Returns:
-        (...) [m]
+        Standard deviation, (...) [m].
     """
     xx, yy, xy = cov[..., 0], cov[..., 1], cov[..., 2]
     with np.errstate(invalid="ignore"):

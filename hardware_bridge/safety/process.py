@@ -1,7 +1,7 @@
-"""The supervisor as a process of its own, which owns the ports of the cars.
+"""The supervisor process, which owns the ports of the cars.
 
-A thread of the deciding process would hang with it, and be late under load. The two talk through
-a pair of sockets; when that of the deciding process closes, it is gone, and the cars stop.
+A thread would hang with the deciding process, and be late under load. The two processes are
+connected by a socket pair; when the deciding process's end closes, the cars stop.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from hardware_bridge.safety.watch import supervise
 from hardware_bridge.systems import expect_linux
 
 START = 60.0
-"""[s] For the start of the process, which loads compiled code."""
+"""[s] Timeout for the start of the process, which loads compiled code."""
 
 
 class SupervisorProcess:
-    """The deciding process's end."""
+    """The deciding process's end of the connection."""
 
     def __init__(self, charge: Charge) -> None:
-        """Start it and wait until it has its ports.
+        """Start the supervisor and wait until its ports are open.
 
         Raises:
             BridgeError: A port of a car cannot be opened.
@@ -38,7 +38,7 @@ class SupervisorProcess:
         ours.setblocking(False)
         self._socket = ours
         self.gone = False
-        """True once it has ended or was killed, after `receive` has found that out."""
+        """True once `receive` has detected that the supervisor ended or was killed."""
         spawn = multiprocessing.get_context("spawn")
         self.process: SpawnProcess = spawn.Process(
             target=supervise, args=(charge, theirs), name="relpos supervisor", daemon=True
@@ -51,7 +51,7 @@ class SupervisorProcess:
             raise BridgeError(problem)
 
     def _wait_ready(self) -> str:
-        """Why it cannot begin; empty if it does."""
+        """Return the reason for a failed start; empty if the supervisor runs."""
         readable, *_ = select.select([self._socket], [], [], START)
         try:
             answer = unpack(self._socket.recv(ROOM), self._n_cars) if readable else None
@@ -60,11 +60,11 @@ class SupervisorProcess:
         return answer.problem if isinstance(answer, Ready) else "supervisor: it did not start"
 
     def fileno(self) -> int:
-        """Readable when it has something to say."""
+        """Return a file descriptor that is readable when messages are pending."""
         return self._socket.fileno()
 
     def send(self, message: Message) -> bool:
-        """Tell it; False if it is gone, or so far behind that it will stop the cars anyway."""
+        """Send a message; return False if the supervisor is gone, or so late that the cars stop."""
         try:
             self._socket.send(pack(message))
         except (BlockingIOError, OSError):
@@ -72,7 +72,7 @@ class SupervisorProcess:
         return True
 
     def receive(self) -> list[Message]:
-        """All that it said since the last call."""
+        """Return all messages since the last call."""
         messages: list[Message] = []
         try:
             while data := self._socket.recv(ROOM):
@@ -86,13 +86,13 @@ class SupervisorProcess:
 
     @property
     def alive(self) -> bool:
-        """Whether it still runs."""
+        """True while the process runs."""
         return self.process.is_alive()
 
     def close(self) -> None:
-        """Let the cars stand and end it; by closing the socket, if it does not listen.
+        """Stop the cars and end the supervisor by closing the socket; kill it after a timeout.
 
-        The second time nothing is left to do.
+        A second call has no effect.
         """
         if self._socket.fileno() < 0:
             return

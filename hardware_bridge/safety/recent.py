@@ -1,7 +1,7 @@
-"""What cars may still be doing because of what they were told a moment ago.
+"""Bounds of the cars' motion given the commands sent so far.
 
-Estimates of speed are old and a car does not follow a command at once. What was sent is known at
-once: a car is at most as fast, and its wheels at most as far turned, as it was told lately.
+Estimates of speed are delayed and a car does not follow a command at once. Its speed and steering
+angle are at most as large as the recent commands permit.
 """
 
 from __future__ import annotations
@@ -13,33 +13,33 @@ import numpy as np
 from tracking.arrays import F64
 
 SERVO = 2.0
-"""[rad/s] Wheels surely turn back so fast; delays of servo and wire are in it."""
+"""[rad/s] Rate at which wheels turn back at least; includes delays of servo and wire."""
 
 
 class Recent(NamedTuple):
-    """All arrays over (env, car); but for the first two, none negative."""
+    """Arrays over (env, car); all except `speed` and `steering` are non-negative."""
 
     speed: F64
-    """Speed that was sent last, forward positive [m/s]."""
+    """Latest commanded speed, forward positive [m/s]."""
     steering: F64
-    """Steering angle that was sent last, left positive [rad]."""
+    """Latest commanded steering angle, left positive [rad]."""
     forward: F64
-    """Fastest that the car may still be, for what was sent [m/s]."""
+    """Highest possible forward speed of the car [m/s]."""
     backward: F64
-    """Fastest that the car may still be backwards [m/s]."""
+    """Highest possible backward speed of the car [m/s]."""
     left: F64
-    """Furthest that its wheels may still be turned to the left [rad]."""
+    """Largest possible steering angle to the left [rad]."""
     right: F64
-    """Furthest that its wheels may still be turned to the right [rad]."""
+    """Largest possible steering angle to the right [rad]."""
 
     def after(self, speed: F64, steering: F64, elapsed: F64, braking: float) -> Recent:
-        """What may be after a command.
+        """Return the bounds after a command.
 
         Args:
-            speed: Speed that is sent, (env, car) [m/s].
-            steering: Steering angle that is sent, (env, car) [rad].
-            elapsed: Since the last command, (env, 1) [s].
-            braking: What cars surely brake with [m/s2].
+            speed: Commanded speed, (env, car) [m/s].
+            steering: Commanded steering angle, (env, car) [rad].
+            elapsed: Time since the last command, (env, 1) [s].
+            braking: Deceleration that every car reaches at least [m/s2].
         """
         slower, straighter = braking * elapsed, SERVO * elapsed
         return Recent(
@@ -53,5 +53,5 @@ class Recent(NamedTuple):
 
 
 def at_rest(shape: tuple[int, int]) -> Recent:
-    """Nothing was sent yet."""
+    """Return the bounds of cars at rest, before any command."""
     return Recent(*(np.zeros(shape) for _ in Recent._fields))

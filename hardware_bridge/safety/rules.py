@@ -1,8 +1,8 @@
-"""The rules of the gate, a table: each caps speeds, and may stop a car for good.
+"""The rules of the gate, a table: each caps speeds, and may disarm a car.
 
-A rule looks at one moment, arrays over (env, car), and remembers nothing. Comparisons are such
-that what is not a number, or comes from the future, counts as unwell.
-`docs/explanation/safety.md` has the table in words, and the reasoning behind the distances.
+A rule evaluates one snapshot, arrays over (env, car), and has no memory. Comparisons are written
+such that NaN and future times count as faults.
+`docs/explanation/safety.md` describes the rules and derives the distances.
 """
 
 from __future__ import annotations
@@ -23,31 +23,31 @@ from tracking.arrays import F64, Bool
 from tracking.estimate import Status
 
 AHEAD = 0.05
-"""[s] A time so far ahead of the clock is no time."""
+"""[s] Times that are further ahead of the clock are invalid."""
 DIRECTION = 1.0
-"""[-] Standard deviations that the direction of another that is too near is believed to be off;
-with more, cars next to each other could not part."""
+"""[-] Assumed position error for the direction of another car that is too near, in standard
+deviations; with a larger value cars next to each other could not part."""
 
 
 RECOVERED = 0.1
-"""[V] Above `cell_slow` a battery counts as charged again."""
+"""[V] Margin above `cell_slow` from which a battery counts as charged again."""
 LONG_AGO = 60.0
-"""[s] A range as old is none."""
+"""[s] Older ranges count as missing."""
 
 
 class Rule(NamedTuple):
-    """One line of the table."""
+    """A rule of the table."""
 
     name: str
     check: Callable[[Moment, SafetyParams], Verdict]
     meaning: str
-    """What a user is told."""
+    """Reason reported to the user."""
     effect: str
-    """What it does, for `docs/explanation/safety.md`."""
+    """Effect of the rule, for `docs/explanation/safety.md`."""
 
 
 def silence(m: Moment, p: SafetyParams) -> Verdict:
-    """The process that decides hangs, was stopped or is gone."""
+    """The deciding process hangs, was stopped or has ended."""
     quiet: Bool = _never(m) | ~_within(m.now - m.word, p.silence)[:, None]
     return _held(quiet)
 
@@ -63,12 +63,12 @@ def fault(m: Moment, p: SafetyParams) -> Verdict:
 
 
 def runaway(m: Moment, p: SafetyParams) -> Verdict:
-    """The car is faster than it was ever asked to be, by its own controller."""
+    """The car's controller reports a speed that no command explains."""
     return _held(m.told.over_for >= p.runaway_time)
 
 
 def deaf(m: Moment, p: SafetyParams) -> Verdict:
-    """The car obeys nothing: it answers no command, says no more of its speed, or stands still."""
+    """The car acknowledges no commands, reports no speed, or is at rest despite commands."""
     return _held((m.told.deaf_for >= p.answer_time) | (m.told.idle_for >= p.idle_time))
 
 
@@ -80,12 +80,12 @@ def battery(m: Moment, p: SafetyParams) -> Verdict:
 
 
 def absent(m: Moment, p: SafetyParams) -> Verdict:
-    """The car takes no part: none would look out for it."""
+    """The car is not part of the group; others would not avoid it."""
     return _held(m.picture.present != 1.0)
 
 
 def stale(m: Moment, p: SafetyParams) -> Verdict:
-    """What is known of the car is old: its node was not heard, or nothing was estimated."""
+    """The last message of the car's node or the latest estimates are too old."""
     times = (m.now[:, None] - m.heard, (m.now - m.picture.t)[:, None])
     old = ~(_within(times[0], p.stale_stop) & _within(times[1], p.stale_stop))
     older = ~(_within(times[0], p.stale_slow) & _within(times[1], p.stale_slow))
@@ -93,14 +93,14 @@ def stale(m: Moment, p: SafetyParams) -> Verdict:
 
 
 def covariance(m: Moment, p: SafetyParams) -> Verdict:
-    """A covariance is none: not finite, not symmetric or not positive definite."""
+    """A covariance matrix is invalid: not finite, not symmetric or not positive definite."""
     q = m.picture
     bad: Bool = np.any(_judged(q) & ((q.sound != 1.0) | ~(q.sigma >= 0.0)), axis=-1)
     return _held(bad)
 
 
 def sigma(m: Moment, p: SafetyParams) -> Verdict:
-    """Where another is, is not known well enough."""
+    """The position of another car is too uncertain."""
     worst = np.where(_judged(m.picture), m.picture.sigma, 0.0).max(axis=-1)
     over = ~(worst <= p.sigma_slow * np.where(m.was_slow, p.hysteresis, 1.0))
     far = ~(worst <= p.sigma_stop)
@@ -108,19 +108,19 @@ def sigma(m: Moment, p: SafetyParams) -> Verdict:
 
 
 def unknown(m: Moment, p: SafetyParams) -> Verdict:
-    """The position of another is not known yet, or its ranges contradict each other."""
+    """The position of another car is not known yet, or its ranges contradict each other."""
     q = m.picture
     unsure = _others(q) & ~_judged(q)
     age = m.now[:, None, None] - q.ranged
     ranged = _within(age, LONG_AGO) & np.isfinite(q.distance)
     known = ranged & (age <= p.range_limit)
-    # A wall between two lasts for a while, and who stands goes on when it is past.
+    # An obstruction is temporary: a car that is stopped, not disarmed, continues once it is past.
     hold: Bool = np.any(unsure & ~ranged, axis=-1)
     stand: Bool = np.any(unsure & ~known, axis=-1)
-    # Doubt lasts for seconds, and only cars that move dispel it: a formation that crept through
-    # it would fall apart. One that has yet to find itself creeps.
+    # DOUBTFUL lasts for seconds and ends only through motion; capped to `slow`, a formation would
+    # break up. Pairs that are not known yet are capped.
     slow: Bool = np.any(unsure & (q.status != Status.DOUBTFUL), axis=-1)
-    # Only the distance is known: whichever way the car goes may be the wrong one, for both.
+    # Only the distance is known: both cars may be approaching, so each uses half of it.
     way = 0.5 * (q.distance - p.range_error - p.separation)
     speed = stopping_speed(way, p.reaction + np.where(known, np.maximum(age, 0.0), 0.0), p.braking)
     cap = np.where(unsure, speed, FREE).min(axis=-1)
@@ -129,17 +129,17 @@ def unknown(m: Moment, p: SafetyParams) -> Verdict:
 
 
 def lost_heading(m: Moment, p: SafetyParams) -> Verdict:
-    """The car does not know where it points."""
+    """The heading of the car is not known."""
     sure = (m.picture.oriented == 1.0) & np.isfinite(m.picture.heading)
     return _capped(np.where(sure, FREE, 0.0), _never(m))
 
 
 def separation(m: Moment, p: SafetyParams) -> Verdict:
-    """Another car is nearer than both need to stop.
+    """Another car is nearer than both cars need to stop.
 
-    Of the room between two, a car may use half, or what the other cannot use at its speed if that
-    is more; of one that is held to no rules it may use that alone. Such a one, a person or a car
-    that is pushed, is as fast as it is seen to be, and may turn any way.
+    A car may use half of the clearance, or all that the other cannot use at its speed if that is
+    larger; next to a node that no gate limits, only the latter. Such a node (a person, a pushed
+    car) is assumed to keep its estimated speed in any direction.
     """
     q, recent = m.picture, m.recent
     ahead = ahead_of(q)
@@ -163,8 +163,8 @@ def separation(m: Moment, p: SafetyParams) -> Verdict:
         gone = np.minimum(sign * q.speed, sign * recent.speed)[:, None, :] * -np.cos(off)
         room = room + np.where(sure & held, np.maximum(gone, 0.0) ** 2, 0.0) / (2.0 * p.hardest)
     share = np.maximum(room - used, np.where(held, 0.5 * room, 0.0))
-    # Where they may be that near already, the other may be in any direction of a lens: that of the
-    # error, which has the estimate in its middle, without the separation round the car.
+    # If the other may be within the separation already, its direction is uncertain within a lens:
+    # the circle of its error around the estimate, outside of the separation circle around the car.
     error, least = DIRECTION * q.sigma, p.separation
     cosine = (least * least + d * d - error * error) / (2.0 * least * d)
     spread = np.where(d < least + error, np.arccos(np.clip(cosine, -1.0, 1.0)), 0.0)
@@ -173,7 +173,7 @@ def separation(m: Moment, p: SafetyParams) -> Verdict:
 
 
 def fence(m: Moment, p: SafetyParams) -> Verdict:
-    """The fence is nearer than the car needs to stop, or its place in it is not known."""
+    """The fence is nearer than the car needs to stop, or the car's position in it is not known."""
     if p.fence is None:
         return _capped(np.full(m.heard.shape, FREE), _never(m))
     q = m.picture
@@ -183,7 +183,7 @@ def fence(m: Moment, p: SafetyParams) -> Verdict:
     inside, offset = to_edges(q.place, corners)
     away = np.hypot(offset[..., 0], offset[..., 1])
     out = placed & ~inside & ~(away.min(axis=-1) <= margin)
-    # A place outside is an error as long as it may be one: the car is on the fence then.
+    # A position outside by less than the margin counts as an error: the car is set on the fence.
     nearest = np.take_along_axis(offset, away.argmin(axis=-1)[..., None, None], axis=-2)[..., 0, :]
     place = np.where(inside[..., None], q.place, q.place + nearest)
     _, offset = to_edges(place, corners)
@@ -196,20 +196,20 @@ def fence(m: Moment, p: SafetyParams) -> Verdict:
 
 
 def _within(age: F64, limit: float) -> Bool:
-    """Whether an age is one, and below a limit."""
+    """Return whether ages are valid and at most the limit."""
     good: Bool = (age <= limit) & (age >= -AHEAD)
     return good
 
 
 def _others(q: Picture) -> Bool:
-    """Pairs of cars that may be there, (env, car, other)."""
+    """Return the pairs of cars that may be present, (env, car, other)."""
     here = q.present != 0.0
     both: Bool = here[:, :, None] & here[:, None, :]
     return both & ~np.eye(here.shape[1], dtype=bool)
 
 
 def _judged(q: Picture) -> Bool:
-    """Pairs whose position is said to be known, and so is judged by its covariance."""
+    """Return the pairs whose position is known, so that its covariance is checked."""
     known = (q.status == Status.OK) | (q.status == Status.LOST)
     judged: Bool = known & np.isfinite(q.pos).all(axis=-1) & _others(q)
     return judged
@@ -273,4 +273,4 @@ RULES = (
         "good outside",
     ),
 )  # fmt: skip
-"""In the order in which reasons are told."""
+"""Rules in the order in which reasons are reported."""

@@ -1,7 +1,7 @@
-"""The safety gate in the simulated loop: what it lets through is what the cars are told.
+"""The safety gate in the simulated loop: the cars get its output as commands.
 
-It is asked once a decision, ten times as rarely as on real cars, and arms the cars whenever it may,
-as a person would.
+It runs once per decision, a tenth of its rate on real cars, and arms the cars whenever possible,
+as an operator would.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from tracking.arrays import F64, Bool
 
 
 class SimulatedGate:
-    """Of a batch of rooms. Law: environment k of a batch is that environment alone."""
+    """Gates of a batch of rooms. Invariant: results of a room do not depend on the batch."""
 
     def __init__(self, n_envs: int, n_cars: int, params: SafetyParams | None = None) -> None:
-        """Stand at first.
+        """Create gates with all cars disarmed.
 
         Args:
             n_envs: Rooms.
@@ -43,12 +43,12 @@ class SimulatedGate:
         self._stopped[env], self._reason[env] = True, NOT_ARMED
 
     def allow(self, view: AgentView, speed: F64, steering: F64) -> tuple[F64, F64]:
-        """What the cars may do.
+        """Return the permitted commands.
 
         Args:
-            view: On which it was decided.
-            speed: Wanted, (env, car) [m/s].
-            steering: Wanted, (env, car) [rad].
+            view: State that the decision was based on.
+            speed: Requested speed, (env, car) [m/s].
+            steering: Requested steering angle, (env, car) [rad].
 
         Returns:
             Speed [m/s] and steering [rad], each (env, car).
@@ -75,7 +75,7 @@ class SimulatedGate:
         return self._speed, self._steering
 
     def infos(self) -> dict[str, NDArray[Any]]:
-        """What infos say of it, (env, car); as on real cars."""
+        """Return the gate's entries of the infos, (env, car), as on real cars."""
         why = [[reason_text(code) for code in row] for row in self._reason.tolist()]
         return {
             "asked_speed": self._asked.copy(),

@@ -1,4 +1,4 @@
-"""The supervisor: the gate with its cars' drivers, pure; `process` gives it ports and a clock."""
+"""The supervisor: the gate with its cars' drivers, pure; `process` adds ports and a clock."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from tracking.arrays import F64, I64, Bool
 
 NONE_KNOWN: Mapping[int, Any] = MappingProxyType({})
 HALF_A_TICK = 0.005
-"""[s]"""
+"""[s] Tolerance of the interval between commands."""
 LATE = 0.02
-"""[s] A tick later than this is counted as missed."""
+"""[s] Delay above which a tick counts as missed."""
 
 
 class Supervisor:
-    """Holds the cars of one group to the rules, tick by tick."""
+    """Applies the rules to the cars of one group, tick by tick."""
 
     def __init__(
         self,
@@ -39,16 +39,16 @@ class Supervisor:
         watchdog: Mapping[int, float] = NONE_KNOWN,
         believed: Mapping[int, Believed] = NONE_KNOWN,
     ) -> None:
-        """Begin with nothing armed.
+        """Create a supervisor with no car armed.
 
         Args:
             params: Limits.
             n_cars: Slots.
-            drivers: Of the slots that have a car.
-            names: What each of these is called in notices.
-            cells: Of the batteries of the slots where they are known.
-            watchdog: Of the slots where it is known [s]; else it is `SafetyParams.deadman`.
-            believed: Of the slots whose words are checked; of the others all are believed.
+            drivers: Driver of each slot that has a car.
+            names: Name of each of these slots in notices.
+            cells: Number of battery cells of each slot where it is known.
+            watchdog: Watchdog time of each slot [s]; default: `SafetyParams.deadman`.
+            believed: Message filter of each slot; without one all messages are accepted.
         """
         slots = range(n_cars)
         self._telemetry = Telemetry(
@@ -71,29 +71,29 @@ class Supervisor:
         self._late, self._missed = 0.0, 0
         self._lag, self._decided = 0.0, -np.inf
         self._ended = ""
-        """Why it is over for all cars."""
+        """Reason for the end of the run, for all cars."""
         self._broken: dict[int, str] = {}
         self._told: dict[int, tuple[float, bool]] = {}
-        """When each car was last told something, and whether it was to move."""
+        """Time of each car's last command, and whether it was one to move."""
         self._taken: dict[int, float] = {}
-        """When the port of each car last took what it was sent, or was lost [s]."""
+        """Time at which each car's port last took its command, or was lost [s]."""
         self._sent: list[int] = []
-        """Slots that the last tick had something for."""
+        """Slots with a command in the last tick."""
         self.quit = False
-        """Asked to end."""
+        """True once the supervisor is to end."""
 
     def take(self, message: Message) -> list[Notice]:
-        """A message from the deciding process; what of it the user should read."""
+        """Process a message of the deciding process; return notices for the user."""
         match message:
             case Word(t, heard):
                 self._word[0], self._heard[0] = t, heard
             case Decision(picture):
-                # One that was overtaken by a later one, or is of no time, is not looked at.
+                # Outdated snapshots and those without a valid time are ignored.
                 if picture.t[0] >= self._picture.t[0]:
                     self._picture = picture
                     self._word[0] = max(float(picture.t[0]), self._word[0])
             case Order("arm"):
-                # Who has asked to end it does not begin again.
+                # No arming after quit.
                 return [] if self.quit else self._arm()
             case Order("disarm"):
                 self._gate.disarm()
@@ -110,38 +110,38 @@ class Supervisor:
         return []
 
     def hear(self, slot: int, data: bytes, now: float) -> None:
-        """Bytes that a car's controller sent [s]."""
+        """Process bytes that a car's controller sent at time `now` [s]."""
         readings: Iterable[Reading] = self._drivers[slot].telemetry.feed(data)
         if slot in self._believed:
             readings = self._believed[slot].sift(readings, round(now * 1e9))
         self._telemetry.take(slot, readings, now)
 
     def abandon(self, why: str) -> None:
-        """The deciding process is gone, or this one is ended: nothing will move again."""
+        """Stop all cars permanently: the deciding process is gone or this one is ended."""
         self._gate.stop()
         self.quit, self._ended = True, why
 
     def interrupt(self) -> None:
-        """There was no supervision for longer than cars go on by themselves: they stand by now.
+        """Disarm all cars after a pause longer than `deadman`: they have stopped by themselves.
 
-        Words and pictures of before may be of a time that no clock has counted.
+        Earlier heartbeats and snapshots may be older than the clock says.
         """
         self._gate.interrupt()
-        self._taken.clear()  # ports took nothing, as nothing was sent
+        self._taken.clear()  # nothing was sent during the pause
 
     def tick(self, now: float, late: float, linked: Sequence[int]) -> dict[int, bytes]:
-        """What every car is sent now.
+        """Return the command of every car.
 
         After a pause in which cars have stopped by themselves, none moves until it is armed again.
 
         Args:
-            now: [s]
-            late: How late this tick is [s].
-            linked: Slots of the cars whose port is open; in a dry run of all.
+            now: Current time [s].
+            late: Delay of this tick [s].
+            linked: Slots of the cars with an open port; in a dry run of all.
 
         Returns:
-            Bytes by slot, for those with a car, whether its port is open or not. Of a driver that
-            fails there are none: its car stops by itself, and the others are told as ever.
+            Bytes by slot for all cars, also without an open port. A driver that fails yields none:
+            its car stops by itself, and the others get their commands.
         """
         self._late, self._missed = max(late, self._late), self._missed + (late > LATE)
         if now - self._now[0] > self._gate.params.deadman and np.isfinite(self._now[0]):
@@ -162,14 +162,14 @@ class Supervisor:
         return said
 
     def _is_linked(self, slot: int, now: float) -> bool:
-        """Whether commands of an open port leave; a car that hears none has stopped by itself."""
+        """Return whether commands reach the car; without commands it has stopped by itself."""
         if slot not in self._drivers:
             return True
         longest = self._gate.params.deadman + self._drivers[slot].gap
         return slot not in self._broken and now - self._taken.get(slot, now) <= longest
 
     def _is_due(self, slot: int, now: float, out: GateOutput) -> bool:
-        """Whether a controller takes a command by now; the first that stops it is always due."""
+        """Return whether a command is due, and note it; the first stop command always is."""
         t, moved = self._told.get(slot, (-np.inf, True))
         moves = bool(out.moving[0, slot])
         due = now - t >= self._drivers[slot].gap - HALF_A_TICK or (moved and not moves)
@@ -178,12 +178,12 @@ class Supervisor:
         return due
 
     def _bytes(self, slot: int, out: GateOutput) -> bytes:
-        """What a car is sent; nothing where its driver cannot even say neutral."""
+        """Return the command of a car; empty if its driver cannot encode neutral either."""
         driver = self._drivers[slot]
         if out.moving[0, slot]:
             try:
                 return driver.drive(float(out.speed[0, slot]), float(out.steering[0, slot]))
-            except Exception as error:  # whatever it is, the car must be told to stop
+            except Exception as error:  # of any kind: the car must get a stop command
                 self._broken[slot] = str(error)
         try:
             return driver.neutral()
@@ -192,24 +192,24 @@ class Supervisor:
             return b""
 
     def written(self, now: float, taken: Sequence[int]) -> None:
-        """What the last tick asked for was handed to the ports.
+        """Record that the commands of the last tick were passed to the ports.
 
         Args:
-            now: [s]
-            taken: Slots whose ports took it.
+            now: Current time [s].
+            taken: Slots whose ports took the command.
         """
         for slot in self._sent:
             if slot in taken:
                 self._taken[slot] = now
                 self._telemetry.sent(slot, self._drivers[slot].sequence - 1, now)
             else:
-                self._told.pop(slot, None)  # it was not
+                self._told.pop(slot, None)  # not sent
         t = float(self._picture.t[0])
         if t > self._decided:
             self._decided, self._lag = t, now - t
 
     def stopped(self) -> list[Notice]:
-        """Cars that were stopped for good since the last call, and why."""
+        """Return notices of the cars disarmed since the last call, with reasons."""
         assert self._output is not None
         armed, reason = self._output.armed[0], self._output.reason[0]
         lost = np.flatnonzero(self._armed & ~armed)
@@ -223,7 +223,7 @@ class Supervisor:
         return self._ended or reason_text(int(reason[slot]))
 
     def report(self) -> Report:
-        """What the gate did at the last tick."""
+        """Return the state and output of the gate at the last tick."""
         assert self._output is not None
         out = self._output
         report = Report(
@@ -244,7 +244,7 @@ class Supervisor:
         return report
 
     def _arm(self) -> list[Notice]:
-        # Well it is only after the next ticks, if its driver works again by then.
+        # A failed driver gets another try: its car counts as linked again from the next tick on.
         self._broken.clear()
         cars = np.zeros_like(self._linked)
         cars[0, list(self._drivers)] = True

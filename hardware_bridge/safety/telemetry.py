@@ -1,4 +1,4 @@
-"""What the cars' own controllers say of themselves, as far as the gate looks at it."""
+"""Telemetry of the cars' controllers, as used by the gate."""
 
 from __future__ import annotations
 
@@ -13,37 +13,37 @@ from hardware_bridge.safety.recent import Recent
 from tracking.arrays import F64, Bool
 
 OLD = 0.5
-"""[s] What a controller said so long ago of its speed is not looked at."""
+"""[s] Age from which a reported speed is ignored."""
 SAG = 2.0
-"""[s] Time constant of the mean voltage: a motor that starts lets it sag for a moment."""
+"""[s] Time constant of the mean voltage, since a starting motor lets it sag for a moment."""
 STANDS, DRIVES = 0.05, 0.2
-"""[m/s] A wheel as slow stands; a car that is asked for as much, and can go as slow, should not."""
+"""[m/s] A car slower than the first speed is at rest; commands from the second on must move it."""
 MARGIN = 1.1
-"""[-] Times the slowest that a car can go."""
+"""[-] Factor on a car's lowest speed; smaller commands need not move it."""
 COMMANDS = 1000
-"""[-] Commands of each car whose answers are waited for; more than it is sent until it is deaf."""
+"""[-] Number of unanswered commands kept per car; more than are sent within `answer_time`."""
 
 
 class Told(NamedTuple):
-    """Of every car, arrays over (env, car); harmless where a controller says nothing."""
+    """Telemetry of every car, arrays over (env, car); without effect where none is received."""
 
     over_for: F64
-    """Time for which it has been faster than it was ever asked to be [s]."""
+    """[s] Time for which the car has been faster than its commands explain."""
     idle_for: F64
-    """Time for which its wheels have stood although it is asked to drive [s]."""
+    """[s] Time for which the wheels have been at rest despite a command to drive."""
     deaf_for: F64
-    """Time since the newest command was sent that it answered, and since it told its speed, if it
-    has ever done so [s]: what is sent to it may wait in a server on the way."""
+    """[s] Time since the newest acknowledged command was sent, or since the last speed report if
+    there was one; the larger of both. Commands may wait in a server on the way."""
     fault: Bool
-    """Its controller has a fault."""
+    """True if the controller reports a fault."""
     cell: F64
-    """Mean voltage of a cell of its battery [V]; infinite where it is not known."""
+    """[V] Mean voltage of a battery cell; infinite if unknown."""
     watchdog: F64
-    """Time after which it stops by itself when it hears nothing [s]."""
+    """[s] Time without commands after which the car stops by itself."""
 
 
 def nothing_told(shape: tuple[int, ...], params: SafetyParams) -> Told:
-    """No controller says anything."""
+    """Return the values for cars without telemetry."""
     zero = np.zeros(shape)
     return Told(
         zero, zero, zero, np.zeros(shape, dtype=bool), np.full(shape, np.inf),
@@ -52,7 +52,7 @@ def nothing_told(shape: tuple[int, ...], params: SafetyParams) -> Told:
 
 
 class Telemetry:
-    """Takes readings, and knows since when something is wrong."""
+    """Evaluation of the controllers' readings: start times of faults, and voltages."""
 
     def __init__(
         self,
@@ -64,15 +64,15 @@ class Telemetry:
         answers: Sequence[bool],
         slowest: Sequence[float],
     ) -> None:
-        """Begin with nothing said.
+        """Create an evaluation without readings.
 
         Args:
             params: Limits.
-            n_cars: Slots.
-            cells: Of each car's battery; 0 where its voltage is not looked at.
-            watchdog: Of each car [s].
-            answers: Whether its controller answers every command.
-            slowest: Asked for less it stands, of each car [m/s].
+            n_cars: Number of slots.
+            cells: Number of battery cells of each car; 0 to ignore its voltage.
+            watchdog: Watchdog time of each car [s].
+            answers: True if the controller acknowledges every command.
+            slowest: Lowest speed of each car; it stops at smaller commands [m/s].
         """
         self._params = params
         self._cells = np.array(cells, dtype=np.float64)
@@ -80,7 +80,7 @@ class Telemetry:
         self._answers = np.array(answers, dtype=bool)
         self._drives = np.maximum(DRIVES, MARGIN * np.array(slowest, dtype=np.float64))
         self._sent: list[dict[int, float]] = [{} for _ in range(n_cars)]
-        """When each command was sent that is not answered yet, by its number [s]."""
+        """Time at which each unacknowledged command was sent, by its number [s]."""
         self._speed = np.zeros(n_cars)
         self._said = np.full(n_cars, -np.inf)
         self._answered = np.full(n_cars, -np.inf)
@@ -91,20 +91,20 @@ class Telemetry:
         self._idle_since = np.full(n_cars, np.inf)
 
     def sent(self, slot: int, command: int, now: float) -> None:
-        """A command was handed to a car's port, of this number [s]."""
+        """Record the number of a command and the time `now` [s] at which a car's port took it."""
         waiting = self._sent[slot]
         waiting[command] = now
         if len(waiting) > COMMANDS:
             del waiting[next(iter(waiting))]
 
     def take(self, slot: int, readings: Iterable[Reading], now: float) -> None:
-        """What a car's controller said just now [s]."""
+        """Process readings that a car's controller sent at time `now` [s]."""
         for reading in readings:
             match reading:
                 case MotionReading(speed=speed):
                     self._speed[slot], self._said[slot] = speed, now
                 case AckReading(command=command):
-                    # Of a command that it answers late it was told no sooner; it answers once.
+                    # An answer counts from the sending of its command, which has only one.
                     then = self._sent[slot].pop(command, -np.inf)
                     self._answered[slot] = max(self._answered[slot], then)
                 case StatusReading(voltage=voltage, fault=fault):
@@ -113,13 +113,13 @@ class Telemetry:
                         self._note_voltage(slot, voltage, now)
 
     def told(self, now: float, recent: Recent, moving: Bool, linked: Bool) -> Told:
-        """What rules look at, of one environment.
+        """Return the input of the rules, of one environment.
 
         Args:
-            now: [s]
-            recent: What the cars may still be doing for what they were sent.
-            moving: Whether they were let drive, (car).
-            linked: Whether their ports are open, (car).
+            now: Current time [s].
+            recent: Bounds of the cars' motion given the commands sent so far.
+            moving: True for cars permitted to drive, (car).
+            linked: True for cars with an open port, (car).
         """
         p, fresh = self._params, now - self._said <= OLD
         forward, backward = recent.forward[0], recent.backward[0]
@@ -128,7 +128,7 @@ class Telemetry:
         stands = fresh & (np.abs(self._speed) < STANDS)
         idle = moving & stands & (np.abs(recent.speed[0]) >= self._drives)
         self._idle_since = _since(self._idle_since, idle, now)
-        # It may answer from when its port is open on.
+        # Answers are expected from the opening of the port on.
         self._answered = np.where(linked & np.isfinite(self._answered), self._answered, now)
         known = np.isfinite(self._volts) & (self._cells > 0.0)
         cell = np.where(known, self._volts / np.maximum(self._cells, 1.0), np.inf)
@@ -153,5 +153,5 @@ class Telemetry:
 
 
 def _since(since: F64, is_so: Bool, now: float) -> F64:
-    """Since when something has been so; infinite where it is not."""
+    """Return the start of a condition that holds; infinite where it does not hold."""
     return np.where(is_so, np.minimum(since, now), np.inf)

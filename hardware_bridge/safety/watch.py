@@ -1,4 +1,4 @@
-"""The loop of the supervisor's process: ports of cars, ticks, and what it is told."""
+"""Main loop of the supervisor process: ports of cars, ticks and messages."""
 
 from __future__ import annotations
 
@@ -29,24 +29,24 @@ from hardware_bridge.safety.messages import (
 from hardware_bridge.safety.supervisor import Supervisor
 
 LINGER = 30
-"""[ticks] Neutral is sent so many times before the ports are closed."""
+"""[ticks] Number of ticks with neutral commands before the ports are closed."""
 
 
 def supervise(charge: Charge, talk: socket.socket) -> None:
-    """What the process does until it is told to quit or left alone.
+    """Run the supervisor process until it is ordered to quit or the deciding process is gone.
 
     Args:
-        charge: What it is responsible for.
-        talk: Its end of the pair.
+        charge: Configuration of the supervisor.
+        talk: The supervisor's end of the socket pair.
     """
-    # What a terminal does to its processes, by keys or because it is closed, would reach both: the
-    # deciding process says what is to be done, or is gone.
+    # Signals of the terminal, from keys or its closing, would reach both processes; here they are
+    # ignored, since the deciding process sends orders or ends.
     with contextlib.suppress(OSError):
         os.setsid()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
     _hurry()
-    with contextlib.suppress(OSError):  # for who looks at what has a port open
+    with contextlib.suppress(OSError):  # name shown by tools that list open ports
         Path("/proc/self/comm").write_text("relpos-gate")
     talk.setblocking(False)
     try:
@@ -65,7 +65,7 @@ def supervise(charge: Charge, talk: socket.socket) -> None:
 
 
 class _Watch:
-    """The supervisor with its ports, in its process."""
+    """The supervisor with its ports."""
 
     def __init__(self, charge: Charge, talk: socket.socket) -> None:
         self._talk, self._n_cars, self._dry = talk, charge.n_cars, charge.dry
@@ -90,7 +90,7 @@ class _Watch:
         specs = [car.port for _, car in charge.cars]
         self._links = Links(specs, time.monotonic_ns)
         for driver in self._drivers.values():
-            driver.drive(0.0, 0.0)  # loads what is compiled; nothing is sent
+            driver.drive(0.0, 0.0)  # loads compiled code; nothing is sent
         self._links.watch(talk.fileno())
         self._up: set[str] = set()
         self._asleep = asleep_ns()
@@ -98,11 +98,11 @@ class _Watch:
         self._failed: set[tuple[str, str]] = set()
 
     def abandon(self, why: str) -> None:
-        """Let the cars stand for good, and end."""
+        """Stop the cars permanently, and end."""
         self._supervisor.abandon(why)
 
     def run(self) -> None:
-        """Tick after tick."""
+        """Run ticks until the supervisor has quit."""
         deadline, n_ticks, lingered = time.monotonic_ns() + TICK_NS, 0, 0
         while lingered < LINGER:
             left = deadline - time.monotonic_ns()
@@ -119,7 +119,7 @@ class _Watch:
             if now < deadline:
                 continue
             n_ticks += 1
-            # After a stop, the ticks of the past are not made up for.
+            # Missed ticks are not made up for after a pause.
             deadline = now + TICK_NS if late > TICK_NS else deadline + TICK_NS
             if n_ticks % REPORT_EVERY == 0:
                 self._say([self._supervisor.report()])
@@ -127,14 +127,14 @@ class _Watch:
             lingered += self._supervisor.quit
 
     def close(self) -> None:
-        """Let the cars stand, and release ports and socket."""
+        """Send neutral to all cars; close ports and socket."""
         for name, slot in self._slots.items():
             self._send(name, "neutral", self._drivers[slot].neutral)
         self._links.close()
         self._talk.close()
 
     def _act(self, now: int, late: float) -> None:
-        """Tell every car what it may do now."""
+        """Send every car its command."""
         up = {name for name in self._slots if self._links.is_up(name)}
         for name in up - self._up:
             self._send(name, "greeting", self._drivers[self._slots[name]].opening)
@@ -145,7 +145,7 @@ class _Watch:
         self._asleep = asleep
         linked = [*self._dry, *(self._slots[name] for name in up)]
         sent = self._supervisor.tick(now * 1e-9, late, linked)
-        # Each by itself: one that fails keeps none of the others from being told.
+        # Each port is written separately: a failed one does not affect the others.
         taken = [slot for name, slot in self._slots.items() if self._links.send(name, sent[slot])]
         self._supervisor.written(time.monotonic_ns() * 1e-9, taken)
         said: list[Message] = [
@@ -159,18 +159,18 @@ class _Watch:
             self._send(name, "question", self._drivers[slot].ask)
 
     def _send(self, name: str, what: str, words: Callable[[], bytes]) -> None:
-        """Let a driver speak; one that cannot is told of once, and keeps no other from it."""
+        """Send a message of a driver; report a failure once, without effect on other cars."""
         try:
             data = words()
             if data:
                 self._links.send(name, data)
-        except Exception as error:  # of whatever kind, the other cars must be told
+        except Exception as error:  # of any kind: the other cars must get their messages
             if (name, what) not in self._failed:
                 self._failed.add((name, what))
                 self._say([Notice(f"{name}: its driver cannot make the {what}: {error}")])
 
     def _listen(self) -> bool:
-        """Take in what the deciding process said; whether a decision was among it."""
+        """Process pending messages; return whether one of them requires acting at once."""
         decided = False
         while True:
             try:
@@ -183,7 +183,7 @@ class _Watch:
                 if self._alone:
                     return decided
                 self._alone = True
-                # It would be readable from here on.
+                # A closed socket stays readable.
                 self._links.unwatch(self._talk.fileno())
                 if not self._supervisor.quit:
                     self.abandon("the deciding process is gone")
@@ -197,7 +197,7 @@ class _Watch:
             self._say(self._supervisor.take(message))
 
     def _say(self, messages: Sequence[Message]) -> None:
-        """Tell the deciding process; if it does not listen, so be it."""
+        """Send messages to the deciding process; drop those that it does not take."""
         for message in messages:
             with contextlib.suppress(OSError):
                 self._talk.send(pack(message))
@@ -208,9 +208,9 @@ def _now_us() -> int:
 
 
 def asleep_ns() -> int:
-    """How long the computer was suspended since it started; 0 where no clock tells [ns].
+    """Return the time for which the computer was suspended since its start [ns]; 0 if unknown.
 
-    The monotonic clock stands still meanwhile, so that no time seems to have passed.
+    The monotonic clock does not count this time.
     """
     if not hasattr(time, "CLOCK_BOOTTIME"):
         return 0
@@ -218,9 +218,9 @@ def asleep_ns() -> int:
 
 
 def _hurry() -> None:
-    """Ask for a place before other processes; without the right to, the default has to do."""
+    """Raise the process priority; keep the default without permission."""
     with contextlib.suppress(OSError, AttributeError):
         os.setpriority(os.PRIO_PROCESS, 0, -10)
-    # It computes for a twentieth of the time at most, and those that it keeps waiting can wait.
+    # The supervisor uses a twentieth of a core at most, and other processes can wait for it.
     with contextlib.suppress(OSError, AttributeError):
         os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(10))

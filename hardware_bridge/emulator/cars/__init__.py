@@ -1,4 +1,4 @@
-"""Motor controllers that are not there: the other ends of the drivers."""
+"""Emulated motor controllers: the counterparts of the drivers."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ FIRMWARE: dict[str, Callable[[int, Any, bytes | None, int], CarFirmware]] = {
     "vesc": lambda node, options, key, boot: VescFirmware(node, options),
     "relpos": RelposFirmware,
 }
-"""Name of a driver to the firmware of its controller: from node, options and key of the driver and
-the boot number of the car."""
+"""Name of a driver to the firmware of its controller, from node, options and key of the driver and
+boot number of the car."""
 
 
 def make_firmware(
     name: str, node: int, options: Mapping[str, object], key: bytes | None = None, boot: int = 1
 ) -> CarFirmware:
-    """The firmware that a driver of these options talks to.
+    """Return the firmware that matches a driver.
 
     Args:
         name: One of `FIRMWARE`.
         node: The node that the car carries.
-        options: Those of the driver.
-        key: That of the driver, if it signs.
+        options: Options of the driver.
+        key: Key of the driver, if it signs.
         boot: Differs from one start of the car to the next, for firmware that numbers messages.
 
     Raises:

@@ -11,11 +11,11 @@ from hardware_bridge.readings import UNNAMED, DriveReading, Reading
 
 _LINE = re.compile(rb"\s*(\d{4}), *(\d{4})\s*")
 _LONGEST = 64
-"""[bytes] Of a line; longer ones are damaged."""
+"""[bytes] Longest valid line; longer ones are damaged."""
 
 
 class PwmFirmware:
-    """See the head of this file; `options` say how the car is built, as for the driver."""
+    """Firmware as described at the head of this file; `options` are those of the driver."""
 
     deadman = DEADMAN
 
@@ -27,7 +27,7 @@ class PwmFirmware:
         self._is_long = False
 
     def feed(self, data: bytes) -> list[DriveReading]:
-        """Take bytes as they come; one reading for every line of two pulses."""
+        """Process received bytes; return a reading for every line of two pulses."""
         self.counts.n_bytes += len(data)
         readings = []
         *ended, rest = data.split(b"\r")
@@ -45,12 +45,12 @@ class PwmFirmware:
         return readings
 
     def encode(self, readings: list[Reading]) -> bytes:
-        """What the board reports of its remote control, which is not touched."""
+        """Return the report of the board's remote control, which is in neutral."""
         options = self._options
         return b"%d, %d\r\n" % (options.steering_centre, options.throttle_centre)
 
     def _keep(self, part: bytes) -> None:
-        """Add to the line, of which no more is kept than can be one."""
+        """Add to the line, up to the length of the longest valid one."""
         room = _LONGEST - len(self._line)
         self._is_long = self._is_long or len(part) > room
         self._line += part[:room]

@@ -1,4 +1,4 @@
-"""Our own firmware on a car: commands in the wire format, acknowledged one by one."""
+"""Our own firmware on a car: commands in the wire format, each acknowledged."""
 
 from __future__ import annotations
 
@@ -10,26 +10,26 @@ from hardware_bridge.wire.definition import HOST
 from hardware_bridge.wire.encoder import RelposEncoder
 
 MOST_ACKS = 64
-"""Commands that are remembered until they are acknowledged."""
+"""Largest number of pending acknowledgements."""
 
 
 class RelposFirmware:
-    """See the head of this file; `options` are those of the driver.
+    """Firmware as described at the head of this file; `options` are those of the driver.
 
-    Law: a command is taken once. Of a start of the host only rising numbers are taken; with a key,
-    also only rising boots, so that nothing that was recorded moves the car again.
+    Invariant: a command is executed at most once. Within a boot of the host only rising numbers are
+    accepted; with a key also only rising boots, so that a recorded command never moves the car.
     """
 
     deadman = DEADMAN
 
     def __init__(self, node: int, options: RelposOptions, key: bytes | None, boot: int) -> None:
-        """Start.
+        """Start the firmware.
 
         Args:
             node: The node that the car carries.
-            options: Limits; beyond them nothing is done.
-            key: Of the MAC, or None.
-            boot: Of this start of the car.
+            options: Limits of the commands.
+            key: Key of the MAC, or None.
+            boot: Boot number of this start of the car.
         """
         self._to, self._options, self._keyed = str(node), options, key is not None
         self._decoder = RelposDecoder(key)
@@ -39,7 +39,7 @@ class RelposFirmware:
         self._acks: list[int] = []
 
     def feed(self, data: bytes) -> list[DriveReading]:
-        """Take bytes as they come; one reading for every new command to this car."""
+        """Process received bytes; return a reading for every new command to this car."""
         taken = []
         for reading in self._decoder.feed(data):
             if not isinstance(reading, DriveReading) or reading.to != self._to:
@@ -56,7 +56,7 @@ class RelposFirmware:
         return taken
 
     def encode(self, readings: list[Reading]) -> bytes:
-        """The readings of this moment, and an answer to every command since the last call."""
+        """Return the bytes of the readings, and of an acknowledgement of every pending command."""
         said = list(readings)
         if readings:
             said += [AckReading(readings[0].source, command) for command in self._acks]

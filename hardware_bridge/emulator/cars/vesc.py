@@ -1,7 +1,7 @@
-"""Firmware of an emulated VESC: frames to commands, values when asked.
+"""Firmware of an emulated VESC: frames to commands, and values on request.
 
-A SERVO frame turns the servo and commands no motor: it is seen in the next motor command, and does
-not keep the car going.
+A SERVO frame turns the servo and is no motor command: the next motor command contains the new
+steering angle, and SERVO alone does not reset the dead man's switch.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from hardware_bridge.readings import UNNAMED, DriveReading, MotionReading, Readi
 
 _LENGTHS = {GET_VALUES: 1, SET_RPM: 5, SET_CURRENT_BRAKE: 5, SET_SERVO: 3}
 _MOST_ASKED = 8
-"""Questions that are remembered until they are answered."""
+"""Largest number of pending requests."""
 
 
 class VescFirmware:
-    """See the head of this file; `options` say how the car is built, as for the driver."""
+    """Firmware as described at the head of this file; `options` are those of the driver."""
 
     deadman = DEADMAN
 
@@ -42,7 +42,7 @@ class VescFirmware:
         self._values = VescValues(erpm=0, voltage=0.0, fault=0)
 
     def feed(self, data: bytes) -> list[DriveReading]:
-        """Take bytes as they come; one reading for every SET_RPM and CURRENT_BRAKE."""
+        """Process received bytes; return a reading for every SET_RPM and SET_CURRENT_BRAKE."""
         readings = []
         for payload in self._frames.feed(data):
             command = payload[0]
@@ -61,7 +61,7 @@ class VescFirmware:
         return readings
 
     def encode(self, readings: list[Reading]) -> bytes:
-        """An answer for every question since the last call."""
+        """Return an answer to every request since the last call."""
         values = self._values
         erpm, voltage, fault = values.erpm, values.voltage, values.fault
         for reading in readings:

@@ -1,6 +1,6 @@
-"""Encoders: the devices' end of the formats, for nodes that are not there.
+"""Encoders of emulated devices.
 
-`decode(encode(readings))` gives the readings back, within the resolution of the format.
+`decode(encode(readings))` returns the readings, within the resolution of the format.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ ENCODERS: dict[str, Callable[[str], Encoder]] = {
     "rplidar": RplidarEncoder,
     "positions": PositionsEncoder,
 }
-"""Name of the format to what builds the encoder of the device of that name."""
+"""Name of the format to a factory of the encoder from the name of its device."""
 
 
 def make_encoder(name: str, device: str) -> Encoder:
-    """The encoder of one device.
+    """Return the encoder of one device.
 
     Args:
         name: A key of `ENCODERS`.
-        device: Its own id, as its format writes ids.
+        device: Id of the device as its format writes ids.
 
     Raises:
-        BridgeError: No such format, or no such id in it.
+        BridgeError: Unknown format, or an invalid id.
     """
     if name not in ENCODERS:
         raise BridgeError(f"format {name!r} is not known; choose one of {', '.join(ENCODERS)}")

@@ -1,4 +1,4 @@
-"""The end of a DWM1001 with the maker's firmware: a line of distances a moment."""
+"""Encoder of a DWM1001 with the manufacturer's firmware: a line of distances per instant."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from hardware_bridge.readings import RangeReading, Reading
 
 ID = re.compile(r"[0-9A-F]{4}")
 MOST_ANCHORS = 4
-"""The firmware ranges with so many at a time."""
+"""Largest number of anchors that the firmware ranges with at a time."""
 
 
 class Dwm1001Encoder:
-    """A tag in the shell's ``lec`` stream; its own name goes nowhere."""
+    """A tag in the shell's ``lec`` stream; the format does not include its own id."""
 
     def __init__(self, device: str) -> None:
         self._device = device
 
     def encode(self, readings: list[Reading]) -> bytes:
-        """A line for every four ranges of a moment to anchors with ids of this format."""
+        """Return a line for every four ranges of an instant to anchors with ids of this format."""
         lines = []
         for moment in moments(readings):
             ranges = [r for r in moment if isinstance(r, RangeReading) and ID.fullmatch(r.to)]
@@ -29,6 +29,6 @@ class Dwm1001Encoder:
 
 
 def distances_line(ranges: list[RangeReading]) -> str:
-    """The line; anchors whose position was not entered stand at the origin."""
+    """Return the line; anchors have the position of the origin, as if none had been entered."""
     anchors = (f",AN{k},{r.to},0.00,0.00,0.00,{r.distance:.2f}" for k, r in enumerate(ranges))
     return f"DIST,{len(ranges)}{''.join(anchors)}\r\n"

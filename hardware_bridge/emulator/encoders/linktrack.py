@@ -1,4 +1,4 @@
-"""LinkTrack's end: Node_Frame3 of ranges, Node_Frame2 where there is a sample of the IMU."""
+"""Encoder of a LinkTrack node: Node_Frame3 of ranges, Node_Frame2 with an IMU sample."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ MOST_MILLIMETRES = (1 << 23) - 1
 
 
 def role_and_number(name: str) -> tuple[int, int] | None:
-    """The role and number that `linktrack.name_of` writes so."""
+    """Return the role and number of a name written by `linktrack.name_of`."""
     match = NAME.fullmatch(name)
     if match is None or int(match[2]) > 255:
         return None
@@ -48,7 +48,7 @@ class LinkTrackEncoder:
         self._role, self._number = own
 
     def encode(self, readings: list[Reading]) -> bytes:
-        """A frame a moment, and one for each further sample of the IMU."""
+        """Return a frame per instant, and one for each further IMU sample."""
         return b"".join(map(self._moment, moments(readings)))
 
     def _moment(self, readings: list[Reading]) -> bytes:
@@ -84,7 +84,7 @@ class LinkTrackEncoder:
 
 
 def neighbour(function: int, reading: RangeReading) -> bytes:
-    """The part of a frame that tells one range."""
+    """Return the part of a frame that holds one range."""
     other = role_and_number(reading.to)
     assert other is not None
     millimetres = min(round(reading.distance * 1000.0), MOST_MILLIMETRES)
@@ -94,5 +94,5 @@ def neighbour(function: int, reading: RangeReading) -> bytes:
 
 
 def half_decibels(power: float | None) -> int:
-    """A power [dBm] as the format writes it; 0 is none."""
+    """Return a power [dBm] in the format's units; 0 is none."""
     return 0 if power is None else min(max(round(power * -2.0), 0), 255)

@@ -1,4 +1,4 @@
-"""The end of another tracker: a JSON line a pair or a node."""
+"""Encoder of an external tracker: a JSON line per pair or node."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from tracking.estimate import Status
 
 
 class PositionsEncoder:
-    """A computer that knows where everybody is; its own name goes nowhere."""
+    """A computer with the positions of all nodes; the format does not include its own id."""
 
     def __init__(self, device: str) -> None:
         self._device = device
 
     def encode(self, readings: list[Reading]) -> bytes:
-        """A line for every reading of a pair or a node, with all digits."""
+        """Return a line for every reading of a pair or a node, with all digits."""
         lines = []
         for reading in readings:
             if isinstance(reading, PairReading):
@@ -41,7 +41,7 @@ class PositionsEncoder:
 
 
 def motion(reading: PairReading | PoseReading) -> dict[str, Any]:
-    """What is known of position and velocity."""
+    """Return the known position, velocity and covariance of a reading."""
     said: dict[str, Any] = {}
     if reading.pos is not None:
         said["pos"] = reading.pos

@@ -1,4 +1,4 @@
-"""A time of a reading on the clock that a format writes."""
+"""Conversion of the time of a reading to the clock of a format."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from hardware_bridge.readings import DeviceClock, Reading
 
 
 def ticks_on(clock: DeviceClock, reading: Reading) -> int:
-    """When it was measured, in whole ticks of `clock`; 0 where it does not say."""
+    """Return the time of measurement in whole ticks of `clock`; 0 without a time."""
     said = reading.source
     if said.ticks is None or said.clock is None:
         return 0
@@ -18,5 +18,5 @@ def ticks_on(clock: DeviceClock, reading: Reading) -> int:
 
 
 def moments(readings: list[Reading]) -> list[list[Reading]]:
-    """Readings that follow each other and were made at the same time, together."""
+    """Group consecutive readings of the same time."""
     return [list(same) for _, same in groupby(readings, key=lambda r: r.source.ticks)]

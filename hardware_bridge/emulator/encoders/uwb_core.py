@@ -1,4 +1,4 @@
-"""The end of a board with uwb-core: one JSON line a range, as of 2021."""
+"""Encoder of a board with uwb-core: one JSON line per range, as of 2021."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class UwbCoreEncoder:
         self._device = device
 
     def encode(self, readings: list[Reading]) -> bytes:
-        """A line for each range between boards with ids of this format."""
+        """Return a line for each range between boards with ids of this format."""
         return "".join(
             self._line(r)
             for r in readings

@@ -1,1 +1,1 @@
-"""Distances and turning circles for the rules of the gate."""
+"""Geometry for the rules of the gate: stopping distances, turning circles, polygons."""

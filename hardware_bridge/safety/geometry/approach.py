@@ -1,7 +1,7 @@
-"""How fast cars may go, and how far turn, by the room to what stands around them.
+"""Limits of speed and steering given the clearance to obstacles.
 
-From any speed that is allowed a car comes to rest within the room, whichever way it is steered
-meanwhile within what is allowed: `turning` has the ways, `braking` the speeds.
+From any permitted speed a car stops within the clearance, for any steering within the permitted
+angles: `turning` has the path lengths, `braking` the speeds.
 """
 
 from __future__ import annotations
@@ -16,26 +16,25 @@ from hardware_bridge.safety.picture import Picture
 from tracking.arrays import F64, Bool
 
 ABEAM = 0.7
-"""[-] Sine of the angle from which on something stands next to a car, not before or behind it."""
+"""[-] Sine of the angle to the heading above which an obstacle is abeam, not ahead or astern."""
 CREEP = 0.02
-"""[m] What is left of the way when a speed controller that follows a falling speed seems to be at
-rest."""
+"""[m] Distance to go at which a speed controller that follows a falling speed seems at rest."""
 REAR = 0.16
-"""[m] From the rear axle to the middle of a 1:10 car, which swings out when the car turns."""
+"""[m] From the rear axle to the centre of a 1:10 car, which swings out when the car turns."""
 
 
 def approach(
     m: Moment, p: SafetyParams, towards: F64, room: F64, spread: F64, counts: Bool
 ) -> Verdict:
-    """What things leave to the cars.
+    """Return the limits that obstacles impose on the cars.
 
     Args:
-        m: The moment.
+        m: Input of the rule.
         p: Limits.
-        towards: Shortest ways to things, (env, car, thing, 2).
-        room: How much nearer cars may come, (env, car, thing) [m].
-        spread: How far the directions may be off, (env, car, thing) [rad].
-        counts: Which things are there, (env, car, thing).
+        towards: Directions to the obstacles, (env, car, thing, 2).
+        room: Clearance: distance by which cars may approach, (env, car, thing) [m].
+        spread: Largest error of the directions, (env, car, thing) [rad].
+        counts: True for obstacles that are present, (env, car, thing).
     """
     angle, on_left = bearing(ahead_of(m.picture)[:, :, None], towards)
     share = np.where(
@@ -46,11 +45,11 @@ def approach(
     told = np.where(on_left, *sides)
     tightest = p.turning_radius * np.tan(p.max_steering)
     radius = tightest / np.maximum(np.tan(np.maximum(limit, told)), 1e-3)
-    # Where it may not turn towards a thing at all, it may drive on while it turns away from it.
+    # If it may not turn towards an obstacle at all, it may drive on while it turns away from it.
     away = m.recent.steering[..., None] * np.where(on_left, -1.0, 1.0)
     away = np.where(told == 0.0, np.clip(away, 0.0, p.max_steering - limit), 0.0)
     turned = np.maximum(np.where(on_left, *sides[::-1]), limit)
-    # The middle of a car goes off its heading when it turns: backwards, to the outside.
+    # The centre of a car moves off its heading in a turn: backwards, to the outside.
     inner, outer = REAR / radius, REAR / tightest * np.tan(turned)
     swings = np.arctan(inner) - np.arctan(REAR / tightest * np.tan(away)), np.arctan(outer)
     time = (p.reaction + age_of(m))[..., None]
@@ -68,7 +67,7 @@ def approach(
 
 
 def bearing(ahead: F64, towards: F64) -> tuple[F64, Bool]:
-    """Angle between directions, 0 to pi [rad], and whether the second is to the left."""
+    """Return the angle between directions, 0 to pi [rad], and whether the second is to the left."""
     along = ahead[..., 0] * towards[..., 0] + ahead[..., 1] * towards[..., 1]
     left = ahead[..., 0] * towards[..., 1] - ahead[..., 1] * towards[..., 0]
     angle: F64 = np.arctan2(np.abs(left), along)
@@ -76,12 +75,12 @@ def bearing(ahead: F64, towards: F64) -> tuple[F64, Bool]:
 
 
 def ahead_of(q: Picture) -> F64:
-    """Where cars point, (env, car, 2); NaN where that is unknown."""
+    """Return the directions of the cars, (env, car, 2); NaN where the heading is unknown."""
     heading = np.where(np.isfinite(q.heading), q.heading, np.nan)
     return np.stack([np.cos(heading), np.sin(heading)], axis=-1)
 
 
 def age_of(m: Moment) -> F64:
-    """Of the picture, (env, 1) [s]; where there is none the cars stand for other reasons."""
+    """Return the age of the snapshot, (env, 1) [s]; 0 without one, as other rules stop the cars."""
     age = m.now - m.picture.t
     return np.clip(np.where(np.isfinite(age), age, 0.0), 0.0, 1.0)[:, None]

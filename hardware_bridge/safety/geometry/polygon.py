@@ -1,4 +1,4 @@
-"""Where a place stands in a polygon, the fence."""
+"""Position of a point relative to a polygon, such as the fence."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from tracking.arrays import F64, Bool
 
 
 def to_edges(place: F64, corners: F64) -> tuple[Bool, F64]:
-    """Whether places are inside a polygon, and the way to the nearest point of each edge.
+    """Return whether points are inside a polygon, and the offset to the nearest point of each edge.
 
     Args:
-        place: (..., 2) [m]
-        corners: (corner, 2) [m]
+        place: Points, (..., 2) [m].
+        corners: Corners of the polygon, (corner, 2) [m].
 
     Returns:
         Inside, (...); offsets to the edges, (..., corner, 2) [m].
@@ -30,13 +30,13 @@ def to_edges(place: F64, corners: F64) -> tuple[Bool, F64]:
 
 
 def area(corners: F64) -> float:
-    """Of a polygon [m2]; positive where its corners go counter-clockwise."""
+    """Return the area of a polygon [m2]; positive for counter-clockwise corners."""
     (x, y), (u, v) = corners.T, np.roll(corners, -1, axis=0).T
     return float(0.5 * (x * v - u * y).sum())
 
 
 def outwards(corners: F64) -> F64:
-    """Unit normals of the edges that point out of a polygon, (corner, 2)."""
+    """Return the outward unit normals of the edges of a polygon, (corner, 2)."""
     edge = np.roll(corners, -1, axis=0) - corners
     length = np.maximum(np.hypot(edge[:, 0], edge[:, 1]), 1e-9)
     right = np.stack([edge[:, 1], -edge[:, 0]], axis=-1) / length[:, None]
