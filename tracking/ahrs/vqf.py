@@ -79,7 +79,7 @@ def store_unit(q, e, n, at, w, x, y, z):
 
 @small_kernel
 def integrate(s, c, e, n, dt, gx, gy, gz):
-    """Process a gyroscope reading [rad/s] over dt [s]: rest detection, then strapdown integration."""
+    """Process a gyroscope reading [rad/s] over dt [s]: rest detection, then strapdown."""
     q = s.tilt
     q[e, n, N_GYR_READ] += 1.0
     watch_gyroscope(s.rest, c, e, n, q[e, n, N_GYR_READ], gx, gy, gz)
@@ -186,7 +186,7 @@ def update_heading(s, c, e, n, mx, my, mz):
 
 @small_kernel
 def about_vertical(cos, sin, q, e, n):
-    """Return the 6D orientation rotated about the vertical, given cosine and sine of the half angle."""
+    """Return the 6D orientation rotated about the vertical, by cos and sin of the half angle."""
     w, x, y, z = q[e, n, Q_6D], q[e, n, Q_6D + 1], q[e, n, Q_6D + 2], q[e, n, Q_6D + 3]
     return cos * w - sin * z, cos * x - sin * y, cos * y + sin * x, cos * z + sin * w
 
