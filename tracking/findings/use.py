@@ -1,4 +1,4 @@
-"""What of a recording can be used: which sensors, and which nodes are placed."""
+"""Use of a recording: unused sensors, nodes that are never placed, rejected ranges."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from tracking.log.folder import Log
 from tracking.measurements import Kind
 
 MOST_REFUSED = 0.2
-"""[-] Share of ranges; recordings that are tracked have up to 0.02, one that is lost has 0.5."""
+"""[-] Largest share of rejected ranges; tracked recordings have up to 0.02, a lost one 0.5."""
 
 
 def find_unused(log: Log) -> list[Finding]:
-    """Sensors that are missing or cannot be used."""
+    """Find sensors that are missing or cannot be used."""
     block, constellation, found = log.block, log.constellation, list[Finding]()
     kind, node = block.kind[0], block.i[0]
     with_imu = np.unique(node[kind == Kind.IMU])
@@ -45,11 +45,11 @@ def find_unused(log: Log) -> list[Finding]:
 
 
 def find_unplaced(log: Log, estimate: TeamEstimate) -> list[Finding]:
-    """Nodes that were never placed, and what they lack.
+    """Find nodes that were never placed, and the ranges that they lack.
 
     Args:
-        log: The recording.
-        estimate: Its estimates, arrays over (time, pair).
+        log: A recording.
+        estimate: Estimates of the recording, arrays over (time, pair).
     """
     constellation, block = log.constellation, log.block
     placed = np.asarray(estimate.status >= Status.AMBIGUOUS)
@@ -80,11 +80,11 @@ def find_unplaced(log: Log, estimate: TeamEstimate) -> list[Finding]:
 
 
 def find_refused(log: Log, n_refused: int) -> list[Finding]:
-    """Find ranges that contradict the filter's model of them.
+    """Report a large share of rejected ranges.
 
     Args:
-        log: The recording.
-        n_refused: Ranges that the filter refused as outliers.
+        log: A recording.
+        n_refused: Number of ranges that the filter rejected as outliers.
     """
     share = n_refused / max(log.n_ranges, 1)
     if share <= MOST_REFUSED:
