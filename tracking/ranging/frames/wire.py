@@ -5,14 +5,14 @@ Every node sends the same layout, little-endian, in an IEEE 802.15.4 data frame:
     offset  bytes  field
     0       2      frame control, 0x8841: data, short addresses, one PAN
     2       1      sequence number of the sender
-    3       2      PAN, which separates groups that must not hear each other
     3       2      PAN, which separates groups that must not range with each other
+    5       2      destination, 0xFFFF: all
     7       2      source: ID of the sender, 0 to 254
     9       1      version (high four bits), type (low four bits)
     10      1      root: ID of the initiator that the sender follows
     11      1      round, counted by the initiator
+    12      1      slot of this message in the round
     13      1      n: number of members of the round
-    13      1      n: members of the round
     14      1      part (high four bits), number of parts minus one (low four bits)
     15      1      boot: a random number drawn when the sender was switched on
     16      5      time stamp of this very transmission
