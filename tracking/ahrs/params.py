@@ -25,8 +25,8 @@ class RestParams:
     after: float = 1.5
     """[s] Time for which readings must stay near their low passes."""
     rate: float = math.radians(4.0)
-    """[rad/s] Largest deviation of the gyroscope. The noise of `isas_walk1`, 0.5 to 0.8 deg/s along
-    each axis, exceeds VQF's 2 deg/s, so that its bias would never be estimated."""
+    """[rad/s] Largest deviation of the gyroscope. Noise peaks of `isas_walk1`, 0.5 to 0.8 deg/s per
+    axis, exceed VQF's 2 deg/s, so that its bias would never be estimated."""
     accel: float = 0.5
     """[m/s2] Largest deviation of the accelerometer."""
     largest_bias: float = math.radians(2.0)

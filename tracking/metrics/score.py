@@ -11,9 +11,9 @@ Relative positions are scored in the world frame over the pairs with at least on
 - ``nees``: mean of e^T P^-1 e over the position errors e after that yaw, per dimension: 1 if the
   covariance P is right, larger if the filter is overconfident [1]. P refers to the filter's own
   north, which no measurement relates to another.
+- ``protection_share``: share of OK positions beyond their protection radius, after that yaw.
 - ``integrity_share`` and ``integrity_worst_s``: share and time of pairs that are OK and wrong,
   after that yaw and over the whole run (`tracking.metrics.integrity`).
-  that yaw and over the whole run (`tracking.metrics.integrity`).
 
 References:
     [1] Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking and Navigation,
