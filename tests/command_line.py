@@ -1,4 +1,4 @@
-"""The command line in the process of a test: what it writes and its status, imports paid once."""
+"""In-process command line for tests: output and exit status, with imports done once."""
 
 import contextlib
 import io
@@ -12,7 +12,7 @@ from agents.cli.main import main
 
 @dataclass(frozen=True)
 class Done:
-    """What a command wrote, and its exit status."""
+    """Output and exit status of a command."""
 
     returncode: int
     stdout: str
@@ -20,7 +20,7 @@ class Done:
 
 
 def relpos(*args, cwd="."):
-    """Run ``relpos ARGS`` in a folder, as `agents.cli.main.main` of a process of its own would."""
+    """Run ``relpos ARGS`` in a folder, as `agents.cli.main.main` in a process of its own would."""
     out, err, code = io.StringIO(), io.StringIO(), 0
     with (
         mock.patch.object(sys, "argv", ["relpos", *map(str, args)]),

@@ -1,4 +1,4 @@
-"""Where recorded data is, and groups that many tests share."""
+"""Shared fixtures: the folder of recorded data, and groups."""
 
 import os
 from pathlib import Path
@@ -10,7 +10,7 @@ from hypothesis import settings
 from tracking.constellation import Constellation, NodeConfig
 from tracking.measurements import Kind, MeasurementBlock
 
-# A first example may have kernels compiled in it.
+# The first example may include compilation of kernels.
 settings.register_profile("compiled", deadline=None)
 settings.load_profile("compiled")
 
@@ -25,7 +25,7 @@ def find_data() -> Path | None:
 
 @pytest.fixture(scope="session")
 def data() -> Path:
-    """The folder of recorded data; tests that need it skip elsewhere, never in CI."""
+    """Return the folder of recorded data; tests without it are skipped, but never in CI."""
     folder = find_data()
     if folder is None:
         message = "no recorded data: set RELPOS_DATA to a folder with logs/"
@@ -37,7 +37,7 @@ def data() -> Path:
 
 @pytest.fixture(scope="session", autouse=True)
 def logs_of_stable_baselines(tmp_path_factory):
-    """It makes a folder for every learner that is given no logger."""
+    """Redirect the log folders that Stable-Baselines3 makes for learners without a logger."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("SB3_LOGDIR", str(tmp_path_factory.mktemp("sb3")))
         yield

@@ -1,4 +1,4 @@
-"""Vehicles that follow each other along one path: alike in all, so that motion tells little."""
+"""Vehicles that follow each other along one path: equal motions carry little information."""
 
 import numpy as np
 
@@ -7,11 +7,11 @@ from tracking.measurements import Kind
 
 GAP, SPEED, STEP = 1.2, 0.9, 0.005
 STRAIGHTS = ((-20.0, 8.0), (25.0, 38.0))
-"""[m] Parts of the path that are straight; between them curvatures of up to 0.5 / m alternate."""
+"""[m] Straight parts of the path; between them curvatures of up to 0.5 / m alternate."""
 
 
 class Convoy(ExactGroup):
-    """One behind the other, from rest on; accelerations vibrate, ranges have lasting errors."""
+    """A convoy that starts from rest, with vibrating accelerations and lasting range errors."""
 
     def __init__(self, vehicle, n, seed, *, hz=50.0, seconds=60.0):
         rng = np.random.default_rng(seed)
@@ -27,7 +27,7 @@ class Convoy(ExactGroup):
         at = driven[:, None] - GAP * np.arange(n)
         self._yaw = np.interp(at, s, yaw)
         self.pos = np.stack([np.interp(at, s, path[:, k]) for k in range(2)], axis=-1)
-        if vehicle != "car":  # it need not follow the path to the centimetre
+        if vehicle != "car":  # it need not follow the path exactly
             out = rng.normal(0.0, 0.08, n) + 0.05 * np.sin(0.8 * at + rng.uniform(0.0, 6.0, n))
             left = np.stack([-np.sin(self._yaw), np.cos(self._yaw)], axis=-1)
             self.pos += out[..., None] * left

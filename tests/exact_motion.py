@@ -13,9 +13,9 @@ STAND, RAMP = 2.0, 1.0
 class ExactGroup:
     """Nodes on circles of their own, or cars on curves, in one numbering.
 
-    A group that begins at rest stands for `STAND` and then speeds up within `RAMP` seconds. Cars
-    have the rear axle and the slip that the filter assumes. Accelerations are means until the next
-    sample, as filters hold them.
+    A group that starts at rest stands still for `STAND` and then speeds up within `RAMP` seconds.
+    Cars have the rear axle and the slip that the filter assumes. Accelerations are means until the
+    next sample, as filters hold them.
     """
 
     def __init__(self, vehicle, numbering, *, hz=50.0, at_rest=False, dimensions=2, seconds=12.0):
@@ -57,7 +57,7 @@ class ExactGroup:
         return pos - pos.mean(axis=0) + centre * [1.0, 1.0, 0.0], yaw
 
     def pairs(self, t):
-        """True relative positions, (time, pair, 3)."""
+        """Return true relative positions, (time, pair, 3)."""
         pos = self.at(self.pos, t)
         i, j = self.constellation.pairs.T
         return pos[:, j] - pos[:, i]

@@ -1,7 +1,7 @@
-"""Whether everything imports with the lowest versions that pyproject.toml admits.
+"""Check that everything imports with the lowest versions that pyproject.toml admits.
 
-Without an argument: those versions, a line each. With ``import``: imports every module; what misses
-a package that is an extra is passed over.
+Without an argument it prints those versions, one per line. With ``import`` it imports every
+module; modules that lack the package of an extra are skipped.
 """
 
 import re
@@ -16,16 +16,16 @@ PACKAGES = ("tracking", "relpos_env", "agents", "hardware_bridge")
 
 
 def lowest() -> list[str]:
-    """``name==version`` of each dependency that is no extra."""
+    """Return ``name==version`` of each dependency outside the extras."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     return [re.sub(r">=([\w.]+).*", r"==\1", each) for each in project["dependencies"]]
 
 
 def missing_extras() -> set[str]:
-    """Import all modules.
+    """Import all modules, and return the missing packages of extras.
 
     Raises:
-        ImportError: One of them cannot be imported, or misses a package that is no extra.
+        ImportError: A module cannot be imported, or lacks a package outside the extras.
     """
     ours = {each.partition("==")[0].replace("-", "_") for each in lowest()} | set(PACKAGES)
     missing = set()

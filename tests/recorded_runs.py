@@ -1,4 +1,4 @@
-"""Live runs on the emulator's lines without an operating system, by a clock of their own."""
+"""Live runs on the emulator's byte streams, without an operating system, on a virtual clock."""
 
 import os
 from dataclasses import dataclass, field
@@ -24,7 +24,7 @@ WALL = 1_700_000_000 * 10**9
 
 
 class RigLinks:
-    """Stands for `Links`: time passes in `wait`, the rig goes on with it, cars drive about."""
+    """Replacement of `Links`: time passes in `wait`, in which the rig advances and cars drive."""
 
     def __init__(self, rig: EmulatedRig, config, seed: int):
         self.rig, self.now = rig, START
@@ -53,7 +53,7 @@ class RigLinks:
         chunks = []
         for name, port in self._names.items():
             data = self._kept[name] + self.rig.ports[port].receive()
-            # What a read gives is any part of what was sent.
+            # A read returns any part of the sent bytes.
             n = len(data) if self._rng.random() < 0.7 else int(self._rng.integers(len(data) + 1))
             self._kept[name] = data[n:]
             if n:
@@ -72,7 +72,7 @@ class RigLinks:
 
 @dataclass
 class LiveRun:
-    """What a live run kept by itself, and its recording."""
+    """Results of a live run, and its recording."""
 
     path: Path
     config: object
@@ -97,7 +97,7 @@ def run_live(
     record_truth: bool = False,
     edit=lambda text: text,
 ) -> LiveRun:
-    """Track an emulation by hand, decision by decision, as `agents.hardware.live.live` does."""
+    """Track an emulation step by step, as `agents.hardware.live.live` does."""
     (folder / "e").mkdir(parents=True)
     rig = EmulatedRig(options, folder / "e", ports=lambda name: MemoryPort(), record=record_truth)
     file = folder / "e" / "swarm.toml"
@@ -139,7 +139,7 @@ def run_live(
 
 
 def same_bits(here, there, n: int | None = None) -> None:
-    """Estimates over (time, ...) that are the same, up to the n-th time."""
+    """Assert that estimates over (time, ...) are equal, up to the n-th time."""
     here, there = (here.t, *here.arrays), (there.t, *there.arrays)
     for a, b in zip(here, there, strict=True):
         assert a.dtype == b.dtype

@@ -1,4 +1,4 @@
-"""Commands and code of the documents are those of the programs."""
+"""Commands and code of the documents match the programs."""
 
 import re
 import shlex
@@ -22,7 +22,7 @@ def blocks(page, language):
 
 
 def commands(page):
-    """Command lines of relpos, without what a shell would take."""
+    """Return command lines of relpos, without shell syntax."""
     for block in blocks(page, "sh"):
         for line in block.replace("\\\n", " ").splitlines():
             for part in re.split(r"[;&|]", line.split(" #")[0]):

@@ -1,4 +1,4 @@
-"""Every figure says where it comes from, and what is older than its code is found."""
+"""Every figure has a provenance entry, and figures older than their code are found."""
 
 import json
 import runpy

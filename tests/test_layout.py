@@ -1,4 +1,4 @@
-"""Folders and imports are such that a reader finds the way."""
+"""Sizes and descriptions of folders, and import cycles."""
 
 from pathlib import Path
 

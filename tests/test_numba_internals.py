@@ -1,5 +1,5 @@
-"""What `tracking.kernels.compile_units` uses of numba that is not public: the first test to look
-at when a new numba breaks the others. Each name says what it is for."""
+"""Private parts of numba that `tracking.kernels.compile_units` uses: the first test to read
+when a new numba breaks the others. Each name has its purpose."""
 
 import inspect
 

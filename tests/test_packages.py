@@ -1,4 +1,4 @@
-"""Importing is cheap, and what the folders hold is registered."""
+"""Imports are cheap, examples run, and links between documents resolve."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""Code that is compiled ahead for kinds of processors: by other processes, and in wheels."""
+"""Code compiled ahead of time for processor levels, by other processes and in wheels."""
 
 import os
 import shutil
@@ -52,7 +52,7 @@ def folder(tmp_path):
 
 
 def ship(folder, level):
-    """Keep what is compiled for a level next to the module, and nothing else."""
+    """Keep only the code compiled for a level, next to the module."""
     run(folder, "shipped.outer(1.0)", NUMBA_CPU_NAME=level, NUMBA_CPU_FEATURES="")
     target = folder / "__compiled__" / level
     target.mkdir(parents=True, exist_ok=True)
@@ -64,7 +64,7 @@ def ship(folder, level):
 def test_code_for_a_kind_of_processor_is_used_as_it_is(folder):
     ship(folder, fitting_levels()[0])
     assert run(folder, "(shipped.outer(1.0), shipped.count())") == "(3.0, 0)"
-    # And in every place that it is copied to.
+    # Also in every place that it is copied to.
     shutil.copytree(folder / "__compiled__", folder / "elsewhere" / "__compiled__")
     shutil.copy(folder / "shipped.py", folder / "elsewhere")
     assert run(folder / "elsewhere", "(shipped.outer(1.0), shipped.count())") == "(3.0, 0)"
@@ -82,7 +82,7 @@ def test_code_of_another_text_or_for_another_processor_is_not_used(folder):
 
 
 def test_processes_that_compile_side_by_side_agree_on_names(folder, tmp_path):
-    """What calls a kernel runs with that kernel's code of another process."""
+    """A caller of a kernel runs with that kernel's code from another process."""
     caches = [tmp_path / "a", tmp_path / "b"]
     for cache, warm in zip(caches, ("shipped.outer(1.0)", "shipped.inner(1.0)"), strict=True):
         run(folder, warm, NUMBA_CACHE_DIR=str(cache))
@@ -112,7 +112,7 @@ def test_vectors_are_as_wide_as_the_processor_that_is_compiled_for(
 
 @pytest.mark.skipif(shutil.which("make") is None, reason="no make")
 def test_a_wheel_in_an_empty_environment_compiles_nothing(tmp_path):
-    """The smallest filter, for the best kind of processor that this machine is."""
+    """The smallest filter, for the best processor level of this machine."""
     left_out = (".*", "__pycache__", "__compiled__", "build", "dist", "tests")
     shutil.copytree(ROOT, tmp_path / "source", ignore=shutil.ignore_patterns(*left_out))
     packages = sysconfig.get_path("purelib")
@@ -122,7 +122,7 @@ def test_a_wheel_in_an_empty_environment_compiles_nothing(tmp_path):
     }
     given = {"capture_output": True, "text": True, "check": False, "env": env}
     wanted = [f"LEVELS={fitting_levels()[0]}", "WARM=--filter paper-ekf"]
-    # The environment is there already: nothing is to be installed.
+    # Use the environment as it is: nothing may be installed.
     made = subprocess.run(
         ["make", "-o", ".venv/.dev", "wheel", *wanted], cwd=tmp_path / "source", **given
     )
@@ -149,7 +149,7 @@ def test_a_wheel_in_an_empty_environment_compiles_nothing(tmp_path):
 
 
 def test_compiling_that_takes_seconds_is_announced_once(folder):
-    """A few kernels are not worth a word."""
+    """A few kernels give no message."""
     many = "@kernel\ndef f{0}(x):\n    return x + {0}.0\n\n"
     (folder / "shipped.py").write_text(MODULE + "".join(many.format(k) for k in range(8)))
     for calls, times in (

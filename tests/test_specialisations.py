@@ -1,6 +1,6 @@
-"""Every kernel is compiled for one set of types, whatever is tracked and however it is called.
+"""Every kernel is compiled for one set of types, for all groups and callers.
 
-Seen in a process of its own: other tests call kernels with arrays of their own.
+The check needs a process of its own, since other tests call kernels with arrays of their own.
 """
 
 import os
@@ -20,11 +20,11 @@ from tracking.kernels.compile_units import units_of
 from tracking.measurements import Kind, MeasurementBlock
 
 OF_TWO_FILTERS = {"tracking.filters.first_ranges", "tracking.filters.best_hypothesis"}
-"""Modules whose kernels work on the records of both the joint filter and the pair filters."""
+"""Modules whose kernels take the records of both the joint filter and the pair filters."""
 
 
 def block(n_nodes, dimensions):
-    """Nodes that jitter about their places."""
+    """Return measurements of nodes that jitter about their places."""
     rng = np.random.default_rng(0)
     t = np.repeat(np.arange(0.0, 3.0, 0.02), n_nodes)
     node = np.tile(np.arange(n_nodes), len(t) // n_nodes)
@@ -41,7 +41,7 @@ def block(n_nodes, dimensions):
 
 
 def track(filter_name):
-    """Groups of several sizes and dimensions."""
+    """Track groups of several sizes and dimensions."""
     for n_nodes, dimensions, vehicle in ((3, 2, "car"), (5, 3, "drone"), (4, 3, "human")):
         nodes = tuple(NodeConfig(id=k, vehicle=vehicle) for k in range(n_nodes))
         tracker = Tracker(Constellation(nodes=nodes, dimensions=dimensions), filter=filter_name)
@@ -50,7 +50,7 @@ def track(filter_name):
 
 
 def drive():
-    """Environments of several numbers, and cars that come and go."""
+    """Step environments in several numbers, with cars that join and leave."""
     for env in (FormationVectorEnv(1), FormationVectorEnv(3)):
         env.reset(seed=0)
         for _ in range(20):
@@ -63,7 +63,7 @@ def drive():
 
 
 def several():
-    """Kernels that this process has for more than one set of types."""
+    """Return the kernels that this process has for more than one set of types."""
     return sorted(
         f"{unit.py_func.__module__}.{unit.py_func.__name__}"
         for package in ("tracking.filters", "tracking.ahrs", "relpos_env")

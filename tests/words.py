@@ -1,7 +1,7 @@
-"""Words that plain technical English does without: none may come back, and their number only falls.
+"""Words to avoid in plain technical English; their number may only fall.
 
-`make check` runs it. `tests/words.toml` has the words, the term to use, and how often each still
-occurs; `python tests/words.py --lower` writes what is there where that is less.
+`make check` runs it. `tests/words.toml` has the words, the terms to use, and the limits of
+occurrences; `python tests/words.py --lower` lowers the limits to the present numbers.
 """
 
 from __future__ import annotations

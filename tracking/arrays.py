@@ -12,14 +12,14 @@ LINE = 8
 
 
 def whole_lines(n: int) -> int:
-    """The least multiple of `LINE` that is at least n."""
+    """Return the least multiple of `LINE` that is at least n."""
     return -(-n // LINE) * LINE
 
 
 def aligned(*shape: int) -> F64:
-    """Zeros that begin with a cache line; if their rows are `whole_lines`, each of them does.
+    """Return zeros aligned to a cache line; every row is aligned if its length is `whole_lines`.
 
-    A vector that reaches over two lines takes twice as long to load.
+    A vector across two cache lines takes twice as long to load.
     """
     size = int(np.prod(shape))
     room = np.zeros(size + LINE)

@@ -1,4 +1,4 @@
-"""Axes of a sensor that is read in other axes than those of the body."""
+"""Orientation of a sensor's axes relative to the body."""
 
 from __future__ import annotations
 
@@ -16,24 +16,23 @@ Triple = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Axes:
-    """Which axes of a sensor are x, y and z of the body: forward, left and up."""
+    """Axes of a sensor along x, y and z of the body: forward, left and up."""
 
     order: tuple[int, ...] = (0, 1, 2)
-    """(3) Axis of the sensor, for each of the body."""
+    """Index of the sensor's axis for each axis of the body, (3)."""
     signs: tuple[float, ...] = (1.0, 1.0, 1.0)
-    """(3) -1 where it points the other way."""
+    """-1 if that axis of the sensor points the other way, (3)."""
 
     @classmethod
     def parse(cls, names: Sequence[str], *, mirrored: bool) -> Axes:
-        """Axes from names such as "y", "-x", "z".
+        """Parse names of axes such as "y", "-x", "z".
 
         Args:
             names: Axes of the sensor for x, y and z of the body.
             mirrored: True for a sensor whose own axes may be left-handed.
 
         Raises:
-            ConfigError: They are not three different axes, or no rotation of a sensor that
-                measures rotations.
+            ConfigError: Not three different axes, or left-handed ones without `mirrored`.
         """
         bare = [name.strip().removeprefix("-").removeprefix("+") for name in names]
         if sorted(bare) != sorted(NAMES):
@@ -48,15 +47,15 @@ class Axes:
         return axes
 
     def turn(self, values: F64) -> F64:
-        """Readings in axes of the body, (..., 3)."""
+        """Return readings in axes of the body, (..., 3)."""
         return np.asarray(values[..., list(self.order)] * np.array(self.signs))
 
     def turn_one(self, reading: Triple) -> Triple:
-        """The same of a single reading."""
+        """Return a single reading in axes of the body."""
         a, b, c = (s * reading[k] for k, s in zip(self.order, self.signs, strict=True))
         return a, b, c
 
     @property
     def is_body(self) -> bool:
-        """True for a sensor that is mounted as the body is."""
+        """True if the sensor's axes are those of the body."""
         return self == Axes()

@@ -1,4 +1,4 @@
-"""Who is in the group: nodes, their antennas, and the order in which arrays index them."""
+"""Members of a group: nodes and antennas, and the order in which arrays index them."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from tracking.mount import Mount
 from tracking.vehicles import VEHICLES
 
 MOST_NODES = 256
-"""[-] A filter of more takes gigabytes."""
+"""[-] Largest group; a filter of a larger one takes gigabytes."""
 SLOWEST_HZ, FASTEST_HZ = 1.0, 10_000.0
-"""[1/s] Rates of samples that an orientation can be filtered from."""
+"""[1/s] Sample rates that an orientation can be filtered from."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,20 +40,20 @@ class NodeConfig:
     kind: Literal["moving", "static"] = "moving"
     """A static node has no IMU and never moves."""
     vehicle: str = "none"
-    """What carries it, one of `tracking.vehicles.VEHICLES`."""
+    """Vehicle that carries the node, one of `tracking.vehicles.VEHICLES`."""
     initial_heading: float | None = None
     """[rad] Yaw of the body at its first IMU sample, for headings without a magnetometer."""
     imu_hz: float = 100.0
     """[Hz] Nominal rate of the IMU; the orientation filter is built for it."""
     mag_hz: float | None = None
-    """[Hz] Nominal rate of the magnetometer where it is not that of the IMU."""
+    """[Hz] Nominal rate of the magnetometer; None for the rate of the IMU."""
     mount: Mount = Mount()
-    """Where it sits on a vehicle that cannot move sideways."""
+    """Position of the tracker on a vehicle that cannot move sideways."""
     imu_axes: Axes = Axes()
-    """Of gyroscope and accelerometer in the body; readings are turned where they come in, so that
-    measurements are in axes of the body already."""
+    """Axes of gyroscope and accelerometer in the body. Readings are rotated on input, so
+    measurements are in axes of the body."""
     mag_axes: Axes = Axes()
-    """The same of the magnetometer."""
+    """Axes of the magnetometer in the body."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,15 +61,15 @@ class Constellation:
     """The nodes of a group and the plane or space they move in.
 
     Arrays over nodes follow `nodes`; arrays over pairs follow `pairs`, all i < j in
-    lexicographic order; arrays over antennas follow the nodes that they sit on, where every node
-    without an antenna of its own has one at the origin of its body.
+    lexicographic order; arrays over antennas follow their nodes, and every node without an
+    antenna of its own has one at the origin of its body.
     """
 
     nodes: tuple[NodeConfig, ...]
     dimensions: Literal[2, 3] = 3
     """2 where all nodes move in one plane."""
     heading: Literal["magnetic", "initial"] = "magnetic"
-    """Where yaw comes from: the magnetometer, or `NodeConfig.initial_heading`."""
+    """Source of yaw: the magnetometer, or `NodeConfig.initial_heading`."""
     antennas: tuple[Antenna, ...] = field(default=())
 
     def __post_init__(self) -> None:
@@ -185,10 +185,10 @@ class Constellation:
         return offset
 
     def antenna_index(self, node_id: int, antenna_id: int | None) -> int:
-        """Array index of a node's antenna.
+        """Return the array index of a node's antenna.
 
         Raises:
-            ConfigError: No such antenna, or several and none was named.
+            ConfigError: The node has no such antenna, or has several and none is named.
         """
         own = [k for k, a in enumerate(self.all_antennas) if a.node == node_id]
         if antenna_id is None:

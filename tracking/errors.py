@@ -1,20 +1,20 @@
-"""What can go wrong in a way the user can mend.
+"""Errors that the user can correct.
 
 A bad measurement is not an error: it is counted and skipped.
 """
 
 
 class TrackingError(Exception):
-    """Root of the package's errors; the message says what was expected and what came."""
+    """Base class of the package's errors; the message names the expected and the given value."""
 
 
 class LogError(TrackingError):
-    """A log folder that cannot be read: names the file and the row or field."""
+    """A log folder cannot be read; the message names the file and the row or field."""
 
 
 class ConfigError(TrackingError):
-    """A configuration that makes no sense: names the field and what is allowed."""
+    """A configuration is invalid; the message names the field and the allowed values."""
 
 
 class WireError(TrackingError):
-    """Bytes that are no ranging message: names the field."""
+    """Bytes are not a ranging message; the message names the field."""

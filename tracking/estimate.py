@@ -1,4 +1,4 @@
-"""What the tracker believes: relative positions of every pair, and how sure it is."""
+"""Estimates of the tracker: relative positions of all pairs and their covariances."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from tracking.params.short_repr import short_repr
 
 
 class Status(IntEnum):
-    """How far a pair's estimate can be used."""
+    """Usability of a pair's estimate."""
 
     ABSENT = 0
-    """One of the two is not in the group."""
+    """One of the two nodes is not in the group."""
     STARTING = 1
-    """Not enough measurements yet; position and covariance say nothing."""
+    """Not enough measurements yet; position and covariance are meaningless."""
     AMBIGUOUS = 2
-    """The shape is known, its rotation or mirror image is not."""
+    """The shape is known, but not its rotation or its reflection."""
     OK = 3
-    """Position, velocity and covariance hold, within the accuracy that is asked for."""
+    """Position, velocity and covariance are valid, within the required accuracy."""
     LOST = 4
-    """No range for so long that the position is dead reckoning, or one less certain than the
-    accuracy that is asked for (`VehicleParams.accuracy`)."""
+    """Without ranges for so long that the position is dead reckoned, or less certain than the
+    required accuracy (`VehicleParams.accuracy`)."""
     DOUBTFUL = 5
-    """Its ranges contradict all else: a liar, a wrong calibration, or a filter gone astray."""
+    """Its ranges contradict the rest: a faulty node, a wrong calibration or a diverged filter."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,30 +45,29 @@ class TeamEstimate:
 
     constellation: Constellation
     t: F64
-    """Time the estimate is for, (...) [s]."""
+    """Time of the estimate, (...) [s]."""
     pos_ij_w: F64
     """p_j - p_i, (..., pair, 3) [m]."""
     vel_ij_w: F64
     """v_j - v_i, (..., pair, 3) [m/s]."""
     cov: F64
-    """Covariance of position and velocity, (..., pair, 6, 6); zero across a plane."""
+    """Covariance of position and velocity, (..., pair, 6, 6); zero along z in a plane."""
     q_wb: F64
     """Orientation of each node, (..., node, 4)."""
     has_orientation: Bool
-    """True where `q_wb` came from measurements, (..., node)."""
+    """True if `q_wb` came from measurements, (..., node)."""
     age: F64
     """Time since the last range, (..., pair) [s]; 0 before the first."""
     nis: F64
     """Normalised innovation squared of the last range, (..., pair) [-]."""
     nlos_prob: F64
-    """Probability that the last range was not line of sight, (..., pair) [-]; 0 from filters
-    that do not estimate it."""
+    """Probability that the last range was NLOS, (..., pair) [-]; 0 from filters without it."""
     status: I64
     """A `Status`, (..., pair)."""
 
     @classmethod
     def empty(cls, constellation: Constellation, t: F64) -> TeamEstimate:
-        """Zeros for the given times, (...), to be filled."""
+        """Return zeros for the given times, (...), to be filled."""
         n, p, lead = constellation.n_nodes, constellation.n_pairs, t.shape
         return cls(
             constellation=constellation,
@@ -86,7 +85,7 @@ class TeamEstimate:
 
     @property
     def arrays(self) -> tuple[Any, ...]:
-        """The fields but the time in their order, as kernels take them."""
+        """Fields except the time, in order, as kernel arguments."""
         return (
             self.pos_ij_w,
             self.vel_ij_w,
@@ -100,14 +99,14 @@ class TeamEstimate:
         )
 
     def with_time_axis(self) -> TeamEstimate:
-        """Arrays over (env, 1, ...) that share the memory of these over (env, ...)."""
+        """Return arrays over (env, 1, ...) that share the memory of these over (env, ...)."""
         return TeamEstimate(
             self.constellation, self.t[:, None], *(array[:, None] for array in self.arrays)
         )
 
     @property
     def ok(self) -> Bool:
-        """True where the estimate can be used as it is, (..., pair)."""
+        """True if the estimate can be used, (..., pair)."""
         return np.asarray(self.status == Status.OK)
 
     @property
@@ -116,10 +115,10 @@ class TeamEstimate:
         return np.sqrt(np.diagonal(self.cov, axis1=-2, axis2=-1)[..., :3])
 
     def between(self, i: int, j: int) -> tuple[F64, F64]:
-        """Position and velocity of node j relative to node i in the world frame, each (..., 3).
+        """Return position and velocity of node j relative to i in the world frame, each (..., 3).
 
         Raises:
-            ConfigError: They are one.
+            ConfigError: i and j are equal.
         """
         if i == j:
             raise ConfigError(f"between: expected two different nodes, got {i} twice")
@@ -128,20 +127,20 @@ class TeamEstimate:
         return sign * self.pos_ij_w[..., pair, :], sign * self.vel_ij_w[..., pair, :]
 
     def between_b(self, i: int, j: int) -> tuple[F64, F64]:
-        """Position and velocity of node j relative to node i in i's body frame, each (..., 3)."""
+        """Return position and velocity of node j relative to i in i's body frame, each (..., 3)."""
         pos_w, vel_w = self.between(i, j)
         R_bw = np.swapaxes(quat_to_matrix(self.q_wb[..., i, :]), -1, -2)  # noqa: N806
         return (R_bw @ pos_w[..., None])[..., 0], (R_bw @ vel_w[..., None])[..., 0]
 
     def relative_orientation(self, i: int, j: int) -> F64:
-        """q_ij = q_i^-1 q_j, the orientation of j's body in i's body frame, (..., 4)."""
+        """Return q_ij = q_i^-1 q_j, the orientation of body j in body frame i, (..., 4)."""
         return quat_multiply(quat_conjugate(self.q_wb[..., i, :]), self.q_wb[..., j, :])
 
     def at(self, t: F64 | float) -> TeamEstimate:
-        """The estimate carried to another time at constant velocity.
+        """Predict the estimate at another time with constant velocity.
 
-        The covariance is carried with it, without process noise: meant for the tenth of a
-        second between the tracker's delayed horizon and now.
+        The covariance is propagated without process noise: meant for the tenth of a second between
+        the tracker's delayed horizon and the current time.
         """
         t = np.broadcast_to(np.asarray(t, dtype=np.float64), self.t.shape)
         dt = (t - self.t)[..., None, None]
@@ -156,6 +155,6 @@ class TeamEstimate:
         return TeamEstimate(*(changed.get(f.name, getattr(self, f.name)) for f in fields(self)))
 
     def take(self, env: int) -> TeamEstimate:
-        """One environment, its axis removed."""
+        """Return one environment, its axis removed."""
         arrays = (getattr(self, f.name)[env] for f in fields(self)[1:])
         return TeamEstimate(self.constellation, *arrays)

@@ -1,7 +1,7 @@
-"""The one door into the tracker: blocks of time-ordered measurements.
+"""Input of the tracker: blocks of time-ordered measurements.
 
-A simulator, a log and a live link make the same blocks, so an estimate never depends on
-where its measurements come from. How events are cut into blocks changes nothing.
+Simulator, log reader and live link make the same blocks, so estimates do not depend on the
+source of measurements, nor on the division of events into blocks.
 """
 
 from __future__ import annotations
@@ -20,34 +20,33 @@ from tracking.params.short_repr import short_repr
 N_VALUES = 16
 """Columns of `MeasurementBlock.values`."""
 N_MEASURED = 8
-"""The first of them: what devices send. The rest is told by the tracker's own orientations."""
+"""Number of leading columns that devices send; the tracker's orientation stage adds the rest."""
 ACCEL_NOISE, TOLD, UPRIGHT, GYRO_BIAS, GYRO_VAR = 7, 8, 9, 11, 14
-"""Columns of a STATE event behind orientation and acceleration, see `Kind`."""
+"""Columns of a STATE event after orientation and acceleration, see `Kind`."""
 
 
 class Kind(IntEnum):
-    """What an event is, in the order in which events of one instant are handled.
+    """Kinds of events, in the order in which events of one instant are handled.
 
-    The columns of `MeasurementBlock.values` that each kind uses are given with it.
+    Each kind names its columns of `MeasurementBlock.values`.
     """
 
     JOIN = 0
-    """Node i joins the group (it is also taken in when it is first heard)."""
+    """Node i joins the group (its first range adds it, too)."""
     MAG = 1
     """Magnetic field of node i, body frame [uT]: x y z. Used with the next IMU sample."""
     IMU = 2
     """IMU sample of node i: gyroscope x y z [rad/s], specific force x y z [m/s2]."""
     STATE = 3
-    """Node i's own orientation filter: q_wb (w x y z), gravity-free accel_w x y z [m/s2], then
-    the noise density of the acceleration beyond that of its vehicle [m/s2/sqrt(Hz)], 0 unless the
-    sample is doubted. Then 1 if the rest is reported, as the tracker's own
-    orientations do, 2 if it is and the body rests: by how much it has been turned upright so far,
-    about x and y of the world [rad]; the bias that is taken off its gyroscope, x y z in the body
-    [rad/s], and the variance of that about one axis [(rad/s)^2]."""
+    """State of node i from its orientation filter: q_wb (w x y z); gravity-free accel_w x y z
+    [m/s2]; added noise density of the acceleration [m/s2/sqrt(Hz)], 0 unless the sample is
+    doubtful; AHRS feedback: 0 absent, 1 present as from the tracker's own orientations, 2 present
+    and at rest. With feedback: accumulated tilt correction about world x and y [rad]; subtracted
+    gyroscope bias, x y z in the body [rad/s]; its mean variance per axis [(rad/s)^2]."""
     SURVEY = 4
-    """Distance between static nodes i and j that was surveyed, not ranged [m]."""
+    """Surveyed distance between static nodes i and j [m]."""
     RANGE = 5
-    """UWB range between i and j [m], then received and first-path power [dBm] if `has_power`."""
+    """UWB range between i and j [m]; received and first-path power [dBm] if `has_power`."""
     LEAVE = 6
     """Node i leaves the group."""
 
@@ -56,8 +55,8 @@ class Kind(IntEnum):
 class MeasurementBlock:
     """Events of one step, time-ordered in each environment.
 
-    Laws: any split of the same events into blocks gives the same estimate; environment k of
-    a block gives what that environment alone gives, bit for bit.
+    Properties: any division of the same events into blocks gives the same estimate;
+    environment k of a block equals that environment alone, bit for bit.
     """
 
     __repr__ = short_repr
@@ -69,15 +68,15 @@ class MeasurementBlock:
     i: I64
     """Node index, (env, event)."""
     j: I64
-    """Other node index of a range, (env, event); equal to `i` for the other kinds."""
+    """Other node index of a range or survey, (env, event); equal to `i` for the other kinds."""
     antenna_i: I64
     """Antenna index of node i in `Constellation.all_antennas`, (env, event)."""
     antenna_j: I64
     """Antenna index of node j, (env, event)."""
     values: F64
-    """What was measured, (env, event, N_VALUES); columns as `Kind` says, the rest are 0."""
+    """Measured values, (env, event, N_VALUES); columns as in `Kind`, the rest are 0."""
     has_power: Bool
-    """True where a range came with its powers, (env, event)."""
+    """True for ranges with powers, (env, event)."""
     valid: Bool
     """False for padding, (env, event)."""
 
@@ -93,15 +92,15 @@ class MeasurementBlock:
 
     @property
     def arrays(self) -> tuple[Any, ...]:
-        """The fields in their order, contiguous, as kernels read them: copies where need be."""
+        """Fields in order, contiguous, for kernels that read; copied if necessary."""
         return tuple(np.ascontiguousarray(getattr(self, f.name)) for f in fields(self))
 
     @property
     def in_place(self) -> tuple[Any, ...]:
-        """The fields in their order, as kernels take them that write, or are bound to the block.
+        """Fields in order, for kernels that write or are bound to the block.
 
         Raises:
-            ConfigError: A field is not contiguous: kernels would work on a copy of it.
+            ConfigError: A field is not contiguous; kernels would work on a copy of it.
         """
         for f in fields(self):
             if not getattr(self, f.name).flags.c_contiguous:
@@ -110,7 +109,7 @@ class MeasurementBlock:
 
     @classmethod
     def empty(cls, n_envs: int = 1, n_events: int = 0) -> MeasurementBlock:
-        """A block of padding, to be filled."""
+        """Return a block of padding, to be filled."""
         shape = (n_envs, n_events)
 
         def ints() -> I64:
@@ -140,17 +139,17 @@ class MeasurementBlock:
         antennas: tuple[I64, I64] | None = None,
         has_power: Bool | None = None,
     ) -> MeasurementBlock:
-        """Events of one kind in one environment.
+        """Return events of one kind in one environment.
 
         Args:
-            kind: What they are.
+            kind: Kind of the events.
             t: Times, (event) [s].
             i: Node indices, (event).
             values: The columns that `kind` uses, (event, columns).
-            j: Other node indices, for ranges and surveys.
-            antennas: Antenna indices of i and j, for these. They count the antennas of all nodes,
-                so they are i and j, as assumed here, where every node has one.
-            has_power: True where a range came with its powers.
+            j: Other node indices of ranges and surveys.
+            antennas: Antenna indices of i and j of ranges and surveys. They count the antennas of
+                all nodes; the default i and j assumes one antenna per node.
+            has_power: True for ranges with powers.
         """
         block = cls.empty(1, len(t))
         block.t[0] = t
@@ -169,7 +168,7 @@ class MeasurementBlock:
 
     @classmethod
     def concatenate(cls, blocks: Iterable[MeasurementBlock]) -> MeasurementBlock:
-        """Blocks of the same environments, one after another."""
+        """Join blocks of the same environments in time."""
         parts = list(blocks)
         return cls(
             *(np.concatenate([getattr(b, f.name) for b in parts], axis=1) for f in fields(cls))
@@ -177,7 +176,7 @@ class MeasurementBlock:
 
     @classmethod
     def stack(cls, blocks: Iterable[MeasurementBlock]) -> MeasurementBlock:
-        """Blocks of different environments, side by side, padded to the longest."""
+        """Stack blocks of different environments, padded to the longest."""
         parts = list(blocks)
         n = max(b.n_events for b in parts)
         padded = [
@@ -189,32 +188,32 @@ class MeasurementBlock:
         )
 
     def take(self, events: slice | I64 | Bool) -> MeasurementBlock:
-        """The given event columns of every environment."""
+        """Return the given event columns of every environment."""
         return MeasurementBlock(*(getattr(self, f.name)[:, events] for f in fields(self)))
 
     def env(self, k: int) -> MeasurementBlock:
-        """Environment k alone, without its padding."""
+        """Return environment k without its padding."""
         ok = self.valid[k]
         return MeasurementBlock(*(getattr(self, f.name)[k : k + 1, ok] for f in fields(self)))
 
     def order(self) -> I64:
-        """Event columns in handling order: by time, kind, nodes, antennas, values; padding last."""
+        """Return the handling order: by time, kind, nodes, antennas, values; padding last."""
         first = (self.j, self.i, self.kind, self.t, ~self.valid)
         order: I64 = np.lexsort(first, axis=1)
         tied = np.take_along_axis(self.valid, order, axis=1)[:, 1:]
         for key in first:
             there = np.take_along_axis(key, order, axis=1)
             tied = tied & (there[:, 1:] == there[:, :-1])
-        if tied.any():  # seldom, and it takes several times as long
+        if tied.any():  # seldom, and takes several times as long
             rest = np.moveaxis(self.values[..., ::-1], -1, 0)
             order = np.lexsort((*rest, self.antenna_j, self.antenna_i, *first), axis=1)
         return order
 
     def sorted(self) -> MeasurementBlock:
-        """The events in handling order."""
+        """Return the events in handling order."""
         rows, order = np.arange(self.n_envs)[:, None], self.order()
         return MeasurementBlock(*(getattr(self, f.name)[rows, order] for f in fields(self)))
 
     def count(self, kind: Kind) -> int:
-        """Number of events of a kind over all environments."""
+        """Return the number of events of a kind over all environments."""
         return int(np.sum(self.valid & (self.kind == kind)))

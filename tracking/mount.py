@@ -9,7 +9,7 @@ from tracking.errors import ConfigError
 from tracking.vehicles import VehicleParams
 
 FARTHEST = 10.0
-"""[m] No vehicle that this is for is larger."""
+"""[m] Largest offset of a tracker on its vehicle."""
 KEYS = {
     "ahead_m": "ahead",
     "aside_m": "aside",
@@ -17,32 +17,32 @@ KEYS = {
     "slip_s2_per_m": "slip",
     "height_m": "height",
 }
-"""Of a table ``[nodes.ID.mount]`` in meta.toml or swarm.toml, and the fields that they are."""
+"""Keys of a table ``[nodes.ID.mount]`` in meta.toml or swarm.toml, and their fields."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mount:
-    """What is known of it; None where it is not, and is estimated."""
+    """Position of the tracker and slip of the vehicle; None for values that are estimated."""
 
     ahead: float | None = None
-    """[m] Tracker ahead of the axle that does not steer; negative behind it."""
+    """[m] Distance of the tracker ahead of the axle that does not steer; negative behind it."""
     aside: float = 0.0
-    """[m] Tracker left of the middle of the vehicle; negative right of it."""
+    """[m] Distance of the tracker left of the vehicle's centre line; negative to the right."""
     wheelbase: float | None = None
-    """[m] Between the axles. A tracker is expected between them where `ahead` is not known."""
+    """[m] Distance between the axles. An unknown `ahead` is expected between them."""
     slip: float | None = None
-    """[s2/m] How fast that axle drifts outwards in a curve, per squared speed and yaw rate: the
-    inverse of its cornering stiffness per load [1/rad] times gravity. 0 where tyres do not slip."""
+    """[s2/m] Outward drift speed of that axle in a curve, per squared speed and yaw rate: the
+    inverse of its cornering stiffness per load [1/rad] times gravity. 0 for tyres without slip."""
     height: float = 0.0
     """[m] Height above the plane that a planar group moves in, of static nodes as well: ranges
     between nodes of different heights are longer than distances in the plane. In space heights are
     estimated, and this is not used."""
 
     def check(self, where: str) -> None:
-        """See that the numbers make sense.
+        """Check the ranges of all fields.
 
         Raises:
-            ConfigError: One does not.
+            ConfigError: A field is out of range.
         """
         for name in (f.name for f in fields(self)):
             value = getattr(self, name)
@@ -52,7 +52,7 @@ class Mount:
                 raise ConfigError(f"{where}.{name}: expected {low:g} to {high:g}, got {value!r}")
 
     def prior(self, vehicle: VehicleParams) -> tuple[float, float, float, float]:
-        """Mean and standard deviation of `ahead` [m], and of `slip` [s2/m]; 0 for what is known."""
+        """Return mean and std of `ahead` [m], then of `slip` [s2/m]; std 0 for known values."""
         ahead, ahead_std = vehicle.ahead, vehicle.ahead_std
         if self.wheelbase is not None:
             ahead, ahead_std = 0.5 * self.wheelbase, 0.5 * self.wheelbase

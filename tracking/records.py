@@ -1,4 +1,4 @@
-"""Records of nodes, pairs and groups, so that kernels get few arguments."""
+"""Records of nodes, pairs and groups, which keep kernel arguments few."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ Records = NDArray[Any]
 
 
 def as_records(array: Records) -> Records:
-    """An array of records whose fields the interpreter, too, finds under their names."""
+    """Return an array of records whose fields are attributes without compilation, too."""
     return array.view(np.recarray) if config.DISABLE_JIT else array
 
 
 def record_of(params: Any) -> Records:
-    """The numbers of a params class for kernels, (1)."""
+    """Return the numbers of a params class for kernels, (1)."""
     return as_records(coefficients([params], {}))
 
 
 def coefficients(parts: Sequence[Any], derived: Mapping[str, float], **integers: int) -> Records:
-    """The constants of kernels, (1): numbers of params classes and what is derived from them.
+    """Return the constants of kernels, (1): numbers of params classes and derived numbers.
 
     Args:
-        parts: Params classes. Of fields with one name, the first counts.
-        derived: By name; in place of fields of that name.
-        integers: The same, as integers.
+        parts: Params classes; the first of several fields of one name is used.
+        derived: Derived numbers by name; they replace fields of that name.
+        integers: Integers by name; they replace fields of that name.
     """
     numbers = {
         field.name: getattr(part, field.name)
@@ -42,6 +42,6 @@ def coefficients(parts: Sequence[Any], derived: Mapping[str, float], **integers:
 
 
 def with_records(state: Any) -> Any:
-    """A state in the form that kernels take; shares its memory."""
+    """Return a state in the form that kernels take; shares its memory."""
     nodes, pairs, group = (as_records(a) for a in (state.nodes, state.pairs, state.group))
     return state._replace(nodes=nodes, pairs=pairs, group=group)

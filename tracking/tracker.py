@@ -1,8 +1,8 @@
-"""The tracker: orientation, then the position filter.
+"""The tracker: orientation stage, then position filter.
 
     block -> Orientation (IMU to state) -> Filter (pair EKFs, MDS) -> TeamEstimate
 
-Late data are the business of `Horizon`, which stands in front of it.
+`Horizon` puts late data in order upstream of the tracker.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from tracking.sanity.blocks import check, usable, usable_call
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrackerParams:
-    """Everything the tracker believes."""
+    """Parameters of all stages of the tracker."""
 
     orientation: OrientationParams = field(default_factory=OrientationParams)
     filter: FilterParams = field(default_factory=FilterParams)
@@ -41,8 +41,8 @@ class TrackerParams:
 class Tracker:
     """Relative positions of a batch of groups from their measurements.
 
-    Laws: any split of the same events into blocks gives the same estimates, bit for bit;
-    saved and restored in mid-run equals uninterrupted.
+    Properties: any division of the same events into blocks gives the same estimates, bit for
+    bit; a run that is saved and restored equals an uninterrupted one.
     """
 
     def __init__(
@@ -57,14 +57,14 @@ class Tracker:
         self.constellation = constellation
         self.n_envs = n_envs
         self._t = np.full(n_envs, -np.inf)
-        """Time of the last event that `run` handled, (env) [s]."""
+        """Time of the last event handled by `run`, (env) [s]."""
         self._filter = filter_builder(filter)(constellation, params.filter, n_envs)
         self._orientation = Orientation(
             constellation, params.orientation, n_envs, follows_bias=self._filter.follows_bias
         )
 
     def step(self, block: MeasurementBlock, t: F64 | float) -> TeamEstimate:
-        """Handle a block and report at one time.
+        """Handle a block and return the estimate at one time.
 
         Args:
             block: Events in order, none earlier than those handled before.
@@ -79,19 +79,19 @@ class Tracker:
         return TeamEstimate(history.constellation, *(getattr(history, n)[:, 0] for n in names))
 
     def run(self, block: MeasurementBlock, t_out: F64) -> TeamEstimate:
-        """Handle a block and report at several times.
+        """Handle a block and return the estimates at several times.
 
         Args:
-            block: Events in order, none earlier than those handled before. What cannot be is
-                passed over (`tracking.sanity.blocks`).
+            block: Events in order, none earlier than those handled before. Invalid events are
+                skipped (`tracking.sanity.blocks`).
             t_out: Ascending times, (time) or (env, time) [s], none before the events of earlier
-                blocks. An estimate holds every event up to its time.
+                blocks. An estimate includes every event up to its time.
 
         Returns:
             Estimates, arrays over (env, time, ...).
 
         Raises:
-            ConfigError: The block has other environments or nodes, or times go back.
+            ConfigError: The block has other environments or nodes, or times decrease.
         """
         t_out = np.atleast_2d(np.asarray(t_out, dtype=np.float64))
         block = usable(block)
@@ -103,23 +103,23 @@ class Tracker:
     def bind(
         self, block: MeasurementBlock, estimate: TeamEstimate
     ) -> tuple[Callable[[], None], Callable[[], None]]:
-        """`step` for arrays that stay where they are, without its overhead.
+        """Bind `step` to fixed arrays, without its overhead.
 
         Args:
-            block: Filled again before every step, which leaves states in place of samples.
+            block: Refilled before every step, which replaces samples by states.
             estimate: Arrays over (env, ...), written by every step for its times `t`.
 
         Returns:
-            Two functions to be called one after the other: orientations, then positions.
+            Two functions to be called in order: orientations, then positions.
         """
         follow = self._filter.bind(block, estimate.with_time_axis())
         return self._orientation.bind(block), follow
 
     def calls(self) -> list[list[Call]]:
-        """All kernels that it runs, with arguments of their types, to compile them ahead.
+        """Return all kernels with arguments of their types, to compile them ahead of time.
 
-        In groups that share little code: those of the filter (`Filter.calls`), then what trackers
-        with all filters need.
+        The groups share little code: kernels of the filter (`Filter.calls`), then those that
+        trackers with any filter need.
         """
         block = MeasurementBlock.empty(self.n_envs)
         estimate = TeamEstimate.empty(self.constellation, np.zeros((self.n_envs, 1)))
@@ -127,10 +127,10 @@ class Tracker:
         return [*self._filter.calls(block, estimate), common]
 
     def smooth(self, later: MeasurementBlock, t: F64 | float) -> TeamEstimate:
-        """Report at one time with the help of later measurements, and stay where it is.
+        """Return the estimate at one time given later measurements; the state does not change.
 
-        Late and out-of-order data lose nothing: whatever came in order into `later` counts as
-        if it had been there in time (see `Horizon.waiting`).
+        Late and out-of-order data lose nothing: data that `later` holds in order have the same
+        effect as on time (see `Horizon.waiting`).
 
         Args:
             later: Events after t, in order.
@@ -140,7 +140,7 @@ class Tracker:
             Estimates, arrays over (env, ...).
 
         Raises:
-            ConfigError: The filter cannot smooth; `joint` can. Or as of `run`.
+            ConfigError: The filter cannot smooth (`joint` can), or an error of `run`.
         """
         if not isinstance(self._filter, JointEkf):
             raise ConfigError("smoothing: expected filter 'joint', the others cannot look back")
@@ -157,13 +157,13 @@ class Tracker:
         return self._filter.smooth(states, at.copy())
 
     def reset(self, env: int) -> None:
-        """Forget everything of one environment."""
+        """Reset one environment."""
         self._t[env] = -np.inf
         self._orientation.reset(env)
         self._filter.reset(env)
 
     def part(self, envs: slice) -> Tracker:
-        """Some of the environments, without a step between them; shares their memory."""
+        """Return some of the environments, without a step between them; shares their memory."""
         part = copy.copy(self)
         part.n_envs = len(range(*envs.indices(self.n_envs)))
         part._t = self._t[envs]
@@ -172,7 +172,7 @@ class Tracker:
         return part
 
     def save(self) -> dict[str, Any]:
-        """A copy of everything that evolves."""
+        """Return a copy of the state."""
         return {
             "t": self._t.copy(),
             "orientation": self._orientation.save(),
@@ -180,13 +180,13 @@ class Tracker:
         }
 
     def restore(self, saved: dict[str, Any]) -> None:
-        """Go on from a saved copy."""
+        """Restore a saved state."""
         self._t[:] = saved["t"]
         self._orientation.restore(saved["orientation"])
         self._filter.restore(saved["filter"])
 
     def mean_nis(self) -> F64:
-        """Mean NIS over all accepted ranges, (env) [-]."""
+        """Return the mean NIS over all accepted ranges, (env) [-]."""
         return self._filter.mean_nis()
 
     def range_noise(self) -> F64 | None:
@@ -194,11 +194,11 @@ class Tracker:
         return self._filter.range_noise() if isinstance(self._filter, JointEkf) else None
 
     def n_rejected(self) -> F64:
-        """Ranges refused as outliers, (env)."""
+        """Return the number of ranges rejected as outliers, (env)."""
         return self._filter.n_rejected()
 
 
 def _last_event(block: MeasurementBlock) -> F64:
-    """Time of the last event of each environment, (env) [s]."""
+    """Return the time of the last event of each environment, (env) [s]."""
     t: F64 = np.where(block.valid, block.t, -np.inf).max(axis=1, initial=-np.inf)
     return t

@@ -1,4 +1,4 @@
-"""Vehicles: motion constraints, noise and time constants by what carries a node, in one table."""
+"""Motion constraints, noise and time constants by vehicle, in one table."""
 
 from __future__ import annotations
 
@@ -9,83 +9,82 @@ from tracking.params.checks import check_numbers
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleParams:
-    """What is known about a node from the vehicle that carries it."""
+    """Motion model and AHRS parameters of nodes on one kind of vehicle."""
 
     accel_psd: float = 0.1
     """[m/s2/sqrt(Hz)] White noise of the acceleration: sensor, vibration, tilt jitter."""
     bias_std: float = 0.3
-    """[m/s2] Slow error of the acceleration, mostly gravity seen through a wrong tilt."""
+    """[m/s2] Horizontal acceleration bias, mostly gravity through a tilt error."""
     bias_tau: float = 30.0
-    """[s] How long it stays the same."""
+    """[s] Correlation time of the acceleration bias."""
     bias_tau_with_ahrs_feedback: float = 100.0
-    """[s] The same in space, with an offset, where VQF reports how its orientation is turned
-    upright: what is left of it, and what the gyroscope makes it lean by has states of its own."""
+    """[s] Correlation time of the horizontal acceleration bias of nodes with an offset state in 3D
+    whose VQF reports its tilt corrections, which are modelled apart, as is the gyroscope bias."""
     gyro_std: float = 3e-3
-    """[rad/s] Residual bias of the gyroscope at first, unless it is known better from rest."""
+    """[rad/s] Initial residual gyroscope bias, unless rest has determined it better."""
     gyro_drift: float = 2e-4
-    """[rad/s/sqrt(s)] How fast the bias of the gyroscope changes, where it has states."""
+    """[rad/s/sqrt(s)] Random walk of the gyroscope bias, if it has states."""
     vertical_bias_std: float = 0.1
-    """[m/s2] The same along the vertical, where a wrong tilt shows by its square only: the offset
-    of the accelerometer, less what is learned of it at rest."""
+    """[m/s2] Vertical acceleration bias, second-order in a tilt error: mostly the accelerometer
+    offset, less the part that is estimated at rest."""
     vertical_bias_tau: float = 100.0
-    """[s] How long that stays the same."""
+    """[s] Correlation time of the vertical acceleration bias."""
     initial_tilt_speed: float = 0.0
-    """[m/s] How fast it may move while its orientation is still being found. The tilt of VQF is
-    at first off by the mean acceleration since its first sample, which over a time t is a change
-    of velocity over t."""
+    """[m/s] Speed at which a node may move while its orientation converges. The initial tilt error
+    of VQF is the mean acceleration since its first sample, a velocity change over that time."""
     offset_std: float | None = None
-    """[m/s2] Offset of the accelerometer in the body, in space: a state of its own where the body
-    is turned about, since it turns with it, which `bias_std` does not. None for none."""
+    """[m/s2] Accelerometer offset in the body frame, in 3D: a state of its own for bodies that turn
+    about all axes, since it turns with them, unlike the bias. None for no such state."""
     offset_tau: float = 1000.0
-    """[s] How long that stays the same."""
+    """[s] Correlation time of the accelerometer offset."""
     levelled: bool = False
     """The body stays level: the acceleration is taken in the plane of the body, free of tilt
-    errors, and its slow error turns with the body."""
+    errors, and its bias rotates with the body."""
     heading_std: float = 0.05
-    """[rad] Error of a magnetic heading that changes with place and time."""
+    """[rad] Error of a magnetic heading, which changes with place and time."""
     heading_tau: float = 8.0
-    """[s] How long it stays the same."""
+    """[s] Correlation time of the heading error."""
     first_heading_std: float | None = None
-    """[rad] The same at first, and until the group has moved: what bends the field where it stands
-    is not averaged yet. Also of one that joins and has not driven. None for no more than later."""
+    """[rad] Initial heading error, until the group or a joining node has moved: at rest, local
+    disturbances of the field do not average out. None for `heading_std`."""
     speed_std: float = 2.0
-    """[m/s] Speed of the group as a whole; keeps a group without any reference from drifting."""
+    """[m/s] Standard deviation of the group's mean velocity; bounds drift without a reference."""
     sideways_std: float | None = None
-    """[m/s] Sideways speed of the rear axle, 20 times a second; None for what may move sideways."""
+    """[m/s] Sideways speed of the rear axle, 20 times a second; None if it may move sideways."""
     ahead: float = 0.0
-    """[m] How far the tracker is expected ahead of that axle, where `Mount.ahead` is unknown."""
+    """[m] Expected distance of the tracker ahead of that axle, if `Mount.ahead` is unknown."""
     ahead_std: float = 0.0
-    """[m] Standard deviation of that."""
+    """[m] Standard deviation of `ahead`."""
     slip: float = 0.0
-    """[s2/m] `Mount.slip` where it is unknown: none is as likely as that of soft tyres."""
+    """[s2/m] Expected `Mount.slip` if unknown; none is as likely as that of soft tyres."""
     slip_std: float = 0.0
-    """[s2/m] Standard deviation of that."""
+    """[s2/m] Standard deviation of `slip`."""
     impact_threshold: float | None = None
-    """[m/s2] More is a blow: what carries it runs into something and stops within a sample or two,
-    that may have been cut off at the end of the scale, 8 or 16 g. None for what moves by blows."""
+    """[m/s2] Acceleration of an impact, which stops the vehicle within a sample or two that may be
+    saturated at 8 or 16 g. None for vehicles whose motion consists of impacts."""
     impact_noise_ratio: float = 0.25
-    """[-] Error of what such a sample adds to the velocity, in terms of that."""
+    """[-] Velocity error added by such a sample, as a ratio of its velocity increment."""
     accuracy: float = 0.5
-    """[m] A pair is OK while the position error that it expects, as a root mean square over all
-    directions, is at most this; of two vehicles the larger."""
+    """[m] A pair is OK while its expected RMS position error over all directions is at most this;
+    the larger value of the two vehicles is used."""
     protection: float = 13.0
-    """[-] Protection radius of an OK pair over its expected error; of two vehicles the larger. It
-    was set so that fewer than 1 of 1000 OK samples of simulated runs are off by more."""
+    """[-] Ratio of the protection radius of an OK pair to its expected error; the larger value of
+    both vehicles is used. Fewer than 1 of 1000 OK samples of simulated runs exceed the radius."""
     rests: bool = True
-    """It stands still now and then, and its IMU shows it."""
+    """The vehicle rests at times, and its IMU detects the rest."""
     propagation_period: float = 0.02
-    """[s] The covariance of a group with such a node is carried forward so often; ranges in between
-    do with its older state, without the noise of the time since."""
+    """[s] Period of covariance propagation of a group with such a node. Ranges in between use the
+    older state, without the process noise since."""
 
     ahrs_accel_tau: float | None = None
-    """[s] Time constant of VQF's accelerometer; None is that of `OrientationParams.tau_acc`. Longer
-    trusts the gyroscope more. What accelerates sideways for seconds in every curve, as cars and
-    robots do, would pass for tilted, so that the acceleration lacks it."""
+    """[s] Time constant of VQF's accelerometer; None for `OrientationParams.tau_acc`. Longer trusts
+    the gyroscope more: the sideways acceleration of a car or robot in a curve lasts for seconds and
+    would be taken for tilt, and be missing from the acceleration."""
     ahrs_accel_tau_with_bias: float | None = None
-    """[s] The same for filters with states for slow errors of accelerations; None is as without."""
+    """[s] `ahrs_accel_tau` for filters with acceleration bias states; None for no difference."""
     pair_accel_psd: float = 0.15
-    """[m/s2/sqrt(Hz)] White noise of the acceleration for filters without such states: sensor,
-    vibration and the slow error of a wrong tilt."""
+    """[m/s2/sqrt(Hz)] White noise of the acceleration for filters without bias states: sensor,
+    vibration and tilt error."""
 
     def __post_init__(self) -> None:
         check_numbers(
@@ -96,7 +95,7 @@ class VehicleParams:
 _TURNED = VehicleParams(
     accel_psd=0.05, initial_tilt_speed=1.0, offset_std=0.2, ahrs_accel_tau_with_bias=10.0
 )
-"""What turns about all its axes: its tilt is as good as what is known of the gyroscope's bias."""
+"""Vehicles that rotate about all axes; their tilt depends on the estimated gyroscope bias."""
 VEHICLES = {
     "car": VehicleParams(
         ahrs_accel_tau=30.0,
@@ -127,7 +126,7 @@ VEHICLES = {
         ahrs_accel_tau=30.0,
         pair_accel_psd=0.07,
     ),
-    # Limbs: larger slow errors are measured, but a filter that may move them also makes them up.
+    # Limbs have larger slow errors, but a filter that may estimate them also makes them up.
     "human": VehicleParams(
         protection=5.0,
         accel_psd=0.1,
@@ -142,4 +141,4 @@ VEHICLES = {
     "drone": replace(_TURNED, accel_psd=0.1, speed_std=10.0, rests=False),
     "none": replace(_TURNED, accel_psd=0.1, speed_std=10.0, rests=False),
 }
-"""By `NodeConfig.vehicle`."""
+"""Parameters by `NodeConfig.vehicle`."""

@@ -1,11 +1,10 @@
-"""Smoothing of a whole recording: one pass forwards, one backwards, both together.
+"""Smoothing of a whole recording: a forward pass, a backward pass, and their combination.
 
-Time runs backwards for the second pass: orientations and accelerations stay what they are,
-velocities, rates and the bias of a gyroscope change their sign, who joins leaves. So the joint
-filter itself handles it. What it knows from the past of a moment and what it knows from the future
-err independently but for what is known anyway, so their information adds up, for position and
-velocity of every pair: a two-filter smoother [1]. Rotation and mirror image of a group are known to
-the second pass where the first has not found them yet, and the other way round.
+Time is reversed for the second pass: orientations and accelerations are kept, velocities, rates
+and gyroscope biases change sign, and JOIN and LEAVE are exchanged, so the joint filter itself runs
+it. The errors of both passes are independent but for common priors, so their information adds up
+for position and velocity of every pair: a two-filter smoother [1]. Each pass supplies rotation and
+reflection of a group for the times at which the other has not found them.
 
 References:
     [1] Fraser, Potter, The optimum linear smoother as a combination of two optimum linear filters,
@@ -30,19 +29,19 @@ from tracking.sanity.blocks import usable
 from tracking.tracker import TrackerParams
 
 CONTRADICTION = 25.0
-"""[-] Squared difference of both passes over its variance; beyond it they contradict each other."""
+"""[-] Squared difference of both passes over its variance that counts as a contradiction."""
 KNOWN = (Status.OK, Status.LOST, Status.DOUBTFUL)
 
 
 class Smoothed(NamedTuple):
-    """A recording smoothed."""
+    """A smoothed recording."""
 
     estimate: TeamEstimate
-    """Over (time, ...); NIS, NLOS probabilities, ages and orientations of the pass forwards."""
+    """Over (time, ...); NIS, NLOS probabilities, ages and orientations of the forward pass."""
     nis: float
-    """Mean of that pass [-]."""
+    """Mean NIS of the forward pass [-]."""
     n_rejected: int
-    """Ranges that it refused."""
+    """Number of ranges that the forward pass rejected."""
 
 
 def smooth_whole(
@@ -52,14 +51,14 @@ def smooth_whole(
     params: TrackerParams | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Smoothed:
-    """Estimates that know the whole recording, by the joint filter.
+    """Estimate positions from a whole recording with the joint filter.
 
     Args:
-        constellation: Its nodes.
-        block: All its events, in order, one environment.
+        constellation: Nodes of the recording.
+        block: All events of the recording, in order, one environment.
         t_out: Ascending times, (time) [s].
-        params: What the tracker believes.
-        progress: Called with the share done after each pass.
+        params: Parameters of the tracker.
+        progress: Called with the completed share after each pass.
     """
     params = params or TrackerParams()
     states = Orientation(constellation, params.orientation, follows_bias=True).step(usable(block))
@@ -78,9 +77,9 @@ def smooth_whole(
 
 
 def backwards(block: MeasurementBlock) -> MeasurementBlock:
-    """The same events of one environment with time running backwards.
+    """Return the events of one environment in reversed time.
 
-    Surveyed distances, which hold at any time, come first again.
+    Surveyed distances, which are valid at any time, come first again.
     """
     t, kind, values = -block.t, block.kind.copy(), block.values.copy()
     kind[block.kind == Kind.JOIN], kind[block.kind == Kind.LEAVE] = Kind.LEAVE, Kind.JOIN
@@ -94,7 +93,7 @@ def backwards(block: MeasurementBlock) -> MeasurementBlock:
 
 
 def _together(forward: TeamEstimate, back: TeamEstimate, accuracy: F64) -> TeamEstimate:
-    """Add up what both passes know; `back` is in its own order of times."""
+    """Add the information of both passes; `back` is in its own order of times."""
     d = forward.constellation.dimensions
     axes = np.array([*range(d), *range(3, 3 + d)])
     sign = np.repeat([1.0, -1.0], d)
@@ -133,10 +132,10 @@ def _together(forward: TeamEstimate, back: TeamEstimate, accuracy: F64) -> TeamE
 def _agree(
     t: F64, forward: tuple[F64, F64, Bool], back: tuple[F64, F64, Bool], d: int
 ) -> tuple[Bool, Bool, Bool]:
-    """Leave out the pass that has seen less, where both contradict each other.
+    """Exclude the pass with less data where both passes contradict each other.
 
     Returns:
-        Where each pass counts, and where they contradict each other, (time, pair).
+        Masks of use of each pass, and of contradictions, (time, pair).
     """
     off = (forward[0] - back[0])[..., :d]
     variance = (forward[1] + back[1])[..., :d, :d] + 1e-12 * np.eye(d)
@@ -147,7 +146,7 @@ def _agree(
 
 
 def _inverse(cov: F64, known: Bool) -> F64:
-    """Information; none where nothing is known."""
+    """Return the information matrices; zero for unknown estimates."""
     eye = np.eye(cov.shape[-1])
     safe = np.where(known[..., None, None], cov + 1e-12 * eye, eye)
     return np.asarray(np.linalg.inv(safe) * known[..., None, None])

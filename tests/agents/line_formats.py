@@ -1,4 +1,4 @@
-"""Formats for tests: ``name device to distance #sum``, and a device at a pseudo terminal."""
+"""Test formats: ``name device to distance #sum``, and a device at a pseudo terminal."""
 
 import os
 import threading
@@ -66,11 +66,11 @@ FORMATS = {"alpha": LineFormat("alpha", 115200), "beta": LineFormat("beta", 9216
 
 
 class Talker:
-    """Says the same again and again, from a thread."""
+    """A thread that sends the same bytes repeatedly."""
 
     def __init__(self, said=None, every=0.01):
         self.master, self.slave = os.openpty()
-        tty.setraw(self.slave)  # or the terminal echoes what is said before anybody listens
+        tty.setraw(self.slave)  # else the terminal echoes bytes sent before any reader opens it
         os.set_blocking(self.master, False)
         self.path = os.ttyname(self.slave)
         self._end = threading.Event()

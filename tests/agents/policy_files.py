@@ -31,7 +31,7 @@ def perceptron(size=LAYOUT.size, hidden=(8,), seed=0, scale=0.3):
 
 
 def forward(arrays, observations):
-    """The same network in numpy."""
+    """Evaluate the same network in numpy."""
     x = observations
     for k in range(len(arrays) // 2):
         x = np.tanh(x @ arrays[f"w{k}"] + arrays[f"b{k}"])
@@ -49,7 +49,7 @@ def model(
     domains=(),
     kind=None,
 ):
-    """An ONNX model of nodes and constants."""
+    """Build an ONNX model of nodes and constants."""
     kind = TensorProto.FLOAT if kind is None else kind
     first, last = names or ("observations", "actions")
     graph = helper.make_graph(
@@ -68,13 +68,13 @@ def good_model(**changes):
 
 
 def card_of(data, **changes):
-    """A card that fits the bytes of a network."""
+    """Return a card that matches the bytes of a network."""
     card = Card(name="test", layout=LAYOUT, training={"seed": 1}, results=({"error": 0.1},))
     return replace(card, onnx_sha256=hashlib.sha256(data).hexdigest(), **changes)
 
 
 def put(folder, data, card=None, name="test"):
-    """The two files, unchecked."""
+    """Write the two files, unchecked."""
     (folder / f"{name}.onnx").write_bytes(data)
     text = card if isinstance(card, str) else (card or card_of(data)).to_json()
     (folder / f"{name}.json").write_text(text)

@@ -1,4 +1,4 @@
-"""Training runs of a second, for tests."""
+"""Training runs of one second, for tests."""
 
 import torch
 

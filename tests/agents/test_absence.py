@@ -1,4 +1,4 @@
-"""What is learned of a car that goes: nothing from what its zeros would be worth."""
+"""Learning about a car that leaves: the value of its zero observations has no effect."""
 
 import numpy as np
 import pytest
@@ -13,13 +13,13 @@ SPACE = Box(-np.inf, np.inf, (2,), np.float32)
 
 
 def filled(kind, zeros_worth, *, away=(), left=None):
-    """A buffer in which seat 0 is away for some steps, and gone for good after one.
+    """Return a buffer in which agent slot 0 is away for some steps, or gone after one.
 
     Args:
-        kind: Of buffer.
-        zeros_worth: What the critic says of nothing.
-        away: Steps at which seat 0 is not there.
-        left: The step that it left at.
+        kind: Class of the buffer.
+        zeros_worth: Value that the critic gives zero observations.
+        away: Steps in which the car of slot 0 is away.
+        left: Step in which it leaves.
     """
     rng = np.random.default_rng(3)
     buffer = kind(STEPS, SPACE, SPACE, device="cpu", gae_lambda=0.95, gamma=0.99, n_envs=SEATS)
@@ -31,7 +31,7 @@ def filled(kind, zeros_worth, *, away=(), left=None):
         if gone:
             obs[0], value[0], reward[0] = 0.0, zeros_worth, 0.0
         if step == left:
-            reward[0] += 0.99 * zeros_worth  # what Stable-Baselines3 adds where it ends
+            reward[0] += 0.99 * zeros_worth  # what Stable-Baselines3 adds at the end
         action = rng.standard_normal((SEATS, 2))
         buffer.add(obs, action, reward, starts, value, torch.zeros(SEATS))
         starts = np.array([float(step == left), 0.0, 0.0])
@@ -48,7 +48,7 @@ def test_what_nothing_is_worth_does_not_matter(case):
     np.testing.assert_array_equal(low.returns[present], high.returns[present])
     last = np.flatnonzero(~present[:, 0])[0] - 1
     assert low.advantages[last, 0] == 0.0
-    # With Stable-Baselines3's own, it does.
+    # With the buffer of Stable-Baselines3 it has an effect.
     low, high = (filled(RolloutBuffer, worth, **case) for worth in (-1000.0, 1000.0))
     assert np.abs(low.advantages - high.advantages)[present].max() > 100.0
 

@@ -1,4 +1,4 @@
-"""`relpos bench codec`: lines with a peer, and refusals."""
+"""`relpos bench codec`: rows with a peer, and errors."""
 
 import json
 

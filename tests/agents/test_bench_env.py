@@ -125,7 +125,7 @@ def test_memory_counts_every_array_once():
 def test_every_figure_is_a_row(monkeypatch):
     monkeypatch.setattr(rows, "processes_cost", lambda *_, **__: 10.0)
     shares = []
-    # A turn of no reset has no steps; of these tests it has three.
+    # A round without resets has no steps; in these tests it has three.
     monkeypatch.setattr("agents.bench.env.batch.ceil", lambda _: 3)
     monkeypatch.setattr("agents.bench.env.peer_pymunk.ceil", lambda _: 3)
     monkeypatch.setattr(rows, "EPISODE", 3)

@@ -1,4 +1,4 @@
-"""Training next to an environment that costs nothing."""
+"""Training benchmark with an environment of no cost."""
 
 import json
 
@@ -36,7 +36,7 @@ def test_the_peer_computes_the_same(monkeypatch):
     from agents.training.ppo.learner import make_model
     from agents.training.ppo.network import SwarmFeatures
 
-    # As on processors where torch's own tangent is slow.
+    # As on processors where torch's own tanh is slow.
     for module in (learner, network):
         monkeypatch.setattr(module, "Tanh", FromLogistic)
     config = from_options(TrainConfig, {"scenarios": "swarm-nlos", "envs": "2", "proximity": "8"})

@@ -1,4 +1,4 @@
-"""`relpos calibrate` and `relpos track --calibration` as a user meets them."""
+"""`relpos calibrate` and `relpos track --calibration` on the command line."""
 
 import json
 import tomllib
@@ -21,7 +21,7 @@ from tracking.measurements import Kind, MeasurementBlock
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory):
-    """A drive in a building with much iron in its floor."""
+    """Simulate a drive in a building with much iron in its floor."""
     scenario = tmp_path_factory.mktemp("scenario") / "iron.toml"
     scenario.write_text('extends = "cars-nlos"\n[mag]\ndisturbance = 3.0\n')
     return simulate(scenario=str(scenario), seconds=25.0, seed=6, antenna_delay=0.3)
@@ -29,7 +29,7 @@ def log(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def exact():
-    """The same antennas, and nothing else that is wrong with a range."""
+    """Simulate a drive with the same antennas and no other range errors."""
     return simulate(scenario="cars-nlos", seconds=25.0, seed=4, antenna_delay=0.3, channel="exact")
 
 
@@ -45,7 +45,7 @@ def rms(x):
 def test_antenna_delays_of_a_simulated_drive(exact):
     truth = calibrate_ranges(exact).calibration.ranges
     assert truth.slope == pytest.approx(1.0, abs=1e-3)
-    # A simulated range keeps its error for a metre of driving: it takes a while.
+    # A simulated range keeps its error for a metre of driving, so the run has to be long.
     log = simulate(scenario="cars-nlos", seconds=60.0, seed=4, antenna_delay=0.3)
     found = calibrate_ranges(log)
     offset = found.calibration.ranges.offset
@@ -86,7 +86,7 @@ def test_gyroscopes_at_rest_after_calibration(log):
 
 
 def on_the_spot(log):
-    """The log with magnetometers of nodes that turn on one spot."""
+    """Return the log with magnetometers of nodes that rotate on one spot."""
     block = log.block
     values = block.values.copy()
     for n in range(log.constellation.n_nodes):

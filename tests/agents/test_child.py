@@ -1,4 +1,4 @@
-"""Processes end with the one that began them."""
+"""Processes end with their parent."""
 
 import os
 import signal
@@ -45,7 +45,7 @@ def test_jobs_end_with_a_command_that_is_ended(tmp_path, how):
 
 
 def test_a_policy_tells_nobody_and_leaves_nothing(tmp_path):
-    """Its runtime would keep an identifier in the home folder, and send what it saw."""
+    """Its runtime would store an identifier in the home folder, and send usage data."""
     code = "from agents.policies import load_policy; load_policy('ring')"
     env = {k: v for k, v in os.environ.items() if k != "ORT_DISABLE_TELEMETRY"}
     env |= {"HOME": str(tmp_path), "TMPDIR": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path)}

@@ -1,4 +1,4 @@
-"""Drivers compared on emulated cars, under a virtual clock: figures are what the cars believe."""
+"""Comparison on emulated cars under a virtual clock: figures come from the cars' estimates."""
 
 import json
 import sys
@@ -32,7 +32,7 @@ CONFIG = VirtualBridge(OPTIONS).config
 
 
 class Watched(VirtualBridge):
-    """Notes who is shown what, and may break down."""
+    """A bridge that records the drivers it runs, and may fail."""
 
     def __init__(self, broken_at=None):
         super().__init__(OPTIONS)
@@ -69,7 +69,7 @@ def result(watched):
 
 def test_drivers_take_turns_and_each_begins_a_round(watched, result):
     first, second = "estimate", "estimate_cov"
-    # The first two only load what is loaded when first used.
+    # The first two are the warm-up.
     assert watched.seen[2:] == [first, second, second, first, first, second]
     assert watched.closed
     assert [text for _, text in watched.feed.notices] == ["arm", "quit"]
@@ -110,7 +110,7 @@ def test_the_report_has_dashes_and_no_films(result):
 
 
 def test_figures_are_what_the_cars_believe():
-    """The same drive in a loop of its own: it is the same every time."""
+    """The same drive in a loop of its own: it is equal every time."""
     (row,) = run(VirtualBridge(OPTIONS), seconds=2.0, settle=1.0).rows
     (episode,) = row.episodes
     bridge = VirtualBridge(OPTIONS)
@@ -175,7 +175,7 @@ def test_cars_that_were_stopped_are_told_of():
     bridge = Watched()
 
     def attend(order):
-        # A node that falls silent in mid-episode, for half a second.
+        # A node is silent in mid-episode, for half a second.
         if len(bridge.seen) == 2 and bridge.rig.world.t > 16.0:
             bridge.rig.emulator.nodes[0].node.be_silent(16.6)
 

@@ -1,4 +1,4 @@
-"""Trained policies next to controllers: what they are shown, and how they are named."""
+"""Trained policies next to controllers: their observations and their names."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Intervals hold what they say, and pairs are kept together."""
+"""Intervals have their stated coverage, and pairs are kept together."""
 
 import numpy as np
 import pytest

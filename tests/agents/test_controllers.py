@@ -1,4 +1,4 @@
-"""Laws that all controllers obey, in every observation that they can read."""
+"""Properties of all controllers, in every observation that they can read."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from relpos_env.interface.observations import OBSERVATIONS, observation_mode, sp
 READABLE = [(name, mode) for name, builder in CONTROLLERS.items() for mode in builder.observations]
 POSITIONS = [(name, mode) for name, mode in READABLE if mode != "ranges"]
 LEFT = {"pos": 2, "vel": 2, "target": 2, "command": 2, "heading": 2, "motion": 2}
-"""Stretches whose every second number turns its sign in a mirror."""
+"""Fields in which every second number changes sign under reflection."""
 
 
 def build(name, mode="estimate", n_cars=3):
@@ -23,7 +23,7 @@ def build(name, mode="estimate", n_cars=3):
 
 
 def observe(mode="estimate", n_cars=3, **values):
-    """An observation with some stretches filled; those that the mode lacks are left out."""
+    """Return an observation with some fields filled; those that the mode lacks are left out."""
     fields = observation_mode(mode, n_cars).fields
     observation = np.zeros(total_size(fields), np.float32)
     where = split_fields(fields)
@@ -34,7 +34,7 @@ def observe(mode="estimate", n_cars=3, **values):
 
 
 def draw(rng, mode, n_cars, n):
-    """Observations of cars that are about where they should be, (n, size)."""
+    """Return observations of cars near their targets, (n, size)."""
     fields = observation_mode(mode, n_cars).fields
     where = split_fields(fields)
     o = rng.uniform(-1.0, 1.0, (n, total_size(fields))).astype(np.float32)
@@ -49,9 +49,9 @@ def draw(rng, mode, n_cars, n):
 
 
 def in_a_mirror(o, mode, n_cars):
-    """The same observations with left and right exchanged.
+    """Return the same observations with left and right exchanged.
 
-    The room is mirrored at the line along which leaders are chosen.
+    The room is reflected at the line along which leaders are chosen.
     """
     o = o.copy()
     where = split_fields(observation_mode(mode, n_cars).fields)
@@ -86,7 +86,7 @@ def test_observations_of_another_size_are_refused(name):
 @given(data=st.data())
 @pytest.mark.parametrize(("name", "mode"), READABLE)
 def test_any_observation_gives_an_action(name, mode, data):
-    """Whatever is in the space, corners and zeros as well."""
+    """The action is valid for any observation of the space, corners and zeros included."""
     space = space_of(observation_mode(mode, 4).fields)
     size = space.shape[0]
     kind = data.draw(st.lists(st.sampled_from([0, 1, 2, 3]), min_size=size, max_size=size))
@@ -116,7 +116,7 @@ def test_left_and_right_are_alike(name, mode):
     o = draw(np.random.default_rng(1), mode, 4, 200)
     here, there = controller.act(o), controller.act(in_a_mirror(o, mode, 4))
     known = o[:, split_fields(observation_mode(mode, 4).fields)["mask"]].any(axis=1)
-    # A search goes the same way round everywhere, so that cars do not meet.
+    # A search turns the same way everywhere, so that cars do not meet.
     np.testing.assert_array_equal(here[known, 0], there[known, 0])
     np.testing.assert_array_equal(here[known, 1], -there[known, 1])
 
@@ -144,7 +144,7 @@ def test_it_stands_in_the_wanted_formation(name, mode):
 
 @pytest.mark.parametrize(("name", "mode"), READABLE)
 def test_it_drives_to_its_place(name, mode):
-    """The other is farther ahead than it should be, so the car goes there."""
+    """The other car is farther ahead than its target, so the car moves there."""
     told = dict(mask=1, wanted=1, pos=[2.5, 0.0], range=2.5, target=[2.0, 0.0], heading=[1, 0])
     speed, steering = build(name, mode, 2).act(observe(mode, 2, **told))
     assert speed > 0.05
@@ -201,7 +201,7 @@ def test_a_search_turns_in_little_room():
 
 @pytest.mark.parametrize("heading", [0.0, 1.0, 2.5, -2.0])
 def test_all_cars_follow_the_same_leader(heading):
-    """Whose place is farthest east by north; it follows the command alone."""
+    """The leader's place is farthest east by north; it follows the command only."""
     places = np.array([[0.0, 0.0], [1.0, 2.0], [-1.0, 1.0], [1.0, -1.0]])
     turn = np.array([[np.cos(heading), -np.sin(heading)], [np.sin(heading), np.cos(heading)]])
     reader = Reader(observation_mode("estimate", 4).fields, "", ("estimate",))

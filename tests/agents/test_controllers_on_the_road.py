@@ -1,4 +1,4 @@
-"""What controllers are made of: caution, steering and avoidance, with kinematic cars."""
+"""Parts of controllers: uncertainty weighting, steering and avoidance, with kinematic cars."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ TRIO = observation_mode("estimate", 3).fields
 
 
 class Cars:
-    """Kinematic cars that do at once what they are told."""
+    """Kinematic cars that follow commands at once."""
 
     def __init__(self, pos, heading):
         self.pos, self.heading = np.array(pos, float), np.array(heading, float)
@@ -35,7 +35,7 @@ class Cars:
         return self.speed[:, None] * ahead
 
     def observe(self, fields, places, command):
-        """Observations, (car, size); places and command in the room."""
+        """Return observations, (car, size); places and command are in the room."""
         n, where = len(self.pos), split_fields(fields)
         o = np.zeros((n, total_size(fields)), np.float32)
         for k in range(n):
@@ -54,7 +54,7 @@ class Cars:
 
 
 def test_an_unsure_direction_counts_less():
-    """What matrices say: W = (1 + P / s^2)^-1."""
+    """The reference is W = (1 + P / s^2)^-1."""
     rng = np.random.default_rng(0)
     for _ in range(20):
         ahead, left, mixed = *rng.uniform(0.01, 1.0, 2), rng.uniform(-0.95, 0.95)
@@ -68,7 +68,7 @@ def test_an_unsure_direction_counts_less():
 
 
 def test_range_only_goes_down_the_gradient():
-    """Finite differences of half the squared errors of distances."""
+    """The reference is finite differences of half the squared distance errors."""
     rng = np.random.default_rng(3)
     params = RangeOnlyParams(gain_ahead=1.0, gain_left=1.0)
     reader = Reader(TRIO, "", ("estimate",))
@@ -89,9 +89,9 @@ def test_range_only_goes_down_the_gradient():
 @pytest.mark.parametrize("sent", [True, False])
 @pytest.mark.parametrize("bearing", np.radians([-170, -130, -100, -60, -20, 10, 50, 90, 120, 179]))
 def test_a_car_gets_to_where_it_wants(bearing, sent):
-    """Forwards or backwards; one that is not sent far, by shunting."""
+    """The car drives forwards or backwards; to a near target without a command it manoeuvres."""
     goal = (3.0 if sent else 0.4) * np.array([np.cos(bearing), np.sin(bearing)])
-    # The other is far away.
+    # The other car is far away.
     cars, gears = Cars([[0.0, 0.0], [50.0, 0.0]], [0.0, 0.0]), []
     reader, nothing, still = Reader(PAIR, "", ("estimate",)), np.zeros((2, 2)), np.zeros(2)
     for _ in range(150):
@@ -110,7 +110,7 @@ def test_a_car_gets_to_where_it_wants(bearing, sent):
 
 
 def test_a_blocked_car_backs_out():
-    """It wants on, its wheels are turned, but it stands: back until it has some speed."""
+    """The car stands with a command and turned wheels: it backs out until it has some speed."""
     reader, told = Reader(PAIR, "", ("estimate",)), np.zeros(total_size(PAIR), np.float32)
     where = split_fields(PAIR)
     told[where["command"]] = [0.6, 0.4]
@@ -133,12 +133,12 @@ def test_a_blocked_car_backs_out():
 @pytest.mark.parametrize("offset", [0.0, 0.05, -0.1, 0.3])
 @pytest.mark.parametrize("turned", [0.0, 0.3])
 def test_cars_heading_on_to_each_other_do_not_touch(name, offset, turned):
-    """Told to drive through each other at 1 m/s each; boxes of 0.42 m by 0.20 m."""
+    """Cars of 0.42 m by 0.20 m are commanded through each other at 1 m/s each."""
     controller = CONTROLLERS[name](PAIR)
     cars = Cars([[-2.0, 0.0], [2.0, offset]], [turned, np.pi])
     command, nearest = np.array([[1.0, 0.0], [-1.0, 0.0]]), np.inf
     for _ in range(60):
-        # Nobody pulls: everybody is in his place.
+        # Every car is in its place, so formation errors are zero.
         cars.step(controller.act(cars.observe(PAIR, cars.pos, command)))
         nearest = min(nearest, np.linalg.norm(cars.pos[0] - cars.pos[1]))
     assert nearest > 0.47
@@ -157,7 +157,7 @@ def test_who_is_unsure_keeps_farther_away():
 
 @pytest.mark.parametrize("name", ["consensus", "leader-follower"])
 def test_cars_come_into_formation_on_the_way(name):
-    """Three cars in a row get into a triangle that drives north-east."""
+    """Three cars in a row form a triangle that drives north-east."""
     controller, places = CONTROLLERS[name](TRIO), np.array([[1.0, 0.0], [-0.5, 0.9], [-0.5, -0.9]])
     cars = Cars([[0.0, 0.0], [-0.5, 1.5], [0.3, -1.3]], [0.0, 0.5, 1.0])
     for _ in range(200):

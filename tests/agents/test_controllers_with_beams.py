@@ -1,4 +1,4 @@
-"""What controllers make of distance sensors: where walls are, ways that are clear, few contacts."""
+"""Controllers with distance sensors: position of walls, free paths, few contacts."""
 
 import math
 
@@ -33,7 +33,7 @@ READABLE = [(name, mode) for name, builder in CONTROLLERS.items() for mode in bu
 
 
 def observe(near, mode="estimate", n_cars=3, **values):
-    """An observation with readings, and other stretches as asked."""
+    """Return an observation with readings, and other fields as given."""
     fields = observation_mode(mode, n_cars, len(near)).fields
     o, where = np.zeros(total_size(fields), np.float32), split_fields(fields)
     o[where["near"]] = near
@@ -48,7 +48,7 @@ def see(near, **values):
 
 
 def wall(normal, away, beams):
-    """Readings of a wall in a direction at a distance from the middle of the car."""
+    """Return readings of a wall in a direction at a distance from the centre of the car."""
     directions = beam_directions(beams)
     starts = beam_starts(directions, HALF_LENGTH, HALF_WIDTH)
     angles = np.arctan2(directions[:, 1], directions[:, 0]) - normal
@@ -61,7 +61,7 @@ def wall(normal, away, beams):
 @pytest.mark.parametrize("beams", [8, 16, 24])
 @pytest.mark.parametrize("normal", np.linspace(-3.0, 3.0, 13))
 def test_points_are_on_the_wall(beams, normal):
-    """Of the three beams that look most straight at it, within 3 cm."""
+    """The three sensors that point most directly at it are within 3 cm."""
     near = wall(normal, 0.6, beams)
     around = surroundings(see(near))
     ways = around.ahead * math.cos(normal) + around.left * math.sin(normal)
@@ -81,7 +81,7 @@ def test_what_a_known_car_explains_is_no_wall():
 
 
 def one_point(x, y):
-    """As of sixteen beams, of which one meets something."""
+    """Return readings of sixteen sensors, of which one detects something."""
     ahead, left = np.full((2, 16), NOTHING)
     ahead[0], left[0] = x, y
     return Surroundings(ahead, left)
@@ -90,7 +90,7 @@ def one_point(x, y):
 @pytest.mark.parametrize("gear", [1.0, -1.0])
 @pytest.mark.parametrize("away", [0.1, 0.25, 0.5, 0.8])
 def test_a_clear_way_straight_on(gear, away):
-    """What is left of the way until the margin, cut to the ways that are looked at."""
+    """The result is the remaining path up to the margin, cut to the paths considered."""
     point = one_point(gear * (HALF_LENGTH + PARAMS.margin + away), 0.05)
     way = clear_way(point, np.array(0.0), np.array(gear), PARAMS)
     assert way == BEFORE[np.searchsorted(WAYS, away + 1e-9)]
@@ -100,7 +100,7 @@ def test_a_clear_way_straight_on(gear, away):
 
 
 def test_a_clear_way_on_an_arc():
-    """A car that turns left meets what stands left of its bow, and not what is straight on."""
+    """A car that turns left meets an obstacle left of its bow, not one straight ahead."""
     ahead, left = one_point(0.9, 0.0), one_point(0.5, 0.35)
     curvature, forwards = np.array(1.2), np.array(1.0)
     assert clear_way(ahead, curvature, forwards, PARAMS) == np.inf
@@ -109,7 +109,7 @@ def test_a_clear_way_on_an_arc():
 
 
 def test_few_beams_keep_farther_off():
-    """They miss what stands between them."""
+    """They miss obstacles between their directions."""
     near = {n: standing_bounds(surroundings(see(wall(0.0, 0.5, n))), PARAMS) for n in (8, 16)}
     assert near[8].closing.min() < near[16].closing.min() - 0.03
     assert near[16].closing.min() == pytest.approx(2.0 * (0.29 - PARAMS.keep), abs=0.02)
@@ -160,7 +160,7 @@ def test_one_car_or_many_and_whatever_is_seen(name, mode):
 
 
 def test_hardly_anybody_touches_anything():
-    """In the room where cars without beams touch the wall ten times a minute."""
+    """In this room cars without sensors touch the wall ten times a minute."""
     touched = []
     for beams in (0, 16):
         parts = configure({"task": "hold", "scenario": "ring-nlos", "proximity": beams})

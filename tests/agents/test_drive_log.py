@@ -1,4 +1,4 @@
-"""What a drive keeps of its decisions does not grow with its length."""
+"""The log of a drive does not grow with its length."""
 
 from types import SimpleNamespace
 
@@ -11,7 +11,7 @@ N = 3
 
 
 def drive_of(decisions, cycles):
-    """A log of so many decisions, each told apart by its number."""
+    """Return a log of `decisions` steps, each identified by its number."""
     task = SimpleNamespace(
         target=np.zeros((1, N, N, 2)), has_target=np.ones((1, N, N), bool), error=np.zeros((1, N))
     )

@@ -1,4 +1,4 @@
-"""Through the bytes of any format, a live tracker knows as much as that of the simulation."""
+"""With the bytes of any format a live tracker is as accurate as that of the simulation."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ from hardware_bridge.live.swarm import LiveSwarm
 from relpos_env.core.env_core import EnvCore
 
 SETTLED = 40
-"""[-] Decisions after which errors are compared."""
+"""[-] Steps after which errors are compared."""
 
 
 def known_mean(values):
@@ -23,7 +23,7 @@ def known_mean(values):
 
 
 class Live:
-    """A rig and who listens to it, in a time of their own."""
+    """A rig and its live tracker, on a virtual clock."""
 
     def __init__(self, options, folder):
         self.rig = EmulatedRig(options, folder / "new", ports=lambda name: MemoryPort())
@@ -47,7 +47,7 @@ class Live:
         self.swarm.step(self.t_ns)
 
     def error(self):
-        """Of the relative positions that cars can use, mean [m]."""
+        """Return the mean error of the relative positions that cars can use [m]."""
         pos = self.rig.world.swarm.state.pos_w[0]
         wrong = np.linalg.norm(self.swarm.view.pos[0] - (pos[None] - pos[:, None]), axis=-1)
         known = self.swarm.view.ok[0]
@@ -55,7 +55,7 @@ class Live:
 
 
 def follow(formation):
-    """Speeds and steering angles after the operator's wish, as the wire can say them."""
+    """Return speeds and steering angles for the operator's command, rounded as on the wire."""
     wish, heading = formation.operator.command[0], formation.state.heading[0]
     turn = np.arctan2(wish[:, 1], wish[:, 0]) - heading
     turn = (turn + np.pi) % (2.0 * np.pi) - np.pi

@@ -1,4 +1,4 @@
-"""Engines give what a loop would give."""
+"""Engines give the results of a loop."""
 
 import os
 
@@ -8,7 +8,7 @@ from agents.errors import UsageError
 from agents.jobs import check_jobs, find_engine
 
 LOCAL = ["local"]
-"""That of Ray has a file of its own."""
+"""Local engine; the Ray engine has a test file of its own."""
 
 
 def divided(a, b):

@@ -1,4 +1,4 @@
-"""Many simulated runs: the same figures however they are shared out, and lost runs found."""
+"""Many simulated runs: figures are independent of the number of jobs, and lost runs are found."""
 
 import json
 from dataclasses import replace
@@ -37,7 +37,7 @@ KEYS = {
 
 
 def small_suite():
-    """Cars in and out of sight, and one run whose log is changed."""
+    """Return cars with LOS and NLOS, and one run whose log is changed."""
     los, nlos, *_ = SUITES["paper"].cases
     changed = next(c for c in SUITES["robustness"].cases if c.change is range_outliers)
     return Suite(name="small", title="Small", cases=(los, nlos, changed), seeds=2, seconds=15.0)
@@ -96,8 +96,8 @@ def test_cars_that_come_and_go_are_scored_by_gospa():
     suite = Suite(name="small", title="Small", cases=(case,), seeds=3, seconds=60.0)
     [row] = evaluate(suite=suite, filters=("joint",)).records
     assert row["bound"] is None
-    # Somebody who left is there for a while, and somebody who comes is not at once: half a square
-    # metre each, and at most three pairs.
+    # A node that left stays for a while, and a new one is missing at first: half a square metre
+    # each, and at most three pairs.
     assert row["rmse"] < row["gospa"] < np.sqrt(1.5)
 
 
@@ -227,7 +227,7 @@ def test_cars_can_start_on_a_line():
 
 
 def estimate_of(error, status=Status.OK):
-    """Two nodes 2 m apart whose estimate is off by so much, at 10 Hz from second 1 on."""
+    """Return two nodes 2 m apart with a given estimation error, at 10 Hz from second 1 on."""
     constellation = Constellation(nodes=tuple(NodeConfig(id=k) for k in range(2)), dimensions=2)
     error = np.asarray(error, dtype=np.float64)
     estimate = TeamEstimate.empty(constellation, 1.0 + 0.1 * np.arange(len(error)))

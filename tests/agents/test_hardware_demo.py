@@ -1,4 +1,4 @@
-"""What a drive through the bridge is scored by, and commands that look first."""
+"""Scores of a drive through the bridge, and early checks of commands."""
 
 import numpy as np
 import pytest

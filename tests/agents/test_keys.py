@@ -12,7 +12,7 @@ from agents.hardware.drive.keys import HELP, NO_KEYS, TerminalKeys, key_by_key, 
 
 @pytest.fixture
 def keyboard(monkeypatch):
-    """A terminal; what is written is pressed."""
+    """Return a terminal; writing to it presses keys."""
     ours, theirs = pty.openpty()
     with os.fdopen(theirs, "r") as stdin:
         monkeypatch.setattr(sys, "stdin", stdin)
@@ -44,7 +44,7 @@ def test_nothing_counts_after_a_quit():
 
 
 def test_without_any_input_no_key_is_pressed(monkeypatch):
-    monkeypatch.setattr(sys, "stdin", None)  # as where a shell has closed it
+    monkeypatch.setattr(sys, "stdin", None)  # as when a shell has closed it
     with key_by_key():
         assert TerminalKeys().read_orders() == []
 

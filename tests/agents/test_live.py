@@ -1,4 +1,4 @@
-"""Listening to a live swarm over pseudo terminals: replay = live, also after SIGKILL."""
+"""Live tracking over pseudo terminals: a replay equals the live run, also after SIGKILL."""
 
 import io
 import json
@@ -30,7 +30,7 @@ from tracking.measurements import Kind, MeasurementBlock
 
 
 class RunningRig:
-    """An emulation that is stepped in real time by a thread."""
+    """An emulation stepped in real time by a thread."""
 
     def __init__(self, folder, **options):
         self.rig = EmulatedRig(EmulateOptions(**options), folder)
@@ -74,7 +74,7 @@ def test_replay_is_live_over_ports_that_come_and_go(tmp_path):
     def watch(monitor, notices):
         seen.append(monitor.t_ns)
         told.extend(text for _, text in notices)
-        # Until a port has gone and come back, however slow the machine is.
+        # Until a port has gone and come back, on machines of any speed.
         back = "links.n1 up" in told[3:]
         return not (len(seen) >= 25 and back and any("down" in text for text in told))
 
@@ -122,7 +122,7 @@ def test_a_process_that_was_killed_leaves_all_but_its_last_moment(tmp_path):
 
     replay(file, watch=watch)
     n = min(len(shown), len(again))
-    # The writer may be a few decisions behind, on a machine that is busy.
+    # The writer may be a few steps behind on a busy machine.
     assert n >= len(shown) - 3 * 10
     assert again[:n] == shown[:n]
     assert any(record["distance"] is not None for record in shown[:n])
@@ -142,7 +142,7 @@ def test_what_cannot_be_listened_to(tmp_path):
 
 @pytest.fixture(scope="module")
 def snapshots(tmp_path_factory):
-    """Of a run in memory: the last monitor, and all snapshots."""
+    """Return the last monitor and all snapshots of a run in memory."""
     from recorded_runs import run_live
 
     run = run_live(tmp_path_factory.mktemp("run"), EmulateOptions(scenario="cars-los", seed=3), 60)
@@ -197,7 +197,7 @@ def test_what_is_shown(snapshots, monkeypatch):
 def test_rates():
     rates = Rates(3)
     for k in range(50):
-        n = 10 if k else 500  # a first decision may bring much at once
+        n = 10 if k else 500  # a first step may bring many events at once
         block = MeasurementBlock.of_kind(Kind.IMU, np.zeros(n), np.full(n, 1), np.zeros((n, 6)))
         rates.take(block)
         ends = np.zeros(5, dtype=np.int64), np.full(5, 2)

@@ -1,4 +1,4 @@
-"""A drive in characters: cars, beliefs and walls are where they are."""
+"""Drawing of a drive in characters: cars, estimates and walls are in their places."""
 
 import io
 

@@ -1,4 +1,4 @@
-"""What makes the networks fast makes them no others."""
+"""Optimisations of the networks do not change them."""
 
 import numpy as np
 import pytest
@@ -47,7 +47,7 @@ def test_the_tangent_of_torch_is_used_where_it_is_fast(processor, features, mkl,
 
 @pytest.mark.parametrize("n_present", [0, 2, 5])
 def test_others_that_do_not_count_cost_nothing_and_change_nothing(n_present):
-    """Features and gradients are those of all others computed, and some multiplied by zero."""
+    """Features and gradients equal those of computing all others and multiplying some by zero."""
     torch.manual_seed(0)
     config = from_options(TrainConfig, {"task": "hold", "proximity": "16"})
     policy = make_policy(config)

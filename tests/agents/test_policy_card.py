@@ -1,4 +1,4 @@
-"""Cards: any text is a card or is refused with the place that is wrong."""
+"""Cards: any text is a card, or is refused with the position of the fault."""
 
 import copy
 import json
@@ -35,7 +35,7 @@ RECORD = json.loads(card(results=({"x": 1.0},)).to_json())
 
 
 def places(value, path=()):
-    """Every place in a record."""
+    """Yield the path of every value in a record."""
     yield path
     if isinstance(value, list):
         value = dict(enumerate(value))

@@ -94,7 +94,7 @@ def test_a_policy_does_what_it_was_trained_for(tmp_path):
     shown = demo(policy="hold", seconds=0.5)
     assert (shown.task, shown.scenario) == ("hold", "cars-nlos")
     assert demo(policy="hold", task="ring", seconds=0.5).scenario == demo(seconds=0.5).scenario
-    untold = small(tmp_path, LAYOUT)  # its card does not say
+    untold = small(tmp_path, LAYOUT)  # its card does not name the task
     assert demo(policy=untold, scenario="cars-nlos", seconds=0.5).task == "ring"
 
 

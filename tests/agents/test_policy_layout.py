@@ -1,4 +1,4 @@
-"""Layouts: equal digests, equal numbers; few cars are padded to more as absent ones."""
+"""Layouts: equal digests mean equal fields; few cars are padded with absent ones."""
 
 from dataclasses import replace
 
@@ -27,7 +27,7 @@ def three_cars(**changes):
 
 
 def environments(mode, slots, history=1, steps=25):
-    """The same three cars in rooms with so many slots."""
+    """Return the same three cars in rooms with `slots` agent slots."""
     s = three_cars()
     params = default_params(s, max(slots))
     made = []
@@ -47,7 +47,7 @@ def environments(mode, slots, history=1, steps=25):
 
 
 def telling(layout):
-    """False where the environment says that a number means nothing: ages of absent cars."""
+    """Return a mask that is False for meaningless numbers, such as ages of absent cars."""
     absent = np.ones(layout.one, dtype=bool)
     for row in layout.index:
         if layout.observation == "estimate_cov" and row["name"] == "age":

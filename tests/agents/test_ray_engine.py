@@ -1,4 +1,4 @@
-"""The engine on a cluster of two cores: what comes out is what a loop gives, whatever happens."""
+"""Ray engine on a cluster of two cores: results are those of a loop, despite failures."""
 
 import os
 import subprocess
@@ -13,13 +13,13 @@ from agents.jobs.ray_engine import start_ray
 
 pytest.importorskip("ray", reason="ray is not installed: pip install 'relpos-env[ray]'")
 
-# Ray leaves sockets of its own to the garbage collector.
+# Ray leaves its sockets to the garbage collector.
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::DeprecationWarning")
 
 
 @pytest.fixture(scope="module")
 def cluster():
-    """Two cores; the engine keeps a cluster that is there."""
+    """Start a cluster of two cores, which the engine uses."""
     import ray
 
     start_ray(2, None)
@@ -36,7 +36,7 @@ def text_of(path):
 
 
 def ended_at_first(folder, n):
-    """Ends the worker the first two times that it is asked for 1."""
+    """End the worker the first two times that it is called with 1."""
     marks = Path(folder)
     if n == 1 and len(list(marks.iterdir())) < 2:
         (marks / str(os.getpid())).touch()
@@ -51,7 +51,7 @@ def ended(n):
 
 
 def under_way(folder):
-    """How many calls are under way with this one."""
+    """Return the number of concurrent calls, this one included."""
     import time
 
     mark = Path(folder) / f"{os.getpid()}-{time.perf_counter_ns()}"
@@ -155,7 +155,7 @@ sys.modules["here_alone"] = module
 
 
 def elsewhere(address, code=SCRIPT):
-    """A program of its own that uses the engine; its process and what it says."""
+    """Start a program that uses the engine; return its process and its output."""
     here = Path(__file__).parent
     before = os.environ.get("PYTHONPATH", "")
     search = {"PYTHONPATH": os.pathsep.join([str(here), str(here.parents[1]), before])}
@@ -172,7 +172,7 @@ def elsewhere(address, code=SCRIPT):
 
 
 def processes_of(session):
-    """Processes that run in a session."""
+    """Return the running processes of a session."""
     found = []
     for stat in Path("/proc").glob("[0-9]*/stat"):
         try:

@@ -1,4 +1,4 @@
-"""Recordings tracked again: figures, exports, truth, damage, and the command line."""
+"""Replayed recordings: figures, exports, truth, damage, and the command line."""
 
 import json
 from dataclasses import replace
@@ -23,9 +23,9 @@ from tracking.log.truth import Truth
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
-    """A live run of 12 s in which cars drive about, with truth and ranges without errors.
+    """Make a live run of 12 s in which cars drive, with truth and exact ranges.
 
-    Ranges that err for a metre of driving tell the time of the truth to some 30 ms only.
+    Range errors that last for a metre of driving determine its time to some 30 ms only.
     """
     folder = tmp_path_factory.mktemp("run")
     scenario = folder / "exact.toml"
@@ -56,7 +56,7 @@ def test_it_gives_what_was_live(run, result):
 
 
 def test_the_truth_is_found_by_the_ranges(run, result):
-    # The rig's world began when the recording did; bytes were up to some 30 ms on their way.
+    # The rig's time began with the recording; bytes are delayed by up to some 30 ms.
     assert result.scored.offset == pytest.approx(0.015, abs=0.02)
     assert result.scored.score.rmse < 0.5
     moved = replace(run.log.truth, t=run.log.truth.t + 777.7)
@@ -148,7 +148,7 @@ def test_flaws_are_told(run, tmp_path):
     done = relpos("replay", tmp_path / "bad.rec")
     assert done.exit_code == 0
     assert done.output.count("incomplete: ") == 2
-    # What the recorder said it had to drop.
+    # The number that the recorder reported as dropped.
     read = read_recording(run.path)
     lossy = Recorder(tmp_path / "lossy.rec", read.header)
     lossy.add(Kind.TICK, 0, START + 10**8)

@@ -1,4 +1,4 @@
-"""Figures of reports share a style, which stays theirs."""
+"""Figures of reports share a style that does not leak to others."""
 
 import matplotlib as mpl
 

@@ -1,4 +1,4 @@
-"""The environment and the training of RLlib; they need relpos-env[rllib]."""
+"""Environment and training of RLlib; they need relpos-env[rllib]."""
 
 import json
 import pickle
@@ -35,7 +35,7 @@ from relpos_env.scenarios import SCENARIOS, draw_episode
 from relpos_env.scenarios.life import LifeEvent
 from relpos_env.timing import STAND_STILL
 
-# RLlib and Ray warn of their own former ways, and leave sockets to the garbage collector.
+# RLlib and Ray warn about their own deprecations, and leave sockets to the garbage collector.
 pytestmark = [
     pytest.mark.filterwarnings("ignore::DeprecationWarning"),
     pytest.mark.filterwarnings("ignore::ResourceWarning"),
@@ -44,7 +44,7 @@ pytestmark = [
 ]
 
 LIVELY = {"scenario": "cars-nlos", "level": 4, "max_cycles": 150}
-"""Cars join, leave and return."""
+"""Configuration in which cars join, leave and return."""
 
 
 def test_rllibs_own_check_passes():
@@ -53,7 +53,7 @@ def test_rllibs_own_check_passes():
 
 @pytest.fixture
 def come_and_go(monkeypatch):
-    """Episodes in which car 3 joins, car 1 leaves and returns and car 2 leaves for good."""
+    """Use episodes in which car 3 joins, car 1 leaves and returns and car 2 leaves for good."""
     happens = ((2.0, 3, "join"), (3.0, 1, "leave"), (4.5, 2, "leave"), (6.0, 1, "join"))
 
     def draw(scenario, n_slots, seconds, rng):
@@ -70,7 +70,7 @@ def come_and_go(monkeypatch):
 
 
 def drive(seed, arguments=LIVELY):
-    """Random drives of the form for RLlib and that of PettingZoo, side by side."""
+    """Drive the RLlib form and the PettingZoo form with the same random actions, side by side."""
     ours, theirs = FormationMultiAgentEnv(arguments), FormationEnv(**arguments)
     rng = np.random.default_rng(seed)
     (observations, infos), (wanted, _) = ours.reset(seed=seed), theirs.reset(seed=seed)
@@ -78,7 +78,7 @@ def drive(seed, arguments=LIVELY):
     over = False
     while not over:
         actions = {a: rng.uniform(-1, 1, 2).astype(np.float32) for a in observations}
-        # Who was not shown anything does what it likes, without effect.
+        # Actions of agents without observation are arbitrary, and have no effect.
         others = {a: rng.uniform(-1, 1, 2).astype(np.float32) for a in theirs.agents}
         found = ours.step({a: v for a, v in actions.items() if a in theirs.agents})
         wanted = theirs.step({**others, **{a: v for a, v in actions.items() if a in others}})
@@ -110,7 +110,7 @@ def check_keys(steps):
                 assert truncated[agent] == wanted[3][agent]
         over = not theirs.agents
         missing = set(wanted[0]) - set(observations)
-        # Those that are away, and they alone.
+        # Exactly the agents that are away.
         away = {a for a, info in wanted[4].items() if not info["present"]}
         ending = {a for a, cut in wanted[3].items() if cut}
         assert missing == (set() if over else away - ending)
@@ -153,7 +153,7 @@ def test_episodes_of_rllib_take_joins_leaves_and_returns(come_and_go):
     assert lengths["car_0"] == len(episode) == 80
     assert lengths["car_3"] == 80 - 21
     assert lengths["car_2"] == 46
-    # The step in which it went and that in which it was seen again are one.
+    # The step in which it left and that in which it was observed again are one.
     assert lengths["car_1"] == 80 - 30
     assert episode.agent_episodes["car_2"].is_truncated
 
@@ -171,7 +171,7 @@ def test_runners_never_share_an_episode_and_leave_those_of_comparisons_alone(mon
     def begun(worker, place, again=False):
         context = EnvContext({"arguments": LIVELY, "seed": 3}, worker, recreated_worker=again)
         env = SeededEnv(context)
-        # As RLlib does, whose seeds of neighbours are equal.
+        # As in RLlib, whose seeds of neighbours are equal.
         return [env.reset(seed=3 + worker + place)[0]["car_0"].tobytes() for _ in range(2)]
 
     first = begun(1, 0)
@@ -217,7 +217,7 @@ def test_training_on_two_runners_gives_a_policy_that_drives(tmp_path):
     policy = load_policy(str(result.policy))
     assert policy.layout == Layout("estimate", config.layout.n_cars)
     assert policy.card.training["measured"] == last
-    # The file drives as RLlib's network does, from the checkpoint.
+    # The file drives as RLlib's network from the checkpoint.
     path = result.checkpoint / "learner_group" / "learner" / "rl_module" / MODULE
     module = RLModule.from_checkpoint(str(path.resolve()))
     rows = np.random.default_rng(0).normal(0, 3, (50, policy.layout.size)).astype(np.float32)

@@ -1,4 +1,4 @@
-"""Several scenarios side by side: who sits where; threads change nothing of what happens."""
+"""Several scenarios side by side: agent slots, and independence of threads."""
 
 import numpy as np
 from small_runs import small
@@ -24,7 +24,7 @@ def test_rooms_of_several_scenarios_share_the_seats():
 
 
 def test_rooms_are_the_same_on_any_number_of_threads():
-    """One, as many as rooms, and more: rooms are then stepped in parts."""
+    """One thread, as many as rooms, and more: rooms are then stepped in parts."""
     driven = []
     for threads in ("1", "2", "3"):
         config = small(scenarios=("cars-nlos", "hall"), threads=threads, envs="8")

@@ -1,4 +1,4 @@
-"""The folder of a training run: damaged, foreign, and on a disk that is full."""
+"""Folder of a training run: damaged, foreign, and on a full disk."""
 
 import json
 import os
@@ -18,7 +18,7 @@ from agents.training.train import train
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
-    """An uninterrupted run."""
+    """Make an uninterrupted run."""
     return train(small(), tmp_path_factory.mktemp("runs") / "whole")
 
 

@@ -1,4 +1,4 @@
-"""Several training runs at a time: each as if it were alone, and the best policy is kept."""
+"""Several training runs at a time: each equals a run alone, and the best policy is kept."""
 
 import json
 import multiprocessing
@@ -45,7 +45,7 @@ def same_weights(one, other):
 
 @pytest.fixture(scope="module")
 def two(tmp_path_factory):
-    """Two runs side by side, and what was told of them."""
+    """Make two runs side by side; return their reports, too."""
     folder, told = tmp_path_factory.mktemp("runs") / "two", []
     result = train_policy(
         small(runs="2"), folder, progress=lambda share, row: told.append((share, row))
@@ -79,7 +79,7 @@ def test_the_best_of_both_is_kept(two):
     assert (card["seed"], card["leg"]) == (result.best["seed"], result.best["leg"])
     assert card["chosen_by"] == result.best
     assert "seeds 3 to 4" in (folder / "report.html").read_text()
-    # What drives is the policy of that run and leg.
+    # The exported policy is that of the chosen run and iteration.
     path = export_policy(choice.run, folder / "again", last=choice.weights == LAST)
     seen = np.random.default_rng(0).normal(size=(9, load_policy(path).layout.size))
     driven = [load_policy(p).act(seen.astype(np.float32)) for p in (path, folder / "two.onnx")]
@@ -134,7 +134,7 @@ def test_a_process_that_is_killed_is_told(tmp_path):
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
 def test_runs_end_with_the_process_that_began_them(tmp_path):
-    """Killed: a run that went on would write into a folder that was taken up with --resume."""
+    """A run that went on would write into a folder that --resume uses."""
     code = """
 import multiprocessing, sys, threading, time
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The policies that come with the package."""
+"""Policies included in the package."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from agents.settings import from_json, to_json
 from agents.training.config import TrainConfig
 
 EPISODES = range(2000, 2040)
-"""Enough that a single car that gets stuck in one of them does not decide."""
+"""Enough episodes that a single car stuck in one of them does not decide."""
 
 
 def mean_error(name, **setting):
@@ -24,7 +24,7 @@ def mean_error(name, **setting):
 
 
 def config_of(card):
-    """What a card says of its training; settings that are younger than it are left as they are."""
+    """Return the configuration of a card's training; newer settings keep their defaults."""
     told = card.training["config"]
     every = to_json(TrainConfig())
     parts = {k: {**every[k], **told[k]} for k in ("env", "net", "ppo")}

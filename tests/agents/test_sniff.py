@@ -1,4 +1,4 @@
-"""Readings of one port as they come, and which format they are."""
+"""Readings of one port as they arrive, and detection of their format."""
 
 import json
 import time
@@ -45,7 +45,7 @@ def test_shows_every_reading_once_the_format_is_known(talker):
 
 
 class SlowAtFirst:
-    """A format whose first decoding takes longer than one listens."""
+    """A format whose first decoding takes longer than the listening time."""
 
     def __init__(self, each, seconds):
         self._each, self._wait = each, [seconds]

@@ -1,4 +1,4 @@
-"""The noise of ranges that a log states is used, and not learned."""
+"""Range noise stated in a log is used in place of an estimate."""
 
 import re
 from dataclasses import replace

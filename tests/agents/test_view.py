@@ -1,4 +1,4 @@
-"""The view: what is drawn where, and that a file has it."""
+"""View: positions of the drawn objects, and their presence in a file."""
 
 import subprocess
 import sys
@@ -40,7 +40,7 @@ def test_nodes_stand_round_one_of_them():
     np.testing.assert_array_equal(places[1], [0.0, 0.0, 0.0])
     np.testing.assert_array_equal(places[3], [4.0, 0.0, 0.0])
     assert ellipses.keys() == {2, 3}
-    # Of node 1 nothing is known: another one is the middle.
+    # Node 1 has no estimates: another one is the centre.
     unknown = replace(SNAPSHOT.pairs[0], status="starting", pos_w=None)
     others = (unknown, replace(unknown, node_j=3), SNAPSHOT.pairs[2])
     places, _ = scene.place(replace(SNAPSHOT, pairs=others))
@@ -90,7 +90,7 @@ def test_what_cannot_be_opened(tmp_path, monkeypatch):
     pytest.importorskip("rerun")
     with pytest.raises(UsageError, match=r"\.rrd"):
         open_viewer("none", tmp_path / "a.mp4")
-    # What fails before anything could be shown leaves nothing that would be in the way.
+    # A failure before the first frame leaves no file behind.
     with pytest.raises(RuntimeError), open_viewer("none", tmp_path / "a.rrd"):
         raise RuntimeError
     assert not (tmp_path / "a.rrd").exists()

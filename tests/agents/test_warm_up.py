@@ -1,4 +1,4 @@
-"""Compiling ahead: only what is missing, in processes of its own, and it is found afterwards."""
+"""Ahead-of-time compilation: only missing kernels, in separate processes, found afterwards."""
 
 import json
 import os
@@ -29,7 +29,7 @@ def calls(name="joint", dimensions=3):
 
 @pytest.fixture
 def compiled():
-    """The joint filter, compiled by this process."""
+    """Compile the joint filter in this process."""
     for group in calls():
         for kernel, given in group:
             bind(kernel, *given)

@@ -1,4 +1,4 @@
-"""One tracker: the estimates in the loop and those of the recorded log are the same bits."""
+"""Parity: estimates in the loop and those of the recorded log are equal bit for bit."""
 
 from dataclasses import fields
 
@@ -25,7 +25,7 @@ def assert_same_run(live: list[TeamEstimate], log: TeamEstimate) -> None:
 
 
 def copy(estimate: TeamEstimate) -> TeamEstimate:
-    """The next step overwrites what the loop has."""
+    """Copy an estimate, which the next step of the loop overwrites."""
     arrays = (getattr(estimate, f.name).copy() for f in fields(TeamEstimate)[1:])
     return TeamEstimate(estimate.constellation, *arrays)
 
@@ -33,7 +33,7 @@ def copy(estimate: TeamEstimate) -> TeamEstimate:
 @pytest.mark.parametrize("name", FILTERS)
 @pytest.mark.parametrize("steps", [1, 7, 10, 43])
 def test_simulator_is_replayed_log(tmp_path, name, steps):
-    """However many steps of the physics make a block."""
+    """Blocks of any number of physics steps give the same estimates."""
     place, rng = scenario("cars-nlos"), np.random.default_rng(5)
     swarm = World(place, place.n_cars, n_steps=steps)
     swarm.begin(0, draw_episode(place, place.n_cars, 12.0, rng), rng.spawn(1)[0])
@@ -61,9 +61,9 @@ def test_simulator_is_replayed_log(tmp_path, name, steps):
     ids=lambda each: each.get("scenario", "ring-nlos"),
 )
 def test_environment_is_replayed_log(tmp_path, arguments, name):
-    """From the moment the trackers are switched on; whoever comes, goes or loses power."""
+    """The comparison starts when the trackers are switched on; cars come, go and lose power."""
     env = formation_v0.parallel_env(max_cycles=150, record=True, filter=name, **arguments)
-    for seed in (3, 11):  # of the first episode nothing is left
+    for seed in (3, 11):  # the first episode must leave no trace
         env.reset(seed=seed)
         rng = np.random.default_rng(0)
         live = [copy(env.loop.estimate)]

@@ -25,7 +25,7 @@ def test_robots_range_a_third_of_a_metre_too_long(data, name):
 
 
 def test_the_first_half_corrects_the_second(data):
-    """Errors of ranges that had no part in the calibration."""
+    """The tested ranges are not used for the calibration."""
     log = read_log(data / "logs" / "tiers_run01")
     middle = 0.5 * sum(log.t_range)
     halves = [replace(log, block=log.block.take(log.block.t[0] < middle))]

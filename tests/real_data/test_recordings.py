@@ -1,4 +1,4 @@
-"""The tracker on recordings of real sensors, against what was measured with them."""
+"""Tracker on recordings of real sensors, against their reference measurements."""
 
 import csv
 import gzip
@@ -63,7 +63,7 @@ def test_mds_is_better_than_filters_alone(results, name):
 
 
 def test_one_filter_over_all_nodes_follows_a_hand_among_reflections(results):
-    """From nothing but measurements; no more than 10 s of it are not scored."""
+    """Only measurements are used; at most 10 s are not scored."""
     found = results["inrol_env1", "joint"].score
     assert found.rmse <= 0.25
     assert found.rmse_shape <= 0.122
@@ -71,7 +71,7 @@ def test_one_filter_over_all_nodes_follows_a_hand_among_reflections(results):
 
 
 def test_ranges_of_radios_that_were_not_calibrated_are_found_to_be_long(data):
-    """By 0.36 m, of which a filter takes a part for obstacles."""
+    """They are 0.36 m too long, of which a filter attributes a part to obstacles."""
     [found] = [f for f in examine(read_log(data / "logs" / "tiers_short"))[1] if "offset" in f.name]
     assert 0.2 < float(found.text.split(" when ")[1].split(" m shorter")[0]) < 0.4
 
@@ -97,7 +97,7 @@ def test_once_it_is_found_how_the_group_is_turned_it_is_so_for_good(data, limit)
 
 @pytest.fixture(scope="module")
 def settled_walk(data):
-    """Its score once it is found how the group is turned; ok to a metre."""
+    """Score the walk once the rotation of the group is found; OK up to a metre."""
     params = TrackerParams(filter=FilterParams(joint=JointParams(accuracy=1.0)))
     return track_log(data / "logs" / "isas_walk1", skip=20.0, params=params).score
 
@@ -109,12 +109,12 @@ def test_a_walk_is_followed_once_it_is_found_how_the_group_is_turned(settled_wal
 
 @pytest.mark.xfail(strict=True, reason="its layout leans by 10 to 25 degrees at first: 0.1300 m")
 def test_its_shape_is_too(settled_walk):
-    """With a turn that nothing had measured it was: by luck, as other headings at first showed."""
+    """An unmeasured rotation met the limit by chance, as other initial headings showed."""
     assert settled_walk.rmse_shape <= 0.13
 
 
 def test_recordings_are_near_what_their_ranges_allow(data):
-    """Of the noise that their truth shows."""
+    """The bound is for the noise of their ranges according to truth."""
     log = read_log(data / "logs" / "inrol_env1")
     found = track_log(log, bound=recorded_bound(log))
     for name, least in found.expected.items():
@@ -122,7 +122,7 @@ def test_recordings_are_near_what_their_ranges_allow(data):
 
 
 def test_gross_outliers_are_refused(results):
-    """One fixed node of the walk throws ranges that are metres too long."""
+    """One fixed node of the walk has ranges that are metres too long."""
     assert results["isas_walk1", "ekf-mds"].n_rejected > 0
 
 
@@ -136,7 +136,7 @@ BROAD = {
 
 @pytest.mark.parametrize("trial", BROAD)
 def test_orientation_figures_of_broad(data, trial):
-    """Inclination RMSE and heading error std [deg] of VQF with its default parameters."""
+    """Compare inclination RMSE and heading error std [deg] of VQF with its default parameters."""
     with gzip.open(data / "imu_orientation" / f"{trial}.csv.gz", "rt") as file:
         rows = list(csv.DictReader(file))
 

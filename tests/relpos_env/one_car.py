@@ -16,7 +16,7 @@ from relpos_env.world.car import CarParams, car_record
 
 
 class Car:
-    """One car on an endless floor, with all that it went through."""
+    """One car on an endless floor, with its recorded motion."""
 
     def __init__(self, params=None, body=(0.0,) * 6, dt=DT):
         self.params, self.dt = params or CarParams(), dt

@@ -1,4 +1,4 @@
-"""Runs of every form of the environment under random commands, and the bits of all they gave."""
+"""Runs of every form of the environment under random commands, and all bits of their results."""
 
 from dataclasses import replace
 
@@ -11,7 +11,7 @@ from relpos_env.world.world import World
 
 
 def busy(n_cars=5, rate=60.0):
-    """The hardest level, with so many joins, leaves and losses of power that seconds have some."""
+    """Return the hardest level, with joins, leaves and power losses within seconds."""
     scenario = SCENARIOS["random"].at_level(4).with_cars(n_cars)
     life = {"n_cars": (n_cars - 1, n_cars), "leave_rate": (rate, rate), "absence": (0.2, 4.0)}
     power = {"power_off_rate": (rate, rate), "power_off_time": (0.2, 0.8)}
@@ -19,7 +19,7 @@ def busy(n_cars=5, rate=60.0):
 
 
 def bits(value):
-    """Everything in nested results, comparable to the last bit."""
+    """Return all values of nested results, comparable bit for bit."""
     if isinstance(value, dict):
         return {key: bits(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple) or np.asarray(value).dtype.hasobject and value is not None:
@@ -31,7 +31,7 @@ def bits(value):
 
 
 def commands(space, rng, shape=(), scale=1.0):
-    """Random actions of a space, (*shape, *action)."""
+    """Return random actions of a space, (*shape, *action)."""
     if hasattr(space, "nvec"):
         return rng.integers(space.nvec, size=(*shape, *space.shape))
     if hasattr(space, "n"):
@@ -40,7 +40,7 @@ def commands(space, rng, shape=(), scale=1.0):
 
 
 def parallel_run(env, seed, episodes=3, scale=1.0):
-    """All that whole episodes of the PettingZoo form gave."""
+    """Return all results of whole episodes of the PettingZoo form."""
     rng, trace = np.random.default_rng(7), []
     for k in range(episodes):
         trace.append(bits((*env.reset(seed=None if k else seed), env.state())))
@@ -51,7 +51,7 @@ def parallel_run(env, seed, episodes=3, scale=1.0):
 
 
 def gym_run(env, seed, episodes=3):
-    """All that whole episodes of the Gymnasium form gave."""
+    """Return all results of whole episodes of the Gymnasium form."""
     rng, trace = np.random.default_rng(7), []
     for k in range(episodes):
         trace.append(bits(env.reset(seed=None if k else seed)))
@@ -64,7 +64,7 @@ def gym_run(env, seed, episodes=3):
 
 
 def vector_run(env, seed, steps):
-    """All that so many steps of the vector form gave, with the actions."""
+    """Return all results of some steps of the vector form, with the actions."""
     rng, trace = np.random.default_rng(7), [env.reset(seed=seed)]
     space = env.single_action_space
     taken = [commands(space, rng, (env.num_envs,)) for _ in range(steps)]
@@ -73,7 +73,7 @@ def vector_run(env, seed, steps):
 
 
 def seats_run(env, seed, steps):
-    """All that so many steps of the form for Stable-Baselines3 gave, with the actions."""
+    """Return all results of some steps of the Stable-Baselines3 form, with the actions."""
     env.seed(seed)
     rng, trace = np.random.default_rng(7), [env.reset()]
     taken = [commands(env.action_space, rng, (env.num_envs,)) for _ in range(steps)]
@@ -82,17 +82,17 @@ def seats_run(env, seed, steps):
 
 
 def run_of_seed(seed):
-    """A run of its own, for other processes."""
+    """Return a run in an environment of its own, for other processes."""
     return parallel_run(parallel_env(max_cycles=10), seed, episodes=2)
 
 
 def placed(start, *, room=(8.0, 8.0), obstacles=(), base="cars-los"):
-    """A swarm of one group, its cars and boxes where they are wanted, nothing drawn."""
+    """Return a simulator of one group with given cars and boxes, without randomisation."""
     start = np.array(start, dtype=np.float64)
     n = len(start)
     place = replace(SCENARIOS[base], obstacles=(), n_cars=2, name="placed")
     drawn = draw_episode(place, n, 100.0, np.random.default_rng(0))
-    # As many boxes as are wanted must have room.
+    # There must be room for all given boxes.
     wide = replace(
         place, room=room, ring=(0.3, 0.3), layout="scattered",
         randomisation=Randomisation(obstacles=(0, len(obstacles))),
@@ -106,7 +106,7 @@ def placed(start, *, room=(8.0, 8.0), obstacles=(), base="cars-los"):
 
 
 def drive(swarm, seconds, speed, steering=0.0):
-    """The same command for a while; contacts that every car began, (car)."""
+    """Apply one command for a while; return the contacts that every car began, (car)."""
     shape = swarm.contacts.shape
     contacts = np.zeros(shape[1])
     for _ in range(round(seconds * 10)):

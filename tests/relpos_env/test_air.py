@@ -1,4 +1,4 @@
-"""Whole groups in the reference air: losses, hidden nodes, restarts, doubles, jumping clocks."""
+"""Groups in the reference air: losses, hidden nodes, restarts, duplicate IDs, clock jumps."""
 
 import itertools
 from collections import Counter
@@ -20,7 +20,7 @@ CORNERS = np.array([[0.0, 0, 0], [4, 0, 0], [0, 3, 0], [6, 5, 0], [-3, 4, 0], [2
 
 
 class Group:
-    """Nodes that stand still, unless `pos` is changed."""
+    """Nodes at rest, unless `pos` is changed."""
 
     def __init__(self, pos, seed=1, ids=None, session=None, delays=None, **channel):
         self.pos = np.array(pos, dtype=np.float64)
@@ -39,7 +39,7 @@ class Group:
         self.air.switch_on(node, boot=boot, at=at, id=self.ids[node])
 
     def run(self, seconds):
-        """The ranges of so long, as (time, node that tells, event)."""
+        """Run for some seconds; return the ranges as (time, reporting node, event)."""
         self.air.told.clear()
         self.air.sent.clear()
         for _ in range(round(seconds / DT)):
@@ -47,7 +47,7 @@ class Group:
         return [t for t in self.air.told if isinstance(t.event, RangeEvent)]
 
     def error(self, told):
-        """Of a range, against the nearest of all that have these IDs [m]."""
+        """Return the error of a range to the nearest distance of all nodes with these IDs [m]."""
         ends = [
             [k for k, name in enumerate(self.ids) if name == end]
             for end in (told.event.i, told.event.j)
@@ -59,7 +59,7 @@ class Group:
         assert max(map(self.error, ranges), default=0.0) < limit
 
     def pairs(self, ranges):
-        """How often each pair was ranged, by the count of whichever end knows more."""
+        """Return the number of ranges of each pair, the larger count of its two ends."""
         ends = [t for t in ranges if self.ids[t.node] in (t.event.i, t.event.j)]
         counts = Counter((t.node, t.event.i, t.event.j) for t in ends)
         best = Counter()
@@ -71,7 +71,7 @@ class Group:
         return {s.root for s in self.air.sessions if s is not None}
 
     def together(self):
-        """Whether all follow one initiator and know each other."""
+        """Return whether all follow one initiator and know each other."""
         sessions = [s for s in self.air.sessions if s is not None]
         everyone = tuple(sorted(s.id for s in sessions))
         leads = [s for s in sessions if s.role is Role.INITIATOR]
@@ -142,7 +142,7 @@ def test_two_groups_that_meet(seed):
 
 
 def line(order):
-    """Places of nodes 0, 1, 2 so that `order` stands along a line."""
+    """Return places of nodes 0, 1, 2 on a line in the order `order`."""
     pos = np.empty((3, 3))
     pos[list(order)] = [[0.0, 0, 0], [8, 0, 0], [16, 0, 0]]
     return pos
@@ -185,7 +185,7 @@ def test_a_node_that_is_switched_on_again(who, pause):
     group.right(group.run(1.0))
     group.air.switch_off(who)
     group.right(group.run(pause))
-    group.air._nodes[who]["base"] = 2**38 + 12345  # its clock begins again too
+    group.air._nodes[who]["base"] = 2**38 + 12345  # its clock restarts, too
     group.on(who, boot=200)
     group.right(group.run(1.0))
     assert group.together()
@@ -212,7 +212,7 @@ def test_two_nodes_with_one_id(double, both_at_once, seed):
         clean = [t for t in ranges if double not in (t.event.i, t.event.j)]
         group.right(clean)
         if second:  # the others go on all the time
-            assert all_pairs(rest) <= set(group.pairs(clean)), second
+            assert all_pairs(rest) <= set(group.pairs(clean)), second  # the others go on
         if noticed == {double, 4} and second > 3:
             break
     assert noticed == {double, 4}

@@ -1,4 +1,4 @@
-"""Big groups whose tables are split, and groups that share the air."""
+"""Large groups whose tables are split, and groups that share the air."""
 
 from dataclasses import replace
 
@@ -58,7 +58,7 @@ def test_groups_of_different_numbers_take_turns_in_one_air():
     run(air, pos, 10.0)
     for members in ({0, 1, 2}, {3, 4, 5}):
         told = [t for t in air.told if t.node in members and isinstance(t.event, RangeEvent)]
-        assert len(told) > 600  # each group alone would have 7000; they take turns
+        assert len(told) > 600  # each group alone would have 7000; they alternate
         assert all({t.event.i, t.event.j} <= members for t in told)
 
 

@@ -1,4 +1,4 @@
-"""What cannot be is refused with the name of the argument and what is allowed."""
+"""Invalid input raises an error with the argument's name and the allowed values."""
 
 from dataclasses import replace
 

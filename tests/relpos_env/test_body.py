@@ -1,4 +1,4 @@
-"""A person in motion: laws of the motion, of the skeleton, and of the sensors on it."""
+"""A person in motion: properties of the motion, of the skeleton, and of the sensors on it."""
 
 from dataclasses import fields
 
@@ -49,7 +49,7 @@ def differences(f, t, h=1e-5):
 
 
 def integral(x, dt):
-    """By trapezoids, from 0."""
+    """Integrate by trapezoids, from 0."""
     return np.concatenate([np.zeros((1, 3)), np.cumsum(0.5 * dt * (x[1:] + x[:-1]), axis=0)])
 
 
@@ -135,7 +135,7 @@ def test_a_person_stays_in_the_room_and_differs(seed):
     body = procedural_body(tuple(EXERCISES), ROOM, 60.0, 2.0, DT, np.random.default_rng(seed))
     assert np.all(np.abs(body.pos_w[..., :2]).max(axis=(0, 1)) < 0.5 * np.array(ROOM))
     accel = np.linalg.norm(BodyMotion(body).at(body.t).accel_w, axis=-1)
-    assert np.all(accel[:195] < 0.2)  # stands first
+    assert np.all(accel[:195] < 0.2)  # at rest at first
     assert 10.0 < np.quantile(accel, 0.99) < 40.0
     assert accel.max() < 80.0
     other = procedural_body(tuple(EXERCISES), ROOM, 60.0, 2.0, DT, np.random.default_rng(seed + 9))
@@ -208,7 +208,7 @@ def test_same_seed_same_log_however_it_is_stepped():
 
 
 def errors(log):
-    """Error of every range after the first second, and whether it was hidden."""
+    """Return the error of every range after the first second, and a mask of NLOS."""
     ranges = log.block.kind[0] == Kind.RANGE
     t, i, j = (getattr(log.block, name)[0][ranges] for name in ("t", "i", "j"))
     pos, _ = log.truth.positions(log.constellation, t)
@@ -219,7 +219,7 @@ def errors(log):
 
 
 def test_ranges_of_a_body():
-    """28.5 rounds a second; 6 cm in sight, the paper's 27.5 cm behind the body."""
+    """28.5 rounds a second; 6 cm in LOS, the paper's 27.5 cm behind the body."""
     found = [errors(simulate(scenario="human", seconds=25.0, seed=seed)) for seed in range(4)]
     error, hidden = (np.concatenate(part) for part in zip(*found, strict=True))
     rms = lambda e: np.sqrt(np.mean(e**2))  # noqa: E731
@@ -266,7 +266,7 @@ def test_motion_capture_has_smooth_joins(data):
     body, again = (recorded_body(clips, 150.0, 2.0, DT, np.random.default_rng(4)) for _ in range(2))
     np.testing.assert_array_equal(body.pos_w, again.pos_w)
     moving = BodyMotion(body).at(body.t)
-    assert np.linalg.norm(moving.vel_w[:200], axis=-1).max() < 1e-6  # stands first
+    assert np.linalg.norm(moving.vel_w[:200], axis=-1).max() < 1e-6  # at rest at first
     assert np.linalg.norm(moving.accel_w, axis=-1).max() < 80.0
     assert np.linalg.norm(moving.rate_b, axis=-1).max() < 35.0
     assert np.all(np.abs(body.pos_w[..., :2]).max(axis=(0, 1)) < 0.5 * np.array(ROOM))

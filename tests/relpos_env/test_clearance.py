@@ -1,4 +1,4 @@
-"""How much room cars have: laws of the kernel, and what it says of cars in a room."""
+"""Clearance of cars: properties of the kernel, and values for cars in a room."""
 
 import numpy as np
 from hypothesis import given, settings
@@ -20,7 +20,7 @@ def row(x, y, half_l, half_w, angle):
 
 
 def outline(box, n=400):
-    """Points all along the edges of a box."""
+    """Return points along the edges of a box."""
     x, y, half_l, half_w, c, s = box
     share = np.linspace(-1.0, 1.0, n)
     one = np.ones(n)
@@ -54,11 +54,11 @@ def clearances(poses, room=(5.0, 3.0), box=None, present=None):
 
 def test_the_nearest_of_walls_boxes_and_cars_counts():
     np.testing.assert_allclose(clearances([(0.0, 0.0, 0.3)]), FARTHEST)
-    # A wall ahead, and one next to a car that is turned by a right angle.
+    # A wall ahead, and one next to a car that is rotated by a right angle.
     wall = 0.2 - CAR_RADIUS - WALL_RADIUS
     np.testing.assert_allclose(clearances([(2.5 - 0.15 - 0.2, 0.0, 0.0)]), wall)
     np.testing.assert_allclose(clearances([(2.5 - 0.10 - 0.2, 0.0, np.pi / 2)]), wall)
-    # Two cars one behind the other; who is not there is near nobody.
+    # Two cars one behind the other; an absent car is near no one.
     pair = [(0.0, 0.0, 0.0), (0.5, 0.0, 0.0)]
     np.testing.assert_allclose(clearances(pair), 0.2 - 2.0 * CAR_RADIUS)
     np.testing.assert_allclose(clearances(pair, present=[True, False]), FARTHEST)
@@ -84,7 +84,7 @@ def test_a_car_that_presses_on_a_wall_has_no_room_and_is_told_so_at_every_decisi
 
 
 def test_to_crash_is_not_the_cheapest_end():
-    """Where time is paid for, a contact that ends the episode costs what was left of it."""
+    """If time costs, a contact that ends the episode costs the remaining time."""
     arguments = {"task": "gap", "max_cycles": 150, "end_on_collision": True}
     env = parallel_env(**arguments)
     env.reset(seed=3)

@@ -1,4 +1,4 @@
-"""Moves of the solver without the interpreter are those that pymunk makes with it."""
+"""Solver steps without the interpreter equal those of pymunk with it."""
 
 from dataclasses import replace
 
@@ -65,7 +65,7 @@ class Plain:
 
 
 def crowded(n_envs=3, env=1):
-    """Bodies in which an environment is full of cars and boxes, and its solver."""
+    """Return bodies with an environment full of cars and boxes, and its solver."""
     bodies = make_bodies(n_envs, N_CARS, len(BOXES))
     present = np.isin(np.arange(N_CARS), CARS)
     start = np.array([[-0.5, 0.2, 0.0], [0.9, 0.5, 2.0], [9.0, 9.0, 1.0], [-0.2, -0.7, 1.0]])
@@ -116,7 +116,7 @@ def test_a_box_is_drawn_where_it_stands():
 
 
 def test_the_solvers_arrays_keep_their_room():
-    # Where it finds too little room the C code takes other memory.
+    # If its arrays were too small, the C code would allocate others.
     bodies, solver = crowded()
     room = PhysicsSpace(SIZE, BOXES, CAR, CARS)
     connect(solver, 1, room, 0)
@@ -124,7 +124,7 @@ def test_the_solvers_arrays_keep_their_room():
     places = [int(calls[f"{way}_arr"]) for way in ("put", "got", "met")]
     rng = np.random.default_rng(0)
     for _ in range(200):
-        bodies.body[1, CARS, :2] = rng.uniform(-1.0, 1.0, (len(CARS), 2))  # all in each other
+        bodies.body[1, CARS, :2] = rng.uniform(-1.0, 1.0, (len(CARS), 2))  # all overlap
         bodies.box_body[1, [0, 2], :2] = rng.uniform(-1.0, 1.0, (2, 2))
         solve(bodies, solver, 1, DT)
     assert [int(calls[f"{way}_arr"]) for way in ("put", "got", "met")] == places

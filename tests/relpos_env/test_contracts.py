@@ -1,4 +1,4 @@
-"""What the interfaces promise beyond their libraries' checkers."""
+"""Contracts of the interfaces beyond their libraries' checkers."""
 
 from dataclasses import replace
 

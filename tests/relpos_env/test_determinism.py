@@ -1,4 +1,4 @@
-"""Same seed, same everything, bit for bit, in every form; a batch is its environments alone."""
+"""Equal seeds give equal bits in every form; a batch equals its environments alone."""
 
 from functools import partial
 
@@ -14,7 +14,7 @@ from relpos_env.formation_v0 import parallel_env
 
 HARD = {"scenario": "random", "level": 4, "n_cars": 5, "max_cycles": 30}
 BUSY = {"scenario": busy(), "max_cycles": 30, "observation": "estimate_cov"}
-"""With joins, leaves, losses of power and randomisation of everything."""
+"""Configuration with joins, leaves, power losses and all kinds of randomisation."""
 
 
 @pytest.mark.parametrize("kwargs", [HARD, BUSY, {"max_cycles": 20, "actions": "discrete"}])

@@ -1,4 +1,4 @@
-"""The documents against the code: tables, snippets, quoted code and paths."""
+"""Documents against the code: tables, snippets, quoted code and paths."""
 
 import inspect
 import re
@@ -101,7 +101,7 @@ def test_snippets_run(code, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("code", snippets("how-to/adding.md"), ids=lambda c: c.splitlines()[0])
 def test_quoted_code_is_that_of_the_file(code):
-    """The first line names the file; where something is left out stands a line of three dots."""
+    """The first line names the file; a line of three dots marks an omission."""
     name, _, quoted = code.partition("\n")
     text = (ROOT / name.removeprefix("# ")).read_text()
     for part in re.split(r"^\s*\.\.\.$\n", quoted, flags=re.MULTILINE):

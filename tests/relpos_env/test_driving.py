@@ -1,4 +1,4 @@
-"""Driving on estimates: observations stay in their space, and the formation is kept on them."""
+"""Driving on estimates: observations stay in their space, and the formation is kept."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from relpos_env.tasks import TASKS
 
 
 class Follower:
-    """Drives as the operator asks, and towards where the others say that its place is."""
+    """A driver that follows the operator's command, and moves to its place among the others."""
 
     def __init__(self, fields):
         rows = index_table(fields)
@@ -70,7 +70,7 @@ def formation_error(observation, seed, blind=False):
 
 
 def test_the_formation_is_kept_on_estimates():
-    """Better than on the operator's command alone, which an oracle beats by far."""
+    """The error is below that of the operator's command alone, which an oracle beats by far."""
     seeds = range(2)
     truth = np.mean([formation_error("truth", s) for s in seeds])
     estimate = np.mean([formation_error("estimate", s) for s in seeds])
@@ -82,7 +82,7 @@ def test_the_formation_is_kept_on_estimates():
 
 @pytest.mark.parametrize("n_cars", [4, 6])
 def test_a_group_that_stands_at_first_is_found_right(n_cars):
-    """All rotations are open until somebody drives: nobody is ok and a metre wrong."""
+    """All rotations are possible until a car moves: no car is OK and wrong by a metre."""
     formation = EnvCore(configure({"scenario": "ring-nlos", "n_cars": n_cars}), 8)
     for env in range(8):
         formation.seed(env, np.random.default_rng(env))

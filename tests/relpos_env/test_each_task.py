@@ -1,4 +1,4 @@
-"""What each task asks for, how it ends, and who gets which place when cars come and go."""
+"""Each task: goals, end, and assignment of places when cars come and go."""
 
 import itertools
 from types import SimpleNamespace
@@ -62,7 +62,7 @@ def test_cars_that_come_and_go_are_given_places(name):
             update(task, state, t)
             goals = task.goal_w[0, cars]
             if name != "gap" or t > 100.0:
-                # In a gap task, waiting cars stand where they stand.
+                # In a gap task, waiting cars stay in place.
                 gaps = [np.linalg.norm(a - b) for a, b in itertools.combinations(goals, 2)]
                 assert min(gaps, default=1.0) > 0.45
             assert np.all(np.abs(goals) < np.array(ROOM) / 2)
@@ -146,7 +146,7 @@ def test_ring_starts_where_the_cars_stand_and_turns():
     task = make_task("ring", 3, 1, (5.0, 5.0))
     task.reset(state, ALL)
     update(task, state, 0.0)
-    # The mean of the angles' distance from 0, 120 and 240 degrees, as directions.
+    # The mean of the angles' distances from 0, 120 and 240 degrees, as directions.
     phase = np.angle(np.mean(np.exp(1j * (angle - 2.0 * np.pi * np.arange(3) / 3))))
     places = phase + 2.0 * np.pi * np.arange(3) / 3
     expected = 1.4 * np.stack([np.cos(places), np.sin(places)], axis=1)
@@ -162,7 +162,7 @@ def test_a_long_ring_has_even_places_and_constant_speed():
     task = begun("ring", state, half_axes=(1.0, 2.5), lookahead=0.0)
     length = 2.0 * np.pi + 4.0 * 1.5
     before = task.goal_w[0].copy()
-    # A quarter of the loop later everybody is where the next one was.
+    # A quarter of the loop later every car is in the next one's place.
     update(task, state, length / 4.0)
     distance = np.linalg.norm(task.goal_w[0][:, None] - before[None], axis=-1)
     assert np.allclose(np.sort(distance.min(axis=1)), 0.0, atol=0.05)
@@ -210,7 +210,7 @@ def test_who_joins_before_the_wall_queues_and_who_joins_behind_it_does_not():
     before = task.goal_w.copy()
     state.present[0] = True
     update(task, state, 3.0)
-    # Those on their way go on; the newcomers begin where they stand.
+    # Cars under way continue; new ones start at their positions.
     assert np.allclose(task.goal_w[0, :2], before[0, :2], atol=1e-9)
     assert np.allclose(task.goal_w[0, 2:], state.pos_w[0, 2:])
     assert not task.plan[0, 2].any()
@@ -230,7 +230,7 @@ def test_followers_are_paid_for_going_along_told_or_not():
         task = make_task("follow", 3, 1, ROOM, told=told)
         task.reset(state, ALL)
         goals = []
-        for t in (2.0, 2.3, 2.31):  # the plan is that of 0.3 s later
+        for t in (2.0, 2.3, 2.31):  # the reference is that of 0.3 s later
             update(task, state, t)
             goals.append(task.goal_w.copy())
         state.vel_w = (goals[2] - goals[1]) / 0.01

@@ -1,4 +1,4 @@
-"""Every task with every observation mode against the checkers of the libraries it serves."""
+"""Every task with every observation mode against the checkers of the supported libraries."""
 
 import gymnasium
 import numpy as np

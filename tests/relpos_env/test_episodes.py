@@ -1,4 +1,4 @@
-"""What is drawn for an episode: laws, independence, levels."""
+"""Randomisation of episodes: properties, independence, levels."""
 
 from dataclasses import fields, replace
 
@@ -30,7 +30,7 @@ def draw(chosen, seed=0, slots=SLOTS):
 
 
 def content(episode):
-    """Everything in an episode, to compare by kinds of draws."""
+    """Return the contents of an episode, to compare by kinds of draws."""
     return {
         f.name: value.tolist() if isinstance(value, np.ndarray) else value
         for f in fields(episode)
@@ -112,7 +112,7 @@ def test_one_kind_of_randomisation_leaves_the_draws_of_the_others(kind, layout):
         on = replace(off, **KINDS[kind])
         a, b = (content(draw(replace(place, randomisation=what), 3)) for what in (off, on))
         assert a[kind] != b[kind]
-        # Scattered cars and those that join need floor that is free.
+        # Scattered and joining cars depend on the free floor.
         follows = {"start": {"present", "events"}, "obstacles": {"events"}}.get(kind, set())
         if (kind, layout) == ("obstacles", "scattered"):
             follows.add("start")
@@ -130,7 +130,7 @@ def test_factors_stay_in_their_intervals_and_spread():
     noise = np.array([e.imu.acc_noise / s.imu.acc_noise for e in drawn])
     assert 0.5 <= noise.min() < 0.55
     assert 1.8 < noise.max() <= 2.0
-    assert abs(np.log(noise).mean()) < 0.1  # as often half as double
+    assert abs(np.log(noise).mean()) < 0.1  # a half is as frequent as a double
     assert all(0.1 <= e.radio.antenna_delay_std <= 0.2 for e in drawn)
     assert all(s.radio.channel.loss <= e.radio.channel.loss <= 0.9 for e in drawn)
 

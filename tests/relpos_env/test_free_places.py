@@ -1,4 +1,4 @@
-"""Where a formation stands: clear of what stands in the room, and as near as can be."""
+"""Placement of a formation: clear of obstacles, and as near as possible."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ def test_it_stays_where_it_is_wanted_if_that_is_clear():
     np.testing.assert_array_equal(free_anchor(wanted, HALF, SQUARE, BOX), wanted)
     outside = free_anchor(np.array([-5.0, 0.0]), HALF, SQUARE, BOX)
     np.testing.assert_array_equal(outside, [-2.0, 0.0])
-    gone = np.zeros((2, 6))  # boxes of no size are not there
+    gone = np.zeros((2, 6))  # boxes of size zero are absent
     np.testing.assert_array_equal(free_anchor(np.zeros(2), HALF, SQUARE, gone), [0.0, 0.0])
 
 
@@ -57,7 +57,7 @@ def test_no_place_of_a_standing_formation_is_in_an_obstacle(scenario):
         for box in formation.loop.swarm.boxes[env]:
             if box[2] > 0.0:
                 assert distance(goals, box).min() >= CLEAR - 1e-9
-    # And the group is told how far it is from there.
+    # The error of the group includes the distance from it.
     present = formation.state.present[..., None]
     off = np.where(present, formation.state.pos_w - formation.task.goal_w, 0.0).sum(axis=1)
     place = np.linalg.norm(off, axis=1) / present.sum(axis=(1, 2))

@@ -1,4 +1,4 @@
-"""`gate=True`: the very gate of real cars is in the simulated loop."""
+"""`gate=True`: the safety gate of real cars is in the simulated loop."""
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ def test_cars_that_head_for_each_other_do_not_touch():
     for gate in (False, True):
         env = parallel_env(scenario="ring-los", gate=gate)
         env.reset(seed=0, options={"poses": start})
-        for _ in range(30):  # until the trackers are sure
+        for _ in range(30):  # until the trackers have converged
             env.step({a: np.array([0.25, 0.8], np.float32) for a in env.agents})
         least = np.inf
         for _ in range(80):

@@ -1,4 +1,4 @@
-"""Cars that join, leave and return, trackers without power: what the agents of it see."""
+"""Cars that join, leave and return, trackers without power: effects on the agents."""
 
 from dataclasses import replace
 
@@ -15,26 +15,26 @@ from relpos_env.timing import STAND_STILL
 from tracking import Status
 
 NEW, RETURNS, LEAVES, DARK = 3, 1, 2, 0
-"""Cars by what happens to them."""
+"""Cars by their events."""
 COME_AND_GO = (
     (2.0, NEW, "join"),
     (3.0, RETURNS, "leave"),
     (4.5, LEAVES, "leave"),
     (6.0, RETURNS, "join"),
 )
-"""Seconds since the cars were let go."""
+"""Events by seconds since the end of the initial rest."""
 JOIN = ((8.0, NEW, "join"),)
 OUTAGE = ((8.0, DARK, "power-off"), (20.0, DARK, "power-on"))
 
 
 def first_cycle(t):
-    """The first step that shows what happens at a time: the one that begins at it or after."""
+    """Return the first step that shows an event: the one that starts at its time or after."""
     return int(np.ceil(round(10 * t, 6))) + 1
 
 
 @pytest.fixture
 def life(monkeypatch, request):
-    """Episodes in which just that happens; cars come in where they would have started."""
+    """Use episodes with exactly these events; cars join where they would have started."""
     happens = getattr(request, "param", COME_AND_GO)
 
     def draw(scenario, n_slots, seconds, rng):
@@ -56,14 +56,14 @@ def make(form=parallel_env, **kwargs):
 
 
 def circling(env, k):
-    """Everybody drives a circle of its own, now faster, now slower; none touches another."""
+    """Drive every car on a circle of its own at varying speed; none touches another."""
     speed = 0.4 + 0.1 * np.sin(0.1 * k * (1.0 + 0.2 * np.arange(4)))
     rows = np.stack([speed, np.full(4, 0.7)], axis=-1).astype(np.float32)
     return {a: rows[int(a[-1])] for a in env.agents}
 
 
 def trace(env, seed=0):
-    """Results of every step of an episode, the reset first."""
+    """Return the results of every step of an episode, the reset first."""
     observations, infos = env.reset(seed=seed)
     rows = [(list(env.agents), observations, {}, {}, {}, infos)]
     while env.agents:
@@ -105,7 +105,7 @@ def test_cars_that_are_away_see_zeros_and_earn_nothing(life):
 
 
 def test_what_absent_cars_do_has_no_effect(life):
-    """Not even in the step in which they come back."""
+    """This includes the step in which they return."""
     runs = []
     for action in (0.0, 1.0):
         env = make(max_cycles=70)
@@ -174,12 +174,12 @@ def test_one_controller_for_all_sees_zeros_in_the_place_of_absent_cars(life):
         assert np.array_equal(rows.any(axis=1), env.formation.state.present[0])
         present = env.formation.state.present[0]
         assert not (present & ~info["active"]).any()
-        # Cars that are away are in no formation, and not in a perfect one.
+        # Absent cars are in no formation: their error does not count as 0.
         assert info["formation_error"] == pytest.approx(env.formation.task.error[0, present].mean())
 
 
 def waiting(monkeypatch, *more):
-    """An environment whose new car is to come in where another stands; that one's own way."""
+    """Return an environment whose new car joins at the start of car 0, which blocks it."""
 
     def draw(scenario, n_slots, seconds, rng):
         episode = draw_episode(scenario, n_slots, seconds, rng)
@@ -229,7 +229,7 @@ def test_two_cars_stay_whoever_waits_outside(monkeypatch):
 
 
 def test_a_box_that_was_not_pushed_is_in_nobodys_way():
-    """Doors are drawn next to boxes that can be pushed, however long these are."""
+    """Doors are placed next to movable boxes, regardless of their length."""
     kept = []
     env = make(scenario="rooms-9x7", n_cars=6)
     for seed in range(150):

@@ -1,4 +1,4 @@
-"""What a filter is told of the simulated world, next to that world."""
+"""Filter parameters for the simulated world, against that world."""
 
 import runpy
 from dataclasses import replace
@@ -24,7 +24,7 @@ MEASURES = runpy.run_path(str(Path(__file__).parents[2] / "benchmarks" / "measur
 
 @pytest.fixture(scope="module")
 def drives():
-    """Sixteen drives of cars-nlos."""
+    """Simulate sixteen drives of cars-nlos."""
     return [simulate(scenario="cars-nlos", seconds=60.0, seed=seed) for seed in range(400, 416)]
 
 
@@ -52,14 +52,14 @@ def test_obstacles_that_are_drawn_for_episodes_hide_as_well():
 def test_power_gaps_scatter_as_much_as_they_are_said_to(drives):
     gap, clear = np.concatenate([MEASURES["sight"](log)[1] for log in drives]).T
     nlos = matched_params(recordable("cars-nlos")).nlos
-    # Gaps of a drive are alike: eight drives have tens of independent ones.
+    # Power differences of a drive are correlated: eight drives have tens of independent ones.
     assert gap[clear == 1].std() == pytest.approx(nlos.power_diff_los_std, rel=0.25)
     assert gap[clear == 0].std() == pytest.approx(nlos.power_diff_nlos_std, rel=0.25)
 
 
 def test_sight_is_lost_and_found_as_often_as_is_said(drives):
     seen, hidden, lost, found = sum(MEASURES["sight"](log)[0] for log in drives)
-    # 150 changes each way, many of them of the same drive.
+    # 150 changes each way, many of them in the same drive.
     assert lost / seen == pytest.approx(ENTER_RATE, rel=0.4)
     assert found / hidden == pytest.approx(LEAVE_RATE, rel=0.4)
 

@@ -1,4 +1,4 @@
-"""The simulator says who joins and leaves, as the radios' protocol has it."""
+"""The simulator reports joins and leaves as the radio protocol detects them."""
 
 import numpy as np
 import pytest

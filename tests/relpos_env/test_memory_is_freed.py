@@ -1,4 +1,4 @@
-"""Kernels count no references: what an environment held is free when it is gone."""
+"""Kernels count no references: the memory of an environment is free once it is deleted."""
 
 import gc
 import weakref

@@ -1,4 +1,4 @@
-"""Whether something is about to touch, decided coarsely first."""
+"""Broad phase of the detection of imminent contacts."""
 
 import numpy as np
 import pytest
@@ -31,5 +31,5 @@ def test_what_is_far_touches_nothing_however_it_is_turned(seed):
             if is_far(body, present, boxes, room, reach, 0, n):
                 n_far += 1
                 assert not hit[n]
-                assert not met[n, n + 1 :].any()  # earlier cars have looked at this one
+                assert not met[n, n + 1 :].any()  # earlier cars have checked this one
     assert n_far > 50

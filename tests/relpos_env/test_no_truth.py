@@ -1,4 +1,4 @@
-"""A policy sees no truth: what it sees came through sensors, radio and tracker."""
+"""Policies observe no truth: their input comes from sensors, radio and tracker."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from relpos_env.interface.observations import OBSERVATIONS, observation_mode
 
 
 def move_everything(formation):
-    """Put the world elsewhere behind the backs of the sensors."""
+    """Move all bodies of the world without the sensors' knowledge."""
     state, task = formation.state, formation.task
     rng = np.random.default_rng(0)
     truths = (state.pos_w, state.vel_w, state.accel_w, state.heading, state.yaw_rate)

@@ -1,4 +1,4 @@
-"""Views and observations against plain twins; layouts, spaces and limits."""
+"""Views and observations against reference implementations; layouts, spaces and limits."""
 
 import numpy as np
 import pytest
@@ -41,7 +41,7 @@ def random_estimate(rng):
 
 
 def random_view(seed, far=1.0):
-    """A view with an estimate in it, and the estimate; the rest is drawn."""
+    """Return a view with an estimate in it, and the estimate; the rest is random."""
     rng = RNG(seed)
     view, estimate = make_view(E, N), random_estimate(rng)
     estimate.pos_ij_w[...] *= far
@@ -94,7 +94,7 @@ def turned(view, e, a, vector):
 
 
 def twin(name, view, e, a):
-    """The observation of a car by the words of the documentation: field to numbers."""
+    """Return the observation of a car as documented: field to numbers."""
     others = [b for b in range(N) if b != a]
     ok = view.ok[e, a, others].astype(float)
     age = view.now[e] - view.heard[e, a, others]

@@ -1,4 +1,4 @@
-"""The operator: same trim for all, late, with an error of his own, and within limits."""
+"""The operator: equal trim for all cars, delay, position error, and limits."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ IDEAL = {"reaction": 0.0, "position_std": 0.0, "max_trim": 1e9, "max_speed": 1e9
 
 @dataclass
 class Room:
-    """What is true and what is wanted."""
+    """True state and targets."""
 
     pos_w: np.ndarray
     present: np.ndarray

@@ -1,4 +1,4 @@
-"""Copies of running environments go on bit for bit, here and in other processes."""
+"""Copies of running environments continue bit for bit, here and in other processes."""
 
 import copy
 import multiprocessing
@@ -21,7 +21,7 @@ COPIES = {"pickle": lambda env: pickle.loads(pickle.dumps(env)), "deepcopy": cop
 
 
 def go_on(env, rng, steps):
-    """All that some more steps gave, over the ends of episodes."""
+    """Return all results of some more steps, over the ends of episodes."""
     trace, parallel = [], hasattr(env, "agents")
     shape = (env.num_envs,) if hasattr(env, "num_envs") else ()
     for _ in range(steps):
@@ -42,7 +42,7 @@ def check_copy(env, make_copy, steps=60):
     env.reset(seed=3)
     rng = np.random.default_rng(1)
     go_on(env, rng, 15)
-    # What is touching when it is copied is solved again, and not to the last bit.
+    # Contacts at the time of the copy are solved again, not bit for bit.
     while env.formation.loop.swarm._bodies.calm.any():
         go_on(env, rng, 1)
     twin = make_copy(env)

@@ -1,4 +1,4 @@
-"""Distance sensors: a twin, closed forms, symmetries, noise, and that nothing else changes."""
+"""Distance sensors: reference implementation, closed forms, symmetries, noise, no side effects."""
 
 import math
 
@@ -20,12 +20,12 @@ from tracking.records import as_records
 EXACT = ProximitySimParams(noise_std=0.0, noise_share=0.0)
 SIZE = (0.21, 0.10)
 HALL = (500.0, 500.0)
-"""Half sides of a room whose walls are out of reach."""
+"""Half sides of a room whose walls are out of range."""
 MIDDLE = [[0.0, 0.0, 0.0]]
 
 
 def read(cars, *, boxes=(), room=(3.0, 2.0), beams=16, params=EXACT, tick=1, seeds=(7,), gone=()):
-    """Readings of cars at (x, y, heading) in one room, the same for each seed; (env, car, beam)."""
+    """Return readings of cars at (x, y, heading) in one room per seed; (env, car, sensor)."""
     e, n = len(seeds), len(cars)
     p = np.zeros(e, dtype=PROXIMITY)
     for record in p:
@@ -54,7 +54,7 @@ def cross(a, b):
 
 
 def in_cone(tip, angle, half, polygon):
-    """Distance from the tip of a cone to what of a polygon is in it, by clipping its sides."""
+    """Return the distance from the tip of a cone to a polygon in it, by clipping its sides."""
     right, left = ((math.cos(angle + h), math.sin(angle + h)) for h in (-half, half))
     shifted = polygon - tip
     sides = list(zip(shifted, np.roll(shifted, -1, axis=0), strict=True))
@@ -80,7 +80,7 @@ def in_cone(tip, angle, half, polygon):
 
 
 def twin(cars, boxes, room, beams, params):
-    """What `read` gives of one environment without noise."""
+    """Return the readings of one environment without noise, as `read`."""
     w, d, t = *room, 10.0
     solids = [
         corners(w + t, 0, 2 * t, 200, 0), corners(-w - t, 0, 2 * t, 200, 0),
@@ -101,7 +101,7 @@ def twin(cars, boxes, room, beams, params):
 
 
 def scene(seed):
-    """Cars and boxes anywhere, some over each other."""
+    """Return cars and boxes at random positions, some overlapping."""
     rng = np.random.default_rng(seed)
     cars = np.column_stack([rng.uniform(-3, 3, 4), rng.uniform(-2, 2, 4), rng.uniform(-7, 7, 4)])
     boxes = [
@@ -168,7 +168,7 @@ def test_a_quarter_turn_of_the_room_changes_nothing(seed):
 @pytest.mark.parametrize("heading", np.linspace(-1.5, 1.5, 13))
 @pytest.mark.parametrize("cone", [0.0, 0.3, math.radians(27.0)])
 def test_a_wall_in_front(heading, cone):
-    """The side of the cone that looks most straight at it, from the edge of the body."""
+    """The nearest side of the cone counts, from the edge of the body."""
     params = ProximitySimParams(cone=cone, noise_std=0.0, noise_share=0.0)
     got = read([[9.0, 0.0, heading]], room=(10.0, 500.0), beams=1, params=params)[0, 0, 0]
     away = 1.0 - SIZE[0] * math.cos(heading)
@@ -177,7 +177,7 @@ def test_a_wall_in_front(heading, cone):
 
 
 def test_beams_stand_round_the_car():
-    """At 0, the clearance of each side; the first ahead, the next to the left."""
+    """At 0, the clearance of each side; the first sensor points ahead, the next to the left."""
     ahead, left, behind, right = read([[0.5, 0.25, 0.0]], beams=4)[0, 0]
     assert [ahead, left, behind, right] == pytest.approx([2.29, 1.65, 3.0, 2.15])
     assert read(MIDDLE, room=HALL, beams=5).tolist() == [[[FARTHEST] * 5]]
@@ -215,7 +215,7 @@ def test_an_environment_of_a_batch_is_that_environment_alone():
 
 
 def drive(n_envs=1, steps=12, **arguments):
-    """Observations of a drive, (step, env, car, size), and the formation."""
+    """Return observations of a drive, (step, env, car, size), and the formation."""
     parts = configure({"scenario": "ring-nlos", "max_cycles": 50, **arguments})
     formation = EnvCore(parts, n_envs)
     for e in range(n_envs):
@@ -250,7 +250,7 @@ def test_beams_change_nothing_else(mode):
 
 
 def test_the_room_is_what_is_seen():
-    """In mid-drive, within what noise and a decision may do."""
+    """The check is in mid-drive, within the effects of noise and one control period."""
     place = scenario("ring-nlos")
     _, formation = drive(proximity=16)
     swarm = formation.loop.swarm

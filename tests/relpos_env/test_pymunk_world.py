@@ -1,4 +1,4 @@
-"""The world is a `pymunk.Space` that is kept: it can be looked into, added to and changed."""
+"""The world is a persistent `pymunk.Space`: it can be inspected, extended and changed."""
 
 from dataclasses import replace
 
@@ -30,13 +30,13 @@ def add_ball(space, position, radius=0.15, mass=0.2):
 
 
 def two_balls(world, rng):
-    """For a scenario."""
+    """Add two balls, as a hook of a scenario."""
     for x in (0.0, 0.5):
         add_ball(world.space, (x, rng.uniform(-0.1, 0.1)))
 
 
 def random_drive(env, seed=1, steps=60, opened=False):
-    """Poses after every step, and contacts."""
+    """Return poses after every step, and contacts."""
     env.reset(seed=seed)
     if opened:
         env.world.space  # noqa: B018

@@ -1,4 +1,4 @@
-"""The compiled radios against the reference: the same sessions, messages and ranges, exactly."""
+"""Compiled radios against the reference: equal sessions, messages and ranges, exactly."""
 
 from dataclasses import replace
 
@@ -21,14 +21,14 @@ LOSSY = replace(CALIBRATED, loss=0.05, loss_nlos=0.4, max_distance=4.5)
 
 
 def motion(n, seed):
-    """Where the nodes are at a time: each on a curve of its own."""
+    """Return positions of the nodes over time: each on a curve of its own."""
     rng = np.random.default_rng(seed)
     base, rate = rng.uniform(-2.5, 2.5, (n, 3)), rng.uniform(-1.5, 1.5, (n, 3))
     return lambda t: base + np.sin(rate * t)
 
 
 def plan(n, seed, seconds):
-    """Switches (window, node, boot or None): joins, losses of any node and of the initiator."""
+    """Return switches (window, node, boot or None): joins, losses of nodes and of the initiator."""
     rng = np.random.default_rng(seed + 1)
     windows = int(seconds / DT)
     switches = [(0, k, int(rng.integers(256)), rng.uniform(0.0, 0.009)) for k in range(n - 1)]
@@ -42,7 +42,7 @@ def plan(n, seed, seconds):
 
 
 def state(session):
-    """What must be the same, of the reference."""
+    """Return the state of the reference that must be equal."""
     if session is None:
         return None
     turns = session._turns
@@ -54,7 +54,7 @@ def state(session):
 
 
 def twin_state(radio, env, node):
-    """The same, of the compiled one."""
+    """Return the same state of the compiled session."""
     s = radio._air.sessions[env, node]
     if not radio._air.nodes[env, node]["on"]:
         return None
@@ -74,7 +74,7 @@ def rows(ranges, env=0):
 
 
 def resolved(air):
-    """Ranges at the node with the smaller number."""
+    """Return the ranges at the node with the smaller number."""
     found = [t.event for t in air.told if isinstance(t.event, RangeEvent) and t.node == t.event.i]
     return [(e.i, e.j, e.distance, e.rx_power, e.fp_power) for e in found]
 

@@ -1,4 +1,4 @@
-"""Stable-Baselines3: its checker, training on every task, seats that are the PettingZoo agents."""
+"""Stable-Baselines3: its checker, training on every task, agent slots as PettingZoo agents."""
 
 import numpy as np
 import pytest

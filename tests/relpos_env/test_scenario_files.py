@@ -1,4 +1,4 @@
-"""Scenarios as files: everything can be set, every mistake is named."""
+"""Scenario files: every field can be set, and every fault is named."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -167,7 +167,7 @@ ANYTHING = st.recursive(
 
 
 def places(value, path=()):
-    """Paths of everything in a table."""
+    """Yield the paths of all values in a table."""
     inner = value.items() if isinstance(value, dict) else enumerate(value)
     for key, entry in inner:
         yield (*path, key)
@@ -176,7 +176,7 @@ def places(value, path=()):
 
 
 def mutated(value, path, change):
-    """A copy with what is at a path replaced, taken out or named otherwise."""
+    """Return a copy with the value at a path replaced, removed or renamed."""
     if len(path) > 1:
         inner = mutated(value[path[0]], path[1:], change)
         if isinstance(value, dict):
@@ -192,7 +192,7 @@ def mutated(value, path, change):
 
 
 def outcome(load):
-    """The message of an `EnvError` and what was loaded, one of them None."""
+    """Return the message of an `EnvError` and the result, one of them None."""
     try:
         return None, load()
     except EnvError as error:
@@ -214,7 +214,7 @@ def test_any_change_of_a_file_loads_or_names_a_key(edits):
         try:
             table = mutated(table, path, change)
         except (KeyError, IndexError, TypeError, AttributeError):
-            continue  # the edit before took the place away
+            continue  # an earlier edit removed the place
     message, loaded = outcome(lambda: scenario_from(table, file="my.toml", name="my"))
     if loaded is None:
         assert message.startswith("my.toml: ")

@@ -1,4 +1,4 @@
-"""Scenarios: their rooms and floors, those that come along, and those that cannot be."""
+"""Scenarios: rooms and floors, shipped scenarios, and invalid ones."""
 
 from dataclasses import replace
 
@@ -50,7 +50,7 @@ def test_boxes_overlap_where_points_of_one_lie_in_the_other(a, b):
     assert both[1, 1]
     if nearest == 0.0 and distance(points, rows[1] - [0, 0, 0.01, 0.01, 0, 0]).min() == 0.0:
         assert both[0, 1]
-    if nearest > 0.1:  # more than the grid is coarse
+    if nearest > 0.1:  # beyond the resolution of the grid
         assert not both[0, 1]
 
 
@@ -81,7 +81,7 @@ def test_the_scenarios_of_the_tables_are_what_they_were():
     assert ring == SCENARIOS["ring-los"]
     wall = Obstacle(x=0.0, y=0.0, width=1.45, height=0.2)
     assert replace(ring, name="ring-nlos", obstacles=(wall,)) == SCENARIOS["ring-nlos"]
-    # Poses that recorded seeds begin with.
+    # Initial poses of recorded seeds.
     expected = [[-0.68589, -1.24543, -1.03988], [0.88261, -0.66585, 1.44622]]
     np.testing.assert_allclose(CARS_NLOS.start(rng(0))[:2], expected, atol=1e-5)
 

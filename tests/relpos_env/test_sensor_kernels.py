@@ -1,4 +1,4 @@
-"""IMUs, magnetometers and odometers of the batch: truth without errors, errors as asked."""
+"""IMUs, magnetometers and odometers of the batch: exact without errors, errors as specified."""
 
 from dataclasses import fields, replace
 
@@ -27,7 +27,7 @@ EXACT = ImuSimParams(**{f.name: 0 for f in fields(ImuSimParams) if f.name not in
 
 
 class Imus:
-    """So many IMUs of one environment."""
+    """n IMUs of one environment."""
 
     def __init__(self, params, n=1, seed=SEED):
         records = np.zeros(1, dtype=IMU)
@@ -59,7 +59,7 @@ def test_specific_force_has_gravity_in_it_by_roll_and_pitch(roll, pitch):
 
 
 def test_angular_rate_is_the_derivative_of_the_orientation():
-    """Yaw, then pitch, then roll, all three turning; finite differences of the quaternion."""
+    """Yaw, then pitch, then roll, all three rotating; finite differences of the quaternion."""
     rates = {"yaw": 0.7, "roll": -0.4, "pitch": 0.3}
 
     def q(t):
@@ -113,13 +113,13 @@ def test_imu_biases_are_as_large_as_asked_and_the_slow_part_stays_so():
     for count in range(1, 201):
         imus.read(count)
     np.testing.assert_allclose(imus.drift[0].std(axis=0), slow, rtol=0.1)
-    # Over one time constant it forgets all but 1 / e.
+    # Over one time constant it decays to 1 / e.
     kept = (before * imus.drift[0]).mean(axis=0) / slow**2
     np.testing.assert_allclose(kept, np.exp(-1.0), atol=0.12)
 
 
 class Magnetometers:
-    """So many magnetometers in one room."""
+    """n magnetometers in one room."""
 
     def __init__(self, params, n=1, seed=SEED):
         records = np.zeros(1, dtype=MAG)

@@ -1,4 +1,4 @@
-"""Recorded rooms: ranges as the place makes them, streams that do not touch each other."""
+"""Recorded rooms: ranges with the errors of the place, and independent random streams."""
 
 from dataclasses import replace
 
@@ -79,7 +79,7 @@ def test_as_many_cars_as_a_scenario_asks_for_can_be_recorded(name):
 
 
 def streams(seed=3, **change):
-    """What each kind of sensor gave with parameters of the episode changed."""
+    """Return the data of each kind of sensor with changed parameters of the episode."""
     place = scenario("cars-nlos")
     swarm = World(place, 3)
     rng = np.random.default_rng(seed)

@@ -1,8 +1,7 @@
-"""Leaving the rigid-body solver out where nothing touches changes no bit.
+"""Omitting the rigid-body solver without contacts changes no bit.
 
-The order in which the solver takes several contacts at a time depends on what its space had
-before, so that fast physics, which begins every encounter with a new space, may go on otherwise
-after the first one.
+The order in which the solver handles simultaneous contacts depends on the history of its space.
+Fast physics starts every encounter with a new space, so it may differ after the first one.
 """
 
 import numpy as np
@@ -18,7 +17,7 @@ FIELDS = ("body", "drive", "accel", "contacts", "present")
 
 
 class Wild:
-    """Full speed this way and that."""
+    """Drivers at full speed in random directions."""
 
     def __init__(self, n_cars, rng):
         self._n, self._rng, self._left = n_cars, rng, 0
@@ -33,7 +32,7 @@ class Wild:
 
 
 def run(scenario, seed, seconds, drivers, physics):
-    """The truth after every step of physics, where nothing was near, contacts, solver's steps."""
+    """Return true states, the mask of free motion, contacts and solver steps, per physics step."""
     n = scenario.n_cars
     swarm = World(scenario, n, n_steps=1, physics=physics)
     rng = np.random.default_rng(seed)

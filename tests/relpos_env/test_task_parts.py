@@ -1,4 +1,4 @@
-"""What tasks are made of: shapes, places, curves, options and weights."""
+"""Parts of tasks: shapes, places, curves, options and weights."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ def test_places_are_the_nearest_in_sum_of_squares_and_paths_do_not_cross(seed):
     best = cost[linear_sum_assignment(cost)].sum()
     assert cost[np.arange(9), chosen].sum() == pytest.approx(best)
     assert np.array_equal(chosen, assign(pos + [3.0, -1.0], places))
-    # CAPT: all at the same share of their way, no two come together.
+    # CAPT: all cars at equal shares of their paths, none meet.
     for share in np.linspace(0.0, 1.0, 21):
         now = pos + share * (places[chosen] - pos)
         gaps = np.linalg.norm(now[:, None] - now[None], axis=-1) + 9.0 * np.eye(9)
@@ -56,7 +56,7 @@ def test_curves_are_smooth_closed_and_stay_in_the_room(name, half):
     assert np.abs(speed - 1.0).max() < 0.02
     assert np.all(np.abs(at) <= np.array(half) + 0.01)
     assert np.allclose(at[0], curve.at(np.array([curve.length]))[0])
-    # The direction changes at most as fast as in the tightest bend, and does not jump.
+    # The direction changes at most as fast as in the tightest bend, without jumps.
     bend = np.diff(np.unwrap(np.arctan2(*np.diff(at, axis=0).T[::-1]))) / np.diff(s)[1:]
     assert np.abs(bend).max() < 1.2 / min(0.7, *half)
     assert np.abs(np.diff(bend)).max() < 0.05

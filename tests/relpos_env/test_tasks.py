@@ -1,4 +1,4 @@
-"""Tasks of a batch of rooms: the laws of every task."""
+"""Tasks of a batch of rooms: properties of every task."""
 
 from dataclasses import dataclass
 
@@ -28,7 +28,7 @@ MOVING = [
 
 @dataclass
 class Rooms:
-    """The truth about a batch."""
+    """True states of a batch."""
 
     pos_w: np.ndarray
     vel_w: np.ndarray
@@ -68,7 +68,7 @@ def arrays(task):
 
 
 def error_twin(state, task):
-    """Formation error in plain numpy."""
+    """Return the formation error in plain numpy."""
     error = np.zeros(state.present.shape)
     for env, present in enumerate(state.present):
         pos = state.pos_w[env]

@@ -1,4 +1,4 @@
-"""What touches: rubber and wood as declared, floors that hold boxes, contacts that count once."""
+"""Contacts: declared restitution and friction, floor friction of boxes, single counting."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ from tracking.measurements import Kind
 
 
 def swarm(scenario, start, events=()):
-    """Cars that begin at given poses; nobody else comes or goes but as said."""
+    """Return cars at given poses; only the given events occur."""
     group = World(scenario, len(start), 1)
     episode = draw_episode(scenario, len(start), 60.0, np.random.default_rng(0))
     episode = replace(episode, start=np.array(start), events=tuple(events))
@@ -32,7 +32,7 @@ def swarm(scenario, start, events=()):
 
 
 def bare_car(position, velocity, *, spins=True):
-    """A car without tyres that flies against the wall at x = 2.5 m; its velocity after it."""
+    """Return the velocity of a car without tyres after it hits the wall at x = 2.5 m."""
     space = PhysicsSpace((5.0, 5.0), (), CarParams(), np.array([0])).space
     (body,) = space.bodies
     if not spins:
@@ -63,7 +63,7 @@ def test_the_floor_holds_a_box_that_the_motor_cannot_push(side):
     grip = BOX_FRICTION * BOX_DENSITY * side**2 * GRAVITY
     push = scenario.car.mass * scenario.car.max_accel
     if grip > 1.5 * push:
-        assert at[-1] < 0.05  # the blow at first
+        assert at[-1] < 0.05  # the impact at first
         assert at[-1] - at[50] < 1e-3
     else:
         assert at[-1] > 1.0
@@ -82,7 +82,7 @@ def test_a_contact_that_lasts_counts_once(others):
     group = swarm(scenario, start, events if others == "come and go" else ())
     n = np.zeros(4)
     for k in range(110):
-        # Until the group is left alone it pushes at the wall; then it comes back and hits again.
+        # Until the group is released it pushes at the wall; then it returns and hits again.
         speed = np.zeros((1, 4))
         speed[0, 0] = 1.0 if k < 75 or k >= 82 else -1.0
         group.step(speed, np.zeros((1, 4)))
@@ -96,7 +96,7 @@ def test_a_contact_that_lasts_counts_once(others):
 
 
 def test_a_gyroscope_without_errors_tells_the_heading():
-    """Integrated over the periods that samples are of; likewise velocities."""
+    """Rates and accelerations are integrated over the periods of their samples."""
     nothing = dict.fromkeys(
         ("gyr_noise", "acc_noise", "gyr_bias", "acc_bias", "gyr_drift", "acc_drift", "vibration",
          "gyr_vibration", "bits"), 0

@@ -1,4 +1,4 @@
-"""The car against closed forms."""
+"""Car dynamics against closed forms."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def test_turning_radius_is_the_kinematic_bicycles(speed, front_share):
     pos = car.trace[600:, :2]
     centre = 0.5 * (pos.max(axis=0) + pos.min(axis=0))
     radius = np.linalg.norm(pos - centre, axis=1)
-    # The rear axle turns on L / tan(steering), the centre of mass stands l_r before it.
+    # The rear axle is on a circle of L / tan(steering); the centre of mass is l_r ahead of it.
     expected = np.hypot(0.30 / np.tan(0.3), car.params.rear_axle)
     assert radius.mean() == pytest.approx(expected, rel=0.005)
     assert np.ptp(radius) < 0.01
@@ -68,7 +68,7 @@ def test_understeer_is_axle_load_over_stiffness():
     ("friction", "front", "rear"), [(0.3, 4.95, 5.72), (0.5, 4.95, 5.72), (1.05, 8.0, 10.0)]
 )
 def test_lateral_acceleration_ends_at_the_grip(friction, front, rear):
-    # Front-wheel drive, whose front slides out; full lock with a speed to get beyond the limit.
+    # Front-wheel drive slides at the front; full lock at a speed beyond the limit.
     params = CarParams(
         friction=friction, front_cornering=front, rear_cornering=rear,
         front_drive=1.0, max_speed=5.0, max_accel=4.0,
@@ -89,7 +89,7 @@ def test_top_speed_and_acceleration():
     for sign in (1.0, -1.0):
         car = Car().go(10.0 * sign, 0.0, 6.0)
         assert car.trace[-1, VX] == pytest.approx(3.0 * sign, rel=0.001)
-        # Of the motor's acceleration the wheels' rolling resistance takes its part.
+        # Rolling resistance reduces the motor's acceleration.
         best = (sign * np.diff(car.trace[:, VX])).max() / DT
         assert best == pytest.approx(2.5 - 0.02 * GRAVITY, rel=0.01)
         assert np.abs(car.drive_trace[:, ACCEL]).max() <= 2.5
@@ -101,7 +101,7 @@ def test_stopping_distance(brake):
     begin = car.trace[-1, 0]
     car.go(0.0, 0.0, 3.0)
     a = brake + 0.02 * GRAVITY
-    # The brake at its limit, its lag before, and the controller's exponential below brake / gain.
+    # The braking limit, its lag before, and the controller's exponential below brake / gain.
     slow = brake / 8.0
     expected = (2.0**2 - slow**2) / (2.0 * a) + 2.0 * 0.05 + slow / 8.0
     assert car.trace[-1, 0] - begin == pytest.approx(expected, abs=0.05)
@@ -111,7 +111,7 @@ def test_stopping_distance(brake):
 def test_motor_follows_a_small_step_with_its_lag():
     params = CarParams(motor_lag=0.1, speed_gain=2.0, rolling_resistance=0.0)
     accel = Car(params).go(3.0, 0.0, 1.0).drive_trace[:, ACCEL]
-    # At the limit the controller asks for a constant.
+    # At the limit the controller commands a constant.
     assert np.argmax(accel >= 2.5 * (1.0 - np.exp(-1.0)) - 1e-9) + 1 == 10
     np.testing.assert_allclose(accel[:50], 2.5 * (1 - np.exp(-np.arange(1, 51) / 10)), rtol=1e-12)
 
@@ -135,7 +135,7 @@ def test_every_steering_command_arrives_once_and_in_order():
 def test_roll_and_pitch_settle_at_compliance_times_acceleration():
     car = Car().go(1.5, 0.2, 6.0)
     lateral = car.trace[-1, RATE] * np.hypot(*car.trace[-1, [VX, VY]])
-    assert lateral > 1.0  # to the left, so that the left side comes up
+    assert lateral > 1.0  # to the left, so that the left side rises
     assert car.drive_trace[-1, ROLL] == pytest.approx(0.005 * lateral, rel=0.01)
     car = Car().go(3.0, 0.0, 3.0).go(0.0, 0.0, 0.7)
     braking = -np.diff(car.trace[-2:, VX])[0] / DT
@@ -146,7 +146,7 @@ def test_roll_and_pitch_settle_at_compliance_times_acceleration():
 
 
 def test_roll_swings_as_a_spring_and_damper():
-    """Let go from an angle: the closed form of a damped swing, and rates that are derivatives."""
+    """Release at an angle: closed form of a damped oscillation, and rates as derivatives."""
     car = Car()
     car.drive[0, 0, ROLL] = 0.05
     car.go(0.0, 0.0, 0.6)

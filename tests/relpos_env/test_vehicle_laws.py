@@ -1,4 +1,4 @@
-"""Laws of the car: energy, grip, mirror; its differential equation; a body of pymunk; batches."""
+"""Properties of the car: energy, grip, mirror, differential equation, pymunk body, batches."""
 
 import numpy as np
 import pymunk
@@ -76,7 +76,7 @@ def test_mirrored_commands_give_mirrored_motion(start, speed, steering):
 
 
 def equations(p):
-    """The bicycle as a differential equation in v_x, v_y, yaw rate; tyres by slip angle."""
+    """Return the bicycle model as an ODE in v_x, v_y, yaw rate, with tyres by slip angle."""
 
     def tyre(slip, load, cornering, along):
         most = np.sqrt((p.friction * load) ** 2 - along**2)

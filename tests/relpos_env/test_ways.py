@@ -1,4 +1,4 @@
-"""Ways round what stands in a room: the shortest there are, and what is paid for going along."""
+"""Paths around obstacles: shortest length, and progress rewards along them."""
 
 from types import SimpleNamespace
 
@@ -25,14 +25,14 @@ def some_boxes(rng, n):
 
 
 def gaps(points, box):
-    """How far points are from a box, along that of its sides where they are further."""
+    """Return the distance of points from a box along the side on which they are farther."""
     d = points - box[:2]
     u, v = box[4] * d[:, 0] + box[5] * d[:, 1], box[4] * d[:, 1] - box[5] * d[:, 0]
     return np.maximum(np.abs(u) - box[2], np.abs(v) - box[3])
 
 
 def sees(a, b, boxes):
-    """Whether points along the line from a to b, 2 mm apart, are as clear of boxes as its ends."""
+    """Return whether points from a to b, 2 mm apart, are as clear of boxes as its ends."""
     line = np.linspace(a, b, 2 + int(np.linalg.norm(b - a) / 0.002))
     for box in boxes:
         gap = gaps(line, box)
@@ -42,7 +42,7 @@ def sees(a, b, boxes):
 
 
 def way_twin(start, goal, boxes):
-    """Length of the shortest way, from a graph of everything that can be seen."""
+    """Return the length of the shortest path, from the visibility graph."""
     points = [start, goal]
     for box in boxes:
         turn = np.array([[box[4], box[5]], [-box[5], box[4]]])
@@ -59,7 +59,7 @@ def way_twin(start, goal, boxes):
 
 
 def followed(boxes, goal, track):
-    """Progress of a single car along a track, (point)."""
+    """Return the progress of a single car along a track, (point)."""
     ways = Ways(1, 1, HALF)
     ways.lay(0, boxes)
     gained = []
@@ -75,7 +75,7 @@ def test_without_boxes_the_way_is_straight():
     distance = np.linalg.norm(track - goal, axis=1)
     gained = followed(np.zeros((0, 6)), goal, track)
     np.testing.assert_allclose(gained, [0.0, *(distance[:-1] - distance[1:])], atol=1e-12)
-    # Boxes of no size are not there.
+    # Boxes of size zero are absent.
     np.testing.assert_array_equal(followed(np.zeros((3, 6)), goal, track), gained)
 
 
@@ -103,7 +103,7 @@ def test_the_seeds_above_have_ways_that_bend():
 
 @pytest.mark.parametrize("x", [-0.25, -0.6, -1.5])
 def test_by_a_small_step_the_way_gets_no_more_than_that_shorter(x):
-    """Past the end of a wall and past its berth, and where a slot is nearly too narrow."""
+    """Starts are past the end of a wall and past its margin, and at an almost too narrow slot."""
     for goal in ([0.8, 0.0], [0.3, 0.9], [0.12, -0.4]):
         track = np.stack([np.full(201, x), np.linspace(-2.0, 2.0, 201)], axis=1)
         gained = followed(WALL_ACROSS, np.array(goal), track)
@@ -117,7 +117,7 @@ def test_by_a_small_step_the_way_gets_no_more_than_that_shorter(x):
 
 @pytest.mark.parametrize("axis", [0, 1])
 def test_no_way_leads_between_a_box_and_a_wall_that_it_nearly_touches(axis):
-    """The way round the other end, also where this one is nearer."""
+    """The path goes around the other end, even if this one is nearer."""
     half = np.array(HALF)
     goal, start, box = np.zeros(2), np.zeros(2), np.array([0.0, 0.0, 0.1, 0.1, 1.0, 0.0])
     box[axis], box[2 + axis] = half[axis] - 1.2, 1.0  # 0.2 m from the wall
@@ -130,7 +130,7 @@ def test_no_way_leads_between_a_box_and_a_wall_that_it_nearly_touches(axis):
 
 
 def test_behind_a_wall_it_pays_to_leave_the_straight_line():
-    """From before the wall to its end: further off as the crow flies, nearer along the way."""
+    """From before the wall to its end: farther in a straight line, nearer along the path."""
     goal, start, corner = np.array([0.8, 0.0]), np.array([-0.5, 0.1]), np.array([-0.23, 1.13])
     track = np.linspace(start, corner, 20)
     gained = followed(WALL_ACROSS, goal, track)
@@ -160,7 +160,7 @@ def test_new_goals_absent_cars_and_places_out_of_reach_bring_nothing():
     ways.follow(pos + [0.0, 0.3], one, goal, 0, 1)
     assert ways.progress[0, 0] > 0.0
     assert ways.progress[0, 1] == 0.0
-    ways.follow(pos - [0.0, 0.2], both, goal, 0, 1)  # the second is back: it begins again
+    ways.follow(pos - [0.0, 0.2], both, goal, 0, 1)  # the second car is back: it starts again
     assert ways.progress[0, 0] < 0.0
     assert ways.progress[0, 1] == 0.0
     for other in ([0.1, 0.0], [0.0, 0.1]):
@@ -174,7 +174,7 @@ def test_new_goals_absent_cars_and_places_out_of_reach_bring_nothing():
 
 
 def test_nothing_is_gained_where_no_way_leads_out():
-    """Into a pen and out of it again: the difference is paid when the car is out."""
+    """From into a pen to outside: the difference is paid when the car is out."""
     pen = np.array(
         [[*middle, *half, 1.0, 0.0] for middle, half in (
             ([-1.0, 0.6], [0.6, 0.1]), ([-1.0, -0.6], [0.6, 0.1]),
@@ -190,7 +190,7 @@ def test_nothing_is_gained_where_no_way_leads_out():
 
 
 def test_rooms_do_not_know_of_each_other():
-    """Also where one gets more boxes than there was room for, or fewer than before."""
+    """One room gets more boxes than there was capacity for, or fewer than before."""
     rng = np.random.default_rng(8)
     layouts = [some_boxes(rng, n) for n in (2, 5, 3)]
     goal = rng.uniform(-2.0, 2.0, (3, 1, 2))
@@ -222,7 +222,7 @@ def test_rooms_do_not_know_of_each_other():
 
 
 def test_cars_that_gather_are_paid_for_it():
-    """The term of `hold` is what the cars came nearer, also where cars come and go."""
+    """The term of `hold` is the gain in distance, also while cars come and go."""
     parts = FormationConfig(scenario="swarm-nlos", task="hold", max_cycles=300).resolve()
     formation = EnvCore(parts, 2)
     for env in range(2):

@@ -1,4 +1,4 @@
-"""What collides, what is pushed and what hides; nobody gets through a wall."""
+"""Collisions, pushed boxes and line of sight; no car passes a wall."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ CAR = CarParams()
 FAR_AWAY = (3.5, 3.5, 0.0)
 LIGHT = Obstacle(x=0.0, y=0.0, width=0.3, height=0.3, movable=True)
 DEPTH = 0.03
-"""[m] So deep the solver lets bodies into each other at 2 m/s."""
+"""[m] Penetration that the solver allows at 2 m/s."""
 
 
 def test_cars_collide():

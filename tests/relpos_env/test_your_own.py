@@ -25,7 +25,7 @@ HERE = "tests.relpos_env.test_your_own" if __name__.startswith("tests.") else __
 
 
 class Meet(Rendezvous):
-    """A task of a user, with weights of its own."""
+    """A user's task, with weights of its own."""
 
     default_weights = {"progress": 3.0}  # noqa: RUF012
 
@@ -55,7 +55,7 @@ def sleepy(fields):
 
 
 def slow_filter(constellation, params, n_envs):
-    """A filter of a user."""
+    """A user's filter."""
     return FILTERS["ekf"](constellation, params, n_envs)
 
 

@@ -1,4 +1,4 @@
-"""Vehicles that follow each other: their motion hardly shows how the group is turned."""
+"""Vehicles that follow each other: their motion hardly determines the group's rotation."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ T = np.arange(0.2, 59.5, 0.1)
 
 
 def wrong_share(n, seed):
-    """Share of time and pairs that are ok and off by half a metre after one yaw for the run."""
+    """Return the share of time and pairs that are OK and wrong by half a metre after one yaw."""
     group = Convoy("robot", n, seed)
     estimate, truth = Tracker(group.constellation).run(group.block, T).take(0), group.pairs(T)
     found = score(estimate, truth, np.ones(truth.shape[:2], dtype=bool), T[0] + 10.0)
@@ -20,5 +20,5 @@ def wrong_share(n, seed):
 
 
 def test_a_convoy_is_hardly_ever_ok_and_turned_wrongly():
-    """Without splitting a rotation that is too uncertain, 9 % of the time."""
+    """Without splitting a rotation that is too uncertain it is 9 % of the time."""
     assert np.mean([wrong_share(n, seed) for n in (3, 4) for seed in range(6)]) < 0.01

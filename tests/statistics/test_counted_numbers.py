@@ -1,4 +1,4 @@
-"""Random numbers by counting: normal, uniform, and independent whatever keys are side by side."""
+"""Counter-based random numbers: normal, uniform, and independent for neighbouring keys."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ NEIGHBOURS = {
     "knots": lambda k: key_of(key_of(7, 2 << 40), k),
     "seeds": lambda k: key_of(k, 1 << 40),
 }
-"""Keys that a simulation uses side by side."""
+"""Keys that a simulation uses next to each other."""
 
 
 @pytest.mark.parametrize("what", NEIGHBOURS)

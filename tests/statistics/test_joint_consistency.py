@@ -1,4 +1,4 @@
-"""Does the default filter know how wrong it is, on runs whose noise it knows?"""
+"""Consistency of the default filter on runs with known noise."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ SECONDS, SEEDS = 40.0, range(500, 506)
 
 @pytest.fixture(scope="module")
 def runs():
-    """Score, mean NIS and how long a pair was ok and wrong by a metre, of every seed."""
+    """Return score, mean NIS and time that a pair was OK and wrong by a metre, of every seed."""
     joint = matched_params(recordable("cars-los"))
     params = TrackerParams(filter=FilterParams(joint=joint))
     out = []
@@ -33,7 +33,7 @@ def runs():
 
 
 def test_errors_are_as_large_as_the_covariance_says(runs):
-    """Means of six short runs: wider than the band of 200 long ones in the documents."""
+    """Limits for means of six short runs are wider than the documented band of 200 long ones."""
     nees = np.array([r[0].nees for r in runs], dtype=float)
     assert 0.5 < np.mean(nees) < 1.7
 

@@ -1,4 +1,4 @@
-"""Filters that were led astray find back: their states are spoiled in mid-run."""
+"""Recovery of filters whose states are corrupted in mid-run."""
 
 import numpy as np
 import pytest
@@ -7,18 +7,18 @@ from agents.simulation.simulate import simulate
 from tracking import Status, Tracker
 
 SPOILED = 15.0
-"""[s] When."""
+"""[s] Time of the corruption."""
 END = 30.0
 
 
 @pytest.fixture(scope="module", params=range(700, 704))
 def log(request):
-    """Five cars drive round a wall."""
+    """Simulate five cars that drive around a wall."""
     return simulate(scenario="ring-nlos", cars=5, seconds=END, seed=request.param)
 
 
 def spoiled(log, spoil):
-    """Estimates from when `spoil` changed the filter's positions and velocities, (node, 2)."""
+    """Return estimates after `spoil` changed the filter's positions and velocities, (node, 2)."""
     tracker = Tracker(log.constellation)
     before = log.block.t[0] <= SPOILED
     tracker.step(log.block.take(before), SPOILED)
@@ -38,7 +38,7 @@ def spoiled(log, spoil):
 
 
 def test_a_node_on_the_wrong_side_of_the_others_is_moved(log):
-    """Mirrored across the line that the others are nearest to: right again after three seconds."""
+    """The node is mirrored at the best-fit line of the others: right again within three seconds."""
 
     def spoil(pos, vel):
         others = pos[1:] - pos[1:].mean(axis=0)
@@ -54,7 +54,7 @@ def test_a_node_on_the_wrong_side_of_the_others_is_moved(log):
 
 
 def test_a_layout_that_is_turned_round_is_found_out(log):
-    """By half a turn, so that all ranges fit: right again within ten seconds of driving."""
+    """The layout is rotated by half a turn, which fits all ranges: found within ten seconds."""
     t, estimate, error = spoiled(log, lambda pos, vel: (-pos, -vel))
     later = t > SPOILED + 10.0
     wrong = (estimate.status == Status.OK) & (error > 1.0)

@@ -1,9 +1,9 @@
-"""The core of the joint filter in plain numpy: its specification, and its twin in the tests.
+"""Reference implementation of the joint filter's core in plain numpy: its specification.
 
-One hypothesis of a running group of moving nodes in the plane, without lever arms: what is
-predicted, how ranges with NLOS, the non-holonomic constraint, zero velocity, the mean velocity and
-the gauge correct it. No hypotheses, supervision, start or learning of noise. Derivatives are
-complex steps [1], covariances are full products, updates have the Joseph form.
+One hypothesis of a running group of moving nodes in the plane, without lever arms: prediction, and
+correction by ranges with NLOS, the non-holonomic constraint, zero velocity, the mean velocity and
+the gauge. It has no hypotheses, supervision, start or learning of noise. Derivatives are complex
+steps [1], covariances are full products, updates have the Joseph form.
 `tests/tracking/test_joint_reference.py` runs both on the same events.
 
 References:
@@ -26,26 +26,26 @@ STEP, NEGLIGIBLE, LINE = 1e-30, 1e-3, 1e-3
 
 
 def decay(ratio: Any) -> Any:
-    """The filter's ``exp(-ratio)``, to second order."""
+    """Return the filter's ``exp(-ratio)``, to second order."""
     return 1.0 / (1.0 + ratio * (1.0 + 0.5 * ratio))
 
 
 def normal(off: float, variance: float) -> float:
-    """Likelihood, but for the root of two pi."""
+    """Return the Gaussian likelihood without the factor 1 / root(2 pi)."""
     return float(np.exp(-0.5 * off * off / variance) / np.sqrt(variance))
 
 
 def jacobian(function: Callable[[Any], Any], x: F64) -> F64:
-    """Derivatives of a function by complex steps, (value, state)."""
+    """Return derivatives of a function by complex steps, (value, state)."""
     steps = x + 1j * STEP * np.eye(len(x))
     return np.array([np.imag(function(step)) / STEP for step in steps]).T
 
 
 class JointReference:
-    """The core, from the arrays of one running environment of `JointEkf` on."""
+    """The core of the filter, started from the arrays of one running environment of `JointEkf`."""
 
     def __init__(self, coefficients: Any, state: Any, pair_index: Any) -> None:
-        """Copy what is known; `state` has no env axis and is of a group with one hypothesis."""
+        """Copy the filter's state; `state` has no env axis and one hypothesis."""
         self.c, self.pair_index = coefficients, pair_index
         self.nodes, self.pairs = state.nodes.copy(), state.pairs.copy()
         self.group, h = state.group[0].copy(), int(state.group[0]["best"])
@@ -60,7 +60,7 @@ class JointReference:
         self.indices = [[int(node[name]) for name in names] for node in self.nodes]
 
     def attitude(self, i: int, t: float, q: F64, accel: F64) -> None:
-        """Take an orientation and an acceleration of the world."""
+        """Process an orientation and an acceleration in the world."""
         node, c, held = self.nodes[i], self.c, self.held[i]
         self.integrate(i, t)
         R, dt = quat_to_matrix(q), t - node["t_state"]
@@ -92,7 +92,7 @@ class JointReference:
             node["t_moved"] = t
 
     def integrate(self, i: int, t: float) -> None:
-        """Sum the last acceleration and the body's x axis until t."""
+        """Integrate the last acceleration and the body's x axis until t."""
         node, s = self.nodes[i], self.sums[i]
         dt = t - node["t_pre"]
         node["t_pre"] = t
@@ -103,9 +103,9 @@ class JointReference:
         s[0] += dt
 
     def increments(self, x: Any, i: int) -> list[Any]:
-        """What the sums add to position and velocity beyond ``T v``: ``R dp - R_b B b``, (2) each.
+        """Return increments of position and velocity beyond ``T v``: ``R dp - R_b B b``, (2) each.
 
-        B turns a bias with the body, and R_b is R, where that stays level; both are 1 elsewhere.
+        B rotates a bias with the body, and R_b is R, for level vehicles; both are 1 otherwise.
         """
         s, node, out = self.sums[i], self.nodes[i], []
         cos, sin = np.cos(x[node["i_heading"]]), np.sin(x[node["i_heading"]])
@@ -116,7 +116,7 @@ class JointReference:
         return out
 
     def move(self, x: Any) -> Any:
-        """Dead reckoning of all nodes; what decays does not do so yet."""
+        """Dead-reckon all nodes, without the decay of states."""
         new = x.copy()
         for i, (p, v, _, _) in enumerate(self.indices):
             dp, dv = self.increments(x, i)
@@ -125,7 +125,7 @@ class JointReference:
         return new
 
     def predict(self, t: float) -> None:
-        """Carry states and covariance to t."""
+        """Predict states and covariance at t."""
         c, x, step = self.c, self.x, t - self.group["t"]
         scale, speed = np.ones(len(x)), np.zeros(len(self.nodes))
         for i in range(len(self.nodes)):
@@ -177,25 +177,25 @@ class JointReference:
         self.P, self.moved[:] = T @ self.P @ T.T, 0.0
 
     def read_rotation(self, pos: F64) -> F64:
-        """What reads the rotation of the group off an error of its states, by least squares."""
+        """Return the functional from state errors to the group's rotation, by least squares."""
         A, out = np.zeros(len(self.x)), pos - pos.mean(axis=0)
         A[self.i_pos] = np.stack([-out[:, 1], out[:, 0]], axis=1)
         return A / (A @ A + 1e-9)
 
     def update(self, H: F64, nu: float, R: float) -> None:  # noqa: N803
-        """Kalman update in Joseph form."""
+        """Apply a Kalman update in Joseph form."""
         K = self.P @ H / (H @ self.P @ H + R)
         A = np.eye(len(self.x)) - np.outer(K, H)
         self.x, self.P = self.x + K * nu, A @ self.P @ A.T + R * np.outer(K, K)
         self.moved += K * nu
 
     def distance(self, p: int) -> Callable[[Any], Any]:
-        """Predicted range of a pair as a function of the states, its errors included."""
+        """Return the predicted range of a pair, errors included, as a function of the states."""
         i, j, e = (int(self.pairs[p][name]) for name in ("i", "j", "i_range_error"))
 
         def where(x: Any, i: int) -> Any:
             p, v, *_ = self.indices[i]
-            # By biases and headings the way since the states' time changes too little to count.
+            # The influence of biases and headings on the way since the states' time is neglected.
             way, _ = self.increments(np.real(x), i)
             return x[p : p + 2] + self.sums[i, 0] * x[v : v + 2] + way
 
@@ -206,14 +206,14 @@ class JointReference:
         return predicted
 
     def range(self, p: int, t: float, z: float, evidence: float, rates: Any) -> None:
-        """Correct with a range between two origins; `evidence` and `rates` go by its powers."""
+        """Correct with a range between two origins; `evidence` and `rates` depend on its powers."""
         c, pair, slow = self.c, self.pairs[p], int(self.pairs[p]["i_range_error"]) + 1
         if self.group["heading_gauge_var"] > c["gauge_std"] ** 2:
             self.follow()
         model = self.distance(p)
         H, nu = jacobian(model, self.x), z - model(self.x)
         bent = self.second_order(p, H)
-        # Four transitions of the line of sight; the bias comes or goes with them.
+        # Four LOS/NLOS transitions; they reset the bias.
         S = H @ self.P @ H + bent + c["white_var"]
         less = max(self.P[slow, slow] - 2.0 * self.P[slow] @ H, 0.9 * (c["white_var"] - S))
         leave_var = S + less + c["slow_var"]
@@ -248,7 +248,7 @@ class JointReference:
         pair["t_range"] = t
 
     def second_order(self, p: int, H: F64) -> float:  # noqa: N803
-        """Variance of what a straight line misses, ``(gain tr(P_across) / (2 r))^2``."""
+        """Return the second-order variance of a range, ``(gain tr(P_across) / (2 r))^2``."""
         c, pair, D = self.c, self.pairs[p], np.zeros((2, len(self.x)))
         i, j = self.i_pos[pair["i"]], self.i_pos[pair["j"]]
         D[[0, 1], i], D[[0, 1], j] = -1.0, 1.0
@@ -259,10 +259,10 @@ class JointReference:
         return float(min(gain * max(np.trace(cov) - u @ cov @ u, 0.0), c["largest_bend"]) ** 2)
 
     def constrain(self, t: float) -> None:
-        """Zero velocity of nodes at rest, axles that do not slide, the mean velocity of a group."""
+        """Apply zero velocity at rest, non-holonomic constraints, and the mean velocity."""
         c, n = self.c, len(self.x)
         dt, self.group["t_constraints"] = t - self.group["t_constraints"], t
-        before = self.x.copy()  # axles are linearised at one state: their order decides nothing
+        before = self.x.copy()  # one linearisation point: the order of axles is irrelevant
         for node, (_, v, _, y) in zip(self.nodes, self.indices, strict=True):
             if node["rests"] and t - node["t_moved"] > c["rest_after"]:
                 floor = c["glide_nis"] * (c["rest_var"] + np.diagonal(self.P)[v : v + 2])
@@ -282,7 +282,7 @@ class JointReference:
 
     @staticmethod
     def slides(node: Any, v: int, y: int, x: Any) -> Any:
-        """Sideways velocity of an axle without the slip of its tyres."""
+        """Return the sideways velocity of an axle without the slip of its tyres."""
         yaw, w = np.arctan2(node["sin_yaw"], node["cos_yaw"]) + x[y], node["yaw_rate"]
         m, cos, sin = node["i_mount"], np.cos(yaw), np.sin(yaw)
         ahead, slip = (x[m], x[m + 1]) if m >= 0 else (node["ahead"], node["slip"])

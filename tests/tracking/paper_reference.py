@@ -1,9 +1,9 @@
 """Armani and Holz (ICRA 2024) in plain numpy: the specification of `paper-ekf-mds`.
 
 One EKF per pair of nodes i < j; state ``(x_ij, v_ij, q_ij)``, 3 + 3 + 4 numbers, world frame,
-metres and seconds; MDS over the group. Equation numbers are those of arXiv 2409.12505. What the
-text leaves open is an option of `PaperParams`. `PaperEkf` is the same algorithm, compiled and for
-many groups at once; the tests hold one against the other.
+metres and seconds; MDS over the group. Equation numbers are those of arXiv 2409.12505. Options of
+`PaperParams` cover gaps in the text. `PaperEkf` is the same algorithm, compiled and batched over
+groups; the tests compare both.
 
 References:
     [1] Armani, Holz, Accurately tracking relative positions of moving trackers based on UWB
@@ -36,7 +36,7 @@ ORIENTATION_STD = 0.02
 
 
 class PaperReference:
-    """The filters of one group."""
+    """Filters of one group."""
 
     def __init__(self, constellation: Constellation, params: PaperParams) -> None:
         self.group, self.c, self.d = constellation, params, constellation.dimensions
@@ -50,10 +50,10 @@ class PaperReference:
         self.n_since_mds = 0
 
     def run(self, block: MeasurementBlock, t_out: F64) -> tuple[F64, F64]:
-        """States (time, pair, 10) and covariances (time, pair, 10, 10) at the given times.
+        """Return states (time, pair, 10) and covariances (time, pair, 10, 10) at given times.
 
         Args:
-            block: Events of one environment in order, STATE and not IMU.
+            block: Events of one environment in order, with STATE in place of IMU.
             t_out: Ascending times [s].
         """
         p = self.group.n_pairs
@@ -83,10 +83,10 @@ class PaperReference:
             self.remove(i)
 
     def take_state(self, i: int, t: float, values: F64) -> None:
-        """Eq. (1) and (2): a node's orientation and world acceleration."""
+        """Process a node's orientation and world acceleration, eq. (1) and (2)."""
         for pair in self.filters:
             if i in pair:
-                self.predict(pair, t)  # a control holds until the next
+                self.predict(pair, t)  # a control holds until the next one
         accel = np.where(np.arange(3) < self.d, values[4:7], 0.0)
         self.u[i], self.t_imu[i] = np.concatenate([accel, values[:4]]), t
 
@@ -156,7 +156,7 @@ class PaperReference:
         return self.surveyed.get(pair, float(np.mean(self.first.get(pair, ([0.0], []))[0])))
 
     def refine(self, t: float) -> None:
-        """MDS over the group; its positions go to the filters for the next iteration."""
+        """Refine positions by MDS over the group; the filters use them in the next iteration."""
         self.n_since_mds = 0
         if self.c.feedback == "none":
             return
@@ -171,20 +171,20 @@ class PaperReference:
             self.filters[i, j].use_mds(X[b] - X[a], self.c, self.d)
 
     def mds(self, D: F64) -> F64:
-        """Positions (node, 3) with the distances D: K, its eigenvectors, ``E Lambda^(1/2)``."""
+        """Return positions (node, 3) from distances D: K, its eigenvectors, ``E Lambda^(1/2)``."""
         J = np.eye(len(D)) - 1.0 / len(D)
         eigenvalues, E = np.linalg.eigh(-0.5 * J @ D**2 @ J)
         X = np.zeros((len(D), 3))
         power = 0.5 if self.c.scaling == "root" else 0.25
         for axis in range(min(self.d, len(D))):
             largest = max(eigenvalues[-1 - axis], 0.0)
-            # LAPACK's signs differ with machine and numbering; here the longer tail is ahead.
+            # LAPACK's signs depend on machine and numbering; here the longer tail is positive.
             sign = -1.0 if np.sum(E[:, -1 - axis] ** 3) < 0.0 else 1.0
             X[:, axis] = sign * E[:, -1 - axis] * largest**power
         return X
 
     def positions(self, members: list[int]) -> F64:
-        """Positions of nodes about their centre by the filters' x_ij, (member, 3)."""
+        """Return positions of nodes about their centre from the filters' x_ij, (member, 3)."""
         pos = np.zeros((len(members), 3))
         for (a, i), (b, j) in combinations(enumerate(members), 2):
             if (i, j) in self.filters:
@@ -198,7 +198,7 @@ class PaperReference:
         self.filters[pair].predict(t, u, np.diag(sigma**2), self.d)
 
     def control(self, pair: tuple[int, int], t: float) -> tuple[F64, F64]:
-        """``u``, eq. (6), and the standard deviations of its noise, both (14)."""
+        """Return ``u``, eq. (6), and the standard deviations of its noise, both (14)."""
         u, sigma = np.zeros(14), np.zeros(14)
         for side, node in enumerate(pair):
             moves = not self.group.is_static[node]
@@ -210,7 +210,7 @@ class PaperReference:
         return u, sigma
 
     def remove(self, node: int) -> None:
-        """Destroy the filters of a node that left."""
+        """Remove the filters of a node that left."""
         self.present = [m for m in self.present if m != node]
         left = [pair for pair in self.filters if node in pair]
         for pair in left:

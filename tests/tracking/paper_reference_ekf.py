@@ -1,4 +1,4 @@
-"""The EKF of one pair in plain numpy, eq. (5) to (11) of the paper: see `paper_reference`."""
+"""EKF of one pair in plain numpy, eq. (5) to (11) of the paper: see `paper_reference`."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from tracking.geometry import quat_conjugate, quat_left, quat_multiply, quat_rig
 
 CONJUGATE = np.diag([1.0, -1.0, -1.0, -1.0])
 TINY = 1e-6
-"""[m, m/s] Shorter vectors have no direction."""
+"""[m, m/s] Least length of vectors with a direction."""
 
 
 class PairFilter:
-    """The EKF of one pair, from its first k measurements on."""
+    """EKF of one pair, started by its first k measurements."""
 
     def __init__(self, d: int, x_0: F64, q_0: F64, t: float, distance: float, static: bool) -> None:
         self.x = np.concatenate([x_0, np.zeros(3), q_0])  # v_0 = 0
@@ -32,7 +32,7 @@ class PairFilter:
         if dT <= 0.0:
             return
         one = np.diag((np.arange(3) < d).astype(float))
-        F = np.zeros((10, 10))  # q_ij is a function of the control alone
+        F = np.zeros((10, 10))  # q_ij is a function of the control only
         F[:3, :3], F[:3, 3:6], F[3:6, 3:6] = one, dT * one, one
         W = np.zeros((10, 14))
         W[:3, :3], W[:3, 3:6] = -0.5 * dT**2 * one, 0.5 * dT**2 * one
@@ -47,7 +47,7 @@ class PairFilter:
         """Gate a range, then correct with it and its derivative, eq. (10) and (11).
 
         Returns:
-            The range's innovation, squared, over its variance; None for an outlier.
+            The range's squared innovation over its variance; None for an outlier.
         """
         age = t - self.t_range
         x, v = self.x[:3], self.x[3:6]
@@ -80,7 +80,7 @@ class PairFilter:
         return float((z[0] - h[0]) ** 2 / S[0, 0])
 
     def use_mds(self, x: F64, c: PaperParams, d: int) -> None:
-        """Take the refined relative position of the pair."""
+        """Adopt the refined relative position of the pair."""
         if c.feedback == "replace":
             self.x[:3] = x
         elif c.feedback == "update":

@@ -1,4 +1,4 @@
-"""Rates of the protocol against the paper and the data sheet's arithmetic."""
+"""Rates of the protocol against the paper and the arithmetic of the data sheet."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""The alignment of a group goes from state to state as its table says, whatever is measured."""
+"""Alignment states of a group follow the transition table under any measurements."""
 
 import re
 from operator import attrgetter
@@ -39,14 +39,14 @@ def test_only_its_own_file_writes_the_alignment():
 
 
 def walk(group, silences=(), reflected=None):
-    """Alignment and number of hypotheses after every event, and steps that are not in the table."""
+    """Return alignment and number of hypotheses after every event, and invalid transitions."""
     block, tracker = group.block, Tracker(group.constellation)
     t, kind = block.t[0], block.kind[0]
     kept = np.ones(len(t), dtype=bool)
     for begin, seconds in silences:
         kept &= (t < begin) | (t > begin + seconds)
     if reflected is not None:
-        # Accelerations point elsewhere from here on: the group fits no more as it is aligned.
+        # Later accelerations point elsewhere: they contradict the alignment of the group.
         later = (t > reflected) & (kind == Kind.STATE)
         block.values[0, later, 4:6] *= -1.0
     states = []
@@ -96,7 +96,7 @@ def test_a_group_in_space_that_moves_is_filtered_in_its_modes():
 
 @pytest.mark.parametrize("vehicle", ["robot", "human"])
 def test_rotations_of_a_small_group_at_rest_are_not_split(vehicle, monkeypatch):
-    """Rest does not tell rotations apart, however uncertain errors of ranges leave them."""
+    """At rest, rotations are not distinguishable, regardless of uncertain range errors."""
     monkeypatch.setattr("tests.exact_motion.STAND", 30.0)
     group = ExactGroup(vehicle, range(4), at_rest=True, hz=10.0, seconds=29.0)
     group.block.values[0, group.block.kind[0] == Kind.RANGE, 0] *= 0.06

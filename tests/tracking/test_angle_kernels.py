@@ -1,4 +1,4 @@
-"""Cosine and sine by series where the angle is small, by the library where it is not."""
+"""Cosine and sine: series for small angles, library functions for others."""
 
 import numpy as np
 import pytest

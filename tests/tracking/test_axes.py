@@ -1,4 +1,4 @@
-"""Sensors that are mounted otherwise than the body: their readings come in the body's axes."""
+"""Sensor axes that differ from those of the body: readings are converted to body axes."""
 
 from dataclasses import replace
 from itertools import permutations, product
@@ -20,7 +20,7 @@ EVERY = [
 
 
 def matrix(names):
-    """Rows are the body's axes in the sensor's."""
+    """Return a matrix whose rows are the body's axes in the sensor's."""
     R = np.zeros((3, 3))
     for row, name in enumerate(names):
         R[row, "xyz".index(name[-1])] = -1.0 if name.startswith("-") else 1.0
@@ -58,14 +58,14 @@ def test_a_log_of_a_sensor_that_is_mounted_otherwise_reads_as_one_that_is_not(tm
     for kind, names, firsts in ((Kind.IMU, imu, (0, 3)), (Kind.MAG, mag, (0,))):
         rows = (block.kind[0] == kind) & (block.i[0] == 0)
         for first in firsts:
-            values[0, rows, first : first + 3] @= matrix(names)  # as the sensor has it
+            values[0, rows, first : first + 3] @= matrix(names)  # as the sensor reads it
     folder = write_log(tmp_path / "log", replace(log, block=replace(block, values=values)))
     said = f"imu_axes = {list(imu)}\nmag_axes = {list(mag)}\n".replace("'", '"')
     meta = folder / "meta.toml"
     meta.write_text(meta.read_text().replace("[nodes.1]\n", f"[nodes.1]\n{said}"))
     read = read_log(folder)
     np.testing.assert_array_equal(read.block.values, log.block.values)
-    # What is written again is in axes of the body.
+    # A log is written in axes of the body.
     again = read_log(write_log(tmp_path / "again", read))
     np.testing.assert_array_equal(again.block.values, log.block.values)
     meta.write_text(meta.read_text().replace('"-y", "x"', '"y", "x"'))

@@ -1,4 +1,4 @@
-"""Exponentials by a fraction and a table are those of the library."""
+"""Exponentials by a fraction and a table match the library."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Frames that are followed for the turns of a group in space that may be."""
+"""Hypotheses of the modes of a group's rotation in space."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ from tracking.maths import rotation_modes
 
 
 def told(rng, R, weight):
-    """A likelihood of turns that is highest at R: by vectors that it takes to others."""
+    """Return information and score of a likelihood of rotations with its maximum at R."""
     information, score = np.zeros((9, 9)), np.zeros(9)
     for v in rng.standard_normal((8, 3)):
         for r in range(3):
@@ -29,7 +29,7 @@ def told(rng, R, weight):
 
 
 def open_bank(n_hyps=3):
-    """A group of three whose turn is open, in a bank with room."""
+    """Return a group of three with unknown rotation, in a bank with room."""
     c, s, work, layout = running(3, "human")
     names = (
         "x P pending_updates n_pending accumulated_correction nlos bias_retention loglik alive "
@@ -68,7 +68,7 @@ def test_a_frame_goes_to_the_peak_near_it(seed):
     for _ in range(20):
         known = alignment_modes.move_to_mode(c, s, 0)
     assert known
-    # What was the turn R is none in the frame now, to what a frame is not turned by.
+    # The rotation to the mode is the identity afterwards, within the resolution of steps.
     np.testing.assert_allclose(places(s, 0), before @ R, atol=6.0 * c["mode_step"])
     peak, H = np.eye(3), np.zeros((3, 3))
     rotation_modes.climb_to_mode(s.alignment_information[0], s.alignment_score[0], peak, H)
@@ -77,7 +77,7 @@ def test_a_frame_goes_to_the_peak_near_it(seed):
 
 def test_a_frame_does_not_turn_about_an_axis_of_which_nothing_is_known():
     c, s, _, _ = open_bank()
-    # The vertical was seen, and leans: which is how a turn about the vertical cannot be told.
+    # Only a tilted vertical was measured, so the rotation about the vertical is unknown.
     lean = Rotation.from_rotvec([0.2, 0.0, 0.0]).as_matrix()
     information, score, up = np.zeros((9, 9)), np.zeros(9), [0.0, 0.0, 1.0]
     for r in range(3):
@@ -106,7 +106,7 @@ def test_every_turn_that_may_be_has_a_frame():
     for h in range(3):  # the bank has no room for a fourth
         assert s.loglik[h] == pytest.approx(1.0 + values[h])
         np.testing.assert_allclose(places(s, h), places(begun, 0) @ turns[h], atol=1e-9)
-        # What one frame says of a turn R M', the other says of M'.
+        # The log-likelihood of M' in the new frame is that of R M' in the old one.
         other = anywhere(rng)
         old = log_likelihood(begun.alignment_information[0], begun.alignment_score[0], other)
         old -= log_likelihood(begun.alignment_information[0], begun.alignment_score[0], turns[h])
@@ -116,7 +116,7 @@ def test_every_turn_that_may_be_has_a_frame():
 
 @pytest.mark.parametrize("parted", [True, False])
 def test_frames_that_have_come_together_are_one(parted):
-    """Nearer to each other than two peaks can be."""
+    """Their distance is less than that of two modes."""
     c, s, _, _ = open_bank()
     s.group["t"], s.group["best"] = 100.0, 0
     s.group["alignment"] = Alignment.MODES if parted else Alignment.LINEAR
@@ -132,7 +132,7 @@ def test_frames_that_have_come_together_are_one(parted):
 
 @pytest.mark.parametrize("parted", [True, False])
 def test_a_frame_is_not_likelier_for_being_surer(parted):
-    """As far as all is linear each is as sure as the others; wrong ones are bent and look surer."""
+    """All modes are equally certain if linear; wrong ones look more certain by nonlinearity."""
     c, s, work, _ = open_bank()
     s.group["alignment"] = Alignment.MODES if parted else Alignment.LINEAR
     s.group["n_alive"] = 2
@@ -157,12 +157,12 @@ def test_a_frame_is_not_likelier_for_being_surer(parted):
         motion_constraints.apply_constraint(c, s, 1, 0.0, 1, 0.1, work)
         gained.append((of_range, s.loglik[1] - of_range))
     surer = np.subtract(gained[1], gained[0])
-    # What another sight would have told is all that is left.
+    # The remainder is the effect of the NLOS probability.
     np.testing.assert_allclose(surer, 0.0, atol=0.1)
 
 
 def test_the_nis_is_over_the_variance_that_the_correction_used():
-    """From how much the correction narrows the range: its variance goes from v to v - v^2 / S."""
+    """The reference is the reduction of the range variance, from v to v - v^2 / S."""
     c, s, work, _ = open_bank()
     s.group["n_alive"], s.group["alignment"] = 1, Alignment.FILTERED
     h, p, levers = 0, 0, np.zeros(6)

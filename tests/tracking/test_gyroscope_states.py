@@ -1,4 +1,4 @@
-"""What a gyroscope leans by has states: rest tells of them, and so do ranges."""
+"""States of the residual gyroscope bias: rest measures them, and so do ranges."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ TRUSTED = VEHICLES["hand"].gyro_std
 
 
 def tell(s, bias, var, rests, begins=False):
-    """A STATE event of node 0 that tells of its gyroscope."""
+    """Process a STATE event of node 0 with its gyroscope bias."""
     values = np.zeros((1, 1, N_VALUES))
     values[0, 0, TOLD] = 2.0 if rests else 1.0
     values[0, 0, GYRO_BIAS : GYRO_BIAS + 3], values[0, 0, GYRO_VAR] = bias, var
@@ -28,7 +28,7 @@ def tell(s, bias, var, rests, begins=False):
 
 
 def group(open_turn=False):
-    """Three nodes in hands, of which the first has just told of its gyroscope."""
+    """Return three hand-held nodes, of which the first has just reported its gyroscope bias."""
     c, s, work, layout = running(3, "hand")
     s.nodes["has_ahrs_feedback"], s.preintegrated[:] = True, 0.0
     s.group["alignment"] = Alignment.LINEAR if open_turn else Alignment.FILTERED
@@ -41,7 +41,7 @@ def group(open_turn=False):
 @settings(max_examples=20, deadline=None)
 @given(seed=st.integers(0, 2**31), n=st.integers(1, 30))
 def test_who_knows_no_more_ends_with_what_was_learned_at_rest(seed, n):
-    """Filter and orientation begin with the same; then rest is all that either hears of."""
+    """Filter and orientation stage start with equal estimates, and both use rest only."""
     rng = np.random.default_rng(seed)
     c, s, work, at = group()
     bias, var, noise = 0.002 * rng.standard_normal(3), START_STD**2, 1e-3**2
@@ -75,7 +75,7 @@ def test_what_is_learned_in_motion_only_moves_what_is_left(open_turn):
 
 @pytest.mark.parametrize("lean", [0.003, -0.004])
 def test_ranges_tell_what_a_gyroscope_leans_by(lean):
-    """The hand is never turned, so the body is the world's frame but for the first heading."""
+    """The hand does not rotate, so the body is the world frame up to the first heading."""
     _, tracker = walk(0.0, told=True, lean=lean, seconds=30.0)
     s = tracker.save()["filter"]
     h, at = s.group["best"][0, 0], s.nodes["i_gyro_bias"][0, 0] + np.arange(2)

@@ -1,4 +1,4 @@
-"""The delayed horizon puts late data in order, whatever the order they came in."""
+"""The delayed horizon puts late data in order for any order of arrival."""
 
 from dataclasses import fields
 

@@ -1,4 +1,4 @@
-"""The compiled queue of the horizon against sorted lists, and the laws of a batch."""
+"""Compiled queue of the horizon against sorted lists, and properties of a batch."""
 
 from dataclasses import fields
 
@@ -17,7 +17,7 @@ DELAY = 0.5
 
 
 def random_block(rng, n_envs, n_events, now):
-    """Events about `now`, many at the same time, some late, some twice, some padding."""
+    """Return events about `now`, many at the same time, some late, some doubled, some padding."""
     block = MeasurementBlock.empty(n_envs, n_events)
     shape = block.t.shape
     block.t[:] = np.round(now + rng.uniform(-0.7, 0.2, shape), 1)
@@ -30,7 +30,7 @@ def random_block(rng, n_envs, n_events, now):
 
 
 class Twin:
-    """One environment with a plain list."""
+    """Reference implementation of one environment with a plain list."""
 
     def __init__(self):
         self.held, self.released, self.n_late, self.n_doubled = [], -np.inf, 0, 0
@@ -69,7 +69,7 @@ def assert_events(block, e, expected):
 @settings(max_examples=40)
 @given(seed=st.integers(0, 2**31), n_envs=st.integers(1, 3), largest=st.sampled_from([3, 40, 150]))
 def test_it_is_a_sorted_list(seed, n_envs, largest):
-    """What comes out, waits, and is counted, while slots are freed and room grows."""
+    """Compare output, queue and counters while slots are freed and the queue grows."""
     rng = np.random.default_rng(seed)
     horizon, twins = Horizon(HorizonParams(delay=DELAY), n_envs), [Twin() for _ in range(n_envs)]
     for now in np.cumsum(rng.uniform(0.0, 0.4, 12)):
@@ -98,7 +98,7 @@ def test_a_long_block_is_as_good_as_its_pieces():
 @settings(max_examples=40)
 @given(seed=st.integers(0, 2**31))
 def test_no_order_of_arrival_shows(seed):
-    """Whether it is a block at once, its events in another order, or one block sorted."""
+    """Compare one block, permuted events, and a sorted block."""
     rng = np.random.default_rng(seed)
     block = random_block(rng, 1, 40, 1.0)
     shuffled = block.take(rng.permutation(40))
@@ -195,7 +195,7 @@ def test_a_reset_environment_forgets_and_the_others_do_not():
 
 
 def test_what_devices_send_is_handed_on_and_the_rest_is_nothing():
-    """Into arrays of before, in which states stand that have told more."""
+    """The output arrays hold older states with more values."""
     horizon = Horizon(HorizonParams())
     block, out = MeasurementBlock.empty(1, 3), MeasurementBlock.empty(1, 3)
     block.t[:], block.valid[:] = [[0.1, 0.2, 0.3]], True

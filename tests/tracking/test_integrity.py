@@ -1,4 +1,4 @@
-"""Integrity figures, and what a score says of mirror images and of covariances that are wrong."""
+"""Integrity figures, and scores of reflections and of wrong covariances."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def estimate(std=0.1, status=Status.OK):
 @pytest.mark.parametrize(
     ("off", "std", "status", "wrong"),
     [
-        (0.29, 0.05, Status.OK, False),  # too little to harm
+        (0.29, 0.05, Status.OK, False),  # harmless
         (0.31, 0.05, Status.OK, True),
         (0.31, 0.2, Status.OK, False),  # within three standard deviations
         (0.31, 0.05, Status.AMBIGUOUS, False),

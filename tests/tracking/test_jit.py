@@ -1,4 +1,4 @@
-"""Compiled code that is kept on disk."""
+"""Cache of compiled code on disk."""
 
 import subprocess
 import sys
@@ -36,7 +36,7 @@ def run(folder, call, module="_double_kernels"):
 
 @pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
 def test_code_under_another_number_is_not_taken_for_what_it_is_not(tmp_path):
-    """As processes leave it that compile at the same time, each for other types."""
+    """Processes that compile at the same time for other types can leave such a cache."""
     (tmp_path / "_double_kernels.py").write_text(KERNEL)
     assert run(tmp_path, "double(1), double(1.5)") == "2 3.0"
     first, second = sorted((tmp_path / "__pycache__").glob("*.nbc"))
@@ -44,19 +44,19 @@ def test_code_under_another_number_is_not_taken_for_what_it_is_not(tmp_path):
     first.write_bytes(second.read_bytes())
     second.write_bytes(kept)
     assert run(tmp_path, "double(1), double(1.5)") == "2 3.0"
-    # What was compiled instead has its place now.
+    # The code compiled in its place is found the next time.
     compiled = "double(1), double(1.5), sum(double.stats.cache_hits.values())"
     assert run(tmp_path, compiled) == "2 3.0 2"
 
 
 def results(folder, call="double(1)"):
-    """Result of a call in a process of its own, and how often its code came from disk."""
+    """Return the result of a call in a process of its own, and the number of cache hits."""
     return run(folder, f"{call}, sum(double.stats.cache_hits.values())")
 
 
 @pytest.fixture
 def folder(tmp_path):
-    """A kernel that calls a kernel of another file, which uses a constant of a third."""
+    """Write a kernel that calls a kernel of another file, which uses a constant of a third."""
     (tmp_path / "sizes.py").write_text("FACTOR = 2\nOTHER = 1\n")
     (tmp_path / "_times_kernels.py").write_text(
         "from sizes import FACTOR\nfrom tracking.kernels.jit import kernel\n\n\n"
@@ -87,7 +87,7 @@ def test_a_changed_kernel_of_another_file_compiles_its_callers_again(folder):
 
 @pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
 def test_what_is_not_compiled_in_compiles_nothing_again(folder):
-    """Other constants, comments, docstrings, lines above, times of files."""
+    """Change other constants, comments, docstrings, lines above, times of files."""
     assert results(folder) == "2 0"
     (folder / "sizes.py").write_text("FACTOR = 2\nOTHER = 5\n")
     for name in ("_times_kernels.py", "_double_kernels.py"):
@@ -106,7 +106,7 @@ def test_a_cache_that_cannot_be_read_is_replaced(folder, damage):
         if damage == "no data":
             path.unlink()
         elif damage == "moved class":
-            # A pickle of a name that is not there any more.
+            # A pickle of a name that no longer exists.
             for cached in (folder / "__pycache__").glob("*.nbc"):
                 cached.write_bytes(b"cnumba\nwas_here_once\n.")
         else:
@@ -198,12 +198,12 @@ def both(x):
 def test_a_kernel_is_compiled_once_for_constants_and_variables():
     assert both(np.array([1.0, 2.0])) == 8.0
     assert len(scaled.signatures) == 1
-    assert len(plus_one.signatures) <= 1  # none where the caller comes from the disk
+    assert len(plus_one.signatures) <= 1  # none if the caller comes from the disk
 
 
 @pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
 def test_a_kernel_is_called_and_a_small_one_is_linked_in():
-    """If this fails with another numba, what `compile_units` overrides has changed."""
+    """If this fails with another numba, the parts that `compile_units` overrides have changed."""
     both(np.zeros(2))
     (unit,) = (compiled.library for compiled in both.overloads.values())
     assert [called.key[0][1] for called in unit.calls] == ["scaled"]

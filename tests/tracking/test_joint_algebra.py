@@ -1,4 +1,4 @@
-"""Kernels of the joint filter against plain twins in numpy."""
+"""Kernels of the joint filter against reference implementations in numpy."""
 
 import numpy as np
 import pytest
@@ -38,7 +38,7 @@ SAME_TURN = AlignmentParams().same_rotation
 
 
 def bank(dimensions, kinds=("moving", "moving", "moving"), n_hyps=2, seed=0):
-    """One environment with hypotheses of random states and covariances."""
+    """Return one environment with hypotheses of random states and covariances."""
     nodes = tuple(NodeConfig(id=k, kind=kind) for k, kind in enumerate(kinds))
     constellation = Constellation(nodes=nodes, dimensions=dimensions)
     c = as_records(make_coefficients(constellation, JointParams()))[0]
@@ -82,13 +82,13 @@ def test_hypotheses_are_the_same_where_they_agree_about_the_centre(dimensions, k
     c, s = bank(dimensions, kinds, seed=3)
     moving, none = ~s.nodes["static"], np.eye(dimensions)
     s.x[1] = s.x[0]
-    for k in range(dimensions):  # all of the group elsewhere, and faster if it is free
+    for k in range(dimensions):  # move the whole group, and speed it up if it is free
         s.x[1, s.nodes["i_pos"] + k] += 5.0
         s.x[1, s.nodes["i_vel"][moving] + k] += 3.0 * moving.all()
     assert are_same(c, s, 0, 1, none)
     limit = c["merge_distance"]
     at = s.nodes["i_vel"][0]
-    # One of n moves: it is off by (n - 1) / n of that from the mean, or by all next to static ones.
+    # One of n is faster: off the mean by (n - 1) / n of it, or by all of it next to static nodes.
     share = 2.0 / 3.0 if moving.all() else 1.0
     s.x[1, at] += 0.95 * limit / share
     assert are_same(c, s, 0, 1, none)
@@ -110,7 +110,7 @@ def test_a_hypothesis_that_is_another_one_turned_a_little_is_the_same(dimensions
     rotation_between(c, s, 0, 1, found)
     assert are_same(c, s, 0, 1, found) == (abs(turn) < SAME_TURN)
     np.testing.assert_allclose(found, M.T if abs(turn) < SAME_TURN else none, atol=1e-12)
-    M[1] *= -1.0  # and its mirror image is not
+    M[1] *= -1.0  # but its reflection is not
     rotate_hypothesis(c, s, 1, M)
     found[:] = none
     rotation_between(c, s, 0, 1, found)
@@ -149,13 +149,13 @@ def test_what_is_taken_off_is_the_product(n, m, fades):
     apply_downdate(P, 1, W, 0, m, scale)
     loops.apply_downdate(twin, 1, W, 0, m, scale)
     np.testing.assert_allclose(P[1], twin[1], atol=1e-10)
-    np.testing.assert_array_equal(P[1], P[1].T)  # to the last bit
+    np.testing.assert_array_equal(P[1], P[1].T)  # exactly
     np.testing.assert_array_equal(P[0], before)
     np.testing.assert_array_equal(W, rows)
 
 
 def rows_to_sum(n, m, q, seed):
-    """What `sum_rows` takes: random matrices, rows and weights, and a place for the sum."""
+    """Return arguments of `sum_rows`: random matrices, rows and weights, and an output."""
     rng = np.random.default_rng(seed)
     idx = rng.integers(0, n, size=16)
     val, share = rng.standard_normal(16), rng.standard_normal(16)
@@ -186,14 +186,14 @@ def test_one_half_is_the_mirror_image_of_the_other(n, rows):
 
 
 def step_to_add(p, shape, n, seed):
-    """What `add_to_rows` takes: a random covariance and step of the second of two nodes."""
+    """Return arguments of `add_to_rows`: a random covariance, and a step of the second node."""
     rng = np.random.default_rng(seed)
     d, m = shape
     A = rng.standard_normal((2, n, n))
     F = np.zeros((2, STATES + 1, ROOM))
     F[1, :m, : 2 * d] = rng.standard_normal((m, 2 * d))
     F[1, STATES, :d] = 0.1
-    if d == 3:  # a vertical bias adds to the height only, and in space nothing else without offset
+    if d == 3:  # a vertical bias adds to the height only; without offset nothing else does
         F[1, 2, [0, 1, 3, 4]] = 0.0
         if m < STATES:
             F[1][np.ix_([0, 1, 3], [2, 5])] = 0.0
@@ -223,7 +223,7 @@ def test_a_step_is_a_product_with_its_derivatives(n, p, shape):
 @pytest.mark.parametrize("lanes", [2, 4, 8])
 def test_a_step_in_registers_of_any_width_is_the_same(monkeypatch, lanes, add):
     monkeypatch.setattr(simd, "LANES", lanes)
-    fresh = njit(add.py_func)  # kept nowhere
+    fresh = njit(add.py_func)  # not cached
     plainly = loops.add_to_rows if add is add_to_rows else loops.add_to_columns
     for shape in SHAPES:
         ours, twin = step_to_add(6, shape, 40, 1), step_to_add(6, shape, 40, 1)
@@ -236,7 +236,7 @@ def test_a_step_in_registers_of_any_width_is_the_same(monkeypatch, lanes, add):
 @pytest.mark.parametrize("lanes", [2, 4, 8])
 def test_registers_of_any_width_give_the_same(monkeypatch, lanes):
     monkeypatch.setattr(simd, "LANES", lanes)
-    fresh = njit(apply_downdate.py_func)  # kept nowhere
+    fresh = njit(apply_downdate.py_func)  # not cached
     rng = np.random.default_rng(lanes)
     for n in (8, 40):
         A = rng.standard_normal((n, n))

@@ -1,4 +1,4 @@
-"""What the joint filter believes before it knows: headings, sights, and speeds after a blow."""
+"""Initial values of the joint filter: headings, NLOS probabilities, and speeds after an impact."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ from tracking.vehicles import VEHICLES
 
 
 def one_env(vehicle="car"):
-    """The coefficients and one environment of three nodes, before any measurement."""
+    """Return the coefficients and one environment of three nodes, before any measurement."""
     nodes = tuple(NodeConfig(id=k, vehicle=vehicle) for k in (1, 2, 3))
     constellation = Constellation(nodes=nodes, dimensions=2)
     c = as_records(make_coefficients(constellation, JointParams()))[0]
@@ -43,13 +43,13 @@ def test_after_a_blow_the_speed_is_uncertain(vehicle, accel, is_blow):
     carrier = VEHICLES[vehicle]
     expected = (carrier.impact_noise_ratio * accel * 0.01) ** 2 * is_blow
     assert s.preintegrated[0, NOISE] == pytest.approx(expected)
-    # Half before and half after: what is missing of it is not known.
+    # Half before and half after the sample: the saturated part is unknown.
     assert s.preintegrated[0, DV] == pytest.approx(accel * 0.01)
 
 
 @pytest.mark.parametrize("at_rest", [True, False])
 def test_a_tilt_that_is_being_found_leaves_the_bias_uncertain(at_rest):
-    """Off by the mean acceleration since the first sample, but for what stood all the time."""
+    """Its error is the mean acceleration since the first sample, unless the node was at rest."""
     c, s = one_env("drone" if not at_rest else "hand")
     s.alive[:], s.nodes["present"] = True, True
     s.nodes["has_state"], s.nodes["t_state"] = True, 4.0
@@ -65,7 +65,7 @@ def test_a_tilt_that_is_being_found_leaves_the_bias_uncertain(at_rest):
 
 @pytest.mark.parametrize(("gap", "again"), [(0.01, False), (0.4, False), (0.6, True)])
 def test_an_orientation_goes_on_over_gaps_that_are_filled(gap, again):
-    """What VQF goes on from is as old as it was, though the group has to see who moves again."""
+    """Over a filled gap the orientation keeps its age; a longer one restarts it."""
     c, s = one_env("hand")
     values = np.zeros((1, 2, N_VALUES))
     values[..., 0] = 1.0
@@ -76,7 +76,7 @@ def test_an_orientation_goes_on_over_gaps_that_are_filled(gap, again):
 
 @given(st.floats(-30.0, 30.0))
 def test_range_errors_begin_as_those_of_both_sights(evidence):
-    """The slow error is that of a mixture, with its mean and variance."""
+    """The slow error has the mean and variance of the LOS/NLOS mixture."""
     c, s = one_env()
     s.pairs["start_nlos_llr"][0] = evidence
     hidden = initial_nlos_prob(c, s.pairs[0])

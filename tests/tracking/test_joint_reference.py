@@ -14,11 +14,11 @@ from tracking.models.nlos import power_evidence
 
 START, END = 9.0, 10.5
 SAME = 1e-5
-"""[s] Ranges of one message differ by their rounding only."""
+"""[s] Largest rounding difference between times of ranges from one message."""
 
 
 def noisy(vehicle, at_rest, powers):
-    """A group with noisy ranges, some of them NLOS for a while."""
+    """Return a group with noisy ranges, some of them NLOS for a while."""
     group, rng = (
         ExactGroup(vehicle, range(3), hz=50.0, at_rest=at_rest, seconds=12.0),
         np.random.default_rng(5),
@@ -38,7 +38,7 @@ def noisy(vehicle, at_rest, powers):
 
 
 def advance(reference, t):
-    """Predict to t where it is due, and constrain."""
+    """Predict to t if it is due, and apply the constraints."""
     c, g = reference.c, reference.group
     due = t - g["t_constraints"] + SAME >= c["constraint_period"]
     since = t - g["t"]
@@ -51,7 +51,7 @@ def advance(reference, t):
 
 
 def check(reference, t):
-    """From time to time: how uncertain the rotation of a group in the plane is."""
+    """Update the uncertainty of the planar group's rotation from time to time."""
     if t - reference.group["t_check"] + SAME >= reference.c["check_period"]:
         A = reference.read_rotation(reference.x[reference.i_pos])
         reference.group["heading_gauge_var"] = A @ reference.P @ A
@@ -59,7 +59,7 @@ def check(reference, t):
 
 
 def follow(reference, block, first, last):
-    """Feed the events of a time to the reference."""
+    """Feed the events of a time interval to the reference."""
     c = reference.c
     for k in np.flatnonzero((block.t[0] > first) & (block.t[0] <= last)):
         t, i, j, values = block.t[0, k], block.i[0, k], block.j[0, k], block.values[0, k]

@@ -1,4 +1,4 @@
-"""What the joint filter believes of a range's slow error when the sight may have changed."""
+"""Slow range error of the joint filter after possible LOS/NLOS transitions."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ SHARES = st.floats(0.0, 0.99)
 
 
 def believing(seed, hidden, *, waiting):
-    """Random states and covariance; a correction may wait to be taken off."""
+    """Return random states and covariance, with a pending update if `waiting`."""
     c, s, work, _ = running(2, seed=seed)
     rng = np.random.default_rng(seed)
     n = s.x.shape[1]
@@ -34,7 +34,7 @@ def believing(seed, hidden, *, waiting):
 
 
 def covariance(s):
-    """With what waits taken off."""
+    """Return the covariance after pending updates."""
     rows = s.pending_updates[0, : s.n_pending[0]]
     return s.P[0] - rows.T @ rows
 
@@ -53,7 +53,7 @@ def test_by_so_much_it_is_forgotten(seed, hidden, switched, is_far):
     nlos_bias_var = (
         shares @ (np.array([c["nlos_bias_var"], c["nlos_bias_large_var"]]) + means**2) - excess**2
     )
-    # Four cases, each with its probability, mean and variance: the moments of their mixture.
+    # The moments of a mixture of cases, each with probability, mean and variance.
     chance = np.array([stays, switched * (1.0 - hidden), switched * hidden])
     mean = np.array([x[at], 0.0, excess])
     var = c["slow_var"] + np.array([before[at, at] - c["slow_var"], 0.0, nlos_bias_var])
@@ -72,7 +72,7 @@ def test_by_so_much_it_is_forgotten(seed, hidden, switched, is_far):
 def test_a_change_that_waits_for_the_prediction_moves_the_mean_as_one_at_once(
     seed, hidden, switched
 ):
-    """And all covariances; its own variance is that of a way which leaves as much."""
+    """Covariances agree, too; its own variance is that of the equivalent decay over distance."""
     c, s, work = believing(seed, hidden, waiting=False)
     x, P = s.x[0].copy(), s.P[0].copy()
     s.preintegrated[:] = 0.0
@@ -93,7 +93,7 @@ def test_a_change_that_waits_for_the_prediction_moves_the_mean_as_one_at_once(
 @settings(max_examples=50)
 @given(st.floats(0.0, 1.0), st.floats(-1.0, 3.0), st.floats(0.001, 0.2), st.floats(-3.0, 3.0))
 def test_sight_is_judged_by_the_rule_of_bayes(before, nu, variance, evidence):
-    """Over sight before and after, and over small and large excesses."""
+    """The posterior is over LOS/NLOS before and after, and over small and large excesses."""
     c, s, _, _ = running(2, seed=1)
     s.P[0], s.nlos[0, 0] = np.eye(s.x.shape[1]), before
     at, dt, rates = s.pairs["i_range_error"][0] + 1, 0.1, (0.7, 2.5)

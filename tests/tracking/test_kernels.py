@@ -1,4 +1,4 @@
-"""Compiled kernels against finite differences and plain twins."""
+"""Compiled kernels against finite differences and reference implementations."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from tracking.maths.starting_rotations import starting_rotations
 
 
 def random_pair(rng, d=3, size=6):
-    """States and covariance of one pair, with the range's slow error where size is 7."""
+    """Return states and covariance of one pair, with the range's slow error if size is 7."""
     A = rng.standard_normal((size, size))
     P = A @ A.T + 0.1 * np.eye(size)
     x = rng.standard_normal(size) * 2.0

@@ -1,4 +1,4 @@
-"""The log folder: what is written is read back, and every fault is named."""
+"""Log folder: a written log reads back, and faults are named."""
 
 import csv
 import gzip
@@ -31,7 +31,7 @@ kind = "static"
 
 @pytest.fixture
 def folder(tmp_path):
-    """A small good log as plain files."""
+    """Write a small valid log as plain files."""
     (tmp_path / "meta.toml").write_text(META)
     rows = ["t_s,node_i,node_j,range_m"]
     rows += [f"{0.1 * k:.1f},{1 + k % 2},3,{2.0 + 0.01 * k:.2f}" for k in range(30)]
@@ -45,7 +45,7 @@ def folder(tmp_path):
 
 
 def edit(path, row, column, value):
-    """Replace one field; row as an editor counts, the header is row 1."""
+    """Replace one field; rows are counted from 1 for the header."""
     rows = list(csv.reader(io.StringIO(path.read_text())))
     rows[row - 1][rows[0].index(column)] = value
     path.write_text("\n".join(",".join(r) for r in rows) + "\n")

@@ -1,4 +1,4 @@
-"""What inertial samples of a log must be, and what is said of those that cannot be used."""
+"""Requirements on inertial samples of a log, and messages about unusable ones."""
 
 from dataclasses import replace
 
@@ -17,14 +17,14 @@ SECONDS = 4.0
 
 
 def samples(kind, t, node, width):
-    """Measurements of one sensor."""
+    """Return measurements of one sensor."""
     values = np.zeros((len(t), width))
     values[:, 0] = np.linspace(20.0, 21.0, len(t))
     return MeasurementBlock.of_kind(kind, t, np.full(len(t), node), values)
 
 
 def log_of(imu, mag=(), *, heading="magnetic", headings=(None, None)):
-    """Two nodes that range, with (node, times) of samples."""
+    """Return two nodes that range, with (node, times) of samples."""
     t = np.arange(0.0, SECONDS, 0.05)
     zeros, ones = np.zeros(len(t), dtype=np.int64), np.ones(len(t), dtype=np.int64)
     ranges = MeasurementBlock.of_kind(

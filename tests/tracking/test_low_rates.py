@@ -1,4 +1,4 @@
-"""Groups whose pairs range a few times a second or less: they start, and know how well."""
+"""Groups whose pairs range a few times a second or less: start and consistency."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ from tracking.metrics.integrity import wrong_while_ok
 
 
 def thinned(group, rate, loss, seed):
-    """Every pair ranges `rate` times a second, at times of its own; a share is lost."""
+    """Thin ranges of every pair to `rate` per second at times of its own; a share is lost."""
     block, rng = group.block, np.random.default_rng(seed)
     keep = block.kind[0] != Kind.RANGE
     for i, j in group.constellation.pairs:
@@ -30,14 +30,14 @@ def thinned(group, rate, loss, seed):
 @pytest.mark.parametrize("rate", [0.5, 1.0, 2.0, 4.0, 6.0])
 @pytest.mark.parametrize("n", [3, 5])
 def test_every_group_with_enough_ranges_starts(n, rate, loss):
-    """And no car is ok and wrong by it."""
+    """Also, no car is wrong while OK."""
     group = ExactGroup("car", range(n), hz=50.0, seconds=30.0)
     t = np.arange(0.5, 29.9, 0.1)
     for seed in range(3):
         block = thinned(group, rate, loss, seed)
         estimate = Tracker(group.constellation).run(block, t).take(0)
         runs = (estimate.status >= Status.AMBIGUOUS).all(axis=1)
-        # Three ranges of every pair in a row that are not too old, or two seconds of more.
+        # Three consecutive recent ranges of every pair, or two seconds of more.
         assert t[runs][0] < 3.0 + 9.0 / (rate * (1.0 - loss))
         assert not wrong_while_ok(estimate, group.pairs(t)).any()
 

@@ -1,4 +1,4 @@
-"""Every measurement model of the registry, against finite differences."""
+"""Every measurement model of the registry against finite differences."""
 
 import math
 
@@ -18,7 +18,7 @@ STEP = 1e-6
 
 
 def bearing(r0, r1):
-    """A model of one's own, as docs/how-to/adding.md has it: direction of a neighbour [rad]."""
+    """User model as in docs/how-to/adding.md: direction of a neighbour [rad]."""
     squared = r0 * r0 + r1 * r1
     return math.atan2(r1, r0), -r1 / squared, r0 / squared
 
@@ -35,7 +35,7 @@ OWN = {
 
 
 def function(name):
-    """A model as a function of its state and constants; angles as such, not as cosine and sine."""
+    """Return a model as a function of state and constants, with angles in place of cos and sin."""
     if name != "non-holonomic":
         return (MODELS | OWN)[name].function
 
@@ -86,7 +86,7 @@ def test_an_antenna_is_rotated_by_the_orientation(seed):
     n=st.integers(2, 5),
 )  # fmt: skip
 def test_transitions_over_a_time_are_those_over_its_parts(enter, leave, dt, n):
-    """Chapman and Kolmogorov."""
+    """Chapman-Kolmogorov equation."""
 
     def matrix(over):
         a, b = transition_probs(enter, leave, over)

@@ -1,4 +1,4 @@
-"""Where a tracker sits on a car: what is given, what is expected, what is estimated."""
+"""Position of a tracker on a car: given, expected, and estimated."""
 
 from dataclasses import replace
 
@@ -69,7 +69,7 @@ def test_a_log_keeps_it(run, tmp_path):
 
 
 def test_curves_tell_how_far_ahead_of_its_axle_it_is(run):
-    """Within three standard deviations, which have become less than at first."""
+    """The error is within three standard deviations, which have decreased."""
     world, filters = draw(14, seconds=40.0, long_share=0.0), []
 
     def built(constellation, params, n_envs=1):
@@ -94,7 +94,7 @@ def test_groups_of_more_than_twelve_have_no_states_of_mounts(n, states):
 
 
 def test_an_unknown_mount_without_states_is_noise(run):
-    """A mount that is known to be there says the same, and more surely."""
+    """A known mount gives the same estimate with less variance."""
     ahead, _, slip, _ = Mount().prior(CAR)
     params = TrackerParams(filter=FilterParams(joint=JointParams(max_mounts=2)))
     variance = []

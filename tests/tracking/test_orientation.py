@@ -1,4 +1,4 @@
-"""The VQF wrapper: laws of blocks, and gravity-free acceleration."""
+"""Orientation stage: independence of blocks, and gravity-free acceleration."""
 
 import itertools
 
@@ -116,7 +116,7 @@ def test_a_node_at_rest_does_not_accelerate_whatever_its_accelerometer_reads():
 
 
 def test_a_sensor_that_sticks_gives_no_states():
-    """Nor does it turn the node, and it is heard again as soon as it moves."""
+    """It does not rotate the node, and is used again as soon as it moves."""
     n = 400
     t = np.arange(1, n + 1) / 100.0
     imu = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, GRAVITY], (n, 1))
@@ -160,7 +160,7 @@ def test_any_cut_into_blocks_finds_the_same_limits(seed, cuts):
 
 
 def test_flat_tops_are_limits_and_a_rest_is_none():
-    """Cut at 2 m/s2 nearly all such readings are found; rounded noise about gravity has none."""
+    """Nearly all readings cut at 2 m/s2 are found; rounded noise about gravity gives none."""
     t = np.arange(2000) / 100.0
     noise = 0.05 * np.random.default_rng(2).standard_normal((2000, 3))
     moving = noise + np.stack([4.0 * np.sin(3.0 * t), 0.0 * t, 0.0 * t + GRAVITY], axis=1)
@@ -184,7 +184,7 @@ def test_single_absurd_readings_are_replaced():
 
 
 def test_lost_samples_are_bridged():
-    """A turn at a constant rate goes on over a gap of 0.2 s."""
+    """A rotation at a constant rate continues over a gap of 0.2 s."""
     t = np.arange(1, 501) / 100.0
     imu = np.tile([0.0, 0.0, 0.5, 0.0, 0.0, GRAVITY], (500, 1))
     keep = (t < 3.0) | (t > 3.2)
@@ -198,7 +198,7 @@ def test_lost_samples_are_bridged():
 
 @pytest.mark.parametrize("stamps", ["jitter", "repeated", "pairs", "slow"])
 def test_a_turn_adds_up_to_the_time_that_passed(stamps):
-    """A body turns at 1 rad/s for 10 s: whatever single samples are stamped, it turned by 10."""
+    """A body rotates at 1 rad/s for 10 s, by 10 rad in total for any stamps of its samples."""
     rng, t = np.random.default_rng(4), np.arange(1, 1001) / 100.0
     if stamps == "jitter":
         stamped = np.sort(t + 0.005 * rng.standard_normal(len(t)))
@@ -207,7 +207,7 @@ def test_a_turn_adds_up_to_the_time_that_passed(stamps):
     elif stamps == "pairs":
         stamped = t[np.arange(len(t)) // 2 * 2 + 1]
     else:
-        stamped = 1.1 * t  # a sensor that is slower than it says
+        stamped = 1.1 * t  # a sensor that is slower than nominal
     stamped[[0, -1]] = t[0], stamped[-1]
     samples = 1e-3 * rng.standard_normal((len(t), 6)) + [0.0, 0.0, 1.0, 0.0, 0.0, GRAVITY]
     node = np.zeros(len(t), dtype=np.int64)
@@ -218,7 +218,7 @@ def test_a_turn_adds_up_to_the_time_that_passed(stamps):
 
 
 def test_a_noisy_gyroscope_is_seen_to_rest():
-    """Its bias and the length of gravity are learned: otherwise its tilt runs away."""
+    """Its bias and the norm of gravity are estimated; otherwise its tilt diverges."""
     rng, n = np.random.default_rng(3), 800
     bias, force = np.radians([0.5, -0.6, 0.4]), np.array([0.2, -0.3, GRAVITY + 0.1])
     gyr = bias + np.radians(0.7) * rng.standard_normal((n, 3))
@@ -232,12 +232,12 @@ def test_a_noisy_gyroscope_is_seen_to_rest():
         out = states(stage.step(block))
         accel = np.abs(out[-200:, 4:8].mean(axis=0))
         assert (accel < most).all()
-        assert np.isfinite(most) or accel.max() > 0.05  # VQF's own limit does not see it
+        assert np.isfinite(most) or accel.max() > 0.05  # VQF's own limit does not detect the rest
 
 
 @pytest.mark.parametrize(("swing", "first"), [(15.0, 1.5), (0.0, 0.0)])
 def test_an_orientation_that_starts_in_motion_is_used_once_it_has_settled(swing, first):
-    """Before, its tilt follows single accelerations, and its heading that tilt."""
+    """Before, its tilt follows single accelerations, and its heading follows the tilt."""
     rng, n = np.random.default_rng(0), 600
     t = np.arange(n) / 100.0
     samples = 0.01 * rng.standard_normal((n, 6))

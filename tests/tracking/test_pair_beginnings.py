@@ -1,4 +1,4 @@
-"""Which rotations and mirror images the pair filters begin with."""
+"""Initial rotations and reflections of the pair filters."""
 
 import numpy as np
 import pytest
@@ -10,14 +10,14 @@ FIXED = 5
 
 
 def orientations(X, truth):
-    """What turns every hypothesis, (hyp, pair, 3), into the truth, (hyp, 3, 3)."""
+    """Return the rotation of every hypothesis, (hyp, pair, 3), to the truth, (hyp, 3, 3)."""
     U, _, Vt = np.linalg.svd(np.swapaxes(truth, -1, -2) @ X)
     return U @ Vt
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_nodes_that_join_one_by_one_are_tried_in_every_rotation_and_mirror_image(seed):
-    """Three nodes in space are their own mirror image, which left no room for the fourth's."""
+    """Three nodes in space are their own reflection; the fourth must get both."""
     rng = np.random.default_rng(seed)
     truth = rng.uniform(-3.0, 3.0, (FIXED, 3))
     nodes = tuple(NodeConfig(id=k, kind="static", vehicle="none") for k in range(FIXED))

@@ -1,4 +1,4 @@
-"""What the group tells its pair filters, sight and wheels: laws and plain twins."""
+"""Group refinement, NLOS and wheel constraints of pair filters: properties and references."""
 
 from dataclasses import replace
 
@@ -21,7 +21,7 @@ MOUNT = Mount(ahead=0.15, slip=0.018)
 
 
 def team(n=3, d=2, vehicle="car", params=None):
-    """Coefficients, tables and the state of one running hypothesis with covariance 0.1."""
+    """Return coefficients, tables and state of one running hypothesis with covariance 0.1."""
     params = params or PairEkfParams()
     nodes = tuple(NodeConfig(id=k, vehicle=vehicle, mount=MOUNT) for k in range(n))
     constellation = Constellation(nodes=nodes, dimensions=d)
@@ -39,7 +39,7 @@ def team(n=3, d=2, vehicle="car", params=None):
 
 
 def compiled_mds(x, P, pairs, d):
-    """The kernels of a refinement over all nodes: new states, (pair, 7)."""
+    """Run the kernels of a refinement over all nodes; return new states, (pair, 7)."""
     n, m = int(pairs.max()) + 1, 2 * d
     states, cov = x[:, None].copy(), P[:, None].copy()
     rows = (n - 1) * m
@@ -55,7 +55,7 @@ def compiled_mds(x, P, pairs, d):
 
 
 def random_team(rng, n, d, noise):
-    """Consistent states, those with noise, and covariances of the pairs of n nodes."""
+    """Return consistent states, noisy states, and covariances of the pairs of n nodes."""
     pairs = np.stack(np.triu_indices(n, k=1), axis=1)
     node = np.zeros((n, 7))
     node[:, Y[d]] = rng.uniform(-2.0, 2.0, (n, 2 * d))
@@ -93,14 +93,14 @@ def test_weighted_mds_leaves_what_is_consistent(d):
 
 
 def test_weighted_mds_moves_a_line_into_no_mirror_image():
-    """In a layout as flat as a line, which classical MDS cannot align, nothing special happens."""
+    """The layout is almost a line, which classical MDS cannot align; the result is regular."""
     pairs, exact, _, P = random_team(np.random.default_rng(4), 4, 2, 0.0)
     exact[:, 1] *= 1e-9
     np.testing.assert_allclose(compiled_mds(exact, P, pairs, 2), exact, atol=1e-9)
 
 
 def test_certain_lengths_make_it_classical_mds_with_procrustes():
-    """To first order: three lengths in the plane are kept, and the rotation is that of all."""
+    """To first order: the three distances in the plane are kept, and the rotation is common."""
     rng = np.random.default_rng(5)
     pairs = np.array([[0, 1], [0, 2], [1, 2]])
     for _ in range(10):
@@ -126,7 +126,7 @@ def test_range_error_fades_to_what_it_is_without_news():
 
 
 def apply_constraint(excess, evidence, repeats=6):
-    """NLOS probability and state after ranges that are too long."""
+    """Return NLOS probability and state after ranges that are too long."""
     c, layout, s, _ = team()
     s.x[0, 0, 0], s.pairs["n_ranges"][0] = 2.0, 1
     s.pairs["mean_distance"][0] = 2.0 + excess
@@ -155,7 +155,7 @@ def test_a_right_range_with_a_strong_first_path_is_in_sight():
 
 
 def roll(s, speeds, yaws, axle=MOUNT.ahead, slip=MOUNT.slip, rates=(0.3, -0.2, 0.5)):
-    """Let cars roll as their wheels allow; returns their velocities, (3, 2)."""
+    """Move cars within their wheel constraints; return velocities, (3, 2)."""
     s.nodes["yaw"], s.nodes["yaw_rate"] = yaws, rates
     f = np.stack([np.cos(yaws), np.sin(yaws)], axis=-1)
     left = np.stack([-f[:, 1], f[:, 0]], axis=-1)
@@ -227,7 +227,7 @@ def test_large_groups_are_refined_less_often():
 
 @pytest.mark.parametrize("n", [3, 6, 10])
 def test_wheels_leave_a_covariance_beside_a_node_that_just_joined(n):
-    """Its pairs know nothing of its velocity, those of the others nearly all of theirs."""
+    """Its pairs do not know its velocity; those of other nodes nearly determine theirs."""
     c, layout, s, pairs = team(n=n)
     is_new = (pairs == n - 1).any(axis=-1)
     cols = [*Y[2], 6]

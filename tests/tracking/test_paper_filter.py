@@ -1,4 +1,4 @@
-"""The paper's algorithm: the compiled filter is the specification, and its parts are right."""
+"""The paper's algorithm: the compiled filter matches the specification, and its parts are right."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ OPTIONS = [{}, *({name: value} for name, values in CHOICES.items() for value in 
 
 
 def noisy(group, seed=0):
-    """Ranges with noise and some that are absurd, and a node that leaves and comes back."""
+    """Return ranges with noise and outliers, and a node that leaves and comes back."""
     rng, block = np.random.default_rng(seed), group.block
     values, ranges = block.values.copy(), block.kind[0] == Kind.RANGE
     values[0, ranges, 0] += 0.05 * rng.standard_normal(ranges.sum())
@@ -38,10 +38,10 @@ def noisy(group, seed=0):
 @pytest.mark.parametrize(("n", "dimensions", "seconds"), [(3, 2, 12.0), (5, 2, 8.0), (6, 3, 2.5)])
 def test_the_compiled_filter_is_the_specification(n, dimensions, seconds, option):
     if dimensions == 3 and "scaling" in option:
-        seconds = 1.5  # a layout that shrinks to a metre makes any rounding larger
+        seconds = 1.5  # a layout that shrinks to a metre amplifies rounding
     group = ExactGroup("human", range(n), hz=50.0, dimensions=dimensions, seconds=seconds)
     t, block = np.linspace(0.2, seconds - 0.1, 150), noisy(group)
-    # Noise of the size of the data's: what diverges makes any rounding larger.
+    # Noise as in the data: divergence amplifies rounding.
     params = PaperParams(accel_std=0.5, range_std=0.1, speed_std=0.5, **option)
     x, P = PaperReference(group.constellation, params).run(block, t)
     estimate = PaperEkf(group.constellation, params).run(block, t[None]).take(0)
@@ -55,7 +55,7 @@ def test_the_compiled_filter_is_the_specification(n, dimensions, seconds, option
 
 
 def test_the_covariance_of_the_relative_orientation_is_that_of_both():
-    """W_q Sigma_q W_q^T with the matrices of the specification, for any orientations."""
+    """The reference is W_q Sigma_q W_q^T with the matrices of the specification, at random."""
     rng = np.random.default_rng(3)
     f = PairFilter(3, np.array([1.0, 2.0, 3.0]), np.array([1.0, 0, 0, 0]), 0.0, 3.7, False)
     u = rng.standard_normal(14)
@@ -97,7 +97,7 @@ def test_mds_reproduces_the_distances():
 
 
 def test_given_its_first_layout_it_follows_exact_data_in_the_frame_of_the_world():
-    """With the true derivative of a range; without the layout its frame is arbitrary."""
+    """The range has its true derivative; without a first layout the frame is arbitrary."""
     group = ExactGroup("human", range(4), hz=100.0, seconds=6.0)
     first = group.at(group.pos, np.array([0.08]))[0]
     params = PaperParams(

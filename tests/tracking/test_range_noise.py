@@ -1,4 +1,4 @@
-"""The white noise of ranges is learned from how two of a pair in a row differ."""
+"""White range noise is estimated from differences of consecutive ranges of a pair."""
 
 import numpy as np
 import pytest
@@ -30,10 +30,10 @@ def learned(residuals, dt=0.05, **params):
     seed=st.integers(0, 2**31),
 )  # fmt: skip
 def test_it_is_found_beside_what_lasts_and_beside_what_is_long(std, offset, share, seed):
-    """One in ten ranges is metres long, for twenty ranges at a time: two differences each.
+    """One in ten ranges is metres too long, for twenty ranges at a time: two differences each.
 
-    What is learned goes up and down by 8 % for good, its mean over a thousand ranges by 4 %: limits
-    are five times that.
+    The estimate varies by 8 % in the long run, its mean over a thousand ranges by 4 %: limits are
+    five times that.
     """
     rng = np.random.default_rng(seed)
     long = np.repeat(rng.random(100) < share, 20) * 1.5

@@ -1,4 +1,4 @@
-"""What a tracker is given: refused where it cannot be meant, passed over where it cannot be."""
+"""Input of the tracker: errors for invalid blocks, and skipped invalid measurements."""
 
 from dataclasses import replace
 
@@ -20,7 +20,7 @@ T = np.arange(0.0, 3.0, 0.05)
 
 
 def ranges():
-    """All pairs of a square, one environment."""
+    """Return ranges of all pairs of a square, one environment."""
     pos = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.5], [0.0, 2.0]])
     i, j = (np.tile(c, len(T)) for c in GROUP.pairs.T)
     distance = np.linalg.norm(pos[j] - pos[i], axis=1)[:, None]
@@ -29,7 +29,7 @@ def ranges():
 
 
 def twice(block):
-    """The same in two environments."""
+    """Return the block in two environments."""
     return MeasurementBlock.stack([block, block])
 
 

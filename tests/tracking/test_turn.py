@@ -1,4 +1,4 @@
-"""The turn of a group in the plane: nothing but motion tells it, neither ranges nor joins."""
+"""Rotation of a group in the plane: only motion measures it, not ranges or joins."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ N = 4
 
 
 def four(static=(), seed=0, *, dimensions=2):
-    """One environment of four nodes; nothing is known too well but positions."""
+    """Return one environment of four nodes; only positions are known well."""
     nodes = tuple(
         NodeConfig(id=k, vehicle="car", kind="static" if k in static else "moving")
         for k in range(N)
@@ -42,12 +42,12 @@ def four(static=(), seed=0, *, dimensions=2):
 
 
 def room_for(s):
-    """Scratch of such a group."""
+    """Return the workspace of such a group."""
     return make_workspace(N, len(s.pairs), len(s.x[0]))
 
 
 def turned(s, but=(), *, velocities=True):
-    """What a turn of the group by a radian does to the states."""
+    """Return the derivative of the states by a rotation of the group."""
     D, moving = np.zeros(len(s.x[0])), ~s.nodes["static"]  # noqa: N806
     everybody = np.ones(N, dtype=bool)
     for name, of, free in (("i_pos", everybody, True), ("i_vel", moving, moving.all())):
@@ -100,7 +100,7 @@ def test_a_group_that_knows_as_little_anyway_does_not_wake_with_less():
 
 
 def test_the_moment_that_is_smoothed_wakes_with_the_group():
-    """Its rotation is that of the others: what they learn of it later it learns as well."""
+    """Its rotation is that of the other states, so later information applies to it as well."""
     c, s, _ = four()
     batch = JointState._make(array[None] for array in s)
     clones, wider = with_clones(batch, np.array([c]))
@@ -117,7 +117,7 @@ def test_the_moment_that_is_smoothed_wakes_with_the_group():
 
 
 def test_two_nodes_have_no_shape_that_could_turn_with_their_moves():
-    """What they were moved by would else add up, and count when a third joins."""
+    """Their corrections would otherwise add up, and count when a third node joins."""
     c, s, _ = four()
     s.nodes["present"][2:] = False
     s.accumulated_correction[0] = 1.0
@@ -128,7 +128,7 @@ def test_two_nodes_have_no_shape_that_could_turn_with_their_moves():
 
 
 def test_surveys_do_not_tell_how_a_group_is_turned():
-    """Distances that move the nodes to and fro, as the first after a start do."""
+    """Distances move the nodes back and forth, as the first ones after a start do."""
     c, s, _ = four()
     s.x[0, 4 * N :] = 0.0  # no range errs
     add_rotation_uncertainty(c, s, 0, c["rotation_var"])
@@ -152,7 +152,7 @@ def test_surveys_do_not_tell_how_a_group_is_turned():
 
 
 def test_who_joins_turns_with_the_others():
-    """Their turn is no more certain afterwards, and that of the whole group is as uncertain."""
+    """The rotation of the others is no more certain after the join, that of all as uncertain."""
     c, s, layout = four()
     new, pos = 3, np.array([5.0, -3.0, 0.0])
     s.nodes["present"][new] = False
@@ -163,7 +163,7 @@ def test_who_joins_turns_with_the_others():
     s.nodes["present"][new] = True
     update_heading_variance(c, s)
     assert s.group["heading_gauge_var"][0] == pytest.approx(before, rel=0.05)
-    # A range to it, as exact as may be, tells what it is wrong by itself, and nothing of the turn.
+    # An exact range to the new node corrects its own error, but not the rotation.
     at = s.nodes["i_pos"]
     for other in range(3):
         H = np.zeros(len(s.x[0]))  # noqa: N806

@@ -1,4 +1,4 @@
-"""What an orientation was turned upright by: told as it is, and taken off the acceleration."""
+"""Tilt corrections of an orientation: reported, and removed from the acceleration."""
 
 from dataclasses import replace
 
@@ -24,7 +24,7 @@ FIXED = np.array([[-2.0, -2.0, 0.2], [2.0, -1.5, 2.0], [1.5, 2.0, 0.4], [-1.8, 1
 
 
 def test_what_is_read_changes_by_what_was_turned_upright():
-    """What lasts is taken for a tilt; before and after it is the same acceleration and gravity."""
+    """A lasting force is corrected as a tilt; acceleration and correction keep their sum."""
     n = 1500
     t = np.arange(1, n + 1) / 100.0
     force = np.array([0.1, -0.06, GRAVITY])
@@ -45,14 +45,14 @@ def test_what_is_read_changes_by_what_was_turned_upright():
     accel, (x, y) = out[:, 4:6], out[:, UPRIGHT : UPRIGHT + 2].T
     moved = accel[t > 2.5] - GRAVITY * np.stack([y, -x], axis=1)[t > 2.5]
     turn = np.array([[np.cos(0.7), -np.sin(0.7)], [np.sin(0.7), np.cos(0.7)]])
-    assert np.abs(accel[-1]).max() < 0.2 * np.abs(turn @ force[:2]).max()  # upright by now
+    assert np.abs(accel[-1]).max() < 0.2 * np.abs(turn @ force[:2]).max()  # corrected by now
     np.testing.assert_allclose(moved, np.tile(turn @ force[:2], (len(moved), 1)), atol=2e-3)
 
 
 def walk(upright, told, lean=0.0, seconds=12.0, seed=0):
-    """A hand whose acceleration errs by a tilt that changes: places, (time, pair, 3), and tracker.
+    """Track a hand whose acceleration errs by a varying tilt; return positions and tracker.
 
-    A gyroscope that leans by so much a second [rad/s] is told of by its variance only.
+    Positions are (time, pair, 3). The tilt rate `lean` [rad/s] is reported by its variance only.
     """
     rng = np.random.default_rng(seed)
     nodes = (
@@ -89,7 +89,7 @@ def walk(upright, told, lean=0.0, seconds=12.0, seed=0):
 
 
 def test_a_tilt_that_changes_as_it_is_told_changes_little():
-    """What is left is of how samples are summed: a turn counts from the next sum on."""
+    """The rest is due to preintegration: a correction counts from the next interval on."""
     small, known = 1e-5, slice(6, None)
     told, untold = (
         np.abs(walk(small, told)[0][known] - walk(0.0, told)[0][known]).max() / small

@@ -1,4 +1,4 @@
-"""VQF in compiled form against its author's library, and the laws of the orientation stage."""
+"""Compiled VQF against its author's library, and properties of the orientation stage."""
 
 import csv
 import gzip
@@ -23,7 +23,7 @@ NORTH = np.array([0.5, 20.0, -40.0])
 
 
 def turning(rng, n, dt):
-    """Gyroscope, specific force and field of a sensor that turns, rests and turns again."""
+    """Return gyroscope, specific force and field of a sensor that rotates, rests and rotates."""
     t = np.arange(n) * dt
     rest = (t % 9.0) > 5.0
     phase = rng.uniform(0.0, 6.0, 6)
@@ -32,7 +32,7 @@ def turning(rng, n, dt):
     waves[rest] = 0.0
     noise = rng.standard_normal((n, 6)) * ([0.002] * 3 + [0.02] * 3)
     gyr, acc = waves[:, :3].copy(), np.zeros((n, 3))
-    q = VQF(dt).updateBatch(gyr, acc)["quat6D"]  # of the gyroscope alone
+    q = VQF(dt).updateBatch(gyr, acc)["quat6D"]  # of the gyroscope only
     body = quat_conjugate(q)
     samples = noise + [0.01, -0.02, 0.015, 0.0, 0.0, 0.0]
     samples[:, :3] += gyr
@@ -45,14 +45,14 @@ def plain(samples, field, rng):
 
 
 def disturbed(samples, field, rng):
-    """A magnet for a while, then a new field for good, which is at last accepted."""
+    """Add a magnet for a while, then a lasting new field, which is accepted at last."""
     n = len(field)
     field[n // 5 : n // 4] += [30.0, 0.0, 20.0]
     field[n // 2 :] *= 1.4
 
 
 def with_zeros(samples, field, rng):
-    """Sensors that read nothing, one after another."""
+    """Set readings of one sensor after another to zero."""
     for rows in rng.integers(0, len(samples), (30, 3)):
         samples[rows[0], 3:] = 0.0
         field[rows[1]] = 0.0
@@ -60,17 +60,17 @@ def with_zeros(samples, field, rng):
 
 
 def fast(samples, field, rng):
-    """Half a turn per sample is no small angle any more."""
+    """Rotate by half a turn per sample, beyond the small-angle series."""
     samples[:, :3] *= 40.0
 
 
 def upside_down(samples, field, rng):
-    """The first correction is by 180 degrees."""
+    """Make the first correction one of 180 degrees."""
     samples[:, 3:] = [0.0, 0.0, -GRAVITY]
 
 
 def run(samples, field, hz, params, every=1):
-    """Kernel, a field with some samples: q_6d, q_9d, bias, resting, each (sample, ...)."""
+    """Run the kernel with a field on some samples: q_6d, q_9d, bias, resting, (sample, ...)."""
     nodes = tuple(NodeConfig(id=k, vehicle="hand", imu_hz=hz, mag_hz=hz / every) for k in (1, 2))
     coefficients = make_coefficients(Constellation(nodes=nodes), params)
     n = len(samples)
@@ -85,7 +85,7 @@ def run(samples, field, hz, params, every=1):
 
 
 def of_the_library(params):
-    """Arguments of the twin; what is told of a bias in motion comes later with a longer tau_acc."""
+    """Return arguments of the library; a longer tau_acc delays the bias measured in motion."""
     return {
         "tauAcc": params.tau_acc,
         "tauMag": params.tau_mag,
@@ -108,7 +108,7 @@ def assert_same(samples, field, hz, params):
 @pytest.mark.parametrize("spoil", [plain, disturbed, with_zeros, fast, upside_down])
 @pytest.mark.parametrize(("hz", "tau_acc", "tau_mag"), [(100.0, 3.0, 9.0), (51.3, 30.0, 4.0)])
 def test_it_is_the_library(spoil, hz, tau_acc, tau_mag):
-    """Quaternions, bias and rest of every sample; what is tested for does happen."""
+    """Compare quaternions, bias and rest of every sample; the tested effect does occur."""
     rng = np.random.default_rng(7)
     samples, field = turning(rng, 9000, 1.0 / hz)
     spoil(samples, field, rng)
@@ -124,7 +124,7 @@ def test_it_is_the_library(spoil, hz, tau_acc, tau_mag):
 
 @pytest.mark.parametrize("every", [4, 30])
 def test_it_is_the_library_with_a_slower_magnetometer(every):
-    """At 3 Hz the low pass of the field lets everything pass."""
+    """At 3 Hz the low pass of the field passes everything."""
     rng = np.random.default_rng(9)
     samples, field = turning(rng, 3000, 0.01)
     found = run(samples, field, 100.0, OrientationParams(), every)
@@ -161,7 +161,7 @@ def test_it_is_the_library_on_a_recording(data):
 
 
 def events(rng, n_nodes=3, n=120):
-    """A block of one environment with gaps, a stuck sensor, jumps, limits and zeros."""
+    """Return a block of one environment with gaps, a stuck sensor, jumps, limits and zeros."""
     parts = []
     for node in range(n_nodes):
         samples, field = turning(rng, n, 0.01)
@@ -248,7 +248,7 @@ def test_the_block_that_came_is_left_as_it_was():
 
 
 def test_a_long_silence_keeps_the_bias_and_finds_the_heading_anew():
-    """Only the first sample with a field after it gives a state again."""
+    """Only the first sample with a field after the gap gives a state again."""
     n = 3000
     samples = np.tile([0.01, -0.02, 0.005, 0.0, 0.0, GRAVITY], (n, 1))
     samples += 1e-4 * np.random.default_rng(0).standard_normal(samples.shape)

@@ -1,1 +1,1 @@
-"""Orientation of each node from its IMU and magnetometer: VQF and what surrounds it."""
+"""Orientation of each node from its IMU and magnetometer: VQF and its surroundings."""

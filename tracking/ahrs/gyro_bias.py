@@ -1,12 +1,12 @@
-"""The bias of a gyroscope, by a Kalman filter over its three axes, [1] sec. 3.5.
+"""Gyroscope bias by a Kalman filter over the three axes, [1] sec. 3.5.
 
-At rest the bias is what the gyroscope reads. In motion a bias shows as a tilt that the
-accelerometer has to correct again and again: with R, the low-passed rotation to the world,
+At rest the gyroscope reads its bias. In motion a bias causes a tilt that the accelerometer
+corrects continually: with R, the low-passed rotation to the world,
 
     y = R b + v,    v ~ N(0, W)
 
-where the horizontal parts of y are the rates of that correction. About the vertical nothing is
-seen; there, zero is measured with a large variance, so that what is known is forgotten slowly.
+where the horizontal parts of y are the rates of that correction. The vertical part is not
+observed; zero is measured there with a large variance, so that its estimate decays slowly.
 
 References:
     [1] Laidig, Seel, VQF, Information Fusion 91 (2023) 187.
@@ -21,18 +21,18 @@ from tracking.ahrs.rest import GYR, RESTING
 from tracking.kernels.jit import small_kernel
 
 UNIT = 0.01 * math.pi / 180.0
-"""[rad/s] What it is counted in."""
+"""[rad/s] Unit of the bias covariance."""
 
 ROTATION, LEAN, BIAS, P = 0, 9, 33, 36
 N_BIAS = 42
-"""Columns of the memory: the low passes of the rotation, row by row, and of the horizontal
-rates that the bias makes [rad/s], one filter with 11 signals; the bias [rad/s]; the upper
-triangle of its covariance, row by row [(0.01 deg/s)^2]."""
+"""Columns of the memory: low passes of the rotation, row by row, and of the horizontal rates
+caused by the bias [rad/s], one filter with 11 signals; the bias [rad/s]; the upper triangle of
+its covariance, row by row [(0.01 deg/s)^2]."""
 
 
 @small_kernel
 def start_bias(bias, e, n, var):
-    """Forget the low passes, keep the bias, and believe it with a variance [(0.01 deg/s)^2]."""
+    """Reset the low passes, keep the bias, and set its variance [(0.01 deg/s)^2]."""
     for k in range(N_BIAS):
         if k < BIAS or k >= P:
             bias[e, n, k] = 0.0
@@ -41,7 +41,7 @@ def start_bias(bias, e, n, var):
 
 @small_kernel
 def worst_variance(bias, c, e, n):
-    """A bound of the variance in the worst direction, by Gershgorin [(0.01 deg/s)^2]."""
+    """Return a bound of the variance in the worst direction, by Gershgorin [(0.01 deg/s)^2]."""
     p01, p02 = abs(bias[e, n, P + 1]), abs(bias[e, n, P + 2])
     p12 = abs(bias[e, n, P + 4])
     rows = max(
@@ -54,33 +54,33 @@ def worst_variance(bias, c, e, n):
 
 @small_kernel
 def mean_variance(bias, e, n):
-    """Mean variance of the bias about an axis [(rad/s)^2]."""
+    """Return the mean variance of the bias about an axis [(rad/s)^2]."""
     return (bias[e, n, P] + bias[e, n, P + 3] + bias[e, n, P + 5]) / 3.0 * UNIT * UNIT
 
 
 @small_kernel
 def clip(c, x):
-    """A rate within what a bias can be [rad/s]."""
+    """Clip a rate to the largest bias [rad/s]."""
     largest = c.rest[0].largest_bias
     return min(max(x, -largest), largest)
 
 
 @small_kernel
 def estimate_bias(bias, rest, c, e, n, count, qw, qx, qy, qz, tilt_x, tilt_y):
-    """Update the bias after a correction of the tilt.
+    """Update the bias after a tilt correction.
 
     Args:
         bias: Memory, updated.
-        rest: Of the rest detection.
+        rest: Memory of the rest detection.
         c: OrientationCoefficients.
         e: Environment.
         n: Node.
         count: Number of this sample, the first is 1.
-        qw: Orientation after the correction, 6D.
-        qx: Orientation after the correction, 6D.
-        qy: Orientation after the correction, 6D.
-        qz: Orientation after the correction, 6D.
-        tilt_x: Horizontal part of the upward direction before the correction [-].
+        qw: 6D orientation after the correction, w.
+        qx: 6D orientation after the correction, x.
+        qy: 6D orientation after the correction, y.
+        qz: 6D orientation after the correction, z.
+        tilt_x: Horizontal part of the upward direction before the correction [-], along x.
         tilt_y: Horizontal part of the upward direction before the correction [-], along y.
     """
     b0, b1, b2 = bias[e, n, BIAS], bias[e, n, BIAS + 1], bias[e, n, BIAS + 2]
@@ -118,7 +118,7 @@ def estimate_bias(bias, rest, c, e, n, count, qw, qx, qy, qz, tilt_x, tilt_y):
     p00 += c.drift_var[n] if p00 < start_var else 0.0
     p11 += c.drift_var[n] if p11 < start_var else 0.0
     p22 += c.drift_var[n] if p22 < start_var else 0.0
-    # A = R P and S = A R' + W, which W keeps far from singular.
+    # A = R P and S = A R' + W, which W keeps well conditioned.
     a00, a01, a02 = along(r00, r01, r02, p00, p01, p02, p11, p12, p22)
     a10, a11, a12 = along(r10, r11, r12, p00, p01, p02, p11, p12, p22)
     a20, a21, a22 = along(r20, r21, r22, p00, p01, p02, p11, p12, p22)
@@ -150,7 +150,7 @@ def estimate_bias(bias, rest, c, e, n, count, qw, qx, qy, qz, tilt_x, tilt_y):
 
 @small_kernel
 def along(x, y, z, m00, m01, m02, m11, m12, m22):
-    """A symmetric matrix, given by its upper triangle, times a vector."""
+    """Return the product of a symmetric matrix, given by its upper triangle, and a vector."""
     return (
         m00 * x + m01 * y + m02 * z,
         m01 * x + m11 * y + m12 * z,

@@ -1,9 +1,9 @@
-"""A second-order Butterworth low pass over several signals, started with their mean.
+"""Second-order Butterworth low pass over several signals, initialised with their mean.
 
     y = b0 x + u,    u' = b1 x - a1 y + w,    w' = b2 x - a2 y
 
-The first samples, as many as its time constant is long, are averaged; the filter then goes on
-as if it had always read their mean [1], sec. 3.2. So no single first sample is believed.
+The first samples, for one time constant, are averaged; the filter then continues from their
+mean as its steady state [1], sec. 3.2, so no single first sample dominates.
 
 References:
     [1] Laidig, Seel, VQF: Highly accurate IMU orientation estimation with bias estimation and
@@ -16,7 +16,7 @@ from tracking.kernels.jit import small_kernel
 
 B0, B1, B2, A1, A2, N_MEAN = 0, 1, 2, 3, 4, 5
 N_LOW_PASS = 6
-"""Columns of a filter's coefficients: numerator, denominator, samples averaged first."""
+"""Columns of a filter's coefficients: numerator, denominator, number of averaged samples."""
 
 
 @small_kernel
@@ -24,11 +24,11 @@ def low_pass(memory, e, n, at, size, count, filters, row):
     """Filter signals in place.
 
     Args:
-        memory: (env, node, column). From column `at`, `size` inputs, which become the outputs,
-            and twice as many that the filter keeps; zeros before the first sample.
+        memory: (env, node, column). From column `at`: `size` inputs, which become the outputs,
+            and 2 `size` filter states; zeros before the first sample.
         e: Environment.
         n: Node.
-        at: First column.
+        at: First column of the inputs.
         size: Number of signals.
         count: Number of this sample, the first is 1.
         filters: Coefficients, (row, N_LOW_PASS).

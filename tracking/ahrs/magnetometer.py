@@ -1,10 +1,9 @@
-"""The heading by the magnetometer, and when not to believe it, [1] sec. 3.3 and 3.6.
+"""Heading from the magnetometer, with rejection of disturbed fields, [1] sec. 3.3 and 3.6.
 
-The field, turned to the world by the orientation without a magnetometer, should point north: the
-heading that is missing, delta, is a first-order low pass of the angle between. Where length or
-dip of the field differ from those that are known, the field is disturbed: for a minute nothing
-is corrected, then half as fast. A new field is accepted once it has lasted while the sensor
-turned.
+The field, rotated to the world by the orientation without a magnetometer, should point north: the
+heading correction delta is a first-order low pass of the angle between. A field whose norm or dip
+differs from the reference is disturbed: it corrects nothing for a minute, then at half the gain. A
+new field is accepted as the reference once it has lasted while the sensor turned.
 
 References:
     [1] Laidig, Seel, VQF, Information Fusion 91 (2023) 187.
@@ -21,14 +20,14 @@ DELTA, COS, SIN, GAIN, DISTURBED, REJECTED_T, UNDISTURBED_T = 0, 1, 2, 3, 4, 5, 
 NORM, DIP, NEW_NORM, NEW_DIP, NEW_T, COUNT, FIELD = 7, 8, 9, 10, 11, 12, 13
 N_MAGNETIC = 19
 """Columns of the memory: delta [rad], cosine and sine of its half; least gain of the next reading,
-which starts as a mean; 1 in a disturbed field; how long it was left out and how long it was
-undisturbed [s]; length and dip [rad] of the known field, then of the candidate for a new one,
-and how long the sensor turned in that [s]; number of readings; low pass of length and dip."""
+for an initial mean; 1 in a disturbed field; rejected time and undisturbed time [s]; norm and dip
+[rad] of the reference field, then of the candidate for a new one, and turning time in that [s];
+number of readings; low pass of norm and dip."""
 
 
 @small_kernel
 def start_magnetic(magnetic, c, e, n):
-    """Before any reading: no field is known, and the first ones are believed as they are."""
+    """Initialise the memory: no reference field, and full gain for the first reading."""
     for k in range(N_MAGNETIC):
         magnetic[e, n, k] = 0.0
     magnetic[e, n, COS] = magnetic[e, n, GAIN] = magnetic[e, n, DISTURBED] = 1.0
@@ -38,22 +37,22 @@ def start_magnetic(magnetic, c, e, n):
 
 @small_kernel
 def is_near(c, norm, dip, known_norm, known_dip):
-    """Whether a field is the one that is known."""
+    """Return whether a field matches a known one."""
     near = abs(norm - known_norm) < c.field[0].norm_change * known_norm
     return near and abs(dip - known_dip) < c.field[0].dip_change
 
 
 @small_kernel
 def watch_field(magnetic, c, e, n, norm, dip, rate):
-    """Judge whether the field is disturbed.
+    """Detect whether the field is disturbed, and update the reference.
 
     Args:
         magnetic: Memory, updated.
         c: OrientationCoefficients.
         e: Environment.
         n: Node.
-        norm: Length of the field, in any unit.
-        dip: Its angle below the horizon [rad].
+        norm: Norm of the field, in any unit.
+        dip: Angle of the field below the horizon [rad].
         rate: Low-passed turn rate [rad/s].
     """
     dt, gain, limits = c.mag_dt[n], c.reference_gain[n], c.field[0]
@@ -88,7 +87,7 @@ def watch_field(magnetic, c, e, n, norm, dip, rate):
 
 @small_kernel
 def wrapped(angle):
-    """An angle within -3 pi to 3 pi brought to -pi to pi."""
+    """Wrap an angle within -3 pi to 3 pi to -pi to pi."""
     if angle > math.pi:
         angle -= 2.0 * math.pi
     elif angle < -math.pi:
@@ -98,14 +97,14 @@ def wrapped(angle):
 
 @small_kernel
 def correct_heading(magnetic, c, e, n, mx, my, mz, rate):
-    """Take a field that the 6D orientation turned to the world.
+    """Correct the heading by a field that the 6D orientation rotated to the world.
 
     Args:
         magnetic: Memory, updated.
         c: OrientationCoefficients.
         e: Environment.
         n: Node.
-        mx: Field, not all zero, in any unit.
+        mx: Field, not all zero, in any unit, along x.
         my: Field, not all zero, in any unit, along y.
         mz: Field, not all zero, in any unit, along z, up.
         rate: Low-passed turn rate [rad/s].
@@ -122,7 +121,7 @@ def correct_heading(magnetic, c, e, n, mx, my, mz, rate):
         gain = 0.0
     else:
         gain /= limits.rejection_factor
-    # The first readings are averaged, whatever the field: 1, 1/2, 1/3, ...
+    # The first readings are averaged in any field: 1, 1/2, 1/3, ...
     least = magnetic[e, n, GAIN]
     if least != 0.0:
         gain = max(gain, least)

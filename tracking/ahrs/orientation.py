@@ -1,7 +1,7 @@
-"""From inertial samples to orientation and gravity-free acceleration, one VQF per node.
+"""Orientation and gravity-free acceleration from inertial samples, one VQF per node.
 
-VQF [1] fuses gyroscope, accelerometer and, where there is one, magnetometer. With the
-orientation q_wb the specific force f_b gives the acceleration of the node
+VQF [1] fuses gyroscope, accelerometer and, if present, magnetometer. With the orientation q_wb
+the specific force f_b gives the acceleration of the node
 
     a_w = R(q_wb) f_b - (0, 0, g)
 
@@ -45,12 +45,12 @@ __all__ = [
 
 
 class Orientation:
-    """Turns IMU and MAG events into STATE events.
+    """Conversion of IMU and MAG events into STATE events.
 
-    Laws: any split of the samples into blocks gives the same states, bit for bit; environment k
-    of a batch gives what that environment alone gives, bit for bit.
+    Properties: any division of the samples into blocks gives the same states; environment k of a
+    batch equals that environment alone, both bit for bit.
 
-    The class is a shell around `orient`, which works in place, on slices of environments too.
+    The class wraps `orient`, which works in place, on slices of environments too.
     """
 
     def __init__(
@@ -64,43 +64,43 @@ class Orientation:
         self.coefficients = make_coefficients(constellation, params, follows_bias=follows_bias)
         """Constants of the kernels."""
         self.state = make_state(n_envs, constellation.n_nodes)
-        """Everything that evolves, arrays over (env, node, ...)."""
+        """State of the stage, arrays over (env, node, ...)."""
         forget(self.coefficients, self.state, GRAVITY)
 
     def reset(self, env: int) -> None:
-        """Forget everything of one environment."""
+        """Reset one environment."""
         forget(self.coefficients, self.state.of(slice(env, env + 1)), GRAVITY)
 
     def part(self, envs: slice) -> Orientation:
-        """Some of the environments; shares their memory."""
+        """Return some of the environments; shares their memory."""
         part = copy.copy(self)
         part.state = self.state.of(envs)
         return part
 
     def save(self) -> OrientationState:
-        """A copy of everything that evolves."""
+        """Return a copy of the state."""
         return self.state.copy()
 
     def restore(self, saved: OrientationState) -> None:
-        """Go on from a saved copy."""
+        """Restore a saved state."""
         for array, old in zip(self.state, saved, strict=True):
             array[:] = old
 
     def bind(self, block: MeasurementBlock) -> Callable[[], None]:
-        """`step` in place, for a block that stays where it is and is filled again every time."""
-        block.in_place  # noqa: B018 -- refuses what is not contiguous
+        """Bind `step`, in place, to a block whose arrays are refilled every time."""
+        block.in_place  # noqa: B018 -- raises for arrays that are not contiguous
         kernel, arguments = self.call(block)
         return bind(kernel, *arguments)
 
     def call(self, block: MeasurementBlock) -> Call:
-        """The kernel, with arguments of its types."""
+        """Return the kernel with arguments of its types."""
         arrays = (block.t, block.kind, block.i, block.values, block.valid)
         return orient, (self.coefficients, self.state, *arrays)
 
     def step(self, block: MeasurementBlock) -> MeasurementBlock:
-        """The block with every IMU sample replaced by the state it leads to.
+        """Return the block with every IMU sample replaced by its state.
 
-        MAG events become padding, and so do IMU samples whose heading is not known yet.
+        MAG events become padding, as do IMU samples before the heading is known.
         """
         inertial = block.valid & ((block.kind == Kind.IMU) | (block.kind == Kind.MAG))
         if not np.any(inertial):

@@ -1,4 +1,4 @@
-"""The arrays of the orientation stage: what evolves, and what is derived once.
+"""Arrays of the orientation stage: state and constants.
 
 Every array of the state has the axes env and node first, so a slice of environments is a slice
 of each (`OrientationState.of`). The kernels write the arrays in place.
@@ -30,11 +30,11 @@ class OrientationCoefficients(NamedTuple):
     """Constants derived once from `OrientationParams` and the constellation, (node, ...)."""
 
     dt: F64
-    """Interval of the IMU, (node) [s]."""
+    """Sample interval of the IMU, (node) [s]."""
     rate: F64
-    """Its inverse, (node) [Hz]."""
+    """Sample rate of the IMU, (node) [Hz]."""
     mag_dt: F64
-    """Interval of the magnetometer, (node) [s]."""
+    """Sample interval of the magnetometer, (node) [s]."""
     tilt_pass: F64
     """Low pass of the specific force in the frame of the gyroscope, (node, N_LOW_PASS)."""
     rest_pass: F64
@@ -44,9 +44,9 @@ class OrientationCoefficients(NamedTuple):
     mag_gain: F64
     """Share of a heading error that one magnetometer reading corrects, (node)."""
     tau_mag: F64
-    """Time constant behind it, (node) [s]."""
+    """Time constant of `mag_gain`, (node) [s]."""
     reference_gain: F64
-    """Share by which a reading moves what is known of the field, (node)."""
+    """Gain of a reading on the reference field, (node)."""
     rest: Records
     """`OrientationParams.rest`, (1)."""
     field: Records
@@ -54,15 +54,15 @@ class OrientationCoefficients(NamedTuple):
     start_var: F64
     """Variance of a gyroscope's bias before any measurement, (node) [(0.01 deg/s)^2]."""
     drift_var: F64
-    """What the variance of a gyroscope's bias gains per sample, (node) [(0.01 deg/s)^2]."""
+    """Increase of a gyroscope bias variance per sample, (node) [(0.01 deg/s)^2]."""
     rest_var: F64
-    """Variance of the bias read at rest, (node) [(0.01 deg/s)^2]."""
+    """Variance of the bias measured at rest, (node) [(0.01 deg/s)^2]."""
     motion_var: F64
-    """The same in motion, horizontal, (node)."""
+    """Variance of the horizontal bias measured in motion, (node) [(0.01 deg/s)^2]."""
     vertical_var: F64
-    """The same about the vertical, (node)."""
+    """Variance of the zero measured about the vertical in motion, (node) [(0.01 deg/s)^2]."""
     gravity_gain: F64
-    """Share by which a sample at rest moves the length of gravity, (node)."""
+    """Gain of a sample at rest on the norm of gravity, (node)."""
     max_gap: F64
     """`OrientationParams.max_gap`, (node) [s]."""
     lost_after: F64
@@ -82,38 +82,38 @@ class OrientationCoefficients(NamedTuple):
     sanity: Records
     """`OrientationParams.sanity`, (1)."""
     magnetic: Bool
-    """True where the heading comes from the magnetometer, (node)."""
+    """True if the heading comes from the magnetometer, (node)."""
 
 
 class OrientationState(NamedTuple):
-    """Everything that evolves; the columns are named in the kernels' modules."""
+    """State of the orientation stage; the columns are named in the kernels' modules."""
 
     node: F64
-    """What a node remembers in addition to its VQF, (env, node, N_NODE)."""
+    """State of a node in addition to its VQF, (env, node, N_NODE)."""
     health: F64
-    """Memory of `imu`, (env, node, N_HEALTH)."""
+    """Memory of `sanity.imu`, (env, node, N_HEALTH)."""
     limits: F64
-    """Memory of `saturation`, (env, node, N_LIMIT)."""
+    """Memory of `sanity.saturation`, (env, node, N_LIMIT)."""
     tilt: F64
     """Rotations of VQF, (env, node, N_TILT)."""
     rest: F64
-    """Its rest detection, (env, node, N_REST)."""
+    """Rest detection of VQF, (env, node, N_REST)."""
     bias: F64
-    """Its bias of the gyroscope, (env, node, N_BIAS)."""
+    """Gyroscope bias of VQF, (env, node, N_BIAS)."""
     magnetic: F64
-    """Its heading correction, (env, node, N_MAGNETIC)."""
+    """Heading correction of VQF, (env, node, N_MAGNETIC)."""
 
     def of(self, envs: slice) -> OrientationState:
-        """Some environments, as views."""
+        """Return some environments, as views."""
         return OrientationState(*(array[envs] for array in self))
 
     def copy(self) -> OrientationState:
-        """A copy that shares nothing."""
+        """Return a copy that shares no memory."""
         return OrientationState(*(array.copy() for array in self))
 
 
 def make_state(n_envs: int, n_nodes: int) -> OrientationState:
-    """Room for the state; `forget` brings it to where it is before any measurement."""
+    """Allocate the state; `forget` initialises it."""
     columns = (N_NODE, N_HEALTH, N_LIMIT, N_TILT, N_REST, N_BIAS, N_MAGNETIC)
     return OrientationState(*(np.zeros((n_envs, n_nodes, n)) for n in columns))
 
@@ -124,9 +124,9 @@ def make_coefficients(
     """Derive the constants of the kernels.
 
     Args:
-        constellation: The nodes.
-        params: What is believed.
-        follows_bias: As of `Filter.follows_bias`.
+        constellation: Nodes of the group.
+        params: Parameters of the stage.
+        follows_bias: As `Filter.follows_bias`.
     """
     nodes = constellation.nodes
     dt = np.array([1.0 / node.imu_hz for node in nodes])
@@ -137,7 +137,7 @@ def make_coefficients(
         [b or v.ahrs_accel_tau or params.tau_acc for b, v in zip(with_bias, vehicles, strict=True)]
     )
     b = params.bias
-    # Steady states of the filter of the bias, in its unit.
+    # Steady states of the bias filter, in its unit.
     drift_var = (b.drift_std / UNIT) ** 2 * dt / b.drift_time
     rest_sigma2 = (b.rest_std / UNIT) ** 2
     motion_sigma2 = (b.motion_std / UNIT) ** 2 * tau_acc / VQF_TAU_ACC
@@ -174,10 +174,10 @@ def make_coefficients(
 
 
 def low_pass_of(tau: float, dt: float) -> F64:
-    """Coefficients of a second-order Butterworth low pass, (N_LOW_PASS).
+    """Return the coefficients of a second-order Butterworth low pass, (N_LOW_PASS).
 
-    Its cut-off is at ``sqrt(2) / (2 pi tau)``, by the bilinear transform. Shorter time constants
-    than half an interval let everything pass.
+    The cut-off is at ``sqrt(2) / (2 pi tau)``, by the bilinear transform. Time constants shorter
+    than half an interval pass everything.
 
     Args:
         tau: Time constant of the step response's decaying part [s].

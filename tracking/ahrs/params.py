@@ -1,4 +1,4 @@
-"""Parameters of the orientation stage: every number with its unit, its effect and its source.
+"""Parameters of the orientation stage, each with unit, effect and source.
 
 References:
     [1] Laidig, Seel, VQF, Information Fusion 91 (2023) 187.
@@ -13,24 +13,24 @@ from tracking.params.checks import check_numbers
 from tracking.sanity.params import SanityParams
 
 VQF_TAU_ACC = 3.0
-"""[s] VQF's accelerometer time constant."""
+"""[s] Time constant of VQF's accelerometer."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RestParams:
-    """When a sensor lies still; the values are those of [1] sec. 3.4, but for `rate`."""
+    """Rest detection of a sensor; the values are those of [1] sec. 3.4, except `rate`."""
 
     tau: float = 0.5
     """[s] Time constant of the low passes that readings are compared with."""
     after: float = 1.5
-    """[s] So long the readings must stay near their low passes."""
+    """[s] Time for which readings must stay near their low passes."""
     rate: float = math.radians(4.0)
-    """[rad/s] How near, of the gyroscope. VQF's 2 deg/s are passed by the noise alone of
-    `isas_walk1`, 0.5 to 0.8 deg/s along each axis, so that its bias was never learned."""
+    """[rad/s] Largest deviation of the gyroscope. Noise peaks of `isas_walk1`, 0.5 to 0.8 deg/s per
+    axis, exceed VQF's 2 deg/s, so that its bias would never be estimated."""
     accel: float = 0.5
-    """[m/s2] How near, of the accelerometer."""
+    """[m/s2] Largest deviation of the accelerometer."""
     largest_bias: float = math.radians(2.0)
-    """[rad/s] A steady rate above this is no bias of a gyroscope: something turns."""
+    """[rad/s] Largest gyroscope bias; a larger steady rate is a rotation."""
 
     def __post_init__(self) -> None:
         check_numbers(self)
@@ -38,23 +38,23 @@ class RestParams:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BiasParams:
-    """How the bias of a gyroscope is learned; the values are those of [1] sec. 3.5."""
+    """Estimation of the gyroscope bias; the values are those of [1] sec. 3.5."""
 
     start_std: float = math.radians(0.5)
     """[rad/s] Standard deviation before any measurement."""
     drift_std: float = math.radians(0.1)
     """[rad/s] Drift in `drift_time`."""
     drift_time: float = 100.0
-    """[s] Time over which `drift_std` is stated."""
+    """[s] Time of the drift `drift_std`."""
     motion_std: float = math.radians(0.1)
-    """[rad/s] Standard deviation in the long run in motion, at VQF's `tau_acc`. What tells it are
-    corrections of the tilt, which come later the longer that time constant is. What follows them
-    as fast all the same swings, by tilts of 5 to 10 degrees at 30 s: so the variance of what they
-    tell is in proportion to the square of the time constant."""
+    """[rad/s] Steady-state standard deviation in motion, at VQF's `tau_acc`. Motion shows the bias
+    by tilt corrections, which are delayed by that time constant. An estimate that follows them as
+    fast regardless oscillates, by tilts of 5 to 10 degrees at 30 s: so the variance of the measured
+    bias is proportional to the square of the time constant."""
     rest_std: float = math.radians(0.03)
-    """[rad/s] The same at rest."""
+    """[rad/s] Steady-state standard deviation at rest."""
     vertical_share: float = 1e-4
-    """[-] Share of what is forgotten about the vertical, which motion does not tell."""
+    """[-] Ratio of the variance in motion to that about the vertical, which motion hides."""
 
     def __post_init__(self) -> None:
         check_numbers(self)
@@ -62,29 +62,29 @@ class BiasParams:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MagneticParams:
-    """When a magnetic field is disturbed; the values are those of [1] sec. 3.6."""
+    """Detection of disturbed magnetic fields; the values are those of [1] sec. 3.6."""
 
     tau: float = 0.05
-    """[s] Low pass of length and dip."""
+    """[s] Time constant of the low pass of norm and dip."""
     reference_tau: float = 20.0
-    """[s] Time constant with which what is known of the field follows."""
+    """[s] Time constant with which the reference field follows."""
     norm_change: float = 0.1
-    """[-] Relative difference in length of a field that is not disturbed."""
+    """[-] Largest relative difference of an undisturbed field's norm."""
     dip_change: float = math.radians(10.0)
-    """[rad] The same of the dip."""
+    """[rad] Largest difference of an undisturbed field's dip."""
     new_after: float = 20.0
-    """[s] A new field is accepted after so much turning."""
+    """[s] Turning time in a new field after which it is accepted."""
     first_after: float = 5.0
-    """[s] The first one."""
+    """[s] Turning time in the first field after which it is accepted."""
     least_turn: float = math.radians(20.0)
-    """[rad/s] What counts as turning."""
+    """[rad/s] Least rate that counts as turning."""
     undisturbed_after: float = 0.5
-    """[s] So long the field must be as known before it is believed again."""
+    """[s] Time for which a field must match the reference before it is used again."""
     longest_rejection: float = 60.0
-    """[s] So long a disturbed field is left out."""
+    """[s] Longest time for which a disturbed field is rejected."""
     rejection_factor: float = 2.0
-    """[-] How much slower the heading follows a field that stays disturbed, and how much faster
-    undisturbed time makes up for disturbed time."""
+    """[-] Divides the heading gain in a field that stays disturbed; undisturbed time makes up for
+    rejected time by this factor."""
 
     def __post_init__(self) -> None:
         check_numbers(self)
@@ -92,42 +92,42 @@ class MagneticParams:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OrientationParams:
-    """What the orientation stage believes."""
+    """Parameters of the orientation stage."""
 
     tau_acc: float = VQF_TAU_ACC
-    """[s] VQF's accelerometer time constant. Longer trusts the gyroscope more. VQF default."""
+    """[s] Time constant of VQF's accelerometer. Longer trusts the gyroscope more. VQF default."""
     tau_mag: float = 9.0
-    """[s] VQF's magnetometer time constant. VQF default."""
+    """[s] Time constant of VQF's magnetometer. VQF default."""
     bias: BiasParams = field(default_factory=BiasParams)
-    """How the bias of a gyroscope is learned."""
+    """Estimation of the gyroscope bias."""
     rest: RestParams = field(default_factory=RestParams)
-    """When a sensor lies still."""
+    """Rest detection of a sensor."""
     magnetic: MagneticParams = field(default_factory=MagneticParams)
-    """When a magnetic field is disturbed."""
+    """Detection of disturbed magnetic fields."""
     max_gap: float = 0.5
-    """[s] Missing samples up to here are filled by interpolation, so that the gyroscope is
-    integrated over them. After a longer silence the orientation is initialised again, where there
-    is a magnetometer; elsewhere it goes on from where it was."""
+    """[s] Longest gap that is filled by interpolated samples, over which the gyroscope is
+    integrated. After a longer one the orientation is initialised again with a magnetometer; without
+    one it is kept."""
     lost_after: float = 1.5
-    """[-] Factor on the period of a sensor: samples further apart have lost some between."""
+    """[-] Factor on a sensor's period above which samples between two others are lost."""
     stamp_gain: float = 0.05
-    """[-] Share of the difference between a sample's stamp and that of a steady sensor by which the
-    integration of the gyroscope follows it: jitter is smoothed over 20 samples."""
+    """[-] Share of a stamp's deviation from steady sampling by which the gyroscope's integration
+    time follows it: jitter is smoothed over 20 samples."""
     gravity_tau: float = 0.5
-    """[s] Time constant with which a node at rest learns the length of gravity that its own
-    accelerometer reads, which removes the vertical part of its offset."""
+    """[s] Time constant with which a node at rest estimates gravity as its own accelerometer reads
+    it, which removes the vertical part of its offset."""
     settling: float = 1.5
-    """[s] An orientation that starts in motion is not used for so long, and its heading is averaged
-    from then on: the first tilts follow single accelerations, and headings are measured with them.
-    Limbs that jump start up to 180 deg off and are within 3 deg after 1.5 s."""
+    """[s] Time for which an orientation that starts in motion is not used; its heading is averaged
+    from then on: the first tilts follow single accelerations, and headings depend on tilts. Limbs
+    that jump start up to 180 deg off and are within 3 deg after 1.5 s."""
     settling_accel: float = 3.0
-    """[m/s2] It starts in motion if the length of a specific force differs by more from gravity:
+    """[m/s2] Deviation of a specific force's norm from gravity that counts as a start in motion:
     taken for gravity, such a force tilts by up to 17 deg and more."""
     sanity: SanityParams = field(default_factory=SanityParams)
-    """Which samples are doubtful."""
+    """Thresholds of doubtful samples."""
     doubtful_psd: float = 1.5
-    """[m/s2/sqrt(Hz)] Added noise of an acceleration that is saturated or stands in for a spike:
-    that of a node without an IMU. Such a reading is nearer to the acceleration than none."""
+    """[m/s2/sqrt(Hz)] Added noise of an acceleration that is saturated or replaces a spike: that of
+    a node without an IMU. Such a reading is nearer to the acceleration than none."""
 
     def __post_init__(self) -> None:
         check_numbers(self)

@@ -1,4 +1,4 @@
-"""Whether a sensor lies still: its readings stay near their own low pass, [1] sec. 3.4.
+"""Rest detection: the readings of a sensor stay near their own low pass, [1] sec. 3.4.
 
 References:
     [1] Laidig, Seel, VQF, Information Fusion 91 (2023) 187.
@@ -11,13 +11,13 @@ from tracking.kernels.jit import small_kernel
 
 GYR, ACC, REST_T, RESTING = 0, 9, 18, 19
 N_REST = 20
-"""Columns of the memory: the low passes of gyroscope and accelerometer, whose first three hold
-what they read last [rad/s, m/s2]; how long the readings have been near [s]; 1 at rest."""
+"""Columns of the memory: the low passes of gyroscope and accelerometer, whose first three are
+their last outputs [rad/s, m/s2]; time for which readings have been near [s]; 1 at rest."""
 
 
 @small_kernel
 def watch_gyroscope(rest, c, e, n, count, gx, gy, gz):
-    """Take a reading of the gyroscope [rad/s], the `count`-th of node n."""
+    """Process a gyroscope reading [rad/s], the `count`-th of node n."""
     rest[e, n, GYR], rest[e, n, GYR + 1], rest[e, n, GYR + 2] = gx, gy, gz
     low_pass(rest, e, n, GYR, 3, count, c.rest_pass, n)
     mx, my, mz = rest[e, n, GYR], rest[e, n, GYR + 1], rest[e, n, GYR + 2]
@@ -30,7 +30,7 @@ def watch_gyroscope(rest, c, e, n, count, gx, gy, gz):
 
 @small_kernel
 def watch_accelerometer(rest, c, e, n, count, ax, ay, az):
-    """Take a reading of the accelerometer [m/s2], the `count`-th of node n."""
+    """Process an accelerometer reading [m/s2], the `count`-th of node n."""
     rest[e, n, ACC], rest[e, n, ACC + 1], rest[e, n, ACC + 2] = ax, ay, az
     low_pass(rest, e, n, ACC, 3, count, c.rest_pass, n)
     dx, dy, dz = ax - rest[e, n, ACC], ay - rest[e, n, ACC + 1], az - rest[e, n, ACC + 2]

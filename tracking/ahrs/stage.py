@@ -1,7 +1,7 @@
-"""From inertial samples to states, in one pass over the events of every environment.
+"""Conversion of inertial samples to states, in one pass over the events of every environment.
 
-A field waits for the next inertial sample of its node. A sample is judged, then given to VQF,
-after samples that were lost have been interpolated; its event becomes a STATE in place.
+A field is kept until the next inertial sample of its node. A sample is checked, then processed by
+VQF after interpolated samples in place of lost ones; its event becomes a STATE in place.
 """
 
 from __future__ import annotations
@@ -33,27 +33,27 @@ STARTED, T, GRAVITY, COS_YAW, SIN_YAW = 0, 1, 2, 3, 4
 LAST_GYR, LAST_ACC, FIELD, HAS_FIELD, SEEN_FIELD, TURNED = 5, 8, 11, 14, 15, 16
 MOVED, BEHIND = 18, 19
 N_NODE = 20
-"""Columns of what a node remembers in addition to its VQF: 1 after the first sample; its time
-[s]; length of gravity [m/s2]; cosine and sine of half the turn that gives the initial heading;
-the last sample, gyroscope [rad/s] and specific force [m/s2]; a field that no sample followed yet,
-and 1 if there is one; 1 after a field was used; by how much it was turned upright, about x and y
-of the world [rad]; 1 where it moved while its orientation settled; by how much the time that its
-gyroscope was integrated over is behind the last stamp [s]."""
+"""Columns of a node's state in addition to its VQF: 1 after the first sample; its time [s]; norm
+of gravity [m/s2]; cosine and sine of half the yaw that gives the initial heading; the last sample,
+gyroscope [rad/s] and specific force [m/s2]; a field without a later sample, and 1 if there is one;
+1 after a field was used; accumulated tilt correction about x and y of the world [rad]; 1 if it
+moved while its orientation settled; lag of the gyroscope's integration time behind the last stamp
+[s]."""
 
 
 @kernel
 def orient(c, s, t, kind, node, values, valid):
-    """Turn IMU events into STATE events and MAG events into padding, in place.
+    """Convert IMU events into STATE events and MAG events into padding, in place.
 
-    Environments may be any slice of a batch: then `s` holds the same slice.
+    For a slice of environments, `s` holds the same slice.
 
     Args:
         c: OrientationCoefficients.
         s: OrientationState, updated.
         t: Time, (env, event) [s], in order.
-        kind: `Kind`, (env, event), written.
-        node: Node, (env, event).
-        values: What was measured, (env, event, N_VALUES), written.
+        kind: `Kind` of the events, (env, event), written.
+        node: Node of the events, (env, event).
+        values: Measured values, (env, event, N_VALUES), written.
         valid: False for padding, (env, event), written.
     """
     for e in range(t.shape[0]):
@@ -72,7 +72,7 @@ def orient(c, s, t, kind, node, values, valid):
 
 @small_kernel
 def take_sample(c, s, e, n, t, kind, values, valid, k):
-    """Handle the inertial sample of node n in column k."""
+    """Process the inertial sample of node n in column k."""
     m, good = s.node, s.health
     has_field = m[e, n, HAS_FIELD] != 0.0 and c.magnetic[n]
     m[e, n, HAS_FIELD] = 0.0
@@ -113,7 +113,7 @@ def take_sample(c, s, e, n, t, kind, values, valid, k):
 
 @small_kernel
 def settles(c, s, e, n, ax, ay, az):
-    """Whether node n moves while its orientation is new (`OrientationParams.settling`)."""
+    """Return whether node n moves while its orientation is new (`OrientationParams.settling`)."""
     if s.tilt[e, n, N_ACC_READ] > c.settling_samples[n]:
         return False
     length = math.sqrt(ax * ax + ay * ay + az * az)
@@ -124,9 +124,9 @@ def settles(c, s, e, n, ax, ay, az):
 
 @small_kernel
 def tell_upright(s, e, n, cos, sin, values, k):
-    """Write how node n was turned upright so far, and what is taken for its gyroscope's bias.
+    """Write the accumulated tilt correction and the gyroscope bias of node n.
 
-    Cosine and sine are of half the turn about the vertical that gives its heading.
+    Cosine and sine are of half the yaw that gives its heading.
     """
     m, q = s.node, s.tilt
     turn_cos, turn_sin = cos * cos - sin * sin, 2.0 * cos * sin
@@ -143,18 +143,17 @@ def tell_upright(s, e, n, cos, sin, values, k):
 
 @small_kernel
 def find_gap(c, s, e, n, t):
-    """Samples lost before one at time t [s], and the time between two then [s].
+    """Return the number of samples lost before time t [s], and the sample interval [s].
 
-    Samples are taken at a steady rate, whatever their stamps: the time that the gyroscope was
-    integrated over follows the stamps slowly, so that jitter is smoothed and time adds up. After a
-    long silence VQF starts again instead.
+    Sampling is assumed steady: the integration time of the gyroscope follows the stamps slowly,
+    which smooths jitter and preserves the total time. VQF restarts after a long gap.
     """
     m, dt, n_lost = s.node, c.dt[n], 0
     gap = t - m[e, n, T]
     behind = gap + m[e, n, BEHIND]
     if m[e, n, STARTED] == 0.0 or gap > c.max_gap[n]:
         if m[e, n, STARTED] != 0.0 and c.magnetic[n]:
-            # Where it points now is not known; what its gyroscope reads at rest is still true.
+            # The orientation is unknown; the gyroscope bias estimated at rest remains valid.
             start_vqf(s, c, e, n, worst_variance(s.bias, c, e, n))
             m[e, n, SEEN_FIELD] = m[e, n, MOVED] = 0.0
         m[e, n, BEHIND] = 0.0
@@ -168,7 +167,7 @@ def find_gap(c, s, e, n, t):
 
 @small_kernel
 def integrate_over(c, s, e, n, n_lost, dt, upright):
-    """Give VQF the believed sample, and before it those that were lost, interpolated."""
+    """Run VQF on the accepted sample, after interpolated samples in place of lost ones."""
     m, good = s.node, s.health
     for step in range(n_lost, -1, -1):
         w = step / (n_lost + 1.0)
@@ -182,7 +181,7 @@ def integrate_over(c, s, e, n, n_lost, dt, upright):
             ay += w * (m[e, n, LAST_ACC + 1] - ay)
             az += w * (m[e, n, LAST_ACC + 2] - az)
         elif not upright:
-            ax = ay = az = 0.0  # tells no tilt
+            ax = ay = az = 0.0  # no tilt correction
         update_vqf(s, c, e, n, dt, gx, gy, gz, ax, ay, az)
     for a in range(3):
         m[e, n, LAST_GYR + a] = good[e, n, GOOD + a]
@@ -191,7 +190,7 @@ def integrate_over(c, s, e, n, n_lost, dt, upright):
 
 @small_kernel
 def start_heading(c, s, e, n):
-    """Find the turn after which the first orientation has the initial heading."""
+    """Compute the yaw that gives the first orientation the initial heading."""
     q = s.tilt
     w, x, y, z = q[e, n, Q_6D], q[e, n, Q_6D + 1], q[e, n, Q_6D + 2], q[e, n, Q_6D + 3]
     half = 0.5 * (c.heading[n] - math.atan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z)))
@@ -200,12 +199,12 @@ def start_heading(c, s, e, n):
 
 @kernel
 def forget(c, s, gravity):
-    """Bring every environment and node of `s` to where it was before any measurement.
+    """Reset every environment and node of `s` to the state before any measurement.
 
     Args:
         c: OrientationCoefficients.
         s: OrientationState, written.
-        gravity: Length of gravity assumed [m/s2].
+        gravity: Assumed norm of gravity [m/s2].
     """
     for e in range(s.node.shape[0]):
         for n in range(s.node.shape[1]):

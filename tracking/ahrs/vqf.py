@@ -1,12 +1,13 @@
 """VQF [1]: the orientation of a sensor from its gyroscope, accelerometer and magnetometer.
 
-Three rotations are kept apart. The gyroscope alone is integrated to an orientation in a frame
-that turns slowly, with its bias; there the specific force is low-passed, which leaves gravity,
-and the second rotation brings that upright. The third, about the vertical, is the magnetometer's.
+Three rotations are kept separate. The gyroscope alone is integrated to an orientation in a frame
+that turns slowly, with its bias. In that frame the specific force is low-passed, which leaves
+gravity, and the second rotation makes it vertical. The third, about the vertical, is from the
+magnetometer.
 
     q_6d = q_acc q_gyr,    q_9d = Rz(delta) q_6d
 
-All parameters but the two time constants are the defaults of [1].
+All parameters except the two time constants are the defaults of [1].
 
 References:
     [1] Laidig, Seel, VQF: Highly accurate IMU orientation estimation with bias estimation and
@@ -27,14 +28,13 @@ from tracking.maths.angles import SERIES, small_turn
 Q_GYR, Q_ACC, Q_6D, FORCE, N_GYR_READ, N_ACC_READ = 0, 4, 8, 12, 21, 22
 TURN = 23
 N_TILT = 25
-"""Columns of the memory: the rotations; the low pass of the specific force in the frame of the
-gyroscope; numbers of readings; by how much it was turned upright since that was told, about x and
-y [rad]."""
+"""Columns of the memory: the rotations; low pass of the specific force in the frame of the
+gyroscope; numbers of readings; tilt correction since it was last reported, about x and y [rad]."""
 
 
 @small_kernel
 def start_vqf(s, c, e, n, var):
-    """Forget everything but the bias of the gyroscope, which has a variance [(0.01 deg/s)^2]."""
+    """Reset everything but the gyroscope bias, which gets a variance [(0.01 deg/s)^2]."""
     for k in range(N_TILT):
         s.tilt[e, n, k] = 0.0
     for k in range(N_REST):
@@ -46,7 +46,7 @@ def start_vqf(s, c, e, n, var):
 
 @small_kernel
 def multiply(aw, ax, ay, az, bw, bx, by, bz):
-    """Hamilton product a b."""
+    """Return the Hamilton product a b."""
     return (
         aw * bw - ax * bx - ay * by - az * bz,
         aw * bx + ax * bw + ay * bz - az * by,
@@ -57,7 +57,7 @@ def multiply(aw, ax, ay, az, bw, bx, by, bz):
 
 @small_kernel
 def turned(qw, qx, qy, qz, x, y, z):
-    """R(q) v."""
+    """Return R(q) v."""
     tx, ty, tz = 2 * (qy * z - qz * y), 2 * (qz * x - qx * z), 2 * (qx * y - qy * x)
     return (
         x + qw * tx + qy * tz - qz * ty,
@@ -68,9 +68,9 @@ def turned(qw, qx, qy, qz, x, y, z):
 
 @small_kernel
 def store_unit(q, e, n, at, w, x, y, z):
-    """Write a quaternion with its length made 1, from which only rounding has taken it.
+    """Write a quaternion with its length normalised, which differs from 1 by rounding only.
 
-    One step of Newton for the inverse root: off by the square of what the length is off.
+    One Newton step for the inverse root: the remaining error is of second order.
     """
     scale = 1.5 - 0.5 * (w * w + x * x + y * y + z * z)
     q[e, n, at], q[e, n, at + 1] = scale * w, scale * x
@@ -79,7 +79,7 @@ def store_unit(q, e, n, at, w, x, y, z):
 
 @small_kernel
 def integrate(s, c, e, n, dt, gx, gy, gz):
-    """Take a reading of the gyroscope [rad/s], over dt [s]: rest detection, then strapdown."""
+    """Process a gyroscope reading [rad/s] over dt [s]: rest detection, then strapdown."""
     q = s.tilt
     q[e, n, N_GYR_READ] += 1.0
     watch_gyroscope(s.rest, c, e, n, q[e, n, N_GYR_READ], gx, gy, gz)
@@ -102,7 +102,7 @@ def integrate(s, c, e, n, dt, gx, gy, gz):
 
 @small_kernel
 def store_6d(q, e, n):
-    """Join the two rotations, which gives the orientation without a magnetometer."""
+    """Store the product of the two rotations, the orientation without a magnetometer."""
     q[e, n, Q_6D], q[e, n, Q_6D + 1], q[e, n, Q_6D + 2], q[e, n, Q_6D + 3] = multiply(
         q[e, n, Q_ACC], q[e, n, Q_ACC + 1], q[e, n, Q_ACC + 2], q[e, n, Q_ACC + 3],
         q[e, n, Q_GYR], q[e, n, Q_GYR + 1], q[e, n, Q_GYR + 2], q[e, n, Q_GYR + 3],
@@ -111,7 +111,7 @@ def store_6d(q, e, n):
 
 @small_kernel
 def correct_tilt(s, c, e, n, ax, ay, az):
-    """Take a reading of the accelerometer [m/s2], not all zero: rest, tilt, bias."""
+    """Process an accelerometer reading [m/s2], not all zero: rest, tilt, bias."""
     q = s.tilt
     q[e, n, N_ACC_READ] += 1.0
     count = q[e, n, N_ACC_READ]
@@ -127,8 +127,8 @@ def correct_tilt(s, c, e, n, ax, ay, az):
         scale = 1.0 / length
         ux, uy, uz = scale * ux, scale * uy, scale * uz
     else:
-        ux, uy, uz = 0.0, 0.0, 1.0  # tells nothing
-    # The shortest turn that brings (ux, uy, uz) upright; of those by 180 degrees, one.
+        ux, uy, uz = 0.0, 0.0, 1.0  # no information
+    # The shortest rotation that makes (ux, uy, uz) vertical; for 180 degrees, one of several.
     half = math.sqrt(max(0.5 * (uz + 1.0), 0.0))
     cw, cx, cy = 0.0, 1.0, 0.0
     if half > 1e-6:
@@ -146,7 +146,7 @@ def correct_tilt(s, c, e, n, ax, ay, az):
 
 @small_kernel
 def update_vqf(s, c, e, n, dt, gx, gy, gz, ax, ay, az):
-    """Take an inertial sample of node n; an accelerometer that reads zero tells no tilt.
+    """Process an inertial sample of node n; an accelerometer that reads zero corrects no tilt.
 
     Low passes count samples.
 
@@ -155,11 +155,11 @@ def update_vqf(s, c, e, n, dt, gx, gy, gz, ax, ay, az):
         c: OrientationCoefficients.
         e: Environment.
         n: Node.
-        dt: Time that the gyroscope is integrated over [s].
-        gx: Gyroscope, body frame [rad/s].
+        dt: Integration time of the gyroscope [s].
+        gx: Gyroscope, body frame [rad/s], along x.
         gy: Gyroscope, body frame [rad/s], along y.
         gz: Gyroscope, body frame [rad/s], along z.
-        ax: Specific force, body frame [m/s2].
+        ax: Specific force, body frame [m/s2], along x.
         ay: Specific force, body frame [m/s2], along y.
         az: Specific force, body frame [m/s2], along z.
     """
@@ -172,7 +172,7 @@ def update_vqf(s, c, e, n, dt, gx, gy, gz, ax, ay, az):
 
 @small_kernel
 def update_heading(s, c, e, n, mx, my, mz):
-    """Take a magnetic field, body frame, any unit, after the inertial sample; zero is none."""
+    """Process a magnetic field, body frame, any unit, after the inertial sample; zero is none."""
     if mx == 0.0 and my == 0.0 and mz == 0.0:
         return
     q, rest = s.tilt, s.rest
@@ -186,25 +186,25 @@ def update_heading(s, c, e, n, mx, my, mz):
 
 @small_kernel
 def about_vertical(cos, sin, q, e, n):
-    """The 6D orientation turned about the vertical, by half an angle's cosine and sine."""
+    """Return the 6D orientation rotated about the vertical, by cos and sin of the half angle."""
     w, x, y, z = q[e, n, Q_6D], q[e, n, Q_6D + 1], q[e, n, Q_6D + 2], q[e, n, Q_6D + 3]
     return cos * w - sin * z, cos * x - sin * y, cos * y + sin * x, cos * z + sin * w
 
 
 @kernel
 def run_vqf(c, s, samples, field, has_field, q_6d, q_9d, bias, resting):
-    """VQF alone over a recording of every node, without what `orient` makes of it.
+    """Run VQF alone over a recording of every node, without the additions of `orient`.
 
     Args:
         c: OrientationCoefficients.
         s: OrientationState, updated.
         samples: Gyroscope [rad/s] and specific force [m/s2], (env, node, sample, 6).
         field: Magnetic field, any unit, (env, node, sample, 3).
-        has_field: True for samples with one, (env, node, sample).
-        q_6d: Written, orientations without magnetometer, (env, node, sample, 4).
-        q_9d: Written, with it, (env, node, sample, 4).
-        bias: Written, of the gyroscope, (env, node, sample, 3) [rad/s].
-        resting: Written, True at rest, (env, node, sample).
+        has_field: True for samples with a field, (env, node, sample).
+        q_6d: Orientations without magnetometer, (env, node, sample, 4), written.
+        q_9d: Orientations with magnetometer, (env, node, sample, 4), written.
+        bias: Gyroscope biases, (env, node, sample, 3) [rad/s], written.
+        resting: True at rest, (env, node, sample), written.
     """
     for e in range(samples.shape[0]):
         for n in range(samples.shape[1]):

@@ -1,4 +1,4 @@
-"""Finding the errors of sensors from recordings, and taking them off measurements."""
+"""Estimation of sensor errors from recordings, and correction of measurements."""
 
 from tracking.calibration.calibration import (
     Calibration,

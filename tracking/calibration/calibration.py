@@ -1,12 +1,12 @@
-"""What is known of the sensors' errors, and how it is taken off.
+"""Sensor errors of a group, and their correction.
 
     gyr = gyr_raw - offset
     acc = scale * (acc_raw - offset)
     mag = M (mag_raw - offset)
     distance = (range - b_i - b_j) / slope
 
-Laws: an empty calibration changes nothing, to the last bit; `apply` neither adds nor drops
-events; how events are cut into blocks changes nothing.
+Properties: an empty calibration changes nothing, bit for bit; `apply` neither adds nor drops
+events; the division of events into blocks has no effect.
 """
 
 from __future__ import annotations
@@ -24,28 +24,28 @@ Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]
 
 MIN_DISTANCE = 0.01
-"""[m] A corrected range is not made shorter than this."""
+"""[m] Least corrected range."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NodeCalibration:
-    """The sensors of one node, in its body frame; None where not calibrated."""
+    """Sensor errors of one node, in its body frame; None for sensors without calibration."""
 
     gyr_offset: Vector | None = None
-    """[rad/s]"""
+    """[rad/s] Offset of the gyroscope."""
     acc_offset: Vector | None = None
-    """[m/s2]"""
+    """[m/s2] Offset of the accelerometer."""
     acc_scale: Vector | None = None
-    """[-] Of each axis."""
+    """[-] Scale of each axis of the accelerometer."""
     mag_offset: Vector | None = None
     """[uT] Hard iron."""
     mag_matrix: Matrix | None = None
-    """[-] M, which undoes soft iron."""
+    """[-] M, which corrects soft iron."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RangeCalibration:
-    """The ranges of a group: a common slope, and what the antennas of each node add."""
+    """Range errors of a group: a common slope, and antenna offsets of each node."""
 
     slope: float = 1.0
     """[-] a of ``range = a distance + b_i + b_j``."""
@@ -55,29 +55,29 @@ class RangeCalibration:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Calibration:
-    """Every known sensor error of a group."""
+    """Sensor errors of a group."""
 
     nodes: Mapping[int, NodeCalibration] = field(default_factory=dict)
-    """By node id."""
+    """Calibrations by node id."""
     ranges: RangeCalibration | None = None
-    """None where ranges are not calibrated."""
+    """None for ranges without calibration."""
 
     def apply(self, block: MeasurementBlock, constellation: Constellation) -> MeasurementBlock:
-        """Correct IMU, MAG and RANGE events; all others are left as they are.
+        """Correct IMU, MAG and RANGE events.
 
-        STATE events come from a node's own filter, after its own calibration. A sensor that
-        is not calibrated is left as it is.
+        STATE events come from a node's own filter, after its own calibration. They and sensors
+        without calibration are unchanged.
 
         Args:
             block: Raw measurements.
-            constellation: The nodes that the block's indices mean.
+            constellation: Nodes of the block.
 
         Returns:
             A block of the same events.
 
         Raises:
-            ConfigError: A node has ranges and no offset though ranges are calibrated, or no
-                node of the calibration is in the group.
+            ConfigError: Ranges are calibrated and a node with ranges has no offset, or no node of
+                the calibration is in the group.
         """
         known = set(self.nodes) | set(self.ranges.offset if self.ranges else ())
         if known and not known & set(constellation.ids):
@@ -95,10 +95,10 @@ class Calibration:
 
 
 def merge(calibrations: Iterable[Calibration]) -> Calibration:
-    """Several calibrations as one, such as those of the IMUs and of the ranges.
+    """Merge calibrations, such as those of IMUs and of ranges.
 
     Raises:
-        ConfigError: Two of them give the same field of the same node, or both give ranges.
+        ConfigError: Two calibrations have the same field of the same node, or both have ranges.
     """
     nodes: dict[int, NodeCalibration] = {}
     ranges: RangeCalibration | None = None
@@ -138,7 +138,7 @@ def _correct_node(
     if node.mag_offset is not None:
         rows[:, :3] -= node.mag_offset
     if node.mag_matrix is not None:
-        # Column by column, so that a row does not depend on how many there are.
+        # Column by column, so that a row does not depend on the number of rows.
         matrix = np.array(node.mag_matrix)
         x, y, z = (rows[:, k : k + 1].copy() for k in range(3))
         rows[:, :3] = x * matrix[:, 0] + y * matrix[:, 1] + z * matrix[:, 2]

@@ -21,24 +21,24 @@ class RangeTable:
     __repr__ = short_repr
 
     t: F64
-    """(range) [s]"""
+    """Times, (range) [s]."""
     i: I64
     """Node index, (range)."""
     j: I64
     """Other node index, (range)."""
     measured: F64
-    """(range) [m]"""
+    """Measured ranges, (range) [m]."""
     true: F64
-    """Distance between the antennas, (range) [m]; 0 where not known."""
+    """Distance between the antennas, (range) [m]; 0 if unknown."""
     known: Bool
-    """(range)"""
+    """True if the distance is known, (range)."""
 
 
 def range_table(block: MeasurementBlock, constellation: Constellation, truth: Truth) -> RangeTable:
-    """Put next to every range of environment 0 what it should have been.
+    """Return the ranges of environment 0 with their true distances.
 
-    A distance is known where both positions are and, for an antenna that is not at the
-    origin of its body, the orientation too.
+    A distance is known if both positions are known and, for an antenna away from the origin of
+    its body, the orientation too.
 
     Args:
         block: Measurements; RANGE events are used.
@@ -65,7 +65,7 @@ def range_table(block: MeasurementBlock, constellation: Constellation, truth: Tr
 
 
 def _orientation(truth: Truth, node: int, static: bool, t: F64) -> tuple[F64, Bool]:
-    """Orientation of a node between rows of truth, (time, 4), and where it is known, (time)."""
+    """Interpolate the orientation of a node, (time, 4), with a mask of known ones, (time)."""
     rows = np.nonzero(truth.valid & truth.has_orientation & (truth.node == node))[0]
     if len(rows) == 0:
         return np.tile([1.0, 0.0, 0.0, 0.0], (len(t), 1)), np.zeros(len(t), dtype=bool)
@@ -77,7 +77,7 @@ def _orientation(truth: Truth, node: int, static: bool, t: F64) -> tuple[F64, Bo
     span = t_n[after] - t_n[before]
     share = np.where(span > 0.0, (t - t_n[before]) / np.where(span > 0.0, span, 1.0), 1.0)
     share = share.clip(0.0, 1.0)[:, None]
-    # The shorter way round: q and -q are the same rotation.
+    # Use the nearer one of q and -q, which are the same rotation.
     sign = np.where(np.sum(q_n[before] * q_n[after], axis=1) < 0.0, -1.0, 1.0)[:, None]
     q = (1.0 - share) * q_n[before] + share * sign * q_n[after]
     norm = np.linalg.norm(q, axis=1, keepdims=True)

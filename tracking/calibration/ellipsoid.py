@@ -1,9 +1,9 @@
-"""Ellipsoid or ellipse through points, in spite of a few outliers.
+"""Robust fit of an ellipsoid or ellipse to points with a few outliers.
 
-The quadric ``x^T Q x + 2 q^T x + r = 0`` of least algebraic error under a constraint that
-only ellipsoids meet: ``4 J - I^2 = 1`` in space [1], with I and J the first two invariants of
-Q, and ``J = 1`` in the plane [2]. The start is the best of many small random subsets (least
-median of squares), after that points beyond 3.5 standard deviations are left out.
+The fit is the quadric ``x^T Q x + 2 q^T x + r = 0`` of least algebraic error under a constraint
+that only ellipsoids satisfy: ``4 J - I^2 = 1`` in space [1], with I and J the first two invariants
+of Q, and ``J = 1`` in the plane [2]. It starts from the best of many small random subsets (least
+median of squares); then points beyond 3.5 standard deviations are excluded.
 
 References:
     [1] Li, Griffiths, Least squares ellipsoid specific fitting, GMP 2004.
@@ -32,9 +32,9 @@ class Ellipsoid:
     __repr__ = short_repr
 
     centre: F64
-    """(d), in the unit of the points."""
+    """Centre, (d), in the unit of the points."""
     root: F64
-    """Symmetric positive definite, (d, d), in the inverse unit."""
+    """Symmetric positive definite matrix, (d, d), in the inverse unit."""
 
     @property
     def radius(self) -> float:
@@ -43,11 +43,11 @@ class Ellipsoid:
 
     @property
     def axis_ratio(self) -> float:
-        """Longest over shortest semi-axis [-]."""
+        """Ratio of longest to shortest semi-axis [-]."""
         return float(np.linalg.cond(self.root))
 
     def misfit(self, x: F64) -> F64:
-        """How far points are off, as a share of the radius, (point) [-]."""
+        """Return the deviations of points, relative to the radius, (point) [-]."""
         length: F64 = np.linalg.norm((x - self.centre) @ self.root, axis=1)
         return length - 1.0
 
@@ -57,10 +57,10 @@ def fit_ellipsoid(x: F64, rng: np.random.Generator) -> tuple[Ellipsoid, Bool] | 
 
     Args:
         x: Points, (point, d) with d 2 or 3.
-        rng: Draws the subsets of the start.
+        rng: Generator of the initial subsets.
 
     Returns:
-        The ellipsoid and which points are inliers, (point); None where no ellipsoid fits.
+        The ellipsoid and a mask of inliers, (point); None if no ellipsoid fits.
     """
     best, least = None, np.inf
     for _ in range(N_TRIALS):
@@ -87,7 +87,7 @@ def fit_ellipsoid(x: F64, rng: np.random.Generator) -> tuple[Ellipsoid, Bool] | 
 
 
 def fit_algebraic(x: F64) -> Ellipsoid | None:
-    """The ellipsoid of least algebraic error, outliers included; None where there is none.
+    """Return the ellipsoid of least algebraic error, outliers included; None if there is none.
 
     Args:
         x: Points, (point, d) with d 2 or 3.
@@ -101,7 +101,7 @@ def fit_algebraic(x: F64) -> Ellipsoid | None:
     a, b = np.triu_indices(d)
     quadratic = np.where(a == b, 1.0, 2.0) * y[:, a] * y[:, b]
     linear = np.concatenate([2.0 * y, np.ones((len(y), 1))], axis=1)
-    # The best linear part for any quadratic part, so that only the latter is sought.
+    # The best linear part for any quadratic part leaves only the latter to find.
     linear_of = -np.linalg.lstsq(linear, quadratic, rcond=None)[0]
     reduced = quadratic + linear @ linear_of
     constraint = _constraint(d)
@@ -125,7 +125,7 @@ def fit_algebraic(x: F64) -> Ellipsoid | None:
 
 
 def fit_circle(x: F64) -> Ellipsoid:
-    """The circle (or sphere) of least algebraic error.
+    """Return the circle (or sphere) of least algebraic error.
 
     Args:
         x: Points, (point, d).
@@ -140,7 +140,7 @@ def fit_circle(x: F64) -> Ellipsoid:
 
 
 def _constraint(d: int) -> F64:
-    """Matrix C of the constraint ``v^T C v = 1`` on the upper triangle v of Q."""
+    """Return the matrix C of the constraint ``v^T C v = 1`` on the upper triangle v of Q."""
     a, b = np.triu_indices(d)
     diagonal, off = np.nonzero(a == b)[0], np.nonzero(a != b)[0]
     matrix = np.zeros((len(a), len(a)))

@@ -1,7 +1,7 @@
-"""What can keep data from supporting a calibration."""
+"""Error of insufficient calibration data."""
 
 from tracking.errors import TrackingError
 
 
 class CalibrationError(TrackingError):
-    """Data that cannot support a calibration: says why, and what is needed."""
+    """Data do not support a calibration; the message gives the reason and the requirement."""

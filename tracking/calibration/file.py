@@ -36,9 +36,9 @@ from tracking.errors import ConfigError
 
 FORMAT = 1
 MOST = 1e12
-"""Numbers beyond this mean nothing in any unit."""
+"""Largest number accepted, in any unit."""
 MOST_DIGITS = 18
-"""Of an id."""
+"""Largest number of digits of an id."""
 FIELDS = {
     "gyr_offset_rad_s": "gyr_offset",
     "acc_offset_m_s2": "acc_offset",
@@ -50,13 +50,13 @@ FIELDS = {
 
 
 MOST_OFFSET = {"gyr_offset_rad_s": 1.0, "acc_offset_m_s2": 5.0}
-"""Larger ones are other units, or a defect."""
+"""Largest offsets; larger ones are in other units, or a defect."""
 MOST_RANGE_OFFSET = 10.0
-"""[m] Larger ones are other units, or a defect."""
+"""[m] Largest offset; a larger one is in other units, or a defect."""
 
 
 def calibration_toml(calibration: Calibration) -> str:
-    """A calibration as text; `read_calibration` gives the same, to the last bit."""
+    """Return a calibration as text; `read_calibration` restores it bit for bit."""
     lines = [f"format = {FORMAT}"]
     for node_id, node in sorted(calibration.nodes.items()):
         lines += ["", f"[nodes.{node_id}]"]
@@ -76,8 +76,8 @@ def read_calibration(path: Path | str) -> Calibration:
     """Read and check a calibration.
 
     Raises:
-        ConfigError: Names the file and the field, what was expected and what was found. A
-            field that has no meaning is an error as well.
+        ConfigError: The message names the file and the field, the expected and the found. An
+            unknown field is an error as well.
     """
     path = Path(path)
     try:
@@ -90,14 +90,14 @@ def read_calibration(path: Path | str) -> Calibration:
 
 
 def parse_calibration(text: str, file: str) -> Calibration:
-    """The calibration that a text is.
+    """Parse a calibration.
 
     Args:
-        text: As `calibration_toml` gives it.
-        file: Its name, for messages.
+        text: Text as from `calibration_toml`.
+        file: Name of the file, for messages.
 
     Raises:
-        ConfigError: As for `read_calibration`.
+        ConfigError: As in `read_calibration`.
     """
     try:
         raw = tomllib.loads(text)

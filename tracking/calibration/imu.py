@@ -1,14 +1,14 @@
 """Offsets of gyroscope and accelerometer from rest.
 
-At rest the gyroscope shows its offset, and the accelerometer a vector of length g in a
-direction that only the pose decides [1]:
+At rest the gyroscope reads its offset, and the accelerometer a vector of norm g in a direction
+that depends only on the pose [1]:
 
     gyr = o_g + n,    |s * (acc - o_a)| = g
 
-Six numbers s, o_a need six poses that differ. With fewer poses, only the part of the offset
-along the directions that gravity had in the body is seen: the smallest offset that explains
-the lengths is taken, with s = 1. Of a node that lies level, gravity is known as a vector and
-one pose gives the whole offset, with s = 1.
+Six numbers s, o_a need six different poses. Fewer poses determine only the part of the offset
+along the directions of gravity in the body: the result is the smallest offset that explains the
+norms, with s = 1. For a node that lies level, the gravity vector is known and one pose gives the
+whole offset, with s = 1.
 
 References:
     [1] Frosio, Pedersini, Borghese, IEEE Trans. Instrum. Meas. 58 (2009) 2034.
@@ -28,27 +28,27 @@ from tracking.geometry import GRAVITY
 from tracking.params.short_repr import short_repr
 
 MIN_REST = 1.0
-"""[s] Rest that is needed; white noise of a second is far below any offset."""
+"""[s] Least time at rest; white noise over a second is far below any offset."""
 LEAST_FORCE = 1.0
-"""[m/s2] An accelerometer at rest that reads less measures nothing."""
+"""[m/s2] Least reading of a working accelerometer at rest."""
 POSE_ANGLE = np.radians(10.0)
-"""[rad] Phases closer than this are one pose."""
+"""[rad] Largest angle between phases of one pose."""
 MIN_POSES = 6
 MAX_CONDITION = 15.0
-"""[-] Of the full fit; 1 with each axis up and down once, above this poses are too alike."""
+"""[-] Largest condition number of the full fit; 1 with each axis up and down once."""
 MIN_SIGHT = 0.3
-"""[-] A direction that gravity never had a larger part along is not seen by the partial fit."""
+"""[-] Least RMS part of gravity along a direction that the partial fit determines."""
 MAX_RESIDUAL = 0.1
-"""[m/s2] A larger misfit of |acc| is no offset."""
+"""[m/s2] Largest misfit of |acc| after the fit; an offset does not explain more."""
 MAX_OFFSET = 1.5
-"""[m/s2] A larger offset is a defect, or another unit."""
+"""[m/s2] Largest offset; a larger one is a defect, or in other units."""
 MAX_SCALE = 0.1
-"""[-] A larger difference of a scale from 1 likewise."""
+"""[-] Largest difference of a scale from 1; a larger one is a defect, or in other units."""
 
 
 @dataclass(frozen=True, slots=True)
 class ImuResult:
-    """The IMU of one node at rest."""
+    """Calibration of one IMU."""
 
     __repr__ = short_repr
 
@@ -56,14 +56,14 @@ class ImuResult:
     gyr_se: F64
     """Standard error of the gyroscope offset, (3) [rad/s]."""
     acc_method: str
-    """"full", "partial", "level"."""
+    """Method of the fit: "full", "partial" or "level"."""
     n_poses: int
     n_seen: int
-    """[-] Directions of the accelerometer offset that the data show, 1 to 3."""
+    """[-] Number of determined directions of the accelerometer offset, 1 to 3."""
     residual_before: float
-    """[m/s2] Rms of | |acc| - g | over poses (of the vector where level)."""
+    """[m/s2] Rms of | |acc| - g | over poses (of the vector if level)."""
     residual_after: float
-    """[m/s2]"""
+    """[m/s2] The same rms after the correction."""
     rest: Rest
 
 
@@ -75,17 +75,17 @@ def calibrate_imu(
     gravity: float = GRAVITY,
     params: RestParams | None = None,
 ) -> ImuResult:
-    """Find the offsets of one node.
+    """Estimate the offsets of one node.
 
     Args:
         t: Times, (sample) [s].
         imu: Gyroscope [rad/s] and specific force [m/s2], body frame, (sample, 6).
         level: The node lies level whenever it is at rest.
-        gravity: Length of gravity where the node lies [m/s2].
-        params: What counts as rest.
+        gravity: Norm of gravity at the site [m/s2].
+        params: Thresholds of rest.
 
     Raises:
-        CalibrationError: Too little rest, or an accelerometer that no offset explains.
+        CalibrationError: Too little rest, or accelerations that no offset explains.
     """
     rest = find_rest(t, imu, params)
     if rest.duration < MIN_REST:
@@ -120,7 +120,7 @@ def calibrate_imu(
 
 
 def _standard_error(rest: Rest, gyr: F64) -> F64:
-    """From the noise, or from how much phases differ where that is more, (3) [rad/s]."""
+    """Return the standard error of the noise, or of phase means if larger, (3) [rad/s]."""
     white = gyr.std(axis=0) / np.sqrt(len(gyr))
     if len(rest.n) < 2:
         return np.asarray(white)
@@ -129,10 +129,10 @@ def _standard_error(rest: Rest, gyr: F64) -> F64:
 
 
 def _poses(rest: Rest) -> F64:
-    """Mean specific force of each pose, (pose, 3) [m/s2]; phases of one pose are averaged.
+    """Return the mean specific force of each pose, (pose, 3) [m/s2], over its phases.
 
     Raises:
-        CalibrationError: No force at rest, as from an accelerometer that is dead or in free fall.
+        CalibrationError: There is no force at rest: a dead accelerometer, or free fall.
     """
     least = float(np.linalg.norm(rest.acc, axis=1).min())
     if not least > LEAST_FORCE:
@@ -155,7 +155,7 @@ def _poses(rest: Rest) -> F64:
 
 
 def _fit_full(poses: F64, gravity: float) -> tuple[F64, F64] | None:
-    """Offset [m/s2] and scale [-], (3) each; None where the poses do not determine them."""
+    """Return offset [m/s2] and scale [-], (3) each; None if the poses do not determine them."""
     from scipy.optimize import least_squares
 
     if len(poses) < MIN_POSES:
@@ -176,7 +176,7 @@ def _fit_full(poses: F64, gravity: float) -> tuple[F64, F64] | None:
 
 
 def _fit_partial(poses: F64, gravity: float) -> tuple[F64, int]:
-    """The smallest offset that explains the lengths, (3) [m/s2], and directions seen."""
+    """Return the smallest offset that explains the norms, (3) [m/s2], and its directions."""
     unit = poses / np.linalg.norm(poses, axis=1, keepdims=True)
     _, sight, axes = np.linalg.svd(unit, full_matrices=False)
     seen = axes[sight / np.sqrt(len(poses)) > MIN_SIGHT]
@@ -190,7 +190,7 @@ def _fit_partial(poses: F64, gravity: float) -> tuple[F64, int]:
 
 
 def _fit_level(rest: Rest, gravity: float) -> tuple[F64, F64, float, float]:
-    """Offset [m/s2], scale 1, and rms before and after [m/s2]."""
+    """Return offset [m/s2], scale 1, and rms before and after [m/s2]."""
     up = np.array([0.0, 0.0, gravity])
     offset = np.average(rest.acc, axis=0, weights=rest.n) - up
     tilt = np.degrees(np.arctan2(np.hypot(offset[0], offset[1]), gravity + offset[2]))

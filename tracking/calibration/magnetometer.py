@@ -1,13 +1,13 @@
-"""Hard and soft iron: the readings of a turned node lie on an ellipsoid, not on a sphere.
+"""Hard and soft iron: the readings of a rotated node lie on an ellipsoid, not on a sphere.
 
     mag_raw = S R^T B + h,    mag = M (mag_raw - h),    M = r root(A)
 
 The ellipsoid ``(x - h)^T A (x - h) = 1`` gives the hard iron h and, by the symmetric root, M;
-r, the mean radius, keeps the length of the field. A rotation inside S cannot be seen.
+r, the mean radius, keeps the norm of the field. A rotation inside S is not observable.
 
-A car cannot be turned over. Its readings lie on a ring: an ellipse then gives h and M of the
-two horizontal axes (a circle, if only part of the ring was driven: h alone), and the vertical
-offset stays unknown, which the heading does not need.
+A car cannot be turned over. Its readings lie on a ring: an ellipse gives h and M of the two
+horizontal axes (a circle gives h alone, for a partial ring), and the vertical offset stays
+unknown, which the heading does not need.
 """
 
 from __future__ import annotations
@@ -24,29 +24,29 @@ from tracking.params.short_repr import short_repr
 
 MIN_SAMPLES = 100
 STILL = 0.05
-"""[-] Readings that spread less than this share of their length are of a node at rest."""
+"""[-] Least spread of the readings of a moving node, relative to their norm."""
 RING = 0.25
-"""[-] Readings that spread less than this across their plane than along it are a ring."""
+"""[-] Largest ratio of the spread across a ring's plane to that along it."""
 MAX_TILT = np.radians(20.0)
-"""[rad] A ring must lie in the horizontal plane of the body."""
+"""[rad] Largest tilt of a ring from the horizontal plane of the body."""
 MIN_CELLS = 0.6
-"""[-] Share of the sphere, in cells of equal area, that must be seen."""
+"""[-] Least observed share of the sphere, in cells of equal area."""
 MIN_ELLIPSE, MIN_CIRCLE = 0.75, 0.5
-"""[-] Share of the ring that an ellipse and a circle need."""
+"""[-] Least observed share of the ring for an ellipse and for a circle."""
 MAX_ELLIPSE = 0.03
-"""[-] Residual above which the shape of a ring is that of the room's field, not of soft iron."""
+"""[-] Residual above which the shape of a ring is due to the room's field, not soft iron."""
 MAX_RESIDUAL = 0.1
-"""[-] Of the field's length. More is a field that changes from place to place."""
+"""[-] Largest residual relative to the field; above, the field changes from place to place."""
 MIN_INLIERS = 0.8
 MAX_RATIO = 2.5
-"""[-] Longest over shortest axis of the ellipsoid."""
+"""[-] Largest ratio of the axes of the ellipsoid."""
 FIELD = (3.0, 200.0)
-"""[uT] Fields that can be that of the earth (20 to 70), bent by a room or its horizontal part."""
+"""[uT] Limits of the earth's field (20 to 70), distorted by a room, or its horizontal part."""
 
 
 @dataclass(frozen=True, slots=True)
 class MagResult:
-    """The magnetometer of one node."""
+    """Calibration of one magnetometer."""
 
     __repr__ = short_repr
 
@@ -54,26 +54,26 @@ class MagResult:
     method: str
     """"ellipsoid", or for a ring "ellipse" or "circle" of the horizontal axes."""
     field: float
-    """[uT] Length of the corrected field; of its horizontal part for a ring."""
+    """[uT] Norm of the corrected field; of its horizontal part for a ring."""
     coverage: float
-    """[-] Share of the sphere or ring that was seen."""
+    """[-] Observed share of the sphere or ring."""
     residual_before: float
-    """[-] Rms of the length about its mean, as a share, of inliers."""
+    """[-] Relative standard deviation of the norm of inliers before the correction."""
     residual_after: float
-    """[-]"""
+    """[-] Rms residual of inliers after the correction, relative to the radius."""
     inlier: Bool
-    """(sample)"""
+    """Mask of inliers, (sample)."""
 
 
 def calibrate_magnetometer(mag: F64, *, rng: np.random.Generator) -> MagResult:
-    """Find hard and soft iron of one node.
+    """Estimate hard and soft iron of one node.
 
     Args:
         mag: Readings in the body frame, (sample, 3) [uT].
-        rng: For the start of the robust fit.
+        rng: Generator for the start of the robust fit.
 
     Raises:
-        CalibrationError: The directions do not cover enough, or no ellipsoid is near.
+        CalibrationError: The directions do not cover enough, or no ellipsoid fits.
     """
     if len(mag) < MIN_SAMPLES:
         raise CalibrationError(f"{len(mag)} magnetometer readings, expected at least {MIN_SAMPLES}")
@@ -133,7 +133,7 @@ def _ring(mag: F64, kept: F64, rng: np.random.Generator) -> MagResult:
 
 
 def _result(mag: F64, x: F64, found: Ellipsoid, method: str, coverage: float) -> MagResult:
-    """Check the ellipsoid that was found in x, (sample, d) [uT]."""
+    """Check the ellipsoid fitted to x, (sample, d) [uT], and return its calibration."""
     misfit = found.misfit(x)
     inlier = np.abs(misfit) <= max(3.5 * 1.4826 * float(np.median(np.abs(misfit))), 1e-6)
     after = float(np.sqrt(np.mean(misfit[inlier] ** 2)))
@@ -168,7 +168,7 @@ def _result(mag: F64, x: F64, found: Ellipsoid, method: str, coverage: float) ->
 
 
 def _spread_out(mag: F64, per_box: int = 20) -> I64:
-    """Samples with no more than so many in one box, so that standing still has no weight."""
+    """Select at most `per_box` samples of each box, so that rest has no extra weight."""
     middle = np.median(mag, axis=0)
     size = 0.2 * float(np.median(np.linalg.norm(mag - middle, axis=1))) or 1.0
     box = np.unique(np.round((mag - middle) / size), axis=0, return_inverse=True)[1].ravel()
@@ -179,7 +179,7 @@ def _spread_out(mag: F64, per_box: int = 20) -> I64:
 
 
 def _cells(unit: F64, bands: int = 6, sectors: int = 12) -> float:
-    """Share of the cells of equal area on the sphere that the directions meet."""
+    """Return the share of the sphere's cells of equal area that contain directions."""
     z = np.clip(unit[:, 2] / np.linalg.norm(unit, axis=1), -1.0, 1.0 - 1e-9)
     angle = np.arctan2(unit[:, 1], unit[:, 0]) / (2.0 * np.pi) % 1.0
     band, sector = np.floor(0.5 * (z + 1.0) * bands), np.floor(angle * sectors) % sectors

@@ -1,14 +1,14 @@
-"""What the ranges of a recording err by, measured against its truth.
+"""Range errors of a recording, measured against its truth.
 
-The error of a range is white noise and what stays: parts that change with the way that both ends
-travel (`tracking.filters.joint.params.RangeErrorParams`). How much of each there is shows in the
-variogram, half the mean square of differences over the way between,
+The error of a range is white noise and correlated parts, which change with the distance that both
+ends travel (`tracking.filters.joint.params.RangeErrorParams`). The variogram, half the mean square
+of differences over the distance travelled between, shows the size of each,
 
     gamma(s) = white^2 + fast^2 (1 - exp(-s / fast_length)) + slow^2 (1 - exp(-s / slow_length)).
 
-The median of differences is taken instead of their squares [1], so that a few ranges behind
-obstacles do not count for more than all others: what is found is the noise of ranges in sight. What
-a pair errs by for the whole recording is no difference, and not in it.
+The median of differences is used in place of their squares [1], so that a few NLOS ranges do not
+outweigh all others: the result is the noise of LOS ranges. Differences do not contain the constant
+error of a pair.
 
 References:
     [1] Dowd, The variogram and kriging: robust and resistant estimators, Geostatistics for Natural
@@ -29,46 +29,46 @@ from tracking.log import Log
 from tracking.params.short_repr import short_repr
 
 EDGES = np.concatenate([[0.0], np.geomspace(0.005, 12.0, 19)])
-"""[m] Ways between two ranges of a pair that are looked at together."""
+"""[m] Bin edges of the distance travelled between two ranges of a pair."""
 LAGS = np.unique(np.geomspace(1, 3000, 40).astype(np.int64))
-"""How many ranges of a pair later the second one is."""
+"""Lags between two ranges of a pair, in ranges."""
 ENOUGH, FEWEST = 100, 5
-"""Differences of a mean that counts, and means that tell noise from what stays."""
+"""Least number of differences in a bin, and least number of bins."""
 FAST_LENGTHS, SLOW_LENGTHS = np.geomspace(0.05, 1.0, 14), np.geomspace(0.5, 12.0, 16)
-"""[m] Lengths that are tried."""
+"""[m] Trial correlation lengths."""
 APART = 2.0
-"""[-] The slow part stays for so many times the way of the fast one, at least."""
+"""[-] Least ratio of the slow to the fast length."""
 NORMAL = 1.4826
-"""[-] Standard deviation of Gaussian numbers over the median of their sizes."""
+"""[-] Standard deviation of Gaussian numbers over the median of their magnitudes."""
 LEAST_STD = 0.002
-"""[m] A part that is not found is taken for so much."""
+"""[m] Least standard deviation of a part."""
 STEP = 0.05
-"""[s] Ways are summed over so long, which the jitter of the truth adds little to."""
+"""[s] Step of the travelled distance, to which the jitter of the truth adds little."""
 
 
 @dataclass(frozen=True, slots=True)
 class Variogram:
-    """Half the mean squares of differences between the errors of two ranges of a pair."""
+    """Half the mean squared differences between the errors of two ranges of a pair."""
 
     __repr__ = short_repr
 
     way: F64
-    """Mean way of both ends between the two, (bin) [m]."""
+    """Mean distance travelled by both ends between the two ranges, (bin) [m]."""
     gamma: F64
-    """(bin) [m2]"""
+    """Variogram, (bin) [m2]."""
     n: F64
-    """Differences in it, (bin)."""
+    """Number of differences, (bin)."""
 
 
 def measure_range_errors(log: Log, like: RangeErrorParams | None = None) -> RangeErrorParams:
-    """The noise of the ranges of a recording.
+    """Estimate the noise of the ranges of a recording.
 
     Args:
-        log: A recording with truth; ranges that it labels to be without sight do not count.
-        like: Where what is not measured comes from.
+        log: A recording with truth; ranges labelled NLOS are not used.
+        like: Source of the parameters that are not measured.
 
     Raises:
-        LogError: There is no truth, or too little moves to tell what stays from what does not.
+        LogError: There is no truth, or too little motion to separate the parts.
     """
     from scipy.optimize import nnls
 
@@ -97,7 +97,7 @@ def measure_range_errors(log: Log, like: RangeErrorParams | None = None) -> Rang
 
 
 def range_variogram(log: Log) -> Variogram:
-    """How much the errors of two ranges of a pair differ, over the way between them.
+    """Return the variogram of range errors over the distance travelled.
 
     Raises:
         LogError: There is no truth, or too little of it.
@@ -135,7 +135,7 @@ def range_variogram(log: Log) -> Variogram:
 
 
 def _ways(log: Log, t: F64) -> F64:
-    """How far each node has travelled by some times, (time, node) [m]."""
+    """Return the distance that each node has travelled by some times, (time, node) [m]."""
     grid = np.arange(t[0], t[-1] + STEP, STEP)
     pos, known = log.truth.positions(log.constellation, grid)
     steps = np.linalg.norm(np.diff(pos, axis=0), axis=2)

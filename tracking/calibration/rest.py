@@ -1,4 +1,4 @@
-"""When a node lies still: windows in which neither gyroscope nor accelerometer changes."""
+"""Rest phases of a node: windows in which neither gyroscope nor accelerometer changes."""
 
 from __future__ import annotations
 
@@ -10,41 +10,41 @@ from tracking.arrays import F64, Bool
 from tracking.params.short_repr import short_repr
 
 MAX_GAP = 0.5
-"""[s] A silence this long ends a phase."""
+"""[s] Gap between samples that ends a phase."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RestParams:
-    """What counts as rest. Ten to forty times the noise of common IMUs."""
+    """Thresholds of rest, ten to forty times the noise of common IMUs."""
 
     window: float = 0.5
-    """[s] Length of the window that must be quiet."""
+    """[s] Length of the quiet window."""
     gyr_std: float = 0.02
     """[rad/s] Largest standard deviation of an axis in a window."""
     acc_std: float = 0.1
     """[m/s2] Largest standard deviation of an axis in a window."""
     gyr_mean: float = 0.1
-    """[rad/s] A faster steady turn is no offset."""
+    """[rad/s] Largest mean rate; a faster one is a rotation, not an offset."""
     gyr_agree: float = 0.01
-    """[rad/s] A phase whose mean is farther from the others is a slow turn, and is dropped."""
+    """[rad/s] Largest deviation of a phase's mean from the median; beyond, it is a rotation."""
     duration: float = 1.0
-    """[s] Shorter phases are dropped."""
+    """[s] Shortest phase."""
 
 
 @dataclass(frozen=True, slots=True)
 class Rest:
-    """The rest phases of one node, in time order."""
+    """Rest phases of one node, in time order."""
 
     __repr__ = short_repr
 
     at_rest: Bool
-    """(sample)"""
+    """True for samples at rest, (sample)."""
     span: F64
     """First and last time of each phase, (phase, 2) [s]."""
     n: F64
-    """Samples of each phase, (phase)."""
+    """Number of samples of each phase, (phase)."""
     gyr: F64
-    """Mean of each phase, body frame, (phase, 3) [rad/s]."""
+    """Mean angular rate of each phase, body frame, (phase, 3) [rad/s]."""
     acc: F64
     """Mean specific force of each phase, body frame, (phase, 3) [m/s2]."""
 
@@ -55,12 +55,12 @@ class Rest:
 
 
 def find_rest(t: F64, imu: F64, params: RestParams | None = None) -> Rest:
-    """Find the phases in which a node lies still.
+    """Find the phases in which a node is at rest.
 
     Args:
         t: Times, ascending, (sample) [s].
         imu: Gyroscope [rad/s] and specific force [m/s2], body frame, (sample, 6).
-        params: What counts as rest.
+        params: Thresholds of rest.
     """
     p = params or RestParams()
     quiet = _quiet(t, imu, p)
@@ -93,7 +93,7 @@ def find_rest(t: F64, imu: F64, params: RestParams | None = None) -> Rest:
 
 
 def _quiet(t: F64, imu: F64, p: RestParams) -> Bool:
-    """Samples in the middle of a quiet window, (sample)."""
+    """Return a mask of samples in the middle of a quiet window, (sample)."""
     dt = np.diff(t)
     usual = float(np.median(dt[dt > 0.0])) if (dt > 0.0).any() else p.window
     n = max(round(p.window / usual), 3)

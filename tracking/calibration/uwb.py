@@ -1,11 +1,11 @@
-"""Slope and antenna delays of UWB ranges, for all nodes at once, against truth.
+"""Slope and antenna delays of UWB ranges, for all nodes at once, from true distances.
 
     range = a distance + b_i + b_j + n
 
-Ranges behind an obstacle are too long and must not count: RANSAC [1] on the ranges of all
-pairs together, each pair about its own centre (that of its densest band), finds the slope and
-which ranges agree. Least squares over these, repeated until the same ranges agree, gives a
-and every b; a slope of ranges that hardly change in distance stays 1.
+NLOS ranges are too long and must not count: RANSAC [1] on the ranges of all pairs together,
+each pair about its own centre (that of its densest band), finds the slope and the inliers.
+Least squares over these, repeated until the inliers stay the same, gives a and every b; the
+slope stays 1 if distances hardly change.
 
 References:
     [1] Fischler, Bolles, Comm. ACM 24 (1981) 381.
@@ -26,69 +26,69 @@ from tracking.params.short_repr import short_repr
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UwbParams:
-    """What a calibration of ranges asks of its data."""
+    """Requirements of a range calibration."""
 
     max_distance: float = 8.0
-    """[m] Farther ranges are not used; the paper's calibration holds up to here."""
+    """[m] Largest distance used; the paper's calibration is valid up to it."""
     band: float = 0.3
-    """[m] Half width of the band of ranges that agree at first; three to four times the noise."""
+    """[m] Half width of the initial inlier band; three to four times the noise."""
     min_ranges: int = 100
-    """[-] Over all pairs, with truth."""
+    """[-] Least number of ranges with truth over all pairs."""
     min_per_node: int = 20
-    """[-] Agreeing ranges that each node needs."""
+    """[-] Least number of inliers of each node."""
     min_spread: float = 0.5
-    """[m] Standard deviation of distances within pairs that a slope needs."""
+    """[m] Least standard deviation of distances within pairs for a slope."""
     min_inliers: float = 0.5
-    """[-] Share of ranges that must agree."""
+    """[-] Least share of inliers."""
     max_slope_error: float = 0.1
-    """[-] A slope farther from 1 is a mistake of units or of the truth."""
+    """[-] Largest difference of the slope from 1; beyond, units or truth are wrong."""
     max_offset: float = 1.0
-    """[m] A larger offset is a delay that the radio was never told, or a mistake of the truth. Few
-    places of few nodes fit any mistake exactly, so that the residuals do not tell."""
+    """[m] Largest offset; beyond, the antenna delay is not set in the radio, or the truth is wrong.
+    With few places of few nodes any such error fits exactly, so residuals do not show it."""
 
 
 @dataclass(frozen=True, slots=True)
 class UwbResult:
-    """The ranges of a group, calibrated."""
+    """Range calibration of a group."""
 
     __repr__ = short_repr
 
     calibration: RangeCalibration
     slope_fitted: bool
-    """False where distances spread too little and the slope was left at 1."""
+    """False if distances spread too little; the slope is then 1."""
     slope_se: float
-    """[-] Standard error of the slope for independent errors; 0 where not fitted."""
+    """[-] Standard error of the slope for independent errors; 0 if it is not fitted."""
     separable: bool
-    """False where only sums b_i + b_j are known, and were split in the smallest offsets."""
+    """False if only sums b_i + b_j are determined; the smallest offsets are then given."""
     residual_std: float
-    """[m] Of the agreeing ranges after the fit."""
+    """[m] Standard deviation of inliers after the fit."""
     distance: tuple[float, float]
-    """[m] Least and largest true distance of agreeing ranges: where the calibration holds."""
+    """[m] Least and largest true distance of inliers: the validity of the calibration."""
     used: Bool
-    """Ranges with truth, near enough and of a node with enough of them, (range)."""
+    """Mask of ranges with truth, near enough and of nodes with enough of them, (range)."""
     inlier: Bool
-    """Those that agree, (range)."""
+    """Mask of inliers, (range)."""
     error_before: F64
-    """Range minus true distance, (range) [m]; 0 where the truth is not known."""
+    """Range minus true distance, (range) [m]; 0 if the truth is unknown."""
     error_after: F64
-    """The same after calibration, (range) [m]."""
+    """Range minus true distance after calibration, (range) [m]."""
 
     @property
     def inlier_share(self) -> float:
-        """Share of used ranges that agree [-]."""
+        """Share of inliers among used ranges [-]."""
         return float(self.inlier.sum() / self.used.sum())
 
 
 def calibrate_uwb(
     table: RangeTable, ids: tuple[int, ...], *, random_state: int, params: UwbParams | None = None
 ) -> UwbResult:
-    """Find slope and offsets.
+    """Estimate slope and offsets.
 
     Args:
-        table: Ranges next to their true distances.
+        table: Ranges with their true distances.
         ids: Node ids in array order.
         random_state: Seed of RANSAC.
-        params: What is asked of the data.
+        params: Requirements of the data.
 
     Raises:
         CalibrationError: No truth, too few ranges, or no common line through most of them.
@@ -134,23 +134,23 @@ def calibrate_uwb(
 
 @dataclass(frozen=True, slots=True)
 class _Fit:
-    """A line for all pairs at once."""
+    """One line for all pairs."""
 
     slope: float
     offset: F64
-    """(node) [m]"""
+    """Offset of each node, (node) [m]."""
     inlier: Bool
-    """Ranges that agree, (range)."""
+    """Mask of inliers, (range)."""
     incidence: F64
-    """The two nodes of every pair with such ranges, (pair, node) of 0 and 1."""
+    """The two nodes of every pair with inliers, (pair, node) of 0 and 1."""
     spread: float | None
-    """[m] Root of the sum of squares of what the slope was found from; None where it was not."""
+    """[m] Root sum of squares of the distances that determine the slope; None if not fitted."""
     std: float
-    """[m] Of what is left."""
+    """[m] Standard deviation of the residuals."""
 
 
 def _fit(table: RangeTable, used: Bool, n_nodes: int, p: UwbParams, random_state: int) -> _Fit:
-    """Least squares on the ranges that agree, until these are the same."""
+    """Fit inliers by least squares, until they stay the same."""
     d, z = table.true[used], table.measured[used]
     pair, incidence = _pairs(table.i[used], table.j[used], n_nodes)
     inlier, slope = _agree(d, z, pair, p, random_state)
@@ -180,7 +180,7 @@ def _fit(table: RangeTable, used: Bool, n_nodes: int, p: UwbParams, random_state
 
 
 def _without_rare(table: RangeTable, used: Bool, p: UwbParams, agree: Bool | None = None) -> Bool:
-    """Ranges to fit without those of nodes that have too few, of all or of those that agree."""
+    """Return the used ranges without nodes that have too few, or too few inliers if given."""
     if not table.known.any():
         raise CalibrationError(
             "no range has a true distance, expected truth of both nodes at the ranges' times"
@@ -203,12 +203,12 @@ def _without_rare(table: RangeTable, used: Bool, p: UwbParams, agree: Bool | Non
 
 
 def _last(table: RangeTable) -> int:
-    """The greatest node, in array order."""
+    """Return the largest node index."""
     return int(max(table.i.max(initial=0), table.j.max(initial=0)))
 
 
 def _pairs(i: I64, j: I64, n_nodes: int) -> tuple[I64, F64]:
-    """Pair of every range, (range), and the two nodes of every pair, (pair, node) of 0 and 1."""
+    """Return the pair of every range, (range), and the nodes of every pair, (pair, node)."""
     code, pair = np.unique(np.minimum(i, j) * n_nodes + np.maximum(i, j), return_inverse=True)
     incidence = np.zeros((len(code), n_nodes))
     rows = np.arange(len(code))
@@ -217,7 +217,7 @@ def _pairs(i: I64, j: I64, n_nodes: int) -> tuple[I64, F64]:
 
 
 def _agree(d: F64, z: F64, pair: I64, p: UwbParams, random_state: int) -> tuple[Bool, float]:
-    """Ranges that agree with one line about the centres of their pairs, and its slope."""
+    """Return inliers of one line about the centres of all pairs, and its slope."""
     from sklearn.linear_model import LinearRegression, RANSACRegressor
 
     x, y = np.empty(len(d)), np.empty(len(d))
@@ -242,7 +242,7 @@ def _agree(d: F64, z: F64, pair: I64, p: UwbParams, random_state: int) -> tuple[
 
 
 def _densest(values: F64, half: float) -> Bool:
-    """The values in the band of width 2 half that holds most of them, (value)."""
+    """Return a mask of the values in the densest band of width 2 half, (value)."""
     ordered = np.sort(values)
     stop = np.searchsorted(ordered, ordered + 2.0 * half, side="right")
     low = ordered[int(np.argmax(stop - np.arange(len(ordered))))]

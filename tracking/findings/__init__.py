@@ -1,4 +1,4 @@
-"""Findings: what is wrong with a recording (`docs/reference/findings.md`)."""
+"""Findings: faults of a recording (`docs/reference/findings.md`)."""
 
 from __future__ import annotations
 
@@ -15,20 +15,19 @@ from tracking.log.folder import Log
 
 
 def examine(log: Log, progress: Progress = lambda share: None) -> tuple[Log, list[Finding]]:
-    """Look at what sensors read, at clocks and at ranges.
+    """Examine sensor readings, clocks and ranges.
 
     Args:
         log: A recording.
-        progress: Called with the share done, 0 to 1.
+        progress: Called with the completed share, 0 to 1.
 
     Returns:
-        The log, with biases of gyroscopes and clocks corrected where that can be done, and what was
-        found.
+        The log, with gyroscope biases and clocks corrected where possible, and the findings.
     """
     log, at_rest = correct_at_rest(log)
     found = [*find_unused(log), *find_bad_stamps(log), *at_rest, *find_gyroscope(log)]
     if any(f.severity == "error" for f in found):
-        return log, found  # what follows needs sensors that are right
+        return log, found  # the next checks need sensors without errors
     suspects = find_suspects(log, _part(progress, 0.0, 0.3))
     log, of_clocks = correct_clocks(log, suspects, _part(progress, 0.3, 0.8))
     found += of_clocks

@@ -1,4 +1,4 @@
-"""What an IMU must read at rest: gravity, upwards, of the right length, and no rotation."""
+"""Readings of an IMU at rest: gravity, upwards, of the right norm, and no rotation."""
 
 from __future__ import annotations
 
@@ -15,49 +15,49 @@ from tracking.measurements import Kind
 from tracking.vehicles import VEHICLES
 
 WINDOW = 0.5
-"""[s] A node rests if its readings hardly change for so long."""
+"""[s] Time over which the readings of a node at rest hardly change."""
 FEWEST = 8
-"""[-] Samples in such a time."""
+"""[-] Least samples in that time."""
 STEADY_ACCEL = 0.02
-"""[-] Scatter of accelerations over their mean length, so that it holds in any unit."""
+"""[-] Scatter of accelerations at rest over their mean norm, for any unit."""
 STEADY_GYRO = 0.05
-"""[rad/s] Scatter of rates at rest; or a thirtieth of the largest, in whatever unit."""
+"""[rad/s] Scatter of rates at rest; or a thirtieth of the largest rate, for any unit."""
 MEANT = {"g": GRAVITY, "mg": 1e-3 * GRAVITY}
-"""Units that accelerations come in by mistake [m/s2]."""
+"""[m/s2] Units that accelerations are recorded in by mistake."""
 MOST_LENGTH = 0.05
-"""[-] Relative error of gravity that calibration would have taken off."""
+"""[-] Largest relative error of gravity after calibration."""
 ABSURD_LENGTH = 0.3
-"""[-] Relative error that is none of an accelerometer in m/s2."""
+"""[-] Relative error of gravity above which the unit is not m/s2."""
 TILTED, OVERTURNED = np.radians(8.0), np.radians(45.0)
-"""[rad] Between z and gravity."""
+"""[rad] Angles between z and gravity: tilted, and another axis."""
 MOST_BIAS = 0.035
-"""[rad/s] A steady rate above this is not learned as a bias (`RestParams.largest_bias`)."""
+"""[rad/s] Largest steady rate that is estimated as a bias (`RestParams.largest_bias`)."""
 
 LARGEST_BIAS = 0.2
-"""[rad/s] A gyroscope whose bias is larger is broken, or its units are others."""
+"""[rad/s] Largest bias; a gyroscope beyond is broken, or in other units."""
 MOST_AT_REST = 0.9
-"""[-] Share of time. What seems to rest for longer has no motion to be told apart from."""
+"""[-] Largest share of time at rest; above, rest cannot be distinguished from motion."""
 
 
 @dataclass(frozen=True, slots=True)
 class AtRest:
-    """Means over the time at rest of one IMU."""
+    """Means of one IMU over the time at rest."""
 
     seconds: float
     force: F64
-    """(3) As recorded; over the whole run where it never rests, then only its length means
-    something."""
+    """Specific force as recorded, (3); without rest the mean of the run, of which only the norm is
+    meaningful."""
     length: float
     rate: F64
-    """(3) As recorded."""
+    """Angular rate as recorded, (3)."""
 
 
 def rest_of(t: F64, values: F64) -> AtRest:
-    """Find when an IMU rests, by how little its readings vary.
+    """Find the rest of an IMU by the small variation of its readings.
 
     Args:
         t: Times, (sample) [s].
-        values: Angular rate and specific force, (sample, 6), in whatever unit.
+        values: Angular rate and specific force, (sample, 6), in any unit.
     """
     start = np.searchsorted(t, np.arange(t[0], t[-1] - WINDOW, WINDOW))
     windows = [slice(a, b) for a, b in zip(start[:-1], start[1:], strict=True) if b - a >= FEWEST]
@@ -72,26 +72,26 @@ def rest_of(t: F64, values: F64) -> AtRest:
     if not rests:
         return AtRest(0.0, values[:, 3:].mean(axis=0), float(np.median(size)), np.zeros(3))
     means = np.array([values[w].mean(axis=0) for w in rests])
-    # A steady curve reads as steadily as rest: what turns least is at rest.
+    # A steady curve reads as steadily as rest: the windows with the least rotation are rest.
     rest = np.median(means[np.argsort(np.linalg.norm(means[:, :3], axis=1))[:3]], axis=0)
     return AtRest(WINDOW * len(rests), rest[3:], float(np.linalg.norm(rest[3:])), rest[:3])
 
 
 def is_bias(rest: AtRest, seconds: float) -> bool:
-    """Whether a rate at rest is a bias: what turns steadily all the time may just turn.
+    """Return whether a rate at rest is a bias, not a steady rotation of the node.
 
     Args:
-        rest: Of an IMU.
+        rest: Means of an IMU at rest.
         seconds: Length of its samples [s].
     """
     return bool(np.abs(rest.rate).max() < LARGEST_BIAS and rest.seconds < MOST_AT_REST * seconds)
 
 
 def correct_at_rest(log: Log) -> tuple[Log, list[Finding]]:
-    """Units, axes and biases of every IMU of a recording.
+    """Check units, axes and biases of every IMU of a recording.
 
     Returns:
-        The log, large biases of gyroscopes taken off, and what was found.
+        The log with large gyroscope biases subtracted, and the findings.
     """
     found, block = list[Finding](), log.block
     for n, node in enumerate(log.constellation.nodes):
@@ -108,12 +108,12 @@ def correct_at_rest(log: Log) -> tuple[Log, list[Finding]]:
 
 
 def find_in_samples(node: NodeConfig, t: F64, values: F64) -> list[Finding]:
-    """Units, axes and biases of one IMU.
+    """Check units, axes and biases of one IMU.
 
     Args:
-        node: Whose.
+        node: Node of the IMU.
         t: Times, (sample) [s].
-        values: Angular rate and specific force as they are read, (sample, 6).
+        values: Recorded angular rate and specific force, (sample, 6).
     """
     if len(t) < 4 * FEWEST or t[-1] - t[0] < 2.0 * WINDOW:
         return []

@@ -1,4 +1,4 @@
-"""The clock of the IMUs against that of the ranges: motion that is felt and motion that is seen."""
+"""Clock of the IMUs against that of the ranges: motion in IMU samples and in ranges."""
 
 from __future__ import annotations
 
@@ -24,38 +24,38 @@ from tracking.log.folder import Log
 from tracking.measurements import Kind
 
 NEAR = np.array([-0.2, -0.1, 0.0, 0.1, 0.2])
-"""[s] Tried of all together, and of each node."""
+"""[s] Trial offsets of all nodes together, and of each node."""
 ALL = np.concatenate([-np.arange(0.4, 4.1, 0.4)[::-1], NEAR, np.arange(0.4, 4.1, 0.4)])
-"""[s] Tried where ranges are likeliest at the ends of that, and where an IMU is suspected."""
+"""[s] Trial offsets if ranges are likeliest at the ends of `NEAR`, or an IMU is suspected."""
 LEAST_GAIN, LEAST_ALONE = 0.01, 0.02
-"""[-] By so much the log-likelihood of a range has to grow: of all together, of a single node, as
-its mount on its vehicle looks a little like a clock."""
+"""[-] Least gain in log-likelihood of a range: for all nodes together, and for a single node,
+since its mount on its vehicle looks a little like a clock offset."""
 TOLD = 0.04
-"""[s] Smaller offsets are not distinguished from none."""
+"""[s] Largest offset that counts as none."""
 CARRIED = 0.5
-"""[s] Larger ones are refused."""
+"""[s] Largest offset that is corrected; larger ones are errors."""
 DRIFT = 0.15
-"""[s] If the offsets of both halves differ by more, clocks run too fast or too slowly; that of a
-single node that is not suspected is not the reason then."""
+"""[s] Difference between the offsets of both halves above which clock rates differ; a single node
+without suspicion is then not corrected."""
 MOST_NODES = 8
-"""[-] In larger groups nodes are tried that are suspected; of the others all together."""
+"""[-] Largest group whose nodes are all tried; of larger ones, suspects and all together."""
 
 
 def correct_clocks(
     log: Log, suspects: dict[int, F64], progress: Progress
 ) -> tuple[Log, list[Finding]]:
-    """Find by how much IMUs are stamped late, and move them back.
+    """Estimate clock offsets of IMUs, and correct their stamps.
 
-    What makes ranges likeliest is corrected first: all IMUs together, or that of a node.
+    The offset with the largest gain is corrected first: of all IMUs together, or of one node.
 
     Args:
         log: A recording.
         suspects: Nodes whose IMU contradicts the ranges (`imu_against_ranges.find_suspects`). A
-            clock explains that only if ranges are likelier then than without all of these IMUs.
-        progress: Called with the share done, 0 to 1.
+            clock offset must make ranges likelier than they are without all of these IMUs.
+        progress: Called with the completed share, 0 to 1.
 
     Returns:
-        The log with what could be corrected, and what was found.
+        The log with the corrections, and the findings.
     """
     carriers = np.unique(log.block.i[0, log.block.kind[0] == Kind.IMU]).tolist()
     if not carriers or log.constellation.n_nodes < 3:
@@ -79,16 +79,16 @@ def correct_clocks(
         found.append(_finding(log, nodes, offset))
         if found[-1].severity == "error":
             break
-        # Ranges keep their order, so that labels still belong to them.
+        # Ranges keep their order, so their labels still match.
         own = of_nodes(log.block, nodes)
         log = replace(log, block=moved_in_time(log.block, -offset.at, own))
-        # What all have in common is tried once; the others then one by one.
+        # The offset of all nodes is tried once, then the other nodes one by one.
         groups = [one for one in groups if len(one) == 1 and one != nodes]
     return log, found
 
 
 def _offset(log: Log, nodes: tuple[int, ...], suspects: dict[int, F64]) -> Explained | None:
-    """How late samples of some nodes are stamped [s]; suspects as of `correct_clocks`."""
+    """Estimate the delay of the stamps of some nodes [s]; `suspects` as in `correct_clocks`."""
     block, is_far = beginning(log), bool(suspects)
     own, than = of_nodes(block, nodes), list(suspects.values())[-1] if suspects else None
 

@@ -1,4 +1,4 @@
-"""What is amiss with a recording: the one table of findings."""
+"""Kinds of findings about recordings, in one table."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ class Kind(NamedTuple):
     """One kind of finding."""
 
     severity: Severity
-    """What is tracked all the same is wrong and says `ok` (error), worse than it need be (warning),
-    or just so (note)."""
+    """Effect on estimates: wrong while `ok` (error), less accurate than possible (warning), or
+    neither (note)."""
     meaning: str
     remedy: str
 
@@ -113,28 +113,28 @@ KINDS: dict[str, Kind] = {
     ),
     "never-placed": Kind("note", "a node was never placed", "range it with more of the others"),
 }
-"""By name. `docs/reference/findings.md` shows it."""
+"""Kinds by name, as in `docs/reference/findings.md`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One of them."""
+    """One finding."""
 
     name: str
-    """One of `KINDS`."""
+    """Name in `KINDS`."""
     nodes: tuple[int, ...]
-    """Ids of the nodes that it is about; none for the whole group."""
+    """Ids of the nodes concerned; empty for the whole group."""
     text: str
-    """What was found and what was expected, a line."""
+    """The found and the expected, in one line."""
 
     @property
     def severity(self) -> Severity:
-        """How bad it is."""
+        """Severity of its kind."""
         return KINDS[self.name].severity
 
     @property
     def record(self) -> dict[str, Any]:
-        """Ready for JSON."""
+        """Finding as a dictionary for JSON."""
         return {
             "name": self.name,
             "severity": self.severity,
@@ -145,10 +145,10 @@ class Finding:
 
 
 def refuse_errors(findings: Sequence[Finding]) -> None:
-    """See that nothing is found with which estimates would be `ok` and wrong.
+    """Raise an error for findings with which estimates would be wrong while `ok`.
 
     Raises:
-        LogError: Something is; names all of it.
+        LogError: There is such a finding; the message lists all of them.
     """
     errors = [f"{f.text}; {KINDS[f.name].remedy}" for f in findings if f.severity == "error"]
     if errors:
@@ -156,5 +156,5 @@ def refuse_errors(findings: Sequence[Finding]) -> None:
 
 
 def names(ids: Sequence[int]) -> str:
-    """Nodes by their ids: "node 3", "nodes 1, 2"."""
+    """Return a text of node ids: "node 3", "nodes 1, 2"."""
     return f"node{'s' if len(ids) > 1 else ''} {', '.join(str(i) for i in ids)}"

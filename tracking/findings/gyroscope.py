@@ -1,8 +1,8 @@
-"""A gyroscope against the magnetometer of the same node: both must see the same rotation.
+"""Gyroscope against the magnetometer of the same node: both must measure the same rotation.
 
-A field that is the same everywhere turns in the body as the body turns in the world,
-``dm/dt = -w x m``. Rates in another unit, or axes that differ, do not fit that; which ones would is
-tried: units, signs and permutations of the magnetometer's axes.
+A uniform field turns in the body as the body turns in the world, ``dm/dt = -w x m``. Rates in
+another unit, or axes that differ, contradict this; alternatives are tried: units, signs and
+permutations of the magnetometer's axes.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from tracking.log.folder import Log
 from tracking.measurements import Kind
 
 STEP = 0.2
-"""[s] Changes of the field are taken over so long."""
+"""[s] Interval over which changes of the field are taken."""
 FEWEST = 50
-"""[-] Such changes."""
+"""[-] Least number of such changes."""
 TURNS = 0.05
-"""[-] Least change in terms of the field, as a root mean square: else it does not turn."""
+"""[-] Least RMS change over the RMS field; below it the field does not turn."""
 FITS, FITS_NOT = 0.7, 0.5
-"""[-] Shares of the change that are explained: with right axes more, with wrong ones less. Right
-ones explain 0.82 to 0.99 of simulated people and cars."""
+"""[-] Explained share of the change: right axes explain more than the first, wrong ones less than
+the second. Right axes explain 0.82 to 0.99 for simulated people and cars."""
 UNITS = {"rad/s": 1.0, "deg/s": np.pi / 180.0}
 AXES = [
     (order, signs)
@@ -32,11 +32,11 @@ AXES = [
     for signs in product((1.0, -1.0), repeat=3)
     if np.linalg.det(np.eye(3)[list(order)]) * np.prod(signs) > 0.0
 ]
-"""Rotations of axes: with the signs of all three the other way the same changes fit."""
+"""Rotations of axes; the opposite sign of all three fits the same changes."""
 
 
 def find_gyroscope(log: Log) -> list[Finding]:
-    """Units and axes of every gyroscope with a magnetometer."""
+    """Find wrong units and axes of gyroscopes with a magnetometer."""
     block, found = log.block, list[Finding]()
     for n, node in enumerate(log.constellation.nodes):
         rows = [
@@ -58,7 +58,7 @@ def find_gyroscope(log: Log) -> list[Finding]:
 
 
 def _changes(t: F64, gyr: F64, t_mag: F64, mag: F64) -> tuple[F64, F64, F64] | None:
-    """Rotations [rad], mean fields and changes of the field over `STEP`, (change, 3)."""
+    """Return rotations [rad], mean fields and changes of the field over `STEP`, (change, 3)."""
     at = np.arange(max(t[0], t_mag[0]), min(t[-1], t_mag[-1]), STEP)
     if len(at) < FEWEST:
         return None
@@ -71,7 +71,7 @@ def _changes(t: F64, gyr: F64, t_mag: F64, mag: F64) -> tuple[F64, F64, F64] | N
 
 
 def _judge(angle: F64, field: F64, change: F64) -> tuple[str, str]:
-    """Name and text of what is wrong; empty where nothing is."""
+    """Return name and text of a fault; empty for none."""
     total = float(np.sum(change**2))
     right = _explained(angle, field, change, total)
     if right > FITS_NOT:
@@ -82,7 +82,7 @@ def _judge(angle: F64, field: F64, change: F64) -> tuple[str, str]:
         for axes in AXES
     }
     straight = AXES[0]
-    # Rotations about one axis fit several; the simplest that fits is named.
+    # Rotations about one axis fit several; the simplest is reported.
     best = max(tries, key=lambda way: tries[way] - 0.1 * (way[1] != straight))
     if tries[best] < FITS:
         return "", ""
@@ -109,5 +109,5 @@ def _turned(axes: tuple[tuple[int, ...], tuple[float, ...]], vectors: F64) -> F6
 
 
 def _explained(angle: F64, field: F64, change: F64, total: float) -> float:
-    """Share of the changes of the field that rotations explain."""
+    """Return the share of the field's changes that the rotations explain."""
     return 1.0 - float(np.sum((change + np.cross(angle, field)) ** 2)) / total

@@ -1,4 +1,4 @@
-"""An IMU against the ranges: they must be likelier with it than without it."""
+"""IMUs against ranges: ranges must be likelier with an IMU than without it."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from tracking.log.folder import Log
 from tracking.measurements import Kind, MeasurementBlock
 
 CONTRADICTS = 0.1
-"""[-] By so much the log-likelihood of a range grows, in both halves, without an IMU that is wrong.
-Without one that is right it falls by 0.05 to 0.3."""
+"""[-] Least gain in log-likelihood of a range, in both halves, without an IMU that is wrong.
+Without an IMU that is right it falls by 0.05 to 0.3."""
 
 AXES = {
     "y, -x": ((1, 0), (1, -1)),
@@ -33,16 +33,16 @@ AXES = {
     "-x, y": ((0, 1), (-1, 1)),
     "x, -y": ((0, 1), (1, -1)),
 }
-"""Columns x and y of a sensor that is read with wrong axes or signs along the ground."""
+"""Trial columns x and y, with signs, of a sensor whose horizontal axes are wrong."""
 SENSORS = {"accelerometer": (Kind.IMU, 3), "magnetometer": (Kind.MAG, 0)}
-"""What they are tried of, and its first column."""
+"""Sensors whose axes are tried, with their kind of event and first column."""
 
 
 def find_suspects(log: Log, progress: Progress) -> dict[int, F64]:
-    """Nodes without whose IMU ranges are likelier: each without those before it, the worst first.
+    """Find nodes without whose IMU ranges are likelier, one after the other, the worst first.
 
     Returns:
-        By node, the surprise without its IMU, `Misfit.surprise`.
+        `Misfit.surprise` without the IMUs up to each node, by node.
     """
     if log.constellation.n_nodes < 3:
         return {}
@@ -62,7 +62,7 @@ def find_suspects(log: Log, progress: Progress) -> dict[int, F64]:
 
 
 def find_wrong_axes(log: Log, suspects: Sequence[int], progress: Progress) -> list[Finding]:
-    """What is wrong with IMUs that contradict the ranges: axes, where others explain them."""
+    """Find axes that explain IMUs which contradict the ranges."""
     block, found = beginning(log), list[Finding]()
     for n in through(suspects, 0, progress):
         bare = without(block, n)
@@ -83,7 +83,7 @@ def find_wrong_axes(log: Log, suspects: Sequence[int], progress: Progress) -> li
 
 
 def without(block: MeasurementBlock, n: int) -> MeasurementBlock:
-    """A block but for the IMU and the magnetometer of node n."""
+    """Return a block without the IMU and magnetometer of node n."""
     return block.take(~of_nodes(block, (n,)))
 
 

@@ -1,4 +1,4 @@
-"""Ranges against each other and surveyed distances: what calibration would take off."""
+"""Common errors of ranges, which calibration would remove."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from tracking.log.folder import Log
 from tracking.measurements import Kind
 
 OFFSETS = np.array([-0.6, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6])
-"""[m] That all ranges may have in common."""
+"""[m] Trial offsets of all ranges."""
 SCALES = np.array([-0.09, -0.06, -0.03, 0.0, 0.03, 0.06, 0.09])
-"""[-] Relative errors of all ranges."""
+"""[-] Trial relative errors of all ranges."""
 LEAST_GAIN = 0.01
-"""[-] By so much the log-likelihood of a range has to grow."""
+"""[-] Least gain in log-likelihood of a range."""
 TOLD_OFFSET, TOLD_SCALE = 0.1, 0.015
-"""[m], [-] Smaller errors are not distinguished from none."""
+"""[m], [-] Largest offset and relative error that count as none."""
 
 
 def find_range_errors(log: Log, progress: Progress) -> list[Finding]:
-    """A length, or a factor, that all ranges have too much."""
+    """Find an offset or a factor that all ranges have in common."""
     if log.constellation.n_nodes < 3:
         return []
     block = beginning(log)
@@ -40,19 +40,19 @@ def find_range_errors(log: Log, progress: Progress) -> list[Finding]:
         values = block.values.copy()
         metres = (values[0, is_range, 0] - offset) / (1.0 + scale)
         values[0, is_range, 0] = np.maximum(metres, 0.01)
-        # The likelihood of ranges as recorded: where they shrink, so does their noise.
+        # The likelihood of ranges as recorded: their noise shrinks with them.
         params = params_of(log)
         error = params.range_error
         error = replace(error, white_std=error.white_std / (1.0 + scale))
         params = replace(params, range_error=error)
         found = misfit(log, replace(block, values=values), params)
-        # Where excesses are expected, long ranges are likely; where outliers are none, they fit.
+        # Both are needed: NLOS excesses make long ranges likely, and the NIS leaves outliers out.
         return np.concatenate([found.surprise + np.log1p(scale), 0.5 * found.nis])
 
     progress(0.0)
     offset = best(lambda x: cost(x, 0.0), OFFSETS, LEAST_GAIN, most_surprise(log))
     progress(0.5)
-    # Motion tells a factor only badly.
+    # Motion determines a factor only badly.
     is_surveyed = (log.block.kind[0] == Kind.SURVEY).any()
     scale = None
     if is_surveyed:

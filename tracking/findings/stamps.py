@@ -1,4 +1,4 @@
-"""The times of inertial samples against a steady sensor's."""
+"""Stamps of inertial samples against those of a steady sensor."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from tracking.log.inertial import FEW, LONG_GAP
 from tracking.measurements import Kind
 
 MOST_REPEATED = 0.01
-"""[-] Share of samples with the time of the one before."""
+"""[-] Largest share of samples with the time of their predecessor."""
 MOST_JITTER = 0.2
-"""[-] Scatter of times, in periods of the sensor."""
+"""[-] Largest scatter of times, in periods of the sensor."""
 
 
 def find_bad_stamps(log: Log) -> list[Finding]:
-    """Nodes whose inertial samples have times that repeat or jitter."""
+    """Find nodes whose inertial samples have times that repeat or jitter."""
     block, found = log.block, list[Finding]()
     for n, node in enumerate(log.constellation.nodes):
         t = block.t[0, (block.kind[0] == Kind.IMU) & (block.i[0] == n)]
@@ -25,7 +25,7 @@ def find_bad_stamps(log: Log) -> list[Finding]:
         dt, period = np.diff(t), 1.0 / node.imu_hz
         steps = np.round(dt / period)
         steady = dt < LONG_GAP * period
-        # Errors of two times are in the time between them.
+        # The difference of two times has the errors of both.
         jitter = float(np.std((dt - steps * period)[steady])) / np.sqrt(2.0)
         repeated = float(np.mean(dt <= 0.0))
         if repeated > MOST_REPEATED or jitter > MOST_JITTER * period:

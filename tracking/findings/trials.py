@@ -1,8 +1,8 @@
-"""Trials of the tracker on the beginning of a recording, with some of it changed.
+"""Trial runs of the tracker on changed copies of the beginning of a recording.
 
-Wrong axes, clocks and calibrations show in how likely ranges are, given all that came before them:
-what is right makes them likeliest [1, sec. 5.4]. What explains a recording has to do so in both
-halves of its beginning.
+Wrong axes, clocks and calibrations reduce the likelihood of ranges given all earlier ones, which
+is largest for the right ones [1, sec. 5.4]. An explanation has to hold in both halves of the
+beginning.
 
 References:
     [1] Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking and Navigation,
@@ -30,52 +30,52 @@ T = TypeVar("T")
 LONGEST = 60.0
 """[s] Length of the beginning."""
 BEFORE = 5.0
-"""[s] Inertial samples before its first range, which find the orientation."""
+"""[s] Time of inertial samples before the first range, for the orientation to converge."""
 PLAUSIBLE = -0.8
-"""[-] What explains a recording leaves less surprise, at the usual noise of ranges: a group that is
-lost has more, with a range in seven an outlier; right sensors leave -2.7 to -1.1."""
+"""[-] Largest surprise of an explanation, at the usual noise of ranges: a lost group has more,
+with one range in seven an outlier; right sensors leave -2.7 to -1.1."""
 PARAMS = replace(
     JointParams(noise_learning=NoiseLearningParams(learns=False)),
     nlos=replace(JointParams().nlos, nlos_bias_length=2.0),
     nlos_in_space=replace(JointParams().nlos_in_space, nlos_bias_length=2.0),
 )
-"""Neither learned noise nor a lasting excess may explain what is wrong with a recording."""
+"""Parameters without learned noise and lasting excess, which would explain faults."""
 
 
 class Explained(NamedTuple):
-    """What makes ranges likelier than they are as recorded."""
+    """A change of a recording that makes its ranges likelier."""
 
     at: float
-    """Where they are likeliest."""
+    """Likeliest change."""
     is_within: bool
-    """False at the ends of the trials: it may be further off."""
+    """False at the ends of the trials: the optimum may be beyond."""
     gain: float
-    """Log-likelihood of a range, in the half where it gains less [-]."""
+    """Gain in log-likelihood of a range, in the half with the smaller gain [-]."""
     halves: tuple[float, float]
-    """Where they are likeliest in either half."""
+    """Likeliest change in each half."""
 
 
 Progress = Callable[[float], None]
-"""Called with the share done, 0 to 1."""
+"""Function called with the completed share, 0 to 1."""
 
 
 class Misfit(NamedTuple):
-    """How badly the ranges of a recording fit."""
+    """Misfit of the ranges of a recording."""
 
     surprise: F64
-    """Mean negative log-likelihood of a range but for a constant, (half) [-]."""
+    """Mean negative log-likelihood of a range up to a constant, (half) [-]."""
     nis: F64
-    """Mean NIS of the ranges that are no outliers, (half) [-]."""
+    """Mean NIS of the ranges that are not outliers, (half) [-]."""
 
 
 def beginning(log: Log) -> MeasurementBlock:
-    """The events that trials are made with."""
+    """Return the events for trials."""
     (first, last), t = log.t_range, log.block.t[0]
     return log.block.take((t > first - BEFORE) & (t <= min(first + LONGEST, last)))
 
 
 def params_of(log: Log) -> JointParams:
-    """What the filter assumes of a recording: its white noise of ranges, where that is known."""
+    """Return the filter parameters for a recording, with its white noise of ranges if known."""
     error = PARAMS.range_error
     if log.range_noise is None:
         return PARAMS
@@ -83,18 +83,18 @@ def params_of(log: Log) -> JointParams:
 
 
 def most_surprise(log: Log) -> float:
-    """Surprise of a range above which a group is lost: with more noise there is more of it."""
+    """Return the surprise of a range above which a group is lost; it grows with the noise."""
     white, usual = params_of(log).range_error.white_std, PARAMS.range_error.white_std
     return PLAUSIBLE + max(float(np.log(white / usual)), 0.0)
 
 
 def misfit(log: Log, block: MeasurementBlock, params: JointParams | None = None) -> Misfit:
-    """How badly the ranges of a block fit.
+    """Compute the misfit of the ranges of a block.
 
     Args:
-        log: The recording.
-        block: Its beginning, changed or not; halves are those of the recording's time.
-        params: What the filter assumes; that of `params_of` by default.
+        log: A recording.
+        block: Its beginning, changed or not; halves are in the time of the recording.
+        params: Parameters of the filter; `params_of` by default.
     """
     first, last = log.t_range
     middle = first + 0.5 * min(LONGEST, last - first)
@@ -114,17 +114,17 @@ def misfit(log: Log, block: MeasurementBlock, params: JointParams | None = None)
 def best(
     cost: Callable[[float], F64], at: F64, least: float, most: float, than: F64 | None = None
 ) -> Explained | None:
-    """Where a cost is lowest: a parabola through the lowest of some trials and its neighbours.
+    """Find the minimum of a cost: a parabola through the best trial and its neighbours.
 
     Args:
-        cost: Of a trial, (half) or (2 half); all have to be lower.
+        cost: Costs of a trial, (half) or (2 half); all have to decrease.
         at: Trials, ascending, 0 among them.
-        least: By so much they have to be lower than at 0.
-        most: And the first two, the surprise in each half, lower than this (`most_surprise`).
-        than: And all lower than this.
+        least: Least decrease of the costs from 0.
+        most: Upper limit of the first two costs, the surprise in each half (`most_surprise`).
+        than: Upper limits of all costs.
 
     Returns:
-        What explains the recording; None where 0 is as good.
+        The explanation of the recording; None if 0 is as good.
     """
     costs = np.array([cost(float(x)) for x in at])
     gains = costs[at == 0.0][0] - costs
@@ -138,7 +138,7 @@ def best(
 
 
 def _vertex(at: F64, cost: F64, k: int | None = None) -> tuple[float, bool]:
-    """Where a cost is lowest, near trial k; and whether that is within the trials."""
+    """Return the minimum of a cost near trial k, and whether it is within the trials."""
     k = int(np.argmin(cost)) if k is None else k
     if k in (0, len(at) - 1):
         return float(at[k]), False
@@ -148,11 +148,11 @@ def _vertex(at: F64, cost: F64, k: int | None = None) -> tuple[float, bool]:
 
 
 def through(items: Sequence[T], again: int, progress: Progress) -> Iterator[T]:
-    """Items one after the other, with progress: the first round of them is half of the whole.
+    """Yield items with progress; the first round of items is half of the whole.
 
     Args:
-        items: What is tried.
-        again: Rounds before this one; each takes half of what is left.
+        items: Items to try.
+        again: Number of earlier rounds; each takes half of the rest.
         progress: Called before each item.
     """
     for k, item in enumerate(items):
@@ -161,13 +161,13 @@ def through(items: Sequence[T], again: int, progress: Progress) -> Iterator[T]:
 
 
 def of_nodes(block: MeasurementBlock, nodes: tuple[int, ...]) -> Bool:
-    """True for samples of the IMUs and magnetometers of some nodes, (event)."""
+    """Return a mask of samples of the IMUs and magnetometers of some nodes, (event)."""
     own = np.isin(block.kind[0], (Kind.IMU, Kind.MAG)) & np.isin(block.i[0], nodes)
     return np.asarray(own)
 
 
 def moved_in_time(block: MeasurementBlock, by: float, which: Bool) -> MeasurementBlock:
-    """Events moved by a time [s]; in order."""
+    """Shift some events by a time [s], and restore the order."""
     t = block.t.copy()
     t[0, which] += by
     moved = replace(block, t=t)

@@ -1,4 +1,4 @@
-"""What of a recording can be used: which sensors, and which nodes are placed."""
+"""Use of a recording: unused sensors, nodes that are never placed, rejected ranges."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ MOST_AMBIGUOUS = 0.5
 FLAT = 0.1
 """[-] Extent across a layout over that along it, below which it is called a line or a plane."""
 MOST_REFUSED = 0.2
-"""[-] Share of ranges; recordings that are tracked have up to 0.02, one that is lost has 0.5."""
+"""[-] Largest share of rejected ranges; tracked recordings have up to 0.02, a lost one 0.5."""
 
 
 def find_unused(log: Log) -> list[Finding]:
-    """Sensors that are missing or cannot be used."""
+    """Find sensors that are missing or cannot be used."""
     block, constellation, found = log.block, log.constellation, list[Finding]()
     kind, node = block.kind[0], block.i[0]
     with_imu = np.unique(node[kind == Kind.IMU])
@@ -61,11 +61,11 @@ def find_in_estimates(log: Log, estimate: TeamEstimate, n_refused: int) -> list[
 
 
 def find_unplaced(log: Log, estimate: TeamEstimate) -> list[Finding]:
-    """Nodes that were never placed, and what they lack.
+    """Find nodes that were never placed, and the ranges that they lack.
 
     Args:
-        log: The recording.
-        estimate: Its estimates, arrays over (time, pair).
+        log: A recording.
+        estimate: Estimates of the recording, arrays over (time, pair).
     """
     constellation, block = log.constellation, log.block
     placed = np.asarray(estimate.status >= Status.AMBIGUOUS)
@@ -127,11 +127,11 @@ def find_degenerate(log: Log, estimate: TeamEstimate) -> list[Finding]:
 
 
 def find_refused(log: Log, n_refused: int) -> list[Finding]:
-    """Find ranges that contradict the filter's model of them.
+    """Report a large share of rejected ranges.
 
     Args:
-        log: The recording.
-        n_refused: Ranges that the filter refused as outliers.
+        log: A recording.
+        n_refused: Number of ranges that the filter rejected as outliers.
     """
     share = n_refused / max(log.n_ranges, 1)
     if share <= MOST_REFUSED:

@@ -1,1 +1,1 @@
-"""How numba kernels are compiled, cached and called."""
+"""Compilation, caching and calls of numba kernels."""

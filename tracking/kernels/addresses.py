@@ -1,8 +1,8 @@
-"""Tuples of arrays handed on by address.
+"""Tuples of arrays passed by address.
 
-Numba hands a tuple of arrays to a compiled function as all numbers of all arrays, a hundred and
-more, which costs time at every call and, more so, when it is compiled. `by_reference` puts the
-tuple into memory once; what it returns is read like the tuple and costs one number.
+Numba passes a tuple of arrays to a compiled function as all numbers of all arrays, a hundred and
+more, which costs time at every call and, more so, at compilation. `by_reference` stores the tuple
+in memory once; the result is read like the tuple and costs one number.
 """
 
 from __future__ import annotations
@@ -65,4 +65,4 @@ def _itself(named: Any) -> Any:
 
 
 by_reference = _itself if config.DISABLE_JIT else _by_reference
-"""The address of a named tuple, valid until the calling kernel returns."""
+"""Function that returns the address of a named tuple, valid until the calling kernel returns."""

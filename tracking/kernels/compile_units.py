@@ -1,16 +1,16 @@
-"""How numba compiles and keeps a kernel: each one by itself, once.
+"""Separate compilation and caching of kernels with numba.
 
 By default numba links everything that a function calls into it and optimises all of that again, in
-each caller on the way up, and keeps it there again; and it compiles a function for constants and
-for variables of one type. Here
+each caller on the way up, and stores it there again; and it compiles a function separately for
+constants and for variables of one type. Here
 
 - a kernel is a unit: optimised once, called by its name in machine code. Only small kernels and
   numba's own functions are linked in, and those are optimised with their callers alone;
 - a constant argument is of the same type as a variable;
-- cached code is stamped with what it was compiled from (`fingerprint`), and loads the units that it
+- cached code is stamped with a hash of its sources (`fingerprint`), and loads the units that it
   calls before it runs.
 
-Everything of numba that is not public is used in this file only (numba 0.61 to 0.68).
+Only this file uses parts of numba that are not public (numba 0.61 to 0.68).
 """
 
 from __future__ import annotations
@@ -35,19 +35,19 @@ from tracking.kernels.fingerprint import fingerprint, name_of_record
 from tracking.kernels.processors import fitting_levels
 
 _FORMAT = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
-"""How code is compiled and kept is a part of what it was compiled from."""
+"""Hash of this file: the way of compilation is a part of the sources."""
 SHIPPED = "__compiled__"
-"""Folder next to modules with code that was compiled ahead, for several kinds of processors."""
+"""Folder next to modules with code compiled ahead of time, for several processors."""
 MANY = 5
-"""Number of kernels whose compilation takes seconds."""
+"""Number of kernels from which compilation takes seconds."""
 _log = logging.getLogger("tracking.kernels.jit")
 _kernels: dict[tuple[str, str], Any] = {}
-"""Dispatchers by module and name, for units that are called by cached code."""
+"""Dispatchers by module and name, for units that cached code calls."""
 setattr(Record, "mangling_args", property(name_of_record))  # noqa: B010
 
 
 def compile_as_unit(compiled: Any) -> None:
-    """Let a dispatcher compile its function as a unit, and keep it on the disk."""
+    """Make a dispatcher compile its function as a unit, and cache it on disk."""
     function = compiled.py_func
     _kernels[function.__module__, function.__qualname__] = compiled
     compiled._compiler.pipeline_class = _UnitCompiler
@@ -62,7 +62,7 @@ def compile_as_unit(compiled: Any) -> None:
 
 
 def load_unit(compiled: Any, args: tuple[Any, ...]) -> bool:
-    """Load a dispatcher's code for some types from the disk; false if it has to be compiled."""
+    """Load a dispatcher's code for some types from disk; False if it has to be compiled."""
     if args in compiled.overloads:
         return True
     found = compiled._cache.load_overload(args, compiled.targetctx)
@@ -74,7 +74,7 @@ def load_unit(compiled: Any, args: tuple[Any, ...]) -> bool:
 
 
 def units_of(package: str) -> list[Any]:
-    """Dispatchers of the units in the imported modules of a package."""
+    """Return the dispatchers of the units in the imported modules of a package."""
     return [
         unit
         for (module, _), unit in _kernels.items()
@@ -83,7 +83,7 @@ def units_of(package: str) -> list[Any]:
 
 
 def is_kept(compiled: Any) -> bool:
-    """True if the disk has a dispatcher's code, for some types and this processor."""
+    """True if a dispatcher's code, for some types and this processor, is on disk."""
     return bool(compiled._cache.has_code(compiled.targetctx))
 
 
@@ -97,7 +97,7 @@ class _Unit(JITCodeLibrary):  # type: ignore[misc]
         self.key: Any = None
         """Module and name of the kernel, types; None for one that is linked into its callers."""
         self.calls: list[Any] = []
-        """Units that it calls: those of its own and of what is linked into it."""
+        """Units that it calls, and those that code linked into it calls."""
         self._names: set[str] | None = None
 
     def finalize(self) -> None:
@@ -117,7 +117,7 @@ class _Unit(JITCodeLibrary):  # type: ignore[misc]
             super()._optimize_final_module()
 
     def defined_names(self) -> set[str]:
-        """Names of all functions that the code defines."""
+        """Return the names of all functions that the code defines."""
         if self._names is None:
             functions = self._final_module.functions
             self._names = {f.name for f in functions if not f.is_declaration}
@@ -125,10 +125,10 @@ class _Unit(JITCodeLibrary):  # type: ignore[misc]
 
 
 class _Flags(Flags):  # type: ignore[misc]
-    """Flags of the compiler that are compared quickly: every typed call compares them."""
+    """Compiler flags with fast comparison: every typed call compares them."""
 
     def values(self) -> dict[str, Any]:
-        """All of them by name."""
+        """Return all flags by name."""
         return {**_DEFAULTS, **self._values}
 
     def __hash__(self) -> int:
@@ -145,11 +145,11 @@ class _UnitCompiler(Compiler):  # type: ignore[misc]
     def __init__(self, typing: Any, target: Any, library: Any, args: Any, result: Any,
                  flags: Any, names: Any) -> None:  # fmt: skip
         flags = _Flags(flags)
-        flags.no_cfunc_wrapper = True  # nothing takes kernels as functions of C
+        flags.no_cfunc_wrapper = True  # kernels are never called from C
         super().__init__(typing, target, library, args, result, flags, names)
 
     n_compiled = 0
-    """Units in this process."""
+    """Number of units compiled in this process."""
 
     def compile_extra(self, func: Any) -> Any:
         codegen = self.state.targetctx.codegen()
@@ -163,7 +163,7 @@ class _UnitCompiler(Compiler):  # type: ignore[misc]
         self.state.func_id = identity = FunctionIdentity.from_function(func)
         kernel = _kernels.get((func.__module__, func.__qualname__))
         if kernel is not None:
-            # Numba counts functions. Processes that compile side by side have to agree on names.
+            # Numba numbers functions. Processes that compile in parallel have to agree on names.
             identity.unique_id = int(fingerprint(kernel)[:15], 16)
             identity.unique_name = f"{identity.func_qualname}${identity.unique_id}"
         ExtractByteCode().run_pass(self.state)
@@ -173,15 +173,15 @@ class _UnitCompiler(Compiler):  # type: ignore[misc]
 
 
 class _UnitCacheImpl(CompileResultCacheImpl):  # type: ignore[misc]
-    """What is kept of a unit: its code, and the names in other units that the code expects."""
+    """Cached form of a unit: its code, and the names in other units that the code expects."""
 
     def reduce(self, compiled: Any) -> Any:
-        """What is written to the disk."""
+        """Return the data for the disk."""
         unit = compiled.library
         library, *rest = super().reduce(compiled)
         defined = unit.defined_names()
         if unit.key is not None:
-            # Nothing links it, so its code is enough.
+            # No other code links it, so its code is enough.
             name, kind, (code, _) = library
             library = name, kind, (code, _empty_module(unit))
         calls = [(called.key, called.defined_names()) for called in unit.calls]
@@ -190,7 +190,7 @@ class _UnitCacheImpl(CompileResultCacheImpl):  # type: ignore[misc]
         return unit.key, defined, expected, (library, *rest)
 
     def rebuild(self, target_context: Any, payload: Any) -> Any:
-        """The unit; None if what it calls is not what it was compiled with."""
+        """Return the unit; None if the code that it calls differs from that at compilation."""
         key, defined, expected, reduced = payload
         calls = []
         for (name, args), names in expected:
@@ -224,22 +224,22 @@ class _UnitCache(FunctionCache):  # type: ignore[misc]
         self._cache_file = _CacheFile(compiled, self._impl)
 
     def has_code(self, target_context: Any) -> bool:
-        """Whether there is code for some types, which runs on this processor."""
+        """Return whether there is code for any types that runs on this processor."""
         return self._cache_file.has_code(target_context.codegen().magic_tuple())
 
 
 class _CacheFile(IndexDataCacheFile):  # type: ignore[misc]
-    """The file of one kernel; each entry says what it was compiled from, and for which types.
+    """Cache file of one kernel; each entry has the hash of its sources, and its types.
 
-    Entries are numbered files. Where several processes compile at a time, one can find under a
-    number what another has saved for other types, or what is left from before a change.
+    Entries are numbered files. If several processes compile at a time, a number can hold the
+    entry of another process for other types, or one from before a change.
 
-    What is not found is looked for in what the package brought along, in the folder `SHIPPED`
-    next to the kernel's module, in a folder for each kind of processor.
+    Missing entries are looked up in the installed package, in the folder `SHIPPED` next to the
+    kernel's module, with a folder for each kind of processor.
     """
 
     def __init__(self, compiled: Any, impl: Any) -> None:
-        # The number of the kernel's first line says nothing about its contents.
+        # The line number of the kernel is independent of its contents.
         base = re.sub(r"-\d+\.", ".", impl.filename_base, count=1)
         super().__init__(impl.locator.get_cache_path(), base, None)
         self._kernel = compiled
@@ -250,24 +250,24 @@ class _CacheFile(IndexDataCacheFile):  # type: ignore[misc]
                 self._shipped[level] = IndexDataCacheFile(str(folder / level), base, None)
 
     def load(self, key: Any) -> Any:
-        """The compiled code for a key, None if there is none, or none that can be read."""
+        """Return the compiled code for a key; None if it is missing or cannot be read."""
         stamp = self._stamp()
         for file, at in self._places(key):
             try:
                 found, data = file.load(at) or (None, None)
             except Exception:
-                # A class that has moved, a file that was cut short: what cannot be read is no code.
+                # A class that has moved, or a truncated file: unreadable code counts as missing.
                 continue
             if found == (stamp, at):
                 return data
         return None
 
     def save(self, key: Any, data: Any) -> None:
-        """Keep compiled code under a key."""
+        """Save compiled code under a key."""
         super().save(key, ((self._stamp(), key), data))
 
     def has_code(self, processor: Any) -> bool:
-        """Whether there is code for some types, and a processor as codegen names it."""
+        """Return whether there is code for any types and a processor as named by codegen."""
         self._stamp()
         for file, (_, of, _) in self._places((None, processor, None)):
             try:
@@ -278,7 +278,7 @@ class _CacheFile(IndexDataCacheFile):  # type: ignore[misc]
         return False
 
     def _places(self, key: Any) -> Iterator[tuple[Any, Any]]:
-        """Files to look into, and the key there."""
+        """Yield files to search, and the key in each."""
         types, (triple, *_), code = key
         yield super(), key
         for level, file in self._shipped.items():

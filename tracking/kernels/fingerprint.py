@@ -1,9 +1,9 @@
-"""What compiled code was compiled from: a hash that names it in the cache on the disk.
+"""Hash of the sources of compiled code, which names it in the cache on disk.
 
 Numba names cached code after the time of the kernel's own file. But small kernels are compiled into
 their callers, and so are the constants that they import. `fingerprint` hashes the contents of all
-of these: a change of any of them compiles the kernel again, a change of anything else does not, and
-neither does a copy with new file times.
+of these: a change of any of them compiles the kernel again; other changes and copies with new file
+times do not.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from numba.core.dispatcher import Dispatcher
 
 
 def fingerprint(kernel: Any) -> str:
-    """Hash of a kernel's code and, recursively, of everything that is compiled into it.
+    """Return the hash of a kernel's code and, recursively, of everything compiled into it.
 
     Args:
-        kernel: Of any of the three kinds.
+        kernel: A kernel of any of the three decorators.
     """
     found: str | None = getattr(kernel, "_fingerprint", None)
     if found is None:
@@ -41,19 +41,19 @@ def fingerprint(kernel: Any) -> str:
 
 @lru_cache
 def name_of_record(record: Any) -> tuple[str, tuple[str]]:
-    """A record in the names of machine code: a hash of its fields.
+    """Return the name of a record in machine code: a hash of its fields.
 
-    Numba has a number of the process there. So code from the disk and code of this process can
-    have one name for functions of different records, and be taken for each other.
+    Numba uses a number of the process in its place. Code from the disk and code of this process
+    could then have one name for functions of different records, and be mistaken for each other.
     """
     return "Record", (hashlib.sha256(record.name.encode()).hexdigest()[:20],)
 
 
 def _code_parts(code: CodeType) -> Iterator[str]:
-    """What a function does, without its names for lines, files and itself, nor its docstring."""
+    """Yield a function's code without its names for lines, files and itself, and its docstring."""
     constants = code.co_consts
     if constants and isinstance(constants[0], str | None):
-        constants = constants[1:]  # the docstring, or that there is none
+        constants = constants[1:]  # the docstring or its absence
     yield code.co_code.hex()
     yield repr((code.co_names, code.co_varnames, code.co_freevars))
     for constant in constants:
@@ -64,7 +64,7 @@ def _code_parts(code: CodeType) -> Iterator[str]:
 
 
 def _globals_of(code: CodeType) -> set[str]:
-    """Names of the globals that a function reads, those of functions in it included."""
+    """Return the names of globals that a function and its inner functions read."""
     names, extended = set[str](), 0
     for op, arg in zip(code.co_code[::2], code.co_code[1::2], strict=True):
         if op == opmap["EXTENDED_ARG"]:
@@ -80,7 +80,7 @@ def _globals_of(code: CodeType) -> set[str]:
 
 
 def _describe(value: Any) -> str:
-    """The contents of a global of a kernel."""
+    """Return the contents of a global of a kernel."""
     if isinstance(value, Dispatcher):
         return fingerprint(value)
     if isinstance(value, np.ndarray):
@@ -96,7 +96,7 @@ def _describe(value: Any) -> str:
 
 
 def _files_of(function: FunctionType) -> str:
-    """The files that a function which writes machine code is made of, its own package's."""
+    """Return hashes of the files of its own package that a code generator depends on."""
     package = function.__module__.partition(".")[0]
     waiting, files = [function.__globals__], dict[str, str]()
     while waiting:

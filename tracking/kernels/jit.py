@@ -1,6 +1,6 @@
 """Compiled kernels: the decorators, and calls without overhead.
 
-How they are compiled and kept is in `compile_units`.
+Compilation and caching are in `compile_units`.
 """
 
 from __future__ import annotations
@@ -20,41 +20,41 @@ Call = tuple[Callable[..., Any], tuple[Any, ...]]
 
 
 def kernel(function: Function) -> Function:
-    """Compile a function with numba, without the interpreter, and keep the result on disk.
+    """Compile a function with numba, without the interpreter, and cache the result on disk.
 
-    It holds no lock of the interpreter, so several threads can run kernels at a time. It makes no
-    arrays, only views of those it is given: so references are not counted, which costs atomic
-    operations wherever an array is named.
+    It releases the interpreter lock, so several threads can run kernels at a time. It makes no
+    arrays, only views of its arguments: references are not counted, which would cost atomic
+    operations for every use of an array.
     """
     return _compile(function)
 
 
 def allocating_kernel(function: Function) -> Function:
-    """A kernel that makes arrays of its own, small ones where it runs for many measurements.
+    """Compile a kernel that allocates arrays, small ones if it runs for many measurements.
 
-    It counts who holds them. So it must not take an array that a plain kernel returns, which
+    Its references are counted, so it must not take an array that a plain kernel returns, which
     is not counted.
     """
     return _compile(function, nrt=True)
 
 
 def small_kernel(function: Function) -> Function:
-    """A kernel whose code is put in place of every call: calls with many arrays are not free.
+    """Compile a kernel that is inlined in its callers: calls with many arrays are expensive.
 
-    It is optimised where it is called, and slow when Python calls it.
+    It is optimised within its callers, and slow when called from Python.
     """
     return _compile(function, inline=True)
 
 
 def bind(kernel: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
-    """A kernel that is called again and again with the same arguments: arrays filled again.
+    """Bind a kernel to arguments that are refilled arrays.
 
-    Finding out the types of many arrays takes longer than most kernels do. Here that is done
-    once, and the compiled code is then called without a look at them.
+    Finding the types of many arrays takes longer than most kernels. It is done once here, and
+    the compiled code is then called without a check.
 
     Args:
-        kernel: To call.
-        arguments: Everything it takes.
+        kernel: Kernel to call.
+        arguments: All arguments of the kernel.
     """
     if config.DISABLE_JIT:
         return partial(kernel, *arguments)
@@ -64,30 +64,30 @@ def bind(kernel: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
 
 
 def is_compiled(kernel: Callable[..., Any], *arguments: Any) -> bool:
-    """Load a kernel for arguments of some types; false if it has yet to be compiled."""
+    """Load a kernel for the types of arguments; False if it is not compiled yet."""
     if config.DISABLE_JIT:
         return True
     return load_unit(kernel, types_of(arguments))
 
 
 def missing_in(package: str) -> list[str]:
-    """Kernels of a package, as far as it is imported, of which nothing is on the disk."""
+    """Return the kernels of a package's imported modules that are not on disk."""
     if config.DISABLE_JIT:
         return []
     return [unit.py_func.__qualname__ for unit in units_of(package) if not is_kept(unit)]
 
 
 def types_of(arguments: tuple[Any, ...]) -> tuple[Any, ...]:
-    """What a kernel is compiled for when it is called with these arguments."""
+    """Return the types that a kernel is compiled for when called with these arguments."""
     return tuple(type_of(argument) for argument in arguments)
 
 
 _types: dict[Any, Any] = {}
-"""Numba's types by what they depend on: parts of a batch are bound again and again."""
+"""Cache of numba's types: parts of a batch are bound repeatedly."""
 
 
 def type_of(value: Any) -> Any:
-    """The type that numba gives an argument, found faster."""
+    """Return the numba type of an argument, faster than numba."""
     kind = _kind_of(value)
     if kind is None:
         return typeof(value)
@@ -97,7 +97,7 @@ def type_of(value: Any) -> Any:
 
 
 def _kind_of(value: Any) -> tuple[Any, ...] | None:
-    """What the type of an array, a number or a tuple of them depends on; None for all else."""
+    """Return the key of the type of an array, number or tuple of them; None for all else."""
     if type(value) is np.ndarray:
         flags, dtype = value.flags, value.dtype
         layout = flags.c_contiguous, flags.f_contiguous, flags.writeable, flags.aligned

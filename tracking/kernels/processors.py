@@ -1,4 +1,4 @@
-"""Kinds of processors that code is compiled for ahead, and which of them this machine can run.
+"""Processor levels for ahead-of-time compilation, and those that this machine can run.
 
 Code for x86-64 is compiled for its levels [1], as packages of Linux distributions are; elsewhere
 for the generic processor of the architecture.
@@ -25,7 +25,7 @@ LEVELS = {
 
 @cache
 def fitting_levels() -> tuple[str, ...]:
-    """Processors, by the names of LLVM, whose code runs here; the most capable first."""
+    """Return the LLVM names of processors whose code runs here; the most capable first."""
     if platform.machine().lower() not in ("x86_64", "amd64"):
         return ("generic",)
     has, found = _features(), list[str]()
@@ -37,7 +37,7 @@ def fitting_levels() -> tuple[str, ...]:
 
 
 def has_wide_registers() -> bool:
-    """True if registers of the processor that is compiled for hold eight numbers."""
+    """True if vector registers of the target processor hold eight numbers."""
     if config.CPU_NAME is not None:
         return config.CPU_NAME == "x86-64-v4" or "+avx512f" in (config.CPU_FEATURES or "")
     return bool(_features().get("avx512f"))

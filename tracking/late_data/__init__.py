@@ -1,1 +1,1 @@
-"""Late and out-of-order measurements become an ordered stream."""
+"""Ordering of late and out-of-order measurements."""

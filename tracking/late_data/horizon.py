@@ -1,8 +1,8 @@
-"""The delayed horizon: late and out-of-order measurements become an ordered stream.
+"""Delayed horizon: late and out-of-order measurements become an ordered stream.
 
 Measurements are held back for a fixed delay (100 ms in the paper, accumulated by its
-upstream filters) and handed on in time order. One that is later than the delay cannot be put
-in order any more: it is dropped and counted.
+upstream filters) and released in time order. A measurement that is later than the delay cannot
+be put in order: it is dropped and counted.
 """
 
 from __future__ import annotations
@@ -23,44 +23,44 @@ from tracking.measurements import Kind, MeasurementBlock
 from tracking.params.checks import check_numbers
 
 LONG_BLOCK = 4096
-"""[-] Longer blocks are sorted before they are put in order, event by event."""
+"""[-] Longest block that is queued without being sorted first."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HorizonParams:
-    """How long measurements are held back."""
+    """Delay of the horizon."""
 
     delay: float = 0.1
-    """[s] Longer puts later measurements in order, and makes every estimate older."""
+    """[s] Delay of measurements; a longer one orders later ones and makes all estimates older."""
 
     def __post_init__(self) -> None:
         check_numbers(self, may_be_zero=("delay",))
 
 
 class HorizonState(NamedTuple):
-    """Measurements in the queue, and counters."""
+    """Queued measurements, and counters."""
 
     slots: F64
-    """Events, in columns that `horizon_queue` names, (env, slot, N_COLUMNS)."""
+    """Events, in the columns of `late_data.queue`, (env, slot, N_COLUMNS)."""
     order: I64
-    """Slots: those that wait, in order, then the free ones, (env, slot)."""
+    """Slots: queued ones in order, then free ones, (env, slot)."""
     n_waiting: I64
-    """Events that wait, (env)."""
+    """Number of queued events, (env)."""
     released: F64
-    """Time up to which measurements were handed on, (env) [s]."""
+    """Time up to which measurements were released, (env) [s]."""
     n_late: I64
-    """Measurements dropped because they came too late, (env)."""
+    """Number of measurements dropped as too late, (env)."""
     n_doubled: I64
-    """Measurements dropped because they had come before, (env)."""
+    """Number of measurements dropped as duplicates, (env)."""
 
     def of(self, envs: slice) -> HorizonState:
-        """Some environments, as views."""
+        """Return some environments, as views."""
         views: list[Any] = [array[envs] for array in self]
         return HorizonState(*views)
 
 
 def make_state(n_envs: int, n_slots: int = 64) -> HorizonState:
-    """Nothing waits."""
+    """Return an empty queue."""
 
     def ints(*shape: int) -> I64:
         return np.zeros((n_envs, *shape), dtype=np.int64)
@@ -76,27 +76,27 @@ def make_state(n_envs: int, n_slots: int = 64) -> HorizonState:
 
 
 class Horizon:
-    """A buffer in front of the tracker.
+    """A reordering buffer upstream of the tracker.
 
-    Laws: the stream that comes out does not depend on the order or the blocks in which
-    measurements came in, as long as none is later than the delay; environment k of a batch
-    gives what that environment alone gives.
+    Properties: the output does not depend on the order or the blocks in which measurements arrive,
+    as long as none is later than the delay; environment k of a batch equals that environment
+    alone.
 
-    The class is a shell around `take_in` and `hand_on`, which work on slices of environments
-    too (`HorizonState.of`), once there is room (`reserve`).
+    The class wraps `take_in` and `hand_on`, which work on slices of environments too
+    (`HorizonState.of`), once there is room (`reserve`).
     """
 
     def __init__(self, params: HorizonParams, n_envs: int = 1) -> None:
         self._params = params
         self._n_envs = n_envs
         self._whole: tuple[Horizon, HorizonState] | None = None
-        """Of a part: whose it is, and the memory that it shared."""
+        """For a part: the whole horizon, and the memory that it shared."""
         self.state = make_state(n_envs)
-        """What waits, arrays over (env, ...)."""
+        """Queue, arrays over (env, ...)."""
 
     @property
     def waiting(self) -> MeasurementBlock:
-        """Measurements that came and were not handed on yet, in order, as a copy."""
+        """Copy of the measurements that are still queued, in order."""
         self._check_memory(self.state)
         out = MeasurementBlock.empty(self._n_envs, int(self.state.n_waiting.max(initial=0)))
         hand_on(self.state, np.full(self._n_envs, np.inf), False, out.arrays)
@@ -104,36 +104,36 @@ class Horizon:
 
     @property
     def t(self) -> F64:
-        """Time up to which measurements were handed on, (env) [s]."""
+        """Time up to which measurements were released, (env) [s]."""
         self._check_memory(self.state)
         return self.state.released.copy()
 
     @property
     def n_late(self) -> I64:
-        """Measurements dropped because they came too late, (env)."""
+        """Number of measurements dropped as too late, (env)."""
         return self.state.n_late
 
     @property
     def n_doubled(self) -> I64:
-        """Measurements dropped because they had come before, (env)."""
+        """Number of measurements dropped as duplicates, (env)."""
         return self.state.n_doubled
 
     def step(
         self, block: MeasurementBlock, now: F64 | float, out: MeasurementBlock | None = None
     ) -> MeasurementBlock:
-        """Take what arrived and hand on, in order, everything older than the delay.
+        """Queue new measurements and release, in order, those older than the delay.
 
         Args:
             block: Measurements that arrived, in any order.
-            now: Current time, scalar or (env) [s]; must not go back.
-            out: A block to write into, which saves making one; it may be longer than needed.
+            now: Current time, scalar or (env) [s]; must not decrease.
+            out: A block to write into, which saves an allocation; it may be longer than needed.
 
         Returns:
-            The measurements up to ``now - delay``, sorted; `out` where given.
+            The measurements up to ``now - delay``, sorted; `out` if given.
 
         Raises:
-            ConfigError: More measurements are due than `out` has columns; they still wait. Or
-                this is a part, and they do not fit, or the whole has made room since.
+            ConfigError: More measurements are due than `out` has columns; they stay queued. Or
+                this is a part, and they do not fit, or the whole was reallocated since.
         """
         self._check_memory(self.state)
         until = np.broadcast_to(np.asarray(now, dtype=np.float64), (self._n_envs,))
@@ -145,16 +145,16 @@ class Horizon:
         return self._release(until - self._params.delay, out)
 
     def bind(self, block: MeasurementBlock, now: F64, out: MeasurementBlock) -> Callable[[], None]:
-        """`step` for arrays that stay where they are, without its overhead.
+        """Bind `step` to fixed arrays, without its overhead.
 
         Args:
-            block: Filled again before every call.
-            now: Filled again before every call, (env) [s].
+            block: Refilled before every call.
+            now: Current times, (env) [s], refilled before every call.
             out: Written by every call.
 
         Returns:
-            What does a step; it raises ConfigError if there is not room enough, or if room was
-            made since (`reserve`).
+            A function that makes a step; it raises ConfigError if there is not room enough, or if
+            the queue was reallocated since (`reserve`).
         """
         state, until, delay = self.state, np.empty_like(now), self._params.delay
         take = bind(take_in, state, block.in_place)
@@ -174,27 +174,27 @@ class Horizon:
         return step
 
     def bind_turns(self, constellation: Constellation, out: F64) -> Callable[[], None]:
-        """What sums how far nodes have turned in the samples that wait.
+        """Return a function that integrates the yaw rates of the queued samples.
 
-        An estimate is as old as the delay; nodes that stay level carry its headings to the
-        present by that.
+        Estimates are as old as the delay; for nodes that stay level, this rotation brings their
+        headings to the present.
 
         Args:
-            constellation: The nodes, with the rates of their IMUs.
-            out: About the own vertical, (env, node) [rad], written by every call.
+            constellation: Nodes, with the rates of their IMUs.
+            out: Rotation about the own vertical, (env, node) [rad], written by every call.
         """
         dt = np.array([1.0 / node.imu_hz for node in constellation.nodes])
         return bind(sum_turns, self.state, int(Kind.IMU), dt, out)
 
     def part(self, envs: slice) -> Horizon:
-        """Some of the environments; shares their memory. There is as much room as there is now."""
+        """Return some of the environments; shares their memory, and keeps its present capacity."""
         part = copy.copy(self)
         part.state = self.state.of(envs)
         part._n_envs, part._whole = len(part.state.n_waiting), self._whole or (self, self.state)
         return part
 
     def flush(self) -> MeasurementBlock:
-        """Hand on all that is left, at the end of a stream; it may go on after that."""
+        """Release all queued measurements at the end of a stream, which may continue after that."""
         self._check_memory(self.state)
         before = self.state.released.copy()
         out = self._release(np.full(self._n_envs, np.inf), None)
@@ -203,32 +203,32 @@ class Horizon:
         return out
 
     def reset(self, env: int) -> None:
-        """Forget what one environment still held."""
+        """Clear the queue of one environment."""
         self._check_memory(self.state)
         state = self.state
         state.n_waiting[env] = state.n_late[env] = state.n_doubled[env] = 0
         state.released[env] = -np.inf
 
     def _check_memory(self, state: HorizonState) -> None:
-        """No kernel goes on with arrays that others no longer read."""
+        """Raise an error if kernels would use arrays that were reallocated."""
         whole, shared = self._whole or (self, state)
         if self.state is not state or whole.state is not shared:
             raise ConfigError("horizon: room was made since; bind it, or take its part, again")
 
     @property
     def _room(self) -> int:
-        """Free slots in the fullest environment."""
+        """Number of free slots in the fullest environment."""
         return int(self.state.order.shape[1] - self.state.n_waiting.max(initial=0))
 
     def reserve(self, n_events: int) -> None:
-        """Make room for so many more events in every environment."""
+        """Make room for `n_events` more events in every environment."""
         old = self.state.order.shape[1]
         needed = int(self.state.n_waiting.max(initial=0)) + n_events
         if needed <= old:
             return
         if self._whole is not None:
             raise ConfigError(f"horizon: a part has room for {old} measurements, needs {needed}")
-        # At least twice as many: room that is made often must not be made each time.
+        # At least twice as many: frequent growth must not reallocate each time.
         grown = make_state(self._n_envs, max(needed, 2 * old))
         for name in HorizonState._fields:
             array, before = getattr(grown, name), getattr(self.state, name)

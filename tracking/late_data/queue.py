@@ -1,10 +1,9 @@
-"""The queue of measurements that wait, one an environment, kept in handling order.
+"""Queue of measurements, one per environment, kept in handling order.
 
-Events lie in slots that never move; `order` lists the slots: those that wait, in order, then the
-free ones, the last freed first, since they are still in the cache. An event that comes is put at
-the end and moved forward past those that come after it, which is one comparison for one that
-arrives in order. Only what devices send is kept: what the tracker's own orientations tell next to
-comes behind the horizon.
+Events lie in slots that never move; `order` lists the slots: queued ones in order, then free
+ones, the last freed first, since they are still in the cache. A new event is put at the end and
+moved forward past those that follow it, which is one comparison for one that arrives in order.
+Only values of devices are kept: those of the tracker's own orientations come after the horizon.
 """
 
 from __future__ import annotations
@@ -13,16 +12,16 @@ from tracking.kernels.jit import kernel, small_kernel
 from tracking.measurements import N_MEASURED, N_VALUES
 
 TIME, KIND, NODE_I, NODE_J, ANTENNA_I, ANTENNA_J, VALUES, HAS_POWER = 0, 1, 2, 3, 4, 5, 6, 14
-"""Columns of a slot: the fields of `MeasurementBlock` [s, -], their order that of handling."""
+"""Columns of a slot: the fields of `MeasurementBlock` [s, -], in the order of comparison."""
 N_COLUMNS = 16
-"""Columns of a slot, two lines of the cache; the one after the last means nothing."""
+"""Columns of a slot, two cache lines; the last one is unused."""
 
 
 @small_kernel
 def is_before(s, e, a, b):
-    """Whether the event in slot a is handled before that in slot b: time, kind, nodes.
+    """Return whether the event in slot a is handled before that in b: time, kind, nodes.
 
-    Of those that are alike in these, antennas and values say, so that no order of arrival does.
+    Ties are broken by antennas and values, so the order of arrival has no effect.
     """
     for column in range(TIME, HAS_POWER):
         if s.slots[e, a, column] != s.slots[e, b, column]:
@@ -32,7 +31,7 @@ def is_before(s, e, a, b):
 
 @small_kernel
 def is_same(s, e, a, b):
-    """Whether two events are one measurement."""
+    """Return whether two events are one measurement."""
     same = True
     for column in range(TIME, HAS_POWER):
         same = same and s.slots[e, a, column] == s.slots[e, b, column]
@@ -54,7 +53,7 @@ def put_in_slot(s, e, slot, block, k):
 
 @small_kernel
 def enqueue(s, e, slot):
-    """Move the event in the first free slot to its place; False if it is there already."""
+    """Move the event in the first free slot to its position; False for a duplicate."""
     end = s.n_waiting[e]
     place = end
     while place > 0 and is_before(s, e, slot, s.order[e, place - 1]):
@@ -70,7 +69,7 @@ def enqueue(s, e, slot):
 
 @small_kernel
 def turn_round(order, e, start, stop):
-    """Reverse a stretch of an order."""
+    """Reverse a part of an order."""
     for k in range((stop - start) // 2):
         a, b = start + k, stop - 1 - k
         order[e, a], order[e, b] = order[e, b], order[e, a]
@@ -78,7 +77,7 @@ def turn_round(order, e, start, stop):
 
 @small_kernel
 def free_first(s, e, n):
-    """Put the first n slots behind all others that wait, as the first that are free."""
+    """Free the first n slots, and put them first among the free ones."""
     waiting = s.n_waiting[e]
     turn_round(s.order, e, 0, n)
     turn_round(s.order, e, n, waiting)
@@ -88,16 +87,16 @@ def free_first(s, e, n):
 
 @kernel
 def take_in(s, block):
-    """Put the events of a block in order behind those that wait.
+    """Queue the events of a block in order.
 
-    Late ones are dropped and counted, and so are those that wait already.
+    Late events and duplicates are dropped and counted.
 
     Args:
         s: HorizonState, updated.
         block: Events, (env, event, ...), the arrays of a `MeasurementBlock` in their order.
 
     Returns:
-        How many events were left out for want of slots.
+        Number of events left out for lack of slots.
     """
     t, valid = block[0], block[8]
     n_refused = 0
@@ -120,7 +119,7 @@ def take_in(s, block):
 
 @kernel
 def count_due(s, until):
-    """Most events that any environment has up to a time, (env) [s]."""
+    """Return the largest number of events of an environment up to a time, (env) [s]."""
     most = 0
     for e in range(until.shape[0]):
         low, high = 0, s.n_waiting[e]
@@ -136,14 +135,14 @@ def count_due(s, until):
 
 @kernel
 def hand_on(s, until, remove, out):
-    """Write what waited up to a time.
+    """Write the queued events up to a time.
 
     Args:
         s: HorizonState, updated.
-        until: (env) [s].
-        remove: Whether it waits no longer.
-        out: Events, written, (env, event, ...), at least `count_due` columns; what they do not
-            need is padding.
+        until: Times, (env) [s].
+        remove: True to remove them from the queue.
+        out: Events, written, (env, event, ...), at least `count_due` columns; the rest becomes
+            padding.
     """
     t, kind, i, j, antenna_i, antenna_j, values, has_power, valid = out
     slots = s.slots
@@ -172,13 +171,13 @@ def hand_on(s, until, remove, out):
 
 @kernel
 def sum_turns(s, kind, dt, out):
-    """How far every node has turned about its own vertical in the samples that wait.
+    """Integrate the yaw rate of every node about its own vertical over the queued samples.
 
     Args:
         s: HorizonState.
-        kind: That of inertial samples.
-        dt: Time between two of them, (node) [s].
-        out: (env, node) [rad], written.
+        kind: Kind of inertial samples.
+        dt: Sample interval, (node) [s].
+        out: Rotations, (env, node) [rad], written.
     """
     for e in range(out.shape[0]):
         for n in range(out.shape[1]):

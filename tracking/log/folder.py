@@ -1,4 +1,4 @@
-"""A recorded run in memory, and the names of its files and columns."""
+"""A recorded run in memory, and the names of its columns."""
 
 from __future__ import annotations
 
@@ -29,33 +29,33 @@ class Log:
     name: str
     constellation: Constellation
     block: MeasurementBlock
-    """Every measurement, in order; IMU samples raw."""
+    """All measurements, in order; IMU samples raw."""
     truth: Truth = field(default_factory=Truth.empty)
     nlos: Bool | None = None
-    """What the recording says of each RANGE event, in order; for study, not for tracking."""
+    """Recorded label of each RANGE event, in order; for evaluation, not for tracking."""
     source: str = ""
-    """Where it comes from."""
+    """Origin of the recording."""
     licence: str = ""
     range_noise: float | None = None
-    """[m] Standard deviation of the white noise of its ranges, where it is known; `joint` then
-    does not learn it."""
+    """[m] Standard deviation of the white noise of its ranges if known; `joint` then does not
+    estimate it."""
     accuracy: float | None = None
     """[m] Expected error up to which a pair is ok; None takes that of its vehicles."""
     skipped: dict[str, int] = field(default_factory=dict)
-    """Bad measurements left out while reading, per file."""
+    """Number of bad measurements left out while reading, per file."""
 
     @property
     def t_range(self) -> tuple[float, float]:
-        """First and last range [s]."""
+        """Times of the first and last range [s]."""
         t = self.block.t[0][self.block.kind[0] == Kind.RANGE]
         return float(t[0]), float(t[-1])
 
     @property
     def duration(self) -> float:
-        """From the first to the last measurement [s]."""
+        """Time from the first to the last measurement [s]."""
         return float(np.ptp(self.block.t[0]))
 
     @property
     def n_ranges(self) -> int:
-        """UWB ranges, surveys not counted."""
+        """Number of UWB ranges, without surveys."""
         return self.block.count(Kind.RANGE)

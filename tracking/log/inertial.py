@@ -1,4 +1,4 @@
-"""What inertial samples need to be of use: one clock, times of their own, a heading, a rate."""
+"""Requirements on inertial samples: one clock, distinct times, a heading, a rate."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from tracking.errors import LogError
 from tracking.measurements import Kind, MeasurementBlock
 
 MOST_AT_ONCE = 0.6
-"""[-] Share of samples that may have the time of the one before: those in pairs may."""
+"""[-] Largest share of samples with the time of their predecessor; pairs are accepted."""
 FEW = 20
-"""[-] Of fewer samples nothing is said."""
+"""[-] Least number of samples for a check."""
 TOGETHER = 0.5
-"""[-] Share of magnetometer readings that are taken while the IMU runs, at least."""
+"""[-] Least share of magnetometer readings while the IMU runs."""
 LONG_GAP = 10.0
-"""[-] Periods: what is longer tells nothing about a rate."""
+"""[-] Periods after which an interval does not count for a rate."""
 
 
 def check_inertial(block: MeasurementBlock, constellation: Constellation) -> None:
-    """See that inertial samples can be used: on the ranges' clock, and with a heading."""
+    """Check that inertial samples share the clock of the ranges and have a heading."""
     kind, t = block.kind[0], block.t[0]
     inertial = np.isin(kind, (Kind.IMU, Kind.STATE))
     if not inertial.any():
@@ -53,7 +53,7 @@ def check_inertial(block: MeasurementBlock, constellation: Constellation) -> Non
 def _check_times(
     block: MeasurementBlock, constellation: Constellation, kind: Kind, file: str
 ) -> None:
-    """See that samples come one after the other: a packet's all at once tell no turn."""
+    """Check that samples have distinct times, without which rotations are unknown."""
     for n in range(constellation.n_nodes):
         t = block.t[0, (block.kind[0] == kind) & (block.i[0] == n)]
         if len(t) >= FEW and np.mean(np.diff(t) <= 0.0) > MOST_AT_ONCE:
@@ -67,7 +67,7 @@ def _check_times(
 def in_body_axes(
     constellation: Constellation, block: MeasurementBlock
 ) -> tuple[Constellation, MeasurementBlock]:
-    """The samples turned to axes of the body, and the constellation of such samples."""
+    """Return the samples in axes of the body, and the constellation of such samples."""
     if all(node.imu_axes.is_body and node.mag_axes.is_body for node in constellation.nodes):
         return constellation, block
     values = block.values.copy()
@@ -84,10 +84,10 @@ def in_body_axes(
 
 
 def with_rates(constellation: Constellation, block: MeasurementBlock) -> Constellation:
-    """The constellation with the sensor rates that the recording shows.
+    """Return the constellation with the sensor rates of the recording.
 
     Raises:
-        LogError: Samples of a node come more rarely or more often than any tracker takes them.
+        LogError: The sample rate of a node is outside the tracker's limits.
     """
     nodes = []
     for n, config in enumerate(constellation.nodes):
@@ -114,11 +114,11 @@ def with_rates(constellation: Constellation, block: MeasurementBlock) -> Constel
 
 
 def _rate(t: F64) -> float | None:
-    """Nominal rate of a sensor from its times, rounded to 0.01 Hz; samples may be missing.
+    """Return the nominal rate of a sensor from its times, rounded to 0.01 Hz, or None.
 
-    Times are often rounded to a millisecond: what is between two is wrong, what is between many
-    is not. So each step is counted as the whole number of periods that it must be. Where samples
-    come in packets, there are more of them than periods.
+    Samples may be missing, and times are often rounded to a millisecond: single steps are wrong,
+    their sum is not. So each step is counted as a whole number of periods. Samples in packets are
+    more than the periods.
     """
     every = np.diff(t)
     dt = every[every > 0.0]

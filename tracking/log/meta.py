@@ -1,4 +1,4 @@
-"""meta.toml: what a log is and who is in it."""
+"""meta.toml: description of a log and its nodes."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from tracking.log.folder import FORMAT
 from tracking.mount import KEYS, Mount
 
 MOST = 1e12
-"""Numbers beyond this mean nothing in any unit."""
+"""Largest number accepted, in any unit."""
 MOST_DIGITS = 18
-"""Of an id."""
+"""Largest number of digits of an id."""
 LEAST_NOISE, MOST_NOISE = 1e-3, 10.0
-"""[m] White noise of ranges beyond is a mistake of units."""
+"""[m] Limits of the white noise of ranges; beyond, the unit is wrong."""
 LEAST_ACCURACY, MOST_ACCURACY = 0.01, 10.0
 """[m] Accuracies that can be asked for."""
 MAX_OFFSET = 100.0
-"""[m] An antenna farther from its body's origin is a mistake of units."""
+"""[m] Largest offset of an antenna from its body's origin; beyond, the unit is wrong."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,7 @@ class Meta:
     licence: str
     constellation: Constellation
     range_noise: float | None = None
-    """[m] As of `Log.range_noise`."""
+    """[m] As `Log.range_noise`."""
     accuracy: float | None = None
     """[m] As of `Log.accuracy`."""
 
@@ -44,7 +44,7 @@ def read_meta(path: Path) -> Meta:
     """Read and check meta.toml.
 
     Raises:
-        LogError: Missing, no TOML, or a field that is missing or makes no sense.
+        LogError: The file is missing or not TOML, or a field is missing or invalid.
     """
     if not path.is_file():
         raise LogError(f"{path.parent}: no meta.toml, expected a log folder")

@@ -1,8 +1,8 @@
-"""Reading a log folder.
+"""Reading of a log folder.
 
-What breaks the format (a missing column, an unknown node, text for a number, time going back)
-is an error. A single measurement that cannot be (NaN, a negative or absurd range) is left out
-and counted.
+Violations of the format (a missing column, an unknown node, text for a number, decreasing time)
+are errors. A single impossible measurement (NaN, a negative or absurd range) is left out and
+counted.
 """
 
 from __future__ import annotations
@@ -22,24 +22,24 @@ from tracking.log.truth import Truth
 from tracking.measurements import Kind, MeasurementBlock
 
 MAX_DISTANCE = 300.0
-"""[m] Beyond the reach of any UWB radio."""
+"""[m] Beyond the range of any UWB radio."""
 MAX_GYR = 80.0
 """[rad/s] Beyond any gyroscope's range (2000 deg/s is 35)."""
 MAX_ACC = 700.0
-"""[m/s2] Beyond the range of accelerometers that trackers carry (16 g is 157)."""
+"""[m/s2] Beyond the range of usual accelerometers (16 g is 157)."""
 MAX_POSITION = 1e5
-"""[m] Farther from its origin no true position makes sense."""
+"""[m] Largest distance of a true position from its origin."""
 MAX_MAG = 5000.0
 """[uT] A hundred times the field of the earth."""
 MOST_ID = 2.0**53
-"""Beyond this not every id is a number of its own."""
+"""Largest id that a float represents exactly."""
 
 
 def read_log(folder: Path | str) -> Log:
     """Read a recorded run.
 
     Raises:
-        LogError: Names the file and the row or field, what was expected and what was found.
+        LogError: The message names the file and the row or field, the expected and the found.
     """
     folder = Path(folder)
     if not folder.is_dir():
@@ -50,8 +50,8 @@ def read_log(folder: Path | str) -> Log:
     ranges, nlos = _read_ranges(folder, constellation, skipped)
     imu = _read_imu(folder, constellation, skipped)
     blocks = [ranges, imu, *_read_optional(folder, constellation, skipped)]
-    # RANGE events keep their order, since a stable sort by time, kind and nodes is used on
-    # rows that come in time order; the labels must follow the same order.
+    # RANGE events keep their order: the sort by time, kind and nodes is stable, and rows come in
+    # time order. The labels must follow the same order.
     constellation, block = in_body_axes(constellation, MeasurementBlock.concatenate(blocks))
     order = np.lexsort((block.j[0], block.i[0], block.kind[0], block.t[0]))
     is_range = block.kind[0][order] == Kind.RANGE
@@ -134,7 +134,7 @@ def _read_ranges(
 
 
 def _antennas(table: Table, constellation: Constellation, i: I64, j: I64) -> tuple[I64, I64]:
-    """Antenna index of either end of every range."""
+    """Return the antenna indices of both ends of every range."""
     ends = []
     for column, nodes in (("antenna_i", i), ("antenna_j", j)):
         ids, filled = np.zeros((table.n_rows, 1)), np.zeros((table.n_rows, 1), dtype=bool)
@@ -165,7 +165,7 @@ def _antennas(table: Table, constellation: Constellation, i: I64, j: I64) -> tup
 def _read_imu(
     folder: Path, constellation: Constellation, skipped: dict[str, int]
 ) -> MeasurementBlock:
-    """IMU and MAG events of imu.csv."""
+    """Return the IMU and MAG events of imu.csv."""
     path = find_table(folder, "imu")
     if path is None:
         return MeasurementBlock.empty()
@@ -197,7 +197,7 @@ def _read_imu(
 def _read_optional(
     folder: Path, constellation: Constellation, skipped: dict[str, int]
 ) -> list[MeasurementBlock]:
-    """Events of mag.csv, state.csv and members.csv."""
+    """Return the events of mag.csv, state.csv and members.csv."""
     blocks = _read_members(folder, constellation)
     for stem, kind, columns, limits in (
         ("mag", Kind.MAG, MAG, np.full(3, MAX_MAG)),
@@ -221,7 +221,7 @@ def _read_optional(
 
 
 def _read_members(folder: Path, constellation: Constellation) -> list[MeasurementBlock]:
-    """JOIN and LEAVE events of members.csv."""
+    """Return the JOIN and LEAVE events of members.csv."""
     path = find_table(folder, "members")
     if path is None:
         return []
@@ -257,7 +257,7 @@ def _read_truth(folder: Path, constellation: Constellation, skipped: dict[str, i
 
 
 def _within(values: F64, filled: Bool, limits: F64) -> Bool:
-    """Rows whose values are all there, finite and not beyond the limits."""
+    """Return a mask of rows whose values are all present, finite and within the limits."""
     with np.errstate(invalid="ignore"):
         ok = filled & np.isfinite(values) & (np.abs(values) <= limits)
     return np.asarray(ok.all(axis=1))

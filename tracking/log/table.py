@@ -1,4 +1,4 @@
-"""A CSV file as checked columns: every fault is named by file, row and field."""
+"""A CSV file as checked columns; errors name file, row and field."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from tracking.arrays import F64, I64, Bool
 from tracking.errors import LogError
 
 MOST_BYTES = 256 << 20
-"""Of one table, unpacked: hours of a large group. What is packed may be any number of times as
-large, and rows of text take some twenty times their bytes in memory."""
+"""Largest table, unpacked: hours of a large group. Compression has no bound, and rows of text
+take some twenty times their bytes in memory."""
 MAX_SILENCE = 86400.0
-"""[s] A longer jump between two rows is a broken clock."""
+"""[s] Longest step between two rows; a longer one is a broken clock."""
 
 
 def find_table(folder: Path, stem: str) -> Path | None:
-    """The file of a table, plain or gzip-compressed.
+    """Return the file of a table, plain or gzip-compressed; None if there is none.
 
     Raises:
-        LogError: Both are there, and may differ.
+        LogError: Both exist, and may differ.
     """
     paths = [folder / (stem + suffix) for suffix in (".csv", ".csv.gz")]
     found = [path for path in paths if path.exists() or path.is_symlink()]
@@ -36,7 +36,7 @@ def find_table(folder: Path, stem: str) -> Path | None:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Text columns of one file; row 1 is the header, so data row k stands in row k + 2."""
+    """Text columns of one file; row 1 is the header, so data row k is row k + 2."""
 
     path: Path
     columns: dict[str, list[str]]
@@ -47,7 +47,7 @@ class Table:
         """Read a file and check its header.
 
         Raises:
-            LogError: Not text, no header, a required column missing, or a ragged row.
+            LogError: The file is not text, or has no header, a missing column or a ragged row.
         """
         try:
             open_table = gzip.open if path.suffix == ".gz" else open
@@ -90,14 +90,14 @@ class Table:
         return column in self.columns
 
     def text(self, column: str) -> list[str]:
-        """A column as it stands."""
+        """Return a column as text."""
         return self.columns[column]
 
     def numbers(self, columns: tuple[str, ...]) -> tuple[F64, Bool]:
-        """Columns as numbers, (row, column), and where the fields are not empty.
+        """Return columns as numbers, (row, column), and a mask of the fields that are not empty.
 
         Raises:
-            LogError: Text where a number should be.
+            LogError: A field holds text in place of a number.
         """
         values = np.zeros((self.n_rows, len(columns)))
         filled = np.ones((self.n_rows, len(columns)), dtype=bool)
@@ -120,10 +120,10 @@ class Table:
         return values, filled
 
     def times(self) -> F64:
-        """The column t_s, which must be finite and never go back.
+        """Return the column t_s, which must be finite and never decrease.
 
         Raises:
-            LogError: Otherwise.
+            LogError: A time is missing or not finite, decreases, or jumps.
         """
         values, filled = self.numbers(("t_s",))
         t = values[:, 0]
@@ -150,10 +150,10 @@ class Table:
         return t
 
     def nodes(self, column: str, index_of: dict[int, int]) -> I64:
-        """A column of node ids as indices.
+        """Return a column of node ids as indices.
 
         Raises:
-            LogError: Not an integer, or a node that meta.toml does not name.
+            LogError: An entry is not an integer, or a node missing from meta.toml.
         """
         table: dict[str, int] = {}
         for r, cell in enumerate(self.columns[column]):
@@ -174,12 +174,12 @@ class Table:
         return np.array([table[cell] for cell in self.columns[column]], dtype=np.int64)
 
     def check_share(self, good: Bool, expected: str, columns: tuple[str, ...]) -> None:
-        """Refuse a file of which most rows are bad; single ones are left out by the caller.
+        """Reject a file whose rows are mostly bad; the caller leaves single bad rows out.
 
         Args:
             good: True for usable rows.
-            expected: What a usable row holds, for the message.
-            columns: The fields concerned, for the message.
+            expected: Contents of a usable row, for the message.
+            columns: Fields concerned, for the message.
 
         Raises:
             LogError: More than half of the rows are bad.

@@ -11,7 +11,7 @@ from tracking.constellation import Constellation
 from tracking.params.short_repr import short_repr
 
 MAX_GAP = 0.5
-"""[s] Truth of a moving node is interpolated over gaps up to here."""
+"""[s] Longest gap over which the truth of a moving node is interpolated."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,40 +21,40 @@ class Truth:
     __repr__ = short_repr
 
     t: F64
-    """(row) [s]"""
+    """Times, (row) [s]."""
     node: I64
     """Node index, (row)."""
     pos_w: F64
-    """(row, 3) [m]"""
+    """Positions, (row, 3) [m]."""
     q_wb: F64
-    """(row, 4)"""
+    """Orientations, (row, 4)."""
     has_orientation: Bool
-    """True where the orientation is known, (row)."""
+    """True if the orientation is known, (row)."""
     valid: Bool
-    """False where the row must not be scored, (row)."""
+    """False if the row must not be scored, (row)."""
 
     @classmethod
     def empty(cls) -> Truth:
-        """No truth."""
+        """Return a truth without rows."""
         no = np.zeros(0, dtype=bool)
         return cls(
             np.zeros(0), np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros((0, 4)), no, no
         )
 
     def times(self) -> F64:
-        """The distinct times of moving truth, ascending, (time) [s]."""
+        """Return the distinct times of valid rows, ascending, (time) [s]."""
         return np.unique(self.t[self.valid])
 
     def positions(self, constellation: Constellation, t: F64) -> tuple[F64, Bool]:
-        """Position of every node at the given times, linearly interpolated.
+        """Return the position of every node at given times, linearly interpolated.
 
         Args:
-            constellation: Its nodes.
+            constellation: Nodes of the run.
             t: Times, (time) [s].
 
         Returns:
-            Positions, (time, node, 3) [m], and where they are known, (time, node): between
-            rows at most `MAX_GAP` apart, or any time for a static node.
+            Positions, (time, node, 3) [m], and a mask of known ones, (time, node): between rows at
+            most `MAX_GAP` apart, or at any time for a static node.
         """
         pos = np.zeros((len(t), constellation.n_nodes, 3))
         known = np.zeros((len(t), constellation.n_nodes), dtype=bool)
@@ -76,7 +76,7 @@ class Truth:
         return pos, known
 
     def pairs(self, constellation: Constellation, t: F64) -> tuple[F64, Bool]:
-        """True relative positions, (time, pair, 3) [m], and where they are known."""
+        """Return true relative positions, (time, pair, 3) [m], and a mask of known ones."""
         pos, known = self.positions(constellation, t)
         i, j = constellation.pairs.T
         return pos[:, j] - pos[:, i], known[:, i] & known[:, j]

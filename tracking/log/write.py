@@ -1,4 +1,4 @@
-"""Writing a log folder, whole or not at all."""
+"""Writing of a log folder, complete or not at all."""
 
 from __future__ import annotations
 
@@ -21,16 +21,15 @@ from tracking.mount import KEYS, Mount
 
 
 def write_log(folder: Path | str, log: Log) -> Path:
-    """Write a run so that `read_log` gives the same measurements, to the last bit.
+    """Write a run so that `read_log` returns the same measurements, bit for bit.
 
-    The files are written next to the target and moved in place at the end.
+    The files are written next to the target and moved there at the end.
 
     Raises:
-        LogError: The target exists and is not an empty folder, or holds an event that a log
-            has no place for.
+        LogError: The target exists and is not an empty folder, or cannot be written to.
     """
     check_target(Path(folder))
-    folder = Path(folder).resolve()  # `.` has no name, and a link is none to move a folder to
+    folder = Path(folder).resolve()  # `.` has no name, and a folder cannot replace a link
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         scratch = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
@@ -43,7 +42,7 @@ def write_log(folder: Path | str, log: Log) -> Path:
             writer = csv.writer(text, lineterminator="\n")
             writer.writerow(header)
             writer.writerows(rows)
-            # No time stamp inside: the same run gives the same bytes.
+            # Without a time stamp, equal runs give equal bytes.
             packed = gzip.compress(text.getvalue().encode(), compresslevel=6, mtime=0)
             (scratch / f"{stem}.csv.gz").write_bytes(packed)
         scratch.chmod(0o755)
@@ -57,10 +56,10 @@ def write_log(folder: Path | str, log: Log) -> Path:
 
 
 def check_target(folder: Path) -> None:
-    """See that a log can be written there.
+    """Check that a log can be written to a folder.
 
     Raises:
-        LogError: It exists and is not an empty folder, or its parent is no folder.
+        LogError: The folder exists and is not empty, or its parent is unusable.
     """
     try:
         taken = folder.exists() and (not folder.is_dir() or any(folder.iterdir()))
@@ -114,7 +113,7 @@ def _quoted(text: str) -> str:
 
 
 def _tables(log: Log) -> Iterable[tuple[str, Sequence[str], list[list[object]]]]:
-    """Name, header and rows of every file that the run needs."""
+    """Yield name, header and rows of every file that the run needs."""
     block = log.block
     ids = np.array(log.constellation.ids)
     member = block.take(block.valid[0] & np.isin(block.kind[0], (Kind.JOIN, Kind.LEAVE)))
@@ -123,7 +122,7 @@ def _tables(log: Log) -> Iterable[tuple[str, Sequence[str], list[list[object]]]]
         yield "members", ["t_s", "node", "joins"], _rows(member, ids, joins)
     yield "ranges", *_ranges(log, ids)
     imu, mag = (_of_kind(block, kind) for kind in (Kind.IMU, Kind.MAG))
-    # One row where every sample has its own magnetometer reading, else a file of its own.
+    # One row if every sample has its own magnetometer reading, else a separate file.
     together = imu.t.shape == mag.t.shape and bool(
         np.array_equal(imu.t, mag.t) and np.array_equal(imu.i, mag.i)
     )
@@ -154,7 +153,7 @@ def _tables(log: Log) -> Iterable[tuple[str, Sequence[str], list[list[object]]]]
 
 
 def _ranges(log: Log, ids: np.ndarray) -> tuple[list[str], list[list[object]]]:
-    """Header and rows of ranges.csv."""
+    """Return header and rows of ranges.csv."""
     block = log.block
     chosen = block.valid[0] & np.isin(block.kind[0], (Kind.RANGE, Kind.SURVEY))
     r = block.take(chosen)
@@ -186,7 +185,7 @@ def _of_kind(block: MeasurementBlock, kind: Kind) -> MeasurementBlock:
 
 
 def _rows(block: MeasurementBlock, ids: np.ndarray, values: np.ndarray) -> list[list[object]]:
-    """Rows of time, node and values; floats are written so that they read back exactly."""
+    """Return rows of time, node and values; floats are written to read back exactly."""
     return [
         [t, int(ids[i]), *row]
         for t, i, row in zip(block.t[0].tolist(), block.i[0], values.tolist(), strict=True)

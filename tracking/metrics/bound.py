@@ -1,18 +1,17 @@
-"""The expected error of an efficient estimator: the posterior Cramer-Rao bound along a run.
+"""Expected error of an efficient estimator: the posterior Cramer-Rao bound along a run.
 
 The mean square error of an estimator, over all runs of a world, is at least the inverse of the
 posterior information, which for white Gaussian noise obeys the Riccati recursion linearised at the
 truth [1]. The model is that of the joint filter (`tracking.filters.joint`) with the parameters of
-the world that made the run (`relpos_env.core.oracle_params`): its motion, its range errors,
-wheels that slide as those of the world do, nodes that rest. What the filter only believes (the
-speed of the group) is no part of it. Given are the true motion, which ranges had no line of
-sight, and, unless it is asked otherwise, the rotation and mirror image of the group at the start;
-an estimator has to find these.
+the world (`relpos_env.core.oracle_params`): its motion, its range errors, wheels that slide as in
+the world, nodes that rest. It leaves out the assumptions of the filter (the speed of the group).
+The true motion and the NLOS labels are given and, by default, the initial rotation and reflection
+of the group, which an estimator has to find.
 
-It is a mean over runs: the error of a single run may be smaller. Of a recording, whose world is not
-known, it is what an efficient estimator would err by if the assumed noise were the true one. Errors
-behind obstacles are not Gaussian; their variance is used, so that there the bound is that of
-the best linear estimator. The figures are aligned as those of `tracking.metrics.score` are.
+The bound is a mean over runs: the error of a single run may be smaller. For a recording, whose
+world is unknown, it is the error of an efficient estimator if the assumed noise were the true one.
+NLOS errors are not Gaussian; their variance is used, so the bound is then that of the best linear
+estimator. The figures are aligned like those of `tracking.metrics.score`.
 
 References:
     [1] Tichavsky, Muravchik, Nehorai, Posterior Cramer-Rao bounds for discrete-time nonlinear
@@ -43,10 +42,10 @@ from tracking.params.short_repr import short_repr
 from tracking.records import Records, as_records
 
 RATE = 5.0
-"""[Hz] How often the bound is written down."""
+"""[Hz] Output rate of the bound."""
 UNKNOWN_TURN = {2: 1.0, 3: 0.5**0.5}
-"""[rad] Rotation of a group of which nothing is known, about every axis, by dimensions: a linear
-error by it is as large as that of the best guess, all nodes in one place."""
+"""[rad] Std of an unknown rotation of a group about every axis, by dimensions: its linear error
+is as large as that of the best guess, all nodes at one place."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,17 +55,17 @@ class Bound:
     __repr__ = short_repr
 
     t: F64
-    """(time) [s]"""
+    """Times, (time) [s]."""
     pair_rms: F64
-    """In the world frame, (time, pair) [m]."""
+    """Errors in the world frame, (time, pair) [m]."""
     shape_rms: F64
-    """Over all pairs after the best rotation at each instant, (time) [m]."""
+    """Error over all pairs after the best rotation at each instant, (time) [m]."""
     rmse: float
-    """In the world frame, over the scored time [m]."""
+    """Error in the world frame, over the scored time [m]."""
     rmse_yaw: float
-    """After the best constant yaw of the whole run [m]."""
+    """Error after the best constant yaw of the whole run [m]."""
     rmse_shape: float
-    """After the best rotation at each instant, over the scored time [m]."""
+    """Error after the best rotation at each instant, over the scored time [m]."""
 
 
 def posterior_bound(
@@ -77,15 +76,15 @@ def posterior_bound(
     skip: float = 10.0,
     turn_std: float = 0.0,
 ) -> Bound:
-    """The bound of a recorded run.
+    """Compute the bound of a recorded run.
 
     Args:
-        log: A run with truth; its NLOS labels are used where it has them.
-        params: What the world did, in the terms of the joint filter.
+        log: A run with truth; its NLOS labels are used if present.
+        params: Model of the world in the parameters of the joint filter.
         orientation: Parameters of the orientation stage.
-        skip: Times until so many seconds after the first range do not count.
-        turn_std: How uncertain the rotation of the group is at first, about every axis [rad]:
-            `UNKNOWN_TURN` for who begins with nothing. Its mirror image is known.
+        skip: Time after the first range that is not scored [s].
+        turn_std: Std of the initial rotation of the group, about every axis [rad]:
+            `UNKNOWN_TURN` for an unknown one. The reflection is known.
 
     Raises:
         LogError: The log has no truth, or no ranges.
@@ -145,19 +144,19 @@ def recorded_bound(
     orientation: OrientationParams | None = None,
     skip: float = 10.0,
 ) -> Bound:
-    """The expected error of an efficient estimator on a recording, if the assumed noise is true.
+    """Compute the bound of a recording, valid if the assumed noise is the true one.
 
-    The noise of its ranges in sight is measured (`measure_range_errors`), and nothing is known of
-    the rotation of the group at first. What carries the nodes is as the parameters say.
+    The LOS range noise is measured (`measure_range_errors`), and the initial rotation of the group
+    is unknown. The vehicles are as in `params`.
 
     Args:
         log: A recording with truth.
-        params: What else the world does.
+        params: Model of everything but the ranges.
         orientation: Parameters of the orientation stage.
-        skip: As of `posterior_bound`.
+        skip: Time after the first range that is not scored [s].
 
     Raises:
-        LogError: As of `posterior_bound`, or nothing tells what the ranges err by.
+        LogError: As `posterior_bound`, or range errors cannot be measured.
     """
     params = params or JointParams()
     measured = replace(params, range_error=measure_range_errors(log, params.range_error))
@@ -166,7 +165,7 @@ def recorded_bound(
 
 
 def _truth_at_events(log: Log, block: MeasurementBlock) -> tuple[F64, F64, F64]:
-    """Positions, velocities (event, node, 3) and heading errors (event, node) when they happen."""
+    """Return positions, velocities (event, node, 3) and heading errors (event, node) at events."""
     constellation, t, h = log.constellation, block.t[0], 0.02
     pos, _ = log.truth.positions(constellation, t)
     ahead, _ = log.truth.positions(constellation, t + h)
@@ -186,7 +185,7 @@ def _truth_at_events(log: Log, block: MeasurementBlock) -> tuple[F64, F64, F64]:
 
 
 def _with_a_row_more(state: JointState, coefficients: Records) -> JointState:
-    """A state with room for one number behind its own; its coefficients, (1), know."""
+    """Return a state with one row more; the number in its coefficients, (1), is updated."""
     n = state.x.shape[2]
     width = whole_lines(n + 1)
     coefficients["n"] = width
@@ -202,19 +201,19 @@ def _with_a_row_more(state: JointState, coefficients: Records) -> JointState:
 
 
 def _wanted(constellation: Constellation, known: Bool) -> Bool:
-    """Pairs that count: both positions known, (time, node), and one node moves; (time, pair)."""
+    """Return a mask of scored pairs, (time, pair): both positions known, one node moving."""
     i, j = constellation.pairs.T
     moving = ~constellation.is_static[constellation.pairs].all(axis=1)
     return np.asarray(known[:, i] & known[:, j] & moving)
 
 
 def _yaw_generators(constellation: Constellation, pos: F64, wanted: Bool) -> tuple[F64, float]:
-    """How a yaw of all relative positions adds up over the pairs that count.
+    """Compute the effect of a yaw of all relative positions, summed over the scored pairs.
 
     Args:
-        constellation: The nodes.
+        constellation: Nodes of the run.
         pos: True positions, (time, node, d) [m].
-        wanted: Pairs that count, (time, pair).
+        wanted: Mask of scored pairs, (time, pair).
 
     Returns:
         Coefficients of the position errors in ``sum over pairs (z x x_ij) . e_ij``, (time,
@@ -235,15 +234,15 @@ def _yaw_generators(constellation: Constellation, pos: F64, wanted: Bool) -> tup
 def _summarise(
     constellation: Constellation, t: F64, cov: F64, pos: F64, wanted: Bool, taken: float
 ) -> Bound:
-    """From covariances of positions to errors of pairs.
+    """Compute errors of pairs from covariances of positions.
 
     Args:
-        constellation: The nodes.
-        t: (time) [s]
-        cov: (time, node * d, node * d) [m2]
+        constellation: Nodes of the run.
+        t: Times, (time) [s].
+        cov: Covariance of all positions, (time, node * d, node * d) [m2].
         pos: True positions, (time, node, d) [m].
-        wanted: Pairs that count, (time, pair).
-        taken: Part of the sum of squared errors that the best constant yaw takes out [m2].
+        wanted: Mask of scored pairs, (time, pair).
+        taken: Part of the sum of squared errors that the best constant yaw removes [m2].
     """
     n, d = constellation.n_nodes, constellation.dimensions
     i, j = constellation.pairs.T
@@ -272,14 +271,14 @@ def _summarise(
 
 
 def _beside(cov: F64, generators: F64) -> float:
-    """Trace of a covariance (number, number) off the directions of generators (number, k)."""
+    """Return the trace of a covariance (number, number) off the span of generators (number, k)."""
     basis, size, _ = np.linalg.svd(generators, full_matrices=False)
     basis = basis[:, size > 1e-9 * max(float(size.max(initial=0.0)), 1e-300)]
     return float(np.trace(cov) - np.trace(basis.T @ cov @ basis))
 
 
 def _rotations(relative: F64, d: int) -> F64:
-    """How relative positions (pair, d) change with a rotation, (pair * d, 1 or 3), yaw last."""
+    """Return derivatives of positions (pair, d) by rotations, (pair * d, 1 or 3), yaw last."""
     if d == 2:
         return np.stack([-relative[:, 1], relative[:, 0]], axis=1).reshape(-1, 1)
     axes = [np.cross(axis, relative).reshape(-1) for axis in np.eye(3)]

@@ -1,8 +1,8 @@
-"""Does an estimate know how wrong it is: NEES and NIS with their chi-square bands.
+"""Consistency of estimates: NEES and NIS with their chi-square bands.
 
 The squared error over the covariance, ``e^T P^-1 e / d``, and the squared innovation over its
-variance have mean 1 where the filter's beliefs are right; over n independent samples the mean
-lies in a band of the chi-square distribution [1]. Larger is too sure, smaller too modest.
+variance have mean 1 if the filter's assumptions hold; over n independent samples the mean lies in
+a band of the chi-square distribution [1]. Larger is overconfident, smaller is conservative.
 
 References:
     [1] Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking and Navigation,
@@ -19,20 +19,20 @@ from tracking.estimate import TeamEstimate
 
 
 def chi_square_band(n: int, dof: int, probability: float = 0.95) -> tuple[float, float]:
-    """Where the mean of n independent normalised squares lies, each divided by its dimension.
+    """Return the band of the mean of n normalised squares, each divided by its dimension.
 
     Args:
         n: Independent samples.
         dof: Dimension of each: 1 for a range, 2 or 3 for a position.
-        probability: Of the band.
+        probability: Probability of the band.
 
     Returns:
-        Its ends [-].
+        Ends of the band [-].
 
     Raises:
         ConfigError: A number is out of range.
     """
-    from scipy.special import chdtri  # a tenth of a second, which those do not need who only track
+    from scipy.special import chdtri  # takes 0.1 s, not needed for tracking
 
     if n < 1 or dof < 1:
         raise ConfigError(f"chi-square band: expected n and dof of 1 or more, got {n} and {dof}")
@@ -44,15 +44,15 @@ def chi_square_band(n: int, dof: int, probability: float = 0.95) -> tuple[float,
 
 
 def pair_nees(estimate: TeamEstimate, truth_ij_w: F64) -> tuple[F64, Bool]:
-    """e^T P^-1 e / d of the position errors e of every pair, and where P is known.
+    """Return e^T P^-1 e / d of the position errors e of every pair, and a mask of known P.
 
     Args:
-        estimate: Of one run, arrays over (time, pair).
+        estimate: Estimate of one run, arrays over (time, pair).
         truth_ij_w: True relative positions, (time, pair, 3) [m].
 
     Returns:
-        (time, pair) [-], NaN where there is no covariance, and where there is one, (time, pair).
-        A covariance that is not positive definite is wrong, however small the error: infinite.
+        NEES, (time, pair) [-], NaN without a covariance, and a mask of covariances, (time, pair).
+        The NEES is infinite for a covariance that is not positive definite.
     """
     d = estimate.constellation.dimensions
     cov = estimate.cov[..., :d, :d]

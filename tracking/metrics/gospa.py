@@ -1,13 +1,13 @@
 """Labelled GOSPA: one error for positions, joins and leaves together.
 
 The generalised optimal sub-pattern assignment metric [1] with exponent 2, alpha 2 and known
-labels: a pair that is estimated and true costs its error, at most the cut-off c; one that is
-missed (true, not estimated) or false (estimated, not there) costs ``c / sqrt(2)``:
+labels: a pair that is estimated and present costs its error, at most the cut-off c; one that is
+missed (present, not estimated) or false (estimated, not present) costs ``c / sqrt(2)``:
 
     GOSPA^2 = sum min(error, c)^2 + c^2 / 2 (missed + false)
 
-With known labels there is nothing to assign; an error beyond c counts as one missed and one
-false, which is the same c^2.
+Known labels need no assignment; an error beyond c counts as one missed and one false pair, which
+is the same c^2.
 
 References:
     [1] Rahmathullah, Garcia-Fernandez, Svensson, Generalized optimal sub-pattern assignment
@@ -28,18 +28,18 @@ from tracking.params.short_repr import short_repr
 
 @dataclass(frozen=True, slots=True)
 class Gospa:
-    """The metric over a run and what it is made of."""
+    """The metric over a run and its parts."""
 
     __repr__ = short_repr
 
     total: F64
-    """(time) [m]"""
+    """GOSPA, (time) [m]."""
     localisation: F64
-    """Part of the square that is position error, (time) [m2]."""
+    """Squared position errors in the square of the metric, (time) [m2]."""
     missed: I64
-    """Pairs that are there and not estimated, (time)."""
+    """Number of pairs that are present and not estimated, (time)."""
     false: I64
-    """Pairs that are estimated and not there, (time)."""
+    """Number of pairs that are estimated and not present, (time)."""
 
     @property
     def rms(self) -> float:
@@ -53,10 +53,10 @@ def labelled_gospa(
     """Score a run in which nodes join and leave.
 
     Args:
-        estimate: Of one run, arrays over (time, pair).
+        estimate: Estimate of one run, arrays over (time, pair).
         truth_ij_w: True relative positions, (time, pair, 3) [m].
         is_there: True while both nodes are in the group, (time, pair).
-        cutoff: c, the error from which a pair might as well be missing [m].
+        cutoff: c, the error that costs as much as a missed pair and a false one [m].
 
     Raises:
         ConfigError: The cut-off is not above 0.

@@ -1,8 +1,8 @@
-"""The recursion of `tracking.metrics.bound`: the joint filter's covariance along the true motion.
+"""Recursion of `tracking.metrics.bound`: the joint filter's covariance along the true motion.
 
-One row behind the states is correlated with them and has no dynamics: the sum of the errors so far
-along a yaw of the whole run. Corrections change its correlation with the present errors as a filter
-changes those, which is what the variance of a sum over time needs.
+One row after the states is correlated with them and has no dynamics: the sum of all errors so far
+along a yaw of the whole run. Corrections change its correlation with the present errors as in a
+filter, which gives the variance of a sum over time.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ GAUGE_PERIOD = 1.0
 
 @kernel
 def begin(c, s, t):
-    """Every node in its place, as uncertain as a first shape is; rotation and mirror known."""
+    """Initialise all nodes as uncertain as a first shape, with known rotation and reflection."""
     s.alive[0] = True
     for i in range(s.nodes.shape[0]):
         s.nodes[i].present = True
@@ -51,7 +51,7 @@ def begin(c, s, t):
 
 @small_kernel
 def put_on_truth(c, s, truth, k):
-    """Linearise at the truth: positions, velocities and heading errors as they are."""
+    """Set the linearisation point to true positions, velocities and heading errors."""
     pos, vel, heading = truth
     s.x[0, :] = 0.0
     for i in range(s.nodes.shape[0]):
@@ -68,19 +68,19 @@ def put_on_truth(c, s, truth, k):
 
 @kernel
 def run_bound(coefficients, layout, s, work, block, hidden, truth, turn_var, t_out, yaw, out):
-    """Carry the covariance through the events of one environment.
+    """Propagate the covariance through the events of one environment.
 
     Args:
         coefficients: Constants (`make_coefficients`), (1).
         layout: Tables.
         s: JointState of one environment and one hypothesis, updated.
-        work: Room, as that of the filter's events.
+        work: Workspace, as that of the filter.
         block: t, kind, i, j, antenna_i, antenna_j, values of one environment, (event, ...).
-        hidden: True for ranges without line of sight, (event).
+        hidden: True for NLOS ranges, (event).
         truth: Positions [m], velocities [m/s], (event, node, 3), heading errors, (event, node).
-        turn_var: How uncertain the rotation of the group is at first, about every axis [rad2].
+        turn_var: Variance of the initial rotation of the group, about every axis [rad2].
         t_out: Times, ascending, (time) [s].
-        yaw: Derivatives of the positions by a yaw of all, summed over the pairs that count,
+        yaw: Derivatives of the positions by a yaw of all, summed over the scored pairs,
             (time, node * d) [m].
         out: Covariance of all positions, (time, node * d, node * d), written.
 
@@ -142,13 +142,13 @@ def run_bound(coefficients, layout, s, work, block, hidden, truth, turn_var, t_o
 
 @small_kernel
 def add_to_sum(c, s, yaw, v):
-    """Add the present errors along a yaw to their sum; returns what that adds to its variance.
+    """Add the present errors along a yaw to their sum; return the increase of its variance.
 
     Args:
         c: Coefficients.
         s: JointState of one environment.
         yaw: Derivatives of the positions, (node * d) [m].
-        v: Room, (state).
+        v: Workspace, (state).
     """
     flush_updates(s, 0)
     a, P, added = c.n_own, s.P, 0.0
@@ -172,7 +172,7 @@ def add_to_sum(c, s, yaw, v):
 
 @small_kernel
 def learn_range(c, s, layout, work, p, a_i, a_j, is_hidden, what):
-    """What a range of pair p adds, its sight known."""
+    """Update the covariance by a range of pair p with known NLOS label."""
     pair = s.pairs[p]
     i0, i1, i2 = antenna_offset(s.last_attitude_accel, layout, pair.i, a_i)
     j0, j1, j2 = antenna_offset(s.last_attitude_accel, layout, pair.j, a_j)
@@ -190,7 +190,7 @@ def learn_range(c, s, layout, work, p, a_i, a_j, is_hidden, what):
 
 @small_kernel
 def write_positions(s, d, n, o, out):
-    """The covariance of all positions."""
+    """Write the covariance of all positions."""
     P = s.P
     flush_updates(s, 0)
     for i in range(n):

@@ -1,8 +1,8 @@
-"""Integrity: how far an OK pair may be off, and how long it is wrong.
+"""Integrity: error limits of OK pairs, and durations of wrong ones.
 
-A position error e is *wrong while OK* where the pair's status is OK, ``|e|`` exceeds `LIMIT` and
-``|e|`` exceeds `SIGMAS` standard deviations along e, ``sqrt(e^T P e) / |e|``. The whole run counts,
-from its first estimate on: the start is where a tracker is most likely to be wrong.
+A position error e is *wrong while OK* if the pair's status is OK, ``|e|`` exceeds `LIMIT` and
+``|e|`` exceeds `SIGMAS` standard deviations along e, ``sqrt(e^T P e) / |e|``. The whole run counts
+from its first estimate: a tracker is most likely to be wrong at the start.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from tracking.estimate import TeamEstimate
 from tracking.vehicles import VEHICLES
 
 LIMIT = 0.3
-"""[m] Smaller errors do no harm."""
+"""[m] Largest harmless error."""
 SIGMAS = 3.0
 """[-] Standard deviations along the error."""
 
 
 def protection_radius(estimate: TeamEstimate) -> F64:
-    """Return how far a pair that is OK may be off.
+    """Return the protection radius of every pair.
 
     Args:
-        estimate: Arrays over (..., pair), of `joint` with the vehicles of `VEHICLES`.
+        estimate: Arrays over (..., pair), from `joint` with the vehicles of `VEHICLES`.
 
     Returns:
         Radius about the estimated relative position, (..., pair) [m]: the expected error times
@@ -40,10 +40,10 @@ def protection_radius(estimate: TeamEstimate) -> F64:
 
 
 def wrong_while_ok(estimate: TeamEstimate, truth_ij_w: F64) -> Bool:
-    """Where pairs are OK and wrong, (time, pair).
+    """Return a mask of pairs that are OK and wrong, (time, pair).
 
     Args:
-        estimate: Of one run, arrays over (time, pair).
+        estimate: Estimate of one run, arrays over (time, pair).
         truth_ij_w: True relative positions in the frame of the estimate, (time, pair, 3) [m].
     """
     d = estimate.constellation.dimensions
@@ -55,12 +55,12 @@ def wrong_while_ok(estimate: TeamEstimate, truth_ij_w: F64) -> Bool:
 
 
 def beyond_protection(estimate: TeamEstimate, truth_ij_w: F64, judged: Bool) -> float | None:
-    """Return the share of OK positions that are off by more than their protection radius.
+    """Return the share of OK positions whose error exceeds their protection radius.
 
     Args:
-        estimate: Of one run, arrays over (time, pair).
+        estimate: Estimate of one run, arrays over (time, pair).
         truth_ij_w: True relative positions in the frame of the estimate, (time, pair, 3) [m].
-        judged: Where they are known, (time, pair).
+        judged: Mask of known true positions, (time, pair).
     """
     d = estimate.constellation.dimensions
     counted = judged & estimate.ok
@@ -71,11 +71,11 @@ def beyond_protection(estimate: TeamEstimate, truth_ij_w: F64, judged: Bool) -> 
 
 
 def longest(t: F64, flags: Bool) -> float:
-    """Longest time in one go for which a pair is flagged [s].
+    """Return the longest uninterrupted time for which a pair is flagged [s].
 
     Args:
-        t: Ascending times, (time) [s]; each stands for the time until the next.
-        flags: (time, pair).
+        t: Ascending times, (time) [s]; each is valid until the next.
+        flags: Flags of the pairs, (time, pair).
     """
     if not flags.any():
         return 0.0

@@ -1,20 +1,19 @@
-"""How wrong an estimate is, and whether it knows: the figures every result is stated in.
+"""Accuracy and consistency of an estimate: the figures of all results.
 
 Relative positions are scored in the world frame over the pairs with at least one moving node.
 
-- ``rmse``: as the estimate is.
+- ``rmse``: without alignment.
 - ``rmse_yaw``: after one constant yaw for the whole run, since magnetic north and the frame
   of a motion-capture room differ by a constant.
-- ``rmse_shape``: after the best rotation at each instant. A mirror image stays an error.
-- ``rmse_mirror``: after the best rotation and reflection at each instant: all that ranges alone
-  can tell.
-- ``nees``: mean of e^T P^-1 e over the position errors e after that yaw, per dimension: 1 where
-  the covariance P is right, larger where the filter is too sure [1]. P is meant in the frame of
-  the filter's own north, which no measurement can compare with another.
-- ``protection_share``: share of what is OK that is off by more than its protection radius, after
-  that yaw.
-- ``integrity_share`` and ``integrity_worst_s``: how long pairs are OK and wrong, after that yaw and
-  over the whole run (`tracking.metrics.integrity`).
+- ``rmse_shape``: after the best rotation at each instant. A reflection counts as an error.
+- ``rmse_mirror``: after the best rotation and reflection at each instant: the error of the shape,
+  which is all that ranges alone determine.
+- ``nees``: mean of e^T P^-1 e over the position errors e after that yaw, per dimension: 1 if the
+  covariance P is right, larger if the filter is overconfident [1]. P refers to the filter's own
+  north, which no measurement relates to another.
+- ``protection_share``: share of OK positions beyond their protection radius, after that yaw.
+- ``integrity_share`` and ``integrity_worst_s``: share and time of pairs that are OK and wrong,
+  after that yaw and over the whole run (`tracking.metrics.integrity`).
 
 References:
     [1] Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking and Navigation,
@@ -37,43 +36,43 @@ from tracking.params.short_repr import short_repr
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """Errors of one run; figures are None where nothing could be scored."""
+    """Errors of one run; figures are None if nothing could be scored."""
 
     __repr__ = short_repr
 
     rmse: float | None
-    """[m]"""
+    """[m] Root mean square error in the world frame."""
     rmse_yaw: float | None
-    """[m]"""
+    """[m] Root mean square error after the best constant yaw."""
     yaw_deg: float | None
-    """[deg] The constant yaw that `rmse_yaw` takes out."""
+    """[deg] The constant yaw of `rmse_yaw`."""
     rmse_shape: float | None
-    """[m]"""
+    """[m] Root mean square error after the best rotation at each instant."""
     rmse_mirror: float | None
-    """[m]"""
+    """[m] Root mean square error after the best rotation and reflection at each instant."""
     nees: float | None
-    """[-]"""
+    """[-] Mean NEES per dimension after the best constant yaw."""
     pair_rmse: F64
     """`rmse` of each pair, (pair) [m]; NaN for pairs without a score."""
     pair_rmse_yaw: F64
-    """(pair) [m]"""
+    """`rmse_yaw` of each pair, (pair) [m]."""
     pair_rmse_shape: F64
-    """(pair) [m]"""
+    """`rmse_shape` of each pair, (pair) [m]."""
     n_scored: int
-    """Relative positions that went into the figures."""
+    """Number of relative positions in the figures."""
     coverage: float | None
-    """[-] Share of the relative positions with truth that had an estimate; the rest is not
-    scored. None where there is no truth."""
+    """[-] Share of the relative positions with truth that have an estimate; the rest is not
+    scored. None without truth."""
     ok_share: float | None
-    """[-] Share of those with truth whose status was ok; likewise."""
+    """[-] Share of the relative positions with truth whose status is OK. None without truth."""
     integrity_share: float | None
-    """[-] Share of all relative positions with truth, those not scored included, that were ok and
-    wrong. None where nothing could be scored."""
+    """[-] Share of all relative positions with truth, scored or not, that are OK and wrong. None
+    if nothing could be scored."""
     integrity_worst_s: float | None
-    """[s] Longest time in one go that a pair was so."""
+    """[s] Longest uninterrupted time for which a pair is OK and wrong."""
     protection_share: float | None
-    """[-] Share of the relative positions with truth that were ok and off by more than their
-    protection radius, of those that were ok. None where none was."""
+    """[-] Share of the OK relative positions with truth whose error exceeds their protection
+    radius. None without OK positions."""
 
 
 def score(estimate: TeamEstimate, truth_ij_w: F64, has_truth: Bool, skip_until: float) -> Score:
@@ -82,7 +81,7 @@ def score(estimate: TeamEstimate, truth_ij_w: F64, has_truth: Bool, skip_until: 
     Args:
         estimate: Arrays over (time, pair).
         truth_ij_w: True relative positions, (time, pair, 3) [m].
-        has_truth: True where they are known, (time, pair).
+        has_truth: Mask of known true positions, (time, pair).
         skip_until: Times before this are not scored [s].
     """
     constellation = estimate.constellation
@@ -105,7 +104,7 @@ def score(estimate: TeamEstimate, truth_ij_w: F64, has_truth: Bool, skip_until: 
     x = np.where(scored[..., None], x, 0.0)
     truth = np.where(scored[..., None], truth, 0.0)
     if planar:
-        # Nodes of one plane are scored in it, whatever their height in the truth.
+        # Nodes in a plane are scored in it, regardless of their true height.
         x, truth = x * [1.0, 1.0, 0.0], truth * [1.0, 1.0, 0.0]
 
     yaw = best_yaw(x, truth)
@@ -146,14 +145,14 @@ def score(estimate: TeamEstimate, truth_ij_w: F64, has_truth: Bool, skip_until: 
 
 
 def best_yaw(x: F64, truth: F64) -> float:
-    """The one rotation about the vertical that brings x nearest to truth, both (..., 3) [rad]."""
+    """Return the yaw that brings x nearest to truth, both (..., 3) [rad]."""
     cross = np.sum(x[..., 0] * truth[..., 1] - x[..., 1] * truth[..., 0])
     dot = np.sum(x[..., 0] * truth[..., 0] + x[..., 1] * truth[..., 1])
     return float(np.arctan2(cross, dot))
 
 
 def errors_after(estimate: TeamEstimate, truth_ij_w: F64, yaw_rad: float) -> F64:
-    """Position errors of a run after a constant yaw, (time, pair, 3) [m]."""
+    """Return the position errors of a run after a constant yaw, (time, pair, 3) [m]."""
     c, s = np.cos(yaw_rad), np.sin(yaw_rad)
     R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])  # noqa: N806
     difference: F64 = estimate.pos_ij_w @ R.T - truth_ij_w

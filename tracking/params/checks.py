@@ -10,14 +10,14 @@ from tracking.errors import ConfigError
 
 
 def check_numbers(params: object, *, may_be_zero: Iterable[str] = ()) -> None:
-    """Check every numeric field of a dataclass; None, text, flags and other fields pass.
+    """Check every numeric field of a dataclass; other fields pass.
 
     Args:
         params: The dataclass.
         may_be_zero: Fields that may be 0.
 
     Raises:
-        ConfigError: A number is not finite, negative, or 0 where it may not be; it is named.
+        ConfigError: A number is not finite, is negative, or is 0 and may not be; it is named.
     """
     for f in fields(params):  # type: ignore[arg-type]
         value = getattr(params, f.name)

@@ -1,4 +1,4 @@
-"""Names of what can be chosen: our own, those of installed packages, and `package.module:Name`."""
+"""Look-up of names: built-in, of installed packages, and `package.module:Name`."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ def look_up(
     group: str = "",
     raises: type[Exception] = ConfigError,
 ) -> Entry:
-    """Look an entry up.
+    """Look an entry up by its name.
 
     Args:
-        registry: Our names and entries.
-        name: One of them, or if there is a group `package.module:Name`, a name among its entry
-            points, or the entry itself, which can be called.
+        registry: Built-in names and entries.
+        name: A built-in name or, with a group, `package.module:Name`, a name among its entry
+            points, or the entry itself, a callable.
         argument: Argument that the name was given for, for the message.
-        group: Entry points that other packages declare, as `relpos_env.tasks`.
-        raises: Kind of the error.
+        group: Entry points that other packages declare, such as `relpos_env.tasks`.
+        raises: Class of the error.
 
     Raises:
         ConfigError: No entry of that name, or it cannot be imported.
@@ -47,17 +47,17 @@ def look_up(
             return entry
         if isinstance(name, str) and ":" in name:
             return _import(name)  # type: ignore[no-any-return]
-    except Exception as error:  # whatever the module of a user raises
+    except Exception as error:  # any error of the user's module
         raise raises(f"{argument}: cannot import {name!r}: {error}") from error
     others = f", {', '.join(sorted(found))}" if found else ""
     raise raises(f"{expected}{others} or package.module:Name, got {name!r}")
 
 
 def _import(name: str) -> Any:
-    """What `package.module:Name` stands for.
+    """Return the object `package.module:Name`.
 
     Raises:
-        TypeError: It cannot be called.
+        TypeError: It is not callable.
     """
     module, _, attribute = name.partition(":")
     found: Any = import_module(module)

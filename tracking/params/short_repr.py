@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 LONGEST = 60
-"""[-] Longer texts are cut."""
+"""[-] Maximum length; longer texts are cut."""
 MOST = 6
-"""[-] Of a longer sequence the length is shown."""
+"""[-] Maximum items of a sequence; longer ones are shown by their length."""
 
 
 def short_repr(self: Any) -> str:
-    """``Class(field=value, ...)`` with the type and shape of arrays in place of their numbers.
+    """Return ``Class(field=value, ...)`` with type and shape in place of array contents.
 
     Use it as ``__repr__ = short_repr`` in the body of a dataclass.
     """
@@ -39,5 +39,5 @@ def _short(value: Any) -> str:
 
 
 def _is_large(value: Any) -> bool:
-    """True for what has fields of its own."""
+    """True for arrays and instances of dataclasses."""
     return isinstance(value, np.ndarray) or (is_dataclass(value) and not isinstance(value, type))

@@ -1,8 +1,8 @@
-"""Reading frozen dataclasses from TOML tables by their fields and type hints.
+"""Reading of frozen dataclasses from TOML tables by their fields and type hints.
 
-Numbers, words, tuples, tables in tables and lists of tables. What a table does not say stays as
-in a base: another instance, or what a `Preset` key of the table names. Whatever does not fit is
-an error that names the file, the key and what is allowed.
+Values are numbers, words, tuples, nested tables and lists of tables. Missing keys keep the value
+of a base: another instance, or the one that a `Preset` key of the table names. An invalid entry
+raises an error that names the file, the key and the allowed values.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from tracking.errors import ConfigError
 
 T = TypeVar("T")
 LARGEST = 1e12
-"""Numbers beyond are refused: no quantity here is so large."""
+"""Largest number accepted: no quantity here is so large."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,18 +29,18 @@ class Where:
     file: str
     path: str = ""
     raises: type[Exception] = ConfigError
-    """What errors about the file are."""
+    """Class of the errors about the file."""
 
     def key(self, name: str) -> Where:
-        """A key of the table here."""
+        """Return the place of a key of this table."""
         return replace(self, path=f"{self.path}.{name}" if self.path else name)
 
     def item(self, k: int) -> Where:
-        """An entry of the list here."""
+        """Return the place of an entry of this list."""
         return replace(self, path=f"{self.path}[{k}]")
 
     def error(self, message: str) -> Exception:
-        """An error about this place."""
+        """Return an error about this place."""
         return self.raises(": ".join(part for part in (self.file, self.path, message) if part))
 
 
@@ -50,14 +50,14 @@ class Preset:
 
     key: str
     kind: type
-    """What the value must be: `str` or `int`."""
+    """Type of the value: `str` or `int`."""
     find: Callable[[Any], Any]
-    """Value to base; raises what `Where` says."""
+    """Function from value to base; raises `Where.raises`."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TableReader:
-    """Reads tables; the presets are by the class of the table that they are for."""
+    """Reader of tables; the presets are by the class of their table."""
 
     presets: Mapping[type, Preset] = field(default_factory=dict)
 
@@ -74,13 +74,13 @@ class TableReader:
 
         Args:
             kind: A frozen dataclass.
-            table: Of a TOML file.
-            where: The table is, for messages.
-            base: What the table does not say; None are the defaults of the class.
-            others: Keys that another reader takes.
+            table: Table of a TOML file.
+            where: Place of the table, for messages.
+            base: Source of missing values; None for the defaults of the class.
+            others: Keys that another reader handles.
 
         Raises:
-            ConfigError: Names the file and the key; or what `where` says.
+            ConfigError: Or `where.raises`; the message names the file and the key.
         """
         if not isinstance(table, dict):
             raise where.error(f"expected a table, got {_described(table)}")
@@ -116,7 +116,7 @@ class TableReader:
             raise where.error(str(error).removeprefix(f"{preset.key}: ")) from error
 
     def _value(self, hint: Any, value: object, where: Where, base: Any) -> Any:
-        """One value of a type."""
+        """Return one value of a type."""
         origin = get_origin(hint)
         if origin in (Union, types.UnionType):
             (hint,) = (a for a in get_args(hint) if a is not type(None))
@@ -133,7 +133,7 @@ class TableReader:
         return _scalar(hint, value, where)
 
     def _tuple(self, items: tuple[Any, ...], value: object, where: Where) -> tuple[Any, ...]:
-        """A list of a fixed length, or of any if the type ends in dots."""
+        """Return a list of a fixed length, or of any length if the type ends in dots."""
         if not isinstance(value, list):
             raise where.error(f"expected a list, got {_described(value)}")
         if items[-1] is Ellipsis:
@@ -148,13 +148,13 @@ class TableReader:
 
 @lru_cache(maxsize=256)
 def readable(kind: type) -> dict[str, Any]:
-    """Fields of a dataclass that a file may set, and their types."""
+    """Return the fields of a dataclass that a file may set, and their types."""
     hints = get_type_hints(kind)
     return {f.name: hints[f.name] for f in fields(kind) if f.metadata.get("in_file", True)}
 
 
 def _scalar(hint: Any, value: object, where: Where) -> Any:
-    """A number or a word; true and false are no numbers, and neither is nan."""
+    """Return a number or a word; booleans and NaN are not numbers."""
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
     if hint is float and number:
         finite = isinstance(value, int) or math.isfinite(value)  # type: ignore[arg-type]
@@ -173,7 +173,7 @@ def _scalar(hint: Any, value: object, where: Where) -> Any:
 
 
 def _described(value: object) -> str:
-    """A value as its author knows it, short."""
+    """Return a short form of a value as written in the file."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, dict):
@@ -187,7 +187,7 @@ def _described(value: object) -> str:
 
 
 def _placed(error: Exception, where: Where, names: list[str]) -> Exception:
-    """An error of a class, whose message begins with a field or not, at its place."""
+    """Return an error of a class with its place; its message may begin with a field."""
     message = str(error)
     head = message.split(":", 1)[0]
     if where.path and head.split(".")[0].split("[")[0] in names:

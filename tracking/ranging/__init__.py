@@ -1,4 +1,4 @@
-"""The ranging protocol, without a clock and without a radio; see `docs/reference/protocol.md`."""
+"""Ranging protocol without clock and radio; see `docs/reference/protocol.md`."""
 
 from tracking.ranging.events import (
     DuplicateId,

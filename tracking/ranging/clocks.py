@@ -1,10 +1,10 @@
-"""How fast another node's clock runs relative to one's own: the clock skew, per ordered pair.
+"""Clock skew: the rate of another node's clock relative to the own one, per ordered pair.
 
 A crystal is off by up to 20 ppm, which single-sided ranging turns into metres: the error is
-c / 2 times the reply time times the skew. Two sources tell it: the carrier offset that the
-radio reads from every message, quick and coarse (0.1 ppm), and the stamps themselves, since
-two messages of one sender are so far apart in its own clock and so far in the receiver's. A
-radial speed v looks like a skew of v / c and belongs in it. One scalar Kalman filter takes both.
+c / 2 times the reply time times the skew. Two sources measure the skew: the carrier offset of
+every message, quick and coarse (0.1 ppm), and the stamps, by the interval between two messages of
+one sender in its own clock and in the receiver's. A radial speed v looks like a skew of v / c
+and belongs in it. One scalar Kalman filter fuses both.
 """
 
 from __future__ import annotations
@@ -22,43 +22,43 @@ from tracking.ranging.compiled.exchange import (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClockParams:
-    """What a node believes of clocks."""
+    """Model of the clocks."""
 
     max_skew: float = 60e-6
-    """[1] Two crystals of 20 ppm and some; more is no clock of ours."""
+    """[1] Largest skew of two crystals of 20 ppm, with a margin."""
     carrier_std: float = 0.15e-6
     """[1] Noise of a carrier-offset reading."""
     stamp_std: float = 0.2e-9
     """[s] Noise of a receive stamp."""
     wander: float = 4e-16
-    """[1/s] Spectral density of the skew: 20 ppb in a second, oscillators and accelerations."""
+    """[1/s] Spectral density of the skew: 20 ppb in 1 s, from oscillators and accelerations."""
     jump: float = 2.0
-    """[m] More than a range can change between two messages, reflections included; stamps that
+    """[m] Largest change of a range between two messages, reflections included; stamps that
     differ by more do not belong together."""
     max_interval: float = 4.0
-    """[s] Messages farther apart say nothing about each other's clocks."""
+    """[s] Longest interval between messages that measures the skew."""
     patience: int = 3
-    """[-] After so many misfits in a row it is the estimate that is wrong."""
+    """[-] Number of consecutive misfits after which the estimate is wrong."""
 
 
 @dataclass(slots=True)
 class SkewEstimate:
-    """How much faster the receiver's clock runs than the sender's."""
+    """Relative rate of the receiver's clock to the sender's, minus 1."""
 
     time: int
-    """Of the last update, receiver's ticks without wraps."""
+    """Time of the last update, receiver's ticks without wraps."""
     mean: float = 0.0
-    """[1]"""
+    """Estimated skew [1]."""
     var: float = FIRST_VAR
     misfits: int = 0
 
     def carrier(self, p: ExchangeNumbers, now: int, offset: float) -> None:
-        """Take the carrier offset of a message received now [1]."""
+        """Update by the carrier offset of a message received now [1]."""
         self._predict(p, now)
         self.mean, self.var = take_carrier(p, self.mean, self.var, offset)
 
     def interval(self, p: ExchangeNumbers, now: int, received: int, sent: int) -> tuple[int, float]:
-        """Take the stamps of two messages; whether they fit, and the skew that they tell."""
+        """Update by the stamps of two messages; return whether they fit, and their skew."""
         self._predict(p, now)
         fit, skew, self.mean, self.var, self.misfits = take_interval(
             p, self.mean, self.var, self.misfits, received, sent

@@ -1,4 +1,4 @@
-"""What goes into a session and what comes out of it, apart from bytes."""
+"""Inputs and outputs of a session, except bytes."""
 
 from __future__ import annotations
 
@@ -9,30 +9,30 @@ from tracking.ranging.exchange import RangeEvent
 
 
 class Role(Enum):
-    """What a node does in the round."""
+    """Role of a node in the round."""
 
     LISTENING = "listening"
-    """Just switched on, or reset: hears before it speaks."""
+    """Switched on or reset: listens before it transmits."""
     INITIATOR = "initiator"
     """Starts every round."""
     RESPONDER = "responder"
     """Follows the rounds of a smaller ID."""
     MUTED = "muted"
-    """Heard another node with its own ID and keeps silent for a while."""
+    """Received another node with its own ID; silent for a while."""
 
 
 @dataclass(frozen=True, slots=True)
 class Reception:
-    """What the radio tells of a frame that came in."""
+    """Radio data of a received frame."""
 
     stamp: int
-    """When its stamp moment arrived, 40 bits."""
+    """Arrival of its stamp moment, 40 bits."""
     rx_power: float
-    """[dBm]"""
+    """Received power [dBm]."""
     fp_power: float
-    """First path [dBm]."""
+    """First-path power [dBm]."""
     carrier: float | None = None
-    """How much faster this node's clock runs than the sender's, by the carrier [1]."""
+    """Relative rate of this node's clock to the sender's, minus 1, by the carrier [1]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,33 +41,33 @@ class Transmission:
 
     data: bytes
     at: int
-    """When its stamp moment is to leave: 40 bits, a multiple of 512."""
+    """Transmit time of its stamp moment: 40 bits, a multiple of 512."""
 
 
 @dataclass(frozen=True, slots=True)
 class RoleChanged:
-    """The node does something else from now on."""
+    """Change of the node's role or initiator."""
 
     role: Role
     root: int
-    """The initiator that it follows, its own ID if that is itself."""
+    """Initiator that the node follows; its own ID if it is the initiator."""
 
 
 @dataclass(frozen=True, slots=True)
 class MembersChanged:
-    """The group that ranges in each round is another one."""
+    """Change of the group that ranges in each round."""
 
     members: tuple[int, ...]
     before: tuple[int, ...]
 
     @property
     def joined(self) -> tuple[int, ...]:
-        """Members that were none before."""
+        """New members."""
         return tuple(k for k in self.members if k not in self.before)
 
     @property
     def left(self) -> tuple[int, ...]:
-        """Members that are none any more."""
+        """Former members."""
         return tuple(k for k in self.before if k not in self.members)
 
 
@@ -77,7 +77,7 @@ class DuplicateId:
 
     id: int
     boot: int
-    """Its boot number."""
+    """Boot number of the other node."""
 
 
 Event = RangeEvent | RoleChanged | MembersChanged | DuplicateId

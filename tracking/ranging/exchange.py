@@ -1,14 +1,14 @@
-"""Ranges from overheard stamps: any node that hears two others knows their distance.
+"""Ranges from overheard stamps: any node that receives two others knows their distance.
 
-For every ordered pair the last message that one node sent and the other received is kept,
+For every ordered pair the last message that one node sent and the other received is stored
 with both stamps. The node with the smaller ID asks, the one with the larger ID answers:
 
-    asker       sends T_a ---------------------------- receives R_a        later: R_a is told
-    answerer    ------------- receives R_b --- sends T_b (tells R_b)
+    asker       sends T_a ---------------------------- receives R_a        later: R_a is reported
+    answerer    ------------- receives R_b --- sends T_b (reports R_b)
 
     time of flight = ((R_a - T_a) - (T_b - R_b) (1 + skew)) / 2
 
-with the skew of `tracking.ranging.clocks`. The range is that of the moment T_a.
+with the skew of `tracking.ranging.clocks`. The range is valid at the time T_a.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from tracking.ranging.compiled.exchange import NO_INTERVAL, ExchangeNumbers, exc
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExchangeParams:
-    """When stamps make a range."""
+    """Requirements of stamps for a range."""
 
     clocks: ClockParams = field(default_factory=ClockParams)
     max_distance: float = 200.0
-    """[m] No radio reaches farther; a longer result is none."""
+    """[m] Largest range of the radio; longer results are dropped."""
     max_reply: float = 4.0
-    """[s] An older question is not answered any more; longer than a round of 62 nodes."""
+    """[s] Longest time to an answer; longer than a round of 62 nodes."""
     max_error: float = 0.05
     """[m] Largest error by clock skew, one sigma, of a range without a fresh interval."""
 
     def numbers(self) -> ExchangeNumbers:
-        """What the kernels take."""
+        """Return the numbers of the kernels."""
         c = self.clocks
         return ExchangeNumbers(
             c.max_skew, c.carrier_std * c.carrier_std, c.stamp_std, c.wander, c.jump,
@@ -42,26 +42,26 @@ class ExchangeParams:
 
 @dataclass(frozen=True, slots=True)
 class Passage:
-    """One message from a sender to a receiver, each end in its own clock, without wraps."""
+    """One message from a sender to a receiver; each end in its own clock, without wraps."""
 
     sent: int
     received: int
     local: int
-    """When the sender sent it, in the clock of the node that keeps this."""
+    """Transmit time in the clock of the node that stores the passage."""
 
 
 @dataclass(frozen=True, slots=True)
 class RangeEvent:
-    """A distance between two nodes, as one of them or a third one resolved it."""
+    """Distance between two nodes, computed by one of them or by a third one."""
 
     i: int
-    """The smaller ID."""
+    """Smaller ID."""
     j: int
-    """The larger ID."""
+    """Larger ID."""
     time: int
-    """When it was so, this node's clock, 40-bit stamp."""
+    """Time of validity, this node's clock, 40-bit stamp."""
     distance: float
-    """[m]"""
+    """Distance [m]."""
     rx_power: float
     """Received power of the answer at node i [dBm]."""
     fp_power: float
@@ -69,10 +69,10 @@ class RangeEvent:
 
 
 class Exchanges:
-    """The passages that one node knows, and the ranges that follow from them.
+    """Passages known to one node, and the ranges that follow from them.
 
-    Law: noiseless stamps of clocks with any skew give the distance at the time of the range,
-    within the resolution of the stamps.
+    Property: noiseless stamps of clocks with any skew give the distance at the time of the
+    range, within the resolution of the stamps.
     """
 
     def __init__(self, params: ExchangeParams) -> None:
@@ -82,19 +82,19 @@ class Exchanges:
         self._skew: dict[tuple[int, int], SkewEstimate] = {}
 
     def forget(self, node: int | None = None) -> None:
-        """Drop what is known of a node, or of all: its clock has jumped or it has gone."""
+        """Drop a node, or all, after a jump of its clock or its departure."""
         for known in (self._asked, self._answered, self._skew):
             for pair in [p for p in known if node is None or node in p]:
                 del known[pair]  # type: ignore[attr-defined]
 
     def carrier(self, asker: int, answerer: int, now: int, offset: float) -> None:
-        """Take the carrier offset of a message, how much faster the receiver's clock runs [1]."""
+        """Process the carrier offset of a message: relative rate of the receiver's clock [1]."""
         if asker < answerer:
             skew = self._skew.setdefault((asker, answerer), SkewEstimate(now))
             skew.carrier(self._numbers, now, offset)
 
     def add(self, sender: int, receiver: int, passage: Passage) -> tuple[float, int] | None:
-        """Take a passage; the distance [m] and its time, own clock, if it completes an exchange."""
+        """Process a passage; return distance [m] and time, own clock, of a completed exchange."""
         if sender < receiver:
             self._asked[sender, receiver] = passage
             return None

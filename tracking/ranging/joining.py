@@ -1,4 +1,4 @@
-"""When a node that is no member yet speaks: at once, and if in vain after drawn pauses."""
+"""Transmissions of a node that is not a member yet: at once, then with random backoff."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ MAX_DOUBLINGS = 5
 
 
 class Joining:
-    """The attempts of one node to be taken into a round."""
+    """Attempts of one node to join a round."""
 
     def __init__(self, dice: Dice) -> None:
         self._dice = dice
@@ -17,20 +17,20 @@ class Joining:
 
     @property
     def in_vain(self) -> bool:
-        """Whether more than one attempt has failed."""
+        """True if more than one attempt has failed."""
         return self._attempts > 1
 
     def succeeded(self) -> None:
-        """The node is a member: the next time begins at once again."""
+        """Reset the backoff: the node is a member."""
         self._attempts = self._pause = 0
 
     def begin(self) -> None:
-        """The node begins again."""
+        """Start again."""
         self.succeeded()
         self._tried = None
 
     def speaks(self, round: int) -> bool:
-        """Whether to speak in the gap that begins now: once a round, after drawn gaps."""
+        """Return whether to transmit in the gap that begins: once a round, after the backoff."""
         if round == self._tried:
             return False
         if self._pause > 0:

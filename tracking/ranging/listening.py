@@ -1,8 +1,7 @@
-"""What one node makes of the messages that it hears: who is there, and ranges of all pairs.
+"""Evaluation of received messages by one node: peers, and ranges of all pairs.
 
-Every message tells when it was sent and when its sender received each of the others. A node that
-also heard those others knows both ends of their messages, and so the range of two nodes that
-it is not one of.
+Every message has its transmit time and the times at which its sender received the others. A node
+that also received these messages knows both of their ends, and so the range of two other nodes.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from tracking.ranging.peers import Peer, Peers
 
 
 class Listener:
-    """The memory of one node."""
+    """Receiver of one node."""
 
     def __init__(self, node_id: int, params: ExchangeParams) -> None:
         self._id = node_id
@@ -24,21 +23,21 @@ class Listener:
         self._spoken: int | None = None
 
     def forget(self) -> None:
-        """Begin again: the own clock has jumped or the node was reset."""
+        """Reset, after a jump of the own clock or a reset of the node."""
         self.peers.forget()
         self._exchanges.forget()
         self._spoken = None
 
     def spoken(self, sent: int) -> None:
-        """Note that the own message leaves at a time of the own clock."""
+        """Record the transmit time of the own message, own clock."""
         self._spoken = sent
         self.peers.spoken()
 
     def take(self, frame: Frame, reception: Reception, arrived: int) -> list[RangeEvent] | None:
-        """Take a message that arrived at a time of the own clock.
+        """Process a message that arrived at a time of the own clock.
 
         Returns:
-            The ranges that it completes, None if it is a repeated or late one.
+            The ranges that it completes; None for a repeated or late message.
         """
         goes_on = self.peers.take(frame, arrived)
         if goes_on is None:
@@ -52,7 +51,7 @@ class Listener:
         return [event for event in events if event is not None]
 
     def _overhear(self, frame: Frame, src: Peer, row: Entry, arrived: int) -> RangeEvent | None:
-        """Take one row of a table: the sender heard that node at that time."""
+        """Process one row of a table: the time at which the sender received that node."""
         if row.stamp is None:
             return None
         ago = difference(frame.stamp, row.stamp)
@@ -65,7 +64,7 @@ class Listener:
             self.peers.report(row.id, when)
             sent, local = self.peers[row.id].sent, self.peers[row.id].heard
         if not local or not self.peers.same(when, local, ago):
-            return None  # of another message than the last one that was heard here
+            return None  # not of the last message received here
         passage = Passage(sent, received, local)
         result = self._exchanges.add(row.id, frame.src, passage)
         return self._event(result, (frame.src, row.id), (row.rx_power, row.fp_power))
@@ -73,7 +72,7 @@ class Listener:
     def _receive(
         self, frame: Frame, src: Peer, reception: Reception, arrived: int
     ) -> RangeEvent | None:
-        """Take the message itself, from its sender to this node; of its parts the last counts."""
+        """Process the reception by this node; of several parts the last counts."""
         if reception.carrier is not None:
             self._exchanges.carrier(self._id, frame.src, arrived, reception.carrier)
         if frame.part + 1 < frame.parts:

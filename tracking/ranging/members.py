@@ -1,4 +1,4 @@
-"""Who takes part in a round, by rising ID: the routing table."""
+"""Members of a round, by rising ID: the routing table."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from tracking.ranging.frames.wire import Frame
 from tracking.ranging.peers import Peers
 
 MAX_MEMBERS = 62
-"""So many nodes take part in a round at most, those with the smallest IDs."""
+"""Most members of a round: the nodes with the smallest IDs."""
 
 
 class Members:
-    """The members that one node knows; the initiator decides, the others read its table."""
+    """Members that one node knows; the initiator decides, the others read its table."""
 
     def __init__(self, node_id: int) -> None:
         self._id = node_id
@@ -26,11 +26,11 @@ class Members:
         return node in self.ids
 
     def others(self) -> tuple[int, ...]:
-        """All but this node."""
+        """Return all members except this node."""
         return tuple(k for k in self.ids if k != self._id)
 
     def read(self, heard: Frame) -> tuple[int, ...] | None:
-        """Members that a request or reply names; None until all parts of its table were heard."""
+        """Return the members in a request or reply; None until all parts of its table arrived."""
         ids = [e.id for e in heard.entries]
         if heard.part == 0:
             self._rows = ids
@@ -44,18 +44,18 @@ class Members:
         return tuple(sorted({*self._rows[: heard.n - 1], heard.src}))
 
     def ask_first(self, now: int) -> None:
-        """This node becomes initiator: all members are taken to be there."""
+        """Start as initiator: all members count as present."""
         self._asked = now, now
 
     def renew(self, peers: Peers, at: int, drop_after: int) -> None:
-        """Decide on the next round: who was heard in the last one stays or joins.
+        """Decide the members of the next round: nodes received in the last one stay or join.
 
         Args:
-            peers: Who was heard, by this node or by others.
-            at: Begin of the next round, own clock.
+            peers: Nodes received by this node or by others.
+            at: Start of the next round, own clock.
             drop_after: Rounds without a message of a member until it is dropped.
         """
-        # What the last to speak have heard is told a round later: look two rounds back.
+        # Receptions of the last member are reported a round later: look two rounds back.
         since, self._asked = self._asked[0], (self._asked[1], at)
         ids = {self._id, *self.ids}
         for k, peer in peers:

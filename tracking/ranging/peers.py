@@ -1,4 +1,4 @@
-"""What one node remembers of the others: when each was heard, by itself and by the rest."""
+"""Memory of one node about the others: last reception by itself and by others."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from tracking.ranging.frames.timestamps import MODULUS, ticks, unwrap
 from tracking.ranging.frames.wire import Entry, Frame
 
 SLACK = ticks(5e-6)
-"""Two clocks agree on one message as far as this and `DRIFT`."""
+"""[ticks] Largest difference of two clocks about one message, in addition to `DRIFT`."""
 DRIFT = 100e-6
 ELSEWHERE = ticks(50e-6)
-"""A message reported later than the last one heard, by more than this, went past here."""
+"""[ticks] Delay after the last reception from which a reported message was missed here."""
 DOUBT = 16
-"""So many slots long a node is waited for, once a silence was none."""
+"""[slots] Time for which a node is waited for after a silent slot was followed by its message."""
 MAX_SILENCES = 2
-"""But not in more slots in a row."""
+"""Largest number of consecutive slots for such waits."""
 PATIENCE = 3
-"""After so many messages in a row that do not fit, the peer's clock must have jumped."""
+"""Number of consecutive misfits from which the peer's clock has jumped."""
 
 
 @dataclass(slots=True)
@@ -27,27 +27,27 @@ class Peer:
 
     boot: int = 0
     sent: int = 0
-    """When it left, the peer's clock without wraps."""
+    """Transmit time, the peer's clock without wraps."""
     heard: int = 0
-    """When it arrived, own clock without wraps; 0 if only others have heard this peer."""
+    """Receive time, own clock without wraps; 0 if only others have received this peer."""
     reported: int = 0
-    """When the last message left that anyone else heard, own clock."""
+    """Transmit time of its last message that any other node received, own clock."""
     rx_power: float = 0.0
     fp_power: float = 0.0
     fresh: bool = False
-    """Heard since this node's own last message."""
+    """True if received since this node's own last message."""
     missed: int = 0
-    """Rounds without a message of it."""
+    """Number of rounds without a message of the peer."""
     misfits: int = 0
-    """Messages in a row that do not fit its clock."""
+    """Number of consecutive messages that do not fit its clock."""
     silences: int = 0
-    """Slots of it in a row in which nothing was heard."""
+    """Number of consecutive slots of the peer without a reception."""
     doubt: int = 0
-    """Counts down from `DOUBT` since a silent slot after which it was heard again."""
+    """Counts down from `DOUBT` after a reception that followed a silent slot."""
 
 
 class Peers:
-    """All other nodes that were ever heard of."""
+    """All other nodes that were received or reported."""
 
     def __init__(self) -> None:
         self._peers: dict[int, Peer] = {}
@@ -59,16 +59,16 @@ class Peers:
         return self._peers[node]
 
     def forget(self) -> None:
-        """Drop all."""
+        """Drop all peers."""
         self._peers.clear()
 
     def take(self, frame: Frame, arrived: int) -> bool | None:
-        """Note a message that was heard.
+        """Record a received message.
 
         Returns:
-            True if its stamp goes on from the last one; False if the clock begins again, since
-            the peer is new, was switched on again or has jumped; None if the message is a
-            repeated or late one and must be ignored.
+            True if its stamp continues the last one; False if the clock restarts, since the peer
+            is new, was switched on again or has jumped; None for a repeated or late message, to
+            be ignored.
         """
         peer = self._peers.setdefault(frame.src, Peer())
         peer.doubt = DOUBT if peer.silences else max(peer.doubt - 1, 0)
@@ -86,22 +86,22 @@ class Peers:
         return False
 
     def report(self, node: int, when: int) -> None:
-        """Note that another node heard a message that left at a time of the own clock."""
+        """Record that another node received a message sent at a time of the own clock."""
         peer = self._peers.setdefault(node, Peer())
         peer.reported = max(peer.reported, when)
 
     @staticmethod
     def same(a: int, b: int, span: int) -> bool:
-        """Whether two clocks mean the same moment, a span away from one that they share."""
+        """Return whether two times mean the same moment, `span` after a moment that both share."""
         return abs(a - b) <= SLACK + DRIFT * span
 
     def hidden(self, node: int, since: int) -> bool:
-        """Whether others hear a node that this one does not: its last message went past here."""
+        """Return whether others receive a node whose last message was missed here."""
         peer = self._peers.get(node)
         return peer is not None and peer.reported > max(peer.heard + ELSEWHERE, since)
 
     def note_silence(self, node: int) -> bool:
-        """Note a silent slot; True if the node may be speaking all the same, as it was before."""
+        """Record a silent slot; return True if the node may be transmitting, as it was before."""
         peer = self._peers.get(node)
         if peer is None:
             return False
@@ -109,17 +109,17 @@ class Peers:
         return peer.doubt > 0 and peer.silences <= MAX_SILENCES
 
     def alive(self, node: int, since: int) -> bool:
-        """Whether anyone has heard a node since a time of the own clock."""
+        """Return whether any node has received a node since a time of the own clock."""
         peer = self._peers[node]
         return max(peer.heard, peer.reported) > since
 
     def table(self, members: tuple[int, ...], most: int) -> list[Entry]:
-        """At most `most` rows of the next message: the members, then other nodes received."""
+        """Return at most `most` rows of the next message: members, then other received nodes."""
         others = sorted(k for k, peer in self if peer.fresh and k not in members)
         return [self._row(k) for k in (*members, *others)][:most]
 
     def spoken(self) -> None:
-        """The own message is on its way: what is heard from now on goes into the next."""
+        """Start a new table after the own message: later receptions are in the next one."""
         for _, peer in self:
             peer.fresh = False
 

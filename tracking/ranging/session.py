@@ -1,9 +1,9 @@
 """One node of the ranging protocol, without a clock and without a radio.
 
-The shell that owns the radio calls it when a preamble is detected, when a frame has arrived or
-broken off, and when the `deadline` has come; the session answers with frames to send at exact
-times and with events. All times are 40-bit stamps of the node's own radio clock.
-`docs/reference/protocol.md` has the rules, the bytes and the tables of states.
+The program that owns the radio calls it when a preamble is detected, when a frame has arrived or
+broken off, and at the `deadline`; the session returns frames to send at exact times, and events.
+All times are 40-bit stamps of the node's own radio clock. `docs/reference/protocol.md` has the
+rules, the bytes and the tables of states.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from tracking.ranging.turns import Turns, Waiting
 
 
 class Session:
-    """The state machine of one node.
+    """State machine of one node.
 
-    Laws: never an exception, whatever comes in; there is always a deadline, and every state is
-    left when its deadline has come.
+    Properties: no input raises an exception; there is always a deadline, and every state is left
+    at its deadline.
     """
 
     def __init__(self, node_id: int, params: SessionParams, *, boot: int) -> None:
@@ -41,8 +41,8 @@ class Session:
 
         Args:
             node_id: 0 to 254, unique in the group.
-            params: How it takes part.
-            boot: A random number, drawn again whenever the node is switched on.
+            params: Parameters of the node.
+            boot: A random number, drawn at every power-on.
 
         Raises:
             ConfigError: An ID out of range.
@@ -62,12 +62,12 @@ class Session:
 
     @property
     def members(self) -> tuple[int, ...]:
-        """IDs of the members of the round that this node knows."""
+        """IDs of the members of the round, as this node knows them."""
         return self._members.ids
 
     @property
     def deadline(self) -> int:
-        """When `timeout` is to be called, 40-bit stamp."""
+        """Time at which to call `timeout`, 40-bit stamp."""
         return self._turns.deadline % MODULUS
 
     def start(self, now: int) -> list[Output]:
@@ -77,24 +77,24 @@ class Session:
         return self._give()
 
     def preamble(self, now: int) -> list[Output]:
-        """A preamble was detected: `frame` or `broken` will follow."""
+        """Handle a detected preamble: `frame` or `broken` follows."""
         if self._advance(now) and self.role is not Role.MUTED:
             self._turns.hold(self._time.now)
         return self._give()
 
     def broken(self, now: int) -> list[Output]:
-        """What came in was no frame."""
+        """Handle an incoming signal that was not a frame."""
         if self._advance(now) and self._turns.waiting is Waiting.FRAME:
             self._unreadable()
         return self._give()
 
     def frame(self, data: bytes, reception: Reception, now: int) -> list[Output]:
-        """A frame came in.
+        """Handle an incoming frame.
 
         Args:
-            data: Its bytes.
-            reception: What the radio tells of it.
-            now: Stamp of this moment.
+            data: Bytes of the frame.
+            reception: Radio data of the frame.
+            now: Stamp of the present moment.
         """
         if not self._advance(now) or self.role is Role.MUTED:
             return self._give()
@@ -115,7 +115,7 @@ class Session:
         return self._give()
 
     def timeout(self, now: int) -> list[Output]:
-        """The deadline has come."""
+        """Handle the deadline."""
         turns = self._turns
         if not self._advance(now) or self._time.now < turns.deadline:
             return self._give()
@@ -140,17 +140,17 @@ class Session:
         self._turns.await_slot(self._time.now, self.round, leads=leads, shut_out=shut_out)
 
     def _silent_slot(self) -> None:
-        """No preamble came in the slot at the cursor."""
+        """Handle a slot at the cursor without a preamble."""
         at_request = self._turns.at_request
         if not self._turns.silent(self._time.now, self.root):
             self._turns.request_missing(self.root)
             return
-        if at_request:  # others hear the initiator: its request went past here
+        if at_request:  # others receive the initiator: its request was missed here
             self.round = (self.round + 1) % 256
         self._await_slot()
 
     def _become_initiator(self) -> None:
-        """Start rounds of one's own: the initiator and all before this node are silent."""
+        """Start own rounds: the initiator and all earlier nodes in the succession are silent."""
         self._members.ids = tuple(k for k in self.members if k >= self.id)
         self.role, self.root = Role.INITIATOR, self.id
         self._members.ask_first(self._time.now)
@@ -176,28 +176,28 @@ class Session:
         turns.cursor += kind is not Type.JOIN
         if kind is Type.REQUEST and n == 1:
             turns.expected += self._dice.pause(self._params.idle)
-        if root != self.root:  # a smaller ID has joined: the next request is its
+        if root != self.root:  # a smaller ID has joined and sends the next request
             self.role, self.root = Role.RESPONDER, root
         self._await_slot()
 
     def _insert(self, at: int) -> None:
-        """Speak at the start of the gap, as a newcomer whose attempt is due."""
+        """Transmit at the start of the gap if a newcomer's attempt is due."""
         if self._time.now + self._slots.header <= at and self._joining.speaks(self.round):
             self._turns.check_at = self._time.now + self._dice.pause(self._params.first_check)
             self._speak(at)
 
     def _hear(self, heard: Frame, reception: Reception, arrived: int, end: int) -> None:
-        """Take a valid frame of another node, and one's place in the round that it tells."""
+        """Process a valid frame of another node, and keep in step with its round."""
         turns, in_turn = self._turns, heard.type in (Type.REQUEST, Type.REPLY)
         lost = turns.before in (Waiting.TAKEOVER, Waiting.WATCHDOG, Waiting.START)
         if self.role is Role.LISTENING and heard.root == self.id:
-            turns.resume()  # of those who followed this ID before it was switched on again
+            turns.resume()  # from nodes that followed this ID before it was switched on again
             return
         follows = heard.root == self.root and self.role is not Role.LISTENING
         events = None
         if follows or (in_turn and (heard.root < self.root or lost)):
             events = self._listener.take(heard, reception, arrived)
-        if events is None:  # a repeat, or of a group that will follow this one when it hears it
+        if events is None:  # a repeat, or of a group that will follow this one on reception
             self._unreadable()
             return
         self._out += events
@@ -215,13 +215,13 @@ class Session:
             self._insert(end + self._slots.turnaround)
 
     def _keep_step(self, heard: Frame) -> None:
-        """Take round, slot, members and initiator from a request or a reply."""
+        """Adopt round, slot, members and initiator of a request or a reply."""
         here = self.root, self.round, len(self._members)
         in_step = (heard.root, heard.round, heard.n) == here
         members = self._members.read(heard)
         self._turns.cursor = heard.slot + 1
         if self.role is Role.INITIATOR and heard.root == self.id:
-            if not in_step:  # the others have lost the request: ask again
+            if not in_step:  # the others have lost the request: repeat it
                 self._turns.cursor = len(self._members)
             return
         if members and (heard.type is Type.REQUEST or not in_step):
@@ -233,11 +233,11 @@ class Session:
         self.root = heard.root
 
     def _own_id(self, heard: Frame, end: int) -> None:
-        """Another node uses this node's ID: report it, tell it, and keep silent for a while."""
+        """Handle another node with the own ID: report it, alert it, and be silent for a while."""
         echo = heard.boot == self._boot
         if not echo:
             self._out.append(DuplicateId(self.id, heard.boot))
-        if echo or heard.type is Type.ALERT:  # after an alert it is the other one that is silent
+        if echo or heard.type is Type.ALERT:  # after an alert the other node is silent
             self._unreadable()
             return
         words = Words(Type.ALERT, heard.root, heard.round, min(heard.slot + 1, heard.n), heard.n)
@@ -248,14 +248,14 @@ class Session:
         self._turns.wait(Waiting.WATCHDOG, self._time.now + self._dice.pause(self._params.mute))
 
     def _unreadable(self) -> None:
-        """Time went by with something on the air that tells nothing."""
+        """Handle an unreadable transmission."""
         if self.role is Role.LISTENING:
             patience = self._turns.heard_at + ticks(self._params.watchdog)
             self._listen() if self._time.now < patience else self._turns.resume()
             return
         turns = self._turns
         if self.role is Role.INITIATOR and self._dice.bits(2) == 0:
-            turns.check_at = self._time.now  # not in step with a node that sent at the same time
+            turns.check_at = self._time.now  # lose step with a node that sent at the same time
         turns.unreadable(self._time.now, follows=self.role is Role.RESPONDER)
         if turns.before in (Waiting.TAKEOVER, Waiting.WATCHDOG):
             turns.request_missing(self.root)
@@ -263,7 +263,7 @@ class Session:
             self._await_slot()
 
     def _begin(self) -> None:
-        """Begin again: listen before speaking."""
+        """Start again: listen before transmitting."""
         self._forget()
         self.role, self.root = Role.LISTENING, self.id
         self._members.ask_first(self._time.now)
@@ -282,14 +282,14 @@ class Session:
         return 0 <= self._time.now - arrived <= self._slots.longest + self._slots.header
 
     def _advance(self, now: int) -> bool:
-        """Take the time; False if the clock has jumped back, and the node begins again."""
+        """Update the time; return False and restart if the clock has jumped back."""
         goes_on = self._time.take(now)
         if not goes_on:
             self._begin()
         return goes_on
 
     def _give(self) -> list[Output]:
-        """Hand out what there is, and what has changed since the last time."""
+        """Return the outputs, and changes since the last time."""
         out, self._out = self._out, []
         role, members = self._told
         if role != (self.role, self.root):

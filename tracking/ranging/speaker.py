@@ -1,4 +1,4 @@
-"""From what a node wants to say to frames with exact times, split where one is too short."""
+"""Conversion of messages to frames with exact times, split if one frame is too short."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tracking.ranging.params import SessionParams
 
 @dataclass(frozen=True, slots=True)
 class Words:
-    """One message before it has bytes and times."""
+    """A message without its bytes and times."""
 
     type: Type
     root: int
@@ -33,24 +33,24 @@ class Words:
 
 
 class Speaker:
-    """The outgoing side of one node."""
+    """Transmitter of one node."""
 
     def __init__(self, node_id: int, params: SessionParams, slots: Slots, boot: int) -> None:
         self._id, self._params, self._slots, self._boot = node_id, params, slots, boot
         self._sequence = 0
         self.room = MAX_PARTS * entries_per_frame(params.phy.max_frame)
-        """Rows that a message can have."""
+        """Number of rows that a message can have."""
 
     def say(self, words: Words, at: int) -> tuple[list[Transmission], int, int]:
-        """Make the frames of a message.
+        """Build the frames of a message.
 
         Args:
-            words: What it says.
-            at: First stamp moment at the earliest, own clock without wraps.
+            words: Fields of the message.
+            at: Earliest first stamp moment, own clock without wraps.
 
         Returns:
-            The frames; the stamp of the last one, own clock; when the next message's stamp
-            moment can be.
+            The frames; the stamp of the last one, own clock; the earliest stamp moment of the next
+            message.
         """
         out = []
         parts = split(words.rows, self._params.phy.max_frame)

@@ -1,4 +1,4 @@
-"""Whose turn it is: the slots of a round as one node sees them pass."""
+"""TDMA: the slots of a round as one node sees them pass."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from tracking.ranging.params import SessionParams
 from tracking.ranging.peers import Peers
 
 OPEN = 128
-"""Every so-manieth round ends with a free slot, for newcomers that the initiator cannot hear and
-that would always speak at the same time as it."""
+"""Number of rounds after which a round ends with a free slot, for newcomers that the initiator
+cannot receive because both would always transmit at the same time."""
 CHECK_ROUNDS = 64
-"""Between two checks of the own slot at least."""
+"""Least number of rounds between two checks of the own slot."""
 
 
 class Waiting(Enum):
-    """What the deadline is for."""
+    """Purposes of the deadline."""
 
     START = "no other node may be there: become initiator"
     FRAME = "a frame is coming in"
@@ -31,9 +31,9 @@ class Waiting(Enum):
 
 
 class Turns:
-    """The cursor of one node. Times are stamps of the own clock without wraps.
+    """Slot cursor of one node. Times are stamps of the own clock without wraps.
 
-    Slot k belongs to member k; slot 0, and every slot behind the last member, is that of the
+    Slot k belongs to member k; slot 0, and every slot after the last member, belongs to the
     initiator's request.
     """
 
@@ -49,48 +49,48 @@ class Turns:
         self._id, self._params, self._slots = node_id, params, slots
         self._members, self._peers, self._dice = members, peers, dice
         self.cursor = 0
-        """The slot that comes next."""
+        """Index of the next slot."""
         self.expected = 0
-        """The stamp moment of its message."""
+        """Stamp moment of the next slot's message."""
         self.waiting = self.before = Waiting.START
-        """What the deadline is for, and what it was for before a frame came in."""
+        """Purpose of the deadline, and the purpose before a frame came in."""
         self.deadline = self.heard_at = self.check_at = 0
-        """When the wait ends; when anything valid was last heard; when to listen in the own slot
-        next."""
+        """End of the wait; last reception of a valid frame; time from which to listen in the own
+        slot."""
         self._held_deadline = 0
         self._opened = -1
         self.foreign = False
-        """Whether what came in was none of this group's: it took no slot, only time."""
+        """True if the incoming frame was not of this group's slots: it took only time."""
 
     @property
     def at_request(self) -> bool:
-        """Whether the initiator's request comes next."""
+        """True if the initiator's request is next."""
         return self.cursor >= len(self._members)
 
     def wait(self, waiting: Waiting, deadline: int) -> None:
-        """Wait for something until then."""
+        """Set the purpose and the time of the deadline."""
         self.waiting, self.deadline = waiting, deadline
 
     def hold(self, now: int) -> None:
-        """A frame comes in: everything else waits for its end."""
+        """Wait for the end of an incoming frame."""
         if self.waiting is not Waiting.FRAME:
             self.before, self._held_deadline = self.waiting, self.deadline
-            # A newcomer speaks before the member whose turn it is.
+            # A newcomer transmits before the member of the slot.
             self.foreign = now < self.expected - self._slots.header
         self.wait(Waiting.FRAME, now + self._slots.longest + self._slots.header)
 
     def resume(self) -> None:
-        """The frame that came in changes nothing."""
+        """Restore the wait before a frame that changes nothing."""
         self.wait(self.before, self._held_deadline)
 
     def await_slot(self, now: int, round: int, *, leads: bool, shut_out: bool) -> None:
         """Wait for the slot at the cursor.
 
         Args:
-            now: The time.
-            round: Its number; every `OPEN`-th one ends with a slot for newcomers.
-            leads: Whether this node is the initiator.
-            shut_out: Whether this node is a newcomer that has tried to speak in vain.
+            now: Current time.
+            round: Number of the round; every `OPEN`-th one ends with a slot for newcomers.
+            leads: True if this node is the initiator.
+            shut_out: True if this node is a newcomer whose attempts have failed.
         """
         s = self._slots
         mine = leads if self.at_request else self._members.ids[self.cursor] == self._id
@@ -109,14 +109,14 @@ class Turns:
             self.wait(Waiting.SLOT, self.expected - s.header + s.sense)
 
     def silent(self, now: int, root: int) -> bool:
-        """No preamble came in the slot at the cursor: go on to the next slot.
+        """Go on to the next slot after a slot without a preamble.
 
         Args:
-            now: The time.
-            root: The initiator that this node follows.
+            now: Current time.
+            root: Initiator that this node follows.
 
         Returns:
-            False if it was the slot of the request and no node receives the initiator any more.
+            False if it was the slot of the request and the initiator is silent everywhere.
         """
         n, missing = len(self._members), self.at_request
         node = root if missing else self._members.ids[self.cursor]
@@ -131,18 +131,18 @@ class Turns:
         return True
 
     def unreadable(self, now: int, *, follows: bool) -> None:
-        """Something was on the air that tells nothing; it took the slot unless it was early.
+        """Handle an unreadable transmission; it took the slot unless it was early.
 
         Args:
-            now: The time, its end.
-            follows: Whether this node is a responder.
+            now: Current time, the end of the transmission.
+            follows: True if this node is a responder.
         """
         self.expected = now + self._slots.gap + self._slots.header
         if not self.foreign and self.before is not Waiting.PART:
             self.cursor = 1 if self.at_request and follows else self.cursor + 1
 
     def request_missing(self, root: int) -> None:
-        """The initiator is silent: wait for one's place in the line of succession."""
+        """Wait for one's position in the succession after a missing request."""
         self.wait(Waiting.WATCHDOG, self.heard_at + ticks(self._params.watchdog))
         heirs = [k for k in self._members.ids if k != root]
         if self._params.succession and self._id in heirs:

@@ -1,6 +1,6 @@
-"""Which measurements can be used, and which blocks cannot be meant.
+"""Usability of measurements, and validity of blocks.
 
-A measurement that cannot be is passed over; a block that no sensor could have sent is an error.
+An impossible measurement is skipped; a block that no sensor could have sent is an error.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from tracking.sanity.measurements import mark_usable
 
 
 def usable(block: MeasurementBlock) -> MeasurementBlock:
-    """The block without measurements that cannot be.
+    """Return the block without impossible measurements.
 
-    These are what is not finite, ranges of a node with itself, of 0 m or less, or of more than
-    `FARTHEST`, and orientations that are no rotation. A range whose powers are not finite is one
-    without powers. Quaternions that are nearly unit ones are normalised.
+    Events are dropped if they are not finite; ranges if they are of a node with itself, not above
+    0 m, or above `FARTHEST`; orientations if they are not rotations. Powers that are not finite are
+    removed from their range. Quaternions of nearly unit length are normalised.
     """
     kernel, given = usable_call(block)
     if not kernel(*given):
@@ -34,7 +34,7 @@ def usable(block: MeasurementBlock) -> MeasurementBlock:
 
 
 def usable_call(block: MeasurementBlock) -> Call:
-    """The kernel that looks at a block, with copies of its flags that it changes."""
+    """Return the kernel that checks a block, with copies of the flags that it changes."""
     flags = block.valid.copy(), block.has_power.copy(), np.empty_like(block.valid)
     return mark_usable, (block.t, block.kind, block.i, block.j, block.values, *flags)
 
@@ -42,17 +42,17 @@ def usable_call(block: MeasurementBlock) -> Call:
 def check(
     block: MeasurementBlock, t_out: F64, n_envs: int, group: Constellation, since: F64
 ) -> None:
-    """See that kernels, which look at nothing of this, can take a block.
+    """Check that kernels, which check none of this, can process a block.
 
     Args:
         block: Events.
         t_out: Times of the estimates, (1 or env, time) [s].
         n_envs: Environments of the tracker.
-        group: Its nodes.
+        group: Constellation of the tracker.
         since: Time of the last event that it handled, (env) [s].
 
     Raises:
-        ConfigError: What is wrong with it.
+        ConfigError: The block or the times are invalid.
     """
     if len(block.t) != n_envs:
         raise ConfigError(f"block: expected {n_envs} environments, got {len(block.t)}")

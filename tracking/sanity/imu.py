@@ -1,8 +1,8 @@
-"""Inertial samples that cannot be: a sensor that sticks, or jumps.
+"""Detection of stuck and spiking inertial sensors.
 
-Such samples are dropped before the orientation filter sees them. A gyroscope that repeats one
-reading turns the node for ever, and a single absurd one by half a radian; either takes tens of
-seconds of magnetometer to undo.
+Such samples are kept from the orientation filter: a gyroscope that repeats one reading turns
+the node without end, and a single absurd reading by half a radian; the magnetometer takes tens
+of seconds to correct either.
 """
 
 from __future__ import annotations
@@ -11,22 +11,22 @@ from tracking.kernels.jit import small_kernel
 
 SEEN, N_SAME, N_ODD, LAST, GOOD = 0, 1, 2, 3, 9
 N_HEALTH = 15
-"""Columns of the memory: any sample yet; equal readings in a row before the last; odd readings in
-a row; the last reading; the last that was believed."""
+"""Columns of the memory: 1 after the first sample; equal readings in a row before the last; odd
+readings in a row; the last reading; the last accepted reading."""
 
 
 @small_kernel
 def noise_scale(health, e, n, cut_x, cut_y, cut_z, levelled):
-    """How much of `OrientationParams.doubtful_psd` an acceleration is worse by [-].
+    """Return the factor on `OrientationParams.doubtful_psd` of an acceleration [-].
 
     Args:
         health: Memory, (env, node, N_HEALTH).
         e: Environment.
         n: Node.
-        cut_x: True where the scale of the accelerometer cut its x off.
-        cut_y: The same of y.
-        cut_z: The same of z, which a vehicle that stays level does not need.
-        levelled: True for such a vehicle.
+        cut_x: True if x of the accelerometer is saturated.
+        cut_y: True if y of the accelerometer is saturated.
+        cut_z: True if z is saturated, which vehicles that stay level do not use.
+        levelled: True for vehicles that stay level.
     """
     is_cut = cut_x or cut_y or (cut_z and not levelled)
     return 1.0 if is_cut or health[e, n, N_ODD] > 0.0 else 0.0
@@ -34,19 +34,19 @@ def noise_scale(health, e, n, cut_x, cut_y, cut_z, levelled):
 
 @small_kernel
 def inspect_sample(q, health, e, n, values, row, k):
-    """Judge a sample; what is to be used instead of it is in the columns GOOD.
+    """Check a sample; the columns GOOD hold the reading to use in its place.
 
     Args:
         q: Record of `SanityParams`.
         health: Memory, (env, node, N_HEALTH), updated; zeros before the first sample.
         e: Environment.
         n: Node.
-        values: From column 0, gyroscope [rad/s] and specific force [m/s2], (row, sample, 6...).
-        row: Of `values`.
-        k: Sample.
+        values: Gyroscope [rad/s] and specific force [m/s2] from column 0, (row, sample, 6...).
+        row: Row of `values`.
+        k: Sample of `values`.
 
     Returns:
-        True unless the sensor sticks.
+        False for a sensor that is stuck.
     """
     seen = health[e, n, SEEN] != 0.0
     equal, odd = seen, False

@@ -1,4 +1,4 @@
-"""Marks the measurements of a block that can be, and the powers and quaternions that cannot."""
+"""Marks of usable measurements, of their powers, and of quaternions to normalise."""
 
 from __future__ import annotations
 
@@ -9,27 +9,27 @@ from tracking.kernels.jit import kernel
 # Plain numbers of `Kind`: kernels do not know enums.
 STATE, SURVEY, RANGE = 3, 4, 5
 FARTHEST = 1000.0
-"""[m] No UWB radio ranges farther."""
+"""[m] Largest range of UWB radios."""
 UNIT, NEAR_UNIT = 1e-3, 0.1
-"""[-] A quaternion's length may differ from 1 by the first; up to the second it is normalised."""
+"""[-] Deviations of a quaternion's length from 1: accepted, and normalised."""
 
 
 @kernel
 def mark_usable(t, kind, i, j, values, valid, has_power, odd):
-    """Take marks off what cannot be.
+    """Clear the marks of impossible measurements.
 
     Args:
-        t: Of the block, like all that follow, (env, event) [s].
-        kind: (env, event).
-        i: (env, event).
-        j: (env, event).
-        values: (env, event, N_VALUES).
-        valid: Written, (env, event).
-        has_power: Written, (env, event).
-        odd: Written: True for quaternions that are to be normalised, (env, event).
+        t: Times of the block, (env, event) [s].
+        kind: Kinds of the events, (env, event).
+        i: Nodes of the events, (env, event).
+        j: Other nodes of the events, (env, event).
+        values: Measured values, (env, event, N_VALUES).
+        valid: False for padding, (env, event), written.
+        has_power: True for ranges with powers, (env, event), written.
+        odd: True for quaternions to normalise, (env, event), written.
 
     Returns:
-        True if anything was marked otherwise than it came.
+        True if any mark differs from the input.
     """
     changed = False
     for e in range(t.shape[0]):

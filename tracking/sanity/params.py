@@ -1,4 +1,4 @@
-"""What makes an inertial sample doubtful: every number with its unit, its effect and its source."""
+"""Parameters of the checks of inertial samples, each with unit, effect and source."""
 
 from __future__ import annotations
 
@@ -12,43 +12,43 @@ from tracking.records import Records, record_of
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SanityParams:
-    """Thresholds of the checks before the orientation filter.
+    """Thresholds of the checks upstream of the orientation filter.
 
-    All are the authors' choice, on the noise of the recorded and simulated sensors.
+    All are the authors' choice, for the noise of the recorded and simulated sensors.
     """
 
     stuck_after: float = 20.0
-    """[-] Readings in a row that are equal in all six axes; noise makes two of them rare."""
+    """[-] Number of readings in a row, equal in all six axes, of a stuck sensor."""
     gyr_jump: float = 25.0
-    """[rad/s] A change between two samples that no vehicle makes."""
+    """[rad/s] Rate change between two samples that no vehicle reaches."""
     acc_jump: float = 400.0
-    """[m/s2] The same of the specific force."""
+    """[m/s2] Change of the specific force between two samples that no vehicle reaches."""
     odd_most: float = 3.0
-    """[-] Odd readings in a row after which they are used after all."""
+    """[-] Number of odd readings in a row after which readings are used again."""
     chance: float = 1e-5
-    """[-] A run of equal readings is chance as long as it is more likely than this."""
+    """[-] Probability below which a run of equal readings is not attributed to chance."""
     equal_least: float = 0.02
-    """[-] Least share of readings that are equal to the one before, however few came."""
+    """[-] Least assumed share of readings that equal their predecessor."""
     equal_most: float = 0.9
-    """[-] Largest such share."""
+    """[-] Largest assumed share of readings that equal their predecessor."""
     equal_memory: float = 500.0
-    """[-] Readings over which that share is taken."""
+    """[-] Number of readings over which that share is averaged."""
     mean_memory: float = 100.0
-    """[-] Readings over which the mean of an axis is taken."""
+    """[-] Number of readings over which the mean of an axis is taken."""
     limit_least: float = 0.5
-    """[m/s2] The limit of an axis is at least so far from its mean."""
+    """[m/s2] Least distance of a saturation limit from the mean of its axis."""
     held_long: float = 20.0
-    """[-] An axis that repeats itself so often while others change is saturated."""
+    """[-] Number of repetitions of an axis, while others change, that counts as saturation."""
     held_change: float = 1.0
-    """[m/s2] By so much others have to change."""
+    """[m/s2] Change of the other axes that `held_long` requires."""
     whole_after: float = 100.0
-    """[-] Readings in a row within the scale before they tell the tilt again."""
+    """[-] Number of unsaturated readings in a row before they correct the tilt again."""
 
     def __post_init__(self) -> None:
         check_numbers(self)
 
     def as_record(self) -> Records:
-        """For kernels, (1); `chance` is its logarithm."""
+        """Return the record for kernels, (1), with the logarithm of `chance`."""
         record = record_of(self)
         record["chance"] = np.log(self.chance)
         return record

@@ -1,15 +1,14 @@
-"""Axes of an accelerometer at the end of their scale: flat tops in a lively signal.
+"""Detection of saturated accelerometer axes: flat tops in a lively signal.
 
-An axis that is cut off repeats one number, the largest or the smallest that it reads. A run of
-equal readings is taken for that once it is longer than chance makes them, which depends on how
-the sensor rounds and is learned from the readings themselves, and if it lies away from their
-mean. The limit is then known: single readings of it count as well, until one goes beyond. An
-axis that repeats itself for long while another changes is taken for the same: it may have been
-beyond its limit from the beginning. Readings that are equal in all axes are none of this: they
-stand for some that were lost.
+A saturated axis repeats one number, the largest or the smallest of its readings. A run of equal
+readings counts as saturation if it is longer than by chance, which depends on the sensor's
+rounding and is estimated from the readings, and if it lies away from their mean. The limit is
+known from then on: single readings at it count as well, until one exceeds it. An axis that
+repeats itself for long while another changes counts, too: it may have been beyond its limit from
+the start. Readings that are equal in all axes do not count: they replace lost ones.
 
-What is cut off is used and doubted; but it tells no tilt, nor do the readings about it: the
-largest left out, the mean acceleration of a motion is no longer zero.
+Saturated readings are used with more noise, but neither they nor the readings around them correct
+the tilt: without the largest readings, the mean acceleration of a motion is not zero.
 """
 
 from __future__ import annotations
@@ -22,15 +21,14 @@ LAST, RUN, MEAN, SHARE, LOW, HIGH, START = 0, 1, 2, 3, 4, 5, 6
 N_AXIS = 7
 SEEN, N_WHOLE = 3 * N_AXIS, 3 * N_AXIS + 1
 N_LIMIT = 3 * N_AXIS + 2
-"""Columns of the memory. For each axis: the last reading; how many before it were equal; their
-mean; share that are equal; the limits found, infinite for none; what was read when the run of
-the axis began, summed over the other two. Then: any reading yet; readings in a row within the
-scale."""
+"""Columns of the memory. For each axis: last reading; number of equal ones before it; mean; share
+of equal ones; limits found, infinite for none; sum of the other two axes at the start of the run.
+Then: 1 after the first reading; number of unsaturated readings in a row."""
 
 
 @small_kernel
 def start_limits(q, memory, e, n, x, y, z):
-    """Begin with a reading."""
+    """Initialise the memory with a reading."""
     for a in range(3):
         at = a * N_AXIS
         first = (x, y, z)[a]
@@ -42,7 +40,7 @@ def start_limits(q, memory, e, n, x, y, z):
 
 @small_kernel
 def is_at_limit(q, memory, e, n, at, x, others, held):
-    """Whether the reading of one axis is at its limit.
+    """Return whether the reading of one axis is at its limit.
 
     Args:
         q: Record of `SanityParams`.
@@ -50,9 +48,9 @@ def is_at_limit(q, memory, e, n, at, x, others, held):
         e: Environment.
         n: Node.
         at: First column of the axis.
-        x: Its reading [m/s2].
+        x: Reading of the axis [m/s2].
         others: Sum of the readings of the other axes [m/s2].
-        held: Whether all three are as they were.
+        held: True if all three axes repeat their last reading.
     """
     equal = x == memory[e, n, at + LAST]
     run = memory[e, n, at + RUN]
@@ -84,7 +82,7 @@ def is_at_limit(q, memory, e, n, at, x, others, held):
 
 @small_kernel
 def find_limits(q, memory, e, n, x, y, z):
-    """Note which axes are at their limit.
+    """Return which axes are saturated, and update their limits.
 
     Args:
         q: Record of `SanityParams`.
@@ -96,7 +94,7 @@ def find_limits(q, memory, e, n, x, y, z):
         z: Specific force [m/s2], along z.
 
     Returns:
-        True for each axis that is cut off; True if the sample tells the tilt.
+        True for each saturated axis; True if the sample may correct the tilt.
     """
     if memory[e, n, SEEN] == 0.0:
         start_limits(q, memory, e, n, x, y, z)

@@ -83,7 +83,7 @@ def test_grid_is_the_first_at_or_after(time):
     assert at % GRID == 0
     assert 0 <= at - time < GRID
     assert on_grid(at) == at
-    assert (at % MODULUS) % GRID == 0  # the grid has no seam at the wrap
+    assert (at % MODULUS) % GRID == 0  # the grid is continuous at the wrap
 
 
 @quick

@@ -1,4 +1,4 @@
-"""The bytes of a message: what goes in comes out, and nothing else is a frame."""
+"""Bytes of messages: valid frames round-trip, and nothing else decodes."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -92,19 +92,19 @@ def frames(draw):
 
 
 def summed(body):
-    """Bytes with the check sum that fits them."""
+    """Append the matching check sum to bytes."""
     return bytes(body) + crc16(bytes(body)).to_bytes(2, "little")
 
 
 def changed(frame, at, value):
-    """The bytes of a frame with one byte changed and a check sum that fits."""
+    """Return the bytes of a frame with one byte changed and a matching check sum."""
     body = bytearray(encode(frame)[:-2])
     body[at] = value
     return summed(body)
 
 
 def accept(data):
-    """A frame or a WireError; a frame has one form only."""
+    """Decode to a frame or a WireError; a frame has one form only."""
     try:
         frame = decode(data)
     except WireError:
@@ -200,10 +200,10 @@ PLAIN = Frame(Type.REPLY, 5, 2, 9, 1, 3, 77, 1024, (Entry(2, 512, -75.0, -78.0),
         ("slot", 12, 4),
         ("slot", 13, 0),
         ("part", 14, 0x10),
-        ("table", 21, 255),  # an ID that there is not
+        ("table", 21, 255),  # an invalid ID
         ("table", 21, 5),  # the sender itself
         ("table", 21, 7),  # twice
-        ("table", 28 + 1, 1),  # a stamp of a node that was not heard
+        ("table", 28 + 1, 1),  # a stamp of a node that was not received
         ("table", 28 + 6, 0xF1),  # and a power
     ],
 )

@@ -1,1 +1,1 @@
-"""The ranging session in compiled form, for batches of environments."""
+"""Compiled ranging session for batches of environments."""

@@ -15,11 +15,11 @@ from tracking.ranging.frames.timestamps import METRES_PER_TICK, SPEED_OF_LIGHT, 
 
 NO_INTERVAL, FITS, MISFIT = 0, 1, 2
 FIRST_VAR = (30e-6) ** 2
-"""[1] Variance of a clock skew of which nothing is known yet."""
+"""[1] Initial variance of a clock skew."""
 
 
 class ExchangeNumbers(NamedTuple):
-    """`ExchangeParams` and `ClockParams` as plain numbers; the units are theirs."""
+    """`ExchangeParams` and `ClockParams` as plain numbers, in their units."""
 
     max_skew: float
     carrier_var: float
@@ -35,15 +35,15 @@ class ExchangeNumbers(NamedTuple):
 
 @small_kernel
 def predict_skew(p, var, elapsed):
-    """Variance of a clock skew after so many ticks [1]: it wanders, the mean does not."""
+    """Predict the variance of a clock skew over elapsed ticks [1]; the mean stays."""
     dt = min(max(elapsed, 0) / TICK_HZ, 10.0)
     return min(var + p.wander * dt, FIRST_VAR)
 
 
 @small_kernel
 def take_carrier(p, mean, var, offset):
-    """Mean and variance of a clock skew after a reading of the carrier offset [1]."""
-    if not abs(offset) <= p.max_skew:  # nor if it is no number
+    """Return mean and variance of a clock skew after a reading of the carrier offset [1]."""
+    if not abs(offset) <= p.max_skew:  # also if it is not a number
         return mean, var
     gain = var / (var + p.carrier_var)
     return mean + gain * (offset - mean), (1.0 - gain) * var
@@ -51,15 +51,15 @@ def take_carrier(p, mean, var, offset):
 
 @small_kernel
 def take_interval(p, mean, var, misfits, received, sent):
-    """Take the stamps of two messages of one sender.
+    """Update a clock skew by the stamps of two messages of one sender.
 
     Args:
-        p: Beliefs.
+        p: ExchangeNumbers.
         mean: Clock skew so far: how much faster the receiver's clock runs [1].
-        var: Its variance.
-        misfits: Intervals in a row that did not fit.
-        received: Between the two receptions, receiver's ticks.
-        sent: Between the two transmissions, sender's ticks.
+        var: Variance of the clock skew.
+        misfits: Number of consecutive intervals that did not fit.
+        received: Interval of the two receptions, receiver's ticks.
+        sent: Interval of the two transmissions, sender's ticks.
 
     Returns:
         NO_INTERVAL, FITS or MISFIT; the skew of the interval; mean, var, misfits after it.
@@ -81,20 +81,20 @@ def take_interval(p, mean, var, misfits, received, sent):
 
 @small_kernel
 def exchange_distance(p, round_trip, reply, fit, skew, mean, var):
-    """Distance of an asker and an answering node [m], or a negative number if none can be told.
+    """Return the distance of asker and answerer [m], or a negative number if it is unknown.
 
-    With the skew of the interval since the answering node's last message this is an
-    asymmetric double-sided exchange: clock rates cancel to first order, and a distance that
-    changes evenly comes out as it was when the asker sent.
+    With the skew of the interval since the answerer's last message this is an asymmetric
+    double-sided exchange: clock rates cancel to first order, and a distance that changes at a
+    constant rate is that of the asker's transmission.
 
     Args:
-        p: Beliefs.
+        p: ExchangeNumbers.
         round_trip: From the asker's transmission to the answer's reception, asker's ticks.
-        reply: From reception to transmission at the answering node, its ticks.
-        fit: What `take_interval` said of that interval.
-        skew: Its skew: how much faster the asker's clock runs than the answering one's [1].
-        mean: The skew by all that is known, for want of a fresh interval.
-        var: Its variance.
+        reply: From reception to transmission at the answerer, its ticks.
+        fit: Result of `take_interval` for that interval.
+        skew: Skew of the interval: how much faster the asker's clock runs than the answerer's [1].
+        mean: Estimated skew, used without a fresh interval.
+        var: Variance of `mean`.
     """
     if reply <= 0 or reply > p.max_reply * TICK_HZ or fit == MISFIT:
         return -1.0

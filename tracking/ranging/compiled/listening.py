@@ -1,7 +1,7 @@
-"""Kernels of `listening`, `peers` and `exchange`: what a node makes of a message it hears.
+"""Kernels of `listening`, `peers` and `exchange`: evaluation of received messages.
 
-They keep the node's own pairs only, and of these the ranges that the node with the smaller
-number resolves; `p`, `s`, `peers`, `me` as in `heading_gauge`.
+They store only pairs of the node itself, and return only ranges that the node with the smaller
+number computes; `p`, `s`, `peers` and `me` are as in `compiled.turns`.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from tracking.ranging.peers import DOUBT, DRIFT, PATIENCE, SLACK
 
 @small_kernel
 def same_moment(a, b, span):
-    """`Peers.same`."""
+    """Return whether two times are one moment, as `Peers.same`."""
     return abs(a - b) <= SLACK + DRIFT * span
 
 
 @small_kernel
 def forget_exchange(peer):
-    """`Exchanges.forget` of one pair."""
+    """Drop the exchanges of one pair as `Exchanges.forget`."""
     peer.asked = peer.answered = False
     peer.skew_time = peer.skew_misfits = 0
     peer.skew_mean = 0.0
@@ -35,7 +35,7 @@ def forget_exchange(peer):
 
 @small_kernel
 def forget_peers(s, peers, me):
-    """`Listener.forget`."""
+    """Reset the peers as `Listener.forget`."""
     s.spoken = 0
     s.fresh = 0
     for k in range(peers.shape[0]):
@@ -48,7 +48,7 @@ def forget_peers(s, peers, me):
 
 @small_kernel
 def take_stamp(peer, boot, stamp, arrived):
-    """`Peers.take`: 1 if the clock goes on, 0 if it begins again, -1 if it does not fit."""
+    """Update a peer as `Peers.take`: 1 if the clock continues, 0 if it restarts, -1 if not."""
     peer.known = True
     peer.doubt = DOUBT if peer.silences else max(peer.doubt - 1, 0)
     peer.silences = 0
@@ -66,21 +66,21 @@ def take_stamp(peer, boot, stamp, arrived):
 
 @small_kernel
 def take_message(p, s, peers, me, src, message, rows, arrived, carrier):
-    """`Listener.take`.
+    """Process a message as `Listener.take`.
 
     Args:
         p: SessionNumbers.
         s: SESSION of this node, updated.
         peers: PEER, (node, node), updated.
         me: Number of this node.
-        src: Who sent it.
-        message: MESSAGE.
-        rows: When every node heard each other one, its own clock, (node, node).
-        arrived: Own clock.
+        src: Sender of the message.
+        message: MESSAGE of the sender.
+        rows: Receive times of every node from each other one, its own clock, (node, node).
+        arrived: Receive time, own clock.
         carrier: Carrier offset [1].
 
     Returns:
-        Whether it was taken; the distance to `src` [m], negative if none was completed; its
+        Whether it was accepted; the distance to `src` [m], negative if none was completed; its
         time, own clock.
     """
     peer = peers[me, src]
@@ -114,7 +114,7 @@ def take_message(p, s, peers, me, src, message, rows, arrived, carrier):
 
 @small_kernel
 def complete(p, peer, arrived, carrier):
-    """`Exchanges.carrier` and `Exchanges.add` of a message to this node."""
+    """Complete an exchange as `Exchanges.carrier` and `Exchanges.add` for the receiver."""
     if peer.skew_time:
         peer.skew_var = predict_skew(p, peer.skew_var, arrived - peer.skew_time)
     peer.skew_mean, peer.skew_var = take_carrier(p, peer.skew_mean, peer.skew_var, carrier)

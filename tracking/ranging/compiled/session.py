@@ -1,12 +1,12 @@
-"""The session in compiled form, for batches of environments: the twin of `Session`.
+"""Compiled session for batches of environments, equivalent to `Session`.
 
-The same messages at the same times give the same roles, stamps and ranges; a test holds it to
-that. It leaves out what a simulation of one group of distinct nodes does not need: bytes and
+The same messages at the same times give the same roles, stamps and ranges, which a test checks. It
+leaves out features that a simulation of one group of distinct nodes does not need: bytes and
 their errors, tables split over frames, other PANs, duplicate IDs (and so the muted role),
-clocks that jump, antenna delays that the node knows of, ranges overheard by third nodes and
-those that the node with the larger ID resolves a little later.
+clocks that jump, antenna delays that the node knows, ranges overheard by third nodes and
+those that the node with the larger ID computes a little later.
 
-`p`, `s`, `peers`, `me` as in `heading_gauge`.
+`p`, `s`, `peers` and `me` are as in `compiled.turns`.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ REQUEST, REPLY, JOIN = 1, 2, 3
 
 @small_kernel
 def switch_on(p, s, peers, me, boot, now):
-    """`Session.__init__` and `Session.start`."""
+    """Switch a node on as `Session.__init__` and `Session.start`."""
     s.boot = boot & 255
     s.dice = (boot * 2654435761 + me + 1) & 0xFFFFFFFF
     s.round = s.cursor = s.expected = 0
@@ -53,7 +53,7 @@ def switch_on(p, s, peers, me, boot, now):
 
 @small_kernel
 def begin(p, s, peers, me):
-    """`Session._begin`."""
+    """Start again as `Session._begin`."""
     forget_peers(s, peers, me)
     set_members(s, 1 << me)
     s.role, s.root = LISTENING, me
@@ -65,14 +65,14 @@ def begin(p, s, peers, me):
 
 @small_kernel
 def take_preamble(p, s, now):
-    """`Session.preamble`."""
+    """Handle a preamble as `Session.preamble`."""
     s.now = max(now, s.now)
     hold(p, s)
 
 
 @small_kernel
 def take_broken(p, s, me, now):
-    """`Session.broken`."""
+    """Handle a broken frame as `Session.broken`."""
     s.now = max(now, s.now)
     if s.waiting == FRAME:
         unreadable(p, s, me)
@@ -80,7 +80,7 @@ def take_broken(p, s, me, now):
 
 @small_kernel
 def take_timeout(p, s, peers, me, message, rows):
-    """`Session.timeout` at the deadline; it may speak."""
+    """Handle the deadline as `Session.timeout`; the node may transmit."""
     s.now = max(s.deadline, s.now)
     waiting = s.waiting
     if waiting == FRAME:
@@ -101,11 +101,11 @@ def take_timeout(p, s, peers, me, message, rows):
 
 @small_kernel
 def take_frame(p, s, peers, me, src, message, rows, arrived, carrier, now):
-    """`Session.frame` of a valid frame, up to the moment at which a newcomer may speak.
+    """Handle a valid frame as `Session.frame`, up to the time at which a newcomer may transmit.
 
     Returns:
-        Whether a newcomer may speak, after the frame; a distance [m], negative if none; its
-        time.
+        Whether a newcomer may transmit, after the frame; a distance [m], negative if none; the
+        time of the distance.
     """
     s.now = max(now, s.now)
     hold(p, s)
@@ -134,7 +134,7 @@ def take_frame(p, s, peers, me, src, message, rows, arrived, carrier, now):
 
 @small_kernel
 def keep_step(s, me, message):
-    """`Session._keep_step`."""
+    """Keep in step as `Session._keep_step`."""
     in_step = message.root == s.root and message.round == s.round and message.n == s.n
     s.cursor = message.slot + 1
     if s.role == INITIATOR and message.root == me:
@@ -151,7 +151,7 @@ def keep_step(s, me, message):
 
 @small_kernel
 def may_insert(p, s):
-    """`Joining.speaks` and what `Session._insert` does then."""
+    """Return `Joining.speaks`, and schedule the check as `Session._insert`."""
     if s.round == s.tried_round:
         return False
     if s.backoff > 0:
@@ -166,7 +166,7 @@ def may_insert(p, s):
 
 @small_kernel
 def speak(p, s, peers, me, message, rows, at):
-    """`Session._speak`; the message is written and waits to be sent.
+    """Prepare a message as `Session._speak`; it waits to be sent.
 
     Args:
         p: SessionNumbers.
@@ -174,9 +174,9 @@ def speak(p, s, peers, me, message, rows, at):
         peers: PEER, (node, node), updated.
         me: Number of this node.
         message: MESSAGE of this node, written.
-        rows: When every node heard each other one, its own clock, (node, node); its row is
-            written.
-        at: First moment for the stamp, own clock.
+        rows: Receive times of every node from each other one, its own clock, (node, node); the
+            row of this node is written.
+        at: Earliest stamp moment, own clock.
     """
     kind, root = JOIN, s.root
     if s.role == INITIATOR and s.cursor >= s.n:
@@ -213,7 +213,7 @@ def speak(p, s, peers, me, message, rows, at):
 
 @small_kernel
 def renew_members(p, s, peers, me):
-    """`Members.renew`."""
+    """Decide the members as `Members.renew`."""
     members = s.members | 1 << me
     for k in range(peers.shape[0]):
         peer = peers[me, k]

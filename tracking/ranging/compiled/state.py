@@ -1,4 +1,4 @@
-"""The records of the compiled session: what `Session` and its parts remember, node by node."""
+"""Records of the compiled session: the memory of `Session` and its parts, node by node."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ SESSION = np.dtype(
         ("opened", "i8"),
         # Listener and Speaker
         ("spoken", "i8"),
-        ("fresh", "i8"),  # bit k: heard since the own last message
+        ("fresh", "i8"),  # bit k: received since the own last message
         ("speaks", "?"),  # a message is waiting to be sent, or is being sent
         ("speak_at", "i8"),
     ]
 )
-"""One node."""
+"""State of one node."""
 
 PEER = np.dtype(
     [
@@ -74,7 +74,7 @@ PEER = np.dtype(
         ("skew_misfits", "i8"),
     ]
 )
-"""What one node remembers of another."""
+"""State of one node about another."""
 
 MESSAGE = np.dtype(
     [
@@ -85,13 +85,13 @@ MESSAGE = np.dtype(
         ("n", "i8"),
         ("boot", "i8"),
         ("stamp", "i8"),  # sender's clock without wraps
-        ("members", "i8"),  # first rows of the table, with the sender unless it is none
-        ("heard", "i8"),  # rows with a stamp
+        ("members", "i8"),  # first rows of the table; with the sender if it is a member
+        ("heard", "i8"),  # bit k: row k has a stamp
         ("rows", "i8"),  # length of the table
         ("ticks", "i8"),  # time on the air
     ]
 )
-"""A message that is sent, in place of its bytes; the stamps of its rows are kept next to it."""
+"""A sent message in place of its bytes; the stamps of its rows are stored separately."""
 
 
 class SessionNumbers(NamedTuple):
@@ -114,17 +114,17 @@ class SessionNumbers(NamedTuple):
     drop_after: int
     exchange: ExchangeNumbers
     frame: I64
-    """Of a frame with k rows, (k) [ticks]."""
+    """Duration of a frame with k rows, (k) [ticks]."""
     message: I64
-    """Of a group of n nodes with its gap, (n) [ticks]."""
+    """Duration of a message with its gap in a group of n nodes, (n) [ticks]."""
 
 
 def session_numbers(params: SessionParams, n_nodes: int) -> SessionNumbers:
     """Derive the numbers of the kernels.
 
     Args:
-        params: As for `Session`; the antenna delay and the PAN play no part.
-        n_nodes: Of the group, at most `MAX_MEMBERS`, and so few that a table fits into one frame.
+        params: As for `Session`; the antenna delay and the PAN have no effect.
+        n_nodes: Size of the group, at most `MAX_MEMBERS`, whose table fits into one frame.
     """
     slots = Slots(params.phy)
 
@@ -155,7 +155,7 @@ def session_numbers(params: SessionParams, n_nodes: int) -> SessionNumbers:
 
 
 def make_sessions(n_envs: int, n_nodes: int) -> tuple[Records, Records]:
-    """SESSION (env, node) and PEER (env, node, node), all switched off."""
+    """Return SESSION (env, node) and PEER (env, node, node), all switched off."""
     peers = np.zeros((n_envs, n_nodes, n_nodes), dtype=PEER)
     peers["skew_var"] = FIRST_VAR
     return np.zeros((n_envs, n_nodes), dtype=SESSION), peers

@@ -1,4 +1,4 @@
-"""Kernels of `turns`, `dice` and `members`: bit k of an integer stands for node k.
+"""Kernels of `turns`, `dice` and `members`; bit k of an integer is node k.
 
 `p` is a `SessionNumbers`, `s` the SESSION of node `me`, `peers` PEER (node, node) of its
 environment everywhere.
@@ -16,7 +16,7 @@ START, FRAME, TURN, SLOT, TAKEOVER, WATCHDOG = 0, 1, 2, 3, 4, 5
 
 @small_kernel
 def count_bits(mask):
-    """Members in a set."""
+    """Return the number of members in a set."""
     count = 0
     while mask:
         mask &= mask - 1
@@ -26,13 +26,13 @@ def count_bits(mask):
 
 @small_kernel
 def place_of(mask, node):
-    """Members with smaller numbers."""
+    """Return the number of members with smaller numbers than a node."""
     return count_bits(mask & ((1 << node) - 1))
 
 
 @small_kernel
 def member_at(mask, place):
-    """Number of the member at a place."""
+    """Return the number of the member at a place."""
     for _ in range(place):
         mask &= mask - 1
     return count_bits((mask & -mask) - 1)
@@ -40,34 +40,34 @@ def member_at(mask, place):
 
 @small_kernel
 def set_members(s, mask):
-    """Take a set of members."""
+    """Set the members."""
     s.members = mask
     s.n = count_bits(mask)
 
 
 @small_kernel
 def random_bits(s, n):
-    """`Dice.bits`."""
+    """Return random bits as `Dice.bits`."""
     s.dice = (1664525 * s.dice + 1013904223) & 0xFFFFFFFF
     return s.dice >> (32 - n)
 
 
 @small_kernel
 def pause(s, interval):
-    """`Dice.pause`."""
+    """Return a pause as `Dice.pause`."""
     return interval[0] + ((random_bits(s, 20) * (interval[1] - interval[0])) >> 20)
 
 
 @small_kernel
 def wait(s, waiting, deadline):
-    """`Turns.wait`."""
+    """Wait as `Turns.wait`."""
     s.waiting = waiting
     s.deadline = deadline
 
 
 @small_kernel
 def hold(p, s):
-    """`Turns.hold`."""
+    """Wait for a frame as `Turns.hold`."""
     if s.waiting != FRAME:
         s.before = s.waiting
         s.held_deadline = s.deadline
@@ -77,7 +77,7 @@ def hold(p, s):
 
 @small_kernel
 def await_slot(p, s, me):
-    """`Turns.await_slot`."""
+    """Wait for the next slot as `Turns.await_slot`."""
     leads = s.role == INITIATOR
     mine = leads if s.cursor >= s.n else member_at(s.members, s.cursor) == me
     if s.cursor >= s.n and s.round % OPEN == OPEN - 1 and s.round != s.opened:
@@ -100,7 +100,7 @@ def await_slot(p, s, me):
 
 @small_kernel
 def silent_slot(p, s, peers, me):
-    """`Session._silent_slot` and `Turns.silent`."""
+    """Handle a silent slot as `Session._silent_slot` and `Turns.silent`."""
     missing = s.cursor >= s.n
     node = s.root if missing else member_at(s.members, s.cursor)
     since = s.now - 2 * s.n * p.message[s.n]
@@ -125,7 +125,7 @@ def silent_slot(p, s, peers, me):
 
 @small_kernel
 def request_missing(p, s, me):
-    """`Turns.request_missing`."""
+    """Wait for a takeover as `Turns.request_missing`."""
     wait(s, WATCHDOG, s.heard_at + p.watchdog)
     if p.succession and me != s.root and (s.members >> me) & 1:
         heirs = s.members & ~(1 << s.root)
@@ -137,7 +137,7 @@ def request_missing(p, s, me):
 
 @small_kernel
 def unreadable(p, s, me):
-    """`Session._unreadable` and `Turns.unreadable`."""
+    """Handle noise as `Session._unreadable` and `Turns.unreadable`."""
     if s.role == LISTENING:
         if s.now < s.heard_at + p.watchdog:
             listen(p, s)
@@ -157,5 +157,5 @@ def unreadable(p, s, me):
 
 @small_kernel
 def listen(p, s):
-    """`Session._listen`."""
+    """Listen as `Session._listen`."""
     wait(s, START, s.now + pause(s, p.listen))

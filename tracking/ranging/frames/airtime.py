@@ -1,4 +1,4 @@
-"""How long a message is on the air, and how often a round of ranging can be had.
+"""Time of a message on the air, and rate of ranging rounds.
 
 A UWB frame [1] is a preamble of symbols, a start-of-frame delimiter (SFD), a header (PHR) of
 21 bits and the payload, to which Reed-Solomon coding adds 48 parity bits for every 330 bits.
@@ -26,28 +26,28 @@ BLOCK_BITS = 330
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Phy:
-    """One radio setting, and the pauses that the radio needs between messages."""
+    """A radio setting, and the pauses that the radio needs between messages."""
 
     name: str
     preamble_symbols: int
-    """[-] Longer reaches farther and takes longer."""
+    """[-] Preamble symbols; more reach farther and take longer."""
     sfd_symbols: int
-    """[-]"""
+    """[-] Symbols of the SFD."""
     header_bit: float
-    """[s] One bit of the PHR."""
+    """[s] Duration of one bit of the PHR."""
     data_bit: float
-    """[s] One bit of payload."""
+    """[s] Duration of one bit of payload."""
     symbol: float = 496 / 499.2e6
-    """[s] One preamble symbol at 16 MHz pulse repetition."""
+    """[s] Duration of one preamble symbol at 16 MHz pulse repetition."""
     detect: float = 32e-6
-    """[s] Preamble that a receiver needs to notice a message: two chunks of 16 symbols."""
+    """[s] Preamble that a receiver needs for detection: two chunks of 16 symbols."""
     sense: float = 48e-6
-    """[s] Listening that tells silence from a preamble: another chunk."""
+    """[s] Listening time that distinguishes silence from a preamble: another chunk."""
     turnaround: float = 12e-6
-    """[s] From receiving to sending."""
+    """[s] Time from reception to transmission."""
     processing: float = 0.0
-    """[s] From the end of a message to the answer being loaded; the order comes after `sense` of
-    it. 0 where the payload can be written while the own preamble, 1 ms long, is on the air."""
+    """[s] Time from the end of a message until the answer is loaded, which is ordered after
+    `sense`. 0 if the payload can be written during the own preamble, 1 ms long."""
     max_frame: int = 127
     """[bytes] Longest frame; up to 1023 with the long frames of the DW1000."""
 
@@ -62,12 +62,12 @@ class Phy:
 
     @property
     def gap(self) -> float:
-        """Silence between two messages [s]: all listen in it, since a newcomer may speak."""
+        """Silence between two messages, in which all nodes listen for newcomers [s]."""
         return max(self.sense + self.turnaround, self.processing)
 
     @property
     def header_time(self) -> float:
-        """From the start of a frame to the moment that its time stamp means [s]."""
+        """Time from the start of a frame to the moment of its time stamp [s]."""
         return (self.preamble_symbols + self.sfd_symbols) * self.symbol
 
 
@@ -90,20 +90,20 @@ FAST_PHY = Phy(
     sense=32e-6,
     processing=300e-6,
 )
-"""6.8 Mbit/s, preamble 128: eight times the rate, and a shorter reach."""
+"""6.8 Mbit/s, preamble 128: eight times the rate, and a shorter range."""
 
 PHYS = {phy.name: phy for phy in (PAPER_PHY, FAST_PHY)}
 
 
 def airtime(phy: Phy, frame_bytes: int) -> float:
-    """Time that a frame of so many bytes is on the air [s]."""
+    """Return the time on the air of a frame of `frame_bytes` bytes [s]."""
     data = 8 * frame_bytes
     coded = data + PARITY_BITS * math.ceil(data / BLOCK_BITS)
     return phy.header_time + PHR_BITS * phy.header_bit + coded * phy.data_bit
 
 
 def message_time(phy: Phy, n_nodes: int) -> float:
-    """Time from one message of a round to the next, n nodes in the group [s]."""
+    """Return the time from one message of a round to the next, for n nodes [s]."""
     left, total, most = n_nodes - 1, 0.0, entries_per_frame(phy.max_frame)
     while True:
         entries = min(left, most)
@@ -114,5 +114,5 @@ def message_time(phy: Phy, n_nodes: int) -> float:
 
 
 def round_rate(phy: Phy, n_nodes: int) -> float:
-    """Rounds per second in which every pair is ranged once [Hz]."""
+    """Return the rate of rounds, in each of which every pair is ranged once [Hz]."""
     return 1.0 / (n_nodes * message_time(phy, n_nodes))

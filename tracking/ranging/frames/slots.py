@@ -1,4 +1,4 @@
-"""The durations of the protocol in ticks, for one radio setting."""
+"""Durations of the protocol in ticks, for one radio setting."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tracking.ranging.frames.wire import FIXED_BYTES
 
 
 class Slots:
-    """When the next message can be expected after one that was heard.
+    """Expected times of the next message after a received one.
 
     Times of messages are those of their stamps, `header` after the start of the frame.
     """
@@ -22,17 +22,17 @@ class Slots:
         self.turnaround = ticks(phy.turnaround)
         self.gap = ticks(phy.gap)
         self.silent = ticks(phy.sense + phy.turnaround)
-        """What a slot costs in which no node transmits."""
+        """Duration of a slot in which no node transmits."""
         self.join = ticks(airtime(phy, FIXED_BYTES) + phy.gap)
-        """A message without a table, with its gap."""
+        """Duration of a message without a table, with its gap."""
         self.longest = ticks(airtime(phy, phy.max_frame) + phy.gap)
         self.frame = lru_cache(maxsize=None)(self._frame)
         self.message = lru_cache(maxsize=None)(self._message)
 
     def _frame(self, frame_bytes: int) -> int:
-        """A frame of so many bytes."""
+        """Return the duration of a frame of `frame_bytes` bytes."""
         return ticks(airtime(self._phy, frame_bytes))
 
     def _message(self, n_nodes: int) -> int:
-        """A message of a group of so many, with its gap: the length of a slot."""
+        """Return the slot length of n nodes: a message with its gap."""
         return ticks(message_time(self._phy, n_nodes))

@@ -1,29 +1,29 @@
-"""The bytes of a ranging message, and nothing but valid messages out of any bytes.
+"""Bytes of ranging messages; decoding accepts only valid messages.
 
 Every node sends the same layout, little-endian, in an IEEE 802.15.4 data frame:
 
     offset  bytes  field
     0       2      frame control, 0x8841: data, short addresses, one PAN
     2       1      sequence number of the sender
-    3       2      PAN, which separates groups that must not hear each other
+    3       2      PAN, which separates groups that must not range with each other
     5       2      destination, 0xFFFF: all
     7       2      source: ID of the sender, 0 to 254
     9       1      version (high four bits), type (low four bits)
     10      1      root: ID of the initiator that the sender follows
     11      1      round, counted by the initiator
     12      1      slot of this message in the round
-    13      1      n: members of the round
-    14      1      part (high four bits) of a message in so many parts minus one (low four bits)
+    13      1      n: number of members of the round
+    14      1      part (high four bits), number of parts minus one (low four bits)
     15      1      boot: a random number drawn when the sender was switched on
     16      5      time stamp of this very transmission
     21      7 k    the table: ID 1, receive time stamp 5, quality 1
     21+7k   2      check sum, CRC-16 of IEEE 802.15.4
 
-The first n - 1 rows of the table are the other members of the round by rising ID, then come nodes
-heard that are none. A `JOIN` has no table. A table too long for a frame is
-split: every part is a transmission of its own, with its own time stamp. Quality: high four
-bits the received power in steps of 3 dB below -60 dBm, 15 if the node was not heard since the
-sender's last message; low four bits received minus first-path power in dB.
+The first n - 1 rows of the table are the other members of the round by rising ID; then come other
+received nodes. A `JOIN` has no table. A table too long for a frame is split: every part is a
+transmission of its own, with its own time stamp. Quality: high four bits the received power in
+steps of 3 dB below -60 dBm, 15 if the node was not received since the sender's last message; low
+four bits received minus first-path power in dB.
 """
 
 from __future__ import annotations
@@ -51,30 +51,30 @@ _POWER_TOP, _POWER_STEP = -60.0, 3.0
 
 
 class Type(IntEnum):
-    """What a message is."""
+    """Types of messages."""
 
     REQUEST = 1
-    """Of an initiator: starts a round and names its members. If the smallest of them is another
-    node, `root` is that one and the next request is its."""
+    """Message of an initiator: starts a round and names its members. If the smallest of them is
+    another node, `root` is that node, and it sends the next request."""
     REPLY = 2
-    """Of any other member."""
+    """Message of any other member."""
     JOIN = 3
-    """Of a node that is no member yet; `slot` is that of the member whose turn is next."""
+    """Message of a node that is not a member yet; `slot` is that of the next member."""
     ALERT = 4
-    """Of a node that heard another one with its own ID."""
+    """Message of a node that received another one with its own ID."""
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One row of the table: what the sender heard of a node since its own last message."""
+    """One row of the table: the reception of a node since the sender's last message."""
 
     id: int
     stamp: int | None
-    """Receive time stamp, in the sender's clock; None if nothing was heard."""
+    """Receive time stamp, in the sender's clock; None without reception."""
     rx_power: float = 0.0
-    """[dBm]"""
+    """Received power [dBm]."""
     fp_power: float = 0.0
-    """[dBm]"""
+    """First-path power [dBm]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,12 +97,12 @@ class Frame:
 
 
 def entries_per_frame(max_frame: int) -> int:
-    """Rows of the table that fit into a frame of so many bytes."""
+    """Return the number of table rows that fit into a frame of `max_frame` bytes."""
     return (max_frame - FIXED_BYTES) // ENTRY_BYTES
 
 
 def frame_lengths(n_entries: int, max_frame: int) -> list[int]:
-    """Bytes of each part of a message with so many rows."""
+    """Return the bytes of each part of a message with `n_entries` rows."""
     most = entries_per_frame(max_frame)
     parts = max(1, -(-n_entries // most))
     if parts > MAX_PARTS:
@@ -112,13 +112,13 @@ def frame_lengths(n_entries: int, max_frame: int) -> list[int]:
 
 
 def split(entries: Sequence[Entry], max_frame: int) -> list[tuple[Entry, ...]]:
-    """The rows of each part of a message."""
+    """Return the rows of each part of a message."""
     most, parts = entries_per_frame(max_frame), len(frame_lengths(len(entries), max_frame))
     return [tuple(entries[p * most : (p + 1) * most]) for p in range(parts)]
 
 
 def encode(frame: Frame) -> bytes:
-    """The bytes of a frame."""
+    """Return the bytes of a frame."""
     body = _HEADER.pack(
         _FRAME_CONTROL,
         frame.sequence,
@@ -142,10 +142,10 @@ def encode(frame: Frame) -> bytes:
 
 
 def decode(data: bytes) -> Frame:
-    """The frame that the bytes are.
+    """Return the frame of some bytes.
 
     Raises:
-        WireError: They are none; the field is named.
+        WireError: The bytes are invalid; the message names the field.
     """
     rows, rest = divmod(len(data) - FIXED_BYTES, ENTRY_BYTES)
     if len(data) < FIXED_BYTES or rest:
@@ -189,7 +189,7 @@ def _quality(entry: Entry) -> int:
         return _NOT_HEARD << 4
     rx, fp = entry.rx_power, entry.fp_power
     if not (math.isfinite(rx) and math.isfinite(fp)):
-        return _NOT_HEARD - 1 << 4 | 15  # an empty register of the radio: as weak as can be
+        return _NOT_HEARD - 1 << 4 | 15  # an empty register of the radio: weakest power
     step = min(max(round((_POWER_TOP - rx) / _POWER_STEP), 0), _NOT_HEARD - 1)
     return step << 4 | min(max(round(rx - fp), 0), 15)
 
@@ -217,7 +217,7 @@ _CRC = tuple(_crc_row(byte) for byte in range(256))
 
 
 def crc16(data: bytes) -> int:
-    """Check sum of IEEE 802.15.4, which the radio itself adds and checks: x^16+x^12+x^5+1."""
+    """Return the check sum of IEEE 802.15.4, which radios add and check: x^16+x^12+x^5+1."""
     crc = 0
     for byte in data:
         crc = crc >> 8 ^ _CRC[(crc ^ byte) & 0xFF]
