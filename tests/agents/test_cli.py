@@ -1,4 +1,4 @@
-"""The command line as a user meets it: results, JSON, and faults without a traceback."""
+"""Command line as users see it: results, JSON, and faults without a traceback."""
 
 import json
 import shutil
@@ -126,7 +126,7 @@ def test_no_figure_is_cut_off(capsys, monkeypatch):
 
 
 def test_a_log_that_cannot_be_scored(tmp_path):
-    """Static nodes only, no truth, no inertial samples: nothing to draw, and nothing is claimed."""
+    """Static nodes only, no truth, no inertial samples: nothing to draw or to score."""
     (tmp_path / "meta.toml").write_text(
         'format = 1\nname = "still"\ndimensions = 3\n'
         + "".join(f'[nodes.{n}]\nkind = "static"\n' for n in range(1, 5))
@@ -304,7 +304,7 @@ def test_simulate_takes_every_kind_of_scenario(scenario, tmp_path):
 
 
 def out_commands():
-    """Names of all commands that write results into a folder of files."""
+    """Return the names of all commands that write results into a folder."""
     for name, command in cli.commands.items():
         parts = getattr(command, "commands", {"": command})
         for part, each in parts.items():
@@ -325,7 +325,7 @@ def test_a_folder_that_holds_anything_is_refused_before_any_work(name, recording
 def test_overwrite_replaces_files_of_the_same_names_alone(recording, tmp_path):
     for name in ("mine.txt", "report.html"):
         (tmp_path / name).write_text("mine")
-    # Whichever of the two comes first.
+    # The order of the two arguments has no effect.
     done = relpos("track", recording, "--out", tmp_path, "--overwrite")
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "mine.txt").read_text() == "mine"
@@ -379,7 +379,7 @@ def test_a_demonstration_of_a_task_that_ends(tmp_path):
 
 
 def test_contacts_of_a_demonstration_are_those_of_its_steps():
-    """Counted once more from the outside."""
+    """The reference counts the contacts of the steps independently."""
     from agents.controllers import Consensus
     from agents.simulation.demo import demo
     from relpos_env import formation_v0

@@ -1,4 +1,4 @@
-"""Drivers compared: figures of an episode are its own, and claims come with intervals."""
+"""Comparison of drivers: figures per episode, and statements with intervals."""
 
 import json
 import sys
@@ -70,14 +70,14 @@ def test_figures_do_not_depend_on_the_number_of_jobs():
 
 
 def test_figures_are_those_of_the_environment():
-    """The same episode in the form for training: seeds mean the same there."""
+    """The same episode in the training form: seeds have the same meaning there."""
     (episode,) = run_episodes(ON_ESTIMATE, SHORT, [1002])
     parts = SHORT.parts("estimate", 1)
     envs = FormationVecEnv(scenario="cars-nlos", max_cycles=40)
     envs.seed(1002)
     seen, controller = envs.reset(), Consensus(parts.mode.fields)
     error, tracking, contacts, touching = [], [], 0.0, []
-    for _ in range(39):  # the 40th step begins the next episode
+    for _ in range(39):  # the 40th step starts the next episode
         seen = envs.step(np.array([controller.act(o) for o in seen]))[0]
         error.append(envs.formation.task.error[0].mean())
         tracking.append(envs.formation.tracking_error()[0])
@@ -87,7 +87,7 @@ def test_figures_are_those_of_the_environment():
     assert episode.seconds == 4.0
     assert not episode.done
     assert episode.formation_error == pytest.approx(episode.error[20:].mean())
-    # Its last decision is not in the list.
+    # The last step is not in the list.
     expected = np.nanmean(tracking[20:], axis=1).mean()
     assert episode.tracking_error == pytest.approx(expected, rel=0.05)
     assert episode.collisions_per_min == pytest.approx(60.0 * contacts / 4.0)
@@ -109,7 +109,7 @@ def test_time_in_formation_is_that_of_the_worst_car():
 
 
 class Constant:
-    """Every car is asked for the same."""
+    """A driver with the same action for every car."""
 
     def __init__(self, action):
         self._action = np.float32(action)
@@ -120,7 +120,7 @@ class Constant:
 
 @pytest.fixture
 def constant(monkeypatch):
-    """Drivers called by their speed share, which see at most three cars and only estimates."""
+    """Use drivers named by their speed share, with estimates of at most three cars."""
 
     class Entry(ControllerEntry):
         def refusal(self, observation, n_cars, proximity):
@@ -142,7 +142,7 @@ def test_energy_is_what_speeds_up_and_rolls(constant):
     (driving,) = run_episodes(Contender("0.5", "estimate"), setting, [1000])
     car = setting.parts("estimate", 1).scenario.car
     rolling = car.rolling_resistance * car.mass * 9.81
-    # To 1 m/s within the first second, then at that speed; a motor has some lag.
+    # Up to 1 m/s within the first second, then at that speed; a motor has some lag.
     expected = 0.5 * car.mass + rolling * 2.6
     assert driving.energy / 60.0 * 3.0 == pytest.approx(expected, rel=0.1)
 
@@ -285,7 +285,7 @@ def test_faults_end_in_one_line_and_write_nothing(args, message, tmp_path, monke
 
 
 def test_time_in_contact_tells_who_presses_on():
-    """One contact, and cars that drive on against what they touched."""
+    """There is one contact, and cars that keep driving against it."""
     parts = SHORT.parts("estimate", 1)
     running = Simulated(parts, [1000, 1001])
     meter = Meter(running)
@@ -301,7 +301,7 @@ def test_time_in_contact_tells_who_presses_on():
 
 
 def test_no_bar_is_cut_off():
-    """Shares are drawn in percent, and so are the ends of their axes."""
+    """Shares are drawn in percent, and so are the limits of their axes."""
     found = [Interval(0.004, 0.002, 0.01)]
     for name in ("contact_time", "time_in_formation"):
         assert _limits(name, found)[1] >= 100.0 * 0.01
@@ -315,7 +315,7 @@ def test_a_share_of_episodes_with_an_operator_is_checked(share):
 
 
 def test_without_an_operator_cars_follow_the_plan_alone():
-    """Which stands still where a formation is to be held."""
+    """The plan is at rest if a formation is to be held."""
     for share in (0.0, 1.0):
         parts = replace(SHORT, task="hold", operator=share).parts("estimate", 1)
         formation = Simulated(parts, [1000, 1001]).formation

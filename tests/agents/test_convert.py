@@ -1,4 +1,4 @@
-"""Bags and tables of others become logs."""
+"""Conversion of foreign bags and tables to logs."""
 
 import csv
 import gzip
@@ -68,7 +68,7 @@ pos = ["x", "y", "z"]
 
 @pytest.fixture
 def folder(tmp_path):
-    """Tables of two cars and a beacon, from an epoch on."""
+    """Write tables of two cars and a beacon, with times from an epoch."""
     root, t0 = tmp_path / "tables", 1.7e9
     root.mkdir()
 
@@ -211,7 +211,7 @@ def test_a_minus_turns_an_axis_and_nodes_without_measurements_are_left_out(folde
 
 
 def body_arrays(n_nodes, rng):
-    """States at 60 Hz and ranges at 20 Hz of trackers in a world whose y axis points up."""
+    """Return states at 60 Hz and ranges at 20 Hz of trackers in a world with y up."""
     turns = Rotation.random(30 * n_nodes, random_state=rng)
     n_pairs = n_nodes * (n_nodes - 1) // 2
     return turns, {
@@ -300,7 +300,7 @@ heading = "initial"
 
 
 def linktrack_frame(ticks, ranges):
-    """Node_Frame3 of node 2 of mode DR: 2.85 m is 2850."""
+    """Return a Node_Frame3 of node 2 in mode DR: 2.85 m is 2850."""
     body = struct.pack("<2BI4x4xHB", 0, 2, ticks % (1 << 32), 4960, len(ranges))
     for other, metres in ranges:
         body += bytes((0, other)) + round(1000 * metres).to_bytes(3, "little") + bytes((180, 160))
@@ -363,13 +363,13 @@ def test_the_command_says_what_it_made(folder):
     [("sfuise", "sfuise/ISAS-Walk1.bag", "isas_walk1"), ("starloc", "starloc", "starloc_fast1")],
 )
 def test_presets_read_what_was_recorded(data, preset, source, log):
-    """Another hand converted the same recordings: the same samples and ranges, rounded."""
+    """The reference is an independent conversion: the same samples and ranges, rounded."""
     assert preset in PRESETS
     ours, theirs = convert(data / "raw" / source, preset=preset), read_log(data / "logs" / log)
     for kind, digits in ((Kind.IMU, 5e-6), (Kind.RANGE, 6e-3)):
         a, b = (each.block.take(each.block.kind[0] == kind) for each in (ours, theirs))
         assert a.n_events == b.n_events
-        # Rows of almost one time are in another order.
+        # Rows of almost equal times are in another order.
         rows = [np.sort(each.values[0, :, 0]) for each in (a, b)]
         np.testing.assert_allclose(rows[0], rows[1], atol=digits)
         np.testing.assert_allclose(np.diff(a.t[0]), np.diff(b.t[0]), atol=2e-5)
@@ -388,13 +388,13 @@ def test_robots_without_imu_are_followed_but_for_rotation_and_mirror(data):
     strict=True, reason="in some seconds of them it gains 0.002 of log-likelihood a range: chance"
 )
 def test_their_ranges_are_found_to_be_long_in_an_excerpt(data):
-    """By 0.36 m; in the whole recording they are (tests/real_data)."""
+    """They are 0.36 m too long in the whole recording (tests/real_data)."""
     log = convert(data / "raw" / "tiers_ros2", preset="tiers")
     assert "range-offset" in {f.name for f in examine(log)[1]}
 
 
 def residuals(log):
-    """Ranges less true distances of their nodes [m], where truth is known."""
+    """Return ranges minus true distances of their nodes [m], if the truth is known."""
     ranges = log.block.take(log.block.kind[0] == Kind.RANGE)
     pos, known = log.truth.positions(log.constellation, ranges.t[0])
     row, i, j = np.arange(ranges.n_events), ranges.i[0], ranges.j[0]
@@ -407,7 +407,7 @@ def residuals(log):
     [("murp", "murp", 768, 0.1), ("plaza2", "plaza/Plaza2.mat", 1816, 3.0)],
 )
 def test_presets_agree_with_the_truth_of_the_recording(data, preset, source, n_ranges, median):
-    """The authors' ranges are long by centimetres (murp) and by metres (plaza2)."""
+    """The authors' ranges are too long by centimetres (murp) and by metres (plaza2)."""
     log = convert(data / "raw" / source, preset=preset)
     assert log.n_ranges == n_ranges
     assert len(residuals(log)) == n_ranges
@@ -415,7 +415,7 @@ def test_presets_agree_with_the_truth_of_the_recording(data, preset, source, n_r
 
 
 def test_a_drone_with_two_radios_has_two_antennas(data, tmp_path):
-    """The folder has tables of one drone, those of its IMU from another run."""
+    """The folder has tables of one drone, and IMU tables of another run."""
     folder = tmp_path / "ifo001"
     folder.mkdir()
     for path in (data / "raw" / "miluv").glob("*.gz"):
@@ -424,7 +424,7 @@ def test_a_drone_with_two_radios_has_two_antennas(data, tmp_path):
     assert log.constellation.ids == (1, 100, 101, 102, 103, 104, 105)
     assert (log.n_ranges, log.block.count(Kind.IMU)) == (954, 1999)
     assert sorted(set(log.block.antenna_i[0][log.block.kind[0] == Kind.RANGE].tolist())) == [0, 1]
-    # Places of the fixed radios, constellation 0 of the data set's config/uwb/anchors.yaml.
+    # Positions of the fixed radios, constellation 0 of the data set's config/uwb/anchors.yaml.
     known = {
         100: [3.274, 3.464, 1.809], 101: [3.186, 0.274, 1.588], 102: [2.851, -2.923, 1.897],
         103: [-2.498, -3.502, 1.773], 104: [-2.958, 0.613, 1.657], 105: [-2.735, 3.659, 1.89],

@@ -1,4 +1,4 @@
-"""What `relpos doctor` finds on ports, links and cars."""
+"""Diagnoses of `relpos doctor` for ports, links and cars."""
 
 import json
 import os
@@ -131,7 +131,7 @@ def test_damage_gaps_and_losses():
     half = [GOOD[0].replace(b"9", b"8") if k % 4 == 0 else GOOD[0] for k in range(100)]
     assert problem(half).startswith("12 % of the frames are damaged")  # one of the two lines
     late = diagnose(GOOD[:3], seconds=4.0, imu_hz=0.75)
-    assert late.ok  # a stream that comes seldom
+    assert late.ok  # a stream with a low rate
     hearing = heard(GOOD)
     hearing.silent_until(5_000_000_000)
     each = link()
@@ -152,7 +152,7 @@ def test_samples_of_another_rate_than_configured():
     said = problem(GOOD, imu_hz=50.0)
     assert said.startswith("node 1: 100 inertial samples a second, configured 50")
     assert diagnose(GOOD, imu_hz=120.0).ok
-    assert diagnose(GOOD[:50], imu_hz=50.0).ok  # half a second does not tell
+    assert diagnose(GOOD[:50], imu_hz=50.0).ok  # half a second is not enough
 
 
 def test_sequence_numbers_tell_what_is_missing_and_who_started_anew():
@@ -181,7 +181,7 @@ def test_devices_become_nodes_by_ids():
 
 
 def test_nodes_that_another_tracker_tells_of():
-    """They do not speak, and several links may tell of them."""
+    """They do not transmit, and several links may report them."""
     said = b'{"i": 1, "j": 2, "pos": [1, 2]}\n{"node": 2, "yaw": 0}\n{"node": "b", "yaw": 0}\n'
     reports = [
         diagnose([said] * 100, known_formats(), format="positions", ids={"B": 9}) for _ in "ab"
@@ -257,7 +257,7 @@ def test_ports_without_a_configuration(monkeypatch, tmp_path):
         SerialPortInfo(path=str(bad)),
     ]
     assert doctor(listing=lambda: ports).ok
-    assert not doctor(listing=list).ok  # none at all
+    assert not doctor(listing=list).ok  # no ports
     monkeypatch.setattr(os, "access", lambda path, mode: path != str(bad))
     found = doctor(listing=lambda: ports)
     assert not found.ok
@@ -286,7 +286,7 @@ def test_who_has_a_port_open(tmp_path):
 
 @pytest.fixture
 def adapters(monkeypatch):
-    """What the system lists."""
+    """Set the adapters that the system lists."""
     from serial.tools import list_ports, list_ports_common
 
     def adapter(path, number):

@@ -1,4 +1,4 @@
-"""The emulated world is the simulated one, whatever is between it and the host."""
+"""The emulated world equals the simulated one, with any byte streams to the host."""
 
 import json
 import signal
@@ -45,7 +45,7 @@ def formation_of(options):
 
 
 def commands(n_cars, cycles, seed=3):
-    """Speeds and steering angles as the wire can say them, (cycle, car)."""
+    """Return speeds and steering angles rounded as on the wire, (step, car)."""
     rng = np.random.default_rng(seed)
     speed = rng.uniform(-0.5, 1.5, (cycles, n_cars)).round(3)
     return speed, rng.uniform(-0.4, 0.4, (cycles, n_cars)).round(4)
@@ -87,7 +87,7 @@ def test_the_world_goes_as_the_environment_goes(task, scenario, seconds):
 
 
 class Host:
-    """Drives the cars of a rig through bytes, and reads what comes."""
+    """A host that drives the cars of a rig through bytes, and decodes its output."""
 
     def __init__(self, rig):
         self.rig, options, ids = rig, rig.options, rig.constellation.ids
@@ -132,7 +132,7 @@ def test_driven_through_bytes_it_goes_as_the_environment_with_the_same_commands(
     rig, formation = EmulatedRig(options), formation_of(options)
     host, n = Host(rig), rig.world.parts.n_cars
     for _ in range(AT_REST):
-        # Whatever the host wants, they are held.
+        # Cars are held regardless of commands.
         host.step(np.ones(n), np.zeros(n))
     same(rig.world, formation)
     for speed, steering in zip(*commands(n, options.cycles), strict=True):
@@ -257,7 +257,7 @@ def test_same_options_same_bytes():
 
 
 class Clock:
-    """Time that passes only in sleep, and a little at every look."""
+    """A clock that advances in sleep, and slightly at every reading."""
 
     def __init__(self):
         self.now = 10**12

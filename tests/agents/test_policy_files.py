@@ -1,4 +1,4 @@
-"""Files of policies: good ones run, all others are refused with a reason."""
+"""Policy files: valid ones run, all others are refused with a reason."""
 
 import io
 import os
@@ -119,7 +119,7 @@ def refused(folder, data, reason, card=None):
 
 
 class Bomb:
-    """What a pickle can do when it is loaded."""
+    """Payload of a pickle that runs when it is loaded."""
 
     def __reduce__(self):
         return (os.mkdir, ("exploded",))
@@ -167,7 +167,7 @@ def test_random_bytes_are_refused(data):
 
 @given(end=st.integers(0, len(GOOD) - 1))
 def test_truncated_files_are_refused_or_harmless(end):
-    """A file may lose what comes last, the version; then onnxruntime or the trial judges."""
+    """A file may lose its end, the version; then onnxruntime or the trial run decides."""
     data = GOOD[:end]
     with pytest.raises(PolicyError, match="^it: "):
         check_policy(data, card_of(GOOD), "it")
@@ -188,7 +188,7 @@ def test_flipped_bits_never_come_through(flips):
 
 
 def judged(data):
-    """With a hash that fits, it runs within its limits or is refused with a reason."""
+    """With a matching hash it runs within its limits or is refused with a reason."""
     try:
         network = check_policy(data, card_of(data), "it")
     except PolicyError as error:
@@ -232,7 +232,7 @@ def test_data_in_other_files_of_an_attribute_neither(tmp_path):
 
 
 def with_nodes(*nodes, domains=(), **arrays):
-    """The perceptron, and then these from `x` to `actions`."""
+    """Return the perceptron followed by nodes from `x` to `actions`."""
     first, more = perceptron()
     first[-1].output[0] = "x"
     return model([*first, *nodes], more | arrays, domains=domains).SerializeToString()
@@ -298,7 +298,7 @@ FOREIGN = [
 
 @pytest.mark.parametrize("shape", [(5_000, 10_000), (10**6, 10**6), (2**31, 2**31)], ids=str)
 def test_a_small_file_does_not_take_all_memory(tmp_path, capfd, shape):
-    """Half as much again as is allowed, and more."""
+    """Sizes are half as large again as allowed, and more."""
     data = with_nodes(
         node("Expand", ["one", "shape"], ["large"]),
         node("ReduceMax", ["large"], ["most"], keepdims=0),
@@ -311,7 +311,7 @@ def test_a_small_file_does_not_take_all_memory(tmp_path, capfd, shape):
 
 
 def test_a_small_file_does_not_take_all_time(tmp_path):
-    """Minutes of products of constants, neither folded at the start nor run to the end."""
+    """Products of constants take minutes: they are neither folded nor run to the end."""
     data = with_nodes(
         node("Expand", ["one", "shape"], ["m0"]),
         *(node("MatMul", [f"m{k}", "m0"], [f"m{k + 1}"]) for k in range(300)),
@@ -345,7 +345,7 @@ GOOD_TENSOR = good_model().graph.initializer[0].SerializeToString()
 
 
 def wrapped(number, data):
-    """A field with a message."""
+    """Encode a field with a message."""
     length, size = b"", len(data)
     while size > 0x7F:
         length, size = length + bytes([size & 0x7F | 0x80]), size >> 7

@@ -1,4 +1,4 @@
-"""Training: runs that stop and go on, folders, networks, files."""
+"""Training: runs that stop and resume, folders, networks, files."""
 
 import json
 import os
@@ -42,7 +42,7 @@ from relpos_env.errors import EnvError
 
 
 def from_words(words):
-    """Settings from what a command is given."""
+    """Return settings from the arguments of a command."""
     named, given = {leaf.option: leaf for leaf in leaves(TrainConfig)}, {}
     for option, text in zip(words[::2], words[1::2], strict=True):
         leaf = named[option]
@@ -52,7 +52,7 @@ def from_words(words):
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
-    """An uninterrupted run."""
+    """Make an uninterrupted run."""
     folder = tmp_path_factory.mktemp("runs") / "whole"
     return train(small(), folder)
 
@@ -79,7 +79,7 @@ def test_a_run_begins_with_a_policy(run, policy, tmp_path):
     begun = {k: w.detach().clone() for k, w in Actor(model.policy).named_parameters()}
     assert all(torch.equal(w, given[k]) for k, w in begun.items())
     critic = model.policy.value_net.weight.detach().clone()
-    run_leg(model, config, 0)  # the critic alone at first
+    run_leg(model, config, 0)  # at first only the critic is trained
     assert all(torch.equal(w, begun[k]) for k, w in Actor(model.policy).named_parameters())
     assert not torch.equal(model.policy.value_net.weight, critic)
 
@@ -120,7 +120,7 @@ def test_a_run_that_was_stopped_goes_on_as_if_it_had_not_been(run, tmp_path):
 
 
 def test_the_noise_of_actions_falls_to_what_is_asked(run, tmp_path):
-    """But for the few steps of learning since the bound was last looked at."""
+    """The tolerance is for the few optimisation steps since the last update of the bound."""
     train(small(final_log_std="1"), tmp_path / "left")
     free = weights(tmp_path / "left")["policy.log_std"]
     assert (weights(run.folder)["policy.log_std"] < -2.2).all()
@@ -134,7 +134,7 @@ def test_weights_of_rewards_go_to_their_final_values_along_the_run(tmp_path):
     assert weights_of(config, 0.0) == {"collision": 8.0, "progress": 5.0}
     assert weights_of(config, 0.375) == pytest.approx({"collision": 10.0, "progress": 2.5})
     assert weights_of(config, 1.0) == {"collision": 12.0, "progress": 0.0}
-    # Policies are judged by the last, wherever they are.
+    # Policies are evaluated with the final weights at any time.
     assert dict(check_environments(config)[0].config.weights) == weights_of(config, 1.0)
     whole = train(config, tmp_path / "whole")
     seen = []
@@ -182,7 +182,7 @@ def test_the_best_policy_is_best_in_all_scenarios_together():
     assert one == measured("cars-los", episodes=2)
     both = measured("cars-los", "ring-los", episodes=5)
     other = measured("ring-los", episodes=3)
-    # Of equally many cars; the second scenario has other seeds than alone.
+    # Both have equally many cars; the second scenario has other seeds than alone.
     low, high = sorted([one["return"], other["return"]])
     assert low - 0.2 < both["return"] < high + 0.2
     assert both["return"] != one["return"]
@@ -371,7 +371,7 @@ def test_a_name_that_no_policy_can_have_is_refused_at_once(tmp_path):
 
 
 def test_a_task_that_is_done_ends_an_episode_of_the_evaluation():
-    """Nobody is paid or blamed for what comes after it."""
+    """Nothing after the end is rewarded or counted."""
     config = small(task="rendezvous", scenarios="open", eval_episodes="4")
     every, policy = check_environments(config), make_policy(config)
     evaluation = Evaluation(every, layout_of(config), config.eval_episodes, 1)
@@ -387,10 +387,10 @@ def test_a_task_that_is_done_ends_an_episode_of_the_evaluation():
     cut = room.drive(Actor(policy).eval(), 500)
     evaluation.close()
     n_cars, steps = every[0].n_cars, every[0].config.max_cycles - 1
-    # What is left of an episode that is through counts as time in which nothing is earned.
+    # The rest of a finished episode counts as time without reward.
     assert cut.decisions == whole.decisions
     assert cut.minutes == pytest.approx(whole.minutes * (steps + 1) / (2 * steps))
-    # Two are scored by their only decision.
+    # Two are scored by their only step.
     assert len(cut.error) == len(whole.error) / 2 + 2 * n_cars
 
 

@@ -1,4 +1,4 @@
-"""Pictures: of the right shape, repeatable, of what they claim to show, and without a screen."""
+"""Pictures: shape, repeatability, contents, and rendering without a screen."""
 
 import subprocess
 import sys
@@ -23,7 +23,7 @@ SIZE = (480, 360)
 
 
 def make_snapshot(n=4, **changes):
-    """Cars on a ring round two obstacles, every status and kind of link among them."""
+    """Return cars on a ring around two obstacles, with every status and kind of link."""
     angle = 2.0 * np.pi * np.arange(n) / n + 0.3
     pos = 1.6 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     pairs = [(i, j, (i + j) % 3) for i in range(n) for j in range(i + 1, n)]
@@ -66,7 +66,7 @@ def draw(snapshot, size=SIZE, **options):
 
 
 def empty_room(**changes):
-    """A room in which nothing is drawn that could hide something else."""
+    """Return a room without drawings that could hide others."""
     changes = {
         "boxes": np.zeros((0, 6)), "movable": np.zeros(0, dtype=bool), "goal": None, "path": None,
         "links": np.zeros((0, 3), dtype=np.int64), "has_target": np.zeros(4, dtype=bool),
@@ -77,7 +77,7 @@ def empty_room(**changes):
 
 
 def pixel(picture, snapshot, point):
-    """Colour at a point of the room."""
+    """Return the colour at a point of the room."""
     height, width = picture.shape[:2]
     x, y = Layout.fit((width, height), snapshot.room).pixels(np.asarray(point, dtype=float))
     return picture[int(y), int(x)].astype(int)
@@ -175,7 +175,7 @@ def test_no_boxes_and_no_history():
 
 @pytest.mark.parametrize("heading", [0.0, 1.0, -2.5])
 def test_cars_are_where_they_are_and_point_ahead(heading):
-    # Seen from above: paint at the nose, glass in front of the roof.
+    # Seen from above: paint at the nose, glass ahead of the roof.
     pose = np.array([[0.5, -0.75, heading], [-2, 2, 0], [-2, 0, 0], [2, 2, 0]])
     snapshot = empty_room(pose=pose, viewer=3)
     picture = draw(snapshot, (960, 720), fine=4)
@@ -290,7 +290,7 @@ def test_the_whole_room_is_on_the_floor(room, size):
 
 def test_error_axis_has_room_for_all_that_is_shown():
     snapshot = make_snapshot()
-    assert error_axis(snapshot) == 0.2  # the first 5 s, with 0.3 m, are out of the window
+    assert error_axis(snapshot) == 0.2  # the first 5 s, with 0.3 m, are outside the window
     assert error_axis(replace(snapshot, t=20.0)) == 0.4
     assert error_axis(replace(snapshot, tracking_error=np.full(250, 7.0))) == 10.0
     assert error_axis(replace(snapshot, t=100.0)) == 0.05
@@ -350,7 +350,7 @@ def test_arrays_need_no_screen():
 
 @pytest.fixture
 def screen(monkeypatch):
-    """A screen that nobody sees."""
+    """Use an invisible screen."""
     pygame = pytest.importorskip("pygame")
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     yield pygame

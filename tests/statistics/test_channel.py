@@ -1,4 +1,4 @@
-"""What the air does to messages, against real ranges, published figures and its own laws."""
+"""Radio channel against real ranges, published figures and its own properties."""
 
 import itertools
 from dataclasses import replace
@@ -26,18 +26,18 @@ IN_SIGHT, BEHIND = False, True
 
 
 def standing(channel, nlos, pairs=4000, distance=4.0, seconds=0.05):
-    """Ranges of pairs that stand: place, time and (error, received power, gap) of each."""
+    """Return ranges of pairs at rest: place, time and (error, received power, gap) of each."""
     return simulate(channel, np.full(pairs, distance), np.full(pairs, nlos), seconds)
 
 
 def independent(channel, nlos):
-    """One range of every pair: (error, received power, gap)."""
+    """Return one range of every pair: (error, received power, gap)."""
     place, _, values = standing(channel, nlos)
     return values[np.unique(place, return_index=True)[1]]
 
 
 def circling(channel, speed, seconds, pairs, radius=5.0, dt=0.01):
-    """One node goes round the other: (way [m], error [m]) of the ranges of every pair."""
+    """Move one node around the other; return (way [m], error [m]) of the ranges of every pair."""
     radio = Radio(RadioSimParams(channel=channel), 2, list(range(pairs)), dt)
     for k, node in itertools.product(range(pairs), range(2)):
         radio.switch_on(k, node, boot=node, after=0.002 * node)
@@ -54,7 +54,7 @@ def circling(channel, speed, seconds, pairs, radius=5.0, dt=0.01):
         ranges = radio.step(where(w * dt), where((w + 1) * dt))
         k, slot = np.nonzero(np.arange(ranges.t.shape[1]) < ranges.count[:, None])
         t = ranges.t[k, slot]
-        share = t / dt % 1.0  # nodes go straight within a window
+        share = t / dt % 1.0  # nodes move straight within a window
         true = np.sqrt(radius**2 - share * (1.0 - share) * chord**2)
         found.append((k, t * chord / dt, ranges.values[k, slot, 0] - true))
     pair, way, error = (np.concatenate(part) for part in zip(*found, strict=True))
@@ -62,7 +62,7 @@ def circling(channel, speed, seconds, pairs, radius=5.0, dt=0.01):
 
 
 def autocorrelation(tracks, lag, width):
-    """Of errors whose ways differ by so much, over all tracks of zero mean."""
+    """Return the autocorrelation of errors at a distance lag, over tracks of zero mean."""
     products, square = [], np.mean(np.concatenate([error for _, error in tracks]) ** 2)
     for way, error in tracks:
         later = np.searchsorted(way, way + lag - width)
@@ -73,7 +73,7 @@ def autocorrelation(tracks, lag, width):
 
 
 class Line:
-    """Nodes and the messages between them, one by one, as `radio.air` does it."""
+    """Nodes and single messages between them, as in `radio.air`."""
 
     def __init__(self, channel, pos, seed=1, clock_offset=0.0):
         n = len(pos)
@@ -85,7 +85,7 @@ class Line:
         self.pos, self.dt, self.window = np.array(pos, dtype=np.float64), 0.01, 0
 
     def move(self, pos):
-        """Go to other places in one window."""
+        """Move to other places in one window."""
         pos = np.array(pos, dtype=np.float64)
         self.nodes["step"] = np.linalg.norm(pos - self.pos, axis=1)
         next_window(self.nodes, self.seed, self.window, 0.0, self.dt)
@@ -93,7 +93,7 @@ class Line:
         self.pos, self.nodes["step"] = pos, 0.0
 
     def send(self, s, r, boxes=(), capsules=(), t=0.0):
-        """What r hears of a message of s at a time in the window, None if nothing."""
+        """Return the reception by r of a message of s at a time in the window, None if lost."""
         boxes = np.array(boxes, dtype=np.float64).reshape(-1, 6)
         capsules = np.array(capsules, dtype=np.float64).reshape(-1, 7)
         heard = hear_message(
@@ -104,7 +104,7 @@ class Line:
         return self.heard[r].copy() if heard else None
 
     def flown(self, r, heard):
-        """Distance that the stamp of a message sent at time 0 means [m]."""
+        """Return the distance given by the stamp of a message sent at time 0 [m]."""
         node = self.nodes[r]
         ticks = float(heard["stamp"] - node["base"]) - node["frac"]
         return ticks / node["rate"] * SPEED_OF_LIGHT
@@ -124,13 +124,13 @@ def test_the_outdoor_channel_is_that_of_the_real_ranges(data):
 
 @pytest.mark.parametrize("distance", [3.0, 30.0])
 def test_nodes_that_stand_keep_their_error(distance):
-    """2.5 cm of white noise round an error that stays."""
+    """2.5 cm of white noise about a constant error."""
     pairs = 200
     place, _, values = standing(OUTDOOR, IN_SIGHT, pairs, distance, seconds=1.0)
     errors = [values[place == k, 0] for k in range(pairs)]
     assert np.sqrt(np.mean([e.var() for e in errors])) == pytest.approx(0.025, abs=0.003)
     halves = np.array([[e[: len(e) // 2].mean(), e[len(e) // 2 :].mean()] for e in errors])
-    # Means of 65 ranges that are correlated a little, since successive ones share stamps.
+    # Means of 65 ranges that are slightly correlated, since successive ones share stamps.
     assert np.std(halves[:, 0] - halves[:, 1]) < 1.3 * 0.025 * np.sqrt(2 / 65)
     assert np.std(halves[:, 0]) == pytest.approx(np.hypot(0.0246, 0.015), rel=0.2)
     for lag in (2, 3, 5, 20):
@@ -185,7 +185,7 @@ def test_power_gaps(in_sight, behind, place):
 
 
 def test_errors_indoors_follow_the_way():
-    """As published for somebody who walks at 2 m/s: after 50 ms and after a second."""
+    """The reference is for a person who walks at 2 m/s: after 50 ms and after a second."""
     tracks = circling(INDOOR, speed=2.0, seconds=8.0, pairs=800)
     assert np.concatenate([error for _, error in tracks]).std() == pytest.approx(0.11, rel=0.05)
     assert autocorrelation(tracks, 0.1, 0.008) == pytest.approx(0.85, abs=0.03)
@@ -223,13 +223,13 @@ def test_a_message_tells_the_distance_and_the_clocks():
         assert heard["carrier"] == pytest.approx(rate[r] / rate[s] - 1.0, abs=1e-12)
 
 
-# Laws
+# Properties
 
 WALL = [2.0, 0.0, 0.1, 5.0, 1.0, 0.0]
 
 
 def story(channel, seed, skip=0, walls=()):
-    """Messages to and fro while node 1 walks away, some of which are never listened to."""
+    """Exchange messages while node 1 walks away; some are not received."""
     line = Line(channel, [[0.0, 0, 0], [3.0, 0, 0]], seed)
     heard = []
     for k in range(300):
@@ -245,7 +245,7 @@ def story(channel, seed, skip=0, walls=()):
 
 
 def assert_same(some, others):
-    """Messages that were heard in both are the same in every number."""
+    """Assert that messages received in both are equal in every number."""
     both = [(a, b) for a, b in zip(some, others, strict=True) if a is not None and b is not None]
     assert all(a == b for a, b in both)
     return len(both)
@@ -293,7 +293,7 @@ def test_both_ways_share_the_error_of_the_path_but_no_noise():
     assert flown[0].std() == pytest.approx(noise, rel=0.1)
 
 
-# What stands between
+# Obstacles
 
 POINT = st.tuples(*[st.floats(-3.0, 3.0)] * 3)
 ALONG = np.linspace(0.0, 1.0, 1001)[:, None]
@@ -305,7 +305,7 @@ def test_boxes_hide_what_points_along_the_line_say(a, b, centre, width, depth, a
     c, s = np.cos(angle), np.sin(angle)
     box = np.array([centre[0], centre[1], width, depth, c, s])
     points = np.array(a[:2]) + ALONG * (np.array(b[:2]) - a[:2]) - centre[:2]
-    # How far each point is outside the box along the axis where it is farthest.
+    # Distance of each point outside the box along the axis on which it is farthest.
     outside = np.maximum(np.abs(points @ [c, s]) - width, np.abs(points @ [-s, c]) - depth).min()
     spacing = 0.001 * np.linalg.norm(np.subtract(b, a)[:2])
     hidden = crosses_box(a[0], a[1], b[0], b[1], box, 0.0)
@@ -316,7 +316,7 @@ def test_boxes_hide_what_points_along_the_line_say(a, b, centre, width, depth, a
 
 
 def nearest(points, p, q):
-    """Distance of the nearest point from a segment."""
+    """Return the distance of the nearest point from a segment."""
     p, v = np.array(p), np.subtract(q, p)
     length2 = v @ v
     t = np.clip((points - p) @ v / length2, 0.0, 1.0) if length2 > 0.0 else np.zeros(len(points))

@@ -1,4 +1,4 @@
-"""Calibration: known errors are found and taken off, and poor data is refused."""
+"""Calibration: known errors are found and corrected, and poor data is refused."""
 
 from dataclasses import replace
 
@@ -41,7 +41,7 @@ def rng(seed=0):
 
 
 def rests(degrees, noise=0.0, scale=SCALE, seconds=3.0, seed=0):
-    """Poses held still, with a second of shaking after each."""
+    """Return poses at rest, each followed by a second of shaking."""
     draw, parts = rng(seed), []
     for euler in degrees:
         force = Rotation.from_euler("xyz", euler, degrees=True).inv().apply([0.0, 0.0, 9.81])
@@ -261,7 +261,7 @@ def test_one_distance_gives_offsets_only():
 
 
 def test_a_node_with_a_handful_of_agreeing_ranges_has_no_offset():
-    """Its ranges are behind something whose error changes all the time."""
+    """Its ranges are NLOS with an error that varies all the time."""
     data = table(nodes=5, slope=1.0, offset=(0.2, 0.1, -0.1, 0.3, 0.1))[0]
     measured = data.measured.copy()
     of_last = np.flatnonzero((data.i == 4) | (data.j == 4))
@@ -274,7 +274,7 @@ def test_a_node_with_a_handful_of_agreeing_ranges_has_no_offset():
 
 @pytest.mark.parametrize("b", [-1.4, 1.4])
 def test_offsets_that_no_antenna_has_are_refused(b):
-    """Marks of two boards that were mixed up fit three boards exactly."""
+    """Exchanged marks of two boards fit three boards exactly."""
     with pytest.raises(
         CalibrationError, match=r"node 9: an offset of -?1\.40 m, expected within 1"
     ):
@@ -457,7 +457,7 @@ def test_correction_of_every_kind():
     np.testing.assert_allclose(out.values[0, 1, :6], [0.9, 1.8, 2.7, 0.0, 0.0, 19.0])
     np.testing.assert_array_equal(out.values[0, 2], block.values[0, 2])
     np.testing.assert_allclose(out.values[0, 3, :3], [4.0, -80.0, -85.0])
-    assert out.values[0, 4, 0] == 0.01  # nearer than touching
+    assert out.values[0, 4, 0] == 0.01  # clipped to the least range
     np.testing.assert_array_equal(out.valid, block.valid)
     np.testing.assert_array_equal(block.values[0, 0, :3], [14.0, 5.0, 6.0])
     parts = [calibration.apply(block.take(slice(k, k + 1)), constellation) for k in range(6)]

@@ -1,4 +1,4 @@
-"""The joint filter's algebra: derivatives, gauge, long runs."""
+"""Algebra of the joint filter: derivatives, gauge, long runs."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ from tracking.records import as_records
 
 
 def running(dimensions, vehicle="car", seed=0, static=()):
-    """One environment, three nodes, one hypothesis, random states and sums."""
+    """Return one environment, three nodes, one hypothesis, with random states and increments."""
     nodes = tuple(
         NodeConfig(id=k, vehicle=vehicle, kind="static" if k in static else "moving")
         for k in (1, 2, 3)
@@ -55,7 +55,7 @@ def running(dimensions, vehicle="car", seed=0, static=()):
 
 
 def propagate(c, s, work, x, P, t=0.05):  # noqa: N803
-    """States and covariance after dead reckoning from x, P to t."""
+    """Return states and covariance after dead reckoning from x, P to t."""
     s.x[0], s.P[0] = x, P
     s.preintegrated[:], s.nodes["t_pre"] = 0.0, 0.0
     for k in range(3):
@@ -72,13 +72,13 @@ def propagate(c, s, work, x, P, t=0.05):  # noqa: N803
 @pytest.mark.parametrize("dimensions", [2, 3])
 @pytest.mark.parametrize("static", [(), (3,)])
 def test_prediction_is_that_of_its_own_derivatives(dimensions, vehicle, static):
-    """P -> F P F^T + Q with F from finite differences and Q from P = 0."""
+    """The reference is P -> F P F^T + Q, F by finite differences and Q from P = 0."""
     vehicle, *told = vehicle.split(", ")
     c, s, work, _ = running(dimensions, vehicle, static=static)
     s.nodes["has_ahrs_feedback"] = (s.nodes["i_gyro_bias"] >= 0) & bool(told)
     s.nodes["by_gyroscope"] = True
     n = s.x.shape[1]
-    # Range errors forget with the speed; their derivative by it is left out on purpose.
+    # Range errors decay with the speed; their derivative by it is omitted on purpose.
     x0 = s.x[0].copy()
     first_error = s.pairs["i_range_error"][s.pairs["i_range_error"] >= 0].min()
     x0[first_error:] = 0.0
@@ -117,7 +117,7 @@ def test_prediction_takes_off_what_waits(vehicle):
 
 
 def sum_since(c, s, since):
-    """The sums of all nodes over so long [s]."""
+    """Preintegrate samples of all nodes over `since` [s]."""
     for k in range(3):
         preintegration.preintegrate(c, s.nodes, s.last_attitude_accel, s.preintegrated, k, since)
 
@@ -126,7 +126,7 @@ def sum_since(c, s, since):
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize(("since", "atol"), [(0.0, 1e-7), (0.02, 2e-3)])
 def test_range_has_its_own_derivatives(dimensions, seed, since, atol):
-    """Those by biases and by heading errors of what happened since the states are left out."""
+    """Derivatives by biases and heading errors of the increments since the states are omitted."""
     c, s, work, _ = running(dimensions, seed=seed)
     sum_since(c, s, since)
     lever_i, lever_j = np.array([0.3, -0.2, 0.1]), np.array([-0.1, 0.4, 0.2])
@@ -182,7 +182,7 @@ def test_moving_the_centre_changes_nothing_relative(dimensions):
 
 
 def holding(x, P, room):  # noqa: N803
-    """Arrays with one hypothesis of the given states, of which as many corrections may wait."""
+    """Return one hypothesis of given states, with room for `room` pending updates."""
     n = len(x)
     none = dict.fromkeys(JointState._fields)
     return JointState(**none)._replace(
@@ -204,7 +204,7 @@ def holding(x, P, room):  # noqa: N803
     room=st.sampled_from([0, 4, 8, 16]),
 )
 def test_corrections_are_the_textbook_ones(seed, n, m, corrections, room):
-    """Also while they wait: whatever is asked of the covariance knows of them."""
+    """Values of the covariance include pending updates."""
     rng = np.random.default_rng(seed)
     A = rng.standard_normal((n, n))
     P, x = A @ A.T + 0.1 * np.eye(n), rng.standard_normal(n)
@@ -233,7 +233,7 @@ def test_corrections_are_the_textbook_ones(seed, n, m, corrections, room):
 
 
 def test_a_body_that_leans_for_good_is_followed_as_if_it_did_not():
-    """Its bias is what it reads of gravity by leaning; 0.02 rad make 0.2 m/s2."""
+    """Its bias is gravity seen through the tilt; 0.02 rad make 0.2 m/s2."""
     c, s, work, _ = running(3, "hand")
     n, t, lean = s.x.shape[1], 0.2, np.array([0.02, -0.015, 0.0])
     accel, gravity = np.array([3.0, -2.0, 1.5]), np.array([0.0, 0.0, GRAVITY])
@@ -245,14 +245,14 @@ def test_a_body_that_leans_for_good_is_followed_as_if_it_did_not():
     true, _ = propagate(c, s, work, x, np.eye(n), t)
     way, speed = 0.5 * t * t * accel, t * accel
     assert np.abs(off[v : v + 3] - speed).max() > 0.03
-    # What is left is of second order in the lean.
+    # The remainder is of second order in the tilt.
     np.testing.assert_allclose(true[v : v + 3], speed, atol=1e-3)
     np.testing.assert_allclose(true[p : p + 3], way, atol=1e-4)
 
 
 @pytest.mark.parametrize("dimensions", [2, 3])
 def test_the_covariance_of_a_rotation_follows_the_estimate(dimensions):
-    """A group of which only the rotation is unknown stays one after it was moved."""
+    """A group with only its rotation unknown remains one after a correction."""
     c, s, work, _ = running(dimensions, "human")
     n, h = s.x.shape[1], 1e-3
     axes = range(3) if dimensions == 3 else [0]
@@ -282,7 +282,7 @@ def test_the_covariance_of_a_rotation_follows_the_estimate(dimensions):
 
 @pytest.mark.parametrize("dimensions", [2, 3])
 def test_it_is_followed_by_the_product_of_matrices(dimensions):
-    """``T P T^T`` with ``T = 1 + share G A^T``, of a group of which one node is fixed."""
+    """The reference is ``T P T^T`` with ``T = 1 + share G A^T``; one node is fixed."""
     c, s, work, _ = running(dimensions, "human", static=(2,))
     n, rng, share = s.x.shape[1], np.random.default_rng(8), 0.4
     root = rng.standard_normal((n, n))
@@ -319,7 +319,7 @@ def test_it_is_followed_by_the_product_of_matrices(dimensions):
 
 
 def test_a_group_that_is_turned_back_and_forth_keeps_its_shape():
-    """Every correction moves along tangents, which alone would be a stretch of 80 % in the end."""
+    """Every correction is tangential, which alone would stretch the group by 80 % in the end."""
     c, s, work, _ = running(3, "human")
     rng, d = np.random.default_rng(4), 3
     at_p, at_v = (s.nodes[k][:, None] + np.arange(d) for k in ("i_pos", "i_vel"))

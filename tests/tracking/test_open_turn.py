@@ -1,4 +1,4 @@
-"""Groups in space of which nothing tells yet how they are turned."""
+"""Groups in space with unknown rotation."""
 
 import numpy as np
 import pytest
@@ -36,13 +36,13 @@ def log_likelihood(information, score, R):  # noqa: N803
 
 
 def anywhere(rng):
-    """A rotation, or a mirror image."""
+    """Return a rotation or a reflection."""
     R = Rotation.random(random_state=rng).as_matrix()
     return R @ MIRROR if rng.random() < 0.5 else R
 
 
 def evidence(rng, n=12):
-    """A likelihood that prefers some orthogonal matrix, by n vectors that it takes to others."""
+    """Return a likelihood with its maximum near an orthogonal matrix, from n vector pairs."""
     R, weights = anywhere(rng), rng.uniform(0.1, 30.0, n)
     vectors = rng.standard_normal((n, 3)) * [1.0, 1.0, 0.2]
     information, score = np.zeros((9, 9)), np.zeros(9)
@@ -106,7 +106,7 @@ def open_group(vehicle="human", static=()):
 
 
 def drive(c, s, work, turn, steps=12):
-    """Dead reckoning and constraints for a while, with accelerations turned; its log-likelihood."""
+    """Apply dead reckoning and constraints with rotated accelerations; return log-likelihood."""
     total, said = 0.0, []
     rng = np.random.default_rng(7)
     for k in range(steps):
@@ -137,10 +137,10 @@ def drive(c, s, work, turn, steps=12):
 
 @pytest.mark.parametrize("static", [(), (3,)])
 def test_one_filter_gives_the_states_and_likelihoods_of_all_turns(static):
-    """Its twin is the filter itself, given accelerations that were turned before.
+    """The reference is the filter itself with accelerations rotated beforehand.
 
-    Exact where the model is linear: headings are held, range errors do not fade with the way, and
-    what is measured is a velocity.
+    The result is exact where the model is linear: headings are known, range errors do not decay
+    with distance, and velocities are measured.
     """
     c, s, work, _ = open_group(static=static)
     c["fast_length"] = c["slow_length"] = c["nlos_bias_length"] = 1e12
@@ -153,18 +153,18 @@ def test_one_filter_gives_the_states_and_likelihoods_of_all_turns(static):
     s.alignment_information[0], s.alignment_score[0] = (
         0.0,
         0.0,
-    )  # without what is known of fixed nodes
+    )  # without the prior of fixed nodes
     begun = JointState._make(a.copy() for a in s)
     reached = drive(c, s, work, np.eye(3))
     rng = np.random.default_rng(11)
     for _ in range(4):
         turn = anywhere(rng)
         other = JointState._make(a.copy() for a in begun)
-        # As records, like those of the filter.
+        # Records, like those of the filter.
         other = other._replace(nodes=begun.nodes.copy(), group=begun.group.copy())
         other.group["alignment"] = Alignment.FILTERED
         d = (turn - np.eye(3)).ravel()
-        other.x[0] += d @ begun.sensitivity[0]  # what was found of biases is turned as well
+        other.x[0] += d @ begun.sensitivity[0]  # bias estimates are rotated as well
         total = drive(c, other, work, turn)
         np.testing.assert_allclose(s.x[0] + d @ s.sensitivity[0], other.x[0], atol=1e-9)
         np.testing.assert_allclose(s.P[0], other.P[0], atol=1e-9)
@@ -174,7 +174,7 @@ def test_one_filter_gives_the_states_and_likelihoods_of_all_turns(static):
 
 @pytest.mark.parametrize("from_turn", [True, False])
 def test_a_survey_counts_against_a_layout_by_what_no_turn_explains(from_turn):
-    """Of two fixed nodes that an unknown turn puts elsewhere, a distance says nothing yet."""
+    """A distance to a fixed node whose position depends on the rotation has no evidence yet."""
     c, s, work, _ = open_group(static=(2, 3))
     at = s.nodes["i_pos"]
     pair = int(np.nonzero((s.pairs["i"] == 1) & (s.pairs["j"] == 2))[0][0])
@@ -190,7 +190,7 @@ def test_a_survey_counts_against_a_layout_by_what_no_turn_explains(from_turn):
 
 @pytest.mark.parametrize("vehicle", ["human", "hand", "hand, told", "car"])
 def test_slopes_are_carried_as_errors_of_the_states_are(vehicle):
-    """With no acceleration, of which a turn would make another."""
+    """Accelerations are zero: a rotation would change others."""
     vehicle, *told = vehicle.split(", ")
     c, s, work, _ = open_group(vehicle)
     s.nodes["has_ahrs_feedback"], s.nodes["by_gyroscope"] = bool(told), True
@@ -203,7 +203,7 @@ def test_slopes_are_carried_as_errors_of_the_states_are(vehicle):
     s.sensitivity[0] = np.random.default_rng(3).standard_normal(s.sensitivity[0].shape)
     for z in s.sensitivity[0].copy():
         reached = []
-        for step in (h, -h, 0.0):  # the last is the step that slopes are carried over
+        for step in (h, -h, 0.0):  # the last one is the nominal step
             s.x[0], s.preintegrated[:] = x0 + step * z, 0.0
             for i in range(3):
                 s.nodes["t_pre"][i] = 0.0
@@ -219,7 +219,7 @@ def test_slopes_are_carried_as_errors_of_the_states_are(vehicle):
 
 
 def test_what_an_orientation_is_turned_upright_by_turns_with_the_frame():
-    """Its bias is one of the world: with the turn M it is ``M u`` in the frame."""
+    """The bias is in the world frame: with the rotation M it is ``M u`` in the local frame."""
     c, s, work, _ = open_group("hand")
     s.last_attitude_accel[:, 4:], s.nodes["has_ahrs_feedback"] = 0.0, True
     x0, reached = s.x[0].copy(), []
@@ -244,7 +244,7 @@ def test_what_an_orientation_is_turned_upright_by_turns_with_the_frame():
 
 
 def test_what_stands_still_tells_nothing_of_a_turn():
-    """Antennas away from their nodes are where they were, and what is read at rest is a bias."""
+    """Antennas away from their nodes keep their offsets, and readings at rest are biases."""
     c, s, work, layout = running(3, "hand", static=(3,))
     antenna_b = np.array([[0.1, -0.2, 0.05], [0.0, 0.0, 0.0], [-0.1, 0.0, 0.3]])
     layout = layout._replace(antenna_b=antenna_b)
@@ -270,7 +270,7 @@ def test_what_stands_still_tells_nothing_of_a_turn():
     propagation.predict(c, s, 0, 0.3, work)
     alignment_sensitivity.propagate_sensitivity(c, s, 0, work)
     at_v = s.nodes["i_vel"][moving][:, None] + np.arange(3)
-    # But for the tilt that the bias is thought to come from, which is of second order.
+    # Except the tilt implied by the bias, which is of second order.
     assert (
         np.abs(s.sensitivity[0][:, at_v]).max()
         < 0.01 * 0.3 * np.abs(s.last_attitude_accel[moving, 4:]).max()
@@ -292,7 +292,7 @@ def test_turning_the_frame_back_changes_nothing(vehicle):
 
 
 def test_fixed_nodes_of_a_room_are_rather_flat_than_tall():
-    """And that is forgotten with the turn, not with the layout."""
+    """The prior is dropped with the rotation, not with the layout."""
     c, s, _, layout = running(3, "human", static=(1, 2, 3))
     at = s.nodes["i_pos"]
     for k, place in enumerate(([0.0, 0.0, 0.0], [0.3, 0.0, 4.0], [0.3, 0.2, 9.0])):
@@ -320,7 +320,7 @@ def test_an_unknown_turn_makes_no_layout_flat(make_group):
         s.x[0, at[k] : at[k] + 3] = place
     s.P[0] = 1e-4 * np.eye(s.x.shape[1])
     well_known = degeneracy_ratio(c, s, 0, True)
-    # Nearly what is linear along the layout of errors that are all alike goes with the turn.
+    # Most of an error that is linear along the layout is a rotation, if errors are alike.
     assert degeneracy_ratio(c, s, 0, False) > well_known > 10.0
     for a in range(3):
         turn = np.zeros(s.x.shape[1])
@@ -342,7 +342,7 @@ def test_degeneracy_is_the_extent_across_a_layout_over_what_a_regression_leaves_
     s = JointState._make(as_records(a[0]) if a.dtype.names else a[0] for a in batch)
     rng = np.random.default_rng(seed)
     s.nodes["present"] = True
-    s.nodes["present"][0] = n < 5  # one that is not there
+    s.nodes["present"][0] = n < 5  # an absent node
     there = np.flatnonzero(s.nodes["present"])
     at = s.nodes["i_pos"][there][:, None] + np.arange(dimensions)
     pos = rng.standard_normal((len(there), dimensions)) * rng.uniform(0.1, 5.0, dimensions)
@@ -366,7 +366,7 @@ def test_degeneracy_is_the_extent_across_a_layout_over_what_a_regression_leaves_
 
 
 def turned(group, R):  # noqa: N803
-    """The measurements of a group whose accelerations were measured in a turned world."""
+    """Return the measurements with accelerations in a rotated world."""
     block = group.block
     values = block.values.copy()
     state = block.kind == Kind.STATE
@@ -378,7 +378,7 @@ def turned(group, R):  # noqa: N803
 
 @pytest.mark.parametrize("seed", range(6))
 def test_a_group_in_space_finds_how_it_is_turned(make_group, seed):
-    """Whatever the first layout has to do with the world; a wrong mirror image is never ok."""
+    """This holds for any rotation of the world; a wrong reflection is never OK."""
     group = make_group(n=5, dimensions=3, seconds=25.0, hz=50.0)
     R = Rotation.random(random_state=seed).as_matrix()
     t = np.arange(0.5, 24.9, 0.1)
@@ -392,7 +392,7 @@ def test_a_group_in_space_finds_how_it_is_turned(make_group, seed):
 
 
 def test_smoothing_over_the_first_move_of_a_group_takes_the_turn_as_it_is(make_group):
-    """The states of a moment, put into the vector twice, have no slopes."""
+    """The cloned states of one moment have no sensitivities."""
     group = make_group(n=5, dimensions=3, seconds=6.0)
     block = group.block
     values = block.values.copy()

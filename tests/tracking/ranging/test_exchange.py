@@ -1,4 +1,4 @@
-"""Distances from stamps: whatever the clocks, the motion and the order, and never a wrong one."""
+"""Distances from stamps: right for any clocks, motion and order, or absent."""
 
 from dataclasses import replace
 
@@ -29,7 +29,7 @@ BASE = st.integers(GRID, MODULUS - 1) | st.integers(MODULUS - 2**31, MODULUS - 1
 
 
 class Node:
-    """A clock and a listener on a line; noiseless stamps, rounded to ticks."""
+    """A clock and a receiver on a line; noiseless stamps, rounded to ticks."""
 
     def __init__(self, id, place, speed=0.0, skew=0.0, base=GRID, boot=1, listens=()):
         self.id, self.place, self.speed, self.boot = id, place, speed, boot
@@ -48,7 +48,7 @@ class Node:
 
 
 class Line:
-    """Nodes that speak in turns; every one hears all of it, also those that never speak."""
+    """Nodes that transmit in turn; all receive everything, silent nodes included."""
 
     def __init__(self, nodes, carriers=False):
         self.nodes, self.carriers, self.t, self.frame = nodes, carriers, 0.01, None
@@ -97,7 +97,7 @@ class Line:
 
 @st.composite
 def lines(draw, n, speed=10.0, extra=0):
-    """So many nodes 15 m apart, and as many that only listen."""
+    """Draw n nodes 15 m apart, and `extra` nodes that only listen."""
     places = draw(st.permutations(range(n + extra)))
     nodes = [
         Node(
@@ -120,7 +120,7 @@ def test_noiseless_stamps_give_the_distance(n):
         line.rounds(5, order)
         assert max(line.wrong) < 5e-3
         pairs = {(i, j) for i in range(n) for j in range(i + 1, n)}
-        for node in line.nodes:  # the last of them has never spoken
+        for node in line.nodes:  # the last of them has never transmitted
             counts = {pair: node.events.count(pair) for pair in pairs}
             assert min(counts.values()) >= 2, (node.id, counts)
             assert set(node.events) == pairs
@@ -246,7 +246,7 @@ def test_mixed_up_stamps_give_no_wrong_range(drawn, carriers, data):
 
 
 def exchange(exchanges, start, reply, distance, skew):
-    """A question at node 0 and an answer of node 1 whose clock is slower by so much."""
+    """Exchange a question of node 0 and an answer of node 1, whose clock is slower by `skew`."""
     flight = distance / METRES_PER_TICK
     sent, heard = start, round((start + flight) * (1.0 - skew))
     answered = heard + round(reply * (1.0 - skew))
@@ -275,7 +275,7 @@ def test_without_carrier_and_interval_there_is_no_range():
 @quick
 @given(SKEW, st.floats(0.1e-3, 1.6), st.integers(0, 40), st.floats(-1.0, 1.0))
 def test_the_carrier_is_trusted_as_far_as_it_goes(skew, reply, readings, noise):
-    """With readings all wrong by a standard deviation a range is within three of `max_error`."""
+    """With all readings wrong by one standard deviation the range is within 3 `max_error`."""
     params = ExchangeParams()
     exchanges = Exchanges(params)
     wrong = skew + noise * params.clocks.carrier_std / max(readings, 1) ** 0.5

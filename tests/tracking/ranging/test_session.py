@@ -1,4 +1,4 @@
-"""One session alone against anything that the air, its clock and its shell can do to it."""
+"""One session under arbitrary input from the air, its clock and its caller."""
 
 from dataclasses import replace
 
@@ -29,7 +29,7 @@ quick = settings(max_examples=150, derandomize=True)
 
 
 class Alone:
-    """A session, its clock and its shell; every output is checked."""
+    """A session, its clock and its caller; every output is checked."""
 
     def __init__(self, id=3, start=0, params=None, boot=99):
         self.params = params or SessionParams()
@@ -60,7 +60,7 @@ class Alone:
         return difference(self.session.deadline, self.now % MODULUS)
 
     def wait(self, seconds):
-        """Let time pass, with a shell that keeps deadlines."""
+        """Advance time with a caller that keeps deadlines."""
         end, calls = self.now + ticks(seconds), 0
         while self.now + max(self.left, 0) <= end:
             self.timeout()
@@ -73,7 +73,7 @@ class Alone:
         self.take(self.session.timeout(self.now % MODULUS))
 
     def hear(self, data, delay=0.0, stamp=None, carrier=None, powers=(-80.0, -83.0)):
-        """A frame comes in, whole, and is handed over so much later."""
+        """Deliver a whole frame with a delay."""
         self.take(self.session.preamble(self.now % MODULUS))
         moment = self.now + ticks(self.params.phy.header_time)
         on_air = airtime(self.params.phy, min(len(data), self.params.phy.max_frame))
@@ -82,7 +82,7 @@ class Alone:
         self.take(self.session.frame(data, reception, self.now % MODULUS))
 
     def settle(self, seconds=5.0):
-        """Nothing comes in any more: within so long it leads, and ranges go on from there."""
+        """Run without input: the session leads within this time, and ranges continue."""
         end = self.now + ticks(seconds)
         while self.session.role is not Role.INITIATOR:
             self.timeout()
@@ -95,7 +95,7 @@ class Alone:
 
 @st.composite
 def foreign(draw, most=14):
-    """A valid frame of any node with any fields."""
+    """Draw a valid frame of any node with any fields."""
     src = draw(st.integers(0, 8) | st.integers(0, MAX_ID))
     ids = draw(st.lists(st.integers(0, 8) | st.integers(0, MAX_ID), unique=True, max_size=most))
     rows = [
@@ -134,14 +134,14 @@ def act(alone, action, past, clock):
     kind, what = action
     if kind == "wait":
         alone.wait(what)
-    elif kind == "skip":  # a shell that sleeps over its deadlines
+    elif kind == "skip":  # a caller that misses its deadlines
         alone.now += ticks(what)
     elif kind == "preamble":
         alone.take(alone.session.preamble(alone.now % MODULUS))
     elif kind == "broken":
         alone.take(alone.session.broken(alone.now % MODULUS))
     elif kind in ("frame", "plausible"):
-        if kind == "plausible":  # a clock that goes on, rows not long ago
+        if kind == "plausible":  # a continuous clock, recent rows
             stamp = alone.now + clock.setdefault(what.src, what.stamp) & MODULUS - 1
             ago = [stamp - (e.stamp or 0) % ticks(0.05) for e in what.entries]
             rows = [
@@ -248,7 +248,7 @@ def test_frames_of_another_pan_are_ignored():
 
 
 def test_a_member_answers_in_its_slot():
-    """Not in the first one: there it listens whether another one uses its ID."""
+    """It leaves its first slot out to listen for another node with its ID."""
     alone = Alone(id=3)
     alone.hear(request(3, stamp=alone.now))
     alone.wait(3e-4)
@@ -285,7 +285,7 @@ def test_an_alert_after_a_late_frame_is_not_in_the_past():
 
 @pytest.mark.parametrize("type", [Type.REQUEST, Type.REPLY, Type.JOIN, Type.ALERT])
 def test_the_last_slot_of_all(type):
-    """Slot 255 of 255 is a valid field; nothing of it may run over."""
+    """Slot 255 of 255 is a valid field; it must not overflow."""
     alone = Alone(id=3)
     for _ in range(4):
         alone.hear(request(1, stamp=alone.now))
@@ -295,7 +295,7 @@ def test_the_last_slot_of_all(type):
 
 @pytest.mark.parametrize("rows", [60, 230, 254])
 def test_more_nodes_than_a_message_has_room_for(rows):
-    """A node of ID 0 that hears of very many others, one after the other."""
+    """A node of ID 0 receives many others, one after the other."""
     alone = Alone(id=0)
     alone.wait(0.3)
     for first in range(1, rows, 12):
