@@ -1,9 +1,8 @@
 """Hyperbolic tangent of layers, by the faster of two implementations on this machine.
 
 MKL, which torch calls, takes as long as the logistic function on Intel processors with AVX-512, and
-four to seven times as long on others, a third of all learning. MKL against the logistic function
-(torch 2.13, one thread, 10240 x 64 numbers): 0.2 against 0.25 ms; restricted to AVX2 1.1 ms; on
-another machine 1.5 against 0.15 ms.
+four to seven times as long on others, a third of all learning. MKL / logistic, torch 2.13, one
+thread, 10240 x 64 numbers: 0.2 / 0.25 ms; MKL with AVX2 only 1.1 ms; other machine 1.5 / 0.15 ms.
 """
 
 from __future__ import annotations
