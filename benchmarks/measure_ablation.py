@@ -1,8 +1,8 @@
-"""What each mechanism of the joint filter is worth: each left out on the same runs.
+"""Ablation of the joint filter: each mechanism is disabled on the same runs.
 
-For `docs/explanation/tracker.md`. A mechanism is left out by parameters alone. Errors are paired
-with those of the whole filter on the same seeds: the median ratio and its 95 % interval by the
-bootstrap.
+For `docs/explanation/tracker.md`. Mechanisms are disabled by parameters only. Errors are compared
+in pairs with those of the complete filter on the same seeds: the median ratio and its 95 %
+bootstrap interval.
 
 The runs are those of `cases`. Run `python benchmarks/measure_ablation.py [RUNS] [MECHANISM ...] >
 rows.jsonl`, then `python benchmarks/measure_ablation.py --table rows.jsonl`.
@@ -29,28 +29,28 @@ from tracking.metrics.score import score
 
 NEVER, ALWAYS = 1e9, 1e-9
 SKIP, WRONG = 10.0, 0.5
-"""[s, m] Not scored; a pair that is off by more is wrong."""
+"""[s], [m] Time at the start that is not scored; position error above which a pair is wrong."""
 
 
 def joint(change: Callable[[JointParams], JointParams]) -> Callable[[TrackerParams], TrackerParams]:
-    """Parameters with some of the joint filter's changed."""
+    """Return a function that changes parameters of the joint filter."""
     return lambda p: replace(p, filter=replace(p.filter, joint=change(p.filter.joint)))
 
 
 def part(name: str, **values: Any) -> Callable[[TrackerParams], TrackerParams]:
-    """Parameters with some of a part of the joint filter's changed."""
+    """Return a function that changes parameters of a part of the joint filter."""
     return joint(lambda p: replace(p, **{name: replace(getattr(p, name), **values)}))
 
 
 def vehicles(**values: Any) -> Callable[[TrackerParams], TrackerParams]:
-    """Parameters with those of every vehicle changed."""
+    """Return a function that changes parameters of all vehicles."""
     return joint(
         lambda p: replace(p, vehicles={k: replace(v, **values) for k, v in p.vehicles.items()})
     )
 
 
 def nlos(**values: Any) -> Callable[[TrackerParams], TrackerParams]:
-    """Parameters of ranges without line of sight changed, in the plane and in space."""
+    """Return a function that changes NLOS parameters, in the plane and in space."""
     return joint(
         lambda p: replace(
             p, nlos=replace(p.nlos, **values), nlos_in_space=replace(p.nlos_in_space, **values)
@@ -99,11 +99,11 @@ MECHANISMS: dict[str, Callable[[TrackerParams], TrackerParams]] = {
     "frozen ranges": part("supervision", frozen_ranges=NEVER),
     "stale nodes": joint(lambda p: replace(p, range_timeout=NEVER)),
 }
-"""Name to parameters without it."""
+"""Mechanism to the change of parameters that disables it."""
 
 
 def figures(of: Case, params: TrackerParams) -> tuple[float, float, float, float]:
-    """rmse_yaw [m], rmse_shape [m], shares of pairs and time that are ok and wrong, and ok."""
+    """Return rmse_yaw [m], rmse_shape [m], and the shares that are ok and wrong, and ok [-]."""
     estimate = Tracker(of.constellation, params).run(of.block, of.t).take(0)
     found = score(estimate, of.truth, of.known, of.t[0] + SKIP)
     turned = rotate(quat_from_yaw(-np.radians(found.yaw_deg or 0.0)), of.truth)
@@ -114,7 +114,7 @@ def figures(of: Case, params: TrackerParams) -> tuple[float, float, float, float
 
 
 def run(job: tuple[str, int, list[str]]) -> tuple[str, list[tuple[float, float, float, float]]]:
-    """Figures of one run: of the whole filter, then without each mechanism."""
+    """Return the metrics of one run: of the complete filter, then without each mechanism."""
     kind, seed, names = job
     of, whole = case(kind, seed), TrackerParams()
     case.cache_clear()
@@ -122,13 +122,13 @@ def run(job: tuple[str, int, list[str]]) -> tuple[str, list[tuple[float, float, 
 
 
 def interval(ratio: F64, rng: np.random.Generator) -> list[float]:
-    """Median of ratios and its 95 % interval."""
+    """Return the median of ratios and its 95 % interval."""
     draws = np.median(rng.choice(ratio, (2000, len(ratio))), axis=1)
     return [float(x) for x in (np.median(ratio), *np.quantile(draws, [0.025, 0.975]))]
 
 
 def rows(n_runs: int, names: list[str]) -> Iterator[dict[str, Any]]:
-    """A row for each mechanism and kind of run."""
+    """Yield one row per mechanism and kind of run."""
     kinds = ["cars-los", "cars-nlos", "human", "drones", "hand"]
     kinds += [f"late {kind}" for kind in ("cars-nlos", "robots", "human", "drones", "hand")]
     kinds += ["convoy car", "convoy robot", "exact robot", "exact hand", "exact drone"]
@@ -164,7 +164,7 @@ def rows(n_runs: int, names: list[str]) -> Iterator[dict[str, Any]]:
 
 
 def tables(lines: list[str]) -> str:
-    """Rows as tables in Markdown, one for each group of kinds."""
+    """Return Markdown tables, one per group of kinds."""
     rows = [json.loads(line) for line in lines]
     kinds = list(dict.fromkeys(row["kind"] for row in rows))
     names = list(dict.fromkeys(row["without"] for row in rows))
@@ -187,7 +187,7 @@ def tables(lines: list[str]) -> str:
 
 
 def cell(row: dict[str, Any]) -> str:
-    """One figure: errors [m] of the whole filter, else their ratio to it; what is wrong and ok."""
+    """Return one cell: errors [m] of the complete filter or ratios to them; shares wrong and ok."""
     shares = f"{100.0 * row['wrong']:.2g} of {100.0 * row['ok']:.0f} %"
     if not row["without"]:
         return f"{row['yaw']:.3f} / {row['shape']:.3f} m; {shares}"
@@ -200,7 +200,7 @@ def cell(row: dict[str, Any]) -> str:
 
 
 def main() -> None:
-    """Print the rows as JSON lines, or rows of before as tables."""
+    """Print the rows as JSON lines, or saved rows as tables."""
     if sys.argv[1:2] == ["--table"]:
         print(tables(Path(sys.argv[2]).read_text().splitlines()))
         return
